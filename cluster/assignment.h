@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "image/tiles.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// How the work of a frame is dealt to the ranks.
+enum class Distribution {
+  SortFirst,  ///< each rank draws the whole scene, culled to its own tiles
+  SortLast,   ///< each rank draws its own objects over the whole frame; keys are composited
+  Hybrid,     ///< groups of ranks own tiles (sort-first), ranks of a group share the objects (sort-last)
+};
+[[nodiscard]] std::string_view name_of(Distribution distribution);
+[[nodiscard]] Distribution parse_distribution(std::string_view name);  ///< Throws Error (Usage) with the choices.
+
+/// A rectangle of one screen, its edges on tile borders or the screen's edge.
+struct ScreenRect {
+  std::size_t screen = 0;
+  Rect pixels;
+
+  bool operator==(const ScreenRect&) const = default;
+};
+
+/// The screens cut into `weights.size()` areas of rectangles, area i with about weights[i] of the tiles' sum: halved
+/// recursively, whole screens first, then along the longer side at a tile border. An area may be empty when there
+/// are more areas than tiles. Every tile lies in exactly one area.
+[[nodiscard]] std::vector<std::vector<ScreenRect>> assign_tiles(const FrameLayout& layout,
+                                                                const std::vector<int>& weights);
+
+/// The triangles of a scene cut into `parts` shares, balanced by triangle count to one chunk and spatially coherent:
+/// chunks of at most `chunk` neighbouring triangles are halved recursively about the longest axis of their centres.
+/// Ranges of a share ascend. The same on every rank.
+[[nodiscard]] std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts,
+                                                                       std::uint32_t chunk = 512);
+
+/// Which ranks form which group: contiguous, sizes differing by one at most.
+[[nodiscard]] std::vector<std::vector<int>> make_groups(int ranks, int groups);
+
+/// The number of groups hybrid distribution takes when the user names none: about the square root of the ranks.
+[[nodiscard]] int default_groups(int ranks);
+
+/// What one rank does in a frame.
+struct Assignment {
+  std::vector<int> group;             ///< the ranks that composite together, this one among them
+  std::vector<SurfaceRange> objects;  ///< what this rank draws
+  std::vector<ScreenRect> area;       ///< where this rank draws: its group's tiles
+};
+
+/// Every rank's assignment, computed alike on all ranks. `groups` counts for Hybrid only.
+[[nodiscard]] std::vector<Assignment> assign(Distribution distribution, const Scene& scene, const FrameLayout& layout,
+                                             int ranks, int groups);
+
+}  // namespace hpr

@@ -1,0 +1,172 @@
+#include "cluster/mpi_communicator.h"
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <string>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kTag = 0;
+/// A message longer than this travels in parts; the last part is the first one shorter than this (it may be empty).
+constexpr std::size_t kPart = std::size_t{1} << 30U;
+
+void check(int code, const char* call) {
+  if (code == MPI_SUCCESS) return;
+  std::string text(MPI_MAX_ERROR_STRING, '\0');
+  int length = 0;
+  MPI_Error_string(code, text.data(), &length);
+  text.resize(static_cast<std::size_t>(length));
+  throw Error(ExitCode::Lost, fmt::format("{}: {}", call, text),
+              "see the other ranks' messages; a host or rank may be gone");
+}
+
+}  // namespace
+
+MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout) : hang_timeout_(hang_timeout) {
+  check(MPI_Comm_dup(parent, &comm_), "MPI_Comm_dup");
+  check(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  check(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
+  check(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
+}
+
+MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout)
+    : comm_(comm), hang_timeout_(hang_timeout) {
+  check(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  check(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
+  check(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
+}
+
+MpiCommunicator::~MpiCommunicator() {
+  MPI_Comm_free(&comm_);
+}
+
+template <typename Done>
+void MpiCommunicator::poll(Done done, std::string_view doing, int peer) {
+  const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
+  for (unsigned tries = 0; !done(); ++tries) {
+    // Ranks may outnumber cores: after a short spin each failed look gives the core away.
+    if (tries < 64) continue;
+    sched_yield();
+    if (tries % 256 == 0 && std::chrono::steady_clock::now() > deadline) {
+      throw Error(ExitCode::Hang,
+                  fmt::format("rank {}: still {} rank {} after {:.1f} s", rank_, doing, peer,
+                              std::chrono::duration<double>(hang_timeout_).count()),
+                  "a rank stands still; raise --hang-timeout if it only needs longer");
+    }
+  }
+}
+
+void MpiCommunicator::wait(std::vector<MPI_Request>& requests, std::string_view doing, int peer) {
+  poll(
+      [&] {
+        int all = 0;
+        check(MPI_Testall(static_cast<int>(requests.size()), requests.data(), &all, MPI_STATUSES_IGNORE),
+              "MPI_Testall");
+        return all != 0;
+      },
+      doing, peer);
+}
+
+void MpiCommunicator::start_send(std::span<const std::byte> message, int to, std::vector<MPI_Request>& requests) {
+  while (true) {
+    const auto part = message.first(std::min(message.size(), kPart));
+    requests.push_back(MPI_REQUEST_NULL);
+    check(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, kTag, comm_, &requests.back()),
+          "MPI_Isend");
+    if (part.size() < kPart) return;
+    message = message.subspan(kPart);
+  }
+}
+
+void MpiCommunicator::send(std::span<const std::byte> message, int to) {
+  std::vector<MPI_Request> requests;
+  start_send(message, to, requests);
+  wait(requests, "sending to", to);
+}
+
+std::size_t MpiCommunicator::next_part(int from, MPI_Message& part) {
+  MPI_Status status;
+  poll(
+      [&] {
+        int found = 0;
+        check(MPI_Improbe(from, kTag, comm_, &found, &part, &status), "MPI_Improbe");
+        return found != 0;
+      },
+      "waiting for a message from", from);
+  int count = 0;
+  check(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
+  return static_cast<std::size_t>(count);
+}
+
+std::vector<std::byte> MpiCommunicator::receive(int from) {
+  std::vector<std::byte> message;
+  while (true) {
+    MPI_Message part = MPI_MESSAGE_NULL;
+    const std::size_t size = next_part(from, part);
+    message.resize(message.size() + size);
+    std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+    check(MPI_Imrecv(message.data() + (message.size() - size), static_cast<int>(size), MPI_BYTE, &part, request.data()),
+          "MPI_Imrecv");
+    wait(request, "receiving from", from);
+    if (size < kPart) return message;
+  }
+}
+
+void MpiCommunicator::receive(std::span<std::byte> message, int from) {
+  std::size_t done = 0;
+  while (true) {
+    MPI_Message part = MPI_MESSAGE_NULL;
+    const std::size_t size = next_part(from, part);
+    if (size > message.size() - done || (size < kPart && done + size != message.size())) {
+      throw Error(ExitCode::Internal, fmt::format("rank {} expected {} bytes from rank {}, got {}", rank_,
+                                                  message.size(), from, done + size));
+    }
+    std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+    check(MPI_Imrecv(message.data() + done, static_cast<int>(size), MPI_BYTE, &part, request.data()), "MPI_Imrecv");
+    wait(request, "receiving from", from);
+    done += size;
+    if (size < kPart) return;
+  }
+}
+
+std::vector<std::byte> MpiCommunicator::exchange(std::span<const std::byte> out, int peer) {
+  std::vector<MPI_Request> requests;
+  start_send(out, peer, requests);
+  std::vector<std::byte> in = receive(peer);
+  wait(requests, "sending to", peer);
+  return in;
+}
+
+void MpiCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
+  constexpr std::size_t kMost = kPart / sizeof(std::uint64_t);
+  std::vector<std::uint64_t> result(rank_ == root ? std::min(values.size(), kMost) : 0);
+  while (!values.empty()) {
+    const auto part = values.first(std::min(values.size(), kMost));
+    std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+    check(MPI_Ireduce(part.data(), result.data(), static_cast<int>(part.size()), MPI_UINT64_T, MPI_MAX, root, comm_,
+                      request.data()),
+          "MPI_Ireduce");
+    wait(request, "reducing to", root);
+    if (rank_ == root) std::copy_n(result.begin(), part.size(), part.begin());
+    values = values.subspan(part.size());
+  }
+}
+
+std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> members) {
+  MPI_Group all = MPI_GROUP_NULL;
+  MPI_Group some = MPI_GROUP_NULL;
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(MPI_Comm_group(comm_, &all), "MPI_Comm_group");
+  check(MPI_Group_incl(all, static_cast<int>(members.size()), members.data(), &some), "MPI_Group_incl");
+  check(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
+  MPI_Group_free(&some);
+  MPI_Group_free(&all);
+  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_));
+}
+
+}  // namespace hpr

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <mpi.h>
+
+#include "cluster/communicator.h"
+
+namespace hpr {
+
+/// The ranks of an MPI communicator, on a private duplicate so that no other library's messages can match ours.
+/// Messages of any size: they travel in parts of 1 GiB, as MPI counts are ints.
+class MpiCommunicator final : public Communicator {
+ public:
+  /// Collective over `parent`.
+  explicit MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout = kHangTimeout);
+  ~MpiCommunicator() override;
+  MpiCommunicator(const MpiCommunicator&) = delete;
+  MpiCommunicator& operator=(const MpiCommunicator&) = delete;
+
+  [[nodiscard]] int rank() const override { return rank_; }
+  [[nodiscard]] int size() const override { return size_; }
+  [[nodiscard]] std::string_view transport() const override { return "mpi"; }
+  void send(std::span<const std::byte> message, int to) override;
+  void receive(std::span<std::byte> message, int from) override;
+  [[nodiscard]] std::vector<std::byte> receive(int from) override;
+  [[nodiscard]] std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) override;
+  void reduce_max(std::span<std::uint64_t> values, int root) override;
+  [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override;
+
+ private:
+  struct Owned {};  ///< tag: `comm` becomes ours, no duplicate is made
+  MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout);
+
+  void start_send(std::span<const std::byte> message, int to, std::vector<MPI_Request>& requests);
+  /// Waits for all of `requests`; `doing` stands in the error when the time limit passes.
+  void wait(std::vector<MPI_Request>& requests, std::string_view doing, int peer);
+  /// Waits for the next part from `from`; its size in bytes and the handle to receive it by.
+  std::size_t next_part(int from, MPI_Message& part);
+  template <typename Done>
+  void poll(Done done, std::string_view doing, int peer);
+
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  int rank_ = 0;
+  int size_ = 1;
+  std::chrono::nanoseconds hang_timeout_;
+};
+
+}  // namespace hpr

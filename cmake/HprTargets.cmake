@@ -1,0 +1,43 @@
+# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ... [TEST_LABELS ...] [TEST_TIMEOUT s]):
+# one folder, one static library, its unit tests beside it.
+function(hpr_library name)
+  cmake_parse_arguments(ARG "" "TEST_TIMEOUT" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS;TEST_LABELS" ${ARGN})
+  add_library(hpr_${name} STATIC ${ARG_SOURCES})
+  add_library(hpr::${name} ALIAS hpr_${name})
+  target_link_libraries(hpr_${name} PUBLIC hpr::options ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
+  if(ARG_TESTS AND BUILD_TESTING)
+    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name}
+                  LABELS ${ARG_TEST_LABELS} TIMEOUT ${ARG_TEST_TIMEOUT})
+  endif()
+endfunction()
+
+# hpr_unit_test(target SOURCES ... DEPENDS ... PREFIX p [LABELS ...] [TIMEOUT s]): GoogleTests of one process. The label is
+# `unit` (also run under the sanitizers) unless others are given.
+function(hpr_unit_test target)
+  cmake_parse_arguments(ARG "" "PREFIX;TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 30)
+  endif()
+  if(HPR_SANITIZE)
+    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 6")
+  endif()
+  add_executable(${target} ${ARG_SOURCES})
+  target_link_libraries(${target} PRIVATE ${ARG_DEPENDS} GTest::gtest_main)
+  set_target_properties(${target} PROPERTIES BUILD_RPATH ${PROJECT_BINARY_DIR}/lib)
+  gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}." NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60
+                       PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} ENVIRONMENT "${HPR_TEST_ENVIRONMENT}")
+endfunction()
+
+# hpr_mpi_test(name RANKS 1 2 3 ...): the same executable under mpiexec, once per rank count.
+function(hpr_mpi_test name)
+  cmake_parse_arguments(ARG "" "" "RANKS" ${ARGN})
+  foreach(ranks IN LISTS ARG_RANKS)
+    add_test(NAME ${name}.np${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${MPIEXEC_PREFLAGS}
+             $<TARGET_FILE:${name}>)
+    set_tests_properties(${name}.np${ranks} PROPERTIES LABELS mpi PROCESSORS ${ranks} TIMEOUT 60
+      ENVIRONMENT "${HPR_TEST_ENVIRONMENT}")
+  endforeach()
+endfunction()

@@ -1,0 +1,133 @@
+#include "core/file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// A POSIX file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() { reset(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int get() const { return fd_; }
+  int reset() {
+    const int result = fd_ >= 0 ? ::close(fd_) : 0;
+    fd_ = -1;
+    return result;
+  }
+
+ private:
+  int fd_;
+};
+
+[[noreturn]] void fail(std::string_view doing, const std::filesystem::path& path, int error) {
+  const std::string reason = std::generic_category().message(error);
+  throw Error(ExitCode::Io, fmt::format("{} '{}': {}", doing, path.string(), reason),
+              error == ENOSPC || error == EDQUOT
+                  ? "free some space or write elsewhere with -o; nothing partial was left"
+                  : "check the path and its permissions");
+}
+
+void write_all(const Descriptor& file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
+  constexpr std::size_t kMost = std::size_t{1} << 30;
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file.get(), bytes.data(), std::min(bytes.size(), kMost));
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      fail("cannot write", path, errno);
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+}
+
+std::filesystem::path folder_of(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+}  // namespace
+
+std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
+  // O_NONBLOCK so that opening a FIFO returns at once and can be refused.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.get() < 0) fail("cannot read", path, errno);
+  struct stat info {};
+  if (::fstat(file.get(), &info) != 0) fail("cannot read", path, errno);
+  if (!S_ISREG(info.st_mode)) {
+    throw Error(ExitCode::Io, fmt::format("cannot read '{}': not a regular file", path.string()),
+                "name a file, not a folder, pipe or device");
+  }
+  const auto size = static_cast<std::uint64_t>(info.st_size);
+  if (size > limit_bytes) {
+    throw Error(ExitCode::Limit,
+                fmt::format("'{}' has {} bytes, more than the limit of {}", path.string(), size, limit_bytes),
+                "raise the limit with --limit-mem if the file is to be trusted");
+  }
+  std::vector<std::byte> bytes(size);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got = ::read(file.get(), bytes.data() + done, bytes.size() - done);
+    if (got < 0) {
+      if (errno == EINTR) continue;
+      fail("cannot read", path, errno);
+    }
+    if (got == 0) {
+      throw Error(ExitCode::Io, fmt::format("'{}' shrank while it was read", path.string()),
+                  "try again when it is complete");
+    }
+    done += static_cast<std::size_t>(got);
+  }
+  return bytes;
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::string temporary = (folder_of(path) / ("." + path.filename().string() + ".XXXXXX")).string();
+  Descriptor file(::mkostemp(temporary.data(), O_CLOEXEC));
+  if (file.get() < 0) fail("cannot write", path, errno);
+  try {
+    write_all(file, bytes, path);
+    if (::fchmod(file.get(), 0644) != 0 || ::fsync(file.get()) != 0) fail("cannot write", path, errno);
+    if (file.reset() != 0) fail("cannot write", path, errno);
+    if (::rename(temporary.c_str(), path.c_str()) != 0) fail("cannot write", path, errno);
+  } catch (...) {
+    ::unlink(temporary.c_str());
+    throw;
+  }
+  // The rename itself is on disk only once the folder is synced; some file systems refuse that, and lose nothing by it.
+  const Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.get() >= 0) ::fsync(folder.get());
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+  write_file_atomically(path, std::as_bytes(std::span(text)));
+}
+
+void check_writable(const std::filesystem::path& path, bool overwrite) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
+  }
+  if (!overwrite && std::filesystem::exists(path, error)) {
+    throw Error(ExitCode::Io, fmt::format("'{}' exists", path.string()),
+                "choose another name or overwrite it with --force");
+  }
+  if (!std::filesystem::is_directory(folder_of(path), error)) {
+    throw Error(ExitCode::Io,
+                fmt::format("cannot write '{}': there is no folder '{}'", path.string(), folder_of(path).string()),
+                "create the folder first");
+  }
+  if (::access(folder_of(path).c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
+}
+
+}  // namespace hpr

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace hpr {
+
+/// The bytes of a regular file. Throws Error: Io when it is missing, unreadable or no regular file (a FIFO, a device, a
+/// directory), Limit when it is larger than `limit_bytes`.
+[[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes);
+
+/// Writes `bytes` so that `path` is either complete or untouched, also when the disk fills or the process dies:
+/// a temporary file beside it is written, synced, renamed, and the folder synced. Throws Error (Io).
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
+void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+
+/// Throws Error (Io) when `path` exists and may not be overwritten, or its folder is missing: asked before long work.
+void check_writable(const std::filesystem::path& path, bool overwrite);
+
+}  // namespace hpr

@@ -1,0 +1,48 @@
+#include "image/color.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace hpr {
+namespace {
+
+double decode(double level) {
+  return level <= 0.04045 ? level / 12.92 : std::pow((level + 0.055) / 1.055, 2.4);
+}
+
+/// The linear value from which level i + 1 is nearer than level i.
+const std::array<float, 255>& thresholds() {
+  static const std::array<float, 255> table = [] {
+    std::array<float, 255> made{};
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      made[i] = static_cast<float>(decode((static_cast<double>(i) + 0.5) / 255.0));
+    }
+    return made;
+  }();
+  return table;
+}
+
+std::uint8_t encode(float linear) {
+  // Counting thresholds instead of calling pow makes the level exact and the same on every machine. NaN counts none.
+  const auto& table = thresholds();
+  const auto* const above = std::partition_point(table.begin(), table.end(), [&](float t) { return t <= linear; });
+  return static_cast<std::uint8_t>(above - table.begin());
+}
+
+}  // namespace
+
+Rgba8 to_srgb(Rgb linear) {
+  return {encode(linear.r), encode(linear.g), encode(linear.b), 255};
+}
+
+float srgb_to_linear(std::uint8_t level) {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> made{};
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = static_cast<float>(decode(static_cast<double>(i) / 255.0));
+    return made;
+  }();
+  return table[level];
+}
+
+}  // namespace hpr

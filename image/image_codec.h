@@ -1,0 +1,28 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "image/image_io.h"
+
+namespace hpr {
+
+/// What the module libhpr_imageio offers: the only code that sees OpenImageIO. image_io.h is its front.
+class ImageCodec {
+ public:
+  virtual ~ImageCodec() = default;
+
+  [[nodiscard]] virtual std::vector<std::byte> encode_png(const Image<Rgba8>& image) const = 0;
+  [[nodiscard]] virtual std::vector<std::byte> encode_exr(const Image<Rgb>& image,
+                                                          const std::map<std::string, std::string>& attributes,
+                                                          std::span<const ExrLayer> layers) const = 0;
+  [[nodiscard]] virtual Image<Rgba8> decode(std::span<const std::byte> bytes, const std::string& name,
+                                            const ImageLimits& limits) const = 0;
+  [[nodiscard]] virtual FloatImage decode_float(std::span<const std::byte> bytes, const std::string& name,
+                                                const ImageLimits& limits) const = 0;
+};
+
+}  // namespace hpr
+
+/// The module's one symbol. The object lives as long as the module, which is never closed.
+extern "C" const hpr::ImageCodec* hpr_image_codec();

@@ -1,0 +1,71 @@
+#include "image/image_io.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "image/image_codec.h"
+
+namespace hpr {
+namespace {
+
+const ImageCodec& codec() {
+  static const ImageCodec* const loaded = []() -> const ImageCodec* {
+    void* const module = ::dlopen("libhpr_imageio.so", RTLD_NOW | RTLD_LOCAL);
+    if (module == nullptr) {
+      throw Error(ExitCode::Internal, fmt::format("cannot open the image module: {}", ::dlerror()),
+                  "install libopenimageio2.4 and keep libhpr_imageio.so where the build or the package put it");
+    }
+    void* const symbol = ::dlsym(module, "hpr_image_codec");
+    if (symbol == nullptr) throw Error(ExitCode::Internal, "libhpr_imageio.so has no hpr_image_codec", "reinstall hpr");
+    return reinterpret_cast<decltype(&hpr_image_codec)>(symbol)();
+  }();
+  return *loaded;
+}
+
+Image<Rgba8> to_srgb(const Image<Rgb>& image) {
+  Image<Rgba8> result(image.size());
+  for (std::size_t i = 0; i < image.pixels().size(); ++i) result.pixels()[i] = to_srgb(image.pixels()[i]);
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
+  return codec().encode_png(image);
+}
+
+std::vector<std::byte> encode_exr(const Image<Rgb>& image, const std::map<std::string, std::string>& attributes,
+                                  std::span<const ExrLayer> layers) {
+  return codec().encode_exr(image, attributes, layers);
+}
+
+Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
+  return codec().decode(bytes, name, limits);
+}
+
+FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits) {
+  constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30U;
+  return codec().decode_float(read_file(path, kLargestFile), path.string(), limits);
+}
+
+void write_image(const std::filesystem::path& path, const Image<Rgb>& image,
+                 const std::map<std::string, std::string>& attributes) {
+  const std::string extension = path.extension().string();
+  if (extension == ".exr") {
+    write_file_atomically(path, encode_exr(image, attributes));
+  } else if (extension == ".png") {
+    write_png(path, to_srgb(image));
+  } else {
+    throw Error(ExitCode::Usage,
+                fmt::format("cannot write '{}': unknown picture format '{}'", path.string(), extension),
+                "name a .png or .exr file");
+  }
+}
+
+void write_png(const std::filesystem::path& path, const Image<Rgba8>& image) {
+  write_file_atomically(path, encode_png(image));
+}
+
+}  // namespace hpr

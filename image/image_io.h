@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "image/color.h"
+#include "image/image.h"
+
+namespace hpr {
+
+/// How large a picture may be before it is refused (ExitCode::Limit).
+struct ImageLimits {
+  int side = 16384;
+  std::uint64_t pixels = std::uint64_t{1} << 27;  ///< 128 Mi
+};
+
+/// A picture read from a file: `values` [height][width][channels], linear for EXR, the stored level / 255 for PNG and
+/// JPEG.
+struct FloatImage {
+  Size size;
+  std::vector<std::string> channels;
+  std::vector<float> values;
+};
+
+/// One more channel set of an EXR file, e.g. depth or surface ids; floats survive bit by bit.
+struct ExrLayer {
+  std::vector<std::string> channels;  ///< e.g. {"normal.X", "normal.Y", "normal.Z"}
+  std::vector<float> values;          ///< [height][width][channels]
+};
+
+/// PNG, 8 bit RGBA, sRGB.
+[[nodiscard]] std::vector<std::byte> encode_png(const Image<Rgba8>& image);
+
+/// EXR, 32-bit float R G B (bit-exact, NaN included) and `layers` in one part; `attributes` go into the header.
+[[nodiscard]] std::vector<std::byte> encode_exr(const Image<Rgb>& image,
+                                                const std::map<std::string, std::string>& attributes,
+                                                std::span<const ExrLayer> layers = {});
+
+/// Decodes PNG or JPEG (known by their first bytes). Alpha is 255 where the file has none; grey becomes r = g = b;
+/// 16-bit values are rounded to 8. `name` stands in errors. Throws Error: BadInput, or Limit before any pixel is
+/// allocated.
+[[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name,
+                                        const ImageLimits& limits);
+
+/// Reads a PNG, JPEG or EXR file. Throws Error (Io, BadInput, Limit).
+[[nodiscard]] FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits);
+
+/// Writes `image` atomically as PNG (through to_srgb) or EXR, by the extension of `path`; throws Error (Usage) for
+/// others.
+void write_image(const std::filesystem::path& path, const Image<Rgb>& image,
+                 const std::map<std::string, std::string>& attributes = {});
+void write_png(const std::filesystem::path& path, const Image<Rgba8>& image);
+
+}  // namespace hpr

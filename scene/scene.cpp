@@ -1,0 +1,97 @@
+#include "scene/scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "core/check.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// The box of a mesh's used positions in its own coordinates; empty (low > high) when there are none.
+Bounds mesh_bounds(const Mesh& mesh) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Bounds bounds{glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const glm::dvec3 p(mesh.positions[triangle[corner]]);
+      bounds.low = glm::min(bounds.low, p);
+      bounds.high = glm::max(bounds.high, p);
+    }
+  }
+  return bounds;
+}
+
+/// The world box of a box: the image of its centre, give or take |M| times its half extent.
+Bounds transformed(const glm::dmat4& matrix, const Bounds& box) {
+  const glm::dvec3 half = 0.5 * (box.high - box.low);
+  const glm::dvec3 center = glm::dvec3(matrix * glm::dvec4(0.5 * (box.low + box.high), 1.0));
+  glm::dvec3 reach(0.0);
+  for (int axis = 0; axis < 3; ++axis) reach += glm::abs(glm::dvec3(matrix[axis])) * half[axis];
+  return {center - reach, center + reach};
+}
+
+}  // namespace
+
+void finish_scene(Scene& scene) {
+  if (scene.materials.empty()) scene.materials.emplace_back();
+  constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() - std::uint64_t{1};
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+  std::vector<Bounds> boxes;
+  boxes.reserve(scene.meshes.size());
+  for (const Mesh& mesh : scene.meshes) boxes.push_back(mesh_bounds(mesh));
+
+  std::uint64_t triangles = 0;
+  Bounds bounds{glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+  for (Instance& instance : scene.instances) {
+    HPR_CHECK(instance.mesh < scene.meshes.size());
+    instance.first_surface = static_cast<std::uint32_t>(triangles);
+    triangles += scene.mesh_of(instance).triangles.size();
+    if (triangles > kMostTriangles) {
+      throw Error(ExitCode::Limit, fmt::format("the scene has more than {} triangles after instancing", kMostTriangles),
+                  "surface ids have 32 bits; draw fewer instances or a coarser level of detail");
+    }
+    if (scene.mesh_of(instance).triangles.empty()) continue;
+    const Bounds box = transformed(instance.to_world, boxes[instance.mesh]);
+    bounds.low = glm::min(bounds.low, box.low);
+    bounds.high = glm::max(bounds.high, box.high);
+  }
+  scene.triangles = static_cast<std::uint32_t>(triangles);
+  scene.bounds = triangles > 0 ? bounds : Bounds{};
+}
+
+SurfacePlace locate_surface(const Scene& scene, std::uint32_t surface) {
+  HPR_CHECK(surface < scene.triangles);
+  // The last instance that starts at or before the id; empty instances before it start there too and are skipped.
+  const auto after = std::ranges::upper_bound(scene.instances, surface, {}, &Instance::first_surface);
+  const auto index = static_cast<std::uint32_t>(after - scene.instances.begin()) - 1;
+  return {index, surface - scene.instances[index].first_surface};
+}
+
+glm::dvec3 world_position(const Instance& instance, const glm::vec3& position) {
+  return {instance.to_world * glm::dvec4(position, 1.0)};
+}
+
+std::vector<glm::vec3> smooth_normals(const std::vector<glm::vec3>& positions,
+                                      const std::vector<glm::uvec3>& triangles) {
+  std::vector<glm::dvec3> sums(positions.size(), glm::dvec3(0.0));
+  for (const glm::uvec3& t : triangles) {
+    const glm::dvec3 v0(positions[t.x]);
+    const glm::dvec3 normal = glm::cross(glm::dvec3(positions[t.y]) - v0, glm::dvec3(positions[t.z]) - v0);
+    for (int corner = 0; corner < 3; ++corner) sums[t[corner]] += normal;
+  }
+  std::vector<glm::vec3> normals(positions.size());
+  std::ranges::transform(sums, normals.begin(), [](const glm::dvec3& sum) {
+    const double length = glm::length(sum);
+    return length > 0.0 && std::isfinite(length) ? glm::vec3(sum / length) : glm::vec3(0.0F, 0.0F, 1.0F);
+  });
+  return normals;
+}
+
+}  // namespace hpr

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "image/color.h"
+#include "image/image.h"
+
+/// What is drawn, as plain data, independent of how. Right-handed, y up, metres; colours are linear with sRGB
+/// primaries.
+namespace hpr {
+
+enum class Wrap : std::uint8_t { Repeat, MirroredRepeat, ClampToEdge };
+
+struct Texture {
+  std::string name;
+  Image<Rgba8> image;  ///< as stored in the file; whether it means sRGB or linear values depends on who refers to it
+  Wrap wrap_s = Wrap::Repeat;
+  Wrap wrap_t = Wrap::Repeat;
+  bool nearest = false;  ///< magnification filter; bilinear otherwise
+};
+
+/// A texture as a material uses it.
+struct TextureRef {
+  std::int32_t texture = -1;  ///< index into Scene::textures; -1: none
+  std::uint32_t uv_set = 0;   ///< which of the mesh's texture coordinates
+  /// KHR_texture_transform: uv' = (a u + c v + e, b u + d v + f) stored as {a, b, c, d, e, f}.
+  std::array<float, 6> transform{1, 0, 0, 1, 0, 0};
+
+  [[nodiscard]] bool present() const { return texture >= 0; }
+};
+
+enum class AlphaMode : std::uint8_t { Opaque, Mask, Blend };
+
+/// glTF 2.0 metallic-roughness (specification, appendix B), with KHR_materials_transmission, _ior, _emissive_strength.
+struct Material {
+  std::string name;
+  glm::vec4 base_color{1.0F};
+  TextureRef base_color_texture;  ///< sRGB
+  float metallic = 1.0F;
+  float roughness = 1.0F;
+  TextureRef metallic_roughness_texture;  ///< linear: roughness in G, metallic in B
+  glm::vec3 emissive{0.0F};               ///< radiance, strength multiplied in
+  TextureRef emissive_texture;            ///< sRGB
+  float transmission = 0.0F;
+  float ior = 1.5F;
+  AlphaMode alpha_mode = AlphaMode::Opaque;
+  float alpha_cutoff = 0.5F;
+  bool double_sided = false;
+};
+
+/// Triangles of one material in their own coordinates. All positions and normals are finite, all indices in range.
+struct Mesh {
+  std::string name;
+  std::vector<glm::vec3> positions;
+  std::vector<glm::vec3> normals;             ///< unit length, one per position
+  std::array<std::vector<glm::vec2>, 2> uvs;  ///< per set: one per position, or none at all
+  std::vector<glm::uvec3> triangles;          ///< may be degenerate
+  std::uint32_t material = 0;                 ///< index into Scene::materials, always valid
+};
+
+/// A mesh placed in the world. Triangle t of it has the surface id first_surface + t.
+struct Instance {
+  std::uint32_t mesh = 0;
+  glm::dmat4 to_world{1.0};  ///< affine: last row 0 0 0 1, all finite; may be singular or mirror
+  std::uint32_t first_surface = 0;
+};
+
+enum class LightType : std::uint8_t {
+  Point,
+  Directional,
+  Spot,
+  Headlight,  ///< constant irradiance from wherever the eye is, casting no shadow: for scenes without lights
+};
+
+/// KHR_lights_punctual. Candela and lux are taken as W/sr and W/m^2.
+struct Light {
+  std::string name;
+  LightType type = LightType::Point;
+  glm::dvec3 position{0.0};
+  glm::vec3 direction{0.0F, 0.0F, -1.0F};  ///< in which the light shines, unit length
+  glm::vec3 intensity{1.0F};  ///< colour times intensity: W/sr (point, spot) or W/m^2 (directional, headlight)
+  double range = 0.0;         ///< metres; 0: unbounded
+  float inner_cone_radians = 0.0F;
+  float outer_cone_radians = 0.7853982F;
+};
+
+struct PerspectiveLens {
+  double vertical_fov_radians = 0.8;
+  double near_distance = 0.0;  ///< metres; 0: chosen by the renderer. The far plane is at infinity.
+};
+struct OrthographicLens {
+  double half_width = 1.0;  ///< metres
+  double half_height = 1.0;
+  double near_distance = 0.0;
+  double far_distance = 100.0;
+};
+
+struct Camera {
+  std::string name;
+  glm::dvec3 eye{0.0};
+  glm::dmat3 axes{1.0};  ///< columns: right, up, back; orthonormal
+  std::variant<PerspectiveLens, OrthographicLens> lens;
+};
+
+struct Bounds {
+  glm::dvec3 low{0.0};
+  glm::dvec3 high{0.0};
+};
+
+struct Scene {
+  std::string name;
+  std::vector<Mesh> meshes;
+  std::vector<Material> materials;  ///< never empty once finished
+  std::vector<Texture> textures;
+  std::vector<Instance> instances;  ///< in ascending order of first_surface
+  std::vector<Light> lights;        ///< empty: the renderer adds a headlight and says so
+  std::vector<Camera> cameras;
+  Rgb background;                     ///< radiance where no surface is
+  std::vector<std::string> warnings;  ///< what was odd but could be drawn
+  std::uint32_t triangles = 0;        ///< of all instances: the number of surface ids
+  Bounds bounds;                      ///< of all instances; low == high == 0 when there is nothing
+
+  [[nodiscard]] const Mesh& mesh_of(const Instance& instance) const { return meshes[instance.mesh]; }
+};
+
+/// Surface ids [first, last).
+struct SurfaceRange {
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+
+  [[nodiscard]] std::uint32_t count() const { return last - first; }
+  bool operator==(const SurfaceRange&) const = default;
+};
+
+/// Where a surface id lies.
+struct SurfacePlace {
+  std::uint32_t instance = 0;
+  std::uint32_t triangle = 0;  ///< of the instance's mesh
+};
+
+/// Completes a scene whose meshes, materials and instances are set: adds a default material if there is none, numbers
+/// the surfaces, computes `triangles` and `bounds`. Throws Error (Limit) past 2^32 - 2 triangles.
+void finish_scene(Scene& scene);
+
+/// The instance and triangle of a surface id below scene.triangles.
+[[nodiscard]] SurfacePlace locate_surface(const Scene& scene, std::uint32_t surface);
+
+/// The world position of a mesh's vertex, in double.
+[[nodiscard]] glm::dvec3 world_position(const Instance& instance, const glm::vec3& position);
+
+/// Area-weighted vertex normals (for meshes without), unit length; {0, 0, 1} where no triangle has an area.
+[[nodiscard]] std::vector<glm::vec3> smooth_normals(const std::vector<glm::vec3>& positions,
+                                                    const std::vector<glm::uvec3>& triangles);
+
+/// XXH64 over everything that can change a picture; the same on every rank and machine.
+[[nodiscard]] std::uint64_t content_hash(const Scene& scene);
+
+/// A scene as bytes and back, for the way to other ranks. `from_bytes` trusts its input.
+[[nodiscard]] std::vector<std::byte> to_bytes(const Scene& scene);
+[[nodiscard]] Scene scene_from_bytes(std::span<const std::byte> bytes);
+
+}  // namespace hpr

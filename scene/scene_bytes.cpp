@@ -1,0 +1,170 @@
+#include <cereal/archives/binary.hpp>
+#include <cereal/types/array.hpp>
+#include <cereal/types/optional.hpp>
+#include <cereal/types/string.hpp>
+#include <cereal/types/variant.hpp>
+#include <cereal/types/vector.hpp>
+#include <istream>
+#include <ostream>
+#include <streambuf>
+
+#include "core/hash.h"
+#include "scene/scene.h"
+
+// Every struct of scene.h, field by field: what stands here is what reaches the other ranks and what the content hash
+// sees.
+namespace glm {
+
+template <typename Archive, length_t N, typename T, qualifier Q>
+void serialize(Archive& archive, vec<N, T, Q>& v) {
+  for (length_t i = 0; i < N; ++i) archive(v[i]);
+}
+template <typename Archive, length_t C, length_t R, typename T, qualifier Q>
+void serialize(Archive& archive, mat<C, R, T, Q>& m) {
+  for (length_t i = 0; i < C; ++i) archive(m[i]);
+}
+
+}  // namespace glm
+
+namespace hpr {
+
+/// Vectors of plain values go in one piece, not element by element.
+template <typename Archive, typename Value>
+void bulk(Archive& archive, std::vector<Value>& values) {
+  static_assert(std::is_trivially_copyable_v<Value>);
+  auto count = static_cast<cereal::size_type>(values.size());
+  archive(count);
+  values.resize(static_cast<std::size_t>(count));
+  archive(cereal::binary_data(values.data(), values.size() * sizeof(Value)));
+}
+
+template <typename Archive>
+void serialize(Archive& archive, Rgb& c) {
+  archive(c.r, c.g, c.b);
+}
+template <typename Archive>
+void serialize(Archive& archive, Size& s) {
+  archive(s.width, s.height);
+}
+template <typename Archive>
+void serialize(Archive& archive, Texture& t) {
+  Size size = t.image.size();
+  archive(t.name, size, t.wrap_s, t.wrap_t, t.nearest);
+  if (size != t.image.size()) t.image = Image<Rgba8>(size);
+  archive(cereal::binary_data(t.image.pixels().data(), t.image.pixels().size_bytes()));
+}
+template <typename Archive>
+void serialize(Archive& archive, TextureRef& t) {
+  archive(t.texture, t.uv_set, t.transform);
+}
+template <typename Archive>
+void serialize(Archive& archive, Material& m) {
+  archive(m.name, m.base_color, m.base_color_texture, m.metallic, m.roughness, m.metallic_roughness_texture, m.emissive,
+          m.emissive_texture, m.transmission, m.ior, m.alpha_mode, m.alpha_cutoff, m.double_sided);
+}
+template <typename Archive>
+void serialize(Archive& archive, Mesh& m) {
+  archive(m.name, m.material);
+  bulk(archive, m.positions);
+  bulk(archive, m.normals);
+  bulk(archive, m.uvs[0]);
+  bulk(archive, m.uvs[1]);
+  bulk(archive, m.triangles);
+}
+template <typename Archive>
+void serialize(Archive& archive, Instance& i) {
+  archive(i.mesh, i.to_world, i.first_surface);
+}
+template <typename Archive>
+void serialize(Archive& archive, Light& l) {
+  archive(l.name, l.type, l.position, l.direction, l.intensity, l.range, l.inner_cone_radians, l.outer_cone_radians);
+}
+template <typename Archive>
+void serialize(Archive& archive, PerspectiveLens& l) {
+  archive(l.vertical_fov_radians, l.near_distance);
+}
+template <typename Archive>
+void serialize(Archive& archive, OrthographicLens& l) {
+  archive(l.half_width, l.half_height, l.near_distance, l.far_distance);
+}
+template <typename Archive>
+void serialize(Archive& archive, Camera& c) {
+  archive(c.name, c.eye, c.axes, c.lens);
+}
+template <typename Archive>
+void serialize(Archive& archive, Bounds& b) {
+  archive(b.low, b.high);
+}
+template <typename Archive>
+void serialize(Archive& archive, Scene& s) {
+  archive(s.name, s.meshes, s.materials, s.textures, s.instances, s.lights, s.cameras, s.background, s.warnings,
+          s.triangles, s.bounds);
+}
+
+namespace {
+
+class VectorSink final : public std::streambuf {
+ public:
+  std::vector<std::byte> bytes;
+
+ protected:
+  std::streamsize xsputn(const char* text, std::streamsize count) override {
+    const auto added = std::as_bytes(std::span(text, static_cast<std::size_t>(count)));
+    bytes.insert(bytes.end(), added.begin(), added.end());
+    return count;
+  }
+  int_type overflow(int_type c) override {
+    bytes.push_back(static_cast<std::byte>(c));
+    return c;
+  }
+};
+
+class HashSink final : public std::streambuf {
+ public:
+  ContentHash hash;
+
+ protected:
+  std::streamsize xsputn(const char* text, std::streamsize count) override {
+    hash.add(std::as_bytes(std::span(text, static_cast<std::size_t>(count))));
+    return count;
+  }
+};
+
+class SpanSource final : public std::streambuf {
+ public:
+  explicit SpanSource(std::span<const std::byte> bytes) {
+    char* const start = const_cast<char*>(reinterpret_cast<const char*>(bytes.data()));  // only ever read
+    setg(start, start, start + bytes.size());
+  }
+};
+
+void save(const Scene& scene, std::streambuf& sink) {
+  std::ostream stream(&sink);
+  cereal::BinaryOutputArchive archive(stream);
+  archive(const_cast<Scene&>(scene));  // one serialize() both reads and writes; an output archive only reads
+}
+
+}  // namespace
+
+std::vector<std::byte> to_bytes(const Scene& scene) {
+  VectorSink sink;
+  save(scene, sink);
+  return std::move(sink.bytes);
+}
+
+Scene scene_from_bytes(std::span<const std::byte> bytes) {
+  SpanSource source(bytes);
+  std::istream stream(&source);
+  cereal::BinaryInputArchive archive(stream);
+  Scene scene;
+  archive(scene);
+  return scene;
+}
+
+std::uint64_t content_hash(const Scene& scene) {
+  HashSink sink;
+  save(scene, sink);
+  return sink.hash.value();
+}
+
+}  // namespace hpr

@@ -1,0 +1,131 @@
+#include "scene/view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "core/check.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+double near_plane(double wanted, const Bounds& bounds) {
+  if (wanted > 0.0) return wanted;
+  const double extent = glm::length(bounds.high - bounds.low);
+  return extent > 0.0 && std::isfinite(extent) ? 1e-4 * extent : 0.01;
+}
+
+}  // namespace
+
+Ray view_ray(const View& view, double x, double y) {
+  const double px = view.left + (view.right - view.left) * ((view.block.x0 + x) / view.screen.width);
+  const double py = view.top - (view.top - view.bottom) * ((view.block.y0 + y) / view.screen.height);
+  if (view.orthographic) return {view.eye + view.axes * glm::dvec3(px, py, 0.0), -view.axes[2]};
+  return {view.eye, view.axes * glm::dvec3(px, py, -1.0)};
+}
+
+glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin) {
+  const double width = view.right - view.left;
+  const double height = view.top - view.bottom;
+  const double l = view.left + width * view.block.x0 / view.screen.width;
+  const double r = view.left + width * view.block.x1 / view.screen.width;
+  const double t = view.top - height * view.block.y0 / view.screen.height;
+  const double b = view.top - height * view.block.y1 / view.screen.height;
+
+  glm::dmat4 clip_from_eye(0.0);  // glm: [column][row]
+  clip_from_eye[0][0] = 2.0 / (r - l);
+  clip_from_eye[1][1] = 2.0 / (t - b);
+  if (view.orthographic) {
+    clip_from_eye[3][0] = -(r + l) / (r - l);
+    clip_from_eye[3][1] = -(t + b) / (t - b);
+    const double range = view.far_distance - view.near_distance;
+    clip_from_eye[2][2] = 1.0 / range;
+    clip_from_eye[3][2] = view.far_distance / range;
+    clip_from_eye[3][3] = 1.0;
+  } else {
+    clip_from_eye[2][0] = (r + l) / (r - l);
+    clip_from_eye[2][1] = (t + b) / (t - b);
+    clip_from_eye[3][2] = view.near_distance;
+    clip_from_eye[2][3] = -1.0;
+  }
+  const glm::dmat3 eye_from_world = glm::transpose(view.axes);
+  glm::dmat4 look(eye_from_world);
+  look[3] = glm::dvec4(eye_from_world * (origin - view.eye), 1.0);
+  return clip_from_eye * look;
+}
+
+double reversed_depth(const View& view, double distance) {
+  if (view.orthographic) return (view.far_distance - distance) / (view.far_distance - view.near_distance);
+  return view.near_distance / distance;
+}
+
+View make_view(const Camera& camera, Size size, const Bounds& bounds) {
+  HPR_CHECK(size.width > 0 && size.height > 0);
+  View view;
+  view.eye = camera.eye;
+  view.axes = camera.axes;
+  view.screen = size;
+  view.block = {0, 0, size.width, size.height};
+  const double aspect = static_cast<double>(size.width) / size.height;
+  double half_height = 1.0;
+  if (const auto* const lens = std::get_if<PerspectiveLens>(&camera.lens)) {
+    half_height = std::tan(0.5 * lens->vertical_fov_radians);
+    view.near_distance = near_plane(lens->near_distance, bounds);
+  } else {
+    const auto& box = std::get<OrthographicLens>(camera.lens);
+    half_height = box.half_height;
+    view.orthographic = true;
+    view.near_distance = box.near_distance;
+    view.far_distance = box.far_distance;
+  }
+  view.top = half_height;
+  view.bottom = -half_height;
+  view.right = half_height * aspect;
+  view.left = -view.right;
+  return view;
+}
+
+Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up, double vertical_fov_radians) {
+  const glm::dvec3 back = eye - at;
+  const glm::dvec3 right = glm::cross(up, back);
+  if (!(glm::length(back) > 0.0) || !(glm::length(right) > 1e-12 * glm::length(up) * glm::length(back))) {
+    throw Error(ExitCode::Usage, "the camera has no direction: eye and target coincide, or up points along the view",
+                "choose --eye, --at and --up so that they span a plane");
+  }
+  Camera camera;
+  camera.name = "look-at";
+  camera.eye = eye;
+  camera.axes[2] = glm::normalize(back);
+  camera.axes[0] = glm::normalize(right);
+  camera.axes[1] = glm::cross(camera.axes[2], camera.axes[0]);
+  camera.lens = PerspectiveLens{.vertical_fov_radians = vertical_fov_radians, .near_distance = 0.0};
+  return camera;
+}
+
+Camera framing_camera(const Bounds& bounds) {
+  constexpr double kFov = 40.0 * std::numbers::pi / 180.0;
+  const glm::dvec3 center = 0.5 * (bounds.low + bounds.high);
+  const double diagonal = glm::length(bounds.high - bounds.low);
+  const double radius = diagonal > 0.0 && std::isfinite(diagonal) ? 0.5 * diagonal : 1.0;
+  const glm::dvec3 from = glm::normalize(glm::dvec3(0.35, 0.25, 1.0));
+  Camera camera = look_at(center + from * (radius / std::sin(0.5 * kFov)), center, {0.0, 1.0, 0.0}, kFov);
+  camera.name = "framing";
+  return camera;
+}
+
+std::vector<View> split_into_blocks(const View& view, int limit) {
+  HPR_CHECK(limit > 0 && limit % 64 == 0);
+  std::vector<View> blocks;
+  for (int y = view.block.y0; y < view.block.y1; y += limit) {
+    for (int x = view.block.x0; x < view.block.x1; x += limit) {
+      View block = view;
+      block.block = {x, y, std::min(x + limit, view.block.x1), std::min(y + limit, view.block.y1)};
+      blocks.push_back(block);
+    }
+  }
+  return blocks;
+}
+
+}  // namespace hpr

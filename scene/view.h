@@ -1,0 +1,66 @@
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "image/image.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// One screen as an eye sees it, all in double. The screen is the unit of rasterisation: its projection never changes
+/// with strategy or rank count, parts of it are drawn by scissor. Screens beyond the raster limit are cut into fixed
+/// blocks.
+struct View {
+  glm::dvec3 eye{0.0};
+  glm::dmat3 axes{1.0};  ///< columns: right, up, back; orthonormal
+  /// Edges of the whole screen: on the plane one metre before the eye (perspective, off-axis allowed), or in metres
+  /// about the eye (orthographic).
+  double left = -1.0;
+  double right = 1.0;
+  double bottom = -1.0;
+  double top = 1.0;
+  double near_distance = 0.01;
+  double far_distance = 0.0;  ///< orthographic only; perspective has its far plane at infinity
+  bool orthographic = false;
+  Size screen;  ///< pixels of the whole screen
+  Rect block;   ///< the part of it this view draws; pixel (x, y) of the view is pixel (block.x0 + x, block.y0 + y)
+
+  [[nodiscard]] Size size() const { return {block.width(), block.height()}; }
+};
+
+struct Ray {
+  glm::dvec3 origin{0.0};
+  glm::dvec3 direction{0.0};  ///< not normalised: one metre along the view axis (perspective)
+};
+
+/// The ray through (x, y) of the view, in pixels from its upper left corner: pixel centres are at + 0.5.
+[[nodiscard]] Ray view_ray(const View& view, double x, double y);
+
+/// World relative to `origin` -> clip space, for a depth range of [0, 1] reversed: near is 1, infinity (or the
+/// orthographic far plane) is 0. y points up, as GL has it. Multiply with model matrices in double before rounding.
+[[nodiscard]] glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin);
+
+/// The depth a point at `distance` metres along the view axis has in keys.
+[[nodiscard]] double reversed_depth(const View& view, double distance);
+
+/// A camera's view on a screen of `size` pixels. The vertical angle is kept, the horizontal one follows from the
+/// aspect; an orthographic camera keeps its half height. near_distance is the camera's, or 1e-4 of the scene's extent.
+[[nodiscard]] View make_view(const Camera& camera, Size size, const Bounds& bounds);
+
+/// A camera that sees all of `bounds` from the front, a little above and to the right: for scenes that have none.
+[[nodiscard]] Camera framing_camera(const Bounds& bounds);
+
+/// A perspective camera at `eye` that looks at `at`. Throws Error (Usage) when they coincide or `up` is parallel.
+[[nodiscard]] Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up,
+                             double vertical_fov_radians);
+
+/// Cuts a view into blocks no larger than `limit` pixels a side (a multiple of 64); one block when it already fits.
+[[nodiscard]] std::vector<View> split_into_blocks(const View& view, int limit);
+
+/// What GL can draw at once, less a margin: viewports past 16384 are clamped silently.
+inline constexpr int kRasterLimit = 16384;
+
+}  // namespace hpr
