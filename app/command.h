@@ -1,0 +1,58 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cluster/communicator.h"
+#include "core/error.h"
+#include "scene/load_scene.h"
+
+namespace hpr {
+
+/// The options every command has.
+struct Globals {
+  int verbosity = 0;  ///< -v, -vv; -1 is -q
+  std::uint64_t seed = 1;
+  std::string backend = "auto";
+  int device = -1;  ///< -1: by local rank
+  std::string progress = "auto";
+  std::string limit_mem;
+  std::string limit_image;
+  std::string hang_timeout;
+  bool force = false;  ///< overwrite files
+  int ranks = 0;       ///< 0: as many as the launcher started, else 1
+  int threads = 0;     ///< of one rank; 0: the machine's cores divided among the ranks of a host
+
+  [[nodiscard]] SceneLimits scene_limits() const;
+  [[nodiscard]] std::chrono::nanoseconds hang_limit() const;
+};
+
+/// One word after `hpr`: one file, listed in all_commands().
+class Command {
+ public:
+  virtual ~Command() = default;
+
+  [[nodiscard]] virtual std::string_view name() const = 0;
+  [[nodiscard]] virtual std::string_view summary() const = 0;
+  /// Declares options and subcommands on `app`, which outlives this; values land in the command's members.
+  virtual void declare(CLI::App& app) = 0;
+  /// Called once the command line was parsed. Results go to stdout, messages to the log; throws Error.
+  [[nodiscard]] virtual ExitCode run(const Globals& globals) = 0;
+};
+
+/// Every command, in the order `hpr help` lists them.
+[[nodiscard]] std::vector<std::unique_ptr<Command>> all_commands();
+
+/// Runs `body` on `globals.ranks` ranks. Inside an MPI job (mpirun, srun, or our own mpiexec) the job's ranks run it;
+/// with one rank it runs here; otherwise mpiexec is started with this very command line and the body never runs here.
+/// Returns what all ranks agreed on. Check whatever can be checked without the other ranks before calling it.
+[[nodiscard]] ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body);
+
+}  // namespace hpr
