@@ -29,6 +29,7 @@ struct Globals {
   bool force = false;  ///< overwrite files
   int ranks = 0;       ///< 0: as many as the launcher started, else 1
   int threads = 0;     ///< of one rank; 0: the machine's cores divided among the ranks of a host
+  std::vector<std::string> args;  ///< this process's command line after the program's name
 
   [[nodiscard]] SceneLimits scene_limits() const;
   [[nodiscard]] std::chrono::nanoseconds hang_limit() const;
@@ -54,5 +55,15 @@ class Command {
 /// with one rank it runs here; otherwise mpiexec is started with this very command line and the body never runs here.
 /// Returns what all ranks agreed on. Check whatever can be checked without the other ranks before calling it.
 [[nodiscard]] ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body);
+
+/// What this rank may use of the machine it runs on.
+struct HostShare {
+  std::string host;
+  int local_rank = 0;  ///< among the ranks of this host
+  int threads = 1;
+};
+
+/// Collective.
+[[nodiscard]] HostShare host_share(Communicator& comm, const Globals& globals);
 
 }  // namespace hpr

@@ -1,0 +1,62 @@
+#include "app/bench_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "app/bench_raster.h"
+#include "app/version.h"
+#include "raster/gl_context.h"
+
+namespace hpr {
+namespace {
+
+/// Our figure beside the floor's or a peer's, as a ratio of speeds: 1 is equal, more is faster (docs/cli.md).
+class BenchCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "bench"; }
+  [[nodiscard]] std::string_view summary() const override { return "our speed beside a floor's or a peer's, as ratios"; }
+
+  void declare(CLI::App& app) override {
+    app.require_subcommand(1);
+    CLI::App* const raster = app.add_subcommand("raster", "a frame with raster only against a bare GL loop of the same mesh and readback");
+    raster->add_flag("--json", json_, "one JSON document");
+    raster->fallthrough();
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    const int threads = globals.threads > 0 ? globals.threads : cores;
+    const auto context = make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
+    print(bench_raster(*context, threads), context->description());
+    return ExitCode::Done;
+  }
+
+ private:
+  void print(const std::vector<BenchRow>& rows, const std::string& machine) const {
+    if (!json_) {
+      fmt::print("{:<28} {:>10} {:>10} {:<6} {:>6}\n", "", "ours", "floor", "", "ratio");
+      for (const BenchRow& row : rows) {
+        fmt::print("{:<28} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, row.ours, row.floor, row.unit, row.ratio);
+      }
+      return;
+    }
+    nlohmann::ordered_json json{{"schema", "hpr.bench/1"}, {"machine", machine}, {"commit", kCommit}, {"rows", nlohmann::json::array()}};
+    for (const BenchRow& row : rows) {
+      json["rows"].push_back({{"name", row.name}, {"ours", row.ours}, {"floor", row.floor}, {"unit", row.unit}, {"ratio", row.ratio}});
+    }
+    fmt::print("{}\n", json.dump(2));
+  }
+
+  bool json_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_bench_command() {
+  return std::make_unique<BenchCommand>();
+}
+
+}  // namespace hpr

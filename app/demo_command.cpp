@@ -1,0 +1,46 @@
+#include "app/demo_command.h"
+
+#include <filesystem>
+
+#include "app/wall_run.h"
+
+namespace hpr {
+namespace {
+
+constexpr const char* kPicture = "hpr-demo.png";
+
+class DemoCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "demo"; }
+  [[nodiscard]] std::string_view summary() const override { return "a wall picture of a built-in scene: does this machine work?"; }
+
+  void declare(CLI::App& app) override {
+    app.add_option("--wall", wall_, "screens of the wall, e.g. 3x2 or 3x2@640x360")->capture_default_str()->type_name("CxR");
+    app.add_option("-o,--output", output_, "the assembled wall")->capture_default_str()->type_name("FILE.png");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    WallRun run;
+    run.scene = "gen:gallery";
+    run.wall = wall_;
+    run.picture = output_;
+    run.folder = std::filesystem::path(output_).replace_extension("").string() + "-screens";
+    run.summary = true;
+    // The demo's own picture may be made again and again; a name the user chose is guarded as everywhere.
+    Globals own = globals;
+    own.force = globals.force || output_ == kPicture;
+    return run_wall(run, own);
+  }
+
+ private:
+  std::string wall_ = "1x1";
+  std::string output_ = kPicture;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_demo_command() {
+  return std::make_unique<DemoCommand>();
+}
+
+}  // namespace hpr

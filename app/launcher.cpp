@@ -1,0 +1,115 @@
+#include "app/launcher.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.
+constexpr std::array<std::pair<const char*, const char*>, 8> kEnvironment{{
+    {"OMPI_ALLOW_RUN_AS_ROOT", "1"},
+    {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
+    {"OMPI_MCA_rmaps_base_oversubscribe", "1"},
+    {"OMPI_MCA_hwloc_base_binding_policy", "none"},
+    {"OMPI_MCA_mpi_yield_when_idle", "1"},
+    {"OMPI_MCA_pml", "ob1"},
+    {"OMPI_MCA_btl", "self,vader,tcp"},
+    {"OMPI_MCA_orte_execute_quiet", "1"},
+}};
+
+/// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
+[[noreturn]] void become(const std::vector<char*>& arguments, const std::map<std::string, std::string>& extra_env, int stdout_pipe,
+                         pid_t parent) {
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (::getppid() != parent) ::_exit(1);
+  const int null = ::open("/dev/null", O_RDONLY);
+  if (null >= 0) ::dup2(null, STDIN_FILENO);
+  if (stdout_pipe >= 0) ::dup2(stdout_pipe, STDOUT_FILENO);
+  for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
+  for (const auto& [name, value] : extra_env) ::setenv(name.c_str(), value.c_str(), 1);
+  ::execvp(arguments.front(), arguments.data());
+  ::_exit(127);
+}
+
+std::string read_to_end(int pipe) {
+  std::string text;
+  std::array<char, 65536> buffer{};
+  while (true) {
+    const ssize_t got = ::read(pipe, buffer.data(), buffer.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return text;
+    text.append(buffer.data(), static_cast<std::size_t>(got));
+  }
+}
+
+bool on_path(const char* program) {
+  const char* const path = std::getenv("PATH");
+  for (std::string_view rest = path == nullptr ? "" : path; !rest.empty();) {
+    const std::size_t end = std::min(rest.find(':'), rest.size());
+    if (::access((std::filesystem::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return false;
+}
+
+}  // namespace
+
+bool inside_mpi_job() {
+  for (const char* const name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"}) {
+    if (std::getenv(name) != nullptr) return true;
+  }
+  return false;
+}
+
+std::string program_path() {
+  return std::filesystem::read_symlink("/proc/self/exe").string();
+}
+
+int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
+                const std::map<std::string, std::string>& extra_env) {
+  if (!on_path("mpiexec")) {
+    throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
+                "install openmpi-bin, or run with --ranks 1");
+  }
+  std::vector<std::string> words{"mpiexec", "-n", std::to_string(ranks), program_path()};
+  words.insert(words.end(), args.begin(), args.end());
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+
+  std::array<int, 2> pipe{-1, -1};
+  if (captured_stdout != nullptr && ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+    throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
+  }
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0) throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
+  if (child == 0) become(arguments, extra_env, pipe[1], parent);
+
+  if (captured_stdout != nullptr) {
+    ::close(pipe[1]);
+    *captured_stdout = read_to_end(pipe[0]);
+    ::close(pipe[0]);
+  }
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+}  // namespace hpr

@@ -1,0 +1,187 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <new>
+
+#include "app/command.h"
+#include "app/report_error.h"
+#include "app/version.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "core/units.h"
+
+namespace hpr {
+namespace {
+
+void declare_globals(CLI::App& app, Globals& globals) {
+  const auto group = [](CLI::Option* option) { option->group("Everywhere"); };
+  group(app.add_flag_callback("-q,--quiet", [&] { globals.verbosity = -1; }, "errors only"));
+  group(app.add_flag("-v,--verbose", globals.verbosity, "say more; twice: from all ranks"));
+  group(app.add_option("--ranks", globals.ranks, "MPI ranks; hpr starts mpiexec itself")->check(CLI::Range(1, 4096)));
+  group(app.add_option("--threads", globals.threads, "threads of one rank (default: cores / ranks of a host)")
+            ->check(CLI::Range(1, 1024)));
+  group(app.add_option("--seed", globals.seed, "of everything random")->capture_default_str());
+  group(app.add_option("--backend", globals.backend, "OpenGL by: auto, egl, osmesa")->capture_default_str());
+  group(app.add_option("--device", globals.device, "EGL device (default: by local rank)")->check(CLI::NonNegativeNumber));
+  group(app.add_option("--progress", globals.progress, "auto, bar, line or none")
+            ->check(CLI::IsMember({"auto", "bar", "line", "none"}))
+            ->capture_default_str());
+  group(app.add_option("--limit-mem", globals.limit_mem, "refuse scenes larger than this, e.g. 4GiB"));
+  group(app.add_option("--limit-image", globals.limit_image, "refuse pictures larger than this, e.g. 8192x8192"));
+  group(app.add_option("--hang-timeout", globals.hang_timeout, "longest wait for another rank, e.g. 30s"));
+  group(app.add_flag("--force", globals.force, "overwrite files"));
+}
+
+std::vector<std::string> names_of(const std::vector<std::unique_ptr<Command>>& commands) {
+  std::vector<std::string> names;
+  for (const auto& command : commands) names.emplace_back(command->name());
+  return names;
+}
+
+/// The subcommand chain the words name: `app`, or `wall`, or `wall run`, as far as it goes.
+const CLI::App* deepest(const CLI::App* app, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    if (word.starts_with('-')) break;
+    const auto children = app->get_subcommands([&](const CLI::App* child) { return child->get_name() == word; });
+    if (children.empty()) break;
+    app = children.front();
+  }
+  return app;
+}
+
+std::vector<std::string> long_options(const CLI::App* app) {
+  std::vector<std::string> names;
+  for (; app != nullptr; app = app->get_parent()) {
+    for (const CLI::Option* option : app->get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+  }
+  return names;
+}
+
+/// CLI11's complaint in our form: what, and the nearest name.
+Error usage_error(const CLI::App& app, const std::vector<std::string>& words, const CLI::ParseError& error) {
+  const CLI::App* const context = deepest(&app, words);
+  std::string command = "hpr";
+  if (context != &app) command += " " + context->get_name();
+  const std::string help = fmt::format("see '{} --help'", command);
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    const auto known = long_options(context);
+    for (const std::string& word : words) {
+      const std::string option = word.substr(0, word.find('='));
+      if (!option.starts_with("--") || std::ranges::find(known, option) != known.end()) continue;
+      const auto nearest = nearest_name(option, known);
+      return {ExitCode::Usage, fmt::format("unknown option '{}'", printable(option)),
+              nearest ? fmt::format("did you mean '{}'? {}", *nearest, help) : help};
+    }
+  }
+  const auto subcommands = context->get_subcommands([](const CLI::App*) { return true; });
+  if (context != &app && !subcommands.empty() && context->get_require_subcommand_min() > 0) {
+    std::vector<std::string> choices;
+    for (const CLI::App* child : subcommands) choices.push_back(child->get_name());
+    const auto word = std::ranges::find_if(words.begin() + 1, words.end(), [](const std::string& w) { return !w.starts_with('-'); });
+    if (word == words.end()) return {ExitCode::Usage, fmt::format("{} needs a subcommand", command), fmt::format("choices: {}", fmt::join(choices, ", "))};
+    return {ExitCode::Usage, fmt::format("unknown subcommand '{} {}'", command, printable(*word)), unknown_name_hint(*word, choices)};
+  }
+  return {ExitCode::Usage, fmt::format("{}: {}", command, error.what()), help};
+}
+
+ExitCode run(const std::vector<std::string>& words) {
+  Globals globals;
+  globals.args = words;
+  CLI::App app("Hybrid sort-first/sort-last rasteriser plus ray tracer for tiled displays", "hpr");
+  app.set_version_flag("--version", fmt::format("hpr {} ({})", kVersion, kCommit));
+  app.require_subcommand(1);
+  app.fallthrough();
+  declare_globals(app, globals);
+  const auto commands = all_commands();
+  for (const auto& command : commands) {
+    CLI::App* const sub = app.add_subcommand(std::string(command->name()), std::string(command->summary()));
+    sub->fallthrough();
+    command->declare(*sub);
+  }
+
+  if (words.empty()) {
+    fmt::print("{}", app.help());
+    return ExitCode::Usage;
+  }
+  // `hpr help` and `hpr help COMMAND` are other ways to write --help.
+  std::vector<std::string> parsed = words;
+  if (parsed.front() == "help") {
+    parsed.erase(parsed.begin());
+    parsed.emplace_back("--help");
+  }
+  if (!parsed.front().starts_with('-')) {
+    const auto names = names_of(commands);
+    if (std::ranges::find(names, parsed.front()) == names.end()) {
+      throw Error(ExitCode::Usage, fmt::format("unknown command '{}'", printable(parsed.front())),
+                  unknown_name_hint(parsed.front(), names));
+    }
+  }
+  try {
+    std::vector<std::string> reversed(parsed.rbegin(), parsed.rend());  // CLI11 takes them last first
+    app.parse(reversed);
+  } catch (const CLI::Success& done) {  // --help, --version
+    app.exit(done);
+    return ExitCode::Done;
+  } catch (const CLI::ParseError& error) {
+    throw usage_error(app, parsed, error);
+  }
+  log::configure(globals.verbosity < 0 ? log::Level::Error : globals.verbosity == 0 ? log::Level::Info : log::Level::Debug, "");
+  (void)globals.scene_limits();  // malformed sizes and durations are found before any work
+  (void)globals.hang_limit();
+  for (const auto& command : commands) {
+    if (app.got_subcommand(std::string(command->name()))) return command->run(globals);
+  }
+  return ExitCode::Usage;
+}
+
+}  // namespace
+
+SceneLimits Globals::scene_limits() const {
+  SceneLimits limits;
+  if (!limit_mem.empty()) {
+    const auto bytes = parse_bytes(limit_mem);
+    if (!bytes) throw Error(ExitCode::Usage, fmt::format("--limit-mem: '{}' is no size", limit_mem), "write e.g. 4GiB");
+    limits.memory_bytes = *bytes;
+    limits.file_bytes = std::min(limits.file_bytes, *bytes);
+  }
+  if (!limit_image.empty()) {
+    const auto extent = parse_extent(limit_image);
+    if (!extent) throw Error(ExitCode::Usage, fmt::format("--limit-image: '{}' is no size", limit_image), "write e.g. 8192x8192");
+    limits.image.side = std::max(extent->first, extent->second);
+    limits.image.pixels = static_cast<std::uint64_t>(extent->first) * static_cast<std::uint64_t>(extent->second);
+  }
+  return limits;
+}
+
+std::chrono::nanoseconds Globals::hang_limit() const {
+  if (hang_timeout.empty()) return kHangTimeout;
+  const auto limit = parse_duration(hang_timeout);
+  if (!limit || *limit <= std::chrono::nanoseconds::zero()) {
+    throw Error(ExitCode::Usage, fmt::format("--hang-timeout: '{}' is no duration", hang_timeout), "write e.g. 30s");
+  }
+  return *limit;
+}
+
+}  // namespace hpr
+
+int main(int argc, char** argv) {
+  // A reader that goes away (hpr ... | head) shows as a failed write, not as a killed rank.
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    return static_cast<int>(hpr::run(std::vector<std::string>(argv + 1, argv + argc)));
+  } catch (const hpr::Error& error) {
+    hpr::print_error(error);
+    return static_cast<int>(error.code());
+  } catch (const std::bad_alloc&) {
+    hpr::print_error({hpr::ExitCode::Limit, "out of memory", "use a smaller picture or scene"});
+    return static_cast<int>(hpr::ExitCode::Limit);
+  } catch (const std::exception& error) {
+    hpr::print_error({hpr::ExitCode::Internal, error.what(), "this is a defect of hpr: please report it with the command line"});
+    return static_cast<int>(hpr::ExitCode::Internal);
+  }
+}

@@ -1,0 +1,100 @@
+#include "app/output.h"
+
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+
+#include "cluster/collectives.h"
+#include "core/file.h"
+#include "core/parallel.h"
+
+namespace hpr {
+namespace {
+
+std::uint64_t peak_memory_bytes() {
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+/// The slowest rank's time.
+double slowest(Communicator& comm, double ms) {
+  return std::ranges::max(all_gather_value(comm, ms));
+}
+
+}  // namespace
+
+Blocks cut_blocks(std::span<const View> screens) {
+  Blocks blocks;
+  for (std::size_t screen = 0; screen < screens.size(); ++screen) {
+    for (const View& block : split_into_blocks(screens[screen], kRasterLimit)) {
+      blocks.views.push_back(block);
+      blocks.screen_of.push_back(screen);
+    }
+  }
+  return blocks;
+}
+
+std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_by) {
+  std::vector<int> owners;
+  for (const std::size_t screen : blocks.screen_of) owners.push_back(shown_by[screen]);
+  return owners;
+}
+
+TileLayer<Rgba8> to_display(const Frame& frame, int threads) {
+  TileLayer<Rgba8> display(frame.radiance.layout());
+  for (const std::size_t tile : frame.owned) display.set_active(tile);
+  parallel_for(threads, frame.owned.size(), [&](std::size_t i) {
+    const auto from = frame.radiance.tile(frame.owned[i]);
+    std::ranges::transform(from, display.tile(frame.owned[i]).begin(), [](Rgb color) { return to_srgb(color); });
+  });
+  return display;
+}
+
+RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, double frame_ms) {
+  CountingCommunicator& comm = session.comm();
+  RunStats stats;
+  stats.bytes_sent = session.bytes_sent();  // before gathering adds its own
+  stats.ranks = comm.size();
+  stats.plan = plan.explained;
+  stats.passes = plan_passes(session.scene(), plan.rays);
+  stats.ms = slowest(comm, frame_ms);
+  stats.times.push_back({"raster", slowest(comm, times.raster_ms)});
+  stats.times.push_back({"composite", slowest(comm, times.composite_ms)});
+  if (plan.lit || plan.shading == Shading::Local) {
+    const Lighter& lighter = session.lighter(plan.rays);
+    for (const PassTime& pass : lighter.times()) stats.times.push_back({pass.name, slowest(comm, pass.ms)});
+    for (const RayCounts& counts : all_gather_value(comm, lighter.counts())) stats.rays += counts;
+  }
+  std::size_t bytes = 0;
+  for (const std::size_t sent : all_gather_value(comm, stats.bytes_sent)) bytes += sent;
+  stats.bytes_sent = bytes;
+  stats.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
+  return stats;
+}
+
+void write_stats(const std::filesystem::path& path, const RunStats& stats) {
+  nlohmann::ordered_json passes = nlohmann::ordered_json::array();
+  for (const PassTime& time : stats.times) {
+    const auto plan = std::ranges::find(stats.passes, time.name, &PassPlan::name);
+    passes.push_back({{"name", time.name}, {"ms", time.ms}, {"why", plan == stats.passes.end() ? "every frame" : plan->why}});
+  }
+  const nlohmann::ordered_json json{
+      {"schema", "hpr.stats/1"},
+      {"ms", stats.ms},
+      {"plan", stats.plan},
+      {"passes", passes},
+      {"rays",
+       {{"primary", stats.rays.primary},
+        {"shadow", stats.rays.shadow},
+        {"reflection", stats.rays.reflection},
+        {"refraction", stats.rays.refraction},
+        {"ambient-occlusion", stats.rays.ambient_occlusion},
+        {"photon", stats.rays.photon}}},
+      {"bytes_sent", stats.bytes_sent},
+      {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
+      {"ranks", stats.ranks}};
+  write_file_atomically(path, json.dump(2) + "\n");
+}
+
+}  // namespace hpr

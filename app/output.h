@@ -1,0 +1,60 @@
+#pragma once
+
+#include <algorithm>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "app/frame.h"
+
+namespace hpr {
+
+/// Screens cut into the blocks that are rasterised at once; most screens are one block.
+struct Blocks {
+  std::vector<View> views;             ///< one per block: the screens of the frame's layout
+  std::vector<std::size_t> screen_of;  ///< per block
+};
+
+[[nodiscard]] Blocks cut_blocks(std::span<const View> screens);
+
+/// Per block the rank that shows its screen.
+[[nodiscard]] std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_by);
+
+/// One screen's pixels, put together from its blocks.
+template <typename Pixel>
+[[nodiscard]] Image<Pixel> join_blocks(const TileLayer<Pixel>& layer, const Blocks& blocks, std::size_t screen) {
+  Image<Pixel> image;
+  for (std::size_t block = 0; block < blocks.views.size(); ++block) {
+    if (blocks.screen_of[block] != screen) continue;
+    const View& view = blocks.views[block];
+    if (image.size() != view.screen) image = Image<Pixel>(view.screen);
+    const Image<Pixel> part = to_image(layer, block);
+    if (part.size() == image.size()) return part;
+    for (int y = 0; y < part.height(); ++y) {
+      std::ranges::copy(part.row(y), image.row(view.block.y0 + y).begin() + view.block.x0);
+    }
+  }
+  return image;
+}
+
+/// A frame's tiles as display colours.
+[[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads);
+
+/// What a run of frames took, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
+struct RunStats {
+  double ms = 0.0;  ///< one frame, slowest rank
+  std::vector<std::string> plan;
+  std::vector<PassPlan> passes;
+  std::vector<PassTime> times;  ///< of each pass that ran: the slowest rank
+  RayCounts rays;               ///< summed over ranks
+  std::size_t bytes_sent = 0;   ///< summed over ranks
+  std::vector<std::uint64_t> memory_peak_bytes;  ///< per rank
+  int ranks = 1;
+};
+
+/// Collective. What the session's last frame took, on every rank.
+[[nodiscard]] RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, double frame_ms);
+
+void write_stats(const std::filesystem::path& path, const RunStats& stats);
+
+}  // namespace hpr

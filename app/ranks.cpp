@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+#include <mpi.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <optional>
+#include <thread>
+
+#include "app/command.h"
+#include "app/launcher.h"
+#include "app/report_error.h"
+#include "cluster/collectives.h"
+#include "cluster/local_communicator.h"
+#include "cluster/mpi_communicator.h"
+#include "core/log.h"
+
+namespace hpr {
+namespace {
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+/// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 speaks first, so that an
+/// error all ranks agreed on is printed once.
+[[noreturn]] void abort_job(int rank, const Error& error) {
+  if (rank != 0) std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  print_error(error, rank == 0 ? "" : fmt::format("rank {} on {}: ", rank, host_name()));
+  std::fflush(nullptr);
+  MPI_Abort(MPI_COMM_WORLD, static_cast<int>(error.code()));
+  std::abort();  // MPI_Abort does not return
+}
+
+/// MPI_Init and, on success only, MPI_Finalize: a rank that left early would hang in it.
+ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
+  int provided = 0;
+  MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  ExitCode code = ExitCode::Done;
+  try {
+    MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
+    if (globals.ranks > 0 && globals.ranks != comm.size()) {
+      throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
+                  "leave --ranks out under mpirun or srun: the launcher sets the number");
+    }
+    if (rank != 0) {
+      log::configure(globals.verbosity >= 2 ? log::Level::Debug : log::Level::Error, fmt::format("rank {} on {}: ", rank, host_name()));
+    }
+    for (const ExitCode vote : all_gather_value(comm, body(comm))) code = std::max(code, vote);
+  } catch (const Error& error) {
+    abort_job(rank, error);
+  } catch (const std::bad_alloc&) {
+    abort_job(rank, Error(ExitCode::Limit, "out of memory", "use more ranks, a smaller picture or a smaller scene"));
+  } catch (const std::exception& error) {
+    abort_job(rank, Error(ExitCode::Internal, error.what()));
+  }
+  MPI_Finalize();
+  return code;
+}
+
+}  // namespace
+
+HostShare host_share(Communicator& comm, const Globals& globals) {
+  const std::string mine = host_name();
+  HostShare share;
+  share.host = mine;
+  int ranks_here = 0;
+  const auto hosts = all_gather(comm, std::as_bytes(std::span(mine)));
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    if (!std::ranges::equal(hosts[static_cast<std::size_t>(rank)], std::as_bytes(std::span(mine)))) continue;
+    if (rank < comm.rank()) ++share.local_rank;
+    ++ranks_here;
+  }
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  share.threads = globals.threads > 0 ? globals.threads : std::max(1, cores / ranks_here);
+  return share;
+}
+
+ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
+  if (inside_mpi_job()) return run_in_mpi_job(globals, body);
+  if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args));
+  ExitCode code = ExitCode::Done;
+  run_local_ranks(1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());
+  return code;
+}
+
+}  // namespace hpr

@@ -1,0 +1,117 @@
+#include "app/render_command.h"
+
+#include <fmt/format.h>
+
+#include "app/output.h"
+#include "app/render_options.h"
+#include "cluster/scene_distribution.h"
+#include "compositing/assembly.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/stopwatch.h"
+#include "core/units.h"
+#include "image/image_io.h"
+
+namespace hpr {
+namespace {
+
+class RenderCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "render"; }
+  [[nodiscard]] std::string_view summary() const override { return "draw a scene into a picture"; }
+
+  void declare(CLI::App& app) override {
+    app.add_option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+    app.add_option("-o,--output", output_, "the picture: .png or .exr");
+    app.add_option("--size", size_, "pixels of the picture")->capture_default_str()->type_name("WxH");
+    app.add_option("--raw", raw_, "write the keys: per pixel a 64-bit word, depth above surface, row 0 at the top");
+    options_.declare(app);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    const auto extent = parse_extent(size_);
+    if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
+    const Size size{extent->first, extent->second};
+    check_size(size, globals);
+    check_outputs(globals);
+    const FrameSettings settings = options_.settings(globals);
+    return run_ranks(globals, [&](Communicator& comm) {
+      Session session(comm, globals, [&] { return load_scene(source_, globals.scene_limits()); });
+      return draw(session, settings, size);
+    });
+  }
+
+ private:
+  static void check_size(Size size, const Globals& globals) {
+    const ImageLimits defaults{.side = 1 << 20, .pixels = std::uint64_t{1} << 31U};
+    const ImageLimits limits = globals.limit_image.empty() ? defaults : globals.scene_limits().image;
+    if (size.width > limits.side || size.height > limits.side || size.area() > limits.pixels) {
+      throw Error(ExitCode::Limit, fmt::format("a picture of {}x{} pixels is beyond the limit", size.width, size.height),
+                  "draw a smaller one, or raise --limit-image");
+    }
+  }
+
+  void check_outputs(const Globals& globals) const {
+    if (output_.empty() && raw_.empty() && options_.stats.empty() && !options_.explain) {
+      throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");
+    }
+    if (!output_.empty() && !output_.ends_with(".png") && !output_.ends_with(".exr")) {
+      throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", output_), "name a .png or .exr file");
+    }
+    for (const std::string& path : {output_, raw_, options_.stats}) {
+      if (!path.empty()) check_writable(path, globals.force);
+    }
+  }
+
+  ExitCode draw(Session& session, const FrameSettings& settings, Size size) {
+    const View view = make_view(options_.choose_camera(session.scene()), size, session.scene().bounds);
+    const Blocks blocks = cut_blocks(std::span(&view, 1));
+    FramePlan plan = plan_frame(session, settings, blocks.views);
+    plan.lit = !output_.empty() || !options_.stats.empty();
+    const bool speaks = session.comm().rank() == 0;
+    if (options_.explain && speaks) {
+      for (const std::string& line : plan.explained) fmt::print("{}\n", line);
+    }
+    if (output_.empty() && raw_.empty() && options_.stats.empty()) return ExitCode::Done;
+
+    const Stopwatch watch;
+    FrameTimes times;
+    Frame frame = make_frame(session, plan, blocks.views, &times);
+    const std::vector<int> to_root(blocks.views.size(), 0);
+    if (!output_.empty()) assemble<Rgb>(session.comm(), frame.radiance, frame.owned, to_root);
+    if (!raw_.empty()) assemble<Key>(session.comm(), *frame.keys, frame.owned, to_root);
+    const double frame_ms = watch.ms();
+    const RunStats stats = gather_stats(session, plan, times, frame_ms);
+    agree_on_failure(session.comm(), [&] {
+      if (speaks) write(session, plan, blocks, frame, stats);
+    });
+    if (speaks) log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms", session.scene().triangles, size.width, size.height, stats.ranks, stats.ms);
+    return ExitCode::Done;
+  }
+
+  void write(const Session& session, const FramePlan& plan, const Blocks& blocks, const Frame& frame, const RunStats& stats) const {
+    if (!raw_.empty()) {
+      const Image<Key> keys = join_blocks(*frame.keys, blocks, 0);
+      write_file_atomically(raw_, std::as_bytes(keys.pixels()));
+    }
+    if (!output_.empty()) {
+      write_image(output_, join_blocks(frame.radiance, blocks, 0),
+                  {{"hpr:scene", session.scene().name}, {"hpr:distribution", std::string(name_of(plan.distribution))}});
+    }
+    if (!options_.stats.empty()) write_stats(options_.stats, stats);
+  }
+
+  std::string source_;
+  std::string output_;
+  std::string size_ = "1280x720";
+  std::string raw_;
+  RenderOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_render_command() {
+  return std::make_unique<RenderCommand>();
+}
+
+}  // namespace hpr

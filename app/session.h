@@ -1,0 +1,65 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "app/command.h"
+#include "cluster/assignment.h"
+#include "cluster/counting_communicator.h"
+#include "raster/gl_context.h"
+#include "raster/rasterizer.h"
+#include "rt/lighter.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// What stays resident while frames follow one another: the scene, the GL context, geometry on the GPU, the ray scene, the
+/// frame's memory. One per rank; construction is collective.
+class Session {
+ public:
+  /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
+  Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load);
+
+  [[nodiscard]] CountingCommunicator& comm() { return comm_; }
+  [[nodiscard]] const Scene& scene() const { return scene_; }
+  [[nodiscard]] int threads() const { return share_.threads; }
+  [[nodiscard]] const GlContext& gl() const { return *gl_; }
+
+  /// The rasteriser that holds `objects`; kept until other objects are asked for.
+  [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
+  /// The lighter of these settings; kept until others are asked for.
+  [[nodiscard]] Lighter& lighter(const RaySettings& settings);
+  /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the group.
+  [[nodiscard]] CountingCommunicator& group(std::span<const int> members);
+  /// A cleared layer of keys of this layout, reused from frame to frame.
+  [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout);
+
+  /// Bytes this rank sent so far, to all ranks and inside its group.
+  [[nodiscard]] std::size_t bytes_sent() const;
+
+ private:
+  void compare_rasterizers();
+
+  /// One group's communicator and its counter.
+  struct Group {
+    std::vector<int> members;
+    std::unique_ptr<Communicator> comm;
+    std::unique_ptr<CountingCommunicator> counting;
+  };
+
+  CountingCommunicator comm_;
+  HostShare share_;
+  Scene scene_;
+  std::unique_ptr<GlContext> gl_;
+  std::vector<SurfaceRange> objects_;
+  std::unique_ptr<Rasterizer> rasterizer_;
+  std::optional<RaySettings> ray_settings_;
+  std::unique_ptr<Lighter> lighter_;
+  Group group_;
+  std::size_t bytes_of_past_groups_ = 0;
+  TileLayer<Key> keys_;
+};
+
+}  // namespace hpr

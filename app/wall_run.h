@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "app/command.h"
+#include "app/render_options.h"
+#include "walls/display.h"
+#include "walls/wall.h"
+
+namespace hpr {
+
+/// Driving a wall from a scene, as `wall run` and `demo --wall` do it.
+struct WallRun {
+  std::string scene;
+  std::string wall;
+  std::string display = "file";
+  std::string folder;   ///< where the file display writes
+  std::string picture;  ///< the assembled wall goes here too; empty: only into the folder
+  double scale = 1.0;   ///< of the screens' pixels
+  int frames = 1;
+  bool summary = false;  ///< say on stdout what each pass did
+  RenderOptions options;
+};
+
+/// Checks what can be checked alone, then draws on all ranks.
+[[nodiscard]] ExitCode run_wall(const WallRun& run, const Globals& globals);
+
+/// `hpr wall run WALL SCENE`.
+[[nodiscard]] std::unique_ptr<Command> make_wall_run_command();
+
+}  // namespace hpr
