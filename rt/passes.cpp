@@ -1,0 +1,43 @@
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "rt/pass.h"
+
+namespace hpr {
+
+std::vector<std::unique_ptr<Pass>> make_all_passes() {
+  std::vector<std::unique_ptr<Pass>> passes;
+  passes.push_back(make_shadow_pass());
+  passes.push_back(make_reflection_pass());
+  return passes;
+}
+
+std::vector<std::string> all_pass_names() {
+  std::vector<std::string> names;
+  for (const auto& pass : make_all_passes()) names.emplace_back(pass->name());
+  return names;
+}
+
+std::vector<PassPlan> plan_passes(const Scene& scene, const RaySettings& settings) {
+  const std::vector<std::string> names = all_pass_names();
+  for (const std::string& wanted : settings.passes) {
+    if (std::ranges::find(names, wanted) == names.end()) {
+      throw Error(ExitCode::Usage, "no ray pass is called '" + printable(wanted) + "'",
+                  unknown_name_hint(wanted, names));
+    }
+  }
+  const Requirements requirements = requirements_of(scene);
+  std::vector<PassPlan> plan;
+  for (const auto& pass : make_all_passes()) {
+    const std::string name(pass->name());
+    const Requirement& requirement = pass->requirement(requirements);
+    const bool named = std::ranges::find(settings.passes, name) != settings.passes.end();
+    const bool wanted = named || (settings.passes.empty() && settings.auto_passes);
+    plan.push_back(
+        {name, wanted && requirement.needed, wanted ? requirement.why : "not asked for: " + requirement.why});
+  }
+  return plan;
+}
+
+}  // namespace hpr

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "rt/ray_space.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+inline constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
+
+/// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
+class RayBatch {
+ public:
+  void clear() { size_ = 0; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach);
+
+ private:
+  friend class RayScene;
+  static constexpr std::size_t kWidth = 16;
+  /// Sixteen rays as Embree reads them.
+  struct alignas(64) Packet {
+    float origin[3][kWidth];
+    float direction[3][kWidth];
+    float reach[kWidth];
+  };
+
+  std::size_t size_ = 0;
+  std::vector<Packet> packets_;
+};
+
+/// The scene as Embree holds it: meshes used once go in as world triangles, shared ones as instances of a sub-scene.
+///
+/// Answers do not depend on thread counts or on which rays share a packet; of surfaces at equal distance the lowest id
+/// is found, as in keys. A ray that Embree could not bear (not finite, beyond 1.8e18) misses and is counted.
+class RayScene {
+ public:
+  /// Builds with `threads` threads. The scene may go afterwards. Throws Error (NoDevice) when Embree fails.
+  RayScene(const Scene& scene, const RaySpace& space, int threads);
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  /// blocked[i] = 1 where something stands between ray i's origin and its reach. Returns how many rays were invalid.
+  std::uint64_t occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+
+  /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
+  std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces) const;
+
+  /// Triangles left out because their world positions are beyond what float holds.
+  [[nodiscard]] std::uint64_t skipped_triangles() const;
+
+ private:
+  struct Embree;
+  std::unique_ptr<Embree> embree_;
+};
+
+/// True where Embree holds instance i of the scene as an instance of a shared mesh. Singular and strongly distorting
+/// placements are never shared: a ray carried into their coordinates would lose its digits.
+[[nodiscard]] std::vector<std::uint8_t> shared_instances(const Scene& scene);
+
+/// How much larger rounding gets when a point is carried into an instance's coordinates and back: the row sum norm of
+/// |A| |A^-1|, A its linear part; infinite when singular.
+[[nodiscard]] double distortion(const glm::dmat3& linear);
+
+}  // namespace hpr

@@ -1,0 +1,156 @@
+#include "rt/surfaces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "core/check.h"
+#include "rt/ray_scene.h"
+
+namespace hpr {
+namespace {
+
+double largest(const glm::dvec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// `v` at unit length; `otherwise` where it has none. Scaled first, so that tiny and huge vectors keep their direction.
+glm::dvec3 unit(const glm::dvec3& v, const glm::dvec3& otherwise) {
+  const double size = largest(v);
+  if (!(size > 0.0) || !finite(v)) return otherwise;
+  return glm::normalize(v / size);
+}
+
+/// The cross product of two vectors scaled to size one, so that it neither over- nor underflows.
+glm::dvec3 direction_of_cross(const glm::dvec3& a, const glm::dvec3& b) {
+  const double sa = largest(a);
+  const double sb = largest(b);
+  if (!(sa > 0.0) || !(sb > 0.0)) return glm::dvec3(0.0);
+  return unit(glm::cross(a / sa, b / sb), glm::dvec3(0.0));
+}
+
+glm::dmat3 cofactors(const glm::dmat3& m) {
+  return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
+}
+
+double row_sum_norm(const glm::dmat3& m) {
+  double norm = 0.0;
+  for (int row = 0; row < 3; ++row)
+    norm = std::max(norm, std::abs(m[0][row]) + std::abs(m[1][row]) + std::abs(m[2][row]));
+  return norm;
+}
+
+/// Moves barycentric coordinates onto the triangle; the middle where they are undefined (a triangle seen edge-on).
+glm::dvec2 onto_triangle(double u, double v) {
+  if (!std::isfinite(u) || !std::isfinite(v)) return glm::dvec2(1.0 / 3.0);
+  u = std::max(u, 0.0);
+  v = std::max(v, 0.0);
+  const double sum = u + v;
+  if (sum > 1.0) {
+    u /= sum;
+    v /= sum;
+  }
+  return {u, v};
+}
+
+}  // namespace
+
+Surfaces::Surfaces(const Scene& scene, const RaySpace& space) : scene_(scene), space_(space) {
+  std::vector<double> mesh_reach(scene.meshes.size(), 0.0);
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    for (const glm::vec3& p : scene.meshes[i].positions)
+      mesh_reach[i] = std::max(mesh_reach[i], largest(glm::dvec3(p)));
+  }
+  const std::vector<std::uint8_t> shared = shared_instances(scene);
+  placed_.resize(scene.instances.size());
+  for (std::size_t i = 0; i < placed_.size(); ++i) {
+    const glm::dmat4& to_world = scene.instances[i].to_world;
+    const glm::dmat3 linear(to_world);
+    placed_[i].normal_matrix = cofactors(linear / std::max(row_sum_norm(linear), 1e-300));
+    if (shared[i] == 0) continue;
+    placed_[i].distortion = distortion(linear);
+    placed_[i].reach = row_sum_norm(linear) * mesh_reach[scene.instances[i].mesh] +
+                       placed_[i].distortion * largest(glm::dvec3(to_world[3]) - space.origin);
+  }
+}
+
+void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
+  HPR_CHECK(id < scene_.triangles);  // keys come from other ranks: a wrong one must not pass for a picture
+  if (triangle.surface == id) return;
+  const Instance* instance = &scene_.instances[triangle.instance];
+  if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangles.size()) {
+    triangle.index = id - instance->first_surface;
+  } else {
+    const SurfacePlace place = locate_surface(scene_, id);
+    triangle.instance = place.instance;
+    triangle.index = place.triangle;
+    instance = &scene_.instances[place.instance];
+  }
+  triangle.surface = id;
+  const Mesh& mesh = scene_.mesh_of(*instance);
+  const Placed& placed = placed_[triangle.instance];
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  triangle.v0 = world_position(*instance, mesh.positions[corners.x]);
+  // Edges come from differences of the mesh's own coordinates: a far translation does not round them.
+  const glm::dmat3 linear(instance->to_world);
+  const glm::dvec3 p0(mesh.positions[corners.x]);
+  triangle.e1 = linear * (glm::dvec3(mesh.positions[corners.y]) - p0);
+  triangle.e2 = linear * (glm::dvec3(mesh.positions[corners.z]) - p0);
+  triangle.normal = direction_of_cross(triangle.e1, triangle.e2);
+  for (int corner = 0; corner < 3; ++corner) {
+    triangle.normals[static_cast<std::size_t>(corner)] =
+        unit(placed.normal_matrix * glm::dvec3(mesh.normals[corners[corner]]), triangle.normal);
+  }
+  const double place = largest(triangle.v0 - space_.origin);
+  const double extent = std::max(largest(triangle.e1), largest(triangle.e2));
+  const double world = place + extent;
+  triangle.offset = kOriginSteps * kFloatStep * std::max(world, placed.distortion * world + placed.reach);
+}
+
+SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,
+                            const glm::dvec3& direction) const {
+  // Moeller and Trumbore 1997, relative to the ray's origin.
+  const glm::dvec3 from_v0 = origin - triangle.v0;
+  const glm::dvec3 p = glm::cross(direction, triangle.e2);
+  const glm::dvec3 q = glm::cross(from_v0, triangle.e1);
+  const double determinant = glm::dot(triangle.e1, p);
+  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(direction, q) / determinant);
+  const double b0 = 1.0 - at.x - at.y;
+
+  SurfacePoint point;
+  point.position = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
+  point.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
+  point.geometric_normal = glm::dot(triangle.normal, point.to_viewer) < 0.0 ? -triangle.normal : triangle.normal;
+  const auto& corner = triangle.normals;
+  const glm::dvec3 smooth = unit(b0 * corner[0] + at.x * corner[1] + at.y * corner[2], triangle.normal);
+  const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  point.shading_normal = side * smooth;
+
+  // Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, chapter 4: the origin is lifted to where the corners'
+  // tangent planes are, as far as they lie above the triangle.
+  const glm::dvec3 in_triangle = at.x * triangle.e1 + at.y * triangle.e2;
+  const std::array<glm::dvec3, 3> from_corner{in_triangle, in_triangle - triangle.e1, in_triangle - triangle.e2};
+  const std::array<double, 3> weight{b0, at.x, at.y};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3 normal = side * corner[i];
+    point.lift -= weight[i] * std::min(0.0, glm::dot(from_corner[i], normal)) * normal;
+  }
+  point.offset = triangle.offset;
+
+  const Mesh& mesh = scene_.mesh_of(scene_.instances[triangle.instance]);
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  for (std::size_t set = 0; set < point.uv.size(); ++set) {
+    const auto& uvs = mesh.uvs[set];
+    if (uvs.empty()) continue;
+    point.uv[set] = glm::vec2(b0 * glm::dvec2(uvs[corners.x]) + at.x * glm::dvec2(uvs[corners.y]) +
+                              at.y * glm::dvec2(uvs[corners.z]));
+  }
+  point.material = mesh.material;
+  return point;
+}
+
+}  // namespace hpr

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "rt/ray_space.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// A triangle of the scene in world coordinates.
+struct WorldTriangle {
+  std::uint32_t surface = 0xFFFFFFFFU;
+  std::uint32_t instance = 0;
+  std::uint32_t index = 0;  ///< in the instance's mesh
+  glm::dvec3 v0{0.0};
+  glm::dvec3 e1{0.0};
+  glm::dvec3 e2{0.0};
+  glm::dvec3 normal{0.0};               ///< unit length, by the winding; zero when the triangle has no area
+  std::array<glm::dvec3, 3> normals{};  ///< unit length, of the corners
+  double offset = 0.0;                  ///< metres by which ray origins must leave it
+};
+
+/// Where a ray meets a surface, and all that shading asks of the place. World coordinates, metres.
+struct SurfacePoint {
+  glm::dvec3 position{0.0};          ///< v0 + u e1 + v e2
+  glm::dvec3 to_viewer{0.0};         ///< unit length, against the ray
+  glm::dvec3 geometric_normal{0.0};  ///< unit length, on the viewer's side
+  glm::dvec3 shading_normal{0.0};    ///< unit length, interpolated, on the geometric normal's side
+  /// Lifts the origin of shadow rays onto the smooth surface the normals pretend (zero on flat ones).
+  glm::dvec3 lift{0.0};
+  double offset = 0.0;  ///< metres by which ray origins must leave the surface along the geometric normal
+  std::array<glm::vec2, 2> uv{};
+  std::uint32_t material = 0;
+};
+
+/// Surface ids -> triangles -> points. Keeps per instance what every one of its triangles needs.
+class Surfaces {
+ public:
+  /// The scene must outlive this.
+  Surfaces(const Scene& scene, const RaySpace& space);
+
+  /// Sets `triangle` to surface `id` unless it already is; neighbouring pixels mostly share theirs, or the instance.
+  void load(std::uint32_t id, WorldTriangle& triangle) const;
+
+  /// The point where the ray meets the triangle's plane, moved onto the triangle when it lies outside (a pixel's centre
+  /// may miss a triangle it was given by a hair). Exact to double rounding: nothing is read from depths.
+  [[nodiscard]] SurfacePoint meet(const WorldTriangle& triangle, const glm::dvec3& origin,
+                                  const glm::dvec3& direction) const;
+
+ private:
+  struct Placed {
+    glm::dmat3 normal_matrix{
+        1.0};                 ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
+    double distortion = 0.0;  ///< 0: not instanced in the ray scene
+    double reach = 0.0;       ///< metres: |A| |vertex| + distortion |translation| of the instanced mesh
+  };
+
+  const Scene& scene_;
+  RaySpace space_;
+  std::vector<Placed> placed_;
+};
+
+}  // namespace hpr

@@ -1,0 +1,71 @@
+#include "rt/texture.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hpr {
+namespace {
+
+/// A coordinate brought into [0, 1] by the wrap mode, before it is scaled to texels: huge values lose nothing more.
+double wrapped(double coordinate, Wrap wrap) {
+  if (!std::isfinite(coordinate)) return 0.0;
+  switch (wrap) {
+    case Wrap::ClampToEdge:
+      return std::clamp(coordinate, 0.0, 1.0);
+    case Wrap::MirroredRepeat: {
+      const double in_period = coordinate - 2.0 * std::floor(0.5 * coordinate);
+      return in_period > 1.0 ? 2.0 - in_period : in_period;
+    }
+    case Wrap::Repeat:
+      break;
+  }
+  return coordinate - std::floor(coordinate);
+}
+
+/// The texel that stands at `index`, at most one beyond an edge.
+int texel_index(int index, int count, Wrap wrap) {
+  if (index < 0) return wrap == Wrap::Repeat ? count - 1 : 0;
+  if (index >= count) return wrap == Wrap::Repeat ? 0 : count - 1;
+  return index;
+}
+
+glm::dvec4 decoded(Rgba8 texel, Encoding encoding) {
+  constexpr double kLevel = 1.0 / 255.0;
+  if (encoding == Encoding::Srgb) {
+    return {srgb_to_linear(texel.r), srgb_to_linear(texel.g), srgb_to_linear(texel.b), texel.a * kLevel};
+  }
+  return glm::dvec4(texel.r, texel.g, texel.b, texel.a) * kLevel;
+}
+
+}  // namespace
+
+glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 uv) {
+  const Size size = texture.image.size();
+  if (size.area() == 0) return glm::dvec4(1.0);
+  const double s = wrapped(uv.x, texture.wrap_s) * size.width;
+  const double t = wrapped(uv.y, texture.wrap_t) * size.height;
+  const auto texel = [&](int x, int y) {
+    return decoded(
+        texture.image.at(texel_index(x, size.width, texture.wrap_s), texel_index(y, size.height, texture.wrap_t)),
+        encoding);
+  };
+  if (texture.nearest) return texel(static_cast<int>(s), static_cast<int>(t));
+  const double x = std::floor(s - 0.5);
+  const double y = std::floor(t - 0.5);
+  const double fx = s - 0.5 - x;
+  const double fy = t - 0.5 - y;
+  const int x0 = static_cast<int>(x);
+  const int y0 = static_cast<int>(y);
+  const glm::dvec4 upper = texel(x0, y0) * (1.0 - fx) + texel(x0 + 1, y0) * fx;
+  const glm::dvec4 lower = texel(x0, y0 + 1) * (1.0 - fx) + texel(x0 + 1, y0 + 1) * fx;
+  return upper * (1.0 - fy) + lower * fy;
+}
+
+glm::dvec2 transformed_uv(const TextureRef& reference, const glm::vec2& uv) {
+  const auto& m = reference.transform;
+  const double u = uv.x;
+  const double v = uv.y;
+  return {m[0] * u + m[2] * v + m[4], m[1] * u + m[3] * v + m[5]};
+}
+
+}  // namespace hpr
