@@ -1,0 +1,35 @@
+#include "compositing/compositor.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "compositing/binary_swap.h"
+#include "compositing/mpi_reduce.h"
+#include "compositing/serial.h"
+#include "compositing/tree.h"
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+
+std::vector<std::unique_ptr<Compositor>> all_compositors() {
+  std::vector<std::unique_ptr<Compositor>> all;
+  all.push_back(std::make_unique<Serial>());
+  all.push_back(std::make_unique<Tree>());
+  all.push_back(std::make_unique<BinarySwap>());
+  all.push_back(std::make_unique<MpiReduce>());
+  return all;
+}
+
+std::unique_ptr<Compositor> make_compositor(std::string_view name) {
+  std::vector<std::string> choices;
+  for (auto& compositor : all_compositors()) {
+    if (compositor->name() == name) return std::move(compositor);
+    choices.emplace_back(compositor->name());
+  }
+  throw Error(ExitCode::Usage, fmt::format("no compositing strategy is named '{}'", printable(name)),
+              unknown_name_hint(printable(name), choices));
+}
+
+}  // namespace hpr

@@ -1,0 +1,116 @@
+#include "compositing/compositor.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <mutex>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "cluster/local_communicator.h"
+#include "compositing/test_layers.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// The promises of Compositor::composite, held against every strategy. A new strategy is tested by being listed.
+class CompositorTest : public testing::TestWithParam<std::tuple<std::string, int>> {
+ protected:
+  std::unique_ptr<Compositor> compositor_ = make_compositor(std::get<0>(GetParam()));
+  int ranks_ = std::get<1>(GetParam());
+};
+
+TEST_P(CompositorTest, RunsPartitionTheTilesAndHoldTheSerialMaximum) {
+  ASSERT_TRUE(compositor_->fits(ranks_));
+  std::size_t number = 0;
+  for (const auto& [layout, tiles] : test::awkward_tile_lists()) {
+    SCOPED_TRACE("tile list " + std::to_string(number++));
+    const std::vector<Key> expected = test::expected_keys(ranks_, layout);
+    std::vector<int> owners(tiles.size(), 0);
+    std::size_t wrong_keys = 0;
+    std::size_t hidden_tiles = 0;  // hold keys but are not marked as active: they would be lost on the way to a screen
+    std::mutex mutex;
+    run_local_ranks(ranks_, [&, &tiles = tiles, &layout = layout](Communicator& comm) {
+      TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
+      const TileRun mine = compositor_->composite(comm, layer, tiles);
+      const std::lock_guard lock(mutex);
+      ASSERT_LE(mine.end(), tiles.size());
+      for (std::size_t i = mine.first; i < mine.end(); ++i) {
+        ++owners[i];
+        const auto keys = layer.tile(tiles[i]);
+        for (std::size_t p = 0; p < kTilePixels; ++p) {
+          wrong_keys += keys[p] == expected[tiles[i] * kTilePixels + p] ? 0U : 1U;
+        }
+      }
+      for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+        if (!layer.active(tile) && std::ranges::any_of(layer.tile(tile), [](Key key) { return key != kNoKey; })) {
+          ++hidden_tiles;
+        }
+      }
+    });
+    EXPECT_EQ(std::ranges::count(owners, 1), static_cast<std::ptrdiff_t>(tiles.size()));
+    EXPECT_EQ(wrong_keys, 0U);
+    EXPECT_EQ(hidden_tiles, 0U);
+  }
+}
+
+TEST_P(CompositorTest, LeavesTilesThatAreNotListedAlone) {
+  const FrameLayout layout({{200, 70}, {65, 65}});
+  const std::vector<std::size_t> tiles{1, 2, 5, 8};
+  run_local_ranks(ranks_, [&](Communicator& comm) {
+    TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
+    const TileLayer<Key> before = test::random_layer(comm.rank(), layout);
+    (void)compositor_->composite(comm, layer, tiles);
+    for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+      if (std::ranges::binary_search(tiles, tile)) continue;
+      EXPECT_EQ(layer.active(tile), before.active(tile));
+      EXPECT_TRUE(std::ranges::equal(layer.tile(tile), before.tile(tile)));
+    }
+  });
+}
+
+TEST_P(CompositorTest, EqualLayersGiveThatLayer) {
+  const FrameLayout layout({{130, 70}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const TileLayer<Key> same = test::random_layer(0, layout);
+  run_local_ranks(ranks_, [&](Communicator& comm) {
+    TileLayer<Key> layer = test::random_layer(0, layout);
+    const TileRun mine = compositor_->composite(comm, layer, tiles);
+    for (std::size_t i = mine.first; i < mine.end(); ++i) {
+      EXPECT_TRUE(std::ranges::equal(layer.tile(tiles[i]), same.tile(tiles[i])));
+    }
+  });
+}
+
+std::vector<std::string> every_strategy() {
+  std::vector<std::string> names;
+  for (const auto& compositor : all_compositors()) names.emplace_back(compositor->name());
+  return names;
+}
+
+std::string case_name(const testing::TestParamInfo<std::tuple<std::string, int>>& info) {
+  std::string name = std::get<0>(info.param) + "_" + std::to_string(std::get<1>(info.param)) + "_ranks";
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryStrategy, CompositorTest,
+                         testing::Combine(testing::ValuesIn(every_strategy()),
+                                          testing::Values(1, 2, 3, 4, 5, 7, 8, 12, 16, 17)),
+                         case_name);
+
+TEST(MakeCompositor, NamesTheNearestChoiceWhenThereIsNoSuchStrategy) {
+  try {
+    (void)make_compositor("binray-swap");
+    FAIL() << "expected an Error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Usage);
+    EXPECT_STREQ(error.what(), "no compositing strategy is named 'binray-swap'");
+    EXPECT_EQ(error.hint(), "did you mean 'binary-swap'? choices: serial, tree, binary-swap, mpi-reduce");
+  }
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "compositing/compositor.h"
+
+namespace hpr {
+
+/// Every rank sends its layer to rank 0, which merges them in order of rank: the floor any other strategy must beat.
+/// Known as direct send to one rank, and as the naive sort-last of Molnar, Cox, Ellsworth and Fuchs, "A Sorting
+/// Classification of Parallel Rendering", 1994.
+///
+/// Cost: rank 0 receives and merges (P - 1) N keys one after the other; the others send one message of N keys.
+class Serial final : public Compositor {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "serial"; }
+  TileRun composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const override;
+};
+
+}  // namespace hpr

@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+#include <mpi.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "cluster/mpi_communicator.h"
+#include "compositing/assembly.h"
+#include "compositing/compositor.h"
+#include "compositing/test_layers.h"
+
+// Run by ctest under mpiexec with 1 to 5 ranks. Every rank checks its own piece, so no gather can hide a fault.
+// EXPECT, never ASSERT, between collectives: a rank that returns early leaves its peers waiting.
+namespace hpr {
+namespace {
+
+std::size_t wrong_tiles(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                        const std::vector<Key>& expected) {
+  return static_cast<std::size_t>(std::ranges::count_if(tiles, [&](std::size_t tile) {
+    return !std::ranges::equal(layer.tile(tile), std::span(expected).subspan(tile * kTilePixels, kTilePixels));
+  }));
+}
+
+TEST(MpiCompositing, EveryStrategyHoldsTheSerialMaximum) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  for (const auto& [layout, tiles] : test::awkward_tile_lists()) {
+    const std::vector<Key> expected = test::expected_keys(comm.size(), layout);
+    for (const auto& compositor : all_compositors()) {
+      TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
+      const TileRun mine = compositor->composite(comm, layer, tiles);
+      EXPECT_EQ(wrong_tiles(layer, std::span(tiles).subspan(mine.first, mine.count), expected), 0U)
+          << compositor->name();
+    }
+  }
+}
+
+TEST(MpiCompositing, PiecesOfMegabytesReachSeveralScreens) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  const FrameLayout layout({{700, 500}, {700, 500}, {333, 217}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<Key> expected = test::expected_keys(comm.size(), layout);
+  const std::vector<int> shown_by{0, comm.size() - 1, comm.size() / 2};
+  for (const auto& compositor : all_compositors()) {
+    TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
+    const TileRun mine = compositor->composite(comm, layer, tiles);
+    assemble(comm, layer, std::span(tiles).subspan(mine.first, mine.count), shown_by);
+    const std::vector<std::size_t> shown = tiles_shown(layout, shown_by, comm.rank());
+    EXPECT_EQ(wrong_tiles(layer, shown, expected), 0U) << compositor->name();
+  }
+}
+
+/// What ranks other than the first print: their failures, and nothing else.
+class FailurePrinter final : public testing::EmptyTestEventListener {
+ public:
+  explicit FailurePrinter(int rank) : rank_(rank) {}
+
+  void OnTestPartResult(const testing::TestPartResult& result) override {
+    if (!result.failed()) return;
+    std::fprintf(stderr, "rank %d: %s:%d: %s\n", rank_, result.file_name(), result.line_number(), result.message());
+  }
+
+ private:
+  int rank_;
+};
+
+}  // namespace
+}  // namespace hpr
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  testing::InitGoogleTest(&argc, argv);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  auto& listeners = testing::UnitTest::GetInstance()->listeners();
+  if (rank != 0) {
+    delete listeners.Release(listeners.default_result_printer());
+    listeners.Append(new hpr::FailurePrinter(rank));  // the list owns it
+  }
+  int failed = RUN_ALL_TESTS();
+  MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  MPI_Finalize();
+  return failed;
+}
