@@ -17,11 +17,14 @@ namespace {
 class BenchCommand final : public Command {
  public:
   [[nodiscard]] std::string_view name() const override { return "bench"; }
-  [[nodiscard]] std::string_view summary() const override { return "our speed beside a floor's or a peer's, as ratios"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "our speed beside a floor's or a peer's, as ratios";
+  }
 
   void declare(CLI::App& app) override {
     app.require_subcommand(1);
-    CLI::App* const raster = app.add_subcommand("raster", "a frame with raster only against a bare GL loop of the same mesh and readback");
+    CLI::App* const raster =
+        app.add_subcommand("raster", "a frame with raster only against a bare GL loop of the same mesh and readback");
     raster->add_flag("--json", json_, "one JSON document");
     raster->fallthrough();
   }
@@ -29,7 +32,8 @@ class BenchCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
     const int threads = globals.threads > 0 ? globals.threads : cores;
-    const auto context = make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
+    const auto context =
+        make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
     print(bench_raster(*context, threads), context->description());
     return ExitCode::Done;
   }
@@ -43,9 +47,11 @@ class BenchCommand final : public Command {
       }
       return;
     }
-    nlohmann::ordered_json json{{"schema", "hpr.bench/1"}, {"machine", machine}, {"commit", kCommit}, {"rows", nlohmann::json::array()}};
+    nlohmann::ordered_json json{
+        {"schema", "hpr.bench/1"}, {"machine", machine}, {"commit", kCommit}, {"rows", nlohmann::json::array()}};
     for (const BenchRow& row : rows) {
-      json["rows"].push_back({{"name", row.name}, {"ours", row.ours}, {"floor", row.floor}, {"unit", row.unit}, {"ratio", row.ratio}});
+      json["rows"].push_back(
+          {{"name", row.name}, {"ours", row.ours}, {"floor", row.floor}, {"unit", row.unit}, {"ratio", row.ratio}});
     }
     fmt::print("{}\n", json.dump(2));
   }

@@ -12,10 +12,14 @@ constexpr const char* kPicture = "hpr-demo.png";
 class DemoCommand final : public Command {
  public:
   [[nodiscard]] std::string_view name() const override { return "demo"; }
-  [[nodiscard]] std::string_view summary() const override { return "a wall picture of a built-in scene: does this machine work?"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "a wall picture of a built-in scene: does this machine work?";
+  }
 
   void declare(CLI::App& app) override {
-    app.add_option("--wall", wall_, "screens of the wall, e.g. 3x2 or 3x2@640x360")->capture_default_str()->type_name("CxR");
+    app.add_option("--wall", wall_, "screens of the wall, e.g. 3x2 or 3x2@640x360")
+        ->capture_default_str()
+        ->type_name("CxR");
     app.add_option("-o,--output", output_, "the assembled wall")->capture_default_str()->type_name("FILE.png");
   }
 

@@ -33,13 +33,15 @@ std::vector<std::size_t> composite(Session& session, const FramePlan& plan, Tile
 }
 
 /// The colours of keys that already carry them.
-void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, Rgb background, TileLayer<Rgb>& radiance) {
+void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, Rgb background,
+                   TileLayer<Rgb>& radiance) {
   for (const std::size_t tile : tiles) {
     const auto from = keys.tile(tile);
     const auto to = radiance.tile(tile);
     for (std::size_t i = 0; i < from.size(); ++i) {
       const Rgba8 color = from_word(key_rgba(from[i]));
-      to[i] = from[i] == kNoKey ? background : Rgb{srgb_to_linear(color.r), srgb_to_linear(color.g), srgb_to_linear(color.b)};
+      to[i] = from[i] == kNoKey ? background
+                                : Rgb{srgb_to_linear(color.r), srgb_to_linear(color.g), srgb_to_linear(color.b)};
     }
     radiance.set_active(tile);
   }

@@ -46,8 +46,8 @@ struct FramePlan {
 /// A finished frame, in the memory of the ranks that own its tiles.
 struct Frame {
   TileLayer<Key>* keys = nullptr;  ///< the session's, valid until its next frame
-  TileLayer<Rgb> radiance;               ///< of owned tiles
-  std::vector<std::size_t> owned;        ///< tiles this rank lit, ascending
+  TileLayer<Rgb> radiance;         ///< of owned tiles
+  std::vector<std::size_t> owned;  ///< tiles this rank lit, ascending
 };
 
 /// What a frame took on this rank, besides its ray passes (Lighter::times).
@@ -57,6 +57,7 @@ struct FrameTimes {
 };
 
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
-[[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times = nullptr);
+[[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,
+                               FrameTimes* times = nullptr);
 
 }  // namespace hpr

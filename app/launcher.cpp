@@ -32,8 +32,8 @@ constexpr std::array<std::pair<const char*, const char*>, 8> kEnvironment{{
 }};
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
-[[noreturn]] void become(const std::vector<char*>& arguments, const std::map<std::string, std::string>& extra_env, int stdout_pipe,
-                         pid_t parent) {
+[[noreturn]] void become(const std::vector<char*>& arguments, const std::map<std::string, std::string>& extra_env,
+                         int stdout_pipe, pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
   const int null = ::open("/dev/null", O_RDONLY);
@@ -97,7 +97,8 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   }
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
-  if (child < 0) throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
+  if (child < 0)
+    throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   if (child == 0) become(arguments, extra_env, pipe[1], parent);
 
   if (captured_stdout != nullptr) {

@@ -18,14 +18,16 @@ namespace {
 
 void declare_globals(CLI::App& app, Globals& globals) {
   const auto group = [](CLI::Option* option) { option->group("Everywhere"); };
-  group(app.add_flag_callback("-q,--quiet", [&] { globals.verbosity = -1; }, "errors only"));
+  group(app.add_flag_callback(
+      "-q,--quiet", [&] { globals.verbosity = -1; }, "errors only"));
   group(app.add_flag("-v,--verbose", globals.verbosity, "say more; twice: from all ranks"));
   group(app.add_option("--ranks", globals.ranks, "MPI ranks; hpr starts mpiexec itself")->check(CLI::Range(1, 4096)));
   group(app.add_option("--threads", globals.threads, "threads of one rank (default: cores / ranks of a host)")
             ->check(CLI::Range(1, 1024)));
   group(app.add_option("--seed", globals.seed, "of everything random")->capture_default_str());
   group(app.add_option("--backend", globals.backend, "OpenGL by: auto, egl, osmesa")->capture_default_str());
-  group(app.add_option("--device", globals.device, "EGL device (default: by local rank)")->check(CLI::NonNegativeNumber));
+  group(
+      app.add_option("--device", globals.device, "EGL device (default: by local rank)")->check(CLI::NonNegativeNumber));
   group(app.add_option("--progress", globals.progress, "auto, bar, line or none")
             ->check(CLI::IsMember({"auto", "bar", "line", "none"}))
             ->capture_default_str());
@@ -82,9 +84,13 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
   if (context != &app && !subcommands.empty() && context->get_require_subcommand_min() > 0) {
     std::vector<std::string> choices;
     for (const CLI::App* child : subcommands) choices.push_back(child->get_name());
-    const auto word = std::ranges::find_if(words.begin() + 1, words.end(), [](const std::string& w) { return !w.starts_with('-'); });
-    if (word == words.end()) return {ExitCode::Usage, fmt::format("{} needs a subcommand", command), fmt::format("choices: {}", fmt::join(choices, ", "))};
-    return {ExitCode::Usage, fmt::format("unknown subcommand '{} {}'", command, printable(*word)), unknown_name_hint(*word, choices)};
+    const auto word =
+        std::ranges::find_if(words.begin() + 1, words.end(), [](const std::string& w) { return !w.starts_with('-'); });
+    if (word == words.end())
+      return {ExitCode::Usage, fmt::format("{} needs a subcommand", command),
+              fmt::format("choices: {}", fmt::join(choices, ", "))};
+    return {ExitCode::Usage, fmt::format("unknown subcommand '{} {}'", command, printable(*word)),
+            unknown_name_hint(*word, choices)};
   }
   return {ExitCode::Usage, fmt::format("{}: {}", command, error.what()), help};
 }
@@ -130,7 +136,10 @@ ExitCode run(const std::vector<std::string>& words) {
   } catch (const CLI::ParseError& error) {
     throw usage_error(app, parsed, error);
   }
-  log::configure(globals.verbosity < 0 ? log::Level::Error : globals.verbosity == 0 ? log::Level::Info : log::Level::Debug, "");
+  log::configure(globals.verbosity < 0    ? log::Level::Error
+                 : globals.verbosity == 0 ? log::Level::Info
+                                          : log::Level::Debug,
+                 "");
   (void)globals.scene_limits();  // malformed sizes and durations are found before any work
   (void)globals.hang_limit();
   for (const auto& command : commands) {
@@ -151,7 +160,8 @@ SceneLimits Globals::scene_limits() const {
   }
   if (!limit_image.empty()) {
     const auto extent = parse_extent(limit_image);
-    if (!extent) throw Error(ExitCode::Usage, fmt::format("--limit-image: '{}' is no size", limit_image), "write e.g. 8192x8192");
+    if (!extent)
+      throw Error(ExitCode::Usage, fmt::format("--limit-image: '{}' is no size", limit_image), "write e.g. 8192x8192");
     limits.image.side = std::max(extent->first, extent->second);
     limits.image.pixels = static_cast<std::uint64_t>(extent->first) * static_cast<std::uint64_t>(extent->second);
   }
@@ -181,7 +191,8 @@ int main(int argc, char** argv) {
     hpr::print_error({hpr::ExitCode::Limit, "out of memory", "use a smaller picture or scene"});
     return static_cast<int>(hpr::ExitCode::Limit);
   } catch (const std::exception& error) {
-    hpr::print_error({hpr::ExitCode::Internal, error.what(), "this is a defect of hpr: please report it with the command line"});
+    hpr::print_error(
+        {hpr::ExitCode::Internal, error.what(), "this is a defect of hpr: please report it with the command line"});
     return static_cast<int>(hpr::ExitCode::Internal);
   }
 }

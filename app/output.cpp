@@ -77,23 +77,23 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassTime& time : stats.times) {
     const auto plan = std::ranges::find(stats.passes, time.name, &PassPlan::name);
-    passes.push_back({{"name", time.name}, {"ms", time.ms}, {"why", plan == stats.passes.end() ? "every frame" : plan->why}});
+    passes.push_back(
+        {{"name", time.name}, {"ms", time.ms}, {"why", plan == stats.passes.end() ? "every frame" : plan->why}});
   }
-  const nlohmann::ordered_json json{
-      {"schema", "hpr.stats/1"},
-      {"ms", stats.ms},
-      {"plan", stats.plan},
-      {"passes", passes},
-      {"rays",
-       {{"primary", stats.rays.primary},
-        {"shadow", stats.rays.shadow},
-        {"reflection", stats.rays.reflection},
-        {"refraction", stats.rays.refraction},
-        {"ambient-occlusion", stats.rays.ambient_occlusion},
-        {"photon", stats.rays.photon}}},
-      {"bytes_sent", stats.bytes_sent},
-      {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
-      {"ranks", stats.ranks}};
+  const nlohmann::ordered_json json{{"schema", "hpr.stats/1"},
+                                    {"ms", stats.ms},
+                                    {"plan", stats.plan},
+                                    {"passes", passes},
+                                    {"rays",
+                                     {{"primary", stats.rays.primary},
+                                      {"shadow", stats.rays.shadow},
+                                      {"reflection", stats.rays.reflection},
+                                      {"refraction", stats.rays.refraction},
+                                      {"ambient-occlusion", stats.rays.ambient_occlusion},
+                                      {"photon", stats.rays.photon}}},
+                                    {"bytes_sent", stats.bytes_sent},
+                                    {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
+                                    {"ranks", stats.ranks}};
   write_file_atomically(path, json.dump(2) + "\n");
 }
 

@@ -45,9 +45,9 @@ struct RunStats {
   double ms = 0.0;  ///< one frame, slowest rank
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
-  std::vector<PassTime> times;  ///< of each pass that ran: the slowest rank
-  RayCounts rays;               ///< summed over ranks
-  std::size_t bytes_sent = 0;   ///< summed over ranks
+  std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
+  RayCounts rays;                                ///< summed over ranks
+  std::size_t bytes_sent = 0;                    ///< summed over ranks
   std::vector<std::uint64_t> memory_peak_bytes;  ///< per rank
   int ranks = 1;
 };

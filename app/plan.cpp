@@ -19,16 +19,20 @@ Choice choose_distribution(const FrameSettings& settings, const Scene& scene, in
   if (settings.distribution) return {*settings.distribution, "as asked"};
   if (ranks == 1) return {Distribution::SortFirst, "one rank draws everything"};
   if (scene.triangles <= kManyTriangles) {
-    return {Distribution::SortFirst, fmt::format("{} triangles are few enough to cull on every rank, and nothing is composited", scene.triangles)};
+    return {
+        Distribution::SortFirst,
+        fmt::format("{} triangles are few enough to cull on every rank, and nothing is composited", scene.triangles)};
   }
-  return {Distribution::Hybrid, fmt::format("{} triangles are shared inside groups, pixels between them", scene.triangles)};
+  return {Distribution::Hybrid,
+          fmt::format("{} triangles are shared inside groups, pixels between them", scene.triangles)};
 }
 
 std::vector<std::size_t> tiles_in(const FrameLayout& layout, const std::vector<ScreenRect>& area) {
   std::vector<std::size_t> tiles;
   for (const ScreenRect& rect : area) {
     for (int y = rect.pixels.y0; y < rect.pixels.y1; y += kTileSide) {
-      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide) tiles.push_back(layout.tile_at(rect.screen, x, y));
+      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide)
+        tiles.push_back(layout.tile_at(rect.screen, x, y));
     }
   }
   std::ranges::sort(tiles);
@@ -50,18 +54,23 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "binary-swap";
   plan.shading = settings.shading;
   plan.rays = settings.rays;
-  plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks, plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
+  plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
+                               plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
   plan.tiles = tiles_in(plan.layout, plan.mine.area);
 
   auto& lines = plan.explained;
-  lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks, ranks == 1 ? "" : "s", choice.why));
+  lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
+                              ranks == 1 ? "" : "s", choice.why));
   if (plan.mine.group.size() > 1) {
-    lines.push_back(fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), settings.strategy.empty() ? "exact for any rank count, each rank ends with an equal share" : "as asked"));
+    lines.push_back(fmt::format(
+        "composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(),
+        settings.strategy.empty() ? "exact for any rank count, each rank ends with an equal share" : "as asked"));
   } else {
     lines.push_back("composite: off (one rank covers each tile)");
   }
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
-                              plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing" : "each rank lights all it drew, before compositing"));
+                              plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
+                                                                : "each rank lights all it drew, before compositing"));
   if (session.scene().lights.empty()) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
   for (const PassPlan& pass : plan_passes(session.scene(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));

@@ -13,7 +13,8 @@ constexpr std::size_t kBarWidth = 30;
 
 }  // namespace
 
-Progress::Progress(const std::string& mode, std::string what, std::size_t steps) : what_(std::move(what)), steps_(steps) {
+Progress::Progress(const std::string& mode, std::string what, std::size_t steps)
+    : what_(std::move(what)), steps_(steps) {
   const bool terminal = ::isatty(STDERR_FILENO) == 1;
   if (mode == "bar" || (mode == "auto" && terminal && steps > 1)) mode_ = Mode::Bar;
   if (mode == "line") mode_ = Mode::Line;

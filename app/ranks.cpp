@@ -26,8 +26,8 @@ std::string host_name() {
   return name.data();
 }
 
-/// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 speaks first, so that an
-/// error all ranks agreed on is printed once.
+/// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 speaks first, so
+/// that an error all ranks agreed on is printed once.
 [[noreturn]] void abort_job(int rank, const Error& error) {
   if (rank != 0) std::this_thread::sleep_for(std::chrono::milliseconds(300));
   print_error(error, rank == 0 ? "" : fmt::format("rank {} on {}: ", rank, host_name()));
@@ -50,7 +50,8 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
                   "leave --ranks out under mpirun or srun: the launcher sets the number");
     }
     if (rank != 0) {
-      log::configure(globals.verbosity >= 2 ? log::Level::Debug : log::Level::Error, fmt::format("rank {} on {}: ", rank, host_name()));
+      log::configure(globals.verbosity >= 2 ? log::Level::Debug : log::Level::Error,
+                     fmt::format("rank {} on {}: ", rank, host_name()));
     }
     for (const ExitCode vote : all_gather_value(comm, body(comm))) code = std::max(code, vote);
   } catch (const Error& error) {
@@ -86,7 +87,8 @@ ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communic
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
   if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args));
   ExitCode code = ExitCode::Done;
-  run_local_ranks(1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());
+  run_local_ranks(
+      1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());
   return code;
 }
 

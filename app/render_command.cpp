@@ -46,7 +46,8 @@ class RenderCommand final : public Command {
     const ImageLimits defaults{.side = 1 << 20, .pixels = std::uint64_t{1} << 31U};
     const ImageLimits limits = globals.limit_image.empty() ? defaults : globals.scene_limits().image;
     if (size.width > limits.side || size.height > limits.side || size.area() > limits.pixels) {
-      throw Error(ExitCode::Limit, fmt::format("a picture of {}x{} pixels is beyond the limit", size.width, size.height),
+      throw Error(ExitCode::Limit,
+                  fmt::format("a picture of {}x{} pixels is beyond the limit", size.width, size.height),
                   "draw a smaller one, or raise --limit-image");
     }
   }
@@ -56,7 +57,8 @@ class RenderCommand final : public Command {
       throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");
     }
     if (!output_.empty() && !output_.ends_with(".png") && !output_.ends_with(".exr")) {
-      throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", output_), "name a .png or .exr file");
+      throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", output_),
+                  "name a .png or .exr file");
     }
     for (const std::string& path : {output_, raw_, options_.stats}) {
       if (!path.empty()) check_writable(path, globals.force);
@@ -85,11 +87,14 @@ class RenderCommand final : public Command {
     agree_on_failure(session.comm(), [&] {
       if (speaks) write(session, plan, blocks, frame, stats);
     });
-    if (speaks) log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms", session.scene().triangles, size.width, size.height, stats.ranks, stats.ms);
+    if (speaks)
+      log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms", session.scene().triangles, size.width, size.height,
+                stats.ranks, stats.ms);
     return ExitCode::Done;
   }
 
-  void write(const Session& session, const FramePlan& plan, const Blocks& blocks, const Frame& frame, const RunStats& stats) const {
+  void write(const Session& session, const FramePlan& plan, const Blocks& blocks, const Frame& frame,
+             const RunStats& stats) const {
     if (!raw_.empty()) {
       const Image<Key> keys = join_blocks(*frame.keys, blocks, 0);
       write_file_atomically(raw_, std::as_bytes(keys.pixels()));

@@ -49,7 +49,9 @@ void RenderOptions::declare(CLI::App& app) {
   point("--up", up, "which way is up")->needs(by_eye);
   app.add_option("--fov", fov_degrees, "vertical angle in degrees")->check(CLI::Range(0.001, 179.0));
   app.add_option("--passes", passes, "auto, none, or a list of ray passes")->capture_default_str();
-  app.add_option("--max-depth", max_depth, "reflections of reflections")->check(CLI::Range(1, 64))->capture_default_str();
+  app.add_option("--max-depth", max_depth, "reflections of reflections")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -63,7 +65,8 @@ void RenderOptions::declare(CLI::App& app) {
 Camera RenderOptions::choose_camera(const Scene& scene) const {
   Camera chosen;
   if (!eye.empty()) {
-    chosen = look_at(to_point(eye), to_point(at), to_point(up), glm::radians(fov_degrees > 0.0 ? fov_degrees : kDefaultFovDegrees));
+    chosen = look_at(to_point(eye), to_point(at), to_point(up),
+                     glm::radians(fov_degrees > 0.0 ? fov_degrees : kDefaultFovDegrees));
     return chosen;
   }
   if (camera.empty()) {

@@ -33,7 +33,8 @@ void Session::compare_rasterizers() {
     if (prints[rank] != prints[0]) others.push_back(rank);
   }
   if (!others.empty() && comm_.rank() == 0) {
-    log::warning("ranks {} rasterise differently from rank 0 (another GL driver or CPU): pictures may differ at edges", fmt::join(others, ", "));
+    log::warning("ranks {} rasterise differently from rank 0 (another GL driver or CPU): pictures may differ at edges",
+                 fmt::join(others, ", "));
   }
 }
 

@@ -15,8 +15,8 @@
 
 namespace hpr {
 
-/// What stays resident while frames follow one another: the scene, the GL context, geometry on the GPU, the ray scene, the
-/// frame's memory. One per rank; construction is collective.
+/// What stays resident while frames follow one another: the scene, the GL context, geometry on the GPU, the ray scene,
+/// the frame's memory. One per rank; construction is collective.
 class Session {
  public:
   /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
@@ -31,7 +31,8 @@ class Session {
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
   /// The lighter of these settings; kept until others are asked for.
   [[nodiscard]] Lighter& lighter(const RaySettings& settings);
-  /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the group.
+  /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
+  /// group.
   [[nodiscard]] CountingCommunicator& group(std::span<const int> members);
   /// A cleared layer of keys of this layout, reused from frame to frame.
   [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout);

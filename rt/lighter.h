@@ -21,6 +21,8 @@ struct RaySettings {
   int max_depth = 8;                ///< mirrors in a row
   int threads = 1;
   std::uint64_t seed = 1;
+
+  bool operator==(const RaySettings&) const = default;
 };
 
 /// Whether a pass runs for a scene, for --explain and --stats.
