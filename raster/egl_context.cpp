@@ -48,8 +48,10 @@ class EglContext final : public GlContext {
   [[nodiscard]] const GlFunctions& gl() const override { return gl_; }
 
   void make_current() override {
-    release_osmesa();
+    // OSMesa reports any Mesa context of the thread as its own, so it is asked only when EGL has none. Where EGL has
+    // one it is truly current: an OSMesa context releases EGL's before it takes the thread.
     if (eglGetCurrentContext() == context_) return;
+    if (eglGetCurrentContext() == EGL_NO_CONTEXT) release_osmesa();
     if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) != EGL_TRUE) {
       throw Error(ExitCode::NoDevice,
                   fmt::format("EGL cannot make its context current (error 0x{:x}), {}", eglGetError(), device_));

@@ -10,7 +10,8 @@ namespace hpr {
 /// Error (NoDevice).
 [[nodiscard]] std::unique_ptr<GlContext> make_osmesa_context(const GlOptions& options);
 
-/// Releases OSMesa's context on this thread, if the library is loaded and has one.
+/// Releases OSMesa's context on this thread, if the library is loaded and has one. Call it only while EGL has none:
+/// OSMesa takes another Mesa context for its own.
 void release_osmesa();
 
 }  // namespace hpr
