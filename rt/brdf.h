@@ -10,7 +10,9 @@ namespace hpr {
 
 /// How a surface scatters light at one place: glTF 2.0, appendix B. A dielectric base (Lambert under a specular layer)
 /// mixed with a metal; GGX distribution (Walter, Marschner, Li, Torrance 2007) with alpha = roughness^2,
-/// height-correlated Smith shadowing (Heitz 2014), Schlick's Fresnel term.
+/// height-correlated Smith shadowing (Heitz 2014), Schlick's Fresnel term. As the specification has it, a white
+/// dielectric reflects up to 1.3 times what arrives towards grazing viewers and 1.05 times in the mean; metals never
+/// exceed 1.
 struct Brdf {
   glm::dvec3 base_color{1.0};
   double metallic = 0.0;

@@ -16,9 +16,9 @@
 namespace hpr {
 
 struct RaySettings {
-  std::vector<std::string> passes;  ///< by name; empty: as `auto_passes` says
-  bool auto_passes = true;          ///< with no names: what the scene requires; false: none
-  int max_depth = 8;                ///< mirrors in a row
+  std::vector<std::string> passes = {};  ///< by name; empty: as `auto_passes` says
+  bool auto_passes = true;               ///< with no names: what the scene requires; false: none
+  int max_depth = 8;                     ///< mirrors in a row
   int threads = 1;
   std::uint64_t seed = 1;
 

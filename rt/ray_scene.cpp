@@ -268,6 +268,13 @@ std::uint64_t load(const Packet& packet, std::size_t count, RTCRay16& rays, int*
     const bool usable = i < count && ordered && largest > 0.0F && packet.reach[i] >= 0.0F;
     valid[i] = usable ? -1 : 0;
     usable_lanes += usable ? 1 : 0;
+    if (!usable) {
+      // The mask alone does not do: where Embree has no native packet of this width it goes by tnear <= tfar instead,
+      // and its assertions look at every lane. So these hold a harmless ray that ends before it begins.
+      rays.org_x[i] = rays.org_y[i] = rays.org_z[i] = 0.0F;
+      rays.dir_x[i] = rays.dir_y[i] = rays.dir_z[i] = 1.0F;
+      rays.tfar[i] = -1.0F;
+    }
     rays.tnear[i] = 0.0F;
     rays.time[i] = 0.0F;
     rays.mask[i] = 0xFFFFFFFFU;

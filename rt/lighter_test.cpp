@@ -1,0 +1,355 @@
+#include "rt/lighter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+#include <random>
+
+#include "rt/test_scene.h"
+
+namespace hpr {
+namespace {
+
+using test::add_material;
+using test::add_mesh;
+using test::place;
+using test::quad;
+
+Light point_light(const glm::dvec3& position, float intensity) {
+  Light light;
+  light.position = position;
+  light.intensity = glm::vec3(intensity);
+  return light;
+}
+
+Scene white_floor() {
+  Scene scene;
+  add_material(scene, test::matte());
+  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Lighter, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
+  Scene scene = white_floor();
+  scene.lights = {point_light({0.1, 2.0, 0.1}, 7.0F)};
+  // Narrow, and with the light near the eye's axis: there the specular layer's share is below 1e-7.
+  const View view = test::view_from({0, 5, 0.1}, {0, 0, 0}, {65, 33}, scene, 0.1);
+  const test::Lit lit = test::light(scene, view);
+  for (int y = 0; y < 33; ++y) {
+    for (int x = 0; x < 65; ++x) {
+      const Ray ray = view_ray(view, x + 0.5, y + 0.5);
+      const glm::dvec3 p = ray.origin - ray.direction * (ray.origin.y / ray.direction.y);
+      const glm::dvec3 way = scene.lights[0].position - p;
+      const double d2 = glm::dot(way, way);
+      const double expected = 7.0 * (way.y / std::sqrt(d2)) / (std::numbers::pi * d2);
+      ASSERT_NEAR(lit.image.at(x, y).g / expected, 1.0, 1e-6) << x << ',' << y;
+    }
+  }
+  EXPECT_EQ(lit.counts.shadow, 65U * 33U);
+  EXPECT_EQ(lit.counts.not_finite, 0U);
+}
+
+TEST(Lighter, ABlockersShadowEndsWhereGeometrySays) {
+  Scene scene = white_floor();
+  // A square of half side 0.5 at half the light's height: its shadow has half side 1.
+  place(scene, add_mesh(scene, quad({-0.5, 1, 0.5}, {1, 0, 0}, {0, 0, -1}, 0)));
+  finish_scene(scene);
+  scene.lights = {point_light({0, 2, 0}, 1.0F)};
+  const View view = test::view_from({0.0, 0.9, 3.9}, {0, 0, 0}, {80, 60}, scene);
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  const test::Lit lit = test::light(scene, view);
+  const test::Lit unshadowed = test::light(scene, view, {.auto_passes = false});
+  int dark = 0;
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 80; ++x) {
+      const Key key = keys.at(0, x, y);
+      if (key == kNoKey || key_surface(key) >= 2) continue;
+      const Ray ray = view_ray(view, x + 0.5, y + 0.5);
+      const glm::dvec3 p = ray.origin - ray.direction * (ray.origin.y / ray.direction.y);
+      const double edge = std::max(std::abs(p.x), std::abs(p.z)) - 1.0;
+      EXPECT_GT(unshadowed.image.at(x, y).r, 0.0F);
+      if (std::abs(edge) < 1e-5) continue;
+      ASSERT_EQ(lit.image.at(x, y).r == 0.0F, edge < 0.0) << x << ',' << y;
+      dark += edge < 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(dark, 20);
+  EXPECT_EQ(unshadowed.counts.shadow, 0U);
+}
+
+TEST(Lighter, ALightThatLiesOnASurfaceIsNotHiddenByIt) {
+  Scene scene = white_floor();
+  add_mesh(scene, quad({-4, 3, -4}, {8, 0, 0}, {0, 0, 8}, 0));
+  place(scene, 1);
+  finish_scene(scene);
+  scene.lights = {point_light({0.1, 3.0, 0.2}, 1.0F)};
+  const View view = test::view_from({0, 1, 0.1}, {0, 0, 0}, {32, 32}, scene);
+  const test::Lit lit = test::light(scene, view);
+  for (const Rgb& pixel : lit.image.pixels()) EXPECT_GT(pixel.r, 0.0F);
+}
+
+TEST(Lighter, AMirrorShowsTheColourOfWhatItReflectsTimesItsReflectance) {
+  Scene scene;
+  add_material(scene, test::mirror(0.25F));
+  add_material(scene, test::glowing({3.0F, 0.5F, 0.125F}));
+  place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+  place(scene, add_mesh(scene, quad({-50, 10, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
+  finish_scene(scene);
+  const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {5, 5}, scene, 1e-4, {0, 0, -1});
+  const test::Lit lit = test::light(scene, view);
+  // The headlight is hidden in the mirror lobe: only the image of the glowing quad is seen.
+  EXPECT_NEAR(lit.image.at(2, 2).r, 0.75F, 1e-6F);
+  EXPECT_NEAR(lit.image.at(2, 2).g, 0.125F, 1e-6F);
+  EXPECT_NEAR(lit.image.at(2, 2).b, 0.03125F, 1e-6F);
+  const test::Lit off = test::light(scene, view, {.passes = {"shadow"}});
+  EXPECT_EQ(off.image.at(2, 2), Rgb{});
+}
+
+TEST(Lighter, AMirrorThatFacesNothingShowsTheBackground) {
+  Scene scene;
+  add_material(scene, test::mirror(0.5F));
+  place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+  scene.background = {0.5F, 1.0F, 2.0F};
+  finish_scene(scene);
+  const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {65, 65}, scene, 1.2, {0, 0, -1});
+  const test::Lit lit = test::light(scene, view);
+  EXPECT_NEAR(lit.image.at(32, 32).b, 1.0F, 1e-5F);
+  EXPECT_EQ(lit.image.at(0, 0), (Rgb{0.5F, 1.0F, 2.0F}));
+}
+
+TEST(Lighter, TwoFacingMirrorsSumTheirGeometricSeriesUpToTheDepth) {
+  constexpr double kRho = 0.75;
+  Scene scene;
+  Material glowing_mirror = test::mirror(static_cast<float>(kRho));
+  glowing_mirror.emissive = glm::vec3(1.0F);
+  add_material(scene, glowing_mirror);
+  place(scene, add_mesh(scene, quad({-50, 0, 50}, {100, 0, 0}, {0, 0, -100}, 0)));
+  place(scene, add_mesh(scene, quad({-50, 4, -50}, {100, 0, 0}, {0, 0, 100}, 0)));
+  finish_scene(scene);
+  const View view = test::view_from({0, 2, 0}, {0, 0, 0}, {3, 3}, scene, 1e-6, {0, 0, -1});
+  for (const int depth : {0, 1, 2, 7, 40}) {
+    const test::Lit lit = test::light(scene, view, {.max_depth = depth});
+    const int bounces = std::min(depth, 38);  // 0.75^39 is below what a path may carry
+    const double expected = (1.0 - std::pow(kRho, bounces + 1)) / (1.0 - kRho);
+    EXPECT_NEAR(lit.image.at(1, 1).r, expected, 1e-4) << depth;
+    EXPECT_EQ(lit.counts.reflection, 9U * static_cast<unsigned>(bounces)) << depth;
+  }
+}
+
+TEST(Lighter, WhatAMirrorShowsIsLitAndShadowed) {
+  // The eye sees, by a mirror, a floor whose light is blocked on one half.
+  Scene scene;
+  add_material(scene, test::matte());
+  add_material(scene, test::mirror(1.0F));
+  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  place(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 8, 0}, 1)));
+  place(scene, add_mesh(scene, quad({0, 1, 4}, {4, 0, 0}, {0, 0, -8}, 0)));
+  finish_scene(scene);
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = {0.0F, -1.0F, 0.0F};
+  scene.lights = {sun};
+  const View view = test::view_from({0, 0.5, 3}, {0, 0.2, -4}, {64, 64}, scene, 0.3);
+  const test::Lit lit = test::light(scene, view);
+  // Seen at a slant, a little of the light goes to the specular layer.
+  EXPECT_NEAR(lit.image.at(20, 34).r, 1.0 / std::numbers::pi, 1e-3);
+  EXPECT_EQ(lit.image.at(44, 34).r, 0.0F);
+}
+
+TEST(Lighter, NoSphereShadowsItselfAtAnyScale) {
+  for (const double scale : {1e-9, 1e-3, 1.0, 1e3, 1e9}) {
+    for (const double offset : {0.0, 100.0}) {
+      Scene scene;
+      add_material(scene, test::matte());
+      const std::uint32_t ball = add_mesh(scene, test::sphere(1.0, 16, 0));
+      const glm::dvec3 center = scale * offset * glm::dvec3(1.0, 0.5, -0.3);
+      place(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), center), glm::dvec3(scale)));
+      finish_scene(scene);
+      Light sun;
+      sun.type = LightType::Directional;
+      sun.direction = glm::normalize(glm::vec3(-0.8F, -0.5F, -0.2F));
+      scene.lights = {sun};
+      const View view = test::view_from(center + glm::dvec3(0, 0, 4.0 * scale), center, {64, 64}, scene, 0.6);
+      const test::Lit lit = test::light(scene, view);
+      const test::Lit unshadowed = test::light(scene, view, {.auto_passes = false});
+      int differing = 0;
+      int lit_pixels = 0;
+      for (std::size_t i = 0; i < lit.image.pixels().size(); ++i) {
+        differing += lit.image.pixels()[i] == unshadowed.image.pixels()[i] ? 0 : 1;
+        lit_pixels += unshadowed.image.pixels()[i].r > 0.0F ? 1 : 0;
+      }
+      EXPECT_EQ(differing, 0) << scale << ' ' << offset;
+      EXPECT_GT(lit_pixels, 500);
+    }
+  }
+}
+
+Scene busy_scene(bool flattened) {
+  Scene scene;
+  add_material(scene, test::matte({0.8F, 0.7F, 0.6F}));
+  Material shiny;
+  shiny.base_color = {0.9F, 0.8F, 0.5F, 1.0F};
+  shiny.roughness = 0.15F;
+  add_material(scene, shiny);
+  place(scene, add_mesh(scene, quad({-3, -1, 3}, {6, 0, 0}, {0, 0, -6}, 0)));
+  const Mesh ball = test::sphere(0.6, 10, 1);
+  const std::uint32_t shared = flattened ? 0 : add_mesh(scene, ball);
+  for (int i = 0; i < 4; ++i) {
+    glm::dmat4 to_world = glm::translate(glm::dmat4(1.0), {1.3 * i - 2.0, 0.1 * i - 0.3, -0.4 * i});
+    to_world = glm::rotate(to_world, 0.7 * i, glm::normalize(glm::dvec3(1, 2, 3)));
+    to_world = glm::scale(to_world, {1.0, i == 2 ? -0.7 : 1.0, 1.0 + 0.2 * i});
+    if (!flattened) {
+      place(scene, shared, to_world);
+      continue;
+    }
+    Mesh moved = ball;
+    const glm::dmat3 normal_matrix = glm::transpose(glm::inverse(glm::dmat3(to_world)));
+    for (glm::vec3& p : moved.positions) p = glm::vec3(to_world * glm::dvec4(p, 1.0));
+    for (glm::vec3& n : moved.normals) n = glm::vec3(glm::normalize(normal_matrix * glm::dvec3(n)));
+    place(scene, add_mesh(scene, moved));
+  }
+  finish_scene(scene);
+  scene.lights = {point_light({2, 4, 3}, 40.0F), point_light({-3, 3, 1}, 20.0F)};
+  scene.background = {0.1F, 0.2F, 0.4F};
+  return scene;
+}
+
+TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
+  const Scene instanced = busy_scene(false);
+  const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {96, 64}, instanced, 0.7);
+  const TileLayer<Key> keys = test::cast_keys(instanced, std::span(&view, 1));
+  const std::vector<std::size_t> tiles = test::all_tiles(keys.layout());
+  TileLayer<Rgb> a(keys.layout());
+  TileLayer<Rgb> b(keys.layout());
+  const Scene flattened = busy_scene(true);
+  Lighter(instanced, {}).light(std::span(&view, 1), keys, tiles, a);
+  Lighter(flattened, {}).light(std::span(&view, 1), keys, tiles, b);
+  int differing = 0;
+  for (const std::size_t tile : tiles) {
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      const Rgb& p = a.tile(tile)[i];
+      const Rgb& q = b.tile(tile)[i];
+      differing += std::abs(p.r - q.r) + std::abs(p.g - q.g) + std::abs(p.b - q.b) > 1e-5F * (1.0F + p.r) ? 1 : 0;
+    }
+  }
+  // Vertices are rounded to float in one of them: a ray at a silhouette or a shadow's edge may fall on its other side.
+  EXPECT_LE(differing, 3);
+}
+
+TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
+  const Scene scene = busy_scene(false);
+  const View left = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {150, 130}, scene, 0.7);
+  const View right = test::view_from({3.3, 1.5, 6}, {0, -0.2, 0}, {70, 64}, scene, 0.7);
+  const std::vector<View> views{left, right};
+  const TileLayer<Key> keys = test::cast_keys(scene, views);
+  const std::vector<std::size_t> tiles = test::all_tiles(keys.layout());
+  TileLayer<Rgb> whole(keys.layout());
+  TileLayer<Rgb> threaded(keys.layout());
+  TileLayer<Rgb> split(keys.layout());
+  Lighter one(scene, {.threads = 1});
+  one.light(views, keys, tiles, whole);
+  const RayCounts counts = one.counts();
+  EXPECT_GT(counts.reflection, 100U);
+  EXPECT_GT(counts.shadow, 100U);
+  Lighter two(scene, {.threads = 2});
+  two.light(views, keys, tiles, threaded);
+  EXPECT_EQ(two.counts(), counts);
+  RayCounts summed;
+  for (auto tile = tiles.rbegin(); tile != tiles.rend(); ++tile) {
+    one.light(views, keys, std::span(&*tile, 1), split);
+    summed += one.counts();
+  }
+  EXPECT_EQ(summed, counts);
+  for (const std::size_t tile : tiles) {
+    EXPECT_TRUE(std::ranges::equal(whole.tile(tile), threaded.tile(tile))) << tile;
+    EXPECT_TRUE(std::ranges::equal(whole.tile(tile), split.tile(tile))) << tile;
+  }
+}
+
+TEST(Lighter, APixelDoesNotDependOnItsNeighbours) {
+  const Scene scene = busy_scene(false);
+  const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {64, 64}, scene, 0.7);
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  TileLayer<Key> sparse(keys.layout());
+  std::mt19937 random(5);
+  for (std::size_t i = 0; i < kTilePixels; ++i) {
+    if (random() % 3 == 0) sparse.tile(0)[i] = keys.tile(0)[i];
+  }
+  sparse.set_active(0);
+  const std::vector<std::size_t> tiles{0};
+  TileLayer<Rgb> all(keys.layout());
+  TileLayer<Rgb> some(keys.layout());
+  Lighter lighter(scene, {});
+  lighter.light(std::span(&view, 1), keys, tiles, all);
+  lighter.light(std::span(&view, 1), sparse, tiles, some);
+  for (std::size_t i = 0; i < kTilePixels; ++i) {
+    if (sparse.tile(0)[i] != kNoKey) {
+      ASSERT_EQ(all.tile(0)[i], some.tile(0)[i]) << i;
+    }
+  }
+}
+
+TEST(Lighter, ScalingTheWholeSceneByAPowerOfTwoScalesNothingButTheLight) {
+  const auto picture = [](double scale) {
+    Scene scene = busy_scene(false);
+    for (Instance& instance : scene.instances) {
+      instance.to_world = glm::scale(glm::dmat4(1.0), glm::dvec3(scale)) * instance.to_world;
+    }
+    for (Light& light : scene.lights) {
+      light.position *= scale;
+      light.intensity *= static_cast<float>(scale * scale);
+    }
+    finish_scene(scene);
+    const View view = test::view_from(scale * glm::dvec3(0.3, 1.5, 6), {0, -0.2 * scale, 0}, {64, 48}, scene, 0.7);
+    return test::light(scene, view).image;
+  };
+  const Image<Rgb> base = picture(1.0);
+  EXPECT_TRUE(base == picture(std::ldexp(1.0, 20)));
+  EXPECT_TRUE(base == picture(std::ldexp(1.0, -20)));
+}
+
+TEST(Lighter, AnEmptySceneIsItsBackground) {
+  Scene scene;
+  scene.background = {1.0F, 2.0F, 3.0F};
+  finish_scene(scene);
+  const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {10, 7}, scene);
+  const test::Lit lit = test::light(scene, view);
+  for (const Rgb& pixel : lit.image.pixels()) EXPECT_EQ(pixel, (Rgb{1.0F, 2.0F, 3.0F}));
+}
+
+TEST(Lighter, InfiniteRadianceIsBlackAndCounted) {
+  Scene scene = white_floor();
+  scene.materials[0].emissive = glm::vec3(3e38F);
+  scene.materials[0].base_color = glm::vec4(1.0F);
+  scene.lights = {point_light({0, 1e-30, 0}, 3e38F), point_light({0, 1, 0}, 3e38F), point_light({0, 1, 0}, 3e38F)};
+  const View view = test::view_from({0, 0.5, 0.1}, {0, 0, 0}, {9, 9}, scene);
+  const test::Lit lit = test::light(scene, view);
+  for (const Rgb& pixel : lit.image.pixels()) EXPECT_TRUE(std::isfinite(pixel.r));
+  EXPECT_GT(lit.counts.not_finite, 0U);
+}
+
+TEST(Lighter, LocalShadingPutsTheDisplayColourIntoTheKeys) {
+  const Scene scene = busy_scene(false);
+  const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {64, 64}, scene, 0.7);
+  TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  const std::vector<Key> before(keys.tile(0).begin(), keys.tile(0).end());
+  const std::vector<std::size_t> tiles{0};
+  TileLayer<Rgb> radiance(keys.layout());
+  Lighter lighter(scene, {});
+  lighter.light(std::span(&view, 1), keys, tiles, radiance);
+  shade_local(lighter, std::span(&view, 1), keys, tiles);
+  for (std::size_t i = 0; i < kTilePixels; ++i) {
+    if (before[i] == kNoKey) {
+      ASSERT_EQ(keys.tile(0)[i], kNoKey);
+    } else {
+      ASSERT_EQ(key_depth(keys.tile(0)[i]), key_depth(before[i]));
+      ASSERT_EQ(from_word(key_rgba(keys.tile(0)[i])), to_srgb(radiance.tile(0)[i]));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hpr

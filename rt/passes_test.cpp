@@ -1,0 +1,59 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "rt/lighter.h"
+#include "rt/test_scene.h"
+
+namespace hpr {
+namespace {
+
+Scene scene_with(const Material& material, std::size_t lights) {
+  Scene scene;
+  test::add_material(scene, material);
+  test::place(scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0)));
+  scene.lights.resize(lights);
+  finish_scene(scene);
+  return scene;
+}
+
+bool runs(const Scene& scene, const RaySettings& settings, const std::string& name) {
+  const std::vector<PassPlan> plan = plan_passes(scene, settings);
+  return std::ranges::find(plan, name, &PassPlan::name)->runs;
+}
+
+TEST(Passes, RunOnlyWhereTheSceneCanShowThem) {
+  EXPECT_FALSE(runs(scene_with(test::matte(), 0), {}, "shadow"));
+  EXPECT_TRUE(runs(scene_with(test::matte(), 1), {}, "shadow"));
+  EXPECT_FALSE(runs(scene_with(test::matte(), 1), {}, "reflection"));
+  EXPECT_TRUE(runs(scene_with(test::mirror(0.5F), 0), {}, "reflection"));
+  EXPECT_FALSE(runs(Scene{}, {}, "reflection"));
+}
+
+TEST(Passes, RunWhenNamedAndNotWhenOthersAre) {
+  const Scene scene = scene_with(test::mirror(0.5F), 1);
+  const RaySettings shadow_only{.passes = {"shadow"}};
+  EXPECT_TRUE(runs(scene, shadow_only, "shadow"));
+  EXPECT_FALSE(runs(scene, shadow_only, "reflection"));
+  EXPECT_FALSE(runs(scene, {.auto_passes = false}, "shadow"));
+  EXPECT_FALSE(runs(scene_with(test::matte(), 1), {.passes = {"reflection"}}, "reflection"));
+}
+
+TEST(Passes, SayWhy) {
+  for (const PassPlan& plan : plan_passes(scene_with(test::matte(), 2), {})) EXPECT_FALSE(plan.why.empty());
+  EXPECT_EQ(plan_passes(scene_with(test::matte(), 2), {})[0].why, "2 lights cast shadows");
+}
+
+TEST(Passes, AnUnknownNameIsRefusedWithTheNearest) {
+  try {
+    (void)plan_passes(Scene{}, {.passes = {"shadwo"}});
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Usage);
+    EXPECT_NE(error.hint().find("'shadow'"), std::string::npos) << error.hint();
+  }
+}
+
+}  // namespace
+}  // namespace hpr
