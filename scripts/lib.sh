@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # What the scripts share: sourced by bash, with the repository's root as the working directory afterwards.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -90,8 +90,8 @@ def one_picture(folder):
             print(f"{name}: other keys than {expected[0]}")
             bad += 1
         # The files' headers may name the run, so the pixels are compared, not the files.
-        compared = run(["diff", expected[2].name, picture.name, "--json"], folder)
-        if compared.returncode not in (0, 1) or json.loads(compared.stdout).get("differing", -1) != 0:
+        compared = run(["diff", expected[2].name, picture.name], folder)
+        if compared.returncode != 0:
             print(f"{name}: other pixels than {expected[0]}: {compared.stdout.strip()}")
             bad += 1
         keys.unlink()
