@@ -29,20 +29,47 @@ std::size_t tiles_in(std::span<const ScreenRect> rects) {
                          [](std::size_t sum, const ScreenRect& rect) { return sum + tiles_in(rect.pixels); });
 }
 
-/// Cuts a rectangle at a tile border along its longer side so that the first part has about `wanted` tiles.
-std::pair<ScreenRect, ScreenRect> cut(const ScreenRect& rect, double wanted) {
-  const bool along_x = rect.pixels.width() >= rect.pixels.height();
+/// Cuts a rectangle at a tile border, `steps` tiles from its left (or upper) edge.
+std::pair<ScreenRect, ScreenRect> cut_at(const ScreenRect& rect, bool along_x, int steps) {
   const int from = along_x ? rect.pixels.x0 : rect.pixels.y0;
   const int to = along_x ? rect.pixels.x1 : rect.pixels.y1;
-  const int steps = (to - from + kTileSide - 1) / kTileSide;
-  const double per_step = static_cast<double>(tiles_in(rect.pixels)) / steps;
-  const int at =
-      std::min(from + kTileSide * std::clamp(static_cast<int>(std::lround(wanted / per_step)), 0, steps), to);
+  const int at = std::min(from + kTileSide * steps, to);
   ScreenRect first = rect;
   ScreenRect second = rect;
   (along_x ? first.pixels.x1 : first.pixels.y1) = at;
   (along_x ? second.pixels.x0 : second.pixels.y0) = at;
   return {first, second};
+}
+
+/// Moves about `wanted` tiles of `rect` to `first` and the rest to `second`. One straight cut across the longer side,
+/// unless it would miss `wanted` by a twentieth of the smaller part: then the row of tiles it runs through is cut as
+/// well.
+void cut(const ScreenRect& rect, double wanted, std::vector<ScreenRect>& first, std::vector<ScreenRect>& second) {
+  const auto add = [](std::vector<ScreenRect>& rects, const ScreenRect& part) {
+    if (!part.pixels.empty()) rects.push_back(part);
+  };
+  const bool along_x = rect.pixels.width() >= rect.pixels.height();
+  const int length = along_x ? rect.pixels.width() : rect.pixels.height();
+  const int steps = (length + kTileSide - 1) / kTileSide;
+  const auto tiles = static_cast<double>(tiles_in(rect.pixels));
+  const double per_step = tiles / steps;
+  const int nearest = std::clamp(static_cast<int>(std::lround(wanted / per_step)), 0, steps);
+  const double miss = std::abs(nearest * per_step - wanted);
+  const int whole = static_cast<int>(wanted / per_step);
+  const int rest = static_cast<int>(std::lround(wanted - whole * per_step));
+  if (miss < 0.5 || miss <= 0.05 * std::min(wanted, tiles - wanted) || rest == 0 || whole == steps) {
+    const auto [before, after] = cut_at(rect, along_x, nearest);
+    add(first, before);
+    add(second, after);
+    return;
+  }
+  const auto [before, others] = cut_at(rect, along_x, whole);
+  const auto [row, after] = cut_at(others, along_x, 1);
+  const auto [row_before, row_after] = cut_at(row, !along_x, rest);
+  add(first, before);
+  add(first, row_before);
+  add(second, row_after);
+  add(second, after);
 }
 
 void assign_recursively(std::vector<ScreenRect> rects, std::span<const int> weights,
@@ -65,9 +92,7 @@ void assign_recursively(std::vector<ScreenRect> rects, std::span<const int> weig
     } else if (wanted < 0.5) {
       second.push_back(rect);
     } else {
-      const auto [before, after] = cut(rect, wanted);
-      if (!before.pixels.empty()) first.push_back(before);
-      if (!after.pixels.empty()) second.push_back(after);
+      cut(rect, wanted, first, second);
     }
     wanted = std::max(0.0, wanted - tiles);
   }
@@ -85,8 +110,8 @@ std::vector<Chunk> make_chunks(const Scene& scene, std::uint32_t most) {
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
     const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
-    for (std::uint32_t first = 0; first < count; first += most) {
-      const std::uint32_t last = std::min(count, first + most);
+    for (std::uint32_t first = 0, last = 0; first < count; first = last) {
+      last = first + std::min(most, count - first);
       glm::dvec3 low(mesh.positions[mesh.triangles[first].x]);
       glm::dvec3 high = low;
       for (std::uint32_t t = first; t < last; ++t) {

@@ -28,8 +28,9 @@ struct ScreenRect {
 };
 
 /// The screens cut into `weights.size()` areas of rectangles, area i with about weights[i] of the tiles' sum: halved
-/// recursively, whole screens first, then along the longer side at a tile border. An area may be empty when there
-/// are more areas than tiles. Every tile lies in exactly one area.
+/// recursively, whole screens first, then along the longer side at a tile border, with a step of one row where a
+/// straight cut would be unfair. An area may be empty when there are more areas than tiles. Every tile lies in exactly
+/// one area.
 [[nodiscard]] std::vector<std::vector<ScreenRect>> assign_tiles(const FrameLayout& layout,
                                                                 const std::vector<int>& weights);
 

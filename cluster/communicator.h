@@ -46,4 +46,7 @@ class Communicator {
 /// How long a wait for another rank may take before it counts as a hang, unless the user says otherwise.
 inline constexpr std::chrono::seconds kHangTimeout{300};
 
+/// Time limits are cut to this, ten years: a deadline further off would overflow the clock and count as passed.
+inline constexpr std::chrono::nanoseconds kLongestWait = std::chrono::hours{87600};
+
 }  // namespace hpr

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <utility>
+
 #include "cluster/communicator.h"
 
 namespace hpr {
 
 /// Passes every message on and counts what this rank sends: the cost model of a strategy, free of timing noise.
-/// A reduce_max counts as the one message of its values that each rank but the root gives away.
+/// A reduce_max counts as the one message of its values that each rank but the root gives away. What goes through a
+/// subset counts here too.
 class CountingCommunicator final : public Communicator {
  public:
   explicit CountingCommunicator(Communicator& inner) : inner_(inner) {}
@@ -31,16 +34,22 @@ class CountingCommunicator final : public Communicator {
     inner_.reduce_max(values, root);
   }
   [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override {
-    return inner_.subset(members);
+    return std::unique_ptr<Communicator>(new CountingCommunicator(inner_.subset(members), *this));
   }
 
  private:
+  CountingCommunicator(std::unique_ptr<Communicator> part, CountingCommunicator& whole)
+      : owned_(std::move(part)), inner_(*owned_), whole_(&whole) {}
+
   void count(std::span<const std::byte> message) {
     ++messages_sent_;
     bytes_sent_ += message.size();
+    if (whole_ != nullptr) whole_->count(message);
   }
 
+  std::unique_ptr<Communicator> owned_;  ///< of a subset
   Communicator& inner_;
+  CountingCommunicator* whole_ = nullptr;  ///< what this one is a subset of
   std::size_t messages_sent_ = 0;
   std::size_t bytes_sent_ = 0;
 };

@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -18,9 +19,13 @@ namespace {
 
 using Message = std::vector<std::byte>;
 
-/// Who sends to whom, in which communicator: world ranks, and the ranks of the communicator ("" is the world).
+/// Which communicator: empty is the world; below it each subset() adds its members, a -1 and how many of just these
+/// members came before. Every member knows these alike without asking the others, and no two are equal.
+using Channel = std::vector<int>;
+
+/// Who sends to whom, in which communicator.
 struct Route {
-  std::vector<int> members;
+  Channel channel;
   int from;
   int to;
 
@@ -30,7 +35,7 @@ struct Route {
 /// All messages on their way between the ranks of this process.
 class PostOffice {
  public:
-  explicit PostOffice(std::chrono::nanoseconds hang_timeout) : hang_timeout_(hang_timeout) {}
+  explicit PostOffice(std::chrono::nanoseconds hang_timeout) : hang_timeout_(std::min(hang_timeout, kLongestWait)) {}
 
   void put(const Route& route, Message message) {
     const std::lock_guard lock(mutex_);
@@ -69,29 +74,22 @@ class PostOffice {
 
 class LocalCommunicator final : public Communicator {
  public:
-  /// `members`: the world ranks of this communicator, in its order.
-  LocalCommunicator(PostOffice& office, std::vector<int> members, int rank)
-      : office_(office), members_(std::move(members)), rank_(rank) {}
+  LocalCommunicator(PostOffice& office, Channel channel, int rank, int size)
+      : office_(office), channel_(std::move(channel)), rank_(rank), size_(size) {
+    // What a reduction sends must not meet a message that was sent before it and is received after it.
+    reductions_ = channel_;
+    reductions_.push_back(-2);
+  }
 
   [[nodiscard]] int rank() const override { return rank_; }
-  [[nodiscard]] int size() const override { return static_cast<int>(members_.size()); }
+  [[nodiscard]] int size() const override { return size_; }
   [[nodiscard]] std::string_view transport() const override { return "threads"; }
 
-  void send(std::span<const std::byte> message, int to) override {
-    HPR_CHECK(to >= 0 && to < size());
-    office_.put({members_, rank_, to}, Message(message.begin(), message.end()));
-  }
-  void receive(std::span<std::byte> message, int from) override {
-    const Message arrived = receive(from);
-    if (arrived.size() != message.size()) {
-      throw Error(ExitCode::Internal, fmt::format("rank {} expected {} bytes from rank {}, got {}", rank_,
-                                                  message.size(), from, arrived.size()));
-    }
-    std::ranges::copy(arrived, message.begin());
-  }
+  void send(std::span<const std::byte> message, int to) override { put(channel_, message, to); }
+  void receive(std::span<std::byte> message, int from) override { take(channel_, message, from); }
   [[nodiscard]] std::vector<std::byte> receive(int from) override {
     HPR_CHECK(from >= 0 && from < size());
-    return office_.take({members_, from, rank_});
+    return office_.take({channel_, from, rank_});
   }
   [[nodiscard]] std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) override {
     send(out, peer);
@@ -99,29 +97,50 @@ class LocalCommunicator final : public Communicator {
   }
   void reduce_max(std::span<std::uint64_t> values, int root) override {
     if (rank_ != root) {
-      send(std::as_bytes(values), root);
+      put(reductions_, std::as_bytes(values), root);
       return;
     }
     std::vector<std::uint64_t> other(values.size());
     for (int from = 0; from < size(); ++from) {
       if (from == root) continue;
-      receive(std::as_writable_bytes(std::span(other)), from);
+      take(reductions_, std::as_writable_bytes(std::span(other)), from);
       std::ranges::transform(values, other, values.begin(),
                              [](std::uint64_t a, std::uint64_t b) { return std::max(a, b); });
     }
   }
   [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override {
-    std::vector<int> world;
-    for (const int member : members) world.push_back(members_.at(static_cast<std::size_t>(member)));
     const auto mine = std::ranges::find(members, rank_);
-    HPR_CHECK(mine != members.end());
-    return std::make_unique<LocalCommunicator>(office_, std::move(world), static_cast<int>(mine - members.begin()));
+    HPR_CHECK(mine != members.end() && members.front() >= 0 && members.back() < size());
+    HPR_CHECK(std::ranges::adjacent_find(members, std::greater_equal{}) == members.end());  // ascending
+    Channel channel = channel_;
+    channel.insert(channel.end(), members.begin(), members.end());
+    const int nth = subsets_made_[channel]++;
+    channel.insert(channel.end(), {-1, nth});
+    return std::make_unique<LocalCommunicator>(office_, std::move(channel), static_cast<int>(mine - members.begin()),
+                                               static_cast<int>(members.size()));
   }
 
  private:
+  void put(const Channel& channel, std::span<const std::byte> message, int to) {
+    HPR_CHECK(to >= 0 && to < size());
+    office_.put({channel, rank_, to}, Message(message.begin(), message.end()));
+  }
+  void take(const Channel& channel, std::span<std::byte> message, int from) {
+    HPR_CHECK(from >= 0 && from < size());
+    const Message arrived = office_.take({channel, from, rank_});
+    if (arrived.size() != message.size()) {
+      throw Error(ExitCode::Internal, fmt::format("rank {} expected {} bytes from rank {}, got {}", rank_,
+                                                  message.size(), from, arrived.size()));
+    }
+    std::ranges::copy(arrived, message.begin());
+  }
+
   PostOffice& office_;
-  std::vector<int> members_;
+  Channel channel_;
+  Channel reductions_;
+  std::map<Channel, int> subsets_made_;
   int rank_;
+  int size_;
 };
 
 }  // namespace
@@ -129,12 +148,10 @@ class LocalCommunicator final : public Communicator {
 void run_local_ranks(int size, const std::function<void(Communicator&)>& body, std::chrono::nanoseconds hang_timeout) {
   HPR_CHECK(size > 0);
   PostOffice office(hang_timeout);
-  std::vector<int> members;
-  for (int rank = 0; rank < size; ++rank) members.push_back(rank);
   std::mutex mutex;
   std::exception_ptr first_failure;
   const auto run = [&](int rank) {
-    LocalCommunicator comm(office, members, rank);
+    LocalCommunicator comm(office, {}, rank, size);
     try {
       body(comm);
     } catch (...) {

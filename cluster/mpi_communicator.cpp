@@ -6,14 +6,13 @@
 #include <algorithm>
 #include <string>
 
+#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {
 namespace {
 
 constexpr int kTag = 0;
-/// A message longer than this travels in parts; the last part is the first one shorter than this (it may be empty).
-constexpr std::size_t kPart = std::size_t{1} << 30U;
 
 void check(int code, const char* call) {
   if (code == MPI_SUCCESS) return;
@@ -27,22 +26,29 @@ void check(int code, const char* call) {
 
 }  // namespace
 
-MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout) : hang_timeout_(hang_timeout) {
-  check(MPI_Comm_dup(parent, &comm_), "MPI_Comm_dup");
-  check(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
-  check(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
-  check(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
-}
+MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes)
+    : MpiCommunicator(
+          Owned{},
+          [&] {
+            MPI_Comm copy = MPI_COMM_NULL;
+            check(MPI_Comm_dup(parent, &copy), "MPI_Comm_dup");
+            return copy;
+          }(),
+          hang_timeout, part_bytes) {}
 
-MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout)
-    : comm_(comm), hang_timeout_(hang_timeout) {
+MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout,
+                                 std::size_t part_bytes)
+    : comm_(comm), hang_timeout_(std::min(hang_timeout, kLongestWait)), part_bytes_(part_bytes) {
+  HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kLargestPart);
   check(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
   check(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
   check(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
 }
 
 MpiCommunicator::~MpiCommunicator() {
-  MPI_Comm_free(&comm_);
+  // After a failed wait MPI may still hold buffers that are gone by now; freeing would let it write to them. The job
+  // ends anyway.
+  if (!abandoned_) MPI_Comm_free(&comm_);
 }
 
 template <typename Done>
@@ -53,6 +59,7 @@ void MpiCommunicator::poll(Done done, std::string_view doing, int peer) {
     if (tries < 64) continue;
     sched_yield();
     if (tries % 256 == 0 && std::chrono::steady_clock::now() > deadline) {
+      abandoned_ = true;
       throw Error(ExitCode::Hang,
                   fmt::format("rank {}: still {} rank {} after {:.1f} s", rank_, doing, peer,
                               std::chrono::duration<double>(hang_timeout_).count()),
@@ -74,12 +81,13 @@ void MpiCommunicator::wait(std::vector<MPI_Request>& requests, std::string_view 
 
 void MpiCommunicator::start_send(std::span<const std::byte> message, int to, std::vector<MPI_Request>& requests) {
   while (true) {
-    const auto part = message.first(std::min(message.size(), kPart));
+    // The last part is the first one shorter than a full one; it may be empty.
+    const auto part = message.first(std::min(message.size(), part_bytes_));
     requests.push_back(MPI_REQUEST_NULL);
     check(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, kTag, comm_, &requests.back()),
           "MPI_Isend");
-    if (part.size() < kPart) return;
-    message = message.subspan(kPart);
+    if (part.size() < part_bytes_) return;
+    message = message.subspan(part_bytes_);
   }
 }
 
@@ -113,7 +121,7 @@ std::vector<std::byte> MpiCommunicator::receive(int from) {
     check(MPI_Imrecv(message.data() + (message.size() - size), static_cast<int>(size), MPI_BYTE, &part, request.data()),
           "MPI_Imrecv");
     wait(request, "receiving from", from);
-    if (size < kPart) return message;
+    if (size < part_bytes_) return message;
   }
 }
 
@@ -122,7 +130,7 @@ void MpiCommunicator::receive(std::span<std::byte> message, int from) {
   while (true) {
     MPI_Message part = MPI_MESSAGE_NULL;
     const std::size_t size = next_part(from, part);
-    if (size > message.size() - done || (size < kPart && done + size != message.size())) {
+    if (size > message.size() - done || (size < part_bytes_ && done + size != message.size())) {
       throw Error(ExitCode::Internal, fmt::format("rank {} expected {} bytes from rank {}, got {}", rank_,
                                                   message.size(), from, done + size));
     }
@@ -130,7 +138,7 @@ void MpiCommunicator::receive(std::span<std::byte> message, int from) {
     check(MPI_Imrecv(message.data() + done, static_cast<int>(size), MPI_BYTE, &part, request.data()), "MPI_Imrecv");
     wait(request, "receiving from", from);
     done += size;
-    if (size < kPart) return;
+    if (size < part_bytes_) return;
   }
 }
 
@@ -143,10 +151,10 @@ std::vector<std::byte> MpiCommunicator::exchange(std::span<const std::byte> out,
 }
 
 void MpiCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
-  constexpr std::size_t kMost = kPart / sizeof(std::uint64_t);
-  std::vector<std::uint64_t> result(rank_ == root ? std::min(values.size(), kMost) : 0);
+  const std::size_t most = part_bytes_ / sizeof(std::uint64_t);
+  std::vector<std::uint64_t> result(rank_ == root ? std::min(values.size(), most) : 0);
   while (!values.empty()) {
-    const auto part = values.first(std::min(values.size(), kMost));
+    const auto part = values.first(std::min(values.size(), most));
     std::vector<MPI_Request> request{MPI_REQUEST_NULL};
     check(MPI_Ireduce(part.data(), result.data(), static_cast<int>(part.size()), MPI_UINT64_T, MPI_MAX, root, comm_,
                       request.data()),
@@ -166,7 +174,7 @@ std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> membe
   check(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
   MPI_Group_free(&some);
   MPI_Group_free(&all);
-  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_));
+  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_));
 }
 
 }  // namespace hpr

@@ -7,11 +7,15 @@
 namespace hpr {
 
 /// The ranks of an MPI communicator, on a private duplicate so that no other library's messages can match ours.
-/// Messages of any size: they travel in parts of 1 GiB, as MPI counts are ints.
+/// Messages of any size: they travel in parts, as MPI counts are ints.
 class MpiCommunicator final : public Communicator {
  public:
-  /// Collective over `parent`.
-  explicit MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout = kHangTimeout);
+  static constexpr std::size_t kLargestPart = std::size_t{1} << 30U;
+
+  /// Collective over `parent`. `part_bytes`: a message as long or longer travels in parts of this size, a multiple of 8
+  /// and the same on all ranks; only tests have a reason to change it.
+  explicit MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout = kHangTimeout,
+                           std::size_t part_bytes = kLargestPart);
   ~MpiCommunicator() override;
   MpiCommunicator(const MpiCommunicator&) = delete;
   MpiCommunicator& operator=(const MpiCommunicator&) = delete;
@@ -28,7 +32,7 @@ class MpiCommunicator final : public Communicator {
 
  private:
   struct Owned {};  ///< tag: `comm` becomes ours, no duplicate is made
-  MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout);
+  MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes);
 
   void start_send(std::span<const std::byte> message, int to, std::vector<MPI_Request>& requests);
   /// Waits for all of `requests`; `doing` stands in the error when the time limit passes.
@@ -42,6 +46,8 @@ class MpiCommunicator final : public Communicator {
   int rank_ = 0;
   int size_ = 1;
   std::chrono::nanoseconds hang_timeout_;
+  std::size_t part_bytes_;
+  bool abandoned_ = false;  ///< a wait was given up with requests under way
 };
 
 }  // namespace hpr

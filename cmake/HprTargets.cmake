@@ -13,6 +13,7 @@ endfunction()
 
 # hpr_unit_test(target SOURCES ... DEPENDS ... PREFIX p [LABELS ...] [TIMEOUT s]): GoogleTests of one process. The label is
 # `unit` (also run under the sanitizers) unless others are given.
+add_custom_target(hpr_unit_tests)  # every test program with label `unit`: all that the sanitizers need built
 function(hpr_unit_test target)
   cmake_parse_arguments(ARG "" "PREFIX;TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
@@ -27,6 +28,9 @@ function(hpr_unit_test target)
   add_executable(${target} ${ARG_SOURCES})
   target_link_libraries(${target} PRIVATE ${ARG_DEPENDS} GTest::gtest_main)
   set_target_properties(${target} PROPERTIES BUILD_RPATH ${PROJECT_BINARY_DIR}/lib)
+  if("unit" IN_LIST ARG_LABELS)
+    add_dependencies(hpr_unit_tests ${target})
+  endif()
   gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}." NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} ENVIRONMENT "${HPR_TEST_ENVIRONMENT}")
 endfunction()

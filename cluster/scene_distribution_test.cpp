@@ -1,0 +1,164 @@
+#include "cluster/scene_distribution.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include "cluster/local_communicator.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+Scene small_scene() {
+  Scene scene;
+  scene.name = "small";
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normals.assign(3, {0, 0, 1});
+  mesh.triangles = {{0, 1, 2}};
+  scene.meshes = {mesh};
+  scene.instances.resize(3);
+  finish_scene(scene);
+  return scene;
+}
+
+/// Passes everything on, but changes the last byte of long messages this rank receives: a broken network or build.
+class DamagingCommunicator final : public Communicator {
+ public:
+  explicit DamagingCommunicator(Communicator& inner) : inner_(inner) {}
+  [[nodiscard]] int rank() const override { return inner_.rank(); }
+  [[nodiscard]] int size() const override { return inner_.size(); }
+  [[nodiscard]] std::string_view transport() const override { return inner_.transport(); }
+  void send(std::span<const std::byte> message, int to) override { inner_.send(message, to); }
+  void receive(std::span<std::byte> message, int from) override { inner_.receive(message, from); }
+  [[nodiscard]] std::vector<std::byte> receive(int from) override {
+    auto message = inner_.receive(from);
+    if (message.size() > 200) message.back() ^= std::byte{1};
+    return message;
+  }
+  [[nodiscard]] std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) override {
+    return inner_.exchange(out, peer);
+  }
+  void reduce_max(std::span<std::uint64_t> values, int root) override { inner_.reduce_max(values, root); }
+  [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override {
+    return inner_.subset(members);
+  }
+
+ private:
+  Communicator& inner_;
+};
+
+/// Runs `body` on `size` ranks and expects every one of them to throw just this.
+void expect_error_on_all(int size, ExitCode code, const std::string& what,
+                         const std::function<void(Communicator&)>& body) {
+  std::atomic<int> thrown = 0;
+  run_local_ranks(size, [&](Communicator& comm) {
+    try {
+      body(comm);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code);
+      EXPECT_EQ(error.what(), what);
+      ++thrown;
+    }
+  });
+  EXPECT_EQ(thrown, size);
+}
+
+TEST(DistributeScene, EveryRankHoldsTheSceneOfRankZero) {
+  const std::uint64_t expected = content_hash(small_scene());
+  for (int size = 1; size <= 9; ++size) {
+    std::atomic<int> loads = 0;
+    run_local_ranks(size, [&](Communicator& comm) {
+      const Scene scene = distribute_scene(comm, [&] {
+        ++loads;
+        return small_scene();
+      });
+      EXPECT_EQ(content_hash(scene), expected);
+      EXPECT_EQ(scene.triangles, 3U);
+    });
+    EXPECT_EQ(loads, 1);
+  }
+}
+
+TEST(DistributeScene, AnErrorOfRankZeroReachesEveryoneWhole) {
+  for (const int size : {1, 2, 5}) {
+    std::atomic<int> thrown = 0;
+    run_local_ranks(size, [&](Communicator& comm) {
+      try {
+        (void)distribute_scene(
+            comm, []() -> Scene { throw Error(ExitCode::Io, "no such file", "check the path", "line 3"); });
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ExitCode::Io);
+        EXPECT_STREQ(error.what(), "no such file");
+        EXPECT_EQ(error.hint(), "check the path");
+        EXPECT_EQ(error.line(), "line 3");
+        ++thrown;
+      }
+    });
+    EXPECT_EQ(thrown, size);
+  }
+}
+
+TEST(DistributeScene, OtherExceptionsBecomeErrorsOnEveryRank) {
+  expect_error_on_all(3, ExitCode::Internal, "vector too long", [](Communicator& comm) {
+    (void)distribute_scene(comm, []() -> Scene { throw std::length_error("vector too long"); });
+  });
+  expect_error_on_all(3, ExitCode::Limit, "out of memory", [](Communicator& comm) {
+    (void)distribute_scene(comm, []() -> Scene { throw std::bad_alloc(); });
+  });
+}
+
+TEST(DistributeScene, ARankThatHoldsAnotherSceneIsNamedOnEveryRank) {
+  std::atomic<int> thrown = 0;
+  run_local_ranks(4, [&](Communicator& comm) {
+    DamagingCommunicator damaging(comm);
+    try {
+      // In a tree of four, rank 3 receives from rank 1 and passes nothing on.
+      (void)distribute_scene(comm.rank() == 3 ? damaging : comm, small_scene);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::BadInput);
+      EXPECT_NE(std::string(error.what()).find("rank 3 holds another scene"), std::string::npos) << error.what();
+      ++thrown;
+    }
+  });
+  EXPECT_EQ(thrown, 4);
+}
+
+TEST(OnRoot, RunsOnRankZeroAloneAndGivesAllItsBytes) {
+  std::atomic<int> runs = 0;
+  run_local_ranks(5, [&](Communicator& comm) {
+    const auto bytes = on_root(comm, [&] {
+      ++runs;
+      return std::vector<std::byte>(3, std::byte{9});
+    });
+    EXPECT_EQ(bytes, std::vector<std::byte>(3, std::byte{9}));
+    EXPECT_TRUE(on_root(comm, [] { return std::vector<std::byte>{}; }).empty());
+  });
+  EXPECT_EQ(runs, 1);
+}
+
+TEST(AgreeOnFailure, TheLowestFailingRankSpeaksForAll) {
+  for (const int size : {3, 4, 9}) {
+    expect_error_on_all(size, ExitCode::Limit, "rank 1 failed", [](Communicator& comm) {
+      agree_on_failure(comm, [&] {
+        if (comm.rank() == 1) throw Error(ExitCode::Limit, "rank 1 failed");
+        if (comm.rank() == 2) throw Error(ExitCode::Io, "rank 2 failed");
+      });
+    });
+  }
+}
+
+TEST(AgreeOnFailure, IsSilentWhenAllSucceed) {
+  std::atomic<int> done = 0;
+  run_local_ranks(6, [&](Communicator& comm) {
+    agree_on_failure(comm, [&] { ++done; });
+    EXPECT_EQ(done, 6);
+  });
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+"""Every way to leave hpr that docs/cli.md names and that can be brought about here.
+
+usage: exit_codes_test.py HPR
+
+Each failure must give its exit code and one error of up to three lines, `hpr: error: WHAT`, the offending line and a
+hint, and leave no file behind, partial or whole. Prints what was wrong and leaves with 1.
+"""
+
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+
+HPR = os.path.abspath(sys.argv[1])
+failures = []
+
+
+def run(arguments, folder, environment=None):
+    return subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False,
+                          env={**os.environ, **(environment or {})})
+
+
+def complain(case, result, message):
+    failures.append(case)
+    print(f"{case}: {message}\n  stdout: {result.stdout[-600:]!r}\n  stderr: {result.stderr[-1200:]!r}")
+
+
+def error_lines(text):
+    """The error's own lines: the one that names it and what is indented below it (mpiexec adds its own words)."""
+    found = []
+    for line in text.splitlines():
+        if line.startswith("hpr: error:") or (found and line.startswith("  ")):
+            found.append(line)
+        elif found:
+            break
+    return found
+
+
+def expect_error(case, arguments, codes, mentions=(), environment=None, prepare=None, folder=None):
+    """Runs hpr in a fresh folder (or `folder`) and expects one of `codes`, an orderly message and no new file."""
+    with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+        where = pathlib.Path(folder or scratch)
+        if prepare:
+            prepare(where)
+        before = sorted(p.name for p in where.rglob("*"))
+        result = run(arguments, where, environment)
+        after = sorted(p.name for p in where.rglob("*"))
+    lines = [line for line in result.stderr.splitlines() if line.startswith("hpr: error:")]
+    if result.returncode not in codes:
+        complain(case, result, f"left with {result.returncode} instead of {' or '.join(map(str, codes))}")
+    elif len(lines) != 1:
+        complain(case, result, f"{len(lines)} lines start an error instead of one")
+    elif len(error_lines(result.stderr)) > 3:
+        complain(case, result, "more than three lines")
+    elif after != before:
+        complain(case, result, f"left files: {sorted(set(after) - set(before))}")
+    else:
+        for word in mentions:
+            if word not in result.stderr:
+                complain(case, result, f"does not say {word!r}")
+
+
+def expect_success(case, arguments, prefix):
+    with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+        result = run(arguments, scratch)
+    if result.returncode != 0:
+        complain(case, result, f"left with {result.returncode}")
+    elif prefix not in result.stdout:
+        complain(case, result, f"stdout does not say {prefix!r}")
+
+
+def gltf(last_index):
+    """A triangle whose third index is `last_index`; anything past 2 points outside its three vertices."""
+    positions = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
+    binary = positions + struct.pack("<3H", 0, 1, last_index)
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}],
+        "buffers": [{"uri": "triangle.bin", "byteLength": len(binary)}],
+    }, binary
+
+
+def write_gltf(last_index):
+    def prepare(folder):
+        document, binary = gltf(last_index)
+        (folder / "triangle.gltf").write_text(json.dumps(document))
+        (folder / "triangle.bin").write_bytes(binary)
+    return prepare
+
+
+def writer(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+TWICE = """hpr_wall = 1
+name = "twice"
+nodes = [{ id = "pc" }]
+windows = [
+  { id = "w0", node = "pc", display = ":0", rect = [0, 0, 64, 36] },
+  { id = "w1", node = "pc", display = ":0", rect = [60, 30, 64, 36] },
+]
+
+[[surfaces]]
+id = "wall"
+
+[surfaces.grid]
+columns = 2
+rows = 1
+tile_pixels = [64, 36]
+tile_size_m = [0.64, 0.36]
+windows = ["w0", "w1"]
+"""
+
+SMALL = ["--size", "64x48"]
+
+
+def full_disk():
+    """A file system of 16 KiB, so that a picture does not fit: needs root and the right to mount."""
+    with tempfile.TemporaryDirectory(prefix="hpr-full-") as folder:
+        mounted = os.geteuid() == 0 and subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=16k", "hpr-full", folder], capture_output=True, check=False).returncode == 0
+        if not mounted:
+            print("full disk: not tried, it needs the right to mount")
+            return
+        try:
+            expect_error("full disk", ["render", "gen:gallery", "--size", "320x256", "-o", f"{folder}/a.exr"], [4],
+                         ["space"], folder=folder)
+        finally:
+            subprocess.run(["umount", folder], check=False)
+
+
+def main():
+    expect_success("help", ["--help"], "render")
+    expect_success("help command", ["help"], "render")
+    expect_success("help of render", ["render", "--help"], "--size")
+    expect_success("version", ["--version"], "hpr")
+
+    expect_error("unknown command", ["rendr"], [2], ["render"])
+    expect_error("unknown option", ["render", "gen:gallery", "-o", "a.png", "--sizee", "64x48"], [2], ["--size"])
+    expect_error("no output named", ["render", "gen:gallery", *SMALL], [2])
+    expect_error("size is no size", ["render", "gen:gallery", "-o", "a.png", "--size", "64by48"], [2], ["64by48"])
+    expect_error("unknown backend", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--backend", "nonsense"], [2],
+                 ["egl", "osmesa"])
+    expect_error("unknown strategy", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--strategy", "tre"], [2], ["tree"])
+    expect_error("unknown distribution", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--distribute", "sort-fist"],
+                 [2], ["sort-first"])
+    expect_error("unknown generator", ["render", "gen:galery", "-o", "a.png", *SMALL], [2], ["gallery"])
+    expect_error("picture of unknown kind", ["render", "gen:gallery", "-o", "a.gif", *SMALL], [2], [".png"])
+
+    expect_error("missing scene", ["render", "none.glb", "-o", "a.png", *SMALL], [4], ["none.glb"])
+    expect_error("missing scene, two ranks", ["render", "none.glb", "-o", "a.png", *SMALL, "--ranks", "2"], [4],
+                 ["none.glb"])
+    expect_error("missing wall", ["wall", "check", "none.toml"], [4], ["none.toml"])
+    expect_error("missing folder", ["render", "gen:gallery", "-o", "none/a.png", *SMALL], [4], ["none"])
+    expect_error("existing picture", ["render", "gen:gallery", "-o", "a.png", *SMALL], [4], ["--force"],
+                 prepare=writer("a.png", "precious"))
+
+    expect_error("scene is no glTF", ["render", "a.glb", "-o", "a.png", *SMALL], [3], ["a.glb"],
+                 prepare=writer("a.glb", "not a scene"))
+    expect_error("index out of range", ["render", "triangle.gltf", "-o", "a.png", *SMALL], [3], ["triangle.gltf"],
+                 prepare=write_gltf(3))
+    expect_error("index out of range, three ranks", ["render", "triangle.gltf", "-o", "a.png", *SMALL, "--ranks", "3"],
+                 [3], ["triangle.gltf"], prepare=write_gltf(3))
+    expect_error("broken wall file", ["wall", "check", "wall.toml"], [3], ["wall.toml:3:"],
+                 prepare=writer("wall.toml", "# a wall\n[wall]\nname = = 1\n"))
+    expect_error("tile driven twice", ["wall", "check", "wall.toml"], [3], ["wall.toml:6:", "twice"],
+                 prepare=writer("wall.toml", TWICE))
+
+    expect_error("picture past the limit", ["render", "gen:gallery", "-o", "a.png", "--size", "4096x4096", "--limit-image",
+                                            "1024x1024"], [6], ["1024"])
+    expect_error("scene past the limit", ["render", "triangle.gltf", "-o", "a.png", *SMALL, "--limit-mem", "16B"], [6],
+                 prepare=write_gltf(2))
+
+    expect_error("no graphics", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--backend", "egl"], [5],
+                 environment={"LIBGL_DRIVERS_PATH": "/none", "GBM_BACKENDS_PATH": "/none", "EGL_PLATFORM": "surfaceless"})
+    full_disk()
+
+    with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+        result = run(["render", "gen:gallery", "-o", "a.png", *SMALL], scratch)
+        other = run(["render", "gen:gallery", "-o", "b.png", *SMALL, "--eye", "0,9,9", "--at", "0,0,0"], scratch)
+        if result.returncode or other.returncode:
+            complain("render", result if result.returncode else other, "left with a failure")
+        else:
+            same = run(["diff", "a.png", "a.png", "--fail", "0"], scratch)
+            if same.returncode != 0:
+                complain("diff of equal pictures", same, f"left with {same.returncode}")
+            different = run(["diff", "a.png", "b.png", "--fail", "0"], scratch)
+            if different.returncode != 1:
+                complain("diff of different pictures", different, f"left with {different.returncode} instead of 1")
+
+    print(f"{len(failures)} cases failed: {', '.join(failures)}" if failures else "every exit code is as documented")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

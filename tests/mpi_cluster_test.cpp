@@ -1,0 +1,224 @@
+// The contract of Communicator, by MPI: run by mpiexec with 1 to 5 ranks. Each rank checks its own part; EXPECT, never
+// ASSERT, between collective calls, so that one failing rank leaves no other waiting.
+#include <gtest/gtest.h>
+#include <mpi.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cluster/collectives.h"
+#include "cluster/mpi_communicator.h"
+#include "cluster/scene_distribution.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+constexpr std::size_t kSmallPart = 1024;
+
+Bytes message_of(int rank, std::size_t size) {
+  Bytes bytes(size);
+  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + static_cast<std::size_t>(rank) * 7);
+  return bytes;
+}
+
+TEST(Mpi, MessagesOfOddSizesGoRoundTheRing) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  const int next = (comm.rank() + 1) % comm.size();
+  const int previous = (comm.rank() + comm.size() - 1) % comm.size();
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{4097}, std::size_t{3'000'001}}) {
+    // Ranks take turns: a large send ends only when it is received.
+    if (comm.size() == 1) {
+      EXPECT_EQ(comm.exchange(message_of(0, size), 0), message_of(0, size));
+      continue;
+    }
+    for (int sender = 0; sender < comm.size(); ++sender) {
+      if (comm.rank() == sender) comm.send(message_of(sender, size), next);
+      if (previous == sender) {
+        EXPECT_TRUE(comm.receive(sender) == message_of(sender, size));
+      }
+    }
+    for (int sender = 0; sender < comm.size(); ++sender) {
+      if (comm.rank() == sender) comm.send(message_of(sender, size), next);
+      if (previous == sender) {
+        Bytes known(size);
+        comm.receive(known, sender);
+        EXPECT_TRUE(known == message_of(sender, size));
+      }
+    }
+  }
+}
+
+TEST(Mpi, MessagesInPartsArriveWholeAndInOrder) {
+  MpiCommunicator comm(MPI_COMM_WORLD, kHangTimeout, kSmallPart);
+  const int peer = comm.rank() ^ 1;
+  if (peer >= comm.size()) return;
+  for (const std::size_t size : {kSmallPart - 1, kSmallPart, kSmallPart + 1, 2 * kSmallPart, 10 * kSmallPart + 3}) {
+    EXPECT_TRUE(comm.exchange(message_of(comm.rank(), size), peer) == message_of(peer, size)) << size;
+    if (comm.rank() < peer) {
+      comm.send(message_of(1, size), peer);
+      comm.send(message_of(2, 5), peer);
+    } else {
+      Bytes known(size);
+      comm.receive(known, peer);
+      EXPECT_TRUE(known == message_of(1, size)) << size;
+      EXPECT_TRUE(comm.receive(peer) == message_of(2, 5));
+    }
+  }
+}
+
+TEST(Mpi, ExchangeMayHaveTwoSizes) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  for (int peer = 0; peer < comm.size(); ++peer) {
+    for (int other = 0; other < peer; ++other) {
+      if (comm.rank() != peer && comm.rank() != other) continue;
+      const int partner = comm.rank() == peer ? other : peer;
+      const auto size_of = [](int rank) { return static_cast<std::size_t>(rank) * 700'001; };
+      EXPECT_TRUE(comm.exchange(message_of(comm.rank(), size_of(comm.rank())), partner) ==
+                  message_of(partner, size_of(partner)));
+    }
+  }
+}
+
+TEST(Mpi, ReduceMaxLeavesTheLargestOfEachOnEveryRoot) {
+  for (const std::size_t part : {kSmallPart, MpiCommunicator::kLargestPart}) {
+    MpiCommunicator comm(MPI_COMM_WORLD, kHangTimeout, part);
+    for (int root = 0; root < comm.size(); ++root) {
+      std::vector<std::uint64_t> values(1001);
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] =
+            static_cast<int>(i) % comm.size() == comm.rank() ? std::numeric_limits<std::uint64_t>::max() - i : i;
+      }
+      comm.reduce_max(values, root);
+      if (comm.rank() != root) continue;
+      bool right = true;
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        right = right && values[i] == std::numeric_limits<std::uint64_t>::max() - i;
+      }
+      EXPECT_TRUE(right) << "root " << root << ", parts of " << part;
+    }
+    comm.reduce_max({}, 0);
+  }
+}
+
+TEST(Mpi, SubsetsNumberTheirMembersAndKeepTheirMessagesApart) {
+  MpiCommunicator comm(MPI_COMM_WORLD, kHangTimeout, kSmallPart);
+  std::vector<int> members;
+  for (int rank = comm.rank() % 2; rank < comm.size(); rank += 2) members.push_back(rank);
+  const auto first = comm.subset(members);
+  const auto second = comm.subset(members);
+  EXPECT_EQ(first->size(), static_cast<int>(members.size()));
+  EXPECT_EQ(members[static_cast<std::size_t>(first->rank())], comm.rank());
+  EXPECT_EQ(all_gather_value(*first, comm.rank()), members);
+  if (first->size() > 1 && first->rank() == 0) {
+    first->send(message_of(1, 3000), 1);
+    second->send(message_of(2, 10), 1);
+    comm.send(message_of(3, 10), members[1]);
+  } else if (first->rank() == 1) {
+    // A large message may wait for its receiver, so the first one is taken first; the small ones in the other order.
+    EXPECT_TRUE(first->receive(0) == message_of(1, 3000));
+    EXPECT_TRUE(comm.receive(members[0]) == message_of(3, 10));
+    EXPECT_TRUE(second->receive(0) == message_of(2, 10));
+  }
+}
+
+TEST(Mpi, CollectivesWorkFromEveryRoot) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  for (int root = 0; root < comm.size(); ++root) {
+    Bytes bytes = comm.rank() == root ? message_of(root, 100'003) : Bytes{};
+    broadcast(comm, bytes, root);
+    EXPECT_TRUE(bytes == message_of(root, 100'003));
+    const auto parts = gather(comm, message_of(comm.rank(), static_cast<std::size_t>(comm.rank()) * 50'000), root);
+    if (comm.rank() == root) {
+      for (int rank = 0; rank < comm.size(); ++rank) {
+        EXPECT_TRUE(parts[static_cast<std::size_t>(rank)] == message_of(rank, static_cast<std::size_t>(rank) * 50'000));
+      }
+    }
+    barrier(comm);
+  }
+  std::vector<int> ranks;
+  for (int rank = 0; rank < comm.size(); ++rank) ranks.push_back(rank);
+  EXPECT_EQ(all_gather_value(comm, comm.rank()), ranks);
+}
+
+TEST(Mpi, AnErrorOfRankZeroReachesEveryone) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  ExitCode code = ExitCode::Done;
+  try {
+    (void)distribute_scene(comm, []() -> Scene { throw Error(ExitCode::BadInput, "index out of range"); });
+  } catch (const Error& error) {
+    code = error.code();
+  }
+  EXPECT_EQ(code, ExitCode::BadInput);
+}
+
+TEST(Mpi, AMessageOfAnotherSizeIsAnInternalError) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  if (comm.rank() > 1 || comm.size() == 1) return;
+  if (comm.rank() == 0) {
+    comm.send(message_of(0, 3), 1);
+    return;
+  }
+  Bytes two(2);
+  ExitCode code = ExitCode::Done;
+  try {
+    comm.receive(two, 0);
+  } catch (const Error& error) {
+    code = error.code();
+  }
+  EXPECT_EQ(code, ExitCode::Internal);
+}
+
+TEST(Mpi, AWaitEndsAtTheTimeLimitAndNamesTheRank) {
+  ExitCode code = ExitCode::Done;
+  std::string what;
+  {
+    MpiCommunicator comm(MPI_COMM_WORLD, std::chrono::milliseconds(200));
+    const int silent = (comm.rank() + 1) % comm.size();
+    try {
+      (void)comm.receive(silent);
+    } catch (const Error& error) {
+      code = error.code();
+      what = error.what();
+    }
+    EXPECT_NE(what.find("message from rank " + std::to_string(silent)), std::string::npos) << what;
+  }
+  EXPECT_EQ(code, ExitCode::Hang);
+  MPI_Barrier(MPI_COMM_WORLD);
+}
+
+TEST(Mpi, TheLongestTimeLimitIsNotTakenForAPassedOne) {
+  MpiCommunicator comm(MPI_COMM_WORLD, std::chrono::nanoseconds::max());
+  barrier(comm);
+  EXPECT_EQ(all_gather_value(comm, 1).size(), static_cast<std::size_t>(comm.size()));
+}
+
+}  // namespace
+}  // namespace hpr
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  testing::InitGoogleTest(&argc, argv);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank != 0) {
+    // One account of each test is enough; other ranks still print what failed.
+    auto& listeners = testing::UnitTest::GetInstance()->listeners();
+    struct FailuresOnly : testing::EmptyTestEventListener {
+      void OnTestPartResult(const testing::TestPartResult& result) override {
+        if (result.failed())
+          std::fprintf(stderr, "%s:%d: %s\n", result.file_name(), result.line_number(), result.message());
+      }
+    };
+    delete listeners.Release(listeners.default_result_printer());
+    listeners.Append(new FailuresOnly);
+  }
+  int failed = RUN_ALL_TESTS();
+  MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  MPI_Finalize();
+  return failed;
+}
