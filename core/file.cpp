@@ -5,7 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <string>
 #include <system_error>
 
 #include "core/error.h"
@@ -56,6 +58,42 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
+/// Where a write to `path` ends up: a rename would replace a symbolic link, not what it points at. Refuses what a
+/// rename must not replace: folders, and devices and pipes (a run as root would turn /dev/null into a file).
+std::filesystem::path target_of(const std::filesystem::path& path) {
+  if (!path.has_filename()) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it names no file", path.string()), "name a file");
+  }
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (std::filesystem::is_directory(status)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
+  }
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': not a regular file", path.string()),
+                "name a file, not a pipe or device");
+  }
+  std::filesystem::path target = path;
+  // Ends: status() above has followed the same links, and a loop of them is an error there and at the write.
+  for (int links = 0; links < 40 && std::filesystem::is_symlink(target, error); ++links) {
+    target = folder_of(target) / std::filesystem::read_symlink(target, error);
+  }
+  return target;
+}
+
+/// A new file in `folder`, with the permissions the user's umask gives. Its name is short whatever the final name is,
+/// so that no name the file system allows is too long for us.
+int create_temporary(const std::filesystem::path& folder, std::string& name) {
+  constexpr int kTries = 10000;  // each one is a file that a killed run left behind
+  int fd = -1;
+  for (int i = 0; i < kTries; ++i) {
+    name = (folder / fmt::format(".hpr-{}-{}.part", ::getpid(), i)).string();
+    fd = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0 || errno != EEXIST) break;
+  }
+  return fd;
+}
+
 }  // namespace
 
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
@@ -92,20 +130,21 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  std::string temporary = (folder_of(path) / ("." + path.filename().string() + ".XXXXXX")).string();
-  Descriptor file(::mkostemp(temporary.data(), O_CLOEXEC));
+  const std::filesystem::path target = target_of(path);
+  std::string temporary;
+  Descriptor file(create_temporary(folder_of(target), temporary));
   if (file.get() < 0) fail("cannot write", path, errno);
   try {
     write_all(file, bytes, path);
-    if (::fchmod(file.get(), 0644) != 0 || ::fsync(file.get()) != 0) fail("cannot write", path, errno);
+    if (::fsync(file.get()) != 0) fail("cannot write", path, errno);
     if (file.reset() != 0) fail("cannot write", path, errno);
-    if (::rename(temporary.c_str(), path.c_str()) != 0) fail("cannot write", path, errno);
+    if (::rename(temporary.c_str(), target.c_str()) != 0) fail("cannot write", path, errno);
   } catch (...) {
     ::unlink(temporary.c_str());
     throw;
   }
   // The rename itself is on disk only once the folder is synced; some file systems refuse that, and lose nothing by it.
-  const Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const Descriptor folder(::open(folder_of(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.get() >= 0) ::fsync(folder.get());
 }
 
@@ -114,20 +153,17 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 }
 
 void check_writable(const std::filesystem::path& path, bool overwrite) {
+  const std::filesystem::path folder = folder_of(target_of(path));
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
-  }
   if (!overwrite && std::filesystem::exists(path, error)) {
     throw Error(ExitCode::Io, fmt::format("'{}' exists", path.string()),
                 "choose another name or overwrite it with --force");
   }
-  if (!std::filesystem::is_directory(folder_of(path), error)) {
-    throw Error(ExitCode::Io,
-                fmt::format("cannot write '{}': there is no folder '{}'", path.string(), folder_of(path).string()),
+  if (!std::filesystem::is_directory(folder, error)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': there is no folder '{}'", path.string(), folder.string()),
                 "create the folder first");
   }
-  if (::access(folder_of(path).c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
 }
 
 }  // namespace hpr

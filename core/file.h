@@ -14,11 +14,13 @@ namespace hpr {
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes);
 
 /// Writes `bytes` so that `path` is either complete or untouched, also when the disk fills or the process dies:
-/// a temporary file beside it is written, synced, renamed, and the folder synced. Throws Error (Io).
+/// a temporary file beside it is written, synced, renamed, and the folder synced. A symbolic link stays, what it points
+/// at is replaced. Throws Error (Io), also when `path` is a folder, pipe or device.
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
-/// Throws Error (Io) when `path` exists and may not be overwritten, or its folder is missing: asked before long work.
+/// Throws Error (Io) when `path` exists and may not be overwritten, is no regular file, or its folder is missing or not
+/// writable: asked before long work.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
 }  // namespace hpr

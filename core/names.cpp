@@ -4,6 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace hpr {
@@ -25,25 +28,32 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return cost[a.size()][b.size()];
 }
 
-/// Bytes of the UTF-8 sequence that starts `text`; 0 when there is no valid one.
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const std::size_t length = byte(0) < 0x80                      ? 1
-                             : byte(0) >= 0xC2 && byte(0) < 0xE0 ? 2
-                             : byte(0) >= 0xE0 && byte(0) < 0xF0 ? 3
-                             : byte(0) >= 0xF0 && byte(0) < 0xF5 ? 4
-                                                                 : 0;
-  if (length == 0 || length > text.size()) return 0;
+/// Bytes of the UTF-8 sequence that starts `text` (RFC 3629: no overlong forms, no surrogates), and its code point; 0
+/// when there is no valid one.
+std::pair<std::size_t, std::uint32_t> decode_utf8(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(text[i])); };
+  const std::uint32_t first = byte(0);
+  if (first < 0x80) return {1, first};
+  const std::size_t length = first >= 0xC2 && first < 0xE0   ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
+  if (length == 0 || length > text.size()) return {0, 0};
+  std::uint32_t code = first & (0x7FU >> length);
   for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xC0U) != 0x80U) return 0;
+    if ((byte(i) & 0xC0U) != 0x80U) return {0, 0};
+    code = code << 6U | (byte(i) & 0x3FU);
   }
-  // U+0080..U+009F are control codes; U+202A..U+202E and U+2066..U+2069 turn the text around them.
-  if (length == 2 && byte(0) == 0xC2 && byte(1) < 0xA0) return 0;
-  if (length == 3 && byte(0) == 0xE2 &&
-      ((byte(1) == 0x80 && byte(2) >= 0xAA && byte(2) <= 0xAE) ||
-       (byte(1) == 0x81 && byte(2) >= 0xA6 && byte(2) <= 0xA9)))
-    return 0;
-  return length;
+  constexpr std::array<std::uint32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
+  if (code < kSmallest[length] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000)) return {0, 0};
+  return {length, code};
+}
+
+/// Control codes, line separators, and what is invisible or turns the text around it (Unicode's Bidi_Control).
+bool disturbs_terminals(std::uint32_t code) {
+  const auto between = [code](std::uint32_t low, std::uint32_t high) { return code >= low && code <= high; };
+  return code < 0x20 || between(0x7F, 0x9F) || code == 0x061C || between(0x200B, 0x200F) || between(0x2028, 0x202E) ||
+         between(0x2060, 0x206F) || code == 0xFEFF;
 }
 
 }  // namespace
@@ -51,7 +61,7 @@ std::size_t utf8_length(std::string_view text) {
 std::optional<std::string> nearest_name(std::string_view name, std::span<const std::string> choices) {
   if (name.size() > 200) return std::nullopt;
   std::optional<std::string> best;
-  std::size_t best_distance = name.size() / 3 + 1;
+  std::size_t best_distance = (name.size() + 2) / 3;
   for (const std::string& choice : choices) {
     const std::size_t distance = edit_distance(name, choice);
     if (distance < best_distance || (distance == best_distance && !best)) {
@@ -71,16 +81,16 @@ std::string unknown_name_hint(std::string_view name, std::span<const std::string
 std::string printable(std::string_view text, std::size_t limit) {
   std::string out;
   while (!text.empty()) {
-    if (out.size() >= limit) return out + "...";
-    const std::size_t length = utf8_length(text);
-    const auto first = static_cast<unsigned char>(text[0]);
-    if (length == 0 || first < 0x20 || first == 0x7F) {
-      out += fmt::format("\\x{:02x}", first);
-      text.remove_prefix(1);
-    } else {
-      out += text.substr(0, length);
-      text.remove_prefix(length);
+    const auto [length, code] = decode_utf8(text);
+    std::string piece(text.substr(0, std::max<std::size_t>(length, 1)));
+    text.remove_prefix(piece.size());
+    if (length == 0 || disturbs_terminals(code)) {
+      std::string escaped;
+      for (const char c : piece) escaped += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+      piece = std::move(escaped);
     }
+    if (out.size() + piece.size() > limit) return out + "...";
+    out += piece;
   }
   return out;
 }

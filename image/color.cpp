@@ -11,12 +11,14 @@ double decode(double level) {
   return level <= 0.04045 ? level / 12.92 : std::pow((level + 0.055) / 1.055, 2.4);
 }
 
-/// The linear value from which level i + 1 is nearer than level i.
+/// The smallest float from which level i + 1 is nearer than level i.
 const std::array<float, 255>& thresholds() {
   static const std::array<float, 255> table = [] {
     std::array<float, 255> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
-      made[i] = static_cast<float>(decode((static_cast<double>(i) + 0.5) / 255.0));
+      const double border = decode((static_cast<double>(i) + 0.5) / 255.0);
+      made[i] = static_cast<float>(border);
+      if (static_cast<double>(made[i]) < border) made[i] = std::nextafter(made[i], 2.0F);
     }
     return made;
   }();

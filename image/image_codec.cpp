@@ -70,6 +70,8 @@ class Input {
     input_ = OIIO::ImageInput::create(format, false, &config, &memory_);
     if (!input_)
       throw Error(ExitCode::Internal, fmt::format("OpenImageIO cannot read {}", format), "reinstall libopenimageio2.4");
+    // open() by itself takes the file of that name: the memory must be named to it here, not only at create().
+    input_->set_ioproxy(&memory_);
     OIIO::ImageSpec spec;
     if (!input_->open(name, spec, config)) fail();
     check_limits(spec, name, limits);

@@ -3,6 +3,9 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <system_error>
+
+#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "image/image_codec.h"
@@ -10,9 +13,19 @@
 namespace hpr {
 namespace {
 
+/// Opens the module from lib/ beside the program's folder, where build and installation put it, else from wherever the
+/// loader searches. The path comes first because a sanitizer's dlopen does not see the program's own search path.
+void* open_module() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto beside = program.parent_path().parent_path() / "lib" / "libhpr_imageio.so";
+  if (!error && std::filesystem::exists(beside, error)) return ::dlopen(beside.c_str(), RTLD_NOW | RTLD_LOCAL);
+  return ::dlopen("libhpr_imageio.so", RTLD_NOW | RTLD_LOCAL);
+}
+
 const ImageCodec& codec() {
   static const ImageCodec* const loaded = []() -> const ImageCodec* {
-    void* const module = ::dlopen("libhpr_imageio.so", RTLD_NOW | RTLD_LOCAL);
+    void* const module = open_module();
     if (module == nullptr) {
       throw Error(ExitCode::Internal, fmt::format("cannot open the image module: {}", ::dlerror()),
                   "install libopenimageio2.4 and keep libhpr_imageio.so where the build or the package put it");
@@ -38,6 +51,9 @@ std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
 
 std::vector<std::byte> encode_exr(const Image<Rgb>& image, const std::map<std::string, std::string>& attributes,
                                   std::span<const ExrLayer> layers) {
+  for (const ExrLayer& layer : layers) {
+    HPR_CHECK(layer.values.size() == image.pixels().size() * layer.channels.size());
+  }
   return codec().encode_exr(image, attributes, layers);
 }
 

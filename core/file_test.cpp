@@ -1,0 +1,164 @@
+#include "core/file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <string>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A fresh folder, gone after the test.
+class FileTest : public testing::Test {
+ protected:
+  FileTest() {
+    std::string name = (fs::temp_directory_path() / "hpr-file-test-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) ADD_FAILURE() << "no scratch folder";
+    folder_ = name;
+  }
+  ~FileTest() override { fs::remove_all(folder_); }
+  FileTest(const FileTest&) = delete;
+  FileTest& operator=(const FileTest&) = delete;
+
+  [[nodiscard]] std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  [[nodiscard]] fs::path path(const std::string& name) const { return folder_ / name; }
+
+  fs::path folder_;
+};
+
+std::string text_of(const fs::path& path) {
+  const auto bytes = read_file(path, 1U << 20U);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+template <typename Call>
+ExitCode code_of(Call call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    EXPECT_FALSE(std::string(error.what()).empty());
+    EXPECT_FALSE(error.hint().empty());
+    return error.code();
+  }
+  return ExitCode::Done;
+}
+
+/// While it lives no file may grow past `bytes`: what a full disk looks like to a program.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int);
+};
+
+TEST_F(FileTest, WhatIsWrittenIsRead) {
+  for (const std::size_t size : {0U, 1U, 4097U}) {
+    const std::string text(size, 'x');
+    write_file_atomically(path("a"), text);
+    EXPECT_EQ(text_of(path("a")), text);
+  }
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FileTest, NewFilesHaveTheRightsTheUmaskGives) {
+  const mode_t old = ::umask(027);
+  write_file_atomically(path("a"), "text");
+  ::umask(old);
+  EXPECT_EQ(fs::status(path("a")).permissions(), fs::perms{0640});
+}
+
+TEST_F(FileTest, AWriteThatFailsLeavesTheOldFileAndNothingElse) {
+  write_file_atomically(path("a"), "old");
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_EQ(code_of([&] { write_file_atomically(path("a"), std::string(5000, 'x')); }), ExitCode::Io);
+    EXPECT_EQ(code_of([&] { write_file_atomically(path("b"), std::string(5000, 'x')); }), ExitCode::Io);
+  }
+  EXPECT_EQ(text_of(path("a")), "old");
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FileTest, ANameOfTheGreatestLengthCanBeWritten) {
+  const std::string name(255, 'n');
+  write_file_atomically(path(name), "text");
+  EXPECT_EQ(text_of(path(name)), "text");
+}
+
+TEST_F(FileTest, ASymbolicLinkStaysAndItsTargetIsReplaced) {
+  write_file_atomically(path("target"), "old");
+  fs::create_symlink("target", path("link"));
+  write_file_atomically(path("link"), "new");
+  EXPECT_TRUE(fs::is_symlink(path("link")));
+  EXPECT_EQ(text_of(path("target")), "new");
+  fs::create_symlink("later", path("dangling"));
+  write_file_atomically(path("dangling"), "made");
+  EXPECT_EQ(text_of(path("later")), "made");
+}
+
+TEST_F(FileTest, FoldersPipesAndDevicesAreNeitherReadNorReplaced) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  fs::create_directory(path("folder"));
+  fs::create_symlink("/dev/null", path("null"));
+  for (const char* name : {"pipe", "folder", "null"}) {
+    EXPECT_EQ(code_of([&] { (void)read_file(path(name), 100); }), ExitCode::Io) << name;
+    EXPECT_EQ(code_of([&] { write_file_atomically(path(name), "text"); }), ExitCode::Io) << name;
+    EXPECT_EQ(code_of([&] { check_writable(path(name), true); }), ExitCode::Io) << name;
+  }
+  EXPECT_TRUE(fs::is_fifo(path("pipe")));
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_EQ(files(), 3U);
+}
+
+TEST_F(FileTest, MissingFilesAndFoldersAreIoErrors) {
+  EXPECT_EQ(code_of([&] { (void)read_file(path("none"), 100); }), ExitCode::Io);
+  EXPECT_EQ(code_of([&] { write_file_atomically(path("none/a"), "text"); }), ExitCode::Io);
+  EXPECT_EQ(code_of([&] { check_writable(path("none/a"), false); }), ExitCode::Io);
+  EXPECT_EQ(code_of([] { write_file_atomically("", "text"); }), ExitCode::Io);
+  EXPECT_EQ(code_of([] { check_writable("", true); }), ExitCode::Io);
+}
+
+TEST_F(FileTest, AFileIsReadUpToTheLimitAndNotBeyond) {
+  write_file_atomically(path("a"), std::string(100, 'x'));
+  EXPECT_EQ(read_file(path("a"), 100).size(), 100U);
+  EXPECT_EQ(code_of([&] { (void)read_file(path("a"), 99); }), ExitCode::Limit);
+}
+
+TEST_F(FileTest, AnExistingFileIsOverwrittenOnlyWhenAsked) {
+  EXPECT_EQ(code_of([&] { check_writable(path("a"), false); }), ExitCode::Done);
+  write_file_atomically(path("a"), "text");
+  EXPECT_EQ(code_of([&] { check_writable(path("a"), false); }), ExitCode::Io);
+  EXPECT_EQ(code_of([&] { check_writable(path("a"), true); }), ExitCode::Done);
+  EXPECT_EQ(text_of(path("a")), "text");
+}
+
+TEST_F(FileTest, AFolderThatForbidsWritingIsRefusedBeforeTheWork) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
+  fs::create_directory(path("closed"));
+  fs::permissions(path("closed"), fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_EQ(code_of([&] { check_writable(path("closed/a"), true); }), ExitCode::Io);
+}
+
+}  // namespace
+}  // namespace hpr

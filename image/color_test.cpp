@@ -1,0 +1,74 @@
+#include "image/color.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace hpr {
+namespace {
+
+std::uint8_t level_of(float linear) {
+  return to_srgb({linear, 0.0F, 0.0F}).r;
+}
+
+/// IEC 61966-2-1, level in [0, 1].
+double linear_of(double level) {
+  return level <= 0.04045 ? level / 12.92 : std::pow((level + 0.055) / 1.055, 2.4);
+}
+
+TEST(Color, EveryLevelSurvivesTheWayToLinearAndBack) {
+  for (int level = 0; level < 256; ++level) {
+    EXPECT_EQ(level_of(srgb_to_linear(static_cast<std::uint8_t>(level))), level);
+  }
+}
+
+TEST(Color, DecodesKnownLevels) {
+  EXPECT_EQ(srgb_to_linear(0), 0.0F);
+  EXPECT_EQ(srgb_to_linear(255), 1.0F);
+  EXPECT_FLOAT_EQ(srgb_to_linear(10), 10.0F / 255.0F / 12.92F);  // on the straight part
+  EXPECT_NEAR(srgb_to_linear(128), 0.21586F, 1e-5F);
+}
+
+TEST(Color, EncodesToTheNearestLevel) {
+  for (int level = 0; level < 255; ++level) {
+    const double border = linear_of((level + 0.5) / 255.0);
+    auto below = static_cast<float>(border);
+    while (static_cast<double>(below) >= border) below = std::nextafter(below, -1.0F);
+    const float above = std::nextafter(below, 2.0F);
+    EXPECT_EQ(level_of(below), level);
+    EXPECT_EQ(level_of(above), level + 1);
+  }
+}
+
+TEST(Color, EncodingIsMonotone) {
+  int last = 0;
+  for (int i = -1000; i <= 70000; ++i) {
+    const int level = level_of(static_cast<float>(i) / 65536.0F);
+    EXPECT_GE(level, last);
+    last = level;
+  }
+  EXPECT_EQ(last, 255);
+}
+
+TEST(Color, ClampsAndMakesNanBlack) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(level_of(-1.0F), 0);
+  EXPECT_EQ(level_of(-kInfinity), 0);
+  EXPECT_EQ(level_of(-0.0F), 0);
+  EXPECT_EQ(level_of(7.0F), 255);
+  EXPECT_EQ(level_of(kInfinity), 255);
+  EXPECT_EQ(level_of(std::numeric_limits<float>::quiet_NaN()), 0);
+}
+
+TEST(Color, KeepsChannelsApartAndIsOpaque) {
+  EXPECT_EQ(to_srgb({0.0F, 1.0F, srgb_to_linear(77)}), (Rgba8{0, 255, 77, 255}));
+}
+
+TEST(Color, AWordHoldsRedInItsLowestByte) {
+  EXPECT_EQ(to_word({1, 2, 3, 4}), 0x04030201U);
+  EXPECT_EQ(from_word(0x04030201U), (Rgba8{1, 2, 3, 4}));
+}
+
+}  // namespace
+}  // namespace hpr
