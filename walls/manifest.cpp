@@ -1,0 +1,51 @@
+#include "walls/manifest.h"
+
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "core/hash.h"
+
+namespace hpr {
+
+std::string_view to_string(ScreenState state) {
+  switch (state) {
+    case ScreenState::Fresh:
+      return "fresh";
+    case ScreenState::Stale:
+      return "stale";
+    case ScreenState::Lost:
+      break;
+  }
+  return "lost";
+}
+
+ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state) {
+  return {id, picture.size(), xxh64(std::as_bytes(picture.pixels())), state};
+}
+
+std::string to_json(const RunManifest& manifest) {
+  // ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
+  using Json = nlohmann::ordered_json;
+  Json frames = Json::array();
+  for (const FrameRecord& frame : manifest.frames) {
+    Json screens = Json::array();
+    for (const ScreenRecord& screen : frame.screens) {
+      screens.push_back(Json{{"id", screen.id},
+                             {"width", screen.size.width},
+                             {"height", screen.size.height},
+                             {"xxh64", hex16(screen.xxh64)},
+                             {"state", to_string(screen.state)}});
+    }
+    frames.push_back(
+        Json{{"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}});
+  }
+  const Json document{{"schema", "hpr.wall-run/1"},
+                      {"scene_hash", hex16(manifest.scene_hash)},
+                      {"wall_hash", hex16(manifest.wall_hash)},
+                      {"seed", manifest.seed},
+                      {"versions", manifest.versions},
+                      {"frames", std::move(frames)}};
+  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace hpr
