@@ -2,6 +2,8 @@
 
 #include <mpi.h>
 
+#include <string>
+
 #include "cluster/communicator.h"
 
 namespace hpr {
@@ -43,5 +45,8 @@ class MpiCommunicator final : public Communicator {
   int size_ = 1;
   std::chrono::nanoseconds hang_timeout_;
 };
+
+/// The MPI library and its version, e.g. "Open MPI v4.1.4"; may be called at any time, also before MPI_Init.
+[[nodiscard]] std::string mpi_version();
 
 }  // namespace hpr
