@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "app/bench_raster.h"
-#include "app/version.h"
+#include "hpr/version.h"
 #include "raster/gl_context.h"
 
 namespace hpr {

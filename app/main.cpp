@@ -8,7 +8,7 @@
 
 #include "app/command.h"
 #include "app/report_error.h"
-#include "app/version.h"
+#include "hpr/version.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/units.h"

@@ -8,7 +8,7 @@
 
 #include "app/output.h"
 #include "app/progress.h"
-#include "app/version.h"
+#include "hpr/version.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/assembly.h"

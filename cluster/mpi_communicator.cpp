@@ -177,4 +177,13 @@ std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> membe
   return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_));
 }
 
+std::string mpi_version() {
+  std::string text(MPI_MAX_LIBRARY_VERSION_STRING, '\0');
+  int length = 0;
+  check(MPI_Get_library_version(text.data(), &length), "MPI_Get_library_version");
+  text.resize(static_cast<std::size_t>(length));
+  // What follows the first comma or line break says who built it, where and when.
+  return text.substr(0, text.find_first_of(",\n"));
+}
+
 }  // namespace hpr

@@ -2,6 +2,8 @@
 
 #include <mpi.h>
 
+#include <string>
+
 #include "cluster/communicator.h"
 
 namespace hpr {
@@ -49,5 +51,8 @@ class MpiCommunicator final : public Communicator {
   std::size_t part_bytes_;
   bool abandoned_ = false;  ///< a wait was given up with requests under way
 };
+
+/// The MPI library and its version, e.g. "Open MPI v4.1.4"; may be called at any time, also before MPI_Init.
+[[nodiscard]] std::string mpi_version();
 
 }  // namespace hpr

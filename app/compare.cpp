@@ -1,0 +1,216 @@
+#include "app/compare.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <numeric>
+
+#include "cluster/collectives.h"
+#include "cluster/counting_communicator.h"
+#include "compositing/assembly.h"
+#include "compositing/compositor.h"
+#include "core/check.h"
+#include "core/hash.h"
+#include "core/stopwatch.h"
+
+namespace hpr {
+namespace {
+
+/// What one rank measured in one frame.
+struct Sample {
+  double composite_ms = 0.0;
+  double collect_ms = 0.0;
+  std::uint64_t bytes = 0;
+  std::uint64_t messages = 0;
+};
+
+/// One strategy under comparison on this rank.
+struct Contestant {
+  std::unique_ptr<Compositor> compositor;
+  std::vector<Sample> samples;         ///< per measured frame
+  std::uint64_t differing_pixels = 0;  ///< rank 0: of the worst frame
+  Image<Key> frame;                    ///< rank 0: the last one
+};
+
+/// Makes `layer` equal to `pristine` again, in the memory it has.
+void restore(TileLayer<Key>& layer, const TileLayer<Key>& pristine) {
+  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+    if (!pristine.active(tile)) {
+      layer.clear(tile);
+      continue;
+    }
+    std::ranges::copy(pristine.tile(tile), layer.tile(tile).begin());
+    layer.set_active(tile);
+  }
+}
+
+/// Collective. On rank 0 the largest key per pixel over all ranks' layers, from whole layers merged one after the other
+/// by comparing keys: nothing of it is shared with what is tested.
+std::vector<Key> serial_maximum(Communicator& comm, const TileLayer<Key>& layer) {
+  const std::span<const Key> mine = layer.run({0, layer.tiles()});
+  if (comm.rank() != 0) {
+    comm.send(std::as_bytes(mine), 0);
+    return {};
+  }
+  std::vector<Key> nearest(mine.begin(), mine.end());
+  std::vector<Key> other(mine.size());
+  for (int from = 1; from < comm.size(); ++from) {
+    comm.receive(std::as_writable_bytes(std::span(other)), from);
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
+      if (other[i] > nearest[i]) nearest[i] = other[i];
+    }
+  }
+  return nearest;
+}
+
+std::uint64_t count_differing(const TileLayer<Key>& layer, std::span<const Key> expected) {
+  std::uint64_t differing = 0;
+  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+    const std::span<const Key> want = expected.subspan(tile * kTilePixels, kTilePixels);
+    const std::span<const Key> have = layer.tile(tile);
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      // A key in a tile that is not marked active would not be shown.
+      const Key shown = layer.active(tile) ? have[i] : kNoKey;
+      differing += shown == want[i] ? 0U : 1U;
+    }
+  }
+  return differing;
+}
+
+Image<Key> wall_image(const TileLayer<Key>& layer, const CompareInput& input) {
+  const Size screen = input.screen;
+  Image<Key> wall(Size{screen.width * input.grid.width, screen.height * input.grid.height});
+  for (std::size_t i = 0; i < layer.layout().screens(); ++i) {
+    const Image<Key> part = to_image(layer, i);
+    const int left = static_cast<int>(i) % input.grid.width * screen.width;
+    const int top = static_cast<int>(i) / input.grid.width * screen.height;
+    for (int y = 0; y < screen.height; ++y) std::ranges::copy(part.row(y), wall.row(top + y).begin() + left);
+  }
+  return wall;
+}
+
+/// Collective: one frame of one strategy, from the ranks' layers to the whole frame on rank 0.
+Sample one_frame(Communicator& comm, const Compositor& compositor, TileLayer<Key>& layer,
+                 std::span<const std::size_t> tiles) {
+  const std::vector<int> shown_by(layer.layout().screens(), 0);
+  CountingCommunicator counting(comm);
+  barrier(comm);
+  const Stopwatch watch;
+  const TileRun mine = compositor.composite(counting, layer, tiles);
+  const double composite_ms = watch.ms();
+  assemble(counting, layer, tiles.subspan(mine.first, mine.count), shown_by);
+  return {composite_ms, watch.ms() - composite_ms, counting.bytes_sent(), counting.messages_sent()};
+}
+
+/// `ranks`: per rank its samples, one per frame.
+void summarize(const std::vector<std::vector<Sample>>& ranks, CompareRun& run) {
+  const std::size_t frames = ranks.front().size();
+  std::vector<double> total(frames);
+  std::vector<double> composite(frames);
+  std::vector<double> collect(frames);
+  std::vector<double> imbalance(frames);
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    double sum = 0.0;
+    for (const auto& samples : ranks) {
+      const Sample& sample = samples[frame];
+      total[frame] = std::max(total[frame], sample.composite_ms + sample.collect_ms);
+      composite[frame] = std::max(composite[frame], sample.composite_ms);
+      collect[frame] = std::max(collect[frame], sample.collect_ms);
+      sum += sample.composite_ms;
+    }
+    const double mean = sum / static_cast<double>(ranks.size());
+    imbalance[frame] = mean > 0.0 ? composite[frame] / mean : 1.0;
+  }
+  run.ms = spread_of(total);
+  run.ms_composite = spread_of(composite).median;
+  run.ms_collect = spread_of(collect).median;
+  run.imbalance = spread_of(imbalance).median;
+  // Every frame sends the same.
+  for (const auto& samples : ranks) {
+    run.bytes_total += samples.back().bytes;
+    run.bytes_max_rank = std::max(run.bytes_max_rank, samples.back().bytes);
+    run.messages_total += samples.back().messages;
+  }
+}
+
+/// Collective: every rank's samples on rank 0.
+std::vector<std::vector<Sample>> gather_samples(Communicator& comm, const std::vector<Sample>& samples) {
+  std::vector<std::vector<Sample>> all;
+  for (const auto& bytes : gather(comm, std::as_bytes(std::span(samples)))) {
+    all.emplace_back(bytes.size() / sizeof(Sample));
+    std::memcpy(all.back().data(), bytes.data(), bytes.size());
+  }
+  return all;
+}
+
+std::string frame_hash(const Image<Key>& frame, bool colors) {
+  if (!colors) return hex16(xxh64(std::as_bytes(frame.pixels())));
+  const Image<Rgba8> picture = frame_colors(frame, colors);
+  return hex16(xxh64(std::as_bytes(picture.pixels())));
+}
+
+}  // namespace
+
+Spread spread_of(std::vector<double> values) {
+  HPR_CHECK(!values.empty());
+  std::ranges::sort(values);
+  const std::size_t count = values.size();
+  const double median = (values[(count - 1) / 2] + values[count / 2]) / 2.0;
+  const auto nearest_rank = static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(count)));
+  return {values.front(), median, values[nearest_rank - 1], values.back()};
+}
+
+CompareResult compare_strategies(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
+  HPR_CHECK(settings.frames > 0 && settings.warmup >= 0);
+  const TileLayer<Key> pristine = input.layer(comm);
+  TileLayer<Key> layer(pristine.layout());
+  std::vector<std::size_t> tiles(layer.tiles());
+  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+  const std::vector<Key> expected = serial_maximum(comm, pristine);
+  const bool is_root = comm.rank() == 0;
+
+  std::vector<Contestant> contestants;
+  for (const std::string& name : settings.strategies) contestants.push_back({make_compositor(name), {}, 0, {}});
+
+  for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
+    for (Contestant& contestant : contestants) {
+      restore(layer, pristine);
+      const Sample sample = one_frame(comm, *contestant.compositor, layer, tiles);
+      if (frame >= 0) contestant.samples.push_back(sample);
+      if (!is_root) continue;
+      contestant.differing_pixels = std::max(contestant.differing_pixels, count_differing(layer, expected));
+      if (frame + 1 == settings.frames) contestant.frame = wall_image(layer, input);
+    }
+  }
+
+  CompareResult result;
+  for (Contestant& contestant : contestants) {
+    const auto samples = gather_samples(comm, contestant.samples);
+    if (!is_root) continue;
+    CompareRun run;
+    run.strategy = contestant.compositor->name();
+    run.ranks = comm.size();
+    run.transport = comm.transport();
+    run.frames = settings.frames;
+    summarize(samples, run);
+    run.differing_pixels = contestant.differing_pixels;
+    run.frame_xxh64 = frame_hash(contestant.frame, input.colors);
+    result.runs.push_back(std::move(run));
+  }
+  if (is_root && !contestants.empty()) result.frame = std::move(contestants.front().frame);
+  return result;
+}
+
+Image<Rgba8> frame_colors(const Image<Key>& frame, bool colors) {
+  Image<Rgba8> picture(frame.size());
+  std::ranges::transform(frame.pixels(), picture.pixels().begin(), [&](Key key) {
+    if (key == kNoKey) return Rgba8{};
+    if (colors) return from_word(key_rgba(key));
+    // Neighbouring ids get unlike colours: the top bits of a multiplication by the golden ratio.
+    return from_word(0xFF000000U | (key_surface(key) * 0x9E3779B1U) >> 8U);
+  });
+  return picture;
+}
+
+}  // namespace hpr

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cluster/communicator.h"
+#include "image/color.h"
+#include "image/image.h"
+#include "image/key.h"
+#include "image/tiles.h"
+
+namespace hpr {
+
+/// What is composited: one layer of keys per rank over a wall of equal screens.
+struct CompareInput {
+  std::string name;    ///< "dense", or the scene as the user wrote it
+  Size screen;         ///< pixels of one screen
+  Size grid{1, 1};     ///< screens of the wall, in the order of grid_layout
+  bool colors = true;  ///< the keys' low words are RGBA8 (synthetic layers, local shading), not surfaces
+  /// Collective: this rank's layer, laid out by grid_layout(screen, grid).
+  std::function<TileLayer<Key>(Communicator&)> layer;
+};
+
+struct CompareSettings {
+  std::vector<std::string> strategies;  ///< names; each must fit the number of ranks
+  int frames = 10;
+  int warmup = 2;  ///< frames before the measured ones
+};
+
+/// Milliseconds over the measured frames.
+struct Spread {
+  double min = 0.0;
+  double median = 0.0;
+  double p95 = 0.0;
+  double max = 0.0;
+};
+/// `values` is not empty.
+[[nodiscard]] Spread spread_of(std::vector<double> values);
+
+/// One strategy on one number of ranks.
+struct CompareRun {
+  std::string strategy;
+  int ranks = 1;
+  std::string transport;
+  int frames = 0;
+  Spread ms;                  ///< composite and collect on rank 0, slowest rank of each frame
+  double ms_composite = 0.0;  ///< median of the slowest rank's
+  double ms_collect = 0.0;
+  std::uint64_t bytes_total = 0;     ///< sent in one frame by all ranks
+  std::uint64_t bytes_max_rank = 0;  ///< by the rank that sends most
+  std::uint64_t messages_total = 0;
+  double imbalance = 1.0;              ///< composite: slowest rank / mean of ranks, median over frames
+  std::uint64_t differing_pixels = 0;  ///< of the worst frame, against the serial maximum of the same layers
+  std::string frame_xxh64;             ///< of the RGBA8 frame where keys are colours, else of the keys
+};
+
+struct CompareResult {
+  std::vector<CompareRun> runs;  ///< in order of settings.strategies
+  Image<Key> frame;              ///< the wall as the first strategy composited it
+};
+
+/// Collective. Composites the same layers with every strategy, frame after frame in turns so that what disturbs the
+/// machine disturbs all alike, and collects each frame on rank 0, where every frame is checked key by key against a
+/// maximum computed without merge kernel, codec and strategies. The result stands on rank 0; elsewhere it is empty.
+[[nodiscard]] CompareResult compare_strategies(Communicator& comm, const CompareInput& input,
+                                               const CompareSettings& settings);
+
+/// The wall in colours: those the keys carry, or where they carry surfaces one per surface. Background is 0, 0, 0, 0.
+[[nodiscard]] Image<Rgba8> frame_colors(const Image<Key>& frame, bool colors);
+
+}  // namespace hpr

@@ -1,0 +1,322 @@
+#include "app/compare_command.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+
+#include "app/compare_report.h"
+#include "app/launcher.h"
+#include "cluster/collectives.h"
+#include "cluster/local_communicator.h"
+#include "compositing/compositor.h"
+#include "compositing/synthetic.h"
+#include "core/file.h"
+#include "core/names.h"
+#include "core/units.h"
+#include "image/image_io.h"
+
+namespace hpr {
+namespace {
+
+/// Set for the MPI jobs `hpr compare` starts: rank 0 prints its runs as JSON for the process that started the job.
+constexpr const char* kHandOverVariable = "HPR_COMPARE_HAND_OVER";
+constexpr int kMostRanks = 4096;
+constexpr int kLargestSide = 16384;
+constexpr int kMostScreensASide = 256;
+
+std::vector<std::string> split(std::string_view list) {
+  std::vector<std::string> items;
+  while (true) {
+    const auto comma = list.find(',');
+    items.emplace_back(list.substr(0, comma));
+    if (comma == std::string_view::npos) return items;
+    list.remove_prefix(comma + 1);
+  }
+}
+
+Size parse_size(const std::string& text, const std::string& option, int most) {
+  const auto extent = parse_extent(text);
+  if (!extent) {
+    throw Error(ExitCode::Usage, fmt::format("{}: '{}' is not two positive integers", option, printable(text)),
+                fmt::format("write it like {} 3x2", option));
+  }
+  if (extent->first > most || extent->second > most) {
+    throw Error(ExitCode::Limit, fmt::format("{}: {} is more than {} a side", option, printable(text), most));
+  }
+  return {extent->first, extent->second};
+}
+
+std::vector<int> parse_ranks(const std::string& list) {
+  std::vector<int> ranks;
+  for (const std::string& item : split(list)) {
+    int value = 0;
+    const auto [end, failure] = std::from_chars(item.data(), item.data() + item.size(), value);
+    if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMostRanks) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("--ranks: '{}' is not a number of ranks from 1 to {}", printable(item), kMostRanks),
+                  "write it like --ranks 1,2,4,8");
+    }
+    ranks.push_back(value);
+  }
+  return ranks;
+}
+
+class CompareCommand final : public Command {
+ public:
+  explicit CompareCommand(SceneInput scene_input) : scene_input_(std::move(scene_input)) {}
+
+  [[nodiscard]] std::string_view name() const override { return "compare"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "measure compositing strategies against each other on the same layers, and check that they agree";
+  }
+
+  void declare(CLI::App& app) override {
+    if (scene_input_) app.add_option("scene", scene_, "a scene to draw the layers from")->type_name("SCENE");
+    app.add_option("--synthetic", synthetic_, "made-up layers: dense, half, sparse, scatter or checker")
+        ->type_name("KIND");
+    app.add_option("--size", size_, "pixels of one screen")->type_name("WxH")->capture_default_str();
+    app.add_option("--tiles", tiles_, "screens of the wall")->type_name("CxR")->capture_default_str();
+    app.add_option("--ranks", ranks_, "numbers of ranks to run on (2,4; inside an MPI job: that job's)")
+        ->type_name("LIST");
+    app.add_option("--strategies", strategies_, "all, or names of strategies")
+        ->type_name("LIST")
+        ->capture_default_str();
+    app.add_option("--frames", frames_, "measured frames")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1'000'000))
+        ->capture_default_str();
+    app.add_option("--warmup", warmup_, "frames before the measured ones")
+        ->type_name("N")
+        ->check(CLI::Range(0, 1'000'000))
+        ->capture_default_str();
+    app.add_option("--transport", transport_, "mpi, or threads of one process")
+        ->type_name("NAME")
+        ->capture_default_str();
+    app.add_option("--csv", csv_, "write one line per run to this file")->type_name("FILE");
+    app.add_flag("--json", json_, "print the result as JSON (schema hpr.compare/1) instead of a table");
+    app.add_option("-o,--output", picture_, "write the composited frame of the last number of ranks")
+        ->type_name("FILE.png");
+    app.add_option("--raw", raw_, "write that frame's keys: per pixel uint64, row 0 at the top")->type_name("FILE");
+  }
+
+  ExitCode run(const Globals& globals) override {
+    const CompareInput input = make_input(globals);
+    check_options(globals);
+    return inside_mpi_job() ? run_in_job(globals, input) : run_here(globals, input);
+  }
+
+ private:
+  [[nodiscard]] CompareInput make_input(const Globals& globals) const {
+    const Size screen = parse_size(size_, "--size", kLargestSide);
+    const Size grid = parse_size(tiles_, "--tiles", kMostScreensASide);
+    if (scene_.empty() == synthetic_.empty()) {
+      throw Error(ExitCode::Usage,
+                  scene_.empty() ? "nothing to composite" : "a scene and --synthetic exclude each other",
+                  scene_input_ ? "name a scene, or --synthetic dense|half|sparse|scatter|checker"
+                               : "add --synthetic dense|half|sparse|scatter|checker");
+    }
+    if (!scene_.empty()) return scene_input_(scene_, screen, grid, globals);
+    if (globals.seed > std::numeric_limits<std::uint32_t>::max()) {
+      throw Error(ExitCode::Usage, fmt::format("--seed: synthetic layers take 32 bits, {} has more", globals.seed));
+    }
+    const SyntheticKind kind = parse_synthetic_kind(synthetic_);
+    const auto seed = static_cast<std::uint32_t>(globals.seed);
+    return {synthetic_, screen, grid, true,
+            [=](Communicator& comm) { return synthetic_wall(kind, comm.rank(), screen, grid, seed); }};
+  }
+
+  /// Everything that can be refused before any rank starts.
+  void check_options(const Globals& globals) const {
+    const std::vector<std::string> transports{"mpi", "threads"};
+    if (std::ranges::find(transports, transport_) == transports.end()) {
+      throw Error(ExitCode::Usage, fmt::format("no transport is named '{}'", printable(transport_)),
+                  unknown_name_hint(printable(transport_), transports));
+    }
+    for (const int ranks : rank_counts()) (void)strategies_for(ranks);
+    if (inside_mpi_job() && transport_ != "mpi") {
+      throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
+                  "leave mpirun away, or --transport");
+    }
+    if (std::getenv(kHandOverVariable) != nullptr) return;  // the process that started this job has looked already
+    if (!picture_.empty() && !picture_.ends_with(".png")) {
+      throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
+    }
+    for (const std::string& path : {csv_, picture_, raw_}) {
+      if (!path.empty()) check_writable(path, globals.force);
+    }
+  }
+
+  /// Empty inside an MPI job unless --ranks is given.
+  [[nodiscard]] std::vector<int> rank_counts() const {
+    if (!ranks_.empty()) return parse_ranks(ranks_);
+    return inside_mpi_job() ? std::vector<int>{} : std::vector<int>{2, 4};
+  }
+
+  [[nodiscard]] std::vector<std::string> strategies_for(int ranks) const {
+    std::vector<std::string> names;
+    if (strategies_ == "all") {
+      for (const auto& compositor : all_compositors()) {
+        if (compositor->fits(ranks)) names.emplace_back(compositor->name());
+      }
+      return names;
+    }
+    for (const std::string& name : split(strategies_)) {
+      if (!make_compositor(name)->fits(ranks)) {
+        throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, ranks));
+      }
+      names.push_back(name);
+    }
+    return names;
+  }
+
+  [[nodiscard]] CompareSettings settings_for(int ranks) const { return {strategies_for(ranks), frames_, warmup_}; }
+
+  /// Inside an MPI job: its ranks are the one number of ranks compared.
+  [[nodiscard]] ExitCode run_in_job(const Globals& globals, const CompareInput& input) const {
+    Globals job = globals;
+    job.ranks = 0;
+    return run_ranks(job, [&](Communicator& comm) {
+      const std::vector<int> wanted = rank_counts();
+      if (!wanted.empty() && wanted != std::vector<int>{comm.size()}) {
+        throw Error(ExitCode::Usage, fmt::format("--ranks {} inside an MPI job of {} ranks", ranks_, comm.size()),
+                    "leave --ranks away, or mpirun");
+      }
+      CompareResult result = compare_strategies(comm, input, settings_for(comm.size()));
+      std::vector<std::byte> verdict(1);
+      if (comm.rank() == 0) {
+        if (std::getenv(kHandOverVariable) != nullptr) {
+          std::fputs(runs_to_json(result.runs).c_str(), stdout);
+          write_frame(result.frame, input);
+          verdict[0] = static_cast<std::byte>(verdict_on(result.runs));
+        } else {
+          verdict[0] = static_cast<std::byte>(finish(globals, input, std::move(result)));
+        }
+      }
+      broadcast(comm, verdict);
+      return static_cast<ExitCode>(verdict[0]);
+    });
+  }
+
+  /// One process: ranks are threads, or MPI jobs of this program that hand over their runs.
+  [[nodiscard]] ExitCode run_here(const Globals& globals, const CompareInput& input) const {
+    CompareResult result;
+    const std::vector<int> counts = rank_counts();
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const int ranks = counts[i];
+      std::vector<CompareRun> runs;
+      if (transport_ == "threads") {
+        const auto body = [&](Communicator& comm) {
+          CompareResult here = compare_strategies(comm, input, settings_for(ranks));
+          if (comm.rank() == 0) {
+            runs = std::move(here.runs);
+            result.frame = std::move(here.frame);
+          }
+        };
+        run_local_ranks(ranks, body, globals.hang_limit());
+      } else {
+        std::string output;
+        const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()), &output,
+                                     {{kHandOverVariable, "1"}});
+        // Its ranks have said on stderr what went wrong.
+        if (code != static_cast<int>(ExitCode::Done) && code != static_cast<int>(ExitCode::CheckFailed)) {
+          return static_cast<ExitCode>(code);
+        }
+        runs = runs_from_json(output);
+      }
+      result.runs.insert(result.runs.end(), runs.begin(), runs.end());
+    }
+    return finish(globals, input, std::move(result));
+  }
+
+  /// What a job needs to run `ranks` of the rank counts; `last`: it also writes the frame.
+  [[nodiscard]] std::vector<std::string> job_arguments(const Globals& globals, int ranks, bool last) const {
+    std::vector<std::string> arguments = input_arguments(globals);
+    const auto add = [&](const std::string& option, const std::string& value) {
+      arguments.push_back(option);
+      arguments.push_back(value);
+    };
+    add("--ranks", std::to_string(ranks));
+    if (last && !picture_.empty()) add("-o", picture_);
+    if (last && !raw_.empty()) add("--raw", raw_);
+    add("--backend", globals.backend);
+    if (globals.device >= 0) add("--device", std::to_string(globals.device));
+    if (globals.threads > 0) add("--threads", std::to_string(globals.threads));
+    if (!globals.limit_mem.empty()) add("--limit-mem", globals.limit_mem);
+    if (!globals.limit_image.empty()) add("--limit-image", globals.limit_image);
+    if (!globals.hang_timeout.empty()) add("--hang-timeout", globals.hang_timeout);
+    if (globals.force) arguments.emplace_back("--force");
+    for (int i = 0; i < globals.verbosity; ++i) arguments.emplace_back("-v");
+    if (globals.verbosity < 0) arguments.emplace_back("-q");
+    return arguments;
+  }
+
+  /// What decides the result, without the number of ranks.
+  [[nodiscard]] std::vector<std::string> input_arguments(const Globals& globals) const {
+    std::vector<std::string> arguments{"compare"};
+    if (!scene_.empty()) arguments.push_back(scene_);
+    if (!synthetic_.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic_});
+    arguments.insert(arguments.end(), {"--size", size_, "--tiles", tiles_, "--strategies", strategies_});
+    arguments.insert(arguments.end(), {"--frames", std::to_string(frames_), "--warmup", std::to_string(warmup_)});
+    arguments.insert(arguments.end(), {"--transport", transport_, "--seed", std::to_string(globals.seed)});
+    return arguments;
+  }
+
+  [[nodiscard]] static ExitCode verdict_on(const std::vector<CompareRun>& runs) {
+    const bool differ = std::ranges::any_of(runs, [](const CompareRun& run) { return run.differing_pixels > 0; });
+    return differ ? ExitCode::CheckFailed : ExitCode::Done;
+  }
+
+  /// Writes the files that were asked for; `frame` is empty where a job has written them.
+  void write_frame(const Image<Key>& frame, const CompareInput& input) const {
+    if (frame.pixels().empty()) return;
+    if (!picture_.empty()) write_png(picture_, frame_colors(frame, input.colors));
+    if (!raw_.empty()) write_file_atomically(raw_, std::as_bytes(frame.pixels()));
+  }
+
+  [[nodiscard]] ExitCode finish(const Globals& globals, const CompareInput& input, CompareResult result) const {
+    CompareReport report;
+    report.machine = this_machine();
+    report.screen = input.screen;
+    report.grid = input.grid;
+    report.input = input.name;
+    report.seed = globals.seed;
+    std::vector<int> counts;
+    for (const CompareRun& run : result.runs) {
+      if (counts.empty() || counts.back() != run.ranks) counts.push_back(run.ranks);
+    }
+    report.command = fmt::format("hpr {} --ranks {}", fmt::join(input_arguments(globals), " "), fmt::join(counts, ","));
+    report.runs = std::move(result.runs);
+    write_frame(result.frame, input);
+    if (!csv_.empty()) write_file_atomically(csv_, compare_csv(report));
+    std::fputs((json_ ? compare_json(report) : compare_table(report)).c_str(), stdout);
+    return verdict_on(report.runs);
+  }
+
+  SceneInput scene_input_;
+  std::string scene_;
+  std::string synthetic_;
+  std::string size_ = "1920x1080";
+  std::string tiles_ = "1x1";
+  std::string ranks_;
+  std::string strategies_ = "all";
+  int frames_ = 10;
+  int warmup_ = 2;
+  std::string transport_ = "mpi";
+  std::string csv_;
+  bool json_ = false;
+  std::string picture_;
+  std::string raw_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_compare_command(SceneInput scene_input) {
+  return std::make_unique<CompareCommand>(std::move(scene_input));
+}
+
+}  // namespace hpr
