@@ -25,6 +25,7 @@ class Session {
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
   [[nodiscard]] const Scene& scene() const { return scene_; }
   [[nodiscard]] int threads() const { return share_.threads; }
+  [[nodiscard]] const std::string& host() const { return share_.host; }
   [[nodiscard]] const GlContext& gl() const { return *gl_; }
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for.

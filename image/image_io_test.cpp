@@ -242,20 +242,31 @@ TEST(ImageIo, ExrGivesBackEveryBitOfEveryFloat) {
   EXPECT_EQ(channel(read, "normal.Y")[3], -3.0F);
 }
 
-TEST(ImageIo, OversizeExrIsRefusedByTheHeaderAlone) {
-  Bytes file = encode_exr(Image<Rgb>({4, 4}), {});
-  for (const std::string_view window :
-       {std::string_view("dataWindow\0box2i", 16), std::string_view("displayWindow\0box2i", 19)}) {
-    const auto name = std::as_bytes(std::span(window));
-    const auto found = std::ranges::search(file, name);
-    ASSERT_FALSE(found.empty());
-    // After the type's zero and the size stand x0, y0, x1, y1, little-endian.
-    for (const int corner : {2, 3}) {
-      const std::int32_t last = 99999;
-      std::memcpy(&*found.end() + 5 + 4 * corner, &last, sizeof last);
+TEST(ImageIo, ExrPastTheLimitIsRefused) {
+  const Bytes file = encode_exr(Image<Rgb>({4, 3}), {});
+  EXPECT_EQ(code_of([&] { (void)through_file(file, ".exr", {.side = 4, .pixels = 12}); }), ExitCode::Done);
+  EXPECT_EQ(code_of([&] { (void)through_file(file, ".exr", {.side = 3, .pixels = 12}); }), ExitCode::Limit);
+  EXPECT_EQ(code_of([&] { (void)through_file(file, ".exr", {.side = 4, .pixels = 11}); }), ExitCode::Limit);
+}
+
+TEST(ImageIo, AnExrHeaderThatLiesAboutItsSizeIsRefusedBeforeAnyPixelIsAllocated) {
+  const Bytes honest = encode_exr(Image<Rgb>({4, 4}), {});
+  for (const std::int32_t last : {99999, 1 << 20, 1 << 30}) {
+    Bytes file = honest;
+    for (const std::string_view window :
+         {std::string_view("dataWindow\0box2i", 16), std::string_view("displayWindow\0box2i", 19)}) {
+      const auto found = std::ranges::search(file, std::as_bytes(std::span(window)));
+      ASSERT_FALSE(found.empty());
+      // After the type's zero and the size stand x0, y0, x1, y1, little-endian.
+      for (const std::ptrdiff_t corner : {2, 3}) std::memcpy(&*found.end() + 5 + 4 * corner, &last, sizeof last);
+    }
+    try {
+      (void)through_file(file, ".exr");
+      ADD_FAILURE() << last;
+    } catch (const Error& error) {
+      EXPECT_TRUE(error.code() == ExitCode::Limit || error.code() == ExitCode::BadInput) << error.what();
     }
   }
-  EXPECT_EQ(code_of([&] { (void)through_file(file, ".exr"); }), ExitCode::Limit);
 }
 
 TEST(ImageIo, DamagedExrIsBadInput) {

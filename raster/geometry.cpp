@@ -1,0 +1,141 @@
+#include "raster/geometry.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <limits>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// Sorted, disjoint and not touching, inside [0, end).
+std::vector<SurfaceRange> merged(std::vector<SurfaceRange> ranges, std::uint32_t end) {
+  for (SurfaceRange& range : ranges) range.last = std::min(range.last, end);
+  std::erase_if(ranges, [](const SurfaceRange& range) { return range.first >= range.last; });
+  std::ranges::sort(ranges, {}, &SurfaceRange::first);
+  std::vector<SurfaceRange> result;
+  for (const SurfaceRange& range : ranges) {
+    if (!result.empty() && range.first <= result.back().last) {
+      result.back().last = std::max(result.back().last, range.last);
+    } else {
+      result.push_back(range);
+    }
+  }
+  return result;
+}
+
+/// Part of an instance: triangles [range.first, range.last) of its mesh.
+struct InstanceRange {
+  std::uint32_t instance = 0;
+  SurfaceRange range;
+};
+
+std::vector<InstanceRange> split_by_instance(const Scene& scene, const std::vector<SurfaceRange>& ranges) {
+  std::vector<InstanceRange> parts;
+  for (const SurfaceRange& range : ranges) {
+    for (std::uint32_t instance = locate_surface(scene, range.first).instance; instance < scene.instances.size();
+         ++instance) {
+      const std::uint32_t base = scene.instances[instance].first_surface;
+      if (base >= range.last) break;
+      const auto count = static_cast<std::uint32_t>(scene.mesh_of(scene.instances[instance]).triangles.size());
+      const std::uint32_t first = std::max(range.first, base) - base;
+      const std::uint32_t last = std::min(range.last - base, count);
+      if (first < last) parts.push_back({instance, {first, last}});
+    }
+  }
+  return parts;
+}
+
+/// Where a mesh's chunks stand in Geometry::chunks.
+struct ChunkRun {
+  std::size_t first = 0;
+  std::size_t last = 0;
+};
+
+/// Appends the triangles of `ranges` with the positions they use, in the order of their use.
+ChunkRun append_mesh(const Mesh& mesh, const std::vector<SurfaceRange>& ranges, Geometry& geometry) {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place(mesh.positions.size(), kNone);
+  const ChunkRun run{geometry.chunks.size(), 0};
+  for (const SurfaceRange& range : ranges) {
+    // Borders at fixed multiples, so that instances that share a mesh share its chunks.
+    for (std::uint32_t first = range.first; first < range.last;) {
+      const std::uint32_t last = std::min(range.last, (first / kChunkTriangles + 1) * kChunkTriangles);
+      Chunk chunk{first, last - first, static_cast<std::uint32_t>(geometry.triangles.size()), {}};
+      const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
+      chunk.box = {start, start};
+      for (std::uint32_t t = first; t < last; ++t) {
+        glm::uvec3 moved(0U);
+        for (int corner = 0; corner < 3; ++corner) {
+          const std::uint32_t vertex = mesh.triangles[t][corner];
+          const glm::vec3& position = mesh.positions[vertex];
+          if (place[vertex] == kNone) {
+            place[vertex] = static_cast<std::uint32_t>(geometry.positions.size());
+            geometry.positions.push_back(position);
+          }
+          moved[corner] = place[vertex];
+          chunk.box.add({position, position});
+        }
+        geometry.triangles.push_back(moved);
+      }
+      geometry.chunks.push_back(chunk);
+      first = last;
+    }
+  }
+  return {run.first, geometry.chunks.size()};
+}
+
+/// Cuts one instance's part into pieces along the chunks of its mesh.
+void append_pieces(const InstanceRange& part, const ChunkRun& run, Geometry& geometry) {
+  const auto begin = geometry.chunks.begin();
+  const auto meets = [&](const Chunk& chunk) { return chunk.first + chunk.count <= part.range.first; };
+  auto chunk = std::partition_point(begin + static_cast<std::ptrdiff_t>(run.first),
+                                    begin + static_cast<std::ptrdiff_t>(run.last), meets);
+  const auto end = begin + static_cast<std::ptrdiff_t>(run.last);
+  while (chunk != end && chunk->first < part.range.last) {
+    Piece piece{part.instance, std::max(chunk->first, part.range.first), 0, static_cast<std::size_t>(chunk - begin), 0,
+                chunk->box};
+    for (; chunk != end && chunk->first < part.range.last && piece.chunks < kPieceChunks; ++chunk, ++piece.chunks) {
+      piece.last = std::min(chunk->first + chunk->count, part.range.last);
+      piece.box.add(chunk->box);
+    }
+    geometry.pieces.push_back(piece);
+  }
+}
+
+}  // namespace
+
+Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> objects) {
+  const std::vector<SurfaceRange> ranges = merged({objects.begin(), objects.end()}, scene.triangles);
+  const std::vector<InstanceRange> parts = split_by_instance(scene, ranges);
+
+  std::vector<std::vector<SurfaceRange>> wanted(scene.meshes.size());
+  for (const InstanceRange& part : parts) wanted[scene.instances[part.instance].mesh].push_back(part.range);
+  std::uint64_t triangles = 0;
+  for (std::size_t mesh = 0; mesh < wanted.size(); ++mesh) {
+    wanted[mesh] = merged(std::move(wanted[mesh]), static_cast<std::uint32_t>(scene.meshes[mesh].triangles.size()));
+    for (const SurfaceRange& range : wanted[mesh]) triangles += range.count();
+  }
+  // Indirect draws address the index buffer with 32 bits, three indices a triangle.
+  constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() / 3;
+  if (triangles > kMostTriangles) {
+    throw Error(
+        ExitCode::Limit,
+        fmt::format("one rank's share has {} distinct triangles; OpenGL addresses {}", triangles, kMostTriangles),
+        "use more ranks with --distribute sort-last");
+  }
+
+  Geometry geometry;
+  geometry.triangles.reserve(triangles);
+  std::vector<ChunkRun> runs(scene.meshes.size());
+  for (std::size_t mesh = 0; mesh < wanted.size(); ++mesh) {
+    if (!wanted[mesh].empty()) runs[mesh] = append_mesh(scene.meshes[mesh], wanted[mesh], geometry);
+  }
+  for (const InstanceRange& part : parts) append_pieces(part, runs[scene.instances[part.instance].mesh], geometry);
+  return geometry;
+}
+
+}  // namespace hpr

@@ -1,0 +1,54 @@
+#include "raster/gl_context.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "core/error.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "raster/egl_context.h"
+#include "raster/osmesa_context.h"
+
+namespace hpr {
+namespace {
+
+std::unique_ptr<GlContext> make_one(const std::string& backend, const GlOptions& options) {
+  return backend == "egl" ? make_egl_context(options) : make_osmesa_context(options);
+}
+
+}  // namespace
+
+std::vector<std::string> all_gl_backends() {
+  return {"egl", "osmesa"};
+}
+
+std::unique_ptr<GlContext> make_gl_context(const GlOptions& options) {
+  const std::vector<std::string> backends = all_gl_backends();
+  if (options.backend != "auto" && std::ranges::find(backends, options.backend) == backends.end()) {
+    std::vector<std::string> choices = backends;
+    choices.insert(choices.begin(), "auto");
+    throw Error(ExitCode::Usage, fmt::format("unknown backend '{}'", printable(options.backend)),
+                unknown_name_hint(options.backend, choices));
+  }
+  // llvmpipe reads it when its screen is made, which is with the first context.
+  if (options.threads > 0) setenv("LP_NUM_THREADS", std::to_string(options.threads).c_str(), 1);
+
+  if (options.backend != "auto") return make_one(options.backend, options);
+  std::string failures;
+  for (const std::string& backend : backends) {
+    try {
+      std::unique_ptr<GlContext> context = make_one(backend, options);
+      if (!failures.empty()) log::warning("drawing by {} ({}), because {}", backend, context->description(), failures);
+      return context;
+    } catch (const Error& error) {
+      if (!failures.empty()) failures += "; ";
+      failures += error.what();
+    }
+  }
+  throw Error(ExitCode::NoDevice, failures,
+              "install a software renderer: apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)");
+}
+
+}  // namespace hpr

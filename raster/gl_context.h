@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hpr {
+
+struct GlFunctions;
+
+/// An OpenGL 4.5 core context without a window, bound to the thread that uses it. Several, of different backends, may
+/// live in one process and be used in turn: call make_current() before every block of GL calls.
+class GlContext {
+ public:
+  GlContext() = default;
+  GlContext(const GlContext&) = delete;
+  GlContext& operator=(const GlContext&) = delete;
+  virtual ~GlContext() = default;
+
+  /// The backend as on the command line: "egl" or "osmesa".
+  [[nodiscard]] virtual std::string_view name() const = 0;
+  /// Renderer, version and device, for people.
+  [[nodiscard]] virtual std::string description() const = 0;
+  /// Whether the CPU draws.
+  [[nodiscard]] virtual bool software() const = 0;
+  /// Makes this the calling thread's context and releases another backend's; cheap when it already is.
+  virtual void make_current() = 0;
+  /// The functions of this context; call them only while it is current.
+  [[nodiscard]] virtual const GlFunctions& gl() const = 0;
+};
+
+struct GlOptions {
+  std::string backend = "auto";  ///< "auto" or one of all_gl_backends()
+  int device = -1;               ///< EGL device by index; -1: hardware devices are dealt out by local rank
+  int local_rank = 0;            ///< of this process on its host
+  int threads = 0;               ///< of a software renderer, before the process's first context; 0: it decides
+};
+
+/// In the order "auto" tries them.
+[[nodiscard]] std::vector<std::string> all_gl_backends();
+
+/// A context, current on this thread. "auto" takes the first backend that works and logs what it passed over. Throws
+/// Error: NoDevice, with every attempt and its reason; Usage for an unknown backend.
+[[nodiscard]] std::unique_ptr<GlContext> make_gl_context(const GlOptions& options);
+
+}  // namespace hpr

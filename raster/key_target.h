@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "image/image.h"
+#include "raster/gl_objects.h"
+
+namespace hpr {
+
+/// What GL draws keys into: 32-bit float depth and 32-bit unsigned words (the low halves of keys), both 0 where nothing
+/// is drawn. Grows to what is needed and stays.
+class KeyTarget {
+ public:
+  explicit KeyTarget(GlContext& context);
+
+  /// Binds it with the scissor test on `part` of a view of `view` pixels, whose viewport it sets, and clears that part.
+  /// The screen keeps its projection and viewport whatever is drawn of it: scissoring alone changes no pixel, shifted
+  /// viewports and sub-frusta do. The framebuffer ends at the part's far corner.
+  void begin(Size view, const Rect& part);
+
+  /// Reads `pixels` of the view into depths() and words(); rows from the bottom up, as GL has them.
+  void read(Size view, const Rect& pixels);
+  [[nodiscard]] const std::vector<float>& depths() const { return depths_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& words() const { return words_; }
+
+ private:
+  void grow(Size needed);
+
+  GlContext& context_;
+  Size size_;
+  GlObject words_buffer_;
+  GlObject depth_buffer_;
+  GlObject framebuffer_;
+  std::vector<float> depths_;
+  std::vector<std::uint32_t> words_;
+};
+
+}  // namespace hpr

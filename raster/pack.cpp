@@ -1,0 +1,73 @@
+#include "raster/pack.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "core/check.h"
+#include "core/parallel.h"
+
+namespace hpr {
+namespace {
+
+/// A rectangle of GL's rows.
+struct Rows {
+  const float* depths;
+  const std::uint32_t* words;
+  Rect pixels;
+
+  /// Of pixel (x, y) of the screen.
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(pixels.y1 - 1 - y) * static_cast<std::size_t>(pixels.width()) +
+           static_cast<std::size_t>(x - pixels.x0);
+  }
+};
+
+bool any_drawn(const Rows& rows, const Rect& rect) {
+  const auto width = static_cast<std::size_t>(rect.width());
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    const float* const depth = rows.depths + rows.index(rect.x0, y);
+    std::uint32_t bits = 0;
+    for (std::size_t x = 0; x < width; ++x) bits |= std::bit_cast<std::uint32_t>(depth[x]);
+    if (bits != 0) return true;
+  }
+  return false;
+}
+
+void merge_row(const float* depths, const std::uint32_t* words, std::size_t count, Key* keys) {
+  for (std::size_t x = 0; x < count; ++x) {
+    const Key key = Key{std::bit_cast<std::uint32_t>(depths[x])} << 32U | words[x];
+    keys[x] = std::max(keys[x], key);
+  }
+}
+
+}  // namespace
+
+void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> words, const Rect& pixels,
+               std::size_t screen, TileLayer<Key>& layer, int threads) {
+  if (pixels.empty()) return;
+  HPR_CHECK(depths.size() >= pixels.area() && words.size() >= pixels.area());
+  const Rows rows{depths.data(), words.data(), pixels};
+  const int first_column = pixels.x0 / kTileSide;
+  const int first_row = pixels.y0 / kTileSide;
+  const auto columns = static_cast<std::size_t>((pixels.x1 - 1) / kTileSide - first_column + 1);
+  const auto tile_rows = static_cast<std::size_t>((pixels.y1 - 1) / kTileSide - first_row + 1);
+
+  parallel_for(threads, tile_rows, [&](std::size_t row) {
+    for (std::size_t column = 0; column < columns; ++column) {
+      const int x0 = (first_column + static_cast<int>(column)) * kTileSide;
+      const int y0 = (first_row + static_cast<int>(row)) * kTileSide;
+      const Rect rect = intersection(pixels, {x0, y0, x0 + kTileSide, y0 + kTileSide});
+      if (!any_drawn(rows, rect)) continue;
+      const std::size_t tile = layer.layout().tile_at(screen, x0, y0);
+      Key* const keys = layer.tile(tile).data();
+      for (int y = rect.y0; y < rect.y1; ++y) {
+        const std::size_t from = rows.index(rect.x0, y);
+        merge_row(rows.depths + from, rows.words + from, static_cast<std::size_t>(rect.width()),
+                  keys + (y - y0) * kTileSide + (rect.x0 - x0));
+      }
+      layer.set_active(tile);
+    }
+  });
+}
+
+}  // namespace hpr

@@ -1,0 +1,190 @@
+#include "raster/rasterizer.h"
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "core/check.h"
+#include "core/stopwatch.h"
+#include "raster/geometry.h"
+#include "raster/gl_functions.h"
+#include "raster/gl_objects.h"
+#include "raster/key_target.h"
+#include "raster/pack.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::string_view kVertexShader = R"(#version 450 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in uint first_surface;   // per command
+layout(location = 2) in mat4 clip_from_mesh;  // per command
+invariant gl_Position;
+flat out uint first;
+void main() {
+  gl_Position = clip_from_mesh * vec4(position, 1.0);
+  first = first_surface;
+}
+)";
+
+// The complement is what the low half of a key holds, so that 0 is left for "nothing".
+constexpr std::string_view kFragmentShader = R"(#version 450 core
+flat in uint first;
+layout(location = 0) out uint word;
+void main() { word = ~(first + uint(gl_PrimitiveID)); }
+)";
+
+constexpr GLuint kPositions = 0;  // vertex buffer bindings
+constexpr GLuint kRecords = 1;
+
+template <typename T>
+void upload(const GlFunctions& gl, const GlObject& buffer, const std::vector<T>& data, GLenum usage) {
+  gl.NamedBufferData(buffer.name(), static_cast<GLsizeiptr>(data.size() * sizeof(T)), data.data(), usage);
+}
+
+}  // namespace
+
+class Rasterizer::Implementation {
+ public:
+  Implementation(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
+                 Culling culling)
+      : context_(current(context)),
+        scene_(scene),
+        threads_(threads),
+        culling_(culling),
+        geometry_(collect_geometry(scene, objects)),
+        program_(make_program(context, kVertexShader, kFragmentShader)),
+        positions_(make_buffer(context)),
+        indices_(make_buffer(context)),
+        records_(make_buffer(context)),
+        commands_(make_buffer(context)),
+        vertex_array_(make_vertex_array(context)),
+        target_(context) {
+    const GlFunctions& gl = context_.gl();
+    upload(gl, positions_, geometry_.positions, GL_STATIC_DRAW);
+    upload(gl, indices_, geometry_.triangles, GL_STATIC_DRAW);
+    describe_vertices(gl);
+    check_gl(gl, "uploading the scene");
+    // From here on only boxes are needed of it.
+    geometry_.positions = {};
+    geometry_.triangles = {};
+  }
+
+  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
+    const Size size = view.size();
+    HPR_CHECK(size.width <= kRasterLimit && size.height <= kRasterLimit);
+    HPR_CHECK(screen < layer.layout().screens() && layer.layout().size(screen) == size);
+    HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
+    stats_ = {};
+    context_.make_current();
+    for (const Rect& wanted : parts) {
+      const Rect part = intersection(wanted, {0, 0, size.width, size.height});
+      if (!part.empty()) draw_part(view, screen, part, layer);
+    }
+    check_gl(context_.gl(), "drawing");
+  }
+
+  [[nodiscard]] const RasterStats& stats() const { return stats_; }
+
+ private:
+  static GlContext& current(GlContext& context) {
+    context.make_current();
+    return context;
+  }
+
+  void describe_vertices(const GlFunctions& gl) {
+    const GLuint array = vertex_array_.name();
+    gl.VertexArrayElementBuffer(array, indices_.name());
+    gl.VertexArrayVertexBuffer(array, kPositions, positions_.name(), 0, sizeof(glm::vec3));
+    gl.VertexArrayVertexBuffer(array, kRecords, records_.name(), 0, sizeof(DrawRecord));
+    gl.VertexArrayBindingDivisor(array, kRecords, 1);
+    gl.VertexArrayAttribFormat(array, 0, 3, GL_FLOAT, GL_FALSE, 0);
+    gl.VertexArrayAttribIFormat(array, 1, 1, GL_UNSIGNED_INT, offsetof(DrawRecord, first_surface));
+    for (GLuint column = 0; column < 4; ++column) {
+      gl.VertexArrayAttribFormat(array, 2 + column, 4, GL_FLOAT, GL_FALSE, column * 4 * GLuint{sizeof(float)});
+    }
+    for (GLuint attribute = 0; attribute < 6; ++attribute) {
+      gl.EnableVertexArrayAttrib(array, attribute);
+      gl.VertexArrayAttribBinding(array, attribute, attribute == 0 ? kPositions : kRecords);
+    }
+  }
+
+  /// Everything that others who use the context may have changed.
+  void set_state(const GlFunctions& gl) const {
+    constexpr std::array<GLenum, 9> kOff{GL_CULL_FACE,     GL_BLEND,  GL_STENCIL_TEST,       GL_POLYGON_OFFSET_FILL,
+                                         GL_DEPTH_CLAMP,   GL_DITHER, GL_RASTERIZER_DISCARD, GL_PRIMITIVE_RESTART,
+                                         GL_COLOR_LOGIC_OP};
+    for (const GLenum off : kOff) {
+      gl.Disable(off);
+    }
+    gl.PolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    gl.DepthRangef(0.0F, 1.0F);
+    gl.Enable(GL_DEPTH_TEST);
+    // Strictly: at equal depth the surface drawn first stays, which is the one with the lower id.
+    gl.DepthFunc(GL_GREATER);
+    gl.UseProgram(program_.name());
+    gl.BindVertexArray(vertex_array_.name());
+    gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
+  }
+
+  void draw_part(const View& view, std::size_t screen, const Rect& part, TileLayer<Key>& layer) {
+    Stopwatch watch;
+    const auto lap = [&watch](double& ms) {
+      ms += watch.ms();
+      watch.restart();
+    };
+    const DrawList list = make_draw_list(scene_, geometry_, view, part, culling_, threads_);
+    stats_.triangles_drawn += list.triangles_drawn;
+    stats_.triangles_culled += list.triangles_culled;
+    stats_.chunks_drawn += list.chunks_drawn;
+    stats_.chunks_culled += list.chunks_culled;
+    lap(stats_.cull_ms);
+    if (list.commands.empty() || list.pixels.empty()) return;
+
+    const GlFunctions& gl = context_.gl();
+    target_.begin(view.size(), list.pixels);
+    set_state(gl);
+    upload(gl, records_, list.records, GL_STREAM_DRAW);
+    upload(gl, commands_, list.commands, GL_STREAM_DRAW);
+    gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(list.commands.size()),
+                                 sizeof(DrawCommand));
+    gl.Finish();
+    lap(stats_.draw_ms);
+    target_.read(view.size(), list.pixels);
+    stats_.pixels_read += list.pixels.area();
+    lap(stats_.read_ms);
+    pack_keys(target_.depths(), target_.words(), list.pixels, screen, layer, threads_);
+    lap(stats_.pack_ms);
+  }
+
+  GlContext& context_;
+  const Scene& scene_;
+  int threads_;
+  Culling culling_;
+  Geometry geometry_;
+  GlObject program_;
+  GlObject positions_;
+  GlObject indices_;
+  GlObject records_;
+  GlObject commands_;
+  GlObject vertex_array_;
+  KeyTarget target_;
+  RasterStats stats_;
+};
+
+Rasterizer::Rasterizer(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
+                       Culling culling)
+    : implementation_(std::make_unique<Implementation>(context, scene, objects, threads, culling)) {}
+
+Rasterizer::~Rasterizer() = default;
+
+void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
+  implementation_->draw(view, screen, parts, layer);
+}
+
+const RasterStats& Rasterizer::stats() const {
+  return implementation_->stats();
+}
+
+}  // namespace hpr

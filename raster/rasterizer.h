@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "image/key.h"
+#include "image/tiles.h"
+#include "raster/draw_list.h"
+#include "raster/gl_context.h"
+#include "scene/scene.h"
+#include "scene/view.h"
+
+namespace hpr {
+
+/// Of the last draw().
+struct RasterStats {
+  std::uint64_t triangles_drawn = 0;  ///< sent to GL, summed over the parts
+  std::uint64_t triangles_culled = 0;
+  std::uint64_t chunks_drawn = 0;
+  std::uint64_t chunks_culled = 0;
+  std::uint64_t pixels_read = 0;
+  double cull_ms = 0.0;
+  double draw_ms = 0.0;  ///< upload of the commands, clear and GL's drawing, to its end
+  double read_ms = 0.0;
+  double pack_ms = 0.0;
+};
+
+/// Draws one rank's share of a scene into keys by OpenGL.
+///
+/// The same screen gives the same keys however its area is cut into parts, however its triangles are dealt to ranks
+/// whose layers are merged by maximum, and with any number of threads.
+class Rasterizer {
+ public:
+  /// Uploads the triangles of `objects` once. `scene` and `context` must outlive it. Throws Error: Limit when GL has no
+  /// memory for the share, NoDevice when it reports another error. `threads`: for culling and packing; GL's own are
+  /// set with the context.
+  Rasterizer(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
+             Culling culling = Culling::Chunks);
+  ~Rasterizer();
+  Rasterizer(const Rasterizer&) = delete;
+  Rasterizer& operator=(const Rasterizer&) = delete;
+
+  /// Merges (maximum) the keys of `parts` of the layer's `screen` into `layer`; tiles become active where something was
+  /// drawn. `view` is as large as that screen and at most kRasterLimit pixels a side; parts are in its pixels and may
+  /// reach past it. Throws Error as the constructor does.
+  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
+
+  [[nodiscard]] const RasterStats& stats() const;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// XXH64 over the keys of one small fixed scene: equal on ranks whose rasterisers draw alike. CPUs without AVX and
+/// other drivers differ.
+[[nodiscard]] std::uint64_t raster_fingerprint(GlContext& context);
+
+}  // namespace hpr

@@ -1,0 +1,182 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+#include <string>
+
+#include "scene/scene.h"
+
+namespace hpr {
+namespace {
+
+/// A scene in which every field has a value that is not its default.
+Scene full_scene() {
+  Scene scene;
+  scene.name = "full";
+  Mesh mesh;
+  mesh.name = "mesh";
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normals.assign(3, {0, 0, 1});
+  mesh.uvs[0] = {{0, 0}, {1, 0}, {0, 1}};
+  mesh.uvs[1] = {{0, 0}, {2, 0}, {0, 2}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.material = 1;
+  scene.meshes = {mesh, Mesh{}};
+  Material material;
+  material.name = "material";
+  material.base_color = {0.1F, 0.2F, 0.3F, 0.4F};
+  material.base_color_texture = {.texture = 0, .uv_set = 1, .transform = {2, 0, 0, 2, 0.5F, 0.5F}};
+  material.metallic = 0.3F;
+  material.roughness = 0.2F;
+  material.metallic_roughness_texture.texture = 0;
+  material.emissive = {1, 2, 3};
+  material.emissive_texture.texture = 0;
+  material.transmission = 0.5F;
+  material.ior = 1.3F;
+  material.alpha_mode = AlphaMode::Mask;
+  material.alpha_cutoff = 0.4F;
+  material.double_sided = true;
+  scene.materials = {Material{}, material};
+  Texture texture{.name = "texture", .image = Image<Rgba8>({2, 3}, {1, 2, 3, 4})};
+  texture.wrap_s = Wrap::ClampToEdge;
+  texture.wrap_t = Wrap::MirroredRepeat;
+  texture.nearest = true;
+  scene.textures = {texture};
+  Instance instance;
+  instance.to_world[3] = {1, 2, 3, 1};
+  scene.instances = {instance, instance};
+  scene.lights = {Light{.name = "light",
+                        .type = LightType::Spot,
+                        .position = {1, 2, 3},
+                        .direction = {0, -1, 0},
+                        .intensity = {4, 5, 6},
+                        .range = 7.0,
+                        .inner_cone_radians = 0.1F,
+                        .outer_cone_radians = 0.2F}};
+  scene.cameras = {Camera{.name = "a", .eye = {1, 2, 3}, .axes = glm::dmat3(1.0), .lens = PerspectiveLens{1.0, 0.1}},
+                   Camera{.name = "b", .eye = {}, .axes = glm::dmat3(1.0), .lens = OrthographicLens{1, 2, 3, 4}}};
+  scene.background = {0.1F, 0.2F, 0.3F};
+  scene.warnings = {"odd"};
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(SceneBytes, ComeBackAsTheSameScene) {
+  const Scene scene = full_scene();
+  const auto bytes = to_bytes(scene);
+  const Scene copy = scene_from_bytes(bytes);
+  EXPECT_EQ(to_bytes(copy), bytes);
+  EXPECT_EQ(content_hash(copy), content_hash(scene));
+  EXPECT_EQ(copy.name, "full");
+  EXPECT_EQ(copy.triangles, 2U);
+  EXPECT_EQ(copy.meshes[0].triangles, scene.meshes[0].triangles);
+  EXPECT_EQ(copy.meshes[0].uvs[1], scene.meshes[0].uvs[1]);
+  EXPECT_EQ(copy.textures[0].image, scene.textures[0].image);
+  EXPECT_EQ(copy.instances[1].to_world, scene.instances[1].to_world);
+  EXPECT_EQ(copy.lights[0].type, LightType::Spot);
+  EXPECT_EQ(std::get<PerspectiveLens>(copy.cameras[0].lens).near_distance, 0.1);
+  EXPECT_EQ(std::get<OrthographicLens>(copy.cameras[1].lens).far_distance, 4.0);
+  EXPECT_EQ(copy.warnings, scene.warnings);
+}
+
+TEST(SceneBytes, OfAnEmptySceneComeBackToo) {
+  EXPECT_EQ(content_hash(scene_from_bytes(to_bytes(Scene{}))), content_hash(Scene{}));
+}
+
+TEST(ContentHash, IsTheHashOfTheBytesAndTheSameEveryTime) {
+  EXPECT_EQ(content_hash(full_scene()), content_hash(full_scene()));
+}
+
+TEST(ContentHash, ChangesWithEveryField) {
+  const std::map<std::string, std::function<void(Scene&)>> changes{
+      {"name", [](Scene& s) { s.name += "x"; }},
+      {"mesh name", [](Scene& s) { s.meshes[0].name += "x"; }},
+      {"position", [](Scene& s) { s.meshes[0].positions[2].z = 1e-45F; }},
+      {"normal", [](Scene& s) { s.meshes[0].normals[1].x = 0.5F; }},
+      {"uv 0", [](Scene& s) { s.meshes[0].uvs[0][0].x = 0.5F; }},
+      {"uv 1", [](Scene& s) { s.meshes[0].uvs[1][2].y = 0.5F; }},
+      {"uv set moved", [](Scene& s) { std::swap(s.meshes[0].uvs[0], s.meshes[0].uvs[1]); }},
+      {"triangle", [](Scene& s) { s.meshes[0].triangles[0].x = 2; }},
+      {"mesh material", [](Scene& s) { s.meshes[0].material = 0; }},
+      {"mesh removed", [](Scene& s) { s.meshes.pop_back(); }},
+      {"material name", [](Scene& s) { s.materials[1].name += "x"; }},
+      {"base color", [](Scene& s) { s.materials[1].base_color.a = 0.9F; }},
+      {"base color texture", [](Scene& s) { s.materials[1].base_color_texture.texture = -1; }},
+      {"uv set", [](Scene& s) { s.materials[1].base_color_texture.uv_set = 0; }},
+      {"uv transform", [](Scene& s) { s.materials[1].base_color_texture.transform[5] = 0.1F; }},
+      {"metallic", [](Scene& s) { s.materials[1].metallic = 0.9F; }},
+      {"roughness", [](Scene& s) { s.materials[1].roughness = 0.9F; }},
+      {"metallic-roughness texture", [](Scene& s) { s.materials[1].metallic_roughness_texture.texture = -1; }},
+      {"emissive", [](Scene& s) { s.materials[1].emissive.y = 0.9F; }},
+      {"emissive texture", [](Scene& s) { s.materials[1].emissive_texture.texture = -1; }},
+      {"transmission", [](Scene& s) { s.materials[1].transmission = 0.9F; }},
+      {"ior", [](Scene& s) { s.materials[1].ior = 1.9F; }},
+      {"alpha mode", [](Scene& s) { s.materials[1].alpha_mode = AlphaMode::Blend; }},
+      {"alpha cutoff", [](Scene& s) { s.materials[1].alpha_cutoff = 0.9F; }},
+      {"double sided", [](Scene& s) { s.materials[1].double_sided = false; }},
+      {"texture name", [](Scene& s) { s.textures[0].name += "x"; }},
+      {"texel", [](Scene& s) { s.textures[0].image.at(1, 2).a = 5; }},
+      {"texture shape",
+       [](Scene& s) {
+         s.textures[0].image = Image<Rgba8>({3, 2}, {1, 2, 3, 4});
+       }},
+      {"wrap s", [](Scene& s) { s.textures[0].wrap_s = Wrap::Repeat; }},
+      {"wrap t", [](Scene& s) { s.textures[0].wrap_t = Wrap::Repeat; }},
+      {"nearest", [](Scene& s) { s.textures[0].nearest = false; }},
+      {"instance mesh", [](Scene& s) { s.instances[0].mesh = 1; }},
+      {"to world", [](Scene& s) { s.instances[0].to_world[0][1] = 1e-300; }},
+      {"first surface", [](Scene& s) { s.instances[0].first_surface = 7; }},
+      {"light name", [](Scene& s) { s.lights[0].name += "x"; }},
+      {"light type", [](Scene& s) { s.lights[0].type = LightType::Point; }},
+      {"light position", [](Scene& s) { s.lights[0].position.z = 0; }},
+      {"light direction", [](Scene& s) { s.lights[0].direction.z = 1; }},
+      {"light intensity", [](Scene& s) { s.lights[0].intensity.z = 1; }},
+      {"light range", [](Scene& s) { s.lights[0].range = 1; }},
+      {"inner cone", [](Scene& s) { s.lights[0].inner_cone_radians = 0; }},
+      {"outer cone", [](Scene& s) { s.lights[0].outer_cone_radians = 1; }},
+      {"camera name", [](Scene& s) { s.cameras[0].name += "x"; }},
+      {"camera eye", [](Scene& s) { s.cameras[0].eye.x = 9; }},
+      {"camera axes", [](Scene& s) { s.cameras[0].axes[1][2] = 9; }},
+      {"field of view",
+       [](Scene& s) {
+         s.cameras[0].lens = PerspectiveLens{1.1, 0.1};
+       }},
+      {"near",
+       [](Scene& s) {
+         s.cameras[0].lens = PerspectiveLens{1.0, 0.2};
+       }},
+      {"half width",
+       [](Scene& s) {
+         s.cameras[1].lens = OrthographicLens{9, 2, 3, 4};
+       }},
+      {"half height",
+       [](Scene& s) {
+         s.cameras[1].lens = OrthographicLens{1, 9, 3, 4};
+       }},
+      {"orthographic near",
+       [](Scene& s) {
+         s.cameras[1].lens = OrthographicLens{1, 2, 9, 4};
+       }},
+      {"orthographic far",
+       [](Scene& s) {
+         s.cameras[1].lens = OrthographicLens{1, 2, 3, 9};
+       }},
+      {"background r", [](Scene& s) { s.background.r = 1; }},
+      {"background b", [](Scene& s) { s.background.b = 1; }},
+      {"warnings", [](Scene& s) { s.warnings.clear(); }},
+      {"triangles", [](Scene& s) { s.triangles = 1; }},
+      {"bounds low", [](Scene& s) { s.bounds.low.y = -1; }},
+      {"bounds high", [](Scene& s) { s.bounds.high.y = 100; }},
+  };
+  std::map<std::uint64_t, std::string> seen{{content_hash(full_scene()), "the unchanged scene"}};
+  for (const auto& [what, change] : changes) {
+    Scene scene = full_scene();
+    change(scene);
+    const auto [place, fresh] = seen.emplace(content_hash(scene), what);
+    EXPECT_TRUE(fresh) << what << " hashes like " << place->second;
+    EXPECT_EQ(content_hash(scene_from_bytes(to_bytes(scene))), content_hash(scene)) << what;
+  }
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,172 @@
+#include "scene/view.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+View turned_view(bool orthographic) {
+  Camera camera = look_at({3, 2, 7}, {-1, 0.5, 0}, {0.1, 1, 0}, 0.9);
+  if (orthographic) camera.lens = OrthographicLens{3.0, 2.0, 0.5, 40.0};
+  View view = make_view(camera, {333, 217}, {{-5, -5, -5}, {5, 5, 5}});
+  view.left *= 0.3;  // off-axis, as a screen of a wall is
+  view.top *= 1.7;
+  return view;
+}
+
+/// Where a world point lands, in pixels of the view from its upper left corner, and its depth.
+glm::dvec3 project(const View& view, const glm::dvec3& point, const glm::dvec3& origin) {
+  const glm::dvec4 clip = clip_from_world(view, origin) * glm::dvec4(point - origin, 1.0);
+  const glm::dvec3 ndc = glm::dvec3(clip) / clip.w;
+  return {(0.5 + 0.5 * ndc.x) * view.size().width, (0.5 - 0.5 * ndc.y) * view.size().height, ndc.z};
+}
+
+TEST(View, APointOnAPixelsRayProjectsToThatPixelAndItsDepth) {
+  for (const bool orthographic : {false, true}) {
+    for (const View& view : split_into_blocks(turned_view(orthographic), 128)) {
+      for (const glm::dvec3 origin : {glm::dvec3(0.0), view.eye, glm::dvec3(100, -50, 3)}) {
+        for (const double x : {0.0, 0.5, 17.25, 60.0}) {
+          for (const double y : {0.0, 3.5, 40.0}) {
+            const Ray ray = view_ray(view, x, y);
+            for (const double distance : {0.6, 2.0, 39.0}) {
+              const glm::dvec3 seen = project(view, ray.origin + distance * ray.direction, origin);
+              EXPECT_NEAR(seen.x, x, 1e-9);
+              EXPECT_NEAR(seen.y, y, 1e-9);
+              EXPECT_NEAR(seen.z, reversed_depth(view, distance), 1e-12);
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(View, ADirectionIsOneMetreAlongTheAxis) {
+  for (const bool orthographic : {false, true}) {
+    const View view = turned_view(orthographic);
+    EXPECT_NEAR(glm::dot(view_ray(view, 12.5, 200.5).direction, -view.axes[2]), 1.0, 1e-14);
+  }
+}
+
+TEST(View, DepthIsReversed) {
+  const View perspective = turned_view(false);
+  EXPECT_EQ(reversed_depth(perspective, perspective.near_distance), 1.0);
+  EXPECT_LT(reversed_depth(perspective, 1e12), 1e-9);
+  EXPECT_GT(reversed_depth(perspective, 1e12), 0.0);
+  const View box = turned_view(true);
+  EXPECT_EQ(reversed_depth(box, box.near_distance), 1.0);
+  EXPECT_EQ(reversed_depth(box, box.far_distance), 0.0);
+}
+
+TEST(View, RowZeroIsTheTop) {
+  const View view = make_view(look_at({0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 0.5 * std::numbers::pi), {200, 100}, {});
+  const glm::dvec3 upper_left = view_ray(view, 0, 0).direction;
+  EXPECT_NEAR(glm::distance(upper_left, glm::dvec3(-2, 1, -1)), 0.0, 1e-14);
+  EXPECT_NEAR(glm::distance(view_ray(view, 100, 50).direction, glm::dvec3(0, 0, -1)), 0.0, 1e-14);
+}
+
+TEST(View, BlocksAreThePixelsOfTheWholeAndTheirRaysAreTheSameBits) {
+  for (const bool orthographic : {false, true}) {
+    const View whole = turned_view(orthographic);
+    Image<int> covered(whole.screen, 0);
+    for (const View& block : split_into_blocks(whole, 64)) {
+      EXPECT_LE(block.size().width, 64);
+      EXPECT_LE(block.size().height, 64);
+      for (int y = 0; y < block.size().height; ++y) {
+        for (int x = 0; x < block.size().width; ++x) {
+          ++covered.at(block.block.x0 + x, block.block.y0 + y);
+          const Ray part = view_ray(block, x + 0.5, y + 0.5);
+          const Ray all = view_ray(whole, block.block.x0 + x + 0.5, block.block.y0 + y + 0.5);
+          ASSERT_TRUE(part.origin == all.origin && part.direction == all.direction);
+        }
+      }
+    }
+    for (const int count : covered.pixels()) ASSERT_EQ(count, 1);
+  }
+}
+
+TEST(View, ABlockThatFitsStaysOne) {
+  View view = turned_view(false);
+  EXPECT_EQ(split_into_blocks(view, kRasterLimit).size(), 1U);
+  EXPECT_EQ(split_into_blocks(view, kRasterLimit)[0].block, view.block);
+  view.block = {64, 0, 192, 217};
+  const auto blocks = split_into_blocks(view, 128);
+  ASSERT_EQ(blocks.size(), 2U);
+  EXPECT_EQ(blocks[1].block, (Rect{64, 128, 192, 217}));
+}
+
+TEST(View, TheLensKeepsItsHeightAndTheAspectGivesTheWidth) {
+  const Camera camera = look_at({0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 1.0);
+  for (const Size size : {Size{100, 100}, Size{300, 100}, Size{100, 300}}) {
+    const View view = make_view(camera, size, {});
+    EXPECT_DOUBLE_EQ(view.top, std::tan(0.5));
+    EXPECT_DOUBLE_EQ(view.right / view.top, static_cast<double>(size.width) / size.height);
+    EXPECT_EQ(view.left, -view.right);
+    EXPECT_EQ(view.bottom, -view.top);
+  }
+}
+
+TEST(View, TheNearPlaneFollowsTheSceneUnlessTheCameraSaysSo) {
+  Camera camera = look_at({0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 1.0);
+  EXPECT_DOUBLE_EQ(make_view(camera, {8, 8}, {{0, 0, 0}, {3, 4, 0}}).near_distance, 5e-4);
+  EXPECT_GT(make_view(camera, {8, 8}, {}).near_distance, 0.0);
+  camera.lens = PerspectiveLens{1.0, 0.25};
+  EXPECT_EQ(make_view(camera, {8, 8}, {{0, 0, 0}, {3, 4, 0}}).near_distance, 0.25);
+}
+
+TEST(LookAt, AxesAreOrthonormalAndRightHanded) {
+  const Camera camera = look_at({1e6, 2, 3}, {-4, 5e5, 6}, {0.3, 1, 0}, 1.0);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) EXPECT_NEAR(glm::dot(camera.axes[i], camera.axes[j]), i == j ? 1.0 : 0.0, 1e-14);
+  }
+  EXPECT_GT(glm::dot(glm::cross(camera.axes[0], camera.axes[1]), camera.axes[2]), 0.0);
+  EXPECT_GT(camera.axes[1].y, 0.0);
+}
+
+TEST(LookAt, RefusesWhatHasNoDirection) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [](const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up) {
+    try {
+      (void)look_at(eye, at, up, 1.0);
+    } catch (const Error& error) {
+      return error.code() == ExitCode::Usage;
+    }
+    return false;
+  };
+  EXPECT_TRUE(refused({1, 2, 3}, {1, 2, 3}, {0, 1, 0}));
+  EXPECT_TRUE(refused({0, 5, 0}, {0, 0, 0}, {0, 1, 0}));
+  EXPECT_TRUE(refused({0, 0, 5}, {0, 0, 0}, {0, 0, 0}));
+  EXPECT_TRUE(refused({kNan, 0, 5}, {0, 0, 0}, {0, 1, 0}));
+  EXPECT_TRUE(refused({std::numeric_limits<double>::infinity(), 0, 5}, {0, 0, 0}, {0, 1, 0}));
+  EXPECT_FALSE(refused({0, 0, 1e-30}, {0, 0, 0}, {0, 1, 0})) << "small is not nothing";
+}
+
+TEST(FramingCamera, SeesAllOfTheBounds) {
+  for (const Bounds& bounds :
+       {Bounds{{-1, -1, -1}, {1, 1, 1}}, Bounds{{1e6, 0, 0}, {1e6 + 10, 0.1, 3}}, Bounds{{5, 5, 5}, {5, 5, 5}}}) {
+    const View view = make_view(framing_camera(bounds), {100, 100}, bounds);
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 point((corner & 1) != 0 ? bounds.high.x : bounds.low.x,
+                             (corner & 2) != 0 ? bounds.high.y : bounds.low.y,
+                             (corner & 4) != 0 ? bounds.high.z : bounds.low.z);
+      const glm::dvec3 seen = project(view, point, view.eye);
+      EXPECT_GE(seen.x, 0.0);
+      EXPECT_LE(seen.x, 100.0);
+      EXPECT_GE(seen.y, 0.0);
+      EXPECT_LE(seen.y, 100.0);
+      EXPECT_GT(seen.z, 0.0);
+      EXPECT_LT(seen.z, 1.0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hpr

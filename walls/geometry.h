@@ -1,0 +1,63 @@
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "scene/view.h"
+#include "walls/wall.h"
+
+namespace hpr {
+
+/// The rectangle all screens lie in, seen along their mean normal.
+struct WallExtent {
+  glm::dmat3 axes{1.0};    ///< columns: right, up, towards the viewer; wall space, orthonormal
+  glm::dvec3 center{0.0};  ///< of the rectangle, wall space
+  double width = 0.0;      ///< metres
+  double height = 0.0;     ///< metres
+  bool flat = true;        ///< all screens face the same way in one plane (to 1e-6 of the extent)
+  glm::dvec3 middle{0.0};  ///< mean of the screens' centres, wall space
+};
+
+[[nodiscard]] WallExtent wall_extent(const Wall& wall);
+
+/// Columns: right, up, towards the viewer; orthonormal.
+[[nodiscard]] glm::dmat3 screen_axes(const WallScreen& screen);
+[[nodiscard]] glm::dvec3 screen_center(const WallScreen& screen);
+
+/// One view per screen: off-axis frusta after Kooima, Generalized Perspective Projection, 2008, all in double.
+///
+/// With a viewer in the file the wall is a window into the scene: the viewer stands at the camera's eye, wall axes are
+/// the camera's axes, and a metre is a unit of the scene. Without one, a flat wall shows what the camera sees: the
+/// viewer is placed so that the wall's height subtends the camera's vertical angle. An orthographic camera shows its
+/// half height on half the wall's height. `bounds` (of the scene) choose the near plane where neither wall nor camera
+/// give one. An eye nearer to a screen's plane than clamp_distance_m, or behind it, is moved back for that screen.
+[[nodiscard]] std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds);
+
+/// Where the screens lie in a picture of the whole wall.
+struct WallPicture {
+  Size size;
+  std::vector<Rect> screens;  ///< one per screen of the wall, none empty
+};
+
+/// A flat wall as it stands, at its finest screen's pixels; any other wall plane by plane: upright ones side by side
+/// from left to right, ceilings above, floors below. Scaled down when a side would exceed `max_side` pixels. Edges are
+/// rounded to whole pixels; where all screens have one pitch, and nothing is scaled, each keeps its size.
+[[nodiscard]] WallPicture wall_picture(const Wall& wall, int max_side);
+
+/// How far the gaps of a flat wall are from whole pixels: the error a wall description with bezels in whole pixels
+/// would make. Rows and columns of screens with equal pitch count.
+struct SeamError {
+  double largest_px = 0.0;      ///< at one seam
+  double accumulated_px = 0.0;  ///< over a row or column of seams
+};
+[[nodiscard]] SeamError seam_error(const Wall& wall);
+
+/// Metres per pixel along the screen's width.
+[[nodiscard]] double pixel_pitch(const WallScreen& screen);
+
+/// Of the screen with the smallest pixels.
+[[nodiscard]] double finest_pitch(const Wall& wall);
+
+}  // namespace hpr

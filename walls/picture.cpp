@@ -1,0 +1,144 @@
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "walls/geometry.h"
+
+namespace hpr {
+namespace {
+
+/// A screen's place in the plan, in metres, y down.
+struct Box {
+  double x = 0.0;
+  double y = 0.0;
+  double width = 0.0;
+  double height = 0.0;
+};
+
+/// Screens that lie in one plane, laid out as seen from the viewer's side.
+struct Plane {
+  std::vector<std::size_t> screens;
+  Wall part;  ///< the same screens
+  WallExtent extent;
+  double heading = 0.0;  ///< from straight ahead, clockwise seen from above
+};
+
+bool same_plane(const WallScreen& a, const WallScreen& b) {
+  constexpr double kParallel = 1.0 - 1e-9;
+  const glm::dvec3 normal = screen_axes(a)[2];
+  const double size = screen_width(a) + screen_width(b);
+  return glm::dot(normal, screen_axes(b)[2]) > kParallel &&
+         std::abs(glm::dot(normal, b.lower_left - a.lower_left)) < 1e-6 * size;
+}
+
+std::vector<Plane> planes_of(const Wall& wall, const WallExtent& whole) {
+  std::vector<Plane> planes;
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    const WallScreen& screen = wall.screens[i];
+    auto plane =
+        std::ranges::find_if(planes, [&](const Plane& p) { return same_plane(p.part.screens.front(), screen); });
+    if (plane == planes.end()) plane = planes.insert(plane, Plane{});
+    plane->screens.push_back(i);
+    plane->part.screens.push_back(screen);
+  }
+  for (Plane& plane : planes) {
+    plane.extent = wall_extent(plane.part);
+    const glm::dvec3 towards = plane.extent.center - wall.viewer;
+    const glm::dvec3 ahead = -whole.axes[2];
+    plane.heading = std::atan2(towards.x * -ahead.z + towards.z * ahead.x, towards.x * ahead.x + towards.z * ahead.z);
+  }
+  std::ranges::stable_sort(planes, {}, &Plane::heading);
+  return planes;
+}
+
+void lay_out(const Wall& wall, const Plane& plane, double x, double y, std::vector<Box>& boxes) {
+  const glm::dmat3 inside = glm::transpose(plane.extent.axes);
+  for (const std::size_t i : plane.screens) {
+    const WallScreen& screen = wall.screens[i];
+    const glm::dvec3 a = inside * (screen.lower_left - plane.extent.center);
+    const glm::dvec3 b = inside * (screen.lower_right + screen.upper_left - screen.lower_left - plane.extent.center);
+    const glm::dvec3 low = glm::min(a, b);
+    const glm::dvec3 high = glm::max(a, b);
+    boxes[i] = {x + low.x + 0.5 * plane.extent.width, y - high.y + 0.5 * plane.extent.height, high.x - low.x,
+                high.y - low.y};
+  }
+}
+
+struct Layout {
+  std::vector<Box> boxes;
+  double width = 0.0;
+  double height = 0.0;
+};
+
+Layout layout_of(const Wall& wall) {
+  const WallExtent whole = wall_extent(wall);
+  Layout layout{std::vector<Box>(wall.screens.size()), whole.width, whole.height};
+  const std::vector<Plane> planes = planes_of(wall, whole);
+  // Rows of planes: ceilings face down, floors up, the rest stands.
+  constexpr double kLying = 0.7;
+  std::array<std::vector<const Plane*>, 3> rows;
+  for (const Plane& plane : planes) {
+    const double facing = plane.extent.axes[2].y;
+    rows[facing < -kLying ? 0 : facing > kLying ? 2 : 1].push_back(&plane);
+  }
+  const double margin = planes.size() > 1 ? 0.05 * (whole.width + whole.height) : 0.0;
+  std::array<double, 3> widths{};
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (const Plane* const plane : rows[r]) widths[r] += plane->extent.width + (plane == rows[r].front() ? 0 : margin);
+  }
+  layout.width = std::ranges::max(widths);
+  double y = 0.0;
+  for (std::size_t r = 0; r < 3; ++r) {
+    if (rows[r].empty()) continue;
+    if (y > 0.0) y += margin;
+    double x = 0.5 * (layout.width - widths[r]);
+    double tallest = 0.0;
+    for (const Plane* const plane : rows[r]) tallest = std::max(tallest, plane->extent.height);
+    for (const Plane* const plane : rows[r]) {
+      lay_out(wall, *plane, x, y + 0.5 * (tallest - plane->extent.height), layout.boxes);
+      x += plane->extent.width + margin;
+    }
+    y += tallest;
+  }
+  layout.height = y;
+  return layout;
+}
+
+int rounded(double value) {
+  return static_cast<int>(std::lround(value));
+}
+
+}  // namespace
+
+WallPicture wall_picture(const Wall& wall, int max_side) {
+  HPR_CHECK(max_side > 0);
+  const Layout layout = layout_of(wall);
+  const double finest = finest_pitch(wall);
+  const double longest = std::max(layout.width, layout.height) / finest;
+  const bool scaled = std::ceil(longest) > max_side;
+  const double per_metre = scaled ? max_side / (longest * finest) : 1.0 / finest;
+  const bool native = !scaled && std::ranges::all_of(wall.screens, [&](const WallScreen& screen) {
+    return std::abs(pixel_pitch(screen) - finest) < 1e-9 * finest;
+  });
+
+  WallPicture picture;
+  picture.size = {std::max(1, rounded(layout.width * per_metre)), std::max(1, rounded(layout.height * per_metre))};
+  for (std::size_t i = 0; i < layout.boxes.size(); ++i) {
+    const Box& box = layout.boxes[i];
+    const Size pixels = wall.screens[i].pixels;
+    Rect rect{rounded(box.x * per_metre), rounded(box.y * per_metre), rounded((box.x + box.width) * per_metre),
+              rounded((box.y + box.height) * per_metre)};
+    // Rounding moves whole screens then, and never squeezes one by a pixel.
+    const bool upright = std::abs(box.width - screen_width(wall.screens[i])) < 1e-6 * box.width;
+    if (native && upright) rect = {rect.x0, rect.y0, rect.x0 + pixels.width, rect.y0 + pixels.height};
+    rect.x1 = std::max(rect.x1, rect.x0 + 1);
+    rect.y1 = std::max(rect.y1, rect.y0 + 1);
+    picture.size.width = std::max(picture.size.width, rect.x1);
+    picture.size.height = std::max(picture.size.height, rect.y1);
+    picture.screens.push_back(rect);
+  }
+  return picture;
+}
+
+}  // namespace hpr

@@ -1,0 +1,223 @@
+#include "walls/wall_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "walls/geometry.h"
+#include "walls/wall_draft.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kMostRanks = 1 << 20;
+constexpr double kMetresLimit = 1e6;
+
+void read_nodes(TableReader& document, WallDraft& draft, Findings& findings) {
+  for (const TomlValue* const table : document.tables("nodes")) {
+    TableReader reader(*table, "node", findings);
+    DraftNode draft_node{{}, table->place};
+    WallNode& node = draft_node.node;
+    reader.require("id", "\"n0\"");
+    node.id = reader.id("id").value_or("");
+    node.host = reader.text("host").value_or("localhost");
+    node.ranks = reader.integer("ranks", 1, kMostRanks).value_or(0);
+    for (const TomlValue* const gpu_table : reader.tables("gpus")) {
+      TableReader gpu(*gpu_table, "gpu", findings);
+      gpu.require("id", "\"g0\"");
+      if (auto id = gpu.id("id")) node.gpus.push_back(std::move(*id));
+      gpu.ignore({"backend", "egl_device", "cpu_affinity"});
+      gpu.finish();
+    }
+    reader.ignore({"nic"});
+    reader.finish();
+    draft.nodes.push_back(std::move(draft_node));
+  }
+}
+
+void read_windows(TableReader& document, WallDraft& draft, Findings& findings) {
+  for (const TomlValue* const table : document.tables("windows")) {
+    TableReader reader(*table, "window", findings);
+    DraftWindow draft_window{{}, table->place, reader.place("node"), reader.place("gpu"), reader.place("rank")};
+    WallWindow& window = draft_window.window;
+    reader.require("id", "\"w0\"");
+    window.id = reader.id("id").value_or("");
+    window.node = reader.text("node").value_or("");
+    window.gpu = reader.text("gpu").value_or("");
+    window.display = reader.text("display").value_or("");
+    window.rank = reader.integer("rank", 0, kMostRanks - 1).value_or(-1);
+    window.rect = reader.rect("rect").value_or(Rect{});
+    window.fullscreen = reader.boolean("fullscreen").value_or(false);
+    reader.ignore({"swap_group"});
+    reader.finish();
+    draft.windows.push_back(std::move(draft_window));
+  }
+}
+
+void read_viewers(TableReader& document, Wall& wall, Findings& findings) {
+  const std::vector<const TomlValue*> viewers = document.tables("viewers");
+  for (const TomlValue* const table : viewers) {
+    TableReader reader(*table, "viewer", findings);
+    static_cast<void>(reader.id("id"));
+    const auto position = reader.point("position_m");
+    const auto near_m = reader.real("near_m", 0.0, kMetresLimit);
+    const auto clamp_m = reader.real("clamp_distance_m", 0.0, kMetresLimit);
+    reader.ignore({"ipd_m", "eye_offset_m", "tracker"});
+    reader.finish();
+    if (table != viewers.front()) continue;
+    wall.viewer_given = position.has_value();
+    wall.viewer = position.value_or(wall.viewer);
+    wall.near_m = near_m.value_or(wall.near_m);
+    wall.clamp_distance_m = clamp_m.value_or(wall.clamp_distance_m);
+  }
+  if (viewers.size() > 1) {
+    findings.warning(viewers[1]->place, "only the first viewer is used",
+                     "remove the others, or put the one you want first");
+  }
+}
+
+void read_test(TableReader& document, Wall& wall, Findings& findings) {
+  const TomlValue* const table = document.table("test");
+  if (table == nullptr) return;
+  TableReader reader(*table, "test", findings);
+  if (const auto rgba = reader.integers("gap_rgba", 4, 0, 255)) {
+    const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>((*rgba)[i]); };
+    wall.gap_color = {byte(0), byte(1), byte(2), byte(3)};
+  }
+  reader.ignore({"headless", "scale", "dump", "viewer_path"});
+  reader.finish();
+}
+
+void read_version(TableReader& document) {
+  const TomlValue* const version = document.require("hpr_wall", "1");
+  if (version == nullptr || (version->type == TomlValue::Type::Integer && version->integer == 1)) return;
+  document.error("hpr_wall", "is not 1", "this program reads version 1 of wall files: hpr_wall = 1");
+}
+
+int to_number(std::string_view digits) {
+  int number = 0;
+  const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  return result.ec == std::errc() && result.ptr == digits.data() + digits.size() ? number : -1;
+}
+
+bool all_digits(std::string_view text) {
+  return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// The two numbers of "6x3"; -1 for one too large to hold. None when the text is no such pair.
+std::optional<std::pair<int, int>> pair_of(std::string_view text) {
+  const std::size_t x = text.find('x');
+  if (x == std::string_view::npos) return std::nullopt;
+  const std::string_view a = text.substr(0, x);
+  const std::string_view b = text.substr(x + 1);
+  if (!all_digits(a) || !all_digits(b)) return std::nullopt;
+  return std::pair(to_number(a), to_number(b));
+}
+
+}  // namespace
+
+bool WallReading::ok() const {
+  return std::ranges::none_of(findings, &WallFinding::error);
+}
+
+void finish_wall(Wall& wall) {
+  if (!wall.viewer_given) {
+    const WallExtent extent = wall_extent(wall);
+    wall.viewer = extent.middle + extent.axes[2] * extent.height;
+  }
+  const std::string text = expand_wall(wall);
+  wall.hash = xxh64(std::as_bytes(std::span(text)));
+}
+
+WallReading parse_wall(std::string_view text, const std::string& name) {
+  Findings findings(name, text);
+  WallReading reading;
+  const auto parsed = parse_toml(text);
+  if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
+    findings.error(failure->place, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
+    reading.findings = findings.take();
+    return reading;
+  }
+  Wall& wall = reading.wall;
+  WallDraft draft;
+  TableReader document(std::get<TomlValue>(parsed), "the wall", findings);
+  read_version(document);
+  wall.name = document.text("name").value_or(std::filesystem::path(name).stem().string());
+  read_nodes(document, draft, findings);
+  read_windows(document, draft, findings);
+  read_surfaces(document, draft, findings);
+  read_viewers(document, wall, findings);
+  read_test(document, wall, findings);
+  document.ignore({"sync", "render", "transport", "fault", "monitors", "stereo"});
+  document.finish();
+  link_wall(draft, findings);
+
+  const bool sound = !findings.any_errors();
+  reading.findings = findings.take();
+  if (!sound) return reading;
+  for (DraftNode& node : draft.nodes) wall.nodes.push_back(std::move(node.node));
+  for (DraftWindow& window : draft.windows) wall.windows.push_back(std::move(window.window));
+  for (DraftScreen& screen : draft.screens) wall.screens.push_back(std::move(screen.screen));
+  finish_wall(wall);
+  return reading;
+}
+
+std::optional<Wall> wall_from_shorthand(std::string_view spec) {
+  constexpr double kTileHeight = 0.36;
+  constexpr double kGap = 0.006;
+  const std::size_t at = spec.find('@');
+  const auto grid_size = pair_of(spec.substr(0, at));
+  const auto pixels = at == std::string_view::npos ? std::pair(640, 360) : pair_of(spec.substr(at + 1));
+  if (!grid_size || !pixels) return std::nullopt;
+  const auto [columns, rows] = *grid_size;
+  if (columns < 1 || rows < 1 || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
+    throw Error(ExitCode::BadInput, fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
+                fmt::format("columns times rows must be from 1 to {}", kMostScreens));
+  }
+  const Size size{pixels->first, pixels->second};
+  if (size.width < 1 || size.height < 1 || size.width > kMostScreenSide || size.height > kMostScreenSide) {
+    throw Error(ExitCode::BadInput, fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
+                fmt::format("sides must be from 1 to {} pixels", kMostScreenSide));
+  }
+  WallGrid grid;
+  grid.columns = columns;
+  grid.rows = rows;
+  grid.tile_pixels = size;
+  grid.tile_height_m = kTileHeight;
+  grid.tile_width_m = kTileHeight * size.width / size.height;
+  grid.column_gaps_m.assign(static_cast<std::size_t>(columns - 1), kGap);
+  grid.row_gaps_m.assign(static_cast<std::size_t>(rows - 1), kGap);
+  Wall wall;
+  wall.name = std::string(spec);
+  wall.screens = expand_grid(grid, "wall");
+  finish_wall(wall);
+  return wall;
+}
+
+WallReading read_wall(const std::string& spec) {
+  constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 20;
+  if (auto wall = wall_from_shorthand(spec)) return {std::move(*wall), {}};
+  std::error_code error;
+  if (!std::filesystem::exists(spec, error)) {
+    throw Error(ExitCode::Io, fmt::format("there is no wall file '{}'", printable(spec)),
+                "a wall is a TOML file, or columns x rows such as 3x2 or 3x2@1920x1080");
+  }
+  const std::vector<std::byte> bytes = read_file(spec, kLargestFile);
+  return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec);
+}
+
+Wall load_wall(const std::string& spec) {
+  WallReading reading = read_wall(spec);
+  const auto first = std::ranges::find_if(reading.findings, &WallFinding::error);
+  if (first != reading.findings.end()) throw Error(ExitCode::BadInput, first->what, first->hint, first->line);
+  for (const WallFinding& finding : reading.findings) log::warning("{} ({})", finding.what, finding.hint);
+  return std::move(reading.wall);
+}
+
+}  // namespace hpr

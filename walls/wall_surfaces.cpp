@@ -1,0 +1,230 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "walls/wall_draft.h"
+#include "walls/wall_file.h"
+
+namespace hpr {
+namespace {
+
+constexpr double kMetresLimit = 1e6;
+/// A picture on skewed corners would need a warp; this much is measuring noise.
+constexpr double kPerpendicular = 1e-6;
+
+std::optional<Size> read_pixels(TableReader& reader, std::string_view key) {
+  reader.require(key, "[1920, 1080]");
+  const auto numbers = reader.integers(key, 2, 1, kMostScreenSide);
+  if (!numbers) return std::nullopt;
+  return Size{(*numbers)[0], (*numbers)[1]};
+}
+
+int read_rotate(TableReader& reader) {
+  const int angle = reader.integer("rotate", 0, 270).value_or(0);
+  if (angle % 90 == 0) return angle;
+  reader.error("rotate", fmt::format("is {}", angle), "a panel is turned by 0, 90, 180 or 270 degrees");
+  return 0;
+}
+
+/// `count` gaps: all `common`, unless listed one by one under `key`.
+std::vector<double> read_gaps(TableReader& reader, std::string_view key, int count, double common, double tile) {
+  const auto listed = reader.reals(key, static_cast<std::size_t>(count), kMetresLimit);
+  std::vector<double> gaps = listed.value_or(std::vector<double>(static_cast<std::size_t>(count), common));
+  for (const double gap : gaps) {
+    if (gap > -tile) continue;
+    reader.error(listed ? key : "gap_m", fmt::format("overlaps tiles by {} m, a whole tile", -gap),
+                 "a negative gap must stay smaller than the tile");
+    break;
+  }
+  return gaps;
+}
+
+void read_grid(const TomlValue& table, const std::string& surface, WallDraft& draft, Findings& findings) {
+  TableReader reader(table, "grid", findings);
+  WallGrid grid;
+  reader.require("columns", "3");
+  reader.require("rows", "2");
+  const auto columns = reader.integer("columns", 1, kMostScreens);
+  const auto rows = reader.integer("rows", 1, kMostScreens);
+  const auto pixels = read_pixels(reader, "tile_pixels");
+  reader.require("tile_size_m", "[1.2096, 0.6804]");
+  const auto size = reader.reals("tile_size_m", 2, kMetresLimit);
+  const bool positive = size && (*size)[0] > 0.0 && (*size)[1] > 0.0;
+  if (size && !positive) {
+    reader.error("tile_size_m", fmt::format("is {} x {} m", (*size)[0], (*size)[1]), "sizes must be positive");
+  }
+  const std::vector<double> gap = reader.reals("gap_m", 2, kMetresLimit).value_or(std::vector<double>{0.0, 0.0});
+  grid.center = reader.point("centre_m").value_or(glm::dvec3(0.0));
+  const int rotate = read_rotate(reader);
+  const auto windows = reader.texts("windows");
+  const std::int64_t asked = std::int64_t{columns.value_or(1)} * rows.value_or(1);
+  const bool fits = asked + static_cast<std::int64_t>(draft.screens.size()) <= kMostScreens;
+  if (!fits) {
+    reader.error("columns", fmt::format("times rows is {} screens", asked),
+                 fmt::format("a wall may have {} in all", kMostScreens));
+  }
+  const bool countable = columns && rows && fits;
+  if (countable && positive) {
+    grid.columns = *columns;
+    grid.rows = *rows;
+    grid.column_gaps_m = read_gaps(reader, "column_gaps_m", *columns - 1, gap[0], (*size)[0]);
+    grid.row_gaps_m = read_gaps(reader, "row_gaps_m", *rows - 1, gap[1], (*size)[1]);
+  }
+  for (const std::string_view key : {"column_gaps_m", "row_gaps_m"}) static_cast<void>(reader.has(key));
+  reader.ignore({"curve", "panel_rotate", "mirror", "edge_blend_m"});
+  reader.finish();
+  if (!countable) return;
+  const auto count = static_cast<std::size_t>(asked);
+  if (windows && windows->size() != count) {
+    reader.error("windows", fmt::format("names {} windows for {} x {} screens", windows->size(), *columns, *rows),
+                 fmt::format("name {}, row by row from the top left", count));
+    return;
+  }
+  if (!pixels || !positive) return;
+  grid.tile_pixels = *pixels;
+  grid.tile_width_m = (*size)[0];
+  grid.tile_height_m = (*size)[1];
+  const TomlValue* const list = reader.find("windows");
+  std::vector<WallScreen> screens = expand_grid(grid, surface);
+  for (std::size_t i = 0; i < screens.size(); ++i) {
+    DraftScreen screen{std::move(screens[i]), {}, table.place, table.place, true};
+    screen.screen.rotate = rotate;
+    if (windows) {
+      screen.screen.window = (*windows)[i];
+      screen.window_place = list->items[i].place;
+    }
+    draft.screens.push_back(std::move(screen));
+  }
+}
+
+/// Reads the three corners; false when they are missing or make no rectangle.
+bool read_corners(TableReader& reader, WallScreen& screen, Findings& findings) {
+  reader.require("corners_m", "{ ll = [x, y, z], lr = [x, y, z], ul = [x, y, z] }");
+  const TomlValue* const table = reader.table("corners_m");
+  if (table == nullptr) return false;
+  TableReader corners(*table, "corners_m", findings);
+  for (const std::string_view key : {"ll", "lr", "ul"}) corners.require(key, "[x, y, z]");
+  const auto ll = corners.point("ll");
+  const auto lr = corners.point("lr");
+  const auto ul = corners.point("ul");
+  corners.finish();
+  if (!ll || !lr || !ul) return false;
+  const glm::dvec3 right = *lr - *ll;
+  const glm::dvec3 up = *ul - *ll;
+  constexpr double kSmallest = 1e-6;
+  if (glm::length(right) < kSmallest || glm::length(up) < kSmallest) {
+    reader.error("corners_m", fmt::format("span {} x {} m", glm::length(right), glm::length(up)),
+                 "a screen has a positive width (ll to lr) and height (ll to ul)");
+    return false;
+  }
+  const double cosine = glm::dot(right, up) / (glm::length(right) * glm::length(up));
+  if (std::abs(cosine) > kPerpendicular) {
+    const double angle = std::acos(cosine) * 180.0 / 3.14159265358979323846;
+    reader.error("corners_m", fmt::format("meet at {:.5g} degrees, not at a right angle", angle),
+                 "measure ll, lr and ul again; a skewed picture would need a warp");
+    return false;
+  }
+  screen.lower_left = *ll;
+  screen.lower_right = *lr;
+  screen.upper_left = *ul;
+  return true;
+}
+
+void warn_about_pixel_shape(const DraftScreen& draft, Findings& findings) {
+  constexpr double kSquareEnough = 0.02;
+  const WallScreen& screen = draft.screen;
+  const double x = screen_width(screen) / screen.pixels.width;
+  const double y = screen_height(screen) / screen.pixels.height;
+  if (std::abs(x / y - 1.0) <= kSquareEnough) return;
+  const double turned = screen_width(screen) / screen.pixels.height / (screen_height(screen) / screen.pixels.width);
+  findings.warning(
+      draft.place,
+      fmt::format("the pixels of screen \"{}\" are {:.4g} x {:.4g} mm, not square", screen.id, 1000.0 * x, 1000.0 * y),
+      std::abs(turned - 1.0) <= kSquareEnough
+          ? "give the pixels of the upright picture, width along ll to lr: swap the two numbers"
+          : "check pixels and metres of the lit area");
+}
+
+void read_screens(TableReader& surface, const std::string& surface_id, WallDraft& draft, Findings& findings) {
+  for (const TomlValue* const table : surface.tables("screens")) {
+    TableReader reader(*table, "screen", findings);
+    DraftScreen draft_screen{{}, {}, table->place, reader.place("window"), false};
+    WallScreen& screen = draft_screen.screen;
+    reader.require("id", "\"left\"");
+    screen.id = reader.id("id").value_or("");
+    screen.surface = surface_id;
+    const auto pixels = read_pixels(reader, "pixels");
+    screen.pixels = pixels.value_or(Size{});
+    draft_screen.has_corners = read_corners(reader, screen, findings) && pixels;
+    screen.window = reader.text("window").value_or("");
+    screen.viewport = reader.rect("viewport").value_or(Rect{});
+    screen.rotate = read_rotate(reader);
+    draft_screen.eye = reader.text("eye").value_or("");
+    reader.ignore({"eye", "warp", "edge_blend_m", "mirror", "colour", "overscan_px"});
+    reader.finish();
+    draft.screens.push_back(std::move(draft_screen));
+  }
+}
+
+}  // namespace
+
+std::vector<WallScreen> expand_grid(const WallGrid& grid, const std::string& surface) {
+  const double width =
+      std::accumulate(grid.column_gaps_m.begin(), grid.column_gaps_m.end(), grid.columns * grid.tile_width_m);
+  const double height = std::accumulate(grid.row_gaps_m.begin(), grid.row_gaps_m.end(), grid.rows * grid.tile_height_m);
+  std::vector<WallScreen> screens;
+  double top = grid.center.y + 0.5 * height;
+  for (int row = 0; row < grid.rows; ++row) {
+    double left = grid.center.x - 0.5 * width;
+    for (int column = 0; column < grid.columns; ++column) {
+      WallScreen screen;
+      screen.id = fmt::format("{}-r{}c{}", surface, row, column);
+      screen.surface = surface;
+      screen.pixels = grid.tile_pixels;
+      screen.lower_left = {left, top - grid.tile_height_m, grid.center.z};
+      screen.lower_right = {left + grid.tile_width_m, top - grid.tile_height_m, grid.center.z};
+      screen.upper_left = {left, top, grid.center.z};
+      screen.viewport = {0, 0, grid.tile_pixels.width, grid.tile_pixels.height};
+      screens.push_back(std::move(screen));
+      if (column + 1 < grid.columns) left += grid.tile_width_m + grid.column_gaps_m[static_cast<std::size_t>(column)];
+    }
+    if (row + 1 < grid.rows) top -= grid.tile_height_m + grid.row_gaps_m[static_cast<std::size_t>(row)];
+  }
+  return screens;
+}
+
+void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings) {
+  document.require("surfaces", "[{ id = \"wall\", grid = { ... } }]");
+  const std::vector<const TomlValue*> surfaces = document.tables("surfaces");
+  for (const TomlValue* const table : surfaces) {
+    TableReader reader(*table, "surface", findings);
+    if (surfaces.size() > 1) reader.require("id", "\"wall\"");
+    const std::string id = reader.id("id").value_or("wall");
+    const std::size_t before = draft.screens.size();
+    const bool has_grid = reader.has("grid");
+    const bool has_screens = reader.has("screens");
+    if (has_grid == has_screens) {
+      findings.error(
+          table->place,
+          fmt::format("surface \"{}\" has {}", id, has_grid ? "both a grid and screens" : "neither a grid nor screens"),
+          "give either grid = { ... } or screens = [ ... ]");
+    }
+    if (const TomlValue* const grid = reader.table("grid")) read_grid(*grid, id, draft, findings);
+    read_screens(reader, id, draft, findings);
+    reader.ignore({"mpcdi"});
+    reader.finish();
+    // A grid's tiles are alike: one warning does.
+    bool warned = false;
+    for (std::size_t i = before; i < draft.screens.size() && !(has_grid && warned); ++i) {
+      if (draft.screens[i].has_corners) warn_about_pixel_shape(draft.screens[i], findings);
+      warned = true;
+    }
+  }
+  if (document.has("surfaces") && draft.screens.empty() && !findings.any_errors()) {
+    document.error("surfaces", "hold no screen", "add a grid or screens");
+  }
+}
+
+}  // namespace hpr
