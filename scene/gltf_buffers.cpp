@@ -1,0 +1,49 @@
+#include "scene/gltf_buffers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "scene/gltf_uri.h"
+
+namespace hpr {
+
+std::vector<std::byte> GltfBuffers::resolve(const std::string& uri, const std::string& where,
+                                            GltfContext& context) const {
+  const std::string what = fmt::format("{}: {}", context.name(), where);
+  if (is_data_uri(uri)) {
+    context.charge(uri.size() / 4 * 3, "a data URI");
+    return data_uri_bytes(uri, what);
+  }
+  std::vector<std::byte> bytes =
+      read_jailed(folder_, uri, what, std::min(context.limits().file_bytes, context.memory_left()));
+  context.charge(bytes.size(), "a file");
+  return bytes;
+}
+
+void GltfBuffers::load(const nlohmann::json& root, GltfContext& context) {
+  const auto found = root.find("buffers");
+  if (found == root.end()) return;
+  owned_.resize(found->size());
+  for (std::size_t i = 0; i < found->size(); ++i) {
+    const nlohmann::json& buffer = (*found)[i];
+    const std::string where = fmt::format("buffers[{}]", i);
+    std::span<const std::byte> bytes;
+    if (buffer.contains("uri")) {
+      owned_[i] = resolve(buffer["uri"].get<std::string>(), where, context);
+      bytes = owned_[i];
+    } else if (i == 0 && parts_->has_binary) {
+      bytes = parts_->binary;
+    } else {
+      context.fail(where, "has neither a uri nor a BIN chunk", "export the scene again with its buffers");
+    }
+    const auto length = buffer["byteLength"].get<std::uint64_t>();
+    if (bytes.size() < length) {
+      context.fail(where, fmt::format("must have {} bytes, but there are {}", length, bytes.size()),
+                   "the file is cut off or belongs to another scene");
+    }
+    bytes_.push_back(bytes.first(length));
+  }
+}
+
+}  // namespace hpr

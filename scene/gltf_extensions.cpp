@@ -1,0 +1,73 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "core/names.h"
+#include "scene/gltf_json.h"
+#include "scene/gltf_shape.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::array<std::string_view, 7> kSupported{
+    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
+    "KHR_materials_ior",       "KHR_materials_transmission", "KHR_mesh_quantization",
+    "KHR_texture_transform"};
+
+/// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
+/// requires them.
+constexpr std::array<std::string_view, 12> kLooks{
+    "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion", "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_unlit",
+    "KHR_materials_variants",   "KHR_materials_volume",      "KHR_xmp_json_ld"};
+
+bool contains(const auto& names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+/// The names in the array `key`, each once.
+std::set<std::string> names_in(const GltfItem& root, const char* key) {
+  std::set<std::string> names;
+  if (!root.has(key)) return names;
+  const nlohmann::json& list = root.value()[key];
+  if (!list.is_array()) root.fail(key, "must be an array of names");
+  for (const auto& entry : list) {
+    if (!entry.is_string()) root.fail(key, "must be an array of names");
+    const auto name = entry.get<std::string>();
+    if (!names.insert(name).second) root.warn(key, fmt::format("names {} twice", printable(name)));
+  }
+  return names;
+}
+
+}  // namespace
+
+void check_extensions(nlohmann::json& document, GltfContext& context) {
+  const GltfItem root(context, document);
+  const std::set<std::string> used = names_in(root, "extensionsUsed");
+  const std::set<std::string> required = names_in(root, "extensionsRequired");
+  for (const std::string& name : required) {
+    if (!used.contains(name)) {
+      root.warn("extensionsRequired", fmt::format("{} is not among extensionsUsed", printable(name)));
+    }
+    if (contains(kSupported, name)) continue;
+    if (contains(kLooks, name)) {
+      root.warn("extensionsRequired", fmt::format("{} is not supported; surfaces may look different", name));
+      continue;
+    }
+    const bool compressed = name.find("compression") != std::string::npos;
+    root.fail("extensionsRequired",
+              compressed ? fmt::format("the meshes are compressed with {}, which HPR cannot read", printable(name))
+                         : fmt::format("the scene requires {}, which HPR does not know", printable(name)));
+  }
+  for (const std::string& name : used) {
+    if (required.contains(name) || contains(kSupported, name)) continue;
+    root.warn("extensionsUsed", fmt::format("{} is ignored", printable(name)));
+  }
+}
+
+}  // namespace hpr

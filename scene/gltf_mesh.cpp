@@ -1,0 +1,283 @@
+#include "scene/gltf_mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <iterator>
+#include <utility>
+
+namespace hpr {
+namespace {
+
+using Vectors = std::vector<glm::vec3>;
+
+bool finite(const glm::vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Works on one primitive from its accessors to a finished mesh.
+class PrimitiveBuilder {
+ public:
+  PrimitiveBuilder(const GltfData& data, const tinygltf::Primitive& primitive, const std::string& where)
+      : data_(data), primitive_(primitive), where_(where) {}
+
+  Mesh build(const GltfPose& pose) {
+    Mesh mesh;
+    mesh.positions = data_.vec3s(primitive_.attributes.at("POSITION"));
+    check_positions(mesh.positions);
+    if (pose.joints.empty() && pose.weights.empty()) compare_bounds(mesh.positions);
+    if (const auto found = primitive_.attributes.find("NORMAL"); found != primitive_.attributes.end()) {
+      mesh.normals = data_.vec3s(found->second);
+    }
+    read_uvs(mesh);
+    mesh.triangles = read_triangles(mesh.positions.size());
+    morph(mesh, pose.weights);
+    if (!pose.joints.empty()) skin(mesh, pose.joints);
+    if (mesh.normals.empty()) {
+      make_flat(mesh);
+    } else {
+      repair_normals(mesh);
+    }
+    return mesh;
+  }
+
+ private:
+  void check_positions(const Vectors& positions) const {
+    const auto bad = std::ranges::find_if_not(positions, finite);
+    if (bad != positions.end()) {
+      data_.context().fail(where_ + ".attributes.POSITION",
+                           fmt::format("vertex {} is not finite", bad - positions.begin()));
+    }
+  }
+
+  void compare_bounds(const Vectors& positions) const {
+    const tinygltf::Accessor& accessor = data_.accessor(primitive_.attributes.at("POSITION"));
+    if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) return;
+    if (accessor.minValues.size() != 3 || accessor.maxValues.size() != 3) return;
+    glm::vec3 low = positions[0];
+    glm::vec3 high = positions[0];
+    for (const glm::vec3& p : positions) {
+      low = glm::min(low, p);
+      high = glm::max(high, p);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<std::size_t>(axis);
+      const double slack = 1e-4 * (std::abs(accessor.minValues[a]) + std::abs(accessor.maxValues[a])) + 1e-6;
+      if (low[axis] < accessor.minValues[a] - slack || high[axis] > accessor.maxValues[a] + slack) {
+        data_.context().warn(where_, "vertices lie outside of the min and max their accessor declares");
+        return;
+      }
+    }
+  }
+
+  void read_uvs(Mesh& mesh) const {
+    for (const auto& [name, set] : {std::pair{"TEXCOORD_0", 0U}, std::pair{"TEXCOORD_1", 1U}}) {
+      const auto found = primitive_.attributes.find(name);
+      if (found == primitive_.attributes.end()) continue;
+      mesh.uvs[set] = data_.vec2s(found->second);
+      // Samplers turn coordinates into integers; 1e6 repeats of a texture are already below what a float resolves.
+      constexpr float kFarthest = 1e6F;
+      bool odd = false;
+      for (glm::vec2& uv : mesh.uvs[set]) {
+        for (int axis = 0; axis < 2; ++axis) {
+          if (std::abs(uv[axis]) <= kFarthest) continue;
+          uv[axis] = std::isfinite(uv[axis]) ? std::copysign(kFarthest, uv[axis]) : 0.0F;
+          odd = true;
+        }
+      }
+      if (odd) data_.context().warn(where_, fmt::format("{} has values that are not finite or beyond 1e6", name));
+    }
+  }
+
+  std::vector<glm::uvec3> read_triangles(std::size_t vertices) const {
+    std::vector<std::uint32_t> indices;
+    if (primitive_.indices >= 0) {
+      indices = data_.integers(primitive_.indices);
+      const auto bad = std::ranges::find_if(indices, [&](std::uint32_t index) { return index >= vertices; });
+      if (bad != indices.end()) {
+        data_.context().fail(where_ + ".indices", fmt::format("index {} is {}, but there are {} vertices",
+                                                              bad - indices.begin(), *bad, vertices));
+      }
+    }
+    const std::size_t count = primitive_.indices >= 0 ? indices.size() : vertices;
+    const bool list = primitive_.mode == TINYGLTF_MODE_TRIANGLES;
+    if (count < 3 || (list && count % 3 != 0)) {
+      data_.context().warn(where_, fmt::format("{} vertices make no whole number of triangles", count));
+    }
+    // A strip has up to three times as many corners as indices.
+    data_.context().charge(std::uint64_t{count} * (list ? 4U : 12U), "a mesh");
+    return triangles_of(primitive_.mode, vertices, indices);
+  }
+
+  void morph(Mesh& mesh, const std::vector<double>& weights) const {
+    const std::size_t count = std::min(weights.size(), primitive_.targets.size());
+    bool moved = false;
+    for (std::size_t t = 0; t < count; ++t) {
+      if (weights[t] == 0.0) continue;
+      const auto add = [&](const char* name, Vectors& to) {
+        const auto found = primitive_.targets[t].find(name);
+        if (found == primitive_.targets[t].end() || to.empty()) return;
+        const Vectors deltas = data_.vec3s(found->second);
+        for (std::size_t i = 0; i < to.size(); ++i) {
+          to[i] = glm::vec3(glm::dvec3(to[i]) + weights[t] * glm::dvec3(deltas[i]));
+        }
+        moved = true;
+      };
+      add("POSITION", mesh.positions);
+      add("NORMAL", mesh.normals);
+    }
+    if (moved) check_positions(mesh.positions);
+  }
+
+  void skin(Mesh& mesh, const std::vector<glm::dmat4>& joints) const {
+    const auto indices = primitive_.attributes.find("JOINTS_0");
+    const auto weights = primitive_.attributes.find("WEIGHTS_0");
+    if (indices == primitive_.attributes.end() || weights == primitive_.attributes.end()) {
+      data_.context().warn(where_, "has a skin, but not JOINTS_0 and WEIGHTS_0; drawn by its first joint");
+      const std::vector<std::uint32_t> first(mesh.positions.size() * 4, 0);
+      return bend(mesh, joints, first, Weights(mesh.positions.size(), glm::vec4(1.0F, 0.0F, 0.0F, 0.0F)));
+    }
+    if (primitive_.attributes.contains("JOINTS_1")) {
+      data_.context().warn(where_, "joints past the fourth of a vertex are ignored");
+    }
+    bend(mesh, joints, data_.integers(indices->second), data_.vec4s(weights->second));
+  }
+
+  using Weights = std::vector<glm::vec4>;
+
+  void bend(Mesh& mesh, const std::vector<glm::dmat4>& joints, const std::vector<std::uint32_t>& indices,
+            const Weights& weights) const {
+    bool odd = false;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      glm::dmat4 blend(0.0);
+      double sum = 0.0;
+      for (int k = 0; k < 4; ++k) {
+        const std::uint32_t joint = indices[4 * i + static_cast<std::size_t>(k)];
+        const double weight = weights[i][k];
+        if (!(weight > 0.0) || !std::isfinite(weight)) {
+          odd = odd || weight != 0.0;
+          continue;
+        }
+        if (joint >= joints.size()) {
+          data_.context().fail(where_ + ".attributes.JOINTS_0",
+                               fmt::format("vertex {} names joint {} of {}", i, joint, joints.size()));
+        }
+        blend += weight * joints[joint];
+        sum += weight;
+      }
+      odd = odd || sum == 0.0;
+      blend = sum > 0.0 ? blend / sum : joints[0];
+      mesh.positions[i] = glm::vec3(blend * glm::dvec4(mesh.positions[i], 1.0));
+      if (!mesh.normals.empty()) {
+        // The inverse transpose but for its scale, which also exists for singular matrices.
+        const glm::dmat3 m(blend);
+        const glm::dmat3 cofactors(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+        const glm::dvec3 normal = cofactors * glm::dvec3(mesh.normals[i]);
+        const double length = glm::length(normal);
+        mesh.normals[i] = length > 0.0 ? glm::vec3(normal / length) : glm::vec3(0.0F);
+      }
+    }
+    if (odd) data_.context().warn(where_ + ".attributes.WEIGHTS_0", "some vertices have no usable weights");
+    check_positions(mesh.positions);
+  }
+
+  /// One face, one normal: every triangle gets vertices of its own.
+  void make_flat(Mesh& mesh) const {
+    const std::size_t corners = mesh.triangles.size() * 3;
+    const auto sets = std::ranges::count_if(mesh.uvs, [](const auto& uvs) { return !uvs.empty(); });
+    data_.context().charge(corners * (2 * sizeof(glm::vec3) + static_cast<std::size_t>(sets) * sizeof(glm::vec2)),
+                           "a mesh without normals");
+    Mesh flat;
+    flat.positions.reserve(corners);
+    flat.normals.reserve(corners);
+    for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
+      if (!mesh.uvs[set].empty()) flat.uvs[set].reserve(corners);
+    }
+    for (glm::uvec3& triangle : mesh.triangles) {
+      const glm::dvec3 v0(mesh.positions[triangle.x]);
+      const glm::dvec3 cross =
+          glm::cross(glm::dvec3(mesh.positions[triangle.y]) - v0, glm::dvec3(mesh.positions[triangle.z]) - v0);
+      const double length = glm::length(cross);
+      const glm::vec3 normal =
+          length > 0.0 && std::isfinite(length) ? glm::vec3(cross / length) : glm::vec3(0.0F, 0.0F, 1.0F);
+      const auto first = static_cast<std::uint32_t>(flat.positions.size());
+      for (int corner = 0; corner < 3; ++corner) {
+        flat.positions.push_back(mesh.positions[triangle[corner]]);
+        flat.normals.push_back(normal);
+        for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
+          if (!mesh.uvs[set].empty()) flat.uvs[set].push_back(mesh.uvs[set][triangle[corner]]);
+        }
+      }
+      triangle = {first, first + 1, first + 2};
+    }
+    flat.triangles = std::move(mesh.triangles);
+    mesh = std::move(flat);
+  }
+
+  /// Normals become unit length; those without a direction are taken from the triangles around. Normals that are unit
+  /// vectors but for rounding keep their bits.
+  void repair_normals(Mesh& mesh) const {
+    Vectors smooth;
+    for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+      const glm::dvec3 normal(mesh.normals[i]);
+      const double square = glm::dot(normal, normal);
+      if (std::abs(square - 1.0) < 1e-6) continue;
+      if (square > 0.0 && std::isfinite(square)) {
+        mesh.normals[i] = glm::vec3(normal / std::sqrt(square));
+        continue;
+      }
+      if (smooth.empty()) {
+        data_.context().warn(where_ + ".attributes.NORMAL", "some normals have no direction; computed from the faces");
+        data_.context().charge(mesh.positions.size() * sizeof(glm::vec3), "normals");
+        smooth = smooth_normals(mesh.positions, mesh.triangles);
+      }
+      mesh.normals[i] = smooth[i];
+    }
+  }
+
+  const GltfData& data_;
+  const tinygltf::Primitive& primitive_;
+  const std::string& where_;
+};
+
+}  // namespace
+
+std::vector<glm::uvec3> triangles_of(int mode, std::size_t count, std::span<const std::uint32_t> indices) {
+  const std::size_t corners = indices.empty() ? count : indices.size();
+  const auto at = [&](std::size_t i) { return indices.empty() ? static_cast<std::uint32_t>(i) : indices[i]; };
+  std::vector<glm::uvec3> triangles;
+  if (corners < 3) return triangles;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    triangles.resize(corners / 3);
+    for (std::size_t t = 0; t < triangles.size(); ++t) triangles[t] = {at(3 * t), at(3 * t + 1), at(3 * t + 2)};
+    return triangles;
+  }
+  triangles.resize(corners - 2);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    // Every other triangle of a strip is turned, so that all face the same way (glTF 2.0, section 3.7.2.1).
+    const std::size_t odd = t % 2;
+    triangles[t] = mode == TINYGLTF_MODE_TRIANGLE_STRIP ? glm::uvec3{at(t), at(t + 1 + odd), at(t + 2 - odd)}
+                                                        : glm::uvec3{at(t + 1), at(t + 2), at(0)};
+  }
+  return triangles;
+}
+
+std::optional<Mesh> build_primitive(const GltfData& data, const tinygltf::Primitive& primitive,
+                                    const std::string& where, const GltfPose& pose, std::uint32_t default_material) {
+  if (!primitive.attributes.contains("POSITION")) {
+    data.context().warn(where, "has no positions and is left out");
+    return std::nullopt;
+  }
+  if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+    data.context().warn(where, "points and lines are not drawn");
+    return std::nullopt;
+  }
+  Mesh mesh = PrimitiveBuilder(data, primitive, where).build(pose);
+  mesh.material = primitive.material >= 0 ? static_cast<std::uint32_t>(primitive.material) : default_material;
+  return mesh;
+}
+
+}  // namespace hpr

@@ -1,0 +1,173 @@
+#include "scene/gltf_scan.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <unordered_set>
+#include <vector>
+
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 12;
+constexpr std::size_t kChunkHeaderBytes = 8;
+constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
+constexpr std::uint32_t kBinChunk = 0x004E4942;
+
+std::uint32_t little_endian_32(std::span<const std::byte> bytes, std::size_t offset) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value |= std::to_integer<std::uint32_t>(bytes[offset + i]) << (8 * i);
+  return value;
+}
+
+std::string_view as_text(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
+  constexpr std::string_view kHint = "the file is damaged or incomplete; export or copy it again";
+  if (file.size() < kHeaderBytes)
+    context.fail("header", fmt::format("{} bytes are no binary glTF", file.size()), kHint);
+  const std::uint32_t version = little_endian_32(file, 4);
+  if (version != 2) context.fail("header", fmt::format("glTF version {}", version), "convert the scene to glTF 2.0");
+  const std::uint32_t length = little_endian_32(file, 8);
+  if (length != file.size()) {
+    context.fail("header", fmt::format("it tells of {} bytes, the file has {}", length, file.size()), kHint);
+  }
+
+  GltfParts parts;
+  bool has_json = false;
+  std::size_t offset = kHeaderBytes;
+  for (int chunk = 0; offset < file.size(); ++chunk) {
+    const std::string where = fmt::format("chunk {}", chunk);
+    if (file.size() - offset < kChunkHeaderBytes) context.fail(where, "its header is cut off", kHint);
+    const std::size_t size = little_endian_32(file, offset);
+    const std::uint32_t type = little_endian_32(file, offset + 4);
+    offset += kChunkHeaderBytes;
+    if (size > file.size() - offset) {
+      context.fail(where, fmt::format("{} bytes in a file that has {} left", size, file.size() - offset), kHint);
+    }
+    if (size % 4 != 0) context.warn(where, "its length is no multiple of four");
+    const auto body = file.subspan(offset, size);
+    offset += size;
+
+    if (chunk == 0) {
+      if (type != kJsonChunk) context.fail(where, "the first chunk must be JSON", kHint);
+      parts.json = as_text(body);
+      has_json = true;
+    } else if (type == kJsonChunk) {
+      context.warn(where, "a second JSON chunk is ignored");
+    } else if (type == kBinChunk) {
+      if (parts.has_binary) {
+        context.warn(where, "a second BIN chunk is ignored");
+      } else {
+        if (chunk != 1) context.warn(where, "the BIN chunk should be the second");
+        parts.binary = body;
+        parts.has_binary = true;
+      }
+    }
+  }
+  if (!has_json) context.fail("", "the file has no JSON chunk", kHint);
+  return parts;
+}
+
+/// The bytes of the UTF-8 sequence that starts `text`, 0 where there is none (overlong, surrogate, cut).
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const auto continues = [&](std::size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
+  const unsigned first = byte(0);
+  if (first < 0x80U) return 1;
+  if (first >= 0xC2U && first <= 0xDFU) return continues(1) ? 2 : 0;
+  if ((first & 0xF0U) == 0xE0U) {
+    const bool overlong = first == 0xE0U && byte(1) < 0xA0U;
+    const bool surrogate = first == 0xEDU && byte(1) >= 0xA0U;
+    return continues(1) && continues(2) && !overlong && !surrogate ? 3 : 0;
+  }
+  if (first >= 0xF0U && first <= 0xF4U) {
+    const bool overlong = first == 0xF0U && byte(1) < 0x90U;
+    const bool beyond = first == 0xF4U && byte(1) >= 0x90U;
+    return continues(1) && continues(2) && continues(3) && !overlong && !beyond ? 4 : 0;
+  }
+  return 0;
+}
+
+std::string line_of(std::string_view json, std::size_t offset) {
+  std::size_t line = 1;
+  for (std::size_t i = 0; i < offset; ++i) line += json[i] == '\n' ? 1U : 0U;
+  return fmt::format("line {}", line);
+}
+
+}  // namespace
+
+void scan_json(std::string_view json, GltfContext& context) {
+  // One entry per open array or object: the keys so far (objects only), as they are written.
+  struct Level {
+    bool object = false;
+    std::unordered_set<std::string_view> keys;
+  };
+  std::vector<Level> levels;
+  bool key_follows = false;
+
+  std::size_t i = 0;
+  while (i < json.size()) {
+    const char c = json[i];
+    if (c == '{' || c == '[') {
+      if (levels.size() == kGltfJsonDepth) {
+        context.fail(line_of(json, i), fmt::format("the JSON nests deeper than {} levels", kGltfJsonDepth),
+                     "remove the nesting; glTF needs about ten levels");
+      }
+      levels.push_back({c == '{', {}});
+      key_follows = c == '{';
+    } else if (c == '}' || c == ']') {
+      if (!levels.empty()) levels.pop_back();
+      key_follows = false;
+    } else if (c == ',') {
+      key_follows = !levels.empty() && levels.back().object;
+    } else if (c == '"') {
+      const std::size_t start = ++i;
+      while (i < json.size() && json[i] != '"') {
+        if (json[i] == '\\') {
+          i += 2;
+          continue;
+        }
+        const std::size_t length = utf8_length(json.substr(i));
+        if (length == 0) {
+          context.fail(line_of(json, i), "the text is not UTF-8", "save the file as UTF-8");
+        }
+        i += length;
+      }
+      if (i >= json.size()) return;  // the parser says that the string has no end
+      const std::string_view text = json.substr(start, i - start);
+      if (key_follows && !levels.back().keys.insert(text).second) {
+        context.warn(line_of(json, i), fmt::format("the key \"{}\" stands twice in one object", printable(text)));
+      }
+      key_follows = false;
+    }
+    ++i;
+  }
+}
+
+GltfParts scan_gltf(std::span<const std::byte> file, GltfContext& context) {
+  constexpr std::array<char, 4> kMagic{'g', 'l', 'T', 'F'};
+  const bool binary = file.size() >= kMagic.size() && std::memcmp(file.data(), kMagic.data(), kMagic.size()) == 0;
+  GltfParts parts = binary ? split_glb(file, context) : GltfParts{as_text(file), {}, false};
+
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (parts.json.starts_with(kByteOrderMark)) {
+    context.warn("", "the text starts with a byte order mark");
+    parts.json.remove_prefix(kByteOrderMark.size());
+  }
+  const std::size_t first = parts.json.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos || parts.json[first] != '{') {
+    context.fail("", "this is no glTF: it starts neither with \"glTF\" nor with a JSON object",
+                 "HPR reads .gltf and .glb files");
+  }
+  scan_json(parts.json, context);
+  return parts;
+}
+
+}  // namespace hpr

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hpr {
+
+/// `text` with %XX replaced by bytes; none when a % is not followed by two hex digits.
+[[nodiscard]] std::optional<std::string> percent_decoded(std::string_view text);
+
+/// RFC 4648, strict: the standard alphabet, no white space, padding complete and its unused bits zero. None otherwise.
+[[nodiscard]] std::optional<std::vector<std::byte>> base64_decoded(std::string_view text);
+
+[[nodiscard]] bool is_data_uri(std::string_view uri);
+
+/// The bytes of "data:[type][;base64],...". Throws Error (BadInput); `what` stands in front of the message.
+[[nodiscard]] std::vector<std::byte> data_uri_bytes(std::string_view uri, const std::string& what);
+
+/// Checks that `uri` can only mean a file below the folder that holds the scene: relative, no scheme, no "..", no
+/// backslash, no control character; escapes are decoded first. Returns the relative path. Throws Error (BadInput).
+[[nodiscard]] std::string jailed_path(std::string_view uri, const std::string& what);
+
+/// Reads the regular file `uri` below `folder`, resolved so that neither the URI nor a symbolic link leaves the folder.
+/// Throws Error: BadInput for a URI that is not allowed or an escape, Io when missing or unreadable, Limit past
+/// `limit_bytes`.
+[[nodiscard]] std::vector<std::byte> read_jailed(const std::filesystem::path& folder, std::string_view uri,
+                                                 const std::string& what, std::uint64_t limit_bytes);
+
+}  // namespace hpr
