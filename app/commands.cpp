@@ -1,12 +1,9 @@
 #include "app/bench_command.h"
 #include "app/command.h"
 #include "app/compare_command.h"
+#include "app/compare_scene.h"
 #include "app/demo_command.h"
-#include "app/diff_command.h"
-#include "app/doctor_command.h"
 #include "app/render_command.h"
-#include "app/scene_command.h"
-#include "app/wall_command.h"
 
 namespace hpr {
 
@@ -14,12 +11,8 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> all;
   all.push_back(make_demo_command());
   all.push_back(make_render_command());
-  all.push_back(make_wall_command());
-  all.push_back(make_compare_command());
-  all.push_back(make_diff_command());
-  all.push_back(make_scene_command());
+  all.push_back(make_compare_command(scene_layers));
   all.push_back(make_bench_command());
-  all.push_back(make_doctor_command());
   return all;
 }
 

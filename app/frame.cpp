@@ -10,9 +10,7 @@
 // and each step below is one of its arrows. What the scene is and who does what stand in the Session and the FramePlan
 // (app/plan.cpp); the last arrow, tiles to screens, is taken by whoever shows the frame (app/output.cpp).
 namespace hpr {
-namespace {
 
-/// Draws this rank's objects into its group's tiles.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys) {
   Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
   for (std::size_t screen = 0; screen < views.size(); ++screen) {
@@ -23,6 +21,8 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
     if (!parts.empty()) rasterizer.draw(views[screen], screen, parts, keys);
   }
 }
+
+namespace {
 
 /// Merges the group's layers; returns the tiles this rank ends up owning.
 std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {

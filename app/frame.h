@@ -56,6 +56,9 @@ struct FrameTimes {
   double composite_ms = 0.0;
 };
 
+/// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
+void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
+
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
 [[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,
                                FrameTimes* times = nullptr);

@@ -8,10 +8,10 @@
 
 #include "app/command.h"
 #include "app/report_error.h"
-#include "hpr/version.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/units.h"
+#include "hpr/version.h"
 
 namespace hpr {
 namespace {
@@ -115,11 +115,9 @@ ExitCode run(const std::vector<std::string>& words) {
     return ExitCode::Usage;
   }
   // `hpr help` and `hpr help COMMAND` are other ways to write --help.
-  std::vector<std::string> parsed = words;
-  if (parsed.front() == "help") {
-    parsed.erase(parsed.begin());
-    parsed.emplace_back("--help");
-  }
+  const bool asks_for_help = words.front() == "help";
+  std::vector<std::string> parsed(words.begin() + (asks_for_help ? 1 : 0), words.end());
+  if (asks_for_help) parsed.push_back("--help");
   if (!parsed.front().starts_with('-')) {
     const auto names = names_of(commands);
     if (std::ranges::find(names, parsed.front()) == names.end()) {

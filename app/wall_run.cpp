@@ -8,7 +8,6 @@
 
 #include "app/output.h"
 #include "app/progress.h"
-#include "hpr/version.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/assembly.h"
@@ -16,6 +15,7 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "hpr/version.h"
 #include "image/image_io.h"
 #include "walls/assemble.h"
 #include "walls/geometry.h"
@@ -82,7 +82,7 @@ class WallDriver {
     manifest_.scene_hash = content_hash(session.scene());
     manifest_.wall_hash = wall.hash;
     manifest_.seed = globals.seed;
-    manifest_.versions = {{"hpr", kVersion}, {"commit", kCommit}, {"gl", session.gl().description()}};
+    manifest_.versions = {{"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
   }
 
   [[nodiscard]] const FramePlan& plan() const { return plan_; }
