@@ -1,0 +1,83 @@
+#include "scene/requirements.h"
+
+#include <gtest/gtest.h>
+
+namespace hpr {
+namespace {
+
+Scene scene_of(const Material& material, std::vector<Light> lights = {}) {
+  Scene scene;
+  scene.materials.push_back(material);
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normals.assign(3, {0, 0, 1});
+  mesh.triangles = {{0, 1, 2}};
+  scene.meshes.push_back(mesh);
+  scene.instances.push_back({0, glm::dmat4(1.0), 0});
+  scene.lights = std::move(lights);
+  finish_scene(scene);
+  return scene;
+}
+
+Material rough(float roughness) {
+  Material material;
+  material.roughness = roughness;
+  return material;
+}
+
+TEST(Requirements, ShadowsNeedALightThatCasts) {
+  EXPECT_FALSE(requirements_of(scene_of(rough(1.0F))).shadow.needed);
+  Light headlight;
+  headlight.type = LightType::Headlight;
+  EXPECT_FALSE(requirements_of(scene_of(rough(1.0F), {headlight})).shadow.needed);
+  const Requirement one = requirements_of(scene_of(rough(1.0F), {headlight, Light{}})).shadow;
+  EXPECT_TRUE(one.needed);
+  EXPECT_EQ(one.why, "1 light casts shadows");
+}
+
+TEST(Requirements, ReflectionsNeedAMaterialBelowTheMirrorRoughness) {
+  EXPECT_TRUE(requirements_of(scene_of(rough(0.0F))).reflection.needed);
+  EXPECT_TRUE(requirements_of(scene_of(rough(0.29F))).reflection.needed);
+  EXPECT_FALSE(requirements_of(scene_of(rough(kMirrorRoughness))).reflection.needed);
+}
+
+TEST(Requirements, ASmoothTexelMakesARoughMaterialMirror) {
+  Scene scene = scene_of(rough(1.0F));
+  scene.textures.emplace_back();
+  scene.textures[0].image = Image<Rgba8>({4, 4}, Rgba8{0, 255, 0, 255});
+  scene.materials[0].metallic_roughness_texture.texture = 0;
+  EXPECT_FALSE(requirements_of(scene).reflection.needed);
+  scene.textures[0].image.at(2, 3).g = 40;
+  EXPECT_TRUE(requirements_of(scene).reflection.needed);
+}
+
+TEST(Requirements, MaterialsNoTriangleShowsDoNotCount) {
+  Scene scene = scene_of(rough(1.0F));
+  scene.materials.push_back(rough(0.0F));
+  scene.materials.back().transmission = 1.0F;
+  EXPECT_FALSE(requirements_of(scene).reflection.needed);
+  EXPECT_FALSE(requirements_of(scene).refraction.needed);
+  scene.meshes[0].material = 1;
+  EXPECT_TRUE(requirements_of(scene).reflection.needed);
+  EXPECT_TRUE(requirements_of(scene).refraction.needed);
+}
+
+TEST(Requirements, CausticsNeedBothALightAndASurfaceThatBundles) {
+  EXPECT_FALSE(requirements_of(scene_of(rough(0.0F))).photon.needed);
+  EXPECT_FALSE(requirements_of(scene_of(rough(1.0F), {Light{}})).photon.needed);
+  EXPECT_TRUE(requirements_of(scene_of(rough(0.0F), {Light{}})).photon.needed);
+}
+
+TEST(Requirements, AnEmptySceneNeedsNothingAndSaysWhy) {
+  Scene scene;
+  scene.lights.resize(1);
+  finish_scene(scene);
+  const Requirements needs = requirements_of(scene);
+  for (const Requirement& one : {needs.shadow, needs.reflection, needs.refraction, needs.photon}) {
+    EXPECT_FALSE(one.needed);
+    EXPECT_EQ(one.why, "the scene has no triangles");
+  }
+}
+
+}  // namespace
+}  // namespace hpr
