@@ -134,8 +134,7 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View
   for (const Run& run : all.runs) {
     const auto record = static_cast<std::uint32_t>(list.records.size());
     list.commands.push_back({(run.last - run.first) * 3, 1, run.slot * 3, 0, record});
-    list.records.push_back(
-        {rounded(matrix_of(run.instance)), scene.instances[run.instance].first_surface + run.first, {}});
+    list.records.push_back({rounded(matrix_of(run.instance)), scene.instances[run.instance].first_surface, {}});
   }
   return list;
 }

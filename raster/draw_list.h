@@ -22,7 +22,7 @@ struct DrawCommand {
 /// What the vertex shader needs to know of a command.
 struct DrawRecord {
   std::array<float, 16> clip_from_mesh{};  ///< [column][row]
-  std::uint32_t first_surface = 0;         ///< id of the command's first triangle
+  std::uint32_t first_surface = 0;         ///< of the instance
   std::array<std::uint32_t, 3> padding{};
 };
 

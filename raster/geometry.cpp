@@ -55,7 +55,7 @@ struct ChunkRun {
   std::size_t last = 0;
 };
 
-/// Appends the triangles of `ranges` with the positions they use, in the order of their use.
+/// Appends the triangles of `ranges` with their vertices; other corners share whatever vertex has their position.
 ChunkRun append_mesh(const Mesh& mesh, const std::vector<SurfaceRange>& ranges, Geometry& geometry) {
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> place(mesh.positions.size(), kNone);
@@ -67,17 +67,20 @@ ChunkRun append_mesh(const Mesh& mesh, const std::vector<SurfaceRange>& ranges, 
       Chunk chunk{first, last - first, static_cast<std::uint32_t>(geometry.triangles.size()), {}};
       const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
       chunk.box = {start, start};
+      const auto add_vertex = [&](std::uint32_t vertex, std::uint32_t triangle) {
+        place[vertex] = static_cast<std::uint32_t>(geometry.vertices.size());
+        geometry.vertices.push_back({mesh.positions[vertex], triangle});
+      };
+      const auto own_corner = static_cast<std::uint32_t>(geometry.vertices.size());
+      for (std::uint32_t t = first; t < last; ++t) add_vertex(mesh.triangles[t].z, t);
       for (std::uint32_t t = first; t < last; ++t) {
-        glm::uvec3 moved(0U);
+        glm::uvec3 moved(0U, 0U, own_corner + (t - first));
         for (int corner = 0; corner < 3; ++corner) {
           const std::uint32_t vertex = mesh.triangles[t][corner];
-          const glm::vec3& position = mesh.positions[vertex];
-          if (place[vertex] == kNone) {
-            place[vertex] = static_cast<std::uint32_t>(geometry.positions.size());
-            geometry.positions.push_back(position);
-          }
+          chunk.box.add({mesh.positions[vertex], mesh.positions[vertex]});
+          if (corner == 2) continue;
+          if (place[vertex] == kNone) add_vertex(vertex, t);  // nobody's last corner so far
           moved[corner] = place[vertex];
-          chunk.box.add({position, position});
         }
         geometry.triangles.push_back(moved);
       }

@@ -33,11 +33,17 @@ bool any_drawn(const Rows& rows, const Rect& rect) {
   return false;
 }
 
+Key joined(float depth, std::uint32_t word) {
+  return Key{std::bit_cast<std::uint32_t>(depth)} << 32U | word;
+}
+
+/// Into a tile that holds nothing yet: no comparison, and its memory is not read before it is written.
+void store_row(const float* depths, const std::uint32_t* words, std::size_t count, Key* keys) {
+  for (std::size_t x = 0; x < count; ++x) keys[x] = joined(depths[x], words[x]);
+}
+
 void merge_row(const float* depths, const std::uint32_t* words, std::size_t count, Key* keys) {
-  for (std::size_t x = 0; x < count; ++x) {
-    const Key key = Key{std::bit_cast<std::uint32_t>(depths[x])} << 32U | words[x];
-    keys[x] = std::max(keys[x], key);
-  }
+  for (std::size_t x = 0; x < count; ++x) keys[x] = std::max(keys[x], joined(depths[x], words[x]));
 }
 
 }  // namespace
@@ -60,9 +66,10 @@ void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> wor
       if (!any_drawn(rows, rect)) continue;
       const std::size_t tile = layer.layout().tile_at(screen, x0, y0);
       Key* const keys = layer.tile(tile).data();
+      const auto write_row = layer.active(tile) ? merge_row : store_row;
       for (int y = rect.y0; y < rect.y1; ++y) {
         const std::size_t from = rows.index(rect.x0, y);
-        merge_row(rows.depths + from, rows.words + from, static_cast<std::size_t>(rect.width()),
+        write_row(rows.depths + from, rows.words + from, static_cast<std::size_t>(rect.width()),
                   keys + (y - y0) * kTileSide + (rect.x0 - x0));
       }
       layer.set_active(tile);

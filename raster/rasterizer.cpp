@@ -19,22 +19,23 @@ constexpr std::string_view kVertexShader = R"(#version 450 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in uint first_surface;   // per command
 layout(location = 2) in mat4 clip_from_mesh;  // per command
+layout(location = 6) in uint triangle;        // whose last corner, the provoking one, this is
 invariant gl_Position;
-flat out uint first;
+flat out uint surface;
 void main() {
   gl_Position = clip_from_mesh * vec4(position, 1.0);
-  first = first_surface;
+  surface = first_surface + triangle;
 }
 )";
 
 // The complement is what the low half of a key holds, so that 0 is left for "nothing".
 constexpr std::string_view kFragmentShader = R"(#version 450 core
-flat in uint first;
+flat in uint surface;
 layout(location = 0) out uint word;
-void main() { word = ~(first + uint(gl_PrimitiveID)); }
+void main() { word = ~surface; }
 )";
 
-constexpr GLuint kPositions = 0;  // vertex buffer bindings
+constexpr GLuint kVertices = 0;  // vertex buffer bindings
 constexpr GLuint kRecords = 1;
 
 template <typename T>
@@ -54,19 +55,19 @@ class Rasterizer::Implementation {
         culling_(culling),
         geometry_(collect_geometry(scene, objects)),
         program_(make_program(context, kVertexShader, kFragmentShader)),
-        positions_(make_buffer(context)),
+        vertices_(make_buffer(context)),
         indices_(make_buffer(context)),
         records_(make_buffer(context)),
         commands_(make_buffer(context)),
         vertex_array_(make_vertex_array(context)),
         target_(context) {
     const GlFunctions& gl = context_.gl();
-    upload(gl, positions_, geometry_.positions, GL_STATIC_DRAW);
+    upload(gl, vertices_, geometry_.vertices, GL_STATIC_DRAW);
     upload(gl, indices_, geometry_.triangles, GL_STATIC_DRAW);
     describe_vertices(gl);
     check_gl(gl, "uploading the scene");
     // From here on only boxes are needed of it.
-    geometry_.positions = {};
+    geometry_.vertices = {};
     geometry_.triangles = {};
   }
 
@@ -95,7 +96,7 @@ class Rasterizer::Implementation {
   void describe_vertices(const GlFunctions& gl) {
     const GLuint array = vertex_array_.name();
     gl.VertexArrayElementBuffer(array, indices_.name());
-    gl.VertexArrayVertexBuffer(array, kPositions, positions_.name(), 0, sizeof(glm::vec3));
+    gl.VertexArrayVertexBuffer(array, kVertices, vertices_.name(), 0, sizeof(Vertex));
     gl.VertexArrayVertexBuffer(array, kRecords, records_.name(), 0, sizeof(DrawRecord));
     gl.VertexArrayBindingDivisor(array, kRecords, 1);
     gl.VertexArrayAttribFormat(array, 0, 3, GL_FLOAT, GL_FALSE, 0);
@@ -103,9 +104,10 @@ class Rasterizer::Implementation {
     for (GLuint column = 0; column < 4; ++column) {
       gl.VertexArrayAttribFormat(array, 2 + column, 4, GL_FLOAT, GL_FALSE, column * 4 * GLuint{sizeof(float)});
     }
-    for (GLuint attribute = 0; attribute < 6; ++attribute) {
+    gl.VertexArrayAttribIFormat(array, 6, 1, GL_UNSIGNED_INT, offsetof(Vertex, triangle));
+    for (GLuint attribute = 0; attribute < 7; ++attribute) {
       gl.EnableVertexArrayAttrib(array, attribute);
-      gl.VertexArrayAttribBinding(array, attribute, attribute == 0 ? kPositions : kRecords);
+      gl.VertexArrayAttribBinding(array, attribute, attribute == 0 || attribute == 6 ? kVertices : kRecords);
     }
   }
 
@@ -164,7 +166,7 @@ class Rasterizer::Implementation {
   Culling culling_;
   Geometry geometry_;
   GlObject program_;
-  GlObject positions_;
+  GlObject vertices_;
   GlObject indices_;
   GlObject records_;
   GlObject commands_;
