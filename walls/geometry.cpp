@@ -1,6 +1,7 @@
 #include "walls/geometry.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -86,18 +87,18 @@ double finest_pitch(const Wall& wall) {
   return finest;
 }
 
-WallExtent wall_extent(const Wall& wall) {
-  HPR_CHECK(!wall.screens.empty());
+WallExtent wall_extent(std::span<const WallScreen> screens) {
+  HPR_CHECK(!screens.empty());
   constexpr double kFlatness = 1e-6;
   WallExtent extent;
   glm::dvec3 normal(0.0);
-  for (const WallScreen& screen : wall.screens) {
+  for (const WallScreen& screen : screens) {
     normal += screen_axes(screen)[2];
-    extent.middle += screen_center(screen) / static_cast<double>(wall.screens.size());
+    extent.middle += screen_center(screen) / static_cast<double>(screens.size());
   }
   // Screens all round the viewer cancel out; then the first one says where the front is.
-  const glm::dmat3 first = screen_axes(wall.screens.front());
-  const bool has_front = glm::length(normal) > 0.1 * static_cast<double>(wall.screens.size());
+  const glm::dmat3 first = screen_axes(screens.front());
+  const bool has_front = glm::length(normal) > 0.1 * static_cast<double>(screens.size());
   extent.axes[2] = has_front ? glm::normalize(normal) : first[2];
   const bool first_up_usable = std::abs(glm::dot(first[1], extent.axes[2])) < 0.9;
   extent.axes[1] = up_in_plane(extent.axes[2], first_up_usable ? first[1] : first[0]);
@@ -106,7 +107,7 @@ WallExtent wall_extent(const Wall& wall) {
   glm::dvec3 low(std::numeric_limits<double>::infinity());
   glm::dvec3 high = -low;
   const glm::dmat3 extent_from_wall = glm::transpose(extent.axes);
-  for (const WallScreen& screen : wall.screens) {
+  for (const WallScreen& screen : screens) {
     for (const glm::dvec3& corner : corners_of(screen)) {
       // Relative to the middle, so that a wall far from the origin loses no digits.
       const glm::dvec3 inside = extent_from_wall * (corner - extent.middle);
@@ -132,48 +133,6 @@ std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bound
     views.push_back(screen_view(shared, screen, placement, wall.clamp_distance_m));
   }
   return views;
-}
-
-SeamError seam_error(const Wall& wall) {
-  const WallExtent extent = wall_extent(wall);
-  SeamError worst;
-  if (!extent.flat) return worst;
-  const glm::dmat3 inside = glm::transpose(extent.axes);
-  struct Box {
-    glm::dvec3 low, high;
-    double pitch;
-  };
-  std::vector<Box> boxes;
-  for (const WallScreen& screen : wall.screens) {
-    const glm::dvec3 a = inside * (screen.lower_left - extent.center);
-    const glm::dvec3 b = inside * (corners_of(screen)[3] - extent.center);
-    boxes.push_back({glm::min(a, b), glm::max(a, b), pixel_pitch(screen)});
-  }
-  for (const int axis : {0, 1}) {
-    const int across = 1 - axis;
-    const double tolerance = 1e-6 * (extent.width + extent.height);
-    const auto in_line = [&](const Box& a, const Box& b) {
-      return std::abs(a.low[across] - b.low[across]) < tolerance && std::abs(a.pitch - b.pitch) < 1e-6 * a.pitch;
-    };
-    // Screens of one row (or column) end up together, in the order they stand.
-    std::ranges::sort(boxes, [&](const Box& a, const Box& b) {
-      if (std::abs(a.low[across] - b.low[across]) >= tolerance) return a.low[across] < b.low[across];
-      return a.low[axis] < b.low[axis];
-    });
-    double sum = 0.0;
-    for (std::size_t i = 1; i < boxes.size(); ++i) {
-      if (!in_line(boxes[i - 1], boxes[i])) {
-        sum = 0.0;
-        continue;
-      }
-      const double gap = (boxes[i].low[axis] - boxes[i - 1].high[axis]) / boxes[i].pitch;
-      const double error = gap - std::round(gap);
-      sum += error;
-      worst.largest_px = std::max(worst.largest_px, std::abs(error));
-      worst.accumulated_px = std::max(worst.accumulated_px, std::abs(sum));
-    }
-  }
-  return worst;
 }
 
 }  // namespace hpr

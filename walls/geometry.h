@@ -2,7 +2,7 @@
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
-#include <optional>
+#include <span>
 #include <vector>
 
 #include "scene/view.h"
@@ -20,7 +20,10 @@ struct WallExtent {
   glm::dvec3 middle{0.0};  ///< mean of the screens' centres, wall space
 };
 
-[[nodiscard]] WallExtent wall_extent(const Wall& wall);
+[[nodiscard]] WallExtent wall_extent(std::span<const WallScreen> screens);
+[[nodiscard]] inline WallExtent wall_extent(const Wall& wall) {
+  return wall_extent(wall.screens);
+}
 
 /// Columns: right, up, towards the viewer; orthonormal.
 [[nodiscard]] glm::dmat3 screen_axes(const WallScreen& screen);
@@ -35,10 +38,18 @@ struct WallExtent {
 /// give one. An eye nearer to a screen's plane than clamp_distance_m, or behind it, is moved back for that screen.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds);
 
+/// Screens (by index) that lie in one plane and face the same way; plane after plane from left to right as the viewer
+/// turns, screens in the wall's order.
+[[nodiscard]] std::vector<std::vector<std::size_t>> wall_planes(const Wall& wall);
+
+/// The screens with these indices.
+[[nodiscard]] std::vector<WallScreen> screens_of(const Wall& wall, const std::vector<std::size_t>& indices);
+
 /// Where the screens lie in a picture of the whole wall.
 struct WallPicture {
   Size size;
   std::vector<Rect> screens;  ///< one per screen of the wall, none empty
+  std::vector<Rect> planes;   ///< what each of wall_planes() covers, gaps included
 };
 
 /// A flat wall as it stands, at its finest screen's pixels; any other wall plane by plane: upright ones side by side
@@ -46,13 +57,16 @@ struct WallPicture {
 /// rounded to whole pixels; where all screens have one pitch, and nothing is scaled, each keeps its size.
 [[nodiscard]] WallPicture wall_picture(const Wall& wall, int max_side);
 
-/// How far the gaps of a flat wall are from whole pixels: the error a wall description with bezels in whole pixels
-/// would make. Rows and columns of screens with equal pitch count.
-struct SeamError {
-  double largest_px = 0.0;      ///< at one seam
-  double accumulated_px = 0.0;  ///< over a row or column of seams
+/// What lies between neighbours of one pitch in the rows and columns of a flat wall, and how far that is from whole
+/// pixels: the error a wall description with bezels in whole pixels would make.
+struct WallSeams {
+  int count = 0;
+  double narrowest_m = 0.0;  ///< negative: overlap
+  double widest_m = 0.0;
+  double largest_error_px = 0.0;      ///< at one seam
+  double accumulated_error_px = 0.0;  ///< over a row or column of seams
 };
-[[nodiscard]] SeamError seam_error(const Wall& wall);
+[[nodiscard]] WallSeams wall_seams(const Wall& wall);
 
 /// Metres per pixel along the screen's width.
 [[nodiscard]] double pixel_pitch(const WallScreen& screen);

@@ -1,7 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 
 #include "walls/geometry.h"
 
@@ -16,14 +16,6 @@ struct Box {
   double height = 0.0;
 };
 
-/// Screens that lie in one plane, laid out as seen from the viewer's side.
-struct Plane {
-  std::vector<std::size_t> screens;
-  Wall part;  ///< the same screens
-  WallExtent extent;
-  double heading = 0.0;  ///< from straight ahead, clockwise seen from above
-};
-
 bool same_plane(const WallScreen& a, const WallScreen& b) {
   constexpr double kParallel = 1.0 - 1e-9;
   const glm::dvec3 normal = screen_axes(a)[2];
@@ -32,25 +24,16 @@ bool same_plane(const WallScreen& a, const WallScreen& b) {
          std::abs(glm::dot(normal, b.lower_left - a.lower_left)) < 1e-6 * size;
 }
 
-std::vector<Plane> planes_of(const Wall& wall, const WallExtent& whole) {
-  std::vector<Plane> planes;
-  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
-    const WallScreen& screen = wall.screens[i];
-    auto plane =
-        std::ranges::find_if(planes, [&](const Plane& p) { return same_plane(p.part.screens.front(), screen); });
-    if (plane == planes.end()) plane = planes.insert(plane, Plane{});
-    plane->screens.push_back(i);
-    plane->part.screens.push_back(screen);
-  }
-  for (Plane& plane : planes) {
-    plane.extent = wall_extent(plane.part);
-    const glm::dvec3 towards = plane.extent.center - wall.viewer;
-    const glm::dvec3 ahead = -whole.axes[2];
-    plane.heading = std::atan2(towards.x * -ahead.z + towards.z * ahead.x, towards.x * ahead.x + towards.z * ahead.z);
-  }
-  std::ranges::stable_sort(planes, {}, &Plane::heading);
-  return planes;
+/// From straight ahead, clockwise seen from above.
+double heading_of(const glm::dvec3& towards, const glm::dvec3& ahead) {
+  return std::atan2(towards.z * ahead.x - towards.x * ahead.z, towards.x * ahead.x + towards.z * ahead.z);
 }
+
+/// Screens of one plane, laid out as seen from the viewer's side.
+struct Plane {
+  std::vector<std::size_t> screens;
+  WallExtent extent;
+};
 
 void lay_out(const Wall& wall, const Plane& plane, double x, double y, std::vector<Box>& boxes) {
   const glm::dmat3 inside = glm::transpose(plane.extent.axes);
@@ -66,15 +49,21 @@ void lay_out(const Wall& wall, const Plane& plane, double x, double y, std::vect
 }
 
 struct Layout {
-  std::vector<Box> boxes;
+  std::vector<Box> boxes;   ///< of the screens
+  std::vector<Box> planes;  ///< of wall_planes()
   double width = 0.0;
   double height = 0.0;
 };
 
 Layout layout_of(const Wall& wall) {
   const WallExtent whole = wall_extent(wall);
-  Layout layout{std::vector<Box>(wall.screens.size()), whole.width, whole.height};
-  const std::vector<Plane> planes = planes_of(wall, whole);
+  Layout layout{std::vector<Box>(wall.screens.size()), {}, 0.0, 0.0};
+  std::vector<Plane> planes;
+  for (auto& screens : wall_planes(wall)) {
+    const WallExtent extent = wall_extent(screens_of(wall, screens));
+    planes.push_back({std::move(screens), extent});
+  }
+  layout.planes.resize(planes.size());
   // Rows of planes: ceilings face down, floors up, the rest stands.
   constexpr double kLying = 0.7;
   std::array<std::vector<const Plane*>, 3> rows;
@@ -96,7 +85,10 @@ Layout layout_of(const Wall& wall) {
     double tallest = 0.0;
     for (const Plane* const plane : rows[r]) tallest = std::max(tallest, plane->extent.height);
     for (const Plane* const plane : rows[r]) {
-      lay_out(wall, *plane, x, y + 0.5 * (tallest - plane->extent.height), layout.boxes);
+      const double top = y + 0.5 * (tallest - plane->extent.height);
+      lay_out(wall, *plane, x, top, layout.boxes);
+      layout.planes[static_cast<std::size_t>(plane - planes.data())] = {x, top, plane->extent.width,
+                                                                        plane->extent.height};
       x += plane->extent.width + margin;
     }
     y += tallest;
@@ -105,11 +97,47 @@ Layout layout_of(const Wall& wall) {
   return layout;
 }
 
+/// Half pixels round up, also when arithmetic left them a little short.
 int rounded(double value) {
-  return static_cast<int>(std::lround(value));
+  return static_cast<int>(std::floor(value + 0.5 + 1e-6));
+}
+
+Rect rounded(const Box& box, double per_metre) {
+  return {rounded(box.x * per_metre), rounded(box.y * per_metre), rounded((box.x + box.width) * per_metre),
+          rounded((box.y + box.height) * per_metre)};
 }
 
 }  // namespace
+
+std::vector<std::vector<std::size_t>> wall_planes(const Wall& wall) {
+  std::vector<std::vector<std::size_t>> planes;
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    const auto plane = std::ranges::find_if(
+        planes, [&](const auto& p) { return same_plane(wall.screens[p.front()], wall.screens[i]); });
+    if (plane == planes.end()) {
+      planes.push_back({i});
+    } else {
+      plane->push_back(i);
+    }
+  }
+  const glm::dvec3 ahead = -wall_extent(wall).axes[2];
+  std::vector<std::pair<double, std::vector<std::size_t>>> headed;
+  headed.reserve(planes.size());
+  for (auto& plane : planes) {
+    const double heading = heading_of(wall_extent(screens_of(wall, plane)).center - wall.viewer, ahead);
+    headed.emplace_back(heading, std::move(plane));
+  }
+  std::ranges::stable_sort(headed, {}, [](const auto& plane) { return plane.first; });
+  std::ranges::transform(headed, planes.begin(), [](auto& plane) { return std::move(plane.second); });
+  return planes;
+}
+
+std::vector<WallScreen> screens_of(const Wall& wall, const std::vector<std::size_t>& indices) {
+  std::vector<WallScreen> screens;
+  screens.reserve(indices.size());
+  for (const std::size_t i : indices) screens.push_back(wall.screens.at(i));
+  return screens;
+}
 
 WallPicture wall_picture(const Wall& wall, int max_side) {
   HPR_CHECK(max_side > 0);
@@ -127,8 +155,7 @@ WallPicture wall_picture(const Wall& wall, int max_side) {
   for (std::size_t i = 0; i < layout.boxes.size(); ++i) {
     const Box& box = layout.boxes[i];
     const Size pixels = wall.screens[i].pixels;
-    Rect rect{rounded(box.x * per_metre), rounded(box.y * per_metre), rounded((box.x + box.width) * per_metre),
-              rounded((box.y + box.height) * per_metre)};
+    Rect rect = rounded(box, per_metre);
     // Rounding moves whole screens then, and never squeezes one by a pixel.
     const bool upright = std::abs(box.width - screen_width(wall.screens[i])) < 1e-6 * box.width;
     if (native && upright) rect = {rect.x0, rect.y0, rect.x0 + pixels.width, rect.y0 + pixels.height};
@@ -137,6 +164,9 @@ WallPicture wall_picture(const Wall& wall, int max_side) {
     picture.size.width = std::max(picture.size.width, rect.x1);
     picture.size.height = std::max(picture.size.height, rect.y1);
     picture.screens.push_back(rect);
+  }
+  for (const Box& box : layout.planes) {
+    picture.planes.push_back(intersection(rounded(box, per_metre), {0, 0, picture.size.width, picture.size.height}));
   }
   return picture;
 }

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/command.h"
+#include "walls/wall_file.h"
+
+namespace hpr {
+
+/// What `hpr wall check` says about a wall.
+struct WallCheck {
+  std::string spec;  ///< as the user named it
+  WallReading reading;
+};
+
+/// The answer in words: every finding, and for a sound wall one line of figures.
+[[nodiscard]] std::string describe_check(const WallCheck& check);
+
+/// The same as JSON, schema hpr.wall-check/1.
+[[nodiscard]] std::string check_json(const WallCheck& check);
+
+/// `hpr wall check|plan|expand|pattern|run`.
+[[nodiscard]] std::unique_ptr<Command> make_wall_command();
+
+}  // namespace hpr
