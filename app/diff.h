@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "image/image_io.h"
+#include "image/key.h"
+#include "image/metrics.h"
+
+namespace hpr {
+
+/// What may differ before two files count as different.
+struct DiffTolerance {
+  double value = 0.0;    ///< largest absolute difference per value
+  double percent = 0.0;  ///< of all pixels: how many may exceed it
+};
+
+/// How two pictures, or two files of keys, differ.
+struct DiffReport {
+  bool keys = false;
+  Size size;                          ///< of pictures; files of keys do not know theirs
+  std::vector<std::string> channels;  ///< of pictures
+  Difference difference;              ///< of keys: only pixels, differing, and `max`, of the depths
+  std::size_t other_surface = 0;      ///< of keys: pixels that show another surface
+  std::size_t beyond = 0;             ///< pixels with a value past the tolerance
+  bool passed = true;
+  std::vector<float> largest;  ///< of pictures, per pixel: its largest absolute difference; infinite where one is NaN
+};
+
+/// Compares `b` with `a` value by value, channels by name. Throws Error (BadInput), naming both, when sizes or channels
+/// differ.
+[[nodiscard]] DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b,
+                                       const std::string& name_b, const DiffTolerance& tolerance);
+
+/// Compares two equally long lists of keys; every differing key is past the tolerance.
+[[nodiscard]] DiffReport diff_keys(std::span<const Key> a, std::span<const Key> b, double percent);
+
+/// The same for files, by their extension: .keys (a uint64 per pixel, little-endian) or a picture. Throws Error (Io,
+/// BadInput, Limit, and Usage for a tolerance of values between keys).
+[[nodiscard]] DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::path& b,
+                                    const DiffTolerance& tolerance, const ImageLimits& limits);
+
+/// Where pictures differ and how much: black where equal, then from violet over red and orange to pale yellow at the
+/// largest finite difference, lighter meaning more; cyan where only one of both is finite.
+[[nodiscard]] Image<Rgba8> heat_map(const DiffReport& report);
+
+/// What the command prints. `metrics` are names of diff_metrics().
+[[nodiscard]] std::string diff_table(const DiffReport& report, std::span<const std::string> metrics);
+[[nodiscard]] std::string diff_json(const DiffReport& report, std::span<const std::string> metrics,
+                                    const std::string& name_a, const std::string& name_b,
+                                    const DiffTolerance& tolerance);
+
+/// rmse, psnr, max, differing, mean.
+[[nodiscard]] const std::vector<std::string>& diff_metrics();
+
+}  // namespace hpr

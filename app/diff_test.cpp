@@ -1,0 +1,181 @@
+#include "app/diff.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+
+namespace hpr {
+namespace {
+
+FloatImage picture(std::vector<float> values) {
+  return {{static_cast<int>(values.size() / 3), 1}, {"R", "G", "B"}, std::move(values)};
+}
+
+DiffReport diff(const FloatImage& a, const FloatImage& b, const DiffTolerance& tolerance = {}) {
+  return diff_pictures(a, "a", b, "b", tolerance);
+}
+
+class DiffFiles : public testing::Test {
+ protected:
+  DiffFiles() : folder_(testing::TempDir() + "hpr_diff_" + std::to_string(::getpid())) {
+    std::filesystem::create_directory(folder_);
+  }
+  ~DiffFiles() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] std::filesystem::path path(const char* name) const { return folder_ / name; }
+  [[nodiscard]] std::filesystem::path keys_file(const char* name, const std::vector<Key>& keys) const {
+    write_file_atomically(path(name), std::as_bytes(std::span(keys)));
+    return path(name);
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+ExitCode code_of(const std::filesystem::path& a, const std::filesystem::path& b, const DiffTolerance& tolerance = {}) {
+  try {
+    (void)diff_files(a, b, tolerance, {});
+  } catch (const Error& error) {
+    return error.code();
+  }
+  return ExitCode::Done;
+}
+
+TEST(Diff, EqualPicturesPassAndOneBitDoesNot) {
+  const FloatImage a = picture({0, 0.5F, 1, 0.25F, 0.25F, 0.25F});
+  EXPECT_TRUE(diff(a, a).passed);
+  FloatImage b = a;
+  b.values[4] = std::nextafter(0.25F, 1.0F);
+  const DiffReport report = diff(a, b);
+  EXPECT_FALSE(report.passed);
+  EXPECT_EQ(report.difference.differing, 1U);
+  EXPECT_EQ(report.beyond, 1U);
+  EXPECT_EQ(report.largest[0], 0.0F);
+  EXPECT_GT(report.largest[1], 0.0F);
+}
+
+TEST(Diff, TheToleranceIsPerValueAndThePercentagePerPixel) {
+  const FloatImage a = picture({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  const FloatImage b = picture({0.25F, 0, 0, 0, 0.5F, 0.5F, 0, 0, 0, 0, 0, 0});
+  EXPECT_TRUE(diff(a, b, {0.5, 0.0}).passed) << "the bound itself is allowed";
+  EXPECT_FALSE(diff(a, b, {0.49, 0.0}).passed);
+  EXPECT_EQ(diff(a, b, {0.25, 0.0}).beyond, 1U) << "two values of one pixel are one pixel";
+  EXPECT_TRUE(diff(a, b, {0.25, 25.0}).passed);
+  EXPECT_FALSE(diff(a, b, {0.25, 24.9}).passed);
+  EXPECT_FALSE(diff(a, b, {0.0, 49.0}).passed);
+  EXPECT_TRUE(diff(a, b, {0.0, 50.0}).passed);
+}
+
+TEST(Diff, MeanIsTheBiasOfTheSecondPicture) {
+  const DiffReport report = diff(picture({0.5F, 0.5F, 0.5F}), picture({0.75F, 0.75F, 0.75F}));
+  EXPECT_DOUBLE_EQ(report.difference.mean, 0.25);
+}
+
+TEST(Diff, OneSidedNotANumberIsNeverWithinTolerance) {
+  const FloatImage a = picture({0, 0, 0});
+  const FloatImage b = picture({std::numeric_limits<float>::quiet_NaN(), 0, 0});
+  EXPECT_FALSE(diff(a, b, {1e30, 0.0}).passed);
+  EXPECT_TRUE(diff(b, b).passed);
+  EXPECT_EQ(heat_map(diff(a, b)).at(0, 0), (Rgba8{0, 255, 255, 255}));
+}
+
+TEST(Diff, ChannelsAreMatchedByName) {
+  const FloatImage a{{1, 1}, {"R", "G", "B"}, {1, 2, 3}};
+  const FloatImage b{{1, 1}, {"B", "G", "R"}, {3, 2, 1}};
+  EXPECT_TRUE(diff(a, b).passed);
+}
+
+TEST(Diff, OtherSizesOrChannelsAreBadInputThatNamesBoth) {
+  const FloatImage a{{2, 1}, {"R"}, {0, 0}};
+  const FloatImage tall{{1, 2}, {"R"}, {0, 0}};
+  const FloatImage other{{2, 1}, {"Z"}, {0, 0}};
+  for (const FloatImage& b : {tall, other}) {
+    try {
+      (void)diff_pictures(a, "first.png", b, "second.png", {});
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::BadInput);
+      EXPECT_NE(std::string(error.what()).find("first.png is 2x1 R"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("second.png"), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(Diff, TheHeatMapIsBlackWhereEqualAndLighterWhereMoreDiffers) {
+  const FloatImage a = picture(std::vector<float>(12, 0.0F));
+  const FloatImage b = picture({0, 0, 0, 0.001F, 0, 0, 0, 0.5F, 0, 0, 0, 1});
+  const Image<Rgba8> heat = heat_map(diff(a, b));
+  EXPECT_EQ(heat.at(0, 0), (Rgba8{0, 0, 0, 255}));
+  const auto lightness = [&](int x) {
+    const Rgba8 c = heat.at(x, 0);
+    return 0.2126F * srgb_to_linear(c.r) + 0.7152F * srgb_to_linear(c.g) + 0.0722F * srgb_to_linear(c.b);
+  };
+  EXPECT_GT(lightness(1), lightness(0));
+  EXPECT_GT(lightness(2), lightness(1));
+  EXPECT_GT(lightness(3), lightness(2));
+}
+
+TEST(Diff, TheTableAndTheJsonHoldWhatWasAskedFor) {
+  const DiffReport report = diff(picture({0, 0, 0}), picture({0.5F, 0, 0}));
+  const std::vector<std::string> some{"max", "differing"};
+  const std::string table = diff_table(report, some);
+  EXPECT_NE(table.find("max        0.5\n"), std::string::npos) << table;
+  EXPECT_NE(table.find("1 of 1 pixels (100 %)"), std::string::npos) << table;
+  EXPECT_EQ(table.find("rmse"), std::string::npos) << table;
+  EXPECT_NE(table.find("different"), std::string::npos) << table;
+  const auto json = nlohmann::json::parse(diff_json(report, some, "a.png", "b.png", {}));
+  EXPECT_EQ(json["schema"], "hpr.diff/1");
+  EXPECT_EQ(json["differing"], 1);
+  EXPECT_EQ(json["max"], 0.5);
+  EXPECT_EQ(json["passed"], false);
+  EXPECT_FALSE(json.contains("psnr"));
+  const auto equal = nlohmann::json::parse(
+      diff_json(diff(picture({1, 1, 1}), picture({1, 1, 1})), diff_metrics(), "a.png", "b.png", {}));
+  EXPECT_TRUE(equal["psnr"].is_null()) << "infinite";
+  EXPECT_EQ(equal["passed"], true);
+}
+
+TEST_F(DiffFiles, KeysAreComparedOneByOne) {
+  const auto a = keys_file("a.keys", {make_key(0.5F, 7), make_key(0.5F, 8), kNoKey, kNoKey});
+  const auto b = keys_file("b.keys", {make_key(0.5F, 7), make_key(0.25F, 8), make_key(0.125F, 1), kNoKey});
+  const DiffReport report = diff_files(a, b, {}, {});
+  EXPECT_TRUE(report.keys);
+  EXPECT_EQ(report.difference.pixels, 4U);
+  EXPECT_EQ(report.difference.differing, 2U);
+  EXPECT_EQ(report.other_surface, 1U);
+  EXPECT_EQ(report.difference.max, 0.25);
+  EXPECT_FALSE(report.passed);
+  EXPECT_TRUE(diff_files(a, b, {0.0, 50.0}, {}).passed);
+  EXPECT_TRUE(diff_files(a, a, {}, {}).passed);
+}
+
+TEST_F(DiffFiles, WhatCannotBeComparedHasItsExitCode) {
+  const auto keys = keys_file("a.keys", {1, 2});
+  write_file_atomically(path("odd.keys"), "1234567890");
+  write_png(path("a.png"), Image<Rgba8>({2, 1}));
+  EXPECT_EQ(code_of(keys, keys_file("longer.keys", {1, 2, 3})), ExitCode::BadInput);
+  EXPECT_EQ(code_of(keys, path("odd.keys")), ExitCode::BadInput);
+  EXPECT_EQ(code_of(keys, path("a.png")), ExitCode::BadInput);
+  EXPECT_EQ(code_of(keys, keys, {0.1, 0.0}), ExitCode::Usage);
+  EXPECT_EQ(code_of(path("a.png"), path("missing.png")), ExitCode::Io);
+}
+
+TEST_F(DiffFiles, PicturesAreReadFromPngAndExr) {
+  write_png(path("a.png"), Image<Rgba8>({2, 1}, {10, 20, 30, 255}));
+  write_png(path("b.png"), Image<Rgba8>({2, 1}, {10, 20, 31, 255}));
+  const DiffReport report = diff_files(path("a.png"), path("b.png"), {}, {});
+  EXPECT_EQ(report.difference.differing, 2U);
+  EXPECT_NEAR(report.difference.max, 1.0 / 255.0, 1e-6);
+  write_image(path("a.exr"), Image<Rgb>({2, 1}, {1, 2, 3}));
+  EXPECT_TRUE(diff_files(path("a.exr"), path("a.exr"), {}, {}).passed);
+  EXPECT_EQ(code_of(path("a.png"), path("a.exr")), ExitCode::BadInput) << "sRGB against linear";
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace hpr {
+
+/// What a check found: green, yellow (works, but something is slower or missing) or red (hpr cannot do its work).
+enum class FindingStatus { Ok, Warn, Fail };
+
+struct Finding {
+  std::string name;
+  FindingStatus status = FindingStatus::Ok;
+  std::string detail;  ///< what is there, one line
+  std::string remedy;  ///< the command or step that mends it; empty when nothing needs mending
+};
+
+/// One thing to look at. A check that throws is red, with the error's message and hint.
+struct Check {
+  std::string name;
+  std::function<Finding()> run;  ///< its finding's name is filled in by examine()
+};
+
+/// What any machine is asked: CPU, memory, Embree, MPI, shared memory, temporary folder, host name, image module,
+/// stack.
+[[nodiscard]] std::vector<Check> machine_checks();
+
+/// Runs `checks` in order.
+[[nodiscard]] std::vector<Finding> examine(std::span<const Check> checks);
+
+/// No finding is red.
+[[nodiscard]] bool healthy(std::span<const Finding> findings);
+
+/// One line a finding, and its remedy below it; with terminal colours or without.
+[[nodiscard]] std::string findings_text(std::span<const Finding> findings, bool colors);
+[[nodiscard]] std::string findings_json(std::span<const Finding> findings);
+
+}  // namespace hpr
