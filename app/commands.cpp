@@ -3,7 +3,12 @@
 #include "app/compare_command.h"
 #include "app/compare_scene.h"
 #include "app/demo_command.h"
+#include "app/diff_command.h"
+#include "app/doctor_command.h"
+#include "app/graphics_checks.h"
 #include "app/render_command.h"
+#include "app/scene_command.h"
+#include "app/wall_command.h"
 
 namespace hpr {
 
@@ -11,8 +16,12 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> all;
   all.push_back(make_demo_command());
   all.push_back(make_render_command());
+  all.push_back(make_wall_command());
   all.push_back(make_compare_command(scene_layers));
+  all.push_back(make_diff_command());
+  all.push_back(make_scene_command());
   all.push_back(make_bench_command());
+  all.push_back(make_doctor_command(graphics_checks()));
   return all;
 }
 

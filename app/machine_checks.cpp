@@ -1,4 +1,4 @@
-#include <embree3/rtcore.h>
+#include "rt/embree_compat.h"
 #include <fmt/format.h>
 #include <netdb.h>
 #include <sched.h>

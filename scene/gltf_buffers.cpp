@@ -30,7 +30,9 @@ void GltfBuffers::load(const nlohmann::json& root, GltfContext& context) {
     const std::string where = fmt::format("buffers[{}]", i);
     std::span<const std::byte> bytes;
     if (buffer.contains("uri")) {
-      owned_[i] = resolve(buffer["uri"].get<std::string>(), where, context);
+      const auto uri = buffer["uri"].get<std::string>();
+      if (uri.starts_with("data:image/")) context.warn(where, "its data URI says that it is a picture");
+      owned_[i] = resolve(uri, where, context);
       bytes = owned_[i];
     } else if (i == 0 && parts_->has_binary) {
       bytes = parts_->binary;

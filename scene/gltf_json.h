@@ -64,6 +64,10 @@ class GltfItem {
 
   /// Entries of the top-level array `section`.
   [[nodiscard]] std::size_t section_size(const char* section) const;
+  /// Entry `index` of the top-level array `section`; it must be there.
+  [[nodiscard]] const nlohmann::json& top(const char* section, std::size_t index) const {
+    return (*root_)[section][index];
+  }
 
  private:
   GltfItem(const GltfItem& parent, const char* key, std::size_t position, nlohmann::json& value)

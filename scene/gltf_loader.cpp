@@ -28,6 +28,16 @@ namespace {
 tinygltf::Model parse_model(nlohmann::json root, const GltfContext& context) {
   root.erase("buffers");
   root.erase("images");
+  // tinygltf refuses indices without a bufferView (zeros, or sparse ones); it does not get to see any.
+  std::vector<int> indices;
+  if (root.contains("meshes")) {
+    for (nlohmann::json& mesh : root["meshes"]) {
+      for (nlohmann::json& primitive : mesh["primitives"]) {
+        indices.push_back(primitive.contains("indices") ? primitive["indices"].get<int>() : -1);
+        primitive.erase("indices");
+      }
+    }
+  }
   const std::string text = root.dump();
   if (text.size() > std::numeric_limits<unsigned int>::max()) {
     context.fail("", "the JSON has more than 4 GiB", "split the scene", ExitCode::Limit);
@@ -39,6 +49,14 @@ tinygltf::Model parse_model(nlohmann::json root, const GltfContext& context) {
                                                 static_cast<unsigned int>(text.size()), "")) {
     context.fail("", printable(errors.substr(0, errors.find('\n')), 200));
   }
+  std::size_t next = 0;
+  for (tinygltf::Mesh& mesh : model.meshes) {
+    for (tinygltf::Primitive& primitive : mesh.primitives) {
+      if (next < indices.size()) primitive.indices = indices[next];
+      ++next;
+    }
+  }
+  if (next != indices.size()) context.fail("meshes", "some primitives cannot be read");
   return model;
 }
 

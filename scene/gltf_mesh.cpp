@@ -221,12 +221,14 @@ class PrimitiveBuilder {
   /// vectors but for rounding keep their bits.
   void repair_normals(Mesh& mesh) const {
     Vectors smooth;
+    bool scaled = false;
     for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
       const glm::dvec3 normal(mesh.normals[i]);
       const double square = glm::dot(normal, normal);
       if (std::abs(square - 1.0) < 1e-6) continue;
       if (square > 0.0 && std::isfinite(square)) {
         mesh.normals[i] = glm::vec3(normal / std::sqrt(square));
+        scaled = scaled || std::abs(square - 1.0) > 0.2;
         continue;
       }
       if (smooth.empty()) {
@@ -236,6 +238,7 @@ class PrimitiveBuilder {
       }
       mesh.normals[i] = smooth[i];
     }
+    if (scaled) data_.context().warn(where_ + ".attributes.NORMAL", "some normals are no unit vectors; made so");
   }
 
   const GltfData& data_;

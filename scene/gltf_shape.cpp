@@ -88,6 +88,18 @@ void check_accessors(const GltfItem& root) {
   });
 }
 
+/// A primitive whose data exist only in compressed form: its accessors have no bytes of their own.
+void check_compression(const GltfItem& primitive) {
+  constexpr const char* kDraco = "KHR_draco_mesh_compression";
+  const auto extensions = primitive.object("extensions");
+  if (!extensions || !extensions->has(kDraco)) return;
+  for (const auto& [name, accessor] : primitive.value()["attributes"].items()) {
+    if (!primitive.top("accessors", accessor.get<std::size_t>()).contains("bufferView")) {
+      primitive.fail("", fmt::format("is compressed with {}, which HPR cannot read", kDraco));
+    }
+  }
+}
+
 void check_meshes(const GltfItem& root) {
   root.each("meshes", kOptional, [](const GltfItem& mesh) {
     mesh.numbers("weights", 0);
@@ -95,6 +107,7 @@ void check_meshes(const GltfItem& root) {
       if (primitive.index_map("attributes", "accessors", kRequired) == 0) {
         primitive.fail("attributes", "is empty");
       }
+      check_compression(primitive);
       primitive.index("indices", "accessors");
       primitive.index("material", "materials");
       primitive.whole("mode", kOptional, 0, 6);
@@ -240,7 +253,8 @@ void check_materials(const GltfItem& root) {
 
 void check_perspective(const GltfItem& lens) {
   constexpr double kSmallest = std::numeric_limits<float>::min();
-  const double fov = *lens.number("yfov", kRequired, kSmallest, std::numbers::pi);
+  // At half a turn the picture plane is infinitely wide; 3.141 is 179.97 degrees.
+  const double fov = *lens.number("yfov", kRequired, kSmallest, 3.141);
   if (fov < 1e-3) lens.warn("yfov", fmt::format("{} radians are less than a telescope sees", fov));
   const double near_distance = *lens.number("znear", kRequired, kSmallest);
   if (near_distance < 1e-6) lens.warn("znear", fmt::format("{} metres leave depths little precision", near_distance));
