@@ -90,6 +90,13 @@ Image<Key> wall_image(const TileLayer<Key>& layer, const CompareInput& input) {
   return wall;
 }
 
+/// Rank 0, after each frame: how many pixels are wrong, and the frame itself.
+void inspect(const TileLayer<Key>& layer, std::span<const Key> expected, const CompareInput& input,
+             Contestant& contestant) {
+  contestant.differing_pixels = std::max(contestant.differing_pixels, count_differing(layer, expected));
+  contestant.frame = wall_image(layer, input);
+}
+
 /// Collective: one frame of one strategy, from the ranks' layers to the whole frame on rank 0.
 Sample one_frame(Communicator& comm, const Compositor& compositor, TileLayer<Key>& layer,
                  std::span<const std::size_t> tiles) {
@@ -162,7 +169,7 @@ Spread spread_of(std::vector<double> values) {
 }
 
 CompareResult compare_strategies(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
-  HPR_CHECK(settings.frames > 0 && settings.warmup >= 0);
+  HPR_CHECK(!settings.strategies.empty() && settings.frames > 0 && settings.warmup >= 0);
   const TileLayer<Key> pristine = input.layer(comm);
   TileLayer<Key> layer(pristine.layout());
   std::vector<std::size_t> tiles(layer.tiles());
@@ -178,9 +185,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
       restore(layer, pristine);
       const Sample sample = one_frame(comm, *contestant.compositor, layer, tiles);
       if (frame >= 0) contestant.samples.push_back(sample);
-      if (!is_root) continue;
-      contestant.differing_pixels = std::max(contestant.differing_pixels, count_differing(layer, expected));
-      if (frame + 1 == settings.frames) contestant.frame = wall_image(layer, input);
+      if (is_root) inspect(layer, expected, input, contestant);
     }
   }
 
@@ -198,7 +203,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
     run.frame_xxh64 = frame_hash(contestant.frame, input.colors);
     result.runs.push_back(std::move(run));
   }
-  if (is_root && !contestants.empty()) result.frame = std::move(contestants.front().frame);
+  if (is_root) result.frame = std::move(contestants.front().frame);
   return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,8 +12,8 @@
 
 #include "app/compare_report.h"
 #include "app/launcher.h"
-#include "cluster/collectives.h"
 #include "cluster/local_communicator.h"
+#include "cluster/scene_distribution.h"
 #include "compositing/compositor.h"
 #include "compositing/synthetic.h"
 #include "core/file.h"
@@ -28,6 +29,10 @@ constexpr const char* kHandOverVariable = "HPR_COMPARE_HAND_OVER";
 constexpr int kMostRanks = 4096;
 constexpr int kLargestSide = 16384;
 constexpr int kMostScreensASide = 256;
+
+bool hands_over() {
+  return std::getenv(kHandOverVariable) != nullptr;  // NOLINT(concurrency-mt-unsafe): nothing sets variables
+}
 
 std::vector<std::string> split(std::string_view list) {
   std::vector<std::string> items;
@@ -142,7 +147,7 @@ class CompareCommand final : public Command {
       throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
                   "leave mpirun away, or --transport");
     }
-    if (std::getenv(kHandOverVariable) != nullptr) return;  // the process that started this job has looked already
+    if (hands_over()) return;  // the process that started this job has looked already
     if (!picture_.empty() && !picture_.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
     }
@@ -187,18 +192,15 @@ class CompareCommand final : public Command {
                     "leave --ranks away, or mpirun");
       }
       CompareResult result = compare_strategies(comm, input, settings_for(comm.size()));
-      std::vector<std::byte> verdict(1);
-      if (comm.rank() == 0) {
-        if (std::getenv(kHandOverVariable) != nullptr) {
-          std::fputs(runs_to_json(result.runs).c_str(), stdout);
-          write_frame(result.frame, input);
-          verdict[0] = static_cast<std::byte>(verdict_on(result.runs));
-        } else {
-          verdict[0] = static_cast<std::byte>(finish(globals, input, std::move(result)));
+      const auto verdict = on_root(comm, [&] {
+        if (!hands_over()) {
+          return std::vector{static_cast<std::byte>(finish(globals, input, std::move(result)))};
         }
-      }
-      broadcast(comm, verdict);
-      return static_cast<ExitCode>(verdict[0]);
+        write_frame(result.frame, input);
+        std::fputs(runs_to_json(result.runs).c_str(), stdout);
+        return std::vector{static_cast<std::byte>(verdict_on(result.runs))};
+      });
+      return static_cast<ExitCode>(verdict.at(0));
     });
   }
 
@@ -208,6 +210,7 @@ class CompareCommand final : public Command {
     const std::vector<int> counts = rank_counts();
     for (std::size_t i = 0; i < counts.size(); ++i) {
       const int ranks = counts[i];
+      check_memory(globals, input, ranks);
       std::vector<CompareRun> runs;
       if (transport_ == "threads") {
         const auto body = [&](Communicator& comm) {
@@ -231,6 +234,21 @@ class CompareCommand final : public Command {
       result.runs.insert(result.runs.end(), runs.begin(), runs.end());
     }
     return finish(globals, input, std::move(result));
+  }
+
+  /// Refuses what this host cannot hold, before ranks start to share it.
+  static void check_memory(const Globals& globals, const CompareInput& input, int ranks) {
+    const auto pages = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES));
+    const std::uint64_t physical = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    const std::uint64_t limit = parse_bytes(globals.limit_mem).value_or(physical);
+    // Every rank keeps its layer and a copy to work on; rank 0 also the expected frame, one that arrives and the image.
+    const std::uint64_t layer = grid_layout(input.screen, input.grid).tiles() * kTilePixels * sizeof(Key);
+    const std::uint64_t needed = layer * (2 * static_cast<std::uint64_t>(ranks) + 3);
+    if (needed <= limit) return;
+    throw Error(
+        ExitCode::Limit,
+        fmt::format("{} ranks need about {} MiB of memory, {} MiB may be used", ranks, needed >> 20U, limit >> 20U),
+        "take fewer ranks, fewer screens or smaller ones");
   }
 
   /// What a job needs to run `ranks` of the rank counts; `last`: it also writes the frame.

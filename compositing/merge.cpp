@@ -7,13 +7,14 @@
 
 // Highway compiles this file once per instruction set by including it again.
 #undef HWY_TARGET_INCLUDE
+// NOLINTNEXTLINE(readability-identifier-naming): the name is Highway's
 #define HWY_TARGET_INCLUDE "compositing/merge.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as Highway asks.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace hpr {
+namespace hpr {  // NOLINT(modernize-concat-nested-namespaces): HWY_NAMESPACE is a macro
 namespace HWY_NAMESPACE {
 
 void merge(Key* into, const Key* from, std::size_t count) {

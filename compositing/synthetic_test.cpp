@@ -98,6 +98,17 @@ TEST(Synthetic, AWallShowsTheOnePictureInParts) {
   }
 }
 
+// The colours of a frame hardly show the depth's low bits, which keep ranks from tying; other ranks' layers do.
+TEST(Synthetic, DepthsCarryTheTagOfTheirRank) {
+  for (const int rank : {0, 1, 7, 254}) {
+    const Image<Key> keys = to_image(synthetic_layer(SyntheticKind::Dense, rank, {130, 70}, 1), 0);
+    for (const Key key : keys.pixels()) {
+      const float depth = (1.0F - key_depth(key)) * 16777216.0F;
+      ASSERT_EQ(static_cast<int>(depth) % 256, 1 + (rank * 37 + 11) % 255);
+    }
+  }
+}
+
 TEST(Synthetic, TilesWithoutAKeyAreEmpty) {
   const TileLayer<Key> sparse = synthetic_layer(SyntheticKind::Sparse, 0, {1920, 1080}, 1);
   EXPECT_LT(sparse.active_tiles(), sparse.tiles() / 5);
