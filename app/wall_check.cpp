@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -14,7 +15,7 @@ namespace {
 /// What one wants to know about a sound wall.
 struct Figures {
   std::size_t hosts = 0;
-  double visible_pixels = 0.0;
+  std::size_t visible_pixels = 0;
   bool flat = true;
   double width_px = 0.0;  ///< of a flat wall, gaps included, at its finest pixels
   double height_px = 0.0;
@@ -29,7 +30,7 @@ Figures figures_of(const Wall& wall) {
   figures.hosts = std::max<std::size_t>(hosts.size(), 1);
   double lit = 0.0;
   for (const WallScreen& screen : wall.screens) {
-    figures.visible_pixels += static_cast<double>(screen.pixels.area());
+    figures.visible_pixels += screen.pixels.area();
     lit += screen_width(screen) * screen_height(screen);
   }
   const WallExtent extent = wall_extent(wall);
@@ -39,6 +40,10 @@ Figures figures_of(const Wall& wall) {
   figures.gap_percent = std::max(0.0, 100.0 * (1.0 - lit / (extent.width * extent.height)));
   figures.seams = wall_seams(wall);
   return figures;
+}
+
+double tenths(double value) {
+  return std::round(10.0 * value) / 10.0;
 }
 
 std::string plural(std::size_t count, std::string_view what) {
@@ -59,10 +64,10 @@ std::string describe_check(const WallCheck& check) {
   const Figures figures = figures_of(wall);
   text += fmt::format("ok: {}, {}, ", plural(wall.screens.size(), "screen"), plural(figures.hosts, "host"));
   if (figures.flat) {
-    text += fmt::format("{:.0f}x{:.0f} px of which {:.1f} % lie behind gaps, ", figures.width_px, figures.height_px,
-                        figures.gap_percent);
+    text += fmt::format("{:g}x{:g} px of which {:.1f} % lie behind gaps, ", tenths(figures.width_px),
+                        tenths(figures.height_px), figures.gap_percent);
   }
-  text += fmt::format("{:.1f} Mpx visible\n", figures.visible_pixels * 1e-6);
+  text += fmt::format("{:.1f} Mpx visible\n", static_cast<double>(figures.visible_pixels) * 1e-6);
   if (figures.seams.count > 0) {
     text +=
         fmt::format("seams: {}; bezels in whole pixels would be off by {:.2f} px at one, {:.2f} px across the wall\n",

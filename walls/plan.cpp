@@ -81,9 +81,8 @@ void draw_head(Canvas& canvas, const Plan& plan) {
   if (whole.flat) facts += fmt::format(", {} x {} mm", millimetres(whole.width), millimetres(whole.height));
   if (seams.count > 0) {
     facts += seams.widest_m - seams.narrowest_m < 1e-6
-                 ? fmt::format(", gaps of {} mm (hatched)", millimetres(seams.widest_m))
-                 : fmt::format(", gaps of {} to {} mm (hatched)", millimetres(seams.narrowest_m),
-                               millimetres(seams.widest_m));
+                 ? fmt::format(", gaps of {} mm", millimetres(seams.widest_m))
+                 : fmt::format(", gaps of {} to {} mm", millimetres(seams.narrowest_m), millimetres(seams.widest_m));
   }
   canvas.text({0.5 * kWidth, 34.0}, plan.wall.name, 24.0, kInk);
   canvas.text({0.5 * kWidth, 64.0}, facts, 14.0, kInk);

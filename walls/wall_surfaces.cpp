@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numeric>
@@ -28,15 +29,16 @@ int read_rotate(TableReader& reader) {
   return 0;
 }
 
-/// `count` gaps: all `common`, unless listed one by one under `key`.
+/// `count` gaps: all `common`, unless listed one by one under `key`. Empty when one overlaps a whole tile.
 std::vector<double> read_gaps(TableReader& reader, std::string_view key, int count, double common, double tile) {
   const auto listed = reader.reals(key, static_cast<std::size_t>(count), kMetresLimit);
   std::vector<double> gaps = listed.value_or(std::vector<double>(static_cast<std::size_t>(count), common));
-  for (const double gap : gaps) {
-    if (gap > -tile) continue;
+  const auto bad = std::ranges::find_if(gaps, [&](double gap) { return gap <= -tile; });
+  if (bad != gaps.end()) {
+    const double gap = *bad;
+    gaps.clear();
     reader.error(listed ? key : "gap_m", fmt::format("overlaps tiles by {} m, a whole tile", -gap),
                  "a negative gap must stay smaller than the tile");
-    break;
   }
   return gaps;
 }
@@ -82,7 +84,8 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
                  fmt::format("name {}, row by row from the top left", count));
     return;
   }
-  if (!pixels || !positive) return;
+  const bool spaced = std::ssize(grid.column_gaps_m) == *columns - 1 && std::ssize(grid.row_gaps_m) == *rows - 1;
+  if (!pixels || !positive || !spaced) return;
   grid.tile_pixels = *pixels;
   grid.tile_width_m = (*size)[0];
   grid.tile_height_m = (*size)[1];
