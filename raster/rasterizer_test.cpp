@@ -82,6 +82,34 @@ TEST_P(RasterizerTest, DepthFollowsDistanceOnASlantedPlane) {
   }
 }
 
+TEST_P(RasterizerTest, ThePixelsRayMeetsTheKeysTriangle) {
+  const Scene scene = mixed_scene();
+  const View view = perspective_view({240, 160});
+  const Image<Key> image = draw_all(*context_, scene, view);
+  std::size_t met = 0;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      if (image.at(x, y) == kNoKey) continue;
+      const SurfacePlace place = locate_surface(scene, key_surface(image.at(x, y)));
+      const Instance& instance = scene.instances[place.instance];
+      const Mesh& mesh = scene.mesh_of(instance);
+      const glm::uvec3 corners = mesh.triangles[place.triangle];
+      const glm::dvec3 a = world_position(instance, mesh.positions[corners.x]);
+      const glm::dvec3 e1 = world_position(instance, mesh.positions[corners.y]) - a;
+      const glm::dvec3 e2 = world_position(instance, mesh.positions[corners.z]) - a;
+      const Ray ray = view_ray(view, x + 0.5, y + 0.5);
+      // origin + t direction = a + u e1 + v e2
+      const glm::dvec3 solution = glm::inverse(glm::dmat3(-ray.direction, e1, e2)) * (ray.origin - a);
+      const double least = std::min({solution.y, solution.z, 1.0 - solution.y - solution.z});
+      const double depth = reversed_depth(view, solution.x);
+      if (least > -0.05 && std::abs(static_cast<double>(key_depth(image.at(x, y))) - depth) < 0.01 * depth) ++met;
+    }
+  }
+  // All but slivers, whose corners snap to 1/256 pixel.
+  EXPECT_GT(static_cast<double>(met), 0.995 * static_cast<double>(covered(image)));
+  EXPECT_GT(met, 10000U);
+}
+
 TEST_P(RasterizerTest, PartsOfTheScreenHaveTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = perspective_view({333, 217});
@@ -125,11 +153,17 @@ TEST_P(RasterizerTest, SharesMergedByMaximumHaveTheKeysOfTheWhole) {
 }
 
 TEST_P(RasterizerTest, CullingChangesNothing) {
-  const Scene scene = mixed_scene();
+  Scene scene = mixed_scene();
   std::mt19937 random(11);
   const auto in = [&random](double from, double to) {
     return from + (to - from) * static_cast<double>(random()) / 4294967296.0;
   };
+  // Many small things, so that some edge of the part passes close by one of them.
+  scene.meshes.push_back(waves(4));
+  for (int i = 0; i < 1500; ++i) {
+    scene.instances.push_back(placed(2, {in(-4, 4), in(-4, 4), in(-4, 4)}, in(0.0, 6.28), in(0.01, 0.1)));
+  }
+  finish_scene(scene);
   std::size_t drawn = 0;
   for (int i = 0; i < 24; ++i) {
     View view = perspective_view({97 + i, 71});
