@@ -1,13 +1,13 @@
 #include "app/bench_command.h"
 
 #include <fmt/format.h>
+#include <hpr/version.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "app/bench_raster.h"
-#include "hpr/version.h"
 #include "raster/gl_context.h"
 
 namespace hpr {

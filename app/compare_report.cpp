@@ -1,12 +1,12 @@
 #include "app/compare_report.h"
 
 #include <fmt/format.h>
+#include <hpr/version.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
-#include "hpr/version.h"
 
 namespace hpr {
 namespace {

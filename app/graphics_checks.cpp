@@ -12,7 +12,8 @@ Finding try_backend(const std::string& backend) {
   try {
     const auto context = make_gl_context({.backend = backend, .device = -1, .local_rank = 0, .threads = 1});
     if (context->software()) {
-      return {backend, FindingStatus::Ok, context->description() + " (software: pictures are right, frames are slow)", ""};
+      return {backend, FindingStatus::Ok, context->description() + " (software: pictures are right, frames are slow)",
+              ""};
     }
     return {backend, FindingStatus::Ok, context->description(), ""};
   } catch (const Error& error) {

@@ -1,4 +1,3 @@
-#include "rt/embree_compat.h"
 #include <fmt/format.h>
 #include <netdb.h>
 #include <sched.h>
@@ -23,6 +22,7 @@
 #include "core/names.h"
 #include "core/stopwatch.h"
 #include "image/image_io.h"
+#include "rt/embree_compat.h"
 
 namespace hpr {
 namespace {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <hpr/version.h>
 
 #include <algorithm>
 #include <csignal>
@@ -11,7 +12,6 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/units.h"
-#include "hpr/version.h"
 
 namespace hpr {
 namespace {

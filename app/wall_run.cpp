@@ -1,6 +1,7 @@
 #include "app/wall_run.h"
 
 #include <fmt/format.h>
+#include <hpr/version.h>
 
 #include <algorithm>
 #include <cstring>
@@ -15,7 +16,6 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
-#include "hpr/version.h"
 #include "image/image_io.h"
 #include "walls/assemble.h"
 #include "walls/geometry.h"
@@ -82,7 +82,8 @@ class WallDriver {
     manifest_.scene_hash = content_hash(session.scene());
     manifest_.wall_hash = wall.hash;
     manifest_.seed = globals.seed;
-    manifest_.versions = {{"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
+    manifest_.versions = {
+        {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
   }
 
   [[nodiscard]] const FramePlan& plan() const { return plan_; }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -120,15 +121,20 @@ TEST_F(FileTest, ASymbolicLinkStaysAndItsTargetIsReplaced) {
 TEST_F(FileTest, FoldersPipesAndDevicesAreNeitherReadNorReplaced) {
   ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
   fs::create_directory(path("folder"));
-  fs::create_symlink("/dev/null", path("null"));
-  for (const char* name : {"pipe", "folder", "null"}) {
+  std::vector<const char*> names{"pipe", "folder"};
+  // A device of the test's own: should the code ever replace what it is given, the machine keeps its /dev/null.
+  const bool may_make_devices = ::mknod(path("null").c_str(), S_IFCHR | 0600, makedev(1, 3)) == 0;
+  if (may_make_devices) names.push_back("null");
+  for (const char* name : names) {
     EXPECT_EQ(code_of([&] { (void)read_file(path(name), 100); }), ExitCode::Io) << name;
     EXPECT_EQ(code_of([&] { write_file_atomically(path(name), "text"); }), ExitCode::Io) << name;
     EXPECT_EQ(code_of([&] { check_writable(path(name), true); }), ExitCode::Io) << name;
   }
   EXPECT_TRUE(fs::is_fifo(path("pipe")));
-  EXPECT_TRUE(fs::is_character_file("/dev/null"));
-  EXPECT_EQ(files(), 3U);
+  if (may_make_devices) {
+    EXPECT_TRUE(fs::is_character_file(path("null")));
+  }
+  EXPECT_EQ(files(), names.size());
 }
 
 TEST_F(FileTest, MissingFilesAndFoldersAreIoErrors) {
