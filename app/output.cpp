@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "cluster/collectives.h"
@@ -41,12 +42,15 @@ std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_b
   return owners;
 }
 
-TileLayer<Rgba8> to_display(const Frame& frame, int threads) {
+TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops) {
+  const auto gain = static_cast<float>(std::exp2(exposure_stops));
   TileLayer<Rgba8> display(frame.radiance.layout());
   for (const std::size_t tile : frame.owned) display.set_active(tile);
   parallel_for(threads, frame.owned.size(), [&](std::size_t i) {
     const auto from = frame.radiance.tile(frame.owned[i]);
-    std::ranges::transform(from, display.tile(frame.owned[i]).begin(), [](Rgb color) { return to_srgb(color); });
+    std::ranges::transform(from, display.tile(frame.owned[i]).begin(), [gain](Rgb color) {
+      return to_srgb({color.r * gain, color.g * gain, color.b * gain});
+    });
   });
   return display;
 }

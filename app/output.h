@@ -37,8 +37,9 @@ template <typename Pixel>
   return image;
 }
 
-/// A frame's tiles as display colours.
-[[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads);
+/// A frame's tiles as display colours,
+/// `exposure_stops` brighter.
+[[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops);
 
 /// What a run of frames took, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {

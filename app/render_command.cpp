@@ -47,7 +47,8 @@ class RenderCommand final : public Command {
     const ImageLimits limits = globals.limit_image.empty() ? defaults : globals.scene_limits().image;
     if (size.width > limits.side || size.height > limits.side || size.area() > limits.pixels) {
       throw Error(ExitCode::Limit,
-                  fmt::format("a picture of {}x{} pixels is beyond the limit", size.width, size.height),
+                  fmt::format("a picture of {}x{} pixels is beyond the limit of {} a side and {} in all", size.width,
+                              size.height, limits.side, limits.pixels),
                   "draw a smaller one, or raise --limit-image");
     }
   }
@@ -80,30 +81,31 @@ class RenderCommand final : public Command {
     FrameTimes times;
     Frame frame = make_frame(session, plan, blocks.views, &times);
     const std::vector<int> to_root(blocks.views.size(), 0);
-    if (!output_.empty()) assemble<Rgb>(session.comm(), frame.radiance, frame.owned, to_root);
+    // A PNG holds display colours, a third of the bytes of the radiance an EXR holds.
+    TileLayer<Rgba8> display;
+    if (output_.ends_with(".png")) {
+      display = to_display(frame, session.threads(), options_.exposure);
+      assemble<Rgba8>(session.comm(), display, frame.owned, to_root);
+    } else if (!output_.empty()) {
+      assemble<Rgb>(session.comm(), frame.radiance, frame.owned, to_root);
+    }
     if (!raw_.empty()) assemble<Key>(session.comm(), *frame.keys, frame.owned, to_root);
     const double frame_ms = watch.ms();
     const RunStats stats = gather_stats(session, plan, times, frame_ms);
     agree_on_failure(session.comm(), [&] {
-      if (speaks) write(session, plan, blocks, frame, stats);
+      if (!speaks) return;
+      if (!raw_.empty()) write_file_atomically(raw_, std::as_bytes(join_blocks(*frame.keys, blocks, 0).pixels()));
+      if (output_.ends_with(".png")) {
+        write_png(output_, join_blocks(display, blocks, 0));
+      } else if (!output_.empty()) {
+        write_image(output_, join_blocks(frame.radiance, blocks, 0), {{"hpr:scene", session.scene().name}});
+      }
+      if (!options_.stats.empty()) write_stats(options_.stats, stats);
     });
     if (speaks)
       log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms", session.scene().triangles, size.width, size.height,
                 stats.ranks, stats.ms);
     return ExitCode::Done;
-  }
-
-  void write(const Session& session, const FramePlan& plan, const Blocks& blocks, const Frame& frame,
-             const RunStats& stats) const {
-    if (!raw_.empty()) {
-      const Image<Key> keys = join_blocks(*frame.keys, blocks, 0);
-      write_file_atomically(raw_, std::as_bytes(keys.pixels()));
-    }
-    if (!output_.empty()) {
-      write_image(output_, join_blocks(frame.radiance, blocks, 0),
-                  {{"hpr:scene", session.scene().name}, {"hpr:distribution", std::string(name_of(plan.distribution))}});
-    }
-    if (!options_.stats.empty()) write_stats(options_.stats, stats);
   }
 
   std::string source_;

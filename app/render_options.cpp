@@ -58,6 +58,10 @@ void RenderOptions::declare(CLI::App& app) {
   app.add_option("--strategy", strategy, "how layers are composited: a strategy's name or auto")->capture_default_str();
   app.add_option("--shading", shading, "deferred: light once after compositing; local: each rank before it")
       ->capture_default_str();
+  app.add_option("--exposure", exposure,
+                 "brightens (or darkens) display colours by so many stops; EXR files stay as lit")
+      ->check(CLI::Range(-30.0, 30.0))
+      ->capture_default_str();
   app.add_flag("--explain", explain, "print the plan of the frame and why");
   app.add_option("--stats", stats, "write what the frame took as JSON")->type_name("FILE.json");
 }

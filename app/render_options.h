@@ -24,6 +24,7 @@ struct RenderOptions {
   std::string shading = "deferred";
   bool explain = false;
   std::string stats;
+  double exposure = 0.0;  ///< stops, of display colours only
 
   void declare(CLI::App& app);
 

@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "app/report_error.h"
 #include "app/wall_command.h"
 #include "core/hash.h"
+#include "core/log.h"
 #include "walls/geometry.h"
 
 namespace hpr {
@@ -52,17 +54,19 @@ std::string plural(std::size_t count, std::string_view what) {
 
 }  // namespace
 
-std::string describe_check(const WallCheck& check) {
-  std::string text;
+void report_findings(const WallCheck& check) {
   for (const WallFinding& finding : check.reading.findings) {
-    text += fmt::format("{}: {}\n", finding.error ? "error" : "warning", finding.what);
-    if (!finding.line.empty()) text += fmt::format("  {}\n", finding.line);
-    text += fmt::format("  hint: {}\n", finding.hint);
+    if (finding.error) {
+      print_error({ExitCode::BadInput, finding.what, finding.hint, finding.line});
+    } else {
+      log::warning("{} ({})", finding.what, finding.hint);
+    }
   }
-  if (!check.reading.ok()) return text;
-  const Wall& wall = check.reading.wall;
+}
+
+std::string describe_wall(const Wall& wall) {
   const Figures figures = figures_of(wall);
-  text += fmt::format("ok: {}, {}, ", plural(wall.screens.size(), "screen"), plural(figures.hosts, "host"));
+  std::string text = fmt::format("ok: {}, {}, ", plural(wall.screens.size(), "screen"), plural(figures.hosts, "host"));
   if (figures.flat) {
     text += fmt::format("{:g}x{:g} px of which {:.1f} % lie behind gaps, ", tenths(figures.width_px),
                         tenths(figures.height_px), figures.gap_percent);

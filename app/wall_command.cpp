@@ -53,7 +53,12 @@ class WallCommand final : public Command {
 
   [[nodiscard]] ExitCode check() const {
     const WallCheck check{wall_, read_wall(wall_)};
-    fmt::print("{}", json_ ? check_json(check) : describe_check(check));
+    if (json_) {
+      fmt::print("{}", check_json(check));
+    } else {
+      report_findings(check);
+      if (check.reading.ok()) fmt::print("{}", describe_wall(check.reading.wall));
+    }
     return check.reading.ok() ? ExitCode::Done : ExitCode::BadInput;
   }
 

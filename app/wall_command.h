@@ -15,8 +15,11 @@ struct WallCheck {
   WallReading reading;
 };
 
-/// The answer in words: every finding, and for a sound wall one line of figures.
-[[nodiscard]] std::string describe_check(const WallCheck& check);
+/// Every finding on stderr: errors in their three lines, warnings in one.
+void report_findings(const WallCheck& check);
+
+/// A sound wall's figures in words: pixels, hosts, gaps, seams, viewer.
+[[nodiscard]] std::string describe_wall(const Wall& wall);
 
 /// The same as JSON, schema hpr.wall-check/1.
 [[nodiscard]] std::string check_json(const WallCheck& check);

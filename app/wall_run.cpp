@@ -95,7 +95,7 @@ class WallDriver {
   void draw(std::uint64_t number) {
     const Stopwatch watch;
     const Frame frame = make_frame(session_, plan_, blocks_.views, &times_);
-    TileLayer<Rgba8> display = to_display(frame, session_.threads());
+    TileLayer<Rgba8> display = to_display(frame, session_.threads(), run_.options.exposure);
     assemble<Rgba8>(session_.comm(), display, frame.owned, block_owners(blocks_, shown_by_));
     pictures_.clear();
     for (std::size_t screen = 0; screen < shown_by_.size(); ++screen) {

@@ -106,11 +106,23 @@ Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up
 
 Camera framing_camera(const Bounds& bounds) {
   constexpr double kFov = 40.0 * std::numbers::pi / 180.0;
+  constexpr double kNarrowest = 1.0;  // width to height of the screens it is made for; wider ones show more
+  constexpr double kMargin = 1.05;
+  const double slope = std::tan(0.5 * kFov) / kMargin;
   const glm::dvec3 center = 0.5 * (bounds.low + bounds.high);
-  const double diagonal = glm::length(bounds.high - bounds.low);
-  const double radius = diagonal > 0.0 && std::isfinite(diagonal) ? 0.5 * diagonal : 1.0;
+  const glm::dvec3 half = 0.5 * (bounds.high - bounds.low);
+  const bool finite = std::isfinite(glm::length(half));
   const glm::dvec3 from = glm::normalize(glm::dvec3(0.35, 0.25, 1.0));
-  Camera camera = look_at(center + from * (radius / std::sin(0.5 * kFov)), center, {0.0, 1.0, 0.0}, kFov);
+  Camera camera = look_at(from, glm::dvec3(0.0), {0.0, 1.0, 0.0}, kFov);
+  // As far back as the box corner that is nearest to the edge of the picture demands.
+  double distance = 0.0;
+  for (int corner = 0; corner < 8 && finite; ++corner) {
+    const glm::dvec3 sign((corner & 1) != 0 ? 1.0 : -1.0, (corner & 2) != 0 ? 1.0 : -1.0,
+                          (corner & 4) != 0 ? 1.0 : -1.0);
+    const glm::dvec3 at = glm::transpose(camera.axes) * (sign * half);  // right, up, back of the centre
+    distance = std::max({distance, at.z + std::abs(at.y) / slope, at.z + std::abs(at.x) / (slope * kNarrowest)});
+  }
+  camera.eye = center + from * (distance > 0.0 ? distance : 1.0);
   camera.name = "framing";
   return camera;
 }
