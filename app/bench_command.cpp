@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 #include <hpr/version.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "app/bench_raster.h"
+#include "core/parallel.h"
 #include "raster/gl_context.h"
 
 namespace hpr {
@@ -30,8 +29,7 @@ class BenchCommand final : public Command {
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
-    const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-    const int threads = globals.threads > 0 ? globals.threads : cores;
+    const int threads = globals.threads > 0 ? globals.threads : usable_cores();
     const auto context =
         make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
     print(bench_raster(*context, threads), context->description());

@@ -208,9 +208,9 @@ class CompareCommand final : public Command {
   [[nodiscard]] ExitCode run_here(const Globals& globals, const CompareInput& input) const {
     CompareResult result;
     const std::vector<int> counts = rank_counts();
+    for (const int ranks : counts) check_memory(globals, input, ranks);  // all before any is measured
     for (std::size_t i = 0; i < counts.size(); ++i) {
       const int ranks = counts[i];
-      check_memory(globals, input, ranks);
       std::vector<CompareRun> runs;
       if (transport_ == "threads") {
         const auto body = [&](Communicator& comm) {

@@ -19,8 +19,12 @@ class DemoCommand final : public Command {
   void declare(CLI::App& app) override {
     app.add_option("--wall", wall_, "screens of the wall, e.g. 3x2 or 3x2@640x360")
         ->capture_default_str()
-        ->type_name("CxR");
-    app.add_option("-o,--output", output_, "the assembled wall")->capture_default_str()->type_name("FILE.png");
+        ->type_name("CxR")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    app.add_option("-o,--output", output_, "the assembled wall")
+        ->capture_default_str()
+        ->type_name("FILE.png")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {

@@ -11,6 +11,12 @@
 // (app/plan.cpp); the last arrow, tiles to screens, is taken by whoever shows the frame (app/output.cpp).
 namespace hpr {
 
+void prepare(Session& session, const FramePlan& plan) {
+  if (!plan.mine.area.empty()) (void)session.rasterizer(plan.mine.objects);
+  if (plan.lit || plan.shading == Shading::Local) (void)session.lighter(plan.rays);
+  if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
+}
+
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys) {
   Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
   for (std::size_t screen = 0; screen < views.size(); ++screen) {

@@ -18,7 +18,8 @@ enum class Shading {
   Local,     ///< each rank lights what it drew, and colours are composited: the classic order
 };
 
-/// How a frame is made; every choice gives the same picture.
+/// How a frame is made; every choice gives the same picture, but for local shading: it has 8 bits a channel, and
+/// coplanar surfaces of different ranks show the brighter colour.
 struct FrameSettings {
   std::optional<Distribution> distribution;  ///< none: chosen by plan_frame
   int groups = 0;                            ///< of Hybrid; 0: default_groups
@@ -55,6 +56,10 @@ struct FrameTimes {
   double raster_ms = 0.0;
   double composite_ms = 0.0;
 };
+
+/// Makes what a frame needs and successive frames share: geometry on the GPU, the ray scene, the group's communicator.
+/// Collective. Left out, the first frame does it and takes the longer for it.
+void prepare(Session& session, const FramePlan& plan);
 
 /// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);

@@ -56,17 +56,20 @@ std::string read_to_end(int pipe) {
   }
 }
 
-bool on_path(const char* program) {
-  const char* const path = std::getenv("PATH");
-  for (std::string_view rest = path == nullptr ? "" : path; !rest.empty();) {
-    const std::size_t end = std::min(rest.find(':'), rest.size());
-    if (::access((std::filesystem::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
-  return false;
-}
-
 }  // namespace
+
+std::optional<std::filesystem::path> find_on_path(std::string_view program) {
+  const char* const path = std::getenv("PATH");
+  std::string_view rest = path == nullptr ? "" : path;
+  while (!rest.empty()) {
+    const std::string_view folder = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
+    std::filesystem::path candidate = std::filesystem::path(folder.empty() ? "." : folder) / program;
+    std::error_code error;
+    if (std::filesystem::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0) return candidate;
+  }
+  return std::nullopt;
+}
 
 bool inside_mpi_job() {
   for (const char* const name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"}) {
@@ -81,7 +84,7 @@ std::string program_path() {
 
 int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
                 const std::map<std::string, std::string>& extra_env) {
-  if (!on_path("mpiexec")) {
+  if (!find_on_path("mpiexec")) {
     throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
                 "install openmpi-bin, or run with --ranks 1");
   }
@@ -109,6 +112,9 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   int status = 0;
   while (::waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
+    throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hpr {
@@ -15,6 +18,9 @@ namespace hpr {
 /// ended it). The job ends when this process does. Throws Error (Io) when mpiexec cannot be started.
 int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout = nullptr,
                 const std::map<std::string, std::string>& extra_env = {});
+
+/// The first executable file of this name on the PATH.
+[[nodiscard]] std::optional<std::filesystem::path> find_on_path(std::string_view program);
 
 /// The path of the running program.
 [[nodiscard]] std::string program_path();

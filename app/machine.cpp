@@ -1,10 +1,9 @@
 #include "app/machine.h"
 
-#include <algorithm>
 #include <fstream>
-#include <thread>
 
 #include "cluster/mpi_communicator.h"
+#include "core/parallel.h"
 
 namespace hpr {
 namespace {
@@ -22,7 +21,7 @@ std::string cpu_model() {
 }  // namespace
 
 Machine this_machine() {
-  return {cpu_model(), std::max(1, static_cast<int>(std::thread::hardware_concurrency())), mpi_version()};
+  return {cpu_model(), usable_cores(), mpi_version()};
 }
 
 }  // namespace hpr

@@ -18,8 +18,10 @@
 #include <thread>
 
 #include "app/doctor.h"
+#include "app/launcher.h"
 #include "core/error.h"
 #include "core/names.h"
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "image/image_io.h"
 #include "rt/embree_compat.h"
@@ -50,11 +52,7 @@ std::string proc_value(const char* path, std::string_view key) {
 
 Finding check_cpu() {
   const std::string model = proc_value("/proc/cpuinfo", "model name");
-  cpu_set_t allowed;
-  CPU_ZERO(&allowed);
-  const int cores = ::sched_getaffinity(0, sizeof(allowed), &allowed) == 0
-                        ? CPU_COUNT(&allowed)
-                        : static_cast<int>(std::thread::hardware_concurrency());
+  const int cores = usable_cores();
   const bool avx2 = __builtin_cpu_supports("avx2") != 0;
   const char* const isa = __builtin_cpu_supports("avx512f") != 0 ? "AVX-512" : avx2 ? "AVX2" : "SSE";
   std::string detail =
@@ -92,19 +90,6 @@ Finding check_embree() {
                         wide   ? 16
                         : half ? 8
                                : 4));
-}
-
-std::optional<std::filesystem::path> find_on_path(const char* program) {
-  const char* const path = std::getenv("PATH");
-  std::string_view rest = path == nullptr ? "" : path;
-  while (!rest.empty()) {
-    const std::string_view folder = rest.substr(0, rest.find(':'));
-    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
-    std::filesystem::path candidate = std::filesystem::path(folder.empty() ? "." : folder) / program;
-    std::error_code error;
-    if (std::filesystem::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0) return candidate;
-  }
-  return std::nullopt;
 }
 
 /// The first line `command` prints, without what follows a line break; empty when it fails.

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <new>
+#include <system_error>
 
 #include "app/command.h"
 #include "app/report_error.h"
@@ -21,7 +22,9 @@ void declare_globals(CLI::App& app, Globals& globals) {
   group(app.add_flag_callback(
       "-q,--quiet", [&] { globals.verbosity = -1; }, "errors only"));
   group(app.add_flag("-v,--verbose", globals.verbosity, "say more; twice: from all ranks"));
-  group(app.add_option("--ranks", globals.ranks, "MPI ranks; hpr starts mpiexec itself")->check(CLI::Range(1, 4096)));
+  group(app.add_option("--ranks", globals.ranks, "MPI ranks; hpr starts mpiexec itself")
+            ->check(CLI::Range(1, 4096))
+            ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast));
   group(app.add_option("--threads", globals.threads, "threads of one rank (default: cores / ranks of a host)")
             ->check(CLI::Range(1, 1024)));
   group(app.add_option("--seed", globals.seed, "of everything random")->capture_default_str());
@@ -181,10 +184,18 @@ int main(int argc, char** argv) {
   // A reader that goes away (hpr ... | head) shows as a failed write, not as a killed rank.
   std::signal(SIGPIPE, SIG_IGN);
   try {
-    return static_cast<int>(hpr::run(std::vector<std::string>(argv + 1, argv + argc)));
+    const hpr::ExitCode code = hpr::run(std::vector<std::string>(argv + 1, argv + argc));
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+      throw hpr::Error(hpr::ExitCode::Io, "cannot write to standard output",
+                       "free some space, or see who closed the pipe");
+    }
+    return static_cast<int>(code);
   } catch (const hpr::Error& error) {
     hpr::print_error(error);
     return static_cast<int>(error.code());
+  } catch (const std::system_error& error) {  // how fmt reports a failed print
+    hpr::print_error({hpr::ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});
+    return static_cast<int>(hpr::ExitCode::Io);
   } catch (const std::bad_alloc&) {
     hpr::print_error({hpr::ExitCode::Limit, "out of memory", "use a smaller picture or scene"});
     return static_cast<int>(hpr::ExitCode::Limit);

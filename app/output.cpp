@@ -1,5 +1,6 @@
 #include "app/output.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <cmath>
@@ -42,6 +43,17 @@ std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_b
   return owners;
 }
 
+void check_size(Size size, const Globals& globals) {
+  const ImageLimits largest{.side = 1 << 20, .pixels = std::uint64_t{1} << 31U};
+  const ImageLimits limits = globals.limit_image.empty() ? largest : globals.scene_limits().image;
+  if (size.width > limits.side || size.height > limits.side || size.area() > limits.pixels) {
+    throw Error(ExitCode::Limit,
+                fmt::format("a picture of {}x{} pixels is beyond the limit of {} a side and {} in all", size.width,
+                            size.height, limits.side, limits.pixels),
+                "draw a smaller one, or raise --limit-image");
+  }
+}
+
 TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops) {
   const auto gain = static_cast<float>(std::exp2(exposure_stops));
   TileLayer<Rgba8> display(frame.radiance.layout());
@@ -55,24 +67,23 @@ TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_sto
   return display;
 }
 
-RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, double frame_ms) {
+RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, const FrameCost& cost) {
   CountingCommunicator& comm = session.comm();
   RunStats stats;
-  stats.bytes_sent = session.bytes_sent();  // before gathering adds its own
   stats.ranks = comm.size();
   stats.plan = plan.explained;
   stats.passes = plan_passes(session.scene(), plan.rays);
-  stats.ms = slowest(comm, frame_ms);
+  stats.ms = slowest(comm, cost.ms);
   stats.times.push_back({"raster", slowest(comm, times.raster_ms)});
   stats.times.push_back({"composite", slowest(comm, times.composite_ms)});
   if (plan.lit || plan.shading == Shading::Local) {
     const Lighter& lighter = session.lighter(plan.rays);
-    for (const PassTime& pass : lighter.times()) stats.times.push_back({pass.name, slowest(comm, pass.ms)});
+    // The lighter adds up what its threads took; a frame waits for them side by side.
+    for (const PassTime& pass : lighter.times())
+      stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads())});
     for (const RayCounts& counts : all_gather_value(comm, lighter.counts())) stats.rays += counts;
   }
-  std::size_t bytes = 0;
-  for (const std::size_t sent : all_gather_value(comm, stats.bytes_sent)) bytes += sent;
-  stats.bytes_sent = bytes;
+  for (const std::size_t sent : all_gather_value(comm, cost.bytes_sent)) stats.bytes_sent += sent;
   stats.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
   return stats;
 }

@@ -27,15 +27,19 @@ template <typename Pixel>
   for (std::size_t block = 0; block < blocks.views.size(); ++block) {
     if (blocks.screen_of[block] != screen) continue;
     const View& view = blocks.views[block];
+    if (view.size() == view.screen) return to_image(layer, block);
     if (image.size() != view.screen) image = Image<Pixel>(view.screen);
     const Image<Pixel> part = to_image(layer, block);
-    if (part.size() == image.size()) return part;
     for (int y = 0; y < part.height(); ++y) {
       std::ranges::copy(part.row(y), image.row(view.block.y0 + y).begin() + view.block.x0);
     }
   }
   return image;
 }
+
+/// Throws Error (Limit) when a picture or screen is beyond --limit-image, or what one can be without it: 2^20 a side,
+/// 2^31 pixels.
+void check_size(Size size, const Globals& globals);
 
 /// A frame's tiles as display colours,
 /// `exposure_stops` brighter.
@@ -48,13 +52,20 @@ struct RunStats {
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
   RayCounts rays;                                ///< summed over ranks
-  std::size_t bytes_sent = 0;                    ///< summed over ranks
+  std::size_t bytes_sent = 0;                    ///< by the frame, on its way to the screens too; summed over ranks
   std::vector<std::uint64_t> memory_peak_bytes;  ///< per rank
   int ranks = 1;
 };
 
+/// One frame on this rank, from its first triangle to its last tile on a screen.
+struct FrameCost {
+  double ms = 0.0;
+  std::size_t bytes_sent = 0;
+};
+
 /// Collective. What the session's last frame took, on every rank.
-[[nodiscard]] RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, double frame_ms);
+[[nodiscard]] RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times,
+                                    const FrameCost& cost);
 
 void write_stats(const std::filesystem::path& path, const RunStats& stats);
 

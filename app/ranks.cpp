@@ -16,6 +16,7 @@
 #include "cluster/local_communicator.h"
 #include "cluster/mpi_communicator.h"
 #include "core/log.h"
+#include "core/parallel.h"
 
 namespace hpr {
 namespace {
@@ -78,8 +79,9 @@ HostShare host_share(Communicator& comm, const Globals& globals) {
     if (rank < comm.rank()) ++share.local_rank;
     ++ranks_here;
   }
-  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  share.threads = globals.threads > 0 ? globals.threads : std::max(1, cores / ranks_here);
+  // A launcher may already have given this rank cores of its own; else the ranks of a host share all of them.
+  const int online = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  share.threads = globals.threads > 0 ? globals.threads : std::clamp(online / ranks_here, 1, usable_cores());
   return share;
 }
 

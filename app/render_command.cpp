@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "app/launcher.h"
 #include "app/output.h"
 #include "app/render_options.h"
 #include "cluster/scene_distribution.h"
@@ -33,26 +34,16 @@ class RenderCommand final : public Command {
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
     const Size size{extent->first, extent->second};
     check_size(size, globals);
-    check_outputs(globals);
+    if (!inside_mpi_job()) check_outputs(globals);
     const FrameSettings settings = options_.settings(globals);
     return run_ranks(globals, [&](Communicator& comm) {
+      if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(globals); });
       Session session(comm, globals, [&] { return load_scene(source_, globals.scene_limits()); });
       return draw(session, settings, size);
     });
   }
 
  private:
-  static void check_size(Size size, const Globals& globals) {
-    const ImageLimits defaults{.side = 1 << 20, .pixels = std::uint64_t{1} << 31U};
-    const ImageLimits limits = globals.limit_image.empty() ? defaults : globals.scene_limits().image;
-    if (size.width > limits.side || size.height > limits.side || size.area() > limits.pixels) {
-      throw Error(ExitCode::Limit,
-                  fmt::format("a picture of {}x{} pixels is beyond the limit of {} a side and {} in all", size.width,
-                              size.height, limits.side, limits.pixels),
-                  "draw a smaller one, or raise --limit-image");
-    }
-  }
-
   void check_outputs(const Globals& globals) const {
     if (output_.empty() && raw_.empty() && options_.stats.empty() && !options_.explain) {
       throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");
@@ -60,6 +51,13 @@ class RenderCommand final : public Command {
     if (!output_.empty() && !output_.ends_with(".png") && !output_.ends_with(".exr")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", output_),
                   "name a .png or .exr file");
+    }
+    if (!raw_.empty() && options_.shading == "local") {
+      throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
+                  "use --shading deferred");
+    }
+    if (output_.ends_with(".exr") && options_.shading == "local") {
+      log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those", output_);
     }
     for (const std::string& path : {output_, raw_, options_.stats}) {
       if (!path.empty()) check_writable(path, globals.force);
@@ -77,7 +75,9 @@ class RenderCommand final : public Command {
     }
     if (output_.empty() && raw_.empty() && options_.stats.empty()) return ExitCode::Done;
 
+    prepare(session, plan);
     const Stopwatch watch;
+    const std::size_t sent_before = session.comm().bytes_sent();
     FrameTimes times;
     Frame frame = make_frame(session, plan, blocks.views, &times);
     const std::vector<int> to_root(blocks.views.size(), 0);
@@ -90,8 +90,7 @@ class RenderCommand final : public Command {
       assemble<Rgb>(session.comm(), frame.radiance, frame.owned, to_root);
     }
     if (!raw_.empty()) assemble<Key>(session.comm(), *frame.keys, frame.owned, to_root);
-    const double frame_ms = watch.ms();
-    const RunStats stats = gather_stats(session, plan, times, frame_ms);
+    const RunStats stats = gather_stats(session, plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;
       if (!raw_.empty()) write_file_atomically(raw_, std::as_bytes(join_blocks(*frame.keys, blocks, 0).pixels()));

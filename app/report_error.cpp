@@ -14,7 +14,7 @@ namespace {
 std::string one_line(std::string_view text) {
   std::string line(text);
   std::ranges::replace(line, '\n', ' ');
-  return line;
+  return printable(line, 2000);
 }
 
 }  // namespace

@@ -7,13 +7,15 @@
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/log.h"
+#include "core/names.h"
 
 namespace hpr {
 
 Session::Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load)
     : comm_(comm), share_(host_share(comm, globals)), scene_(distribute_scene(comm_, load)) {
   if (comm_.rank() == 0) {
-    for (const std::string& warning : scene_.warnings) log::warning("{}: {}", scene_.name, warning);
+    for (const std::string& warning : scene_.warnings)
+      log::warning("{}: {}", printable(scene_.name), printable(warning, 400));
   }
   agree_on_failure(comm_, [&] {
     gl_ = make_gl_context({.backend = globals.backend,
@@ -57,16 +59,13 @@ Lighter& Session::lighter(const RaySettings& settings) {
   return *lighter_;
 }
 
-CountingCommunicator& Session::group(std::span<const int> members) {
+Communicator& Session::group(std::span<const int> members) {
   if (static_cast<int>(members.size()) == comm_.size()) return comm_;
-  if (!group_.counting || !std::ranges::equal(members, group_.members)) {
-    if (group_.counting) bytes_of_past_groups_ += group_.counting->bytes_sent();
-    group_.counting.reset();
+  if (!group_.comm || !std::ranges::equal(members, group_.members)) {
     group_.comm = comm_.subset(members);
-    group_.counting = std::make_unique<CountingCommunicator>(*group_.comm);
     group_.members.assign(members.begin(), members.end());
   }
-  return *group_.counting;
+  return *group_.comm;
 }
 
 TileLayer<Key>& Session::keys(const FrameLayout& layout) {
@@ -76,10 +75,6 @@ TileLayer<Key>& Session::keys(const FrameLayout& layout) {
     keys_ = TileLayer<Key>(layout);
   }
   return keys_;
-}
-
-std::size_t Session::bytes_sent() const {
-  return comm_.bytes_sent() + bytes_of_past_groups_ + (group_.counting ? group_.counting->bytes_sent() : 0);
 }
 
 }  // namespace hpr

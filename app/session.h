@@ -33,22 +33,17 @@ class Session {
   /// The lighter of these settings; kept until others are asked for.
   [[nodiscard]] Lighter& lighter(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
-  /// group.
-  [[nodiscard]] CountingCommunicator& group(std::span<const int> members);
+  /// group. What it sends counts in comm() too.
+  [[nodiscard]] Communicator& group(std::span<const int> members);
   /// A cleared layer of keys of this layout, reused from frame to frame.
   [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout);
-
-  /// Bytes this rank sent so far, to all ranks and inside its group.
-  [[nodiscard]] std::size_t bytes_sent() const;
 
  private:
   void compare_rasterizers();
 
-  /// One group's communicator and its counter.
   struct Group {
     std::vector<int> members;
     std::unique_ptr<Communicator> comm;
-    std::unique_ptr<CountingCommunicator> counting;
   };
 
   CountingCommunicator comm_;
@@ -60,7 +55,6 @@ class Session {
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<Lighter> lighter_;
   Group group_;
-  std::size_t bytes_of_past_groups_ = 0;
   TileLayer<Key> keys_;
 };
 

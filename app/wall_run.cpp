@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
 #include "cluster/collectives.h"
@@ -15,6 +16,7 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/stopwatch.h"
 #include "image/image_io.h"
 #include "walls/assemble.h"
@@ -28,29 +30,39 @@ namespace {
 /// The assembled wall is a picture to look at, not the frame: larger walls are scaled down.
 constexpr int kLargestPicture = 8192;
 
-/// Per screen the rank that shows it: the one the wall file names, else one on the screen's host, else in turn.
+/// A rank that writes pictures first loads the image module, which costs as much as encoding this many pixels.
+constexpr std::size_t kPixelsWorthAWriter = 4'000'000;
+
+/// Per screen the rank that shows it: the one the wall file names, else one on the screen's host, else any: no more
+/// ranks than the pixels keep busy, each with neighbouring screens.
 std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hosts) {
   const int ranks = static_cast<int>(hosts.size());
+  std::size_t pixels = 0;
+  for (const WallScreen& screen : wall.screens) pixels += screen.pixels.area();
+  const std::size_t writers = std::clamp<std::size_t>(pixels / kPixelsWorthAWriter, 1, hosts.size());
+
   std::vector<int> owners;
   for (std::size_t i = 0; i < wall.screens.size(); ++i) {
     const WallScreen& screen = wall.screens[i];
-    if (screen.rank >= ranks) {
-      log::warning("screen '{}' belongs to rank {}, but there are only {}: another rank shows it", screen.id,
-                   screen.rank, ranks);
+    const auto node = std::ranges::find(wall.nodes, screen.node, &WallNode::id);
+    std::vector<int> on_its_host;
+    for (int rank = 0; rank < ranks; ++rank) {
+      if (node != wall.nodes.end() && node->host == hosts[static_cast<std::size_t>(rank)]) on_its_host.push_back(rank);
     }
     if (screen.rank >= 0 && screen.rank < ranks) {
       owners.push_back(screen.rank);
-      continue;
-    }
-    const auto node = std::ranges::find(wall.nodes, screen.node, &WallNode::id);
-    std::vector<int> candidates;
-    for (int rank = 0; rank < ranks; ++rank) {
-      if (node != wall.nodes.end() && node->host == hosts[static_cast<std::size_t>(rank)]) candidates.push_back(rank);
-    }
-    if (candidates.empty()) {
-      owners.push_back(static_cast<int>(i * hosts.size() / wall.screens.size()));
+    } else if (!on_its_host.empty()) {
+      owners.push_back(on_its_host[i % on_its_host.size()]);
     } else {
-      owners.push_back(candidates[i % candidates.size()]);
+      owners.push_back(static_cast<int>(i * writers / wall.screens.size()));
+    }
+    const bool any_host = node == wall.nodes.end() || node->host == "localhost" || node->host == "*";
+    if (screen.rank < 0 && on_its_host.empty() && !any_host) {
+      log::warning("no rank runs on host '{}' of screen '{}': rank {} shows it", node->host, screen.id, owners.back());
+    }
+    if (screen.rank >= ranks) {
+      log::warning("screen '{}' belongs to rank {}, but there are only {}: rank {} shows it", screen.id, screen.rank,
+                   ranks, owners.back());
     }
   }
   return owners;
@@ -89,11 +101,12 @@ class WallDriver {
   [[nodiscard]] const FramePlan& plan() const { return plan_; }
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
   [[nodiscard]] const FrameTimes& times() const { return times_; }
-  [[nodiscard]] double last_ms() const { return last_ms_; }
+  [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
 
   /// Collective. Draws one frame and shows each screen on the rank it belongs to.
   void draw(std::uint64_t number) {
     const Stopwatch watch;
+    const std::size_t sent_before = session_.comm().bytes_sent();
     const Frame frame = make_frame(session_, plan_, blocks_.views, &times_);
     TileLayer<Rgba8> display = to_display(frame, session_.threads(), run_.options.exposure);
     assemble<Rgba8>(session_.comm(), display, frame.owned, block_owners(blocks_, shown_by_));
@@ -102,7 +115,7 @@ class WallDriver {
       pictures_.push_back(shown_by_[screen] == session_.comm().rank() ? join_blocks(display, blocks_, screen)
                                                                       : Image<Rgba8>());
     }
-    last_ms_ = watch.ms();
+    last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
     agree_on_failure(session_.comm(), [&] { show(number); });
     record(number);
   }
@@ -119,7 +132,7 @@ class WallDriver {
         comm.receive(std::as_writable_bytes(pictures_[screen].pixels()), from);
       }
     }
-    return pictures_;
+    return std::move(pictures_);
   }
 
  private:
@@ -144,7 +157,7 @@ class WallDriver {
         hashes[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
       }
     }
-    const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_ms_));
+    const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
     session_.comm().reduce_max(hashes, 0);  // all but the owner's are 0
     FrameRecord frame{number, slowest, strategy(), {}};
     for (std::size_t screen = 0; screen < hashes.size(); ++screen) {
@@ -169,11 +182,11 @@ class WallDriver {
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
   RunManifest manifest_;
   FrameTimes times_;
-  double last_ms_ = 0.0;
+  FrameCost last_cost_;
 };
 
 void print_summary(const RunStats& stats, const Wall& wall, const Scene& scene) {
-  fmt::print("scene      {}: {} triangles, {} instances, {} lights\n", scene.name, scene.triangles,
+  fmt::print("scene      {}: {} triangles, {} instances, {} lights\n", printable(scene.name), scene.triangles,
              scene.instances.size(), scene.lights.size());
   std::size_t pixels = 0;
   for (const WallScreen& screen : wall.screens) pixels += screen.pixels.area();
@@ -204,19 +217,28 @@ void write_results(const WallRun& run, const Wall& wall, const WallDriver& drive
 ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
                Session& session) {
   const bool speaks = session.comm().rank() == 0;
+  const auto hashes = all_gather_value(session.comm(), wall.hash);
+  for (std::size_t rank = 0; rank < hashes.size(); ++rank) {
+    if (hashes[rank] != hashes[0]) {
+      throw Error(ExitCode::BadInput, fmt::format("rank {} read another '{}' than rank 0", rank, run.wall),
+                  "give every host the same wall file");
+    }
+  }
   WallDriver driver(run, wall, settings, globals, session);
   if (run.options.explain && speaks) {
     for (const std::string& line : driver.plan().explained) fmt::print("{}\n", line);
   }
+  prepare(session, driver.plan());
   {
     Progress progress(speaks ? globals.progress : "none", "frame", static_cast<std::size_t>(run.frames));
     for (int frame = 0; frame < run.frames; ++frame) {
       driver.draw(static_cast<std::uint64_t>(frame));
-      progress.step(fmt::format("{:.1f} ms", driver.last_ms()));
+      progress.step(fmt::format("{:.1f} ms", driver.last_cost().ms));
     }
   }
-  const RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_ms());
-  const std::vector<Image<Rgba8>> pictures = driver.collect_pictures();
+  const RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
+  std::vector<Image<Rgba8>> pictures;
+  if (run.display == "file" || !run.picture.empty()) pictures = driver.collect_pictures();
   agree_on_failure(session.comm(), [&] {
     if (speaks) write_results(run, wall, driver, stats, pictures);
   });
@@ -234,12 +256,6 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   if (run.display == "file" && run.folder.empty()) {
     throw Error(ExitCode::Usage, "the file display needs a folder", "name one with -o DIR, or use --display none");
   }
-  // Made here to be checked: an unknown display or a folder that may not be written is found before any rank starts.
-  (void)make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
-  if (run.display == "file") {
-    check_writable(std::filesystem::path(run.folder) / "wall.png", globals.force);
-    check_writable(std::filesystem::path(run.folder) / "manifest.json", globals.force);
-  }
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),
@@ -248,6 +264,13 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
     check_writable(run.picture, globals.force);
   }
   if (!run.options.stats.empty()) check_writable(run.options.stats, globals.force);
+  // Made to be checked, and last, as it may make its folder: an unknown display or a folder that may not be written is
+  // found before any rank starts.
+  (void)make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
+  if (run.display == "file") {
+    check_writable(std::filesystem::path(run.folder) / "wall.png", globals.force);
+    check_writable(std::filesystem::path(run.folder) / "manifest.json", globals.force);
+  }
 }
 
 }  // namespace
@@ -256,8 +279,10 @@ ExitCode run_wall(const WallRun& run, const Globals& globals) {
   Wall wall = load_wall(run.wall);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
   const FrameSettings settings = run.options.settings(globals);
-  check_outputs(run, wall, globals);
+  for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
+  if (!inside_mpi_job()) check_outputs(run, wall, globals);
   return run_ranks(globals, [&](Communicator& comm) {
+    if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(run, wall, globals); });
     Session session(comm, globals, [&] { return load_scene(run.scene, globals.scene_limits()); });
     return drive(run, wall, settings, globals, session);
   });

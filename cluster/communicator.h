@@ -39,7 +39,8 @@ class Communicator {
   virtual void reduce_max(std::span<std::uint64_t> values, int root) = 0;
 
   /// Collective over `members` only (ascending ranks, this one among them): a communicator of just these, in which
-  /// members[i] is rank i. Its messages cannot meet this one's. This one must outlive it.
+  /// members[i] is rank i. Its messages cannot meet this one's. This one must outlive it. Making it
+  /// is the one wait without a time limit under MPI.
   [[nodiscard]] virtual std::unique_ptr<Communicator> subset(std::span<const int> members) = 0;
 };
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 #include "core/check.h"
@@ -164,7 +165,12 @@ void run_local_ranks(int size, const std::function<void(Communicator&)>& body, s
   };
   {
     std::vector<std::jthread> others;
-    for (int rank = 1; rank < size; ++rank) others.emplace_back(run, rank);
+    try {
+      for (int rank = 1; rank < size; ++rank) others.emplace_back(run, rank);
+    } catch (const std::system_error& error) {
+      office.close();  // those that run already must not wait for those that never will
+      throw Error(ExitCode::Limit, fmt::format("cannot start {} threads: {}", size, error.what()), "use fewer ranks");
+    }
     run(0);  // on the caller's thread: a single rank starts no thread, and a GL context stays where it was made
   }
   if (first_failure) std::rethrow_exception(first_failure);

@@ -4,6 +4,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <exception>
 #include <string>
 
 #include "core/check.h"
@@ -46,9 +47,9 @@ MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nano
 }
 
 MpiCommunicator::~MpiCommunicator() {
-  // After a failed wait MPI may still hold buffers that are gone by now; freeing would let it write to them. The job
+  // After a failed call MPI may still hold buffers that are gone by now; freeing would let it write to them. The job
   // ends anyway.
-  if (!abandoned_) MPI_Comm_free(&comm_);
+  if (!abandoned_ && std::uncaught_exceptions() == exceptions_at_birth_) MPI_Comm_free(&comm_);
 }
 
 template <typename Done>

@@ -2,6 +2,7 @@
 
 #include <mpi.h>
 
+#include <exception>
 #include <string>
 
 #include "cluster/communicator.h"
@@ -48,6 +49,7 @@ class MpiCommunicator final : public Communicator {
   int rank_ = 0;
   int size_ = 1;
   std::chrono::nanoseconds hang_timeout_;
+  int exceptions_at_birth_ = std::uncaught_exceptions();
   std::size_t part_bytes_;
   bool abandoned_ = false;  ///< a wait was given up with requests under way
 };

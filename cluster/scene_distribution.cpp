@@ -74,6 +74,13 @@ std::vector<std::byte> on_root(Communicator& comm, const std::function<std::vect
   return result;
 }
 
+void check_on_root(Communicator& comm, const std::function<void()>& check) {
+  (void)on_root(comm, [&] {
+    check();
+    return std::vector<std::byte>{};
+  });
+}
+
 void agree_on_failure(Communicator& comm, const std::function<void()>& work) {
   for (const auto& verdict : all_gather(comm, pack(failure_of(work)))) throw_if_packed(verdict);
 }
@@ -85,6 +92,7 @@ Scene distribute_scene(Communicator& comm, const std::function<Scene()>& load) {
     return comm.size() > 1 ? to_bytes(*loaded) : std::vector<std::byte>{};
   });
   if (comm.size() == 1) return std::move(*loaded);
+  loaded.reset();
   // Rank 0 too goes on with what was sent, not with what it loaded.
   Scene scene = scene_from_bytes(bytes);
   const auto hashes = all_gather_value(comm, content_hash(scene));

@@ -16,7 +16,10 @@ namespace hpr {
 /// rank, so that no rank waits for one that gave up.
 [[nodiscard]] std::vector<std::byte> on_root(Communicator& comm, const std::function<std::vector<std::byte>()>& work);
 
-/// Collective. Every rank passes its failure, or none; when any has one, all throw the lowest rank's.
+/// Collective. Runs `check` on rank 0 alone; when it fails, every rank throws its Error.
+void check_on_root(Communicator& comm, const std::function<void()>& check);
+
+/// Collective. Runs `work` on every rank; when it fails on any, all throw the lowest rank's Error.
 void agree_on_failure(Communicator& comm, const std::function<void()>& work);
 
 }  // namespace hpr

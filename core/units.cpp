@@ -36,7 +36,7 @@ std::optional<double> with_unit(std::string_view text, const std::array<Unit, N>
 
 std::optional<std::uint64_t> parse_bytes(std::string_view text) {
   constexpr double kKi = 1024.0;
-  constexpr std::array<Unit, 14> kUnits{{{"", 1},
+  constexpr std::array<Unit, 15> kUnits{{{"", 1},
                                          {"B", 1},
                                          {"K", kKi},
                                          {"KiB", kKi},
@@ -49,6 +49,7 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
                                          {"GiB", kKi * kKi * kKi},
                                          {"GB", 1e9},
                                          {"T", kKi * kKi * kKi * kKi},
+                                         {"TB", 1e12},
                                          {"TiB", kKi * kKi * kKi * kKi}}};
   const auto bytes = with_unit(text, kUnits);
   if (!bytes || *bytes > 9e18) return std::nullopt;

@@ -47,7 +47,8 @@ void check_limits(const OIIO::ImageSpec& spec, const std::string& name, const Im
                 "repair the file");
   }
   const auto pixels = static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height);
-  if (spec.width > limits.side || spec.height > limits.side || pixels > limits.pixels || spec.nchannels > 64) {
+  if (spec.width > limits.side || spec.height > limits.side || pixels > limits.pixels || spec.nchannels > 64 ||
+      pixels * static_cast<std::uint64_t>(spec.nchannels) > 4 * limits.pixels) {
     throw Error(ExitCode::Limit,
                 fmt::format("{}: {} x {} pixels of {} channels exceed the limit of {} a side and {} in all", name,
                             spec.width, spec.height, spec.nchannels, limits.side, limits.pixels),

@@ -19,8 +19,8 @@ void* open_module() {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
   const auto beside = program.parent_path().parent_path() / "lib" / "libhpr_imageio.so";
-  if (!error && std::filesystem::exists(beside, error)) return ::dlopen(beside.c_str(), RTLD_NOW | RTLD_LOCAL);
-  return ::dlopen("libhpr_imageio.so", RTLD_NOW | RTLD_LOCAL);
+  if (!error && std::filesystem::exists(beside, error)) return ::dlopen(beside.c_str(), RTLD_LAZY | RTLD_LOCAL);
+  return ::dlopen("libhpr_imageio.so", RTLD_LAZY | RTLD_LOCAL);
 }
 
 const ImageCodec& codec() {

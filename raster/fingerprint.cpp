@@ -21,9 +21,10 @@ Scene fixed_scene() {
   std::uint32_t state = 1;
   for (std::uint32_t triangle = 0; triangle < 400; ++triangle) {
     const float scale = 4.0F / static_cast<float>(1U << (triangle % 10U));
-    const glm::vec3 center(next(state), next(state), next(state));
+    // Braces: the order of the three calls must not be the compiler's choice.
+    const glm::vec3 center{next(state), next(state), next(state)};
     for (int corner = 0; corner < 3; ++corner) {
-      mesh.positions.push_back(center + scale * glm::vec3(next(state), next(state), next(state)));
+      mesh.positions.push_back(center + scale * glm::vec3{next(state), next(state), next(state)});
       mesh.normals.emplace_back(0.0F, 0.0F, 1.0F);
     }
     mesh.triangles.push_back(glm::uvec3(0U, 1U, 2U) + 3U * triangle);

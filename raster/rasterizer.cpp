@@ -67,8 +67,8 @@ class Rasterizer::Implementation {
     describe_vertices(gl);
     check_gl(gl, "uploading the scene");
     // From here on only boxes are needed of it.
-    geometry_.vertices = {};
-    geometry_.triangles = {};
+    std::vector<Vertex>().swap(geometry_.vertices);  // assigning {} would keep the memory
+    std::vector<glm::uvec3>().swap(geometry_.triangles);
   }
 
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {

@@ -86,7 +86,8 @@ class Lighter {
 };
 
 /// `--shading local`: lights `tiles` of `keys` and puts the display colour where the surface id stood, so that the
-/// nearest key carries its pixel's colour. Pixels without a key stay so.
+/// nearest key carries its pixel's colour. Pixels without a key stay so. Of equal depths on different ranks the larger
+/// colour word wins, so coplanar surfaces may look different with another number of ranks.
 void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
                  std::span<const std::size_t> tiles);
 

@@ -173,6 +173,7 @@ std::optional<double> GltfItem::clamped(const char* key, double low, double high
   if (!value->is_number()) fail(key, fmt::format("must be a number, not {}", shown(*value)));
   const std::string before = shown(*value);
   if (clamp_value(*value, low, high)) warn(key, fmt::format("is {}; taken as {}", before, shown(*value)));
+  *value = value->get<double>();  // tinygltf keeps the integers of extensions in 32 bits
   return value->get<double>();
 }
 

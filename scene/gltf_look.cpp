@@ -94,6 +94,9 @@ Material GltfLook::material(const tinygltf::Material& from, const std::string& w
   to.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::Mask
                   : from.alphaMode == "BLEND" ? AlphaMode::Blend
                                               : AlphaMode::Opaque;
+  if (to.alpha_mode != AlphaMode::Opaque) {
+    data_.context().warn("", "alpha masks and blending are not drawn yet: surfaces are opaque");
+  }
   to.alpha_cutoff = static_cast<float>(from.alphaCutoff);
   to.double_sided = from.doubleSided;
   if (const auto* strength = extension(from.extensions, "KHR_materials_emissive_strength")) {
@@ -103,6 +106,7 @@ Material GltfLook::material(const tinygltf::Material& from, const std::string& w
     to.transmission = static_cast<float>(number_in(*transmission, "transmissionFactor", 0.0));
     if (transmission->Has("transmissionTexture")) data_.context().warn("", "transmission textures are ignored");
   }
+  if (to.transmission > 0.0F) data_.context().warn("", "transmission is not drawn yet: clear surfaces look dark");
   if (const auto* ior = extension(from.extensions, "KHR_materials_ior")) {
     to.ior = static_cast<float>(number_in(*ior, "ior", 1.5));
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -95,12 +96,6 @@ std::size_t utf8_length(std::string_view text) {
   return 0;
 }
 
-std::string line_of(std::string_view json, std::size_t offset) {
-  std::size_t line = 1;
-  for (std::size_t i = 0; i < offset; ++i) line += json[i] == '\n' ? 1U : 0U;
-  return fmt::format("line {}", line);
-}
-
 }  // namespace
 
 void scan_json(std::string_view json, GltfContext& context) {
@@ -113,11 +108,20 @@ void scan_json(std::string_view json, GltfContext& context) {
   bool key_follows = false;
 
   std::size_t i = 0;
+  // Lines are counted on from the last complaint: a file may hold a million of them.
+  std::size_t counted = 0;
+  std::size_t line = 1;
+  const auto here = [&] {
+    const std::string_view passed = json.substr(counted, i - counted);
+    line += static_cast<std::size_t>(std::ranges::count(passed, '\n'));
+    counted = i;
+    return fmt::format("line {}", line);
+  };
   while (i < json.size()) {
     const char c = json[i];
     if (c == '{' || c == '[') {
       if (levels.size() == kGltfJsonDepth) {
-        context.fail(line_of(json, i), fmt::format("the JSON nests deeper than {} levels", kGltfJsonDepth),
+        context.fail(here(), fmt::format("the JSON nests deeper than {} levels", kGltfJsonDepth),
                      "remove the nesting; glTF needs about ten levels");
       }
       levels.push_back({c == '{', {}});
@@ -136,14 +140,14 @@ void scan_json(std::string_view json, GltfContext& context) {
         }
         const std::size_t length = utf8_length(json.substr(i));
         if (length == 0) {
-          context.fail(line_of(json, i), "the text is not UTF-8", "save the file as UTF-8");
+          context.fail(here(), "the text is not UTF-8", "save the file as UTF-8");
         }
         i += length;
       }
       if (i >= json.size()) return;  // the parser says that the string has no end
       const std::string_view text = json.substr(start, i - start);
       if (key_follows && !levels.back().keys.insert(text).second) {
-        context.warn(line_of(json, i), fmt::format("the key \"{}\" stands twice in one object", printable(text)));
+        context.warn(here(), fmt::format("the key \"{}\" stands twice in one object", printable(text)));
       }
       key_follows = false;
     }

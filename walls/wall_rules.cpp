@@ -98,10 +98,10 @@ class Linker {
   }
 
   void check_ranks() {
-    const auto ranks_of = [](int sum, const DraftNode& n) { return sum + n.node.ranks; };
+    const auto ranks_of = [](std::int64_t sum, const DraftNode& n) { return sum + n.node.ranks; };
     const bool all_counted =
         !draft_.nodes.empty() && std::ranges::all_of(draft_.nodes, [](const DraftNode& n) { return n.node.ranks > 0; });
-    const int ranks = std::accumulate(draft_.nodes.begin(), draft_.nodes.end(), 0, ranks_of);
+    const std::int64_t ranks = std::accumulate(draft_.nodes.begin(), draft_.nodes.end(), std::int64_t{0}, ranks_of);
     std::map<int, const DraftWindow*> owners;
     for (const DraftWindow& draft : draft_.windows) {
       const int rank = draft.window.rank;
