@@ -183,8 +183,9 @@ void RayScene::Embree::add_instance(const Instance& instance, unsigned int id, R
   const glm::dvec3 place = space.from_world(glm::dvec3(instance.to_world[3]));
   for (int column = 0; column < 4; ++column) {
     const glm::dvec3 values = column < 3 ? glm::dvec3(instance.to_world[column]) * space.scale : place;
-    for (int row = 0; row < 3; ++row)
-      matrix[static_cast<std::size_t>(3 * column + row)] = static_cast<float>(values[row]);
+    for (int row = 0; row < 3; ++row) {
+      matrix[3 * static_cast<std::size_t>(column) + static_cast<std::size_t>(row)] = static_cast<float>(values[row]);
+    }
   }
   const OwnedGeometry geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_INSTANCE));
   rtcSetGeometryInstancedScene(geometry.get(), shared_mesh);
