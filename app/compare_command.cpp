@@ -75,6 +75,7 @@ class CompareCommand final : public Command {
  public:
   explicit CompareCommand(SceneInput scene_input) : scene_input_(std::move(scene_input)) {}
 
+  [[nodiscard]] bool collective() const override { return true; }
   [[nodiscard]] std::string_view name() const override { return "compare"; }
   [[nodiscard]] std::string_view summary() const override {
     return "measure compositing strategies against each other on the same layers, and check that they agree";

@@ -11,6 +11,7 @@ constexpr const char* kPicture = "hpr-demo.png";
 
 class DemoCommand final : public Command {
  public:
+  [[nodiscard]] bool collective() const override { return true; }
   [[nodiscard]] std::string_view name() const override { return "demo"; }
   [[nodiscard]] std::string_view summary() const override {
     return "a wall picture of a built-in scene: does this machine work?";

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "app/diff.h"
+#include "app/output.h"
 #include "core/file.h"
 #include "core/names.h"
 
@@ -32,7 +33,7 @@ class DiffCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     check_options(globals);
-    const DiffReport report = diff_files(a_, b_, tolerance_, globals.scene_limits().image);
+    const DiffReport report = diff_files(a_, b_, tolerance_, picture_limits(globals));
     if (!heat_.empty()) write_png(heat_, heat_map(report));
     const std::string text = json_ ? diff_json(report, metrics_, a_, b_, tolerance_) : diff_table(report, metrics_);
     std::fputs(text.c_str(), stdout);

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -20,7 +21,7 @@ namespace hpr {
 namespace {
 
 /// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.
-constexpr std::array<std::pair<const char*, const char*>, 8> kEnvironment{{
+constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
     {"OMPI_ALLOW_RUN_AS_ROOT", "1"},
     {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
     {"OMPI_MCA_rmaps_base_oversubscribe", "1"},
@@ -29,6 +30,7 @@ constexpr std::array<std::pair<const char*, const char*>, 8> kEnvironment{{
     {"OMPI_MCA_pml", "ob1"},
     {"OMPI_MCA_btl", "self,vader,tcp"},
     {"OMPI_MCA_orte_execute_quiet", "1"},
+    {"OMPI_MCA_opal_signal", ""},  // no stack dumps
 }};
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
@@ -69,6 +71,13 @@ std::optional<std::filesystem::path> find_on_path(std::string_view program) {
     if (std::filesystem::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0) return candidate;
   }
   return std::nullopt;
+}
+
+int launched_rank() {
+  for (const char* const name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"}) {
+    if (const char* const value = std::getenv(name); value != nullptr) return std::atoi(value);
+  }
+  return 0;
 }
 
 bool inside_mpi_job() {
@@ -113,10 +122,16 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   while (::waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
   }
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
+  // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
+  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
+    throw Error(ExitCode::Lost, fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, ::strsignal(code - 128)),
+                "the system's log may say why (out of memory?); nothing partial was left");
+  }
+  if (code == 127) {
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return code;
 }
 
 }  // namespace hpr

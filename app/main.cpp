@@ -1,5 +1,7 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 #include <hpr/version.h>
 
 #include <algorithm>
@@ -9,6 +11,7 @@
 #include <system_error>
 
 #include "app/command.h"
+#include "app/launcher.h"
 #include "app/report_error.h"
 #include "core/log.h"
 #include "core/names.h"
@@ -70,8 +73,10 @@ std::vector<std::string> long_options(const CLI::App* app) {
 /// CLI11's complaint in our form: what, and the nearest name.
 Error usage_error(const CLI::App& app, const std::vector<std::string>& words, const CLI::ParseError& error) {
   const CLI::App* const context = deepest(&app, words);
-  std::string command = "hpr";
-  if (context != &app) command += " " + context->get_name();
+  std::string command = context->get_name();
+  for (const CLI::App* above = context->get_parent(); above != nullptr; above = above->get_parent()) {
+    command = above->get_name() + " " + command;
+  }
   const std::string help = fmt::format("see '{} --help'", command);
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     const auto known = long_options(context);
@@ -132,7 +137,7 @@ ExitCode run(const std::vector<std::string>& words) {
     std::vector<std::string> reversed(parsed.rbegin(), parsed.rend());  // CLI11 takes them last first
     app.parse(reversed);
   } catch (const CLI::Success& done) {  // --help, --version
-    app.exit(done);
+    if (launched_rank() == 0) app.exit(done);
     return ExitCode::Done;
   } catch (const CLI::ParseError& error) {
     throw usage_error(app, parsed, error);
@@ -144,7 +149,8 @@ ExitCode run(const std::vector<std::string>& words) {
   (void)globals.scene_limits();  // malformed sizes and durations are found before any work
   (void)globals.hang_limit();
   for (const auto& command : commands) {
-    if (app.got_subcommand(std::string(command->name()))) return command->run(globals);
+    if (!app.got_subcommand(std::string(command->name()))) continue;
+    return command->collective() || launched_rank() == 0 ? command->run(globals) : ExitCode::Done;
   }
   return ExitCode::Usage;
 }
@@ -183,6 +189,10 @@ std::chrono::nanoseconds Globals::hang_limit() const {
 int main(int argc, char** argv) {
   // A reader that goes away (hpr ... | head) shows as a failed write, not as a killed rank.
   std::signal(SIGPIPE, SIG_IGN);
+  // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
+  for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(standard, F_GETFD) < 0) (void)::open("/dev/null", O_RDWR);
+  }
   try {
     const hpr::ExitCode code = hpr::run(std::vector<std::string>(argv + 1, argv + argc));
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
@@ -191,7 +201,8 @@ int main(int argc, char** argv) {
     }
     return static_cast<int>(code);
   } catch (const hpr::Error& error) {
-    hpr::print_error(error);
+    // What every rank of a job finds before MPI starts is said once.
+    if (hpr::launched_rank() == 0) hpr::print_error(error);
     return static_cast<int>(error.code());
   } catch (const std::system_error& error) {  // how fmt reports a failed print
     hpr::print_error({hpr::ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});

@@ -43,9 +43,13 @@ std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_b
   return owners;
 }
 
+ImageLimits picture_limits(const Globals& globals) {
+  if (!globals.limit_image.empty()) return globals.scene_limits().image;
+  return {.side = 1 << 20, .pixels = std::uint64_t{1} << 31U};
+}
+
 void check_size(Size size, const Globals& globals) {
-  const ImageLimits largest{.side = 1 << 20, .pixels = std::uint64_t{1} << 31U};
-  const ImageLimits limits = globals.limit_image.empty() ? largest : globals.scene_limits().image;
+  const ImageLimits limits = picture_limits(globals);
   if (size.width > limits.side || size.height > limits.side || size.area() > limits.pixels) {
     throw Error(ExitCode::Limit,
                 fmt::format("a picture of {}x{} pixels is beyond the limit of {} a side and {} in all", size.width,

@@ -37,6 +37,9 @@ template <typename Pixel>
   return image;
 }
 
+/// How large a picture may be that HPR itself draws or reads back: --limit-image, or 2^20 a side and 2^31 pixels.
+[[nodiscard]] ImageLimits picture_limits(const Globals& globals);
+
 /// Throws Error (Limit) when a picture or screen is beyond --limit-image, or what one can be without it: 2^20 a side,
 /// 2^31 pixels.
 void check_size(Size size, const Globals& globals);

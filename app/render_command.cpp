@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <set>
+
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/render_options.h"
@@ -18,6 +21,7 @@ namespace {
 
 class RenderCommand final : public Command {
  public:
+  [[nodiscard]] bool collective() const override { return true; }
   [[nodiscard]] std::string_view name() const override { return "render"; }
   [[nodiscard]] std::string_view summary() const override { return "draw a scene into a picture"; }
 
@@ -59,7 +63,11 @@ class RenderCommand final : public Command {
     if (output_.ends_with(".exr") && options_.shading == "local") {
       log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those", output_);
     }
+    std::set<std::filesystem::path> paths;
     for (const std::string& path : {output_, raw_, options_.stats}) {
+      if (!path.empty() && !paths.insert(std::filesystem::weakly_canonical(path)).second) {
+        throw Error(ExitCode::Usage, fmt::format("'{}' is named for two results", path), "give each its own name");
+      }
       if (!path.empty()) check_writable(path, globals.force);
     }
   }

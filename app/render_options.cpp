@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 
@@ -100,6 +101,9 @@ Camera RenderOptions::choose_camera(const Scene& scene) const {
 
 FrameSettings RenderOptions::settings(const Globals& globals) const {
   FrameSettings settings;
+  if (!std::isfinite(fov_degrees) || !std::isfinite(exposure)) {
+    throw Error(ExitCode::Usage, "--fov and --exposure take finite numbers", "write e.g. --fov 45");
+  }
   if (distribute != "auto") settings.distribution = parse_distribution(distribute);
   settings.groups = groups;
   if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();

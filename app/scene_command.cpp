@@ -96,7 +96,7 @@ class SceneCommand final : public Command {
     make_ = app.add_subcommand("make", "writes a generated scene as binary glTF");
     make_->add_option("NAME", source_, "one of `hpr scene list`, also as NAME?key=value")->required();
     make_->add_option("--triangles", triangles_, "about this many, the nearest size the generator has")
-        ->check(CLI::PositiveNumber);
+        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{4'294'967'294}));
     make_->add_option("-o", output_, "the .glb file")->required();
     make_->fallthrough();
     list_ = app.add_subcommand("list", "the scenes HPR generates and their options");

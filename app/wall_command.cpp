@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "app/output.h"
 #include "app/wall_run.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -39,9 +40,14 @@ class WallCommand final : public Command {
 
     CLI::App& run = *app.add_subcommand(std::string(run_->name()), std::string(run_->summary()));
     run_->declare(run);
-    run.callback([this] { action_ = [this](const Globals& globals) { return run_->run(globals); }; });
+    run.callback([this] {
+      runs_ = true;
+      action_ = [this](const Globals& globals) { return run_->run(globals); };
+    });
   }
 
+  /// Only `run` draws; the rest reads a file and answers.
+  [[nodiscard]] bool collective() const override { return runs_; }
   [[nodiscard]] ExitCode run(const Globals& globals) override { return action_(globals); }
 
  private:
@@ -94,6 +100,7 @@ class WallCommand final : public Command {
     }
     const auto path_of = [&](const WallScreen& screen) { return folder / (screen.id + ".png"); };
     for (const WallScreen& screen : wall.screens) check_writable(path_of(screen), globals.force);
+    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
     for (std::size_t i = 0; i < wall.screens.size(); ++i) write_png(path_of(wall.screens[i]), wall_pattern(wall, i));
     return ExitCode::Done;
   }
@@ -102,6 +109,7 @@ class WallCommand final : public Command {
   std::string output_;
   bool json_ = false;
   std::unique_ptr<Command> run_ = make_wall_run_command();
+  bool runs_ = false;
   std::function<ExitCode(const Globals&)> action_;
 };
 

@@ -292,6 +292,7 @@ namespace {
 
 class WallRunCommand final : public Command {
  public:
+  [[nodiscard]] bool collective() const override { return true; }
   [[nodiscard]] std::string_view name() const override { return "run"; }
   [[nodiscard]] std::string_view summary() const override { return "draw a scene on a wall"; }
 
@@ -301,7 +302,7 @@ class WallRunCommand final : public Command {
     app.add_option("--display", run_.display, "file or none")->capture_default_str();
     app.add_option("-o,--output", run_.folder, "folder for the pictures of the file display")->type_name("DIR");
     app.add_option("--scale", run_.scale, "of the screens' pixels, e.g. 0.25")
-        ->check(CLI::PositiveNumber)
+        ->check(CLI::Range(1e-6, 1e6))
         ->capture_default_str();
     app.add_option("--frames", run_.frames, "how many frames")->check(CLI::Range(1, 1'000'000))->capture_default_str();
     run_.options.declare(app);

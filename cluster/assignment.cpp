@@ -128,29 +128,38 @@ std::vector<Chunk> make_chunks(const Scene& scene, std::uint32_t most) {
   return chunks;
 }
 
+/// The chunks' surfaces in order of their ids, neighbours joined.
+std::vector<SurfaceRange> joined(std::span<Chunk> chunks) {
+  std::ranges::sort(chunks, {}, [](const Chunk& chunk) { return chunk.surfaces.first; });
+  std::vector<SurfaceRange> ranges;
+  for (const Chunk& chunk : chunks) {
+    if (!ranges.empty() && ranges.back().last == chunk.surfaces.first) {
+      ranges.back().last = chunk.surfaces.last;
+    } else {
+      ranges.push_back(chunk.surfaces);
+    }
+  }
+  return ranges;
+}
+
+int longest_axis(std::span<const Chunk> chunks) {
+  if (chunks.empty()) return 0;
+  glm::dvec3 low = chunks.front().center;
+  glm::dvec3 high = low;
+  for (const Chunk& chunk : chunks) {
+    low = glm::min(low, chunk.center);
+    high = glm::max(high, chunk.center);
+  }
+  const glm::dvec3 extent = high - low;
+  return extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+}
+
 void partition_recursively(std::span<Chunk> chunks, std::span<std::vector<SurfaceRange>> shares) {
   if (shares.size() == 1) {
-    std::ranges::sort(chunks, {}, [](const Chunk& chunk) { return chunk.surfaces.first; });
-    for (const Chunk& chunk : chunks) {
-      if (!shares[0].empty() && shares[0].back().last == chunk.surfaces.first) {
-        shares[0].back().last = chunk.surfaces.last;
-      } else {
-        shares[0].push_back(chunk.surfaces);
-      }
-    }
+    shares[0] = joined(chunks);
     return;
   }
-  int axis = 0;
-  if (!chunks.empty()) {
-    glm::dvec3 low = chunks.front().center;
-    glm::dvec3 high = low;
-    for (const Chunk& chunk : chunks) {
-      low = glm::min(low, chunk.center);
-      high = glm::max(high, chunk.center);
-    }
-    const glm::dvec3 extent = high - low;
-    axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-  }
+  const int axis = longest_axis(chunks);
   std::ranges::sort(chunks, [axis](const Chunk& a, const Chunk& b) {
     return a.center[axis] != b.center[axis] ? a.center[axis] < b.center[axis] : a.surfaces.first < b.surfaces.first;
   });
@@ -229,6 +238,7 @@ std::vector<Assignment> assign(Distribution distribution, const Scene& scene, co
                                                                    : groups;
   const auto members = make_groups(ranks, group_count);
   std::vector<int> weights;
+  weights.reserve(members.size());
   for (const auto& group : members) weights.push_back(static_cast<int>(group.size()));
   const auto areas = assign_tiles(layout, weights);
 

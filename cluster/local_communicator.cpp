@@ -30,7 +30,7 @@ struct Route {
   int from;
   int to;
 
-  auto operator<=>(const Route&) const = default;
+  auto operator<=>(const Route&) const = default;  // NOLINT(modernize-use-nullptr): clang-tidy 14 sees a 0 in it
 };
 
 /// All messages on their way between the ranks of this process.

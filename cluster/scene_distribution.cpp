@@ -24,7 +24,7 @@ void put(std::vector<std::byte>& bytes, const std::string& text) {
 std::string take_text(std::span<const std::byte>& bytes) {
   std::uint64_t size = 0;
   std::memcpy(&size, bytes.data(), sizeof size);
-  const std::string text(reinterpret_cast<const char*>(bytes.data() + sizeof size), size);
+  std::string text(reinterpret_cast<const char*>(bytes.data() + sizeof size), size);
   bytes = bytes.subspan(sizeof size + size);
   return text;
 }

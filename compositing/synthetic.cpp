@@ -61,7 +61,7 @@ class Pattern {
   }
 
   /// The keys of pixels [x0, x0 + row.size()) of row y. True when any of them is one.
-  bool fill_row(int x0, int y, std::span<Key> row) const {
+  [[nodiscard]] bool fill_row(int x0, int y, std::span<Key> row) const {
     bool any = false;
     int cell = -1;
     std::uint32_t left = 0;

@@ -39,7 +39,10 @@ struct Scratch {
   std::vector<double> ms;
 };
 
-enum Step : std::size_t { kSurfaceStep, kDirectStep, kFirstPassStep };
+// Where each step's time stands.
+constexpr std::size_t kSurfaceStep = 0;
+constexpr std::size_t kDirectStep = 1;
+constexpr std::size_t kFirstPassStep = 2;
 
 glm::dvec3 to_vector(const Rgb& color) {
   return {color.r, color.g, color.b};
@@ -97,7 +100,7 @@ void store(const TileWork& tile, const Rect& place, std::span<Rgb> pixels, RayCo
   std::ranges::fill(pixels, Rgb{});
   for (int y = 0; y < place.height(); ++y) {
     for (int x = 0; x < place.width(); ++x) {
-      const auto i = static_cast<std::size_t>(y * kTileSide + x);
+      const auto i = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
       const glm::dvec3& sum = tile.radiance[i];
       const Rgb color{static_cast<float>(sum.r), static_cast<float>(sum.g), static_cast<float>(sum.b)};
       if (std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b)) {

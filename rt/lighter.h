@@ -66,6 +66,8 @@ class Lighter {
   /// pass, NoDevice when Embree fails.
   Lighter(const Scene& scene, RaySettings settings);
   ~Lighter();
+  Lighter(const Lighter&) = delete;
+  Lighter& operator=(const Lighter&) = delete;
   Lighter(Lighter&&) noexcept;
   Lighter& operator=(Lighter&&) noexcept;
 

@@ -9,6 +9,10 @@
 namespace hpr {
 namespace {
 
+/// The headlight stands a little above and beside the eye, the same way for every screen of a wall: straight from the eye,
+/// rough metal would look flat, as its reflectance and the cosine cancel there.
+constexpr glm::dvec3 kHeadlightLift{0.25, 0.4, 0.1};
+
 /// The window that brings a light to zero at its range, as the extension recommends.
 double range_window(double distance, double range) {
   if (range <= 0.0) return 1.0;
@@ -37,7 +41,7 @@ LightSample sample_light(const Light& light, const glm::dvec3& place, const View
   }
   const bool headlight = light.type == LightType::Headlight;
   if (headlight && view.orthographic) {
-    sample.to_light = view.axes[2];
+    sample.to_light = glm::normalize(view.axes[2] + kHeadlightLift);
     sample.distance = std::numeric_limits<double>::infinity();
     sample.irradiance = intensity;
     return sample;
@@ -46,6 +50,7 @@ LightSample sample_light(const Light& light, const glm::dvec3& place, const View
   sample.distance = glm::length(way);
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return sample;
   sample.to_light = way / sample.distance;
+  if (headlight) sample.to_light = glm::normalize(sample.to_light + kHeadlightLift);
   if (headlight) {
     sample.irradiance = intensity;
     return sample;

@@ -19,12 +19,12 @@ struct LightSample {
 /// spot's ramp is the squared one the extension recommends. A light right on the place gives nothing, not infinity.
 [[nodiscard]] LightSample sample_light(const Light& light, const glm::dvec3& place, const View& view);
 
-/// Only real lights cast shadows; the headlight sits in the eye, where it could not show any.
+/// Only real lights cast shadows; the headlight is so near the eye that it could show few.
 [[nodiscard]] inline bool casts_shadows(const Light& light) {
   return light.type != LightType::Headlight;
 }
 
-/// The scene's lights, or one headlight under which a white wall that faces the eye has radiance 1.
+/// The scene's lights, or one headlight under which a white wall that faces the eye has a radiance of about 0.9.
 [[nodiscard]] std::vector<Light> lights_or_headlight(const Scene& scene);
 
 }  // namespace hpr

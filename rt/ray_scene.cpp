@@ -157,8 +157,9 @@ void RayScene::Embree::start(int threads) {
   const char* const isa = __builtin_cpu_supports("avx2") ? ",isa=avx2" : "";
   device = OwnedDevice(rtcNewDevice(fmt::format("threads={},set_affinity=0{}", std::max(threads, 1), isa).c_str()));
   if (device.get() == nullptr) {
-    throw Error(ExitCode::NoDevice,
-                fmt::format("cannot start Embree: error {}", static_cast<int>(rtcGetDeviceError(nullptr))),
+    const RTCError error = rtcGetDeviceError(nullptr);
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw Error(ExitCode::Limit, "out of memory in Embree", "use fewer ranks or a smaller scene");
+    throw Error(ExitCode::NoDevice, fmt::format("cannot start Embree: error {}", static_cast<int>(error)),
                 "render without ray passes: --passes none");
   }
   rtcSetDeviceErrorFunction(device.get(), &Failure::note, &failure);
@@ -183,8 +184,9 @@ void RayScene::Embree::add_instance(const Instance& instance, unsigned int id, R
   const glm::dvec3 place = space.from_world(glm::dvec3(instance.to_world[3]));
   for (int column = 0; column < 4; ++column) {
     const glm::dvec3 values = column < 3 ? glm::dvec3(instance.to_world[column]) * space.scale : place;
-    for (int row = 0; row < 3; ++row)
-      matrix[static_cast<std::size_t>(3 * column + row)] = static_cast<float>(values[row]);
+    for (int row = 0; row < 3; ++row) {
+      matrix[3 * static_cast<std::size_t>(column) + static_cast<std::size_t>(row)] = static_cast<float>(values[row]);
+    }
   }
   const OwnedGeometry geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_INSTANCE));
   rtcSetGeometryInstancedScene(geometry.get(), shared_mesh);

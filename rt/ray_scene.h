@@ -48,10 +48,10 @@ class RayScene {
   RayScene& operator=(const RayScene&) = delete;
 
   /// blocked[i] = 1 where something stands between ray i's origin and its reach. Returns how many rays were invalid.
-  std::uint64_t occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+  [[nodiscard]] std::uint64_t occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
 
   /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
-  std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces) const;
+  [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces) const;
 
   /// Triangles left out because their world positions are beyond what float holds.
   [[nodiscard]] std::uint64_t skipped_triangles() const;

@@ -35,10 +35,11 @@ std::uint64_t triangle_count(const GallerySize& size) {
   };
   const std::uint64_t balls = (power(9, size.s + 1) - 1) / 8;
   const auto n = static_cast<std::uint64_t>(size.n);
-  const auto v = static_cast<std::uint64_t>(4 * size.s);
+  const auto v = 4 * static_cast<std::uint64_t>(size.s);
   constexpr std::uint64_t kRoom = 2 + 10 + 4 + 24 + 240 + 48;
-  return kRoom + 60 * static_cast<std::uint64_t>(size.cases) + 4 * 12 * n * n * balls + 8 * 20 * power(4, size.k) +
-         4 * (2 * 256 * 32) + 4 * (64 * v * v - 8 * v);
+  constexpr std::uint64_t kKnot = 2 * 256 * 32;
+  return kRoom + 60 * static_cast<std::uint64_t>(size.cases) + 4 * (12 * n * n * balls) + 8 * (20 * power(4, size.k)) +
+         4 * kKnot + 4 * (64 * v * v - 8 * v);
 }
 
 Mesh quad(const std::array<glm::dvec3, 4>& corners, const glm::dvec2& repeat = {1.0, 1.0}) {
@@ -61,9 +62,9 @@ void add_single(Scene& scene, Mesh mesh, std::string name, std::uint32_t materia
 }
 
 void add_room(Scene& scene) {
-  constexpr double x = kHalfLength;
-  constexpr double y = kHeight;
-  constexpr double z = kHalfWidth;
+  const double x = kHalfLength;
+  const double y = kHeight;
+  const double z = kHalfWidth;
   Material checker = plastic("floor", glm::vec3(1.0F), 0.05F);
   checker.base_color_texture.texture =
       add_texture(scene, "checker", patterns::checker({0.05F, 0.05F, 0.05F}, {0.6F, 0.6F, 0.6F}), true);
@@ -86,7 +87,7 @@ void add_room(Scene& scene) {
   add_single(scene, std::move(walls), "walls and ceiling", wall);
 
   Mesh mirrors;
-  constexpr double m = 5.95;
+  const double m = 5.95;
   shapes::add_quad(mirrors, {{{-8, 0.3, -m}, {8, 0.3, -m}, {8, 4.3, -m}, {-8, 4.3, -m}}});
   shapes::add_quad(mirrors, {{{8, 0.3, m}, {-8, 0.3, m}, {-8, 4.3, m}, {8, 4.3, m}}});
   add_single(scene, std::move(mirrors), "mirrors", mirror);
@@ -94,7 +95,7 @@ void add_room(Scene& scene) {
   Mesh panels;
   for (int i = 0; i < kPanels; ++i) {
     const double c = -22.0 + 4.0 * i;
-    constexpr double h = 5.99;
+    const double h = 5.99;
     shapes::add_quad(panels, {{{c - 0.5, h, -0.15}, {c + 0.5, h, -0.15}, {c + 0.5, h, 0.15}, {c - 0.5, h, 0.15}}});
   }
   add_single(scene, std::move(panels), "panels", panel);
@@ -149,10 +150,10 @@ void add_paintings(Scene& scene) {
 
 /// Four slabs of 8 mm and a lid, 1.2 x 1.2 x 1.8 m, half a millimetre apart so that no two faces coincide.
 Mesh glass_case() {
-  constexpr double r = 0.6;
-  constexpr double t = 0.008;
-  constexpr double gap = 0.0005;
-  constexpr double top = 1.8;
+  const double r = 0.6;
+  const double t = 0.008;
+  const double gap = 0.0005;
+  const double top = 1.8;
   Mesh mesh;
   shapes::add_box(mesh, {-r, gap, -r}, {-r + t, top - t - gap, r});
   shapes::add_box(mesh, {r - t, gap, -r}, {r, top - t - gap, r});
@@ -182,7 +183,8 @@ void add_exhibits(Scene& scene, const GallerySize& size) {
 
   int cases = 0;
   for (int i = 0; i < kExhibits; ++i) {
-    const glm::dvec3 foot(-21.6 + 4.8 * (i / 2), 0.0, i % 2 == 0 ? -2.5 : 2.5);
+    const int pair = i / 2;
+    const glm::dvec3 foot(-21.6 + 4.8 * pair, 0.0, i % 2 == 0 ? -2.5 : 2.5);
     const glm::dvec3 top = foot + glm::dvec3(0, 1, 0);
     add_instance(scene, plinth, shapes::placed(foot, 1.0));
     switch (i % 5) {

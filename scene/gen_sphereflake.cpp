@@ -23,7 +23,7 @@ std::array<glm::dvec3, 9> child_directions() {
   const double cosine = std::sqrt(1.0 / 3.0);
   for (int i = 0; i < 3; ++i) {
     const double turns = (45.0 + 120.0 * i) / 360.0;
-    directions[static_cast<std::size_t>(6 + i)] = {cosine * portable::cos_turns(turns),
+    directions[6 + static_cast<std::size_t>(i)] = {cosine * portable::cos_turns(turns),
                                                    cosine * portable::sin_turns(turns), sine};
   }
   return directions;

@@ -17,6 +17,7 @@ namespace {
 
 std::vector<std::string> keys_of(const std::map<std::string, std::string>& options) {
   std::vector<std::string> keys;
+  keys.reserve(options.size());
   for (const auto& [key, text] : options) keys.push_back(key);
   return keys;
 }
@@ -55,6 +56,7 @@ const Generator& find_generator(std::string_view name) {
   const auto found = std::ranges::find(generators, name, &Generator::name);
   if (found == generators.end()) {
     std::vector<std::string> names;
+    names.reserve(generators.size());
     for (const Generator& generator : generators) names.push_back(generator.name);
     throw Error(ExitCode::Usage, fmt::format("gen:{}: there is no such generated scene", printable(name)),
                 unknown_name_hint(name, names));

@@ -8,7 +8,8 @@
 
 namespace hpr {
 
-GltfContext::GltfContext(std::string name, const SceneLimits& limits) : name_(printable(name, 300)), limits_(limits) {}
+GltfContext::GltfContext(std::string_view name, const SceneLimits& limits)
+    : name_(printable(name, 300)), limits_(limits) {}
 
 void GltfContext::fail(std::string_view where, std::string_view what, std::string_view hint, ExitCode code) const {
   const std::string message =

@@ -14,7 +14,7 @@ namespace hpr {
 /// What all steps of loading one glTF file share: its name for messages, its limits, and the warnings so far.
 class GltfContext {
  public:
-  GltfContext(std::string name, const SceneLimits& limits);
+  GltfContext(std::string_view name, const SceneLimits& limits);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const SceneLimits& limits() const { return limits_; }

@@ -51,6 +51,7 @@ class GltfData {
   [[nodiscard]] std::vector<Value> read(int index) const {
     context_->charge(count(index) * sizeof(Value), "an accessor");
     std::vector<Value> values(count(index));
+    // NOLINTNEXTLINE(bugprone-sizeof-expression): a Value may be one float
     read_floats(index, reinterpret_cast<float*>(values.data()), sizeof(Value) / sizeof(float));
     return values;
   }

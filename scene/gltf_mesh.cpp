@@ -92,7 +92,7 @@ class PrimitiveBuilder {
     }
   }
 
-  std::vector<glm::uvec3> read_triangles(std::size_t vertices) const {
+  [[nodiscard]] std::vector<glm::uvec3> read_triangles(std::size_t vertices) const {
     std::vector<std::uint32_t> indices;
     if (primitive_.indices >= 0) {
       indices = data_.integers(primitive_.indices);

@@ -114,6 +114,17 @@ std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& paren
   return model.scenes[active].nodes;
 }
 
+/// How many instances the attributes of EXT_mesh_gpu_instancing describe.
+std::size_t instance_count(const GltfData& data, const tinygltf::Value& attributes, const std::string& where) {
+  std::size_t count = 0;
+  for (const std::string& name : attributes.Keys()) {
+    const std::size_t own = data.count(attributes.Get(name).GetNumberAsInt());
+    if (count != 0 && own != count) data.context().fail(where, "its attributes differ in how many instances there are");
+    count = own;
+  }
+  return count;
+}
+
 }  // namespace
 
 GltfNodes place_nodes(const GltfData& data) {
@@ -155,7 +166,6 @@ std::vector<glm::dmat4> gpu_instances(const GltfData& data, int node) {
   const std::string where = node_path(GltfData::to_size(node)) + ".EXT_mesh_gpu_instancing";
   const tinygltf::Value& attributes = found->second.Get("attributes");
 
-  std::size_t count = 0;
   const auto find = [&](const char* name, int type) {
     const int accessor = attributes.Has(name) ? attributes.Get(name).GetNumberAsInt() : -1;
     if (accessor >= 0) data.require_type(accessor, {type}, fmt::format("{}.{}", where, name));
@@ -164,11 +174,7 @@ std::vector<glm::dmat4> gpu_instances(const GltfData& data, int node) {
   const int translation = find("TRANSLATION", TINYGLTF_TYPE_VEC3);
   const int rotation = find("ROTATION", TINYGLTF_TYPE_VEC4);
   const int scale = find("SCALE", TINYGLTF_TYPE_VEC3);
-  for (const std::string& name : attributes.Keys()) {
-    const std::size_t own = data.count(attributes.Get(name).GetNumberAsInt());
-    if (count != 0 && own != count) data.context().fail(where, "its attributes differ in how many instances there are");
-    count = own;
-  }
+  const std::size_t count = instance_count(data, attributes, where);
   if (count == 0) {
     data.context().warn(where, "has no attributes");
     return {glm::dmat4(1.0)};

@@ -29,35 +29,46 @@ std::string_view as_text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
+constexpr std::string_view kDamaged = "the file is damaged or incomplete; export or copy it again";
+
+struct GlbChunk {
+  std::uint32_t type = 0;
+  std::span<const std::byte> body;
+};
+
+/// The chunk that starts `rest`, which becomes what follows it.
+GlbChunk take_chunk(std::span<const std::byte>& rest, const std::string& where, GltfContext& context) {
+  if (rest.size() < kChunkHeaderBytes) context.fail(where, "its header is cut off", kDamaged);
+  const std::size_t size = little_endian_32(rest, 0);
+  const std::uint32_t type = little_endian_32(rest, 4);
+  rest = rest.subspan(kChunkHeaderBytes);
+  if (size > rest.size()) {
+    context.fail(where, fmt::format("{} bytes in a file that has {} left", size, rest.size()), kDamaged);
+  }
+  if (size % 4 != 0) context.warn(where, "its length is no multiple of four");
+  const auto body = rest.first(size);
+  rest = rest.subspan(size);
+  return {type, body};
+}
+
 GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
-  constexpr std::string_view kHint = "the file is damaged or incomplete; export or copy it again";
   if (file.size() < kHeaderBytes)
-    context.fail("header", fmt::format("{} bytes are no binary glTF", file.size()), kHint);
+    context.fail("header", fmt::format("{} bytes are no binary glTF", file.size()), kDamaged);
   const std::uint32_t version = little_endian_32(file, 4);
   if (version != 2) context.fail("header", fmt::format("glTF version {}", version), "convert the scene to glTF 2.0");
   const std::uint32_t length = little_endian_32(file, 8);
   if (length != file.size()) {
-    context.fail("header", fmt::format("it tells of {} bytes, the file has {}", length, file.size()), kHint);
+    context.fail("header", fmt::format("it tells of {} bytes, the file has {}", length, file.size()), kDamaged);
   }
 
   GltfParts parts;
   bool has_json = false;
-  std::size_t offset = kHeaderBytes;
-  for (int chunk = 0; offset < file.size(); ++chunk) {
+  std::span<const std::byte> rest = file.subspan(kHeaderBytes);
+  for (int chunk = 0; !rest.empty(); ++chunk) {
     const std::string where = fmt::format("chunk {}", chunk);
-    if (file.size() - offset < kChunkHeaderBytes) context.fail(where, "its header is cut off", kHint);
-    const std::size_t size = little_endian_32(file, offset);
-    const std::uint32_t type = little_endian_32(file, offset + 4);
-    offset += kChunkHeaderBytes;
-    if (size > file.size() - offset) {
-      context.fail(where, fmt::format("{} bytes in a file that has {} left", size, file.size() - offset), kHint);
-    }
-    if (size % 4 != 0) context.warn(where, "its length is no multiple of four");
-    const auto body = file.subspan(offset, size);
-    offset += size;
-
+    const auto [type, body] = take_chunk(rest, where, context);
     if (chunk == 0) {
-      if (type != kJsonChunk) context.fail(where, "the first chunk must be JSON", kHint);
+      if (type != kJsonChunk) context.fail(where, "the first chunk must be JSON", kDamaged);
       parts.json = as_text(body);
       has_json = true;
     } else if (type == kJsonChunk) {
@@ -72,7 +83,7 @@ GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
       }
     }
   }
-  if (!has_json) context.fail("", "the file has no JSON chunk", kHint);
+  if (!has_json) context.fail("", "the file has no JSON chunk", kDamaged);
   return parts;
 }
 
@@ -96,6 +107,39 @@ std::size_t utf8_length(std::string_view text) {
   return 0;
 }
 
+/// Names lines of a text, for offsets that never go back: it counts on from the last one, as a hostile file may give cause
+/// for a million complaints.
+class LineCounter {
+ public:
+  explicit LineCounter(std::string_view text) : text_(text) {}
+
+  std::string at(std::size_t offset) {
+    line_ += static_cast<std::size_t>(std::ranges::count(text_.substr(counted_, offset - counted_), '\n'));
+    counted_ = offset;
+    return fmt::format("line {}", line_);
+  }
+
+ private:
+  std::string_view text_;
+  std::size_t counted_ = 0;
+  std::size_t line_ = 1;
+};
+
+/// Where the string that starts at `start` ends: its closing quote, or past the text.
+std::size_t end_of_string(std::string_view json, std::size_t start, LineCounter& lines, GltfContext& context) {
+  std::size_t i = start;
+  while (i < json.size() && json[i] != '"') {
+    if (json[i] == '\\') {
+      i += 2;
+      continue;
+    }
+    const std::size_t length = utf8_length(json.substr(i));
+    if (length == 0) context.fail(lines.at(i), "the text is not UTF-8", "save the file as UTF-8");
+    i += length;
+  }
+  return i;
+}
+
 }  // namespace
 
 void scan_json(std::string_view json, GltfContext& context) {
@@ -106,52 +150,41 @@ void scan_json(std::string_view json, GltfContext& context) {
   };
   std::vector<Level> levels;
   bool key_follows = false;
+  LineCounter lines(json);
 
-  std::size_t i = 0;
-  // Lines are counted on from the last complaint: a file may hold a million of them.
-  std::size_t counted = 0;
-  std::size_t line = 1;
-  const auto here = [&] {
-    const std::string_view passed = json.substr(counted, i - counted);
-    line += static_cast<std::size_t>(std::ranges::count(passed, '\n'));
-    counted = i;
-    return fmt::format("line {}", line);
-  };
-  while (i < json.size()) {
-    const char c = json[i];
-    if (c == '{' || c == '[') {
-      if (levels.size() == kGltfJsonDepth) {
-        context.fail(here(), fmt::format("the JSON nests deeper than {} levels", kGltfJsonDepth),
-                     "remove the nesting; glTF needs about ten levels");
-      }
-      levels.push_back({c == '{', {}});
-      key_follows = c == '{';
-    } else if (c == '}' || c == ']') {
-      if (!levels.empty()) levels.pop_back();
-      key_follows = false;
-    } else if (c == ',') {
-      key_follows = !levels.empty() && levels.back().object;
-    } else if (c == '"') {
-      const std::size_t start = ++i;
-      while (i < json.size() && json[i] != '"') {
-        if (json[i] == '\\') {
-          i += 2;
-          continue;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    switch (json[i]) {
+      case '{':
+      case '[':
+        if (levels.size() == kGltfJsonDepth) {
+          context.fail(lines.at(i), fmt::format("the JSON nests deeper than {} levels", kGltfJsonDepth),
+                       "remove the nesting; glTF needs about ten levels");
         }
-        const std::size_t length = utf8_length(json.substr(i));
-        if (length == 0) {
-          context.fail(here(), "the text is not UTF-8", "save the file as UTF-8");
+        key_follows = json[i] == '{';
+        levels.push_back({key_follows, {}});
+        break;
+      case '}':
+      case ']':
+        if (!levels.empty()) levels.pop_back();
+        key_follows = false;
+        break;
+      case ',':
+        key_follows = !levels.empty() && levels.back().object;
+        break;
+      case '"': {
+        const std::size_t start = i + 1;
+        i = end_of_string(json, start, lines, context);
+        if (i >= json.size()) return;  // the parser says that the string has no end
+        const std::string_view text = json.substr(start, i - start);
+        if (key_follows && !levels.back().keys.insert(text).second) {
+          context.warn(lines.at(i), fmt::format("the key \"{}\" stands twice in one object", printable(text)));
         }
-        i += length;
+        key_follows = false;
+        break;
       }
-      if (i >= json.size()) return;  // the parser says that the string has no end
-      const std::string_view text = json.substr(start, i - start);
-      if (key_follows && !levels.back().keys.insert(text).second) {
-        context.warn(here(), fmt::format("the key \"{}\" stands twice in one object", printable(text)));
-      }
-      key_follows = false;
+      default:
+        break;
     }
-    ++i;
   }
 }
 

@@ -78,7 +78,7 @@ enum class LightType : std::uint8_t {
   Point,
   Directional,
   Spot,
-  Headlight,  ///< constant irradiance from wherever the eye is, casting no shadow: for scenes without lights
+  Headlight,  ///< constant irradiance from beside the eye, wherever it is, casting no shadow: for scenes without lights
 };
 
 /// KHR_lights_punctual. Candela and lux are taken as W/sr and W/m^2.
