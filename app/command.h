@@ -44,7 +44,8 @@ class Command {
   [[nodiscard]] virtual std::string_view summary() const = 0;
   /// Declares options and subcommands on `app`, which outlives this; values land in the command's members.
   virtual void declare(CLI::App& app) = 0;
-  /// Whether all ranks of a job run it. The others are rank 0's alone under mpirun: N copies would speak, and write, N times.
+  /// Whether all ranks of a job run it. The others are rank 0's alone under mpirun: N copies would speak, and write, N
+  /// times.
   [[nodiscard]] virtual bool collective() const { return false; }
   /// Called once the command line was parsed. Results go to stdout, messages to the log; throws Error.
   [[nodiscard]] virtual ExitCode run(const Globals& globals) = 0;

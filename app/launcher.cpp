@@ -125,7 +125,8 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
-    throw Error(ExitCode::Lost, fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, ::strsignal(code - 128)),
+    throw Error(ExitCode::Lost,
+                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, ::strsignal(code - 128)),
                 "the system's log may say why (out of memory?); nothing partial was left");
   }
   if (code == 127) {

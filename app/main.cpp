@@ -1,14 +1,15 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 #include <hpr/version.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <new>
 #include <system_error>
+#include <thread>
 
 #include "app/command.h"
 #include "app/launcher.h"
@@ -201,8 +202,9 @@ int main(int argc, char** argv) {
     }
     return static_cast<int>(code);
   } catch (const hpr::Error& error) {
-    // What every rank of a job finds before MPI starts is said once.
-    if (hpr::launched_rank() == 0) hpr::print_error(error);
+    // What every rank of a job finds before MPI starts is said once: rank 0's exit ends the others while they wait.
+    if (hpr::launched_rank() != 0) std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    hpr::print_error(error, hpr::launched_rank() == 0 ? "" : fmt::format("rank {}: ", hpr::launched_rank()));
     return static_cast<int>(error.code());
   } catch (const std::system_error& error) {  // how fmt reports a failed print
     hpr::print_error({hpr::ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});

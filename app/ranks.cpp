@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -37,8 +39,32 @@ std::string host_name() {
   std::abort();  // MPI_Abort does not return
 }
 
+/// A time limit for the calls of MPI that cannot be polled: starting and ending. When it passes, this rank says so and
+/// ends, and the launcher ends the others.
+class CallLimit {
+ public:
+  CallLimit(std::chrono::nanoseconds limit, const char* doing)
+      : thread_([this, limit, doing](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          if (done_.wait_for(lock, stop, std::min<std::chrono::nanoseconds>(limit, kLongestWait), [] { return false; }))
+            return;
+          if (stop.stop_requested()) return;
+          print_error({ExitCode::Hang, fmt::format("rank {} on {}: still {}", launched_rank(), host_name(), doing),
+                       "a rank stands still; raise --hang-timeout if it only needs longer"});
+          std::fflush(nullptr);
+          ::_exit(static_cast<int>(ExitCode::Hang));
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any done_;
+  std::jthread thread_;
+};
+
 /// MPI_Init and, on success only, MPI_Finalize: a rank that left early would hang in it.
 ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
+  std::optional<CallLimit> limit;
+  limit.emplace(globals.hang_limit(), "starting MPI");
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   int rank = 0;
@@ -46,6 +72,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
   ExitCode code = ExitCode::Done;
   try {
     MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
+    limit.reset();
     if (globals.ranks > 0 && globals.ranks != comm.size()) {
       throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
                   "leave --ranks out under mpirun or srun: the launcher sets the number");
@@ -62,6 +89,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
   } catch (const std::exception& error) {
     abort_job(rank, Error(ExitCode::Internal, error.what()));
   }
+  limit.emplace(globals.hang_limit(), "ending MPI");
   MPI_Finalize();
   return code;
 }

@@ -9,8 +9,8 @@
 namespace hpr {
 namespace {
 
-/// The headlight stands a little above and beside the eye, the same way for every screen of a wall: straight from the eye,
-/// rough metal would look flat, as its reflectance and the cosine cancel there.
+/// The headlight stands a little above and beside the eye, the same way for every screen of a wall: straight from the
+/// eye, rough metal would look flat, as its reflectance and the cosine cancel there.
 constexpr glm::dvec3 kHeadlightLift{0.25, 0.4, 0.1};
 
 /// The window that brings a light to zero at its range, as the extension recommends.

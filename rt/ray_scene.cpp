@@ -158,7 +158,8 @@ void RayScene::Embree::start(int threads) {
   device = OwnedDevice(rtcNewDevice(fmt::format("threads={},set_affinity=0{}", std::max(threads, 1), isa).c_str()));
   if (device.get() == nullptr) {
     const RTCError error = rtcGetDeviceError(nullptr);
-    if (error == RTC_ERROR_OUT_OF_MEMORY) throw Error(ExitCode::Limit, "out of memory in Embree", "use fewer ranks or a smaller scene");
+    if (error == RTC_ERROR_OUT_OF_MEMORY)
+      throw Error(ExitCode::Limit, "out of memory in Embree", "use fewer ranks or a smaller scene");
     throw Error(ExitCode::NoDevice, fmt::format("cannot start Embree: error {}", static_cast<int>(error)),
                 "render without ray passes: --passes none");
   }

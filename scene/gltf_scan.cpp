@@ -107,8 +107,8 @@ std::size_t utf8_length(std::string_view text) {
   return 0;
 }
 
-/// Names lines of a text, for offsets that never go back: it counts on from the last one, as a hostile file may give cause
-/// for a million complaints.
+/// Names lines of a text, for offsets that never go back: it counts on from the last one, as a hostile file may give
+/// cause for a million complaints.
 class LineCounter {
  public:
   explicit LineCounter(std::string_view text) : text_(text) {}

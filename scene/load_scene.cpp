@@ -29,7 +29,8 @@ Scene load_scene(const std::string& source, const SceneLimits& limits) {
   if (source.starts_with(kGenerated)) {
     Scene scene = generate_scene(std::string_view(source).substr(kGenerated.size()));
     if (const std::uint64_t bytes = memory_of(scene); bytes > limits.memory_bytes) {
-      throw Error(ExitCode::Limit, fmt::format("{}: needs {} bytes, more than the limit of {}", source, bytes, limits.memory_bytes),
+      throw Error(ExitCode::Limit,
+                  fmt::format("{}: needs {} bytes, more than the limit of {}", source, bytes, limits.memory_bytes),
                   "choose a smaller scene, or raise --limit-mem");
     }
     return scene;
