@@ -50,6 +50,65 @@ glm::dvec2 spline(std::span<const glm::dvec2> points, double t) {
   return 0.5 * (2.0 * b + f * ((c - a) + f * ((2.0 * a - 5.0 * b + 4.0 * c - d) + f * (3.0 * b - a - 3.0 * c + d))));
 }
 
+/// Triangles between points of the unit sphere.
+struct Faces {
+  std::vector<glm::dvec3> points;
+  std::vector<glm::uvec3> triangles;
+};
+
+Faces icosahedron() {
+  const double phi = 0.5 * (1.0 + std::sqrt(5.0));
+  // The twelve points (0, +-1, +-phi) and their cyclic shifts, point 4 * axis + 2 * (long side < 0) + (short side < 0).
+  std::vector<glm::dvec3> points;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int sign = 0; sign < 4; ++sign) {
+      glm::dvec3 p(0.0);
+      p[(axis + 1) % 3] = (sign & 1) != 0 ? -1.0 : 1.0;
+      p[(axis + 2) % 3] = (sign & 2) != 0 ? -phi : phi;
+      points.push_back(glm::normalize(p));
+    }
+  }
+  // Neighbours are 2 apart before normalisation, everything else at least 3.2: three mutual neighbours are a face.
+  std::vector<glm::uvec3> triangles;
+  const double reach = 2.5 / std::sqrt(1.0 + phi * phi);
+  const auto near = [&](std::uint32_t a, std::uint32_t b) { return glm::distance(points[a], points[b]) < reach; };
+  const auto add_face = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    if (!near(a, b) || !near(b, c) || !near(a, c)) return;
+    const bool outward = glm::dot(glm::cross(points[b] - points[a], points[c] - points[a]), points[a]) > 0.0;
+    triangles.emplace_back(a, outward ? b : c, outward ? c : b);
+  };
+  for (std::uint32_t a = 0; a < 12; ++a) {
+    for (std::uint32_t b = a + 1; b < 12; ++b) {
+      for (std::uint32_t c = b + 1; c < 12; ++c) add_face(a, b, c);
+    }
+  }
+  return {std::move(points), std::move(triangles)};
+}
+
+/// Four triangles for one, the new points on the sphere.
+void subdivide(Faces& faces) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+  std::vector<glm::dvec3>& points = faces.points;
+  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+    const auto [place, added] =
+        middles.try_emplace(std::pair(std::min(a, b), std::max(a, b)), static_cast<std::uint32_t>(points.size()));
+    if (added) points.push_back(glm::normalize(points[a] + points[b]));
+    return place->second;
+  };
+  std::vector<glm::uvec3> finer;
+  finer.reserve(4 * faces.triangles.size());
+  for (const glm::uvec3& t : faces.triangles) {
+    const std::uint32_t ab = middle(t.x, t.y);
+    const std::uint32_t bc = middle(t.y, t.z);
+    const std::uint32_t ca = middle(t.z, t.x);
+    finer.emplace_back(t.x, ab, ca);
+    finer.emplace_back(ab, t.y, bc);
+    finer.emplace_back(ca, bc, t.z);
+    finer.emplace_back(ab, bc, ca);
+  }
+  faces.triangles = std::move(finer);
+}
+
 }  // namespace
 
 void add_quad(Mesh& mesh, const std::array<glm::dvec3, 4>& corners, const glm::dvec2& repeat) {
@@ -78,53 +137,9 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high) {
 
 Mesh icosphere(int level) {
   HPR_CHECK(level >= 0 && level <= 10);
-  const double phi = 0.5 * (1.0 + std::sqrt(5.0));
-  // The twelve points (0, +-1, +-phi) and their cyclic shifts, point 4 * axis + 2 * (long side < 0) + (short side < 0).
-  std::vector<glm::dvec3> points;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int sign = 0; sign < 4; ++sign) {
-      glm::dvec3 p(0.0);
-      p[(axis + 1) % 3] = (sign & 1) != 0 ? -1.0 : 1.0;
-      p[(axis + 2) % 3] = (sign & 2) != 0 ? -phi : phi;
-      points.push_back(glm::normalize(p));
-    }
-  }
-  // Neighbours are 2 apart before normalisation, everything else at least 3.2: three mutual neighbours are a face.
-  std::vector<glm::uvec3> triangles;
-  const double reach = 2.5 / std::sqrt(1.0 + phi * phi);
-  const auto near = [&](std::uint32_t a, std::uint32_t b) { return glm::distance(points[a], points[b]) < reach; };
-  for (std::uint32_t a = 0; a < 12; ++a) {
-    for (std::uint32_t b = a + 1; b < 12; ++b) {
-      for (std::uint32_t c = b + 1; c < 12; ++c) {
-        if (!near(a, b) || !near(b, c) || !near(a, c)) continue;
-        const bool outward = glm::dot(glm::cross(points[b] - points[a], points[c] - points[a]), points[a]) > 0.0;
-        triangles.emplace_back(a, outward ? b : c, outward ? c : b);
-      }
-    }
-  }
-
-  for (int step = 0; step < level; ++step) {
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
-    const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-      const auto [place, added] =
-          middles.try_emplace(std::pair(std::min(a, b), std::max(a, b)), static_cast<std::uint32_t>(points.size()));
-      if (added) points.push_back(glm::normalize(points[a] + points[b]));
-      return place->second;
-    };
-    std::vector<glm::uvec3> finer;
-    finer.reserve(4 * triangles.size());
-    for (const glm::uvec3& t : triangles) {
-      const std::uint32_t ab = middle(t.x, t.y);
-      const std::uint32_t bc = middle(t.y, t.z);
-      const std::uint32_t ca = middle(t.z, t.x);
-      finer.emplace_back(t.x, ab, ca);
-      finer.emplace_back(ab, t.y, bc);
-      finer.emplace_back(ca, bc, t.z);
-      finer.emplace_back(ab, bc, ca);
-    }
-    triangles = std::move(finer);
-  }
-  return sphere_mesh(points, std::move(triangles));
+  Faces faces = icosahedron();
+  for (int step = 0; step < level; ++step) subdivide(faces);
+  return sphere_mesh(faces.points, std::move(faces.triangles));
 }
 
 Mesh cube_sphere(int n) {
@@ -138,23 +153,23 @@ Mesh cube_sphere(int n) {
     return place->second;
   };
   std::vector<glm::uvec3> triangles;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const int side : {-1, 1}) {
-      // On the lower face of an axis the other two change places, so that both faces wind outwards.
-      const std::size_t u = side > 0 ? (axis + 1) % 3 : (axis + 2) % 3;
-      const std::size_t v = side > 0 ? (axis + 2) % 3 : (axis + 1) % 3;
-      const auto at = [&](int i, int j) {
-        std::array<int, 3> p{};
-        p[axis] = side * n;
-        p[u] = 2 * i - n;
-        p[v] = 2 * j - n;
-        return point(p);
-      };
-      for (int j = 0; j < n; ++j) {
-        for (int i = 0; i < n; ++i) {
-          triangles.emplace_back(at(i, j), at(i + 1, j), at(i + 1, j + 1));
-          triangles.emplace_back(at(i, j), at(i + 1, j + 1), at(i, j + 1));
-        }
+  for (std::size_t face = 0; face < 6; ++face) {
+    const std::size_t axis = face / 2;
+    const int side = face % 2 == 0 ? -1 : 1;
+    // On the lower face of an axis the other two change places, so that both faces wind outwards.
+    const std::size_t u = side > 0 ? (axis + 1) % 3 : (axis + 2) % 3;
+    const std::size_t v = side > 0 ? (axis + 2) % 3 : (axis + 1) % 3;
+    const auto at = [&](int i, int j) {
+      std::array<int, 3> p{};
+      p[axis] = side * n;
+      p[u] = 2 * i - n;
+      p[v] = 2 * j - n;
+      return point(p);
+    };
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        triangles.emplace_back(at(i, j), at(i + 1, j), at(i + 1, j + 1));
+        triangles.emplace_back(at(i, j), at(i + 1, j + 1), at(i, j + 1));
       }
     }
   }

@@ -66,7 +66,7 @@ std::optional<std::string> TableReader::text(std::string_view key) {
 }
 
 std::optional<std::string> TableReader::id(std::string_view key) {
-  const auto name = text(key);
+  auto name = text(key);
   if (!name || is_name(*name)) return name;
   error(key, fmt::format("is \"{}\"", printable(*name)),
         "an id has 1 to 64 letters, digits, dots, dashes and underscores, and starts with none of dot and dash");
