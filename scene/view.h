@@ -50,8 +50,8 @@ struct Ray {
 /// aspect; an orthographic camera keeps its half height. near_distance is the camera's, or 1e-4 of the scene's extent.
 [[nodiscard]] View make_view(const Camera& camera, Size size, const Bounds& bounds);
 
-/// A camera that sees all of `bounds` from the front, a little above and to the right, on screens at least as wide as high: for
-/// scenes that have none.
+/// A camera that sees all of `bounds` from the front, a little above and to the right, on screens at least as wide as
+/// high: for scenes that have none.
 [[nodiscard]] Camera framing_camera(const Bounds& bounds);
 
 /// A perspective camera at `eye` that looks at `at`. Throws Error (Usage) when they coincide or `up` is parallel.
