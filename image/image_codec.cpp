@@ -121,6 +121,7 @@ class OiioCodec final : public ImageCodec {
     }
     spec.nchannels = static_cast<int>(spec.channelnames.size());
     spec.attribute("compression", "zip");
+    spec.attribute("DateTime", "1970:01:01 00:00:00");  // the same picture is the same file, whenever it is written
     for (const auto& [key, value] : attributes) spec.attribute(key, value);
 
     const auto channels = static_cast<std::size_t>(spec.nchannels);
