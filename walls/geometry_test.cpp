@@ -47,7 +47,7 @@ WallScreen screen_at(const glm::dvec3& ll, const glm::dvec3& lr, const glm::dvec
 }
 
 std::string example(const char* name) {
-  return std::filesystem::path(__FILE__).parent_path() / "examples" / name;
+  return std::filesystem::path(HPR_WALL_EXAMPLES) / name;
 }
 
 /// Where a ray meets the screen's plane, wall space (the camera is straight(), the eye is the viewer).

@@ -16,7 +16,7 @@ namespace hpr {
 namespace {
 
 std::string example(const char* name) {
-  return std::filesystem::path(__FILE__).parent_path() / "examples" / name;
+  return std::filesystem::path(HPR_WALL_EXAMPLES) / name;
 }
 
 TEST(WallPlan, NamesEveryScreenWithItsSizesAndOwner) {

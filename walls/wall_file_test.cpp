@@ -317,7 +317,7 @@ TEST(WallFile, AShorthandIsAGridWithoutViewer) {
 }
 
 TEST(WallFile, AnExpandedWallIsTheSameWall) {
-  const std::string examples = std::filesystem::path(__FILE__).parent_path() / "examples";
+  const std::string examples = std::filesystem::path(HPR_WALL_EXAMPLES);
   for (const std::string& spec :
        {examples + "/desktop-3x2.toml", examples + "/wall-6x3-4k.toml", examples + "/cave-4.toml",
         std::string("6x3@3840x2160"), std::string("7x3@333x217")}) {
@@ -353,7 +353,7 @@ TEST(WallFile, TheHashChangesWithWhatIsSeenAndNotWithComments) {
 }
 
 TEST(WallFile, AScaledWallKeepsItsMetres) {
-  const std::string examples = std::filesystem::path(__FILE__).parent_path() / "examples";
+  const std::string examples = std::filesystem::path(HPR_WALL_EXAMPLES);
   const Wall wall = scale_wall(load_wall(examples + "/wall-6x3-4k.toml"), 0.0625);
   EXPECT_EQ(wall.screens[17].pixels, (Size{240, 135}));
   EXPECT_EQ(wall.screens[17].viewport, (Rect{0, 0, 240, 135}));
