@@ -27,6 +27,7 @@ struct Sample {
 
 /// One strategy under comparison on this rank.
 struct Contestant {
+  std::unique_ptr<CountingCommunicator> comm;
   std::unique_ptr<Compositor> compositor;
   std::vector<Sample> samples;         ///< per measured frame
   std::uint64_t differing_pixels = 0;  ///< rank 0: of the worst frame
@@ -97,17 +98,42 @@ void inspect(const TileLayer<Key>& layer, std::span<const Key> expected, const C
   contestant.frame = wall_image(layer, input);
 }
 
+/// Collective. Where all ranks are on one host they wait asleep, so that those that come late find a core.
+void wait_for_all(Communicator& comm, PeerMemory* peers) {
+  bool one_host = peers != nullptr;
+  for (int rank = 0; one_host && rank < comm.size(); ++rank) one_host = !peers->of(rank).empty();
+  if (one_host) {
+    peers->meet();
+  } else {
+    barrier(comm);
+  }
+}
+
 /// Collective: one frame of one strategy, from the ranks' layers to the whole frame on rank 0.
-Sample one_frame(Communicator& comm, const Compositor& compositor, TileLayer<Key>& layer,
+Sample one_frame(Contestant& contestant, Assembler& assembler, TileLayer<Key>& layer,
                  std::span<const std::size_t> tiles) {
   const std::vector<int> shown_by(layer.layout().screens(), 0);
-  CountingCommunicator counting(comm);
-  barrier(comm);
+  CountingCommunicator& comm = *contestant.comm;
+  wait_for_all(comm, layer.peers());
+  const std::size_t bytes_before = comm.bytes_sent();
+  const std::size_t messages_before = comm.messages_sent();
   const Stopwatch watch;
-  const TileRun mine = compositor.composite(counting, layer, tiles);
+  const Composited mine = contestant.compositor->composite(comm, layer, tiles, shown_by);
   const double composite_ms = watch.ms();
-  assemble(counting, layer, tiles.subspan(mine.first, mine.count), shown_by);
-  return {composite_ms, watch.ms() - composite_ms, counting.bytes_sent(), counting.messages_sent()};
+  if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, shown_by);
+  const Sample sample{composite_ms, watch.ms() - composite_ms, comm.bytes_sent() - bytes_before,
+                      comm.messages_sent() - messages_before};
+  wait_for_all(comm, layer.peers());  // ranks that are done must not take the cores of those that are still timed
+  return sample;
+}
+
+/// Collective: memory to composite in, where ranks of one host can merge in place if any strategy does so.
+TileLayer<Key> working_layer(Communicator& comm, const FrameLayout& layout,
+                             const std::vector<Contestant>& contestants) {
+  const bool in_place = std::ranges::any_of(
+      contestants, [](const Contestant& contestant) { return contestant.compositor->merges_in_place(); });
+  if (!in_place) return TileLayer<Key>(layout);
+  return {layout, comm.share(TileLayer<Key>::bytes_for(layout))};
 }
 
 /// `ranks`: per rank its samples, one per frame.
@@ -171,19 +197,22 @@ Spread spread_of(std::vector<double> values) {
 CompareResult compare_strategies(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
   HPR_CHECK(!settings.strategies.empty() && settings.frames > 0 && settings.warmup >= 0);
   const TileLayer<Key> pristine = input.layer(comm);
-  TileLayer<Key> layer(pristine.layout());
-  std::vector<std::size_t> tiles(layer.tiles());
+  std::vector<std::size_t> tiles(pristine.tiles());
   std::iota(tiles.begin(), tiles.end(), std::size_t{0});
   const std::vector<Key> expected = serial_maximum(comm, pristine);
   const bool is_root = comm.rank() == 0;
 
   std::vector<Contestant> contestants;
-  for (const std::string& name : settings.strategies) contestants.push_back({make_compositor(name), {}, 0, {}});
+  for (const std::string& name : settings.strategies) {
+    contestants.push_back({std::make_unique<CountingCommunicator>(comm), make_compositor(name), {}, 0, {}});
+  }
+  TileLayer<Key> layer = working_layer(comm, pristine.layout(), contestants);
+  Assembler assembler;
 
   for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
     for (Contestant& contestant : contestants) {
       restore(layer, pristine);
-      const Sample sample = one_frame(comm, *contestant.compositor, layer, tiles);
+      const Sample sample = one_frame(contestant, assembler, layer, tiles);
       if (frame >= 0) contestant.samples.push_back(sample);
       if (is_root) inspect(layer, expected, input, contestant);
     }

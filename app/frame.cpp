@@ -1,6 +1,5 @@
 #include "app/frame.h"
 
-#include "compositing/compositor.h"
 #include "core/stopwatch.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
@@ -33,9 +32,8 @@ namespace {
 /// Merges the group's layers; returns the tiles this rank ends up owning.
 std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {
   if (plan.mine.group.size() == 1) return plan.tiles;
-  const TileRun mine = make_compositor(plan.strategy)->composite(session.group(plan.mine.group), keys, plan.tiles);
-  const auto first = plan.tiles.begin() + static_cast<std::ptrdiff_t>(mine.first);
-  return {first, first + static_cast<std::ptrdiff_t>(mine.count)};
+  Compositor& compositor = session.compositor(plan.strategy, plan.mine.group);
+  return compositor.composite(session.group(plan.mine.group), keys, plan.tiles).tiles;
 }
 
 /// The colours of keys that already carry them.
@@ -58,7 +56,7 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
 Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times) {
   FrameTimes taken;
   Stopwatch watch;
-  TileLayer<Key>& keys = session.keys(plan.layout);
+  TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
   rasterize(session, plan, views, keys);
   taken.raster_ms = watch.ms();
 

@@ -93,11 +93,11 @@ class RenderCommand final : public Command {
     TileLayer<Rgba8> display;
     if (output_.ends_with(".png")) {
       display = to_display(frame, session.threads(), options_.exposure);
-      assemble<Rgba8>(session.comm(), display, frame.owned, to_root);
+      session.assembler().assemble(session.comm(), display, frame.owned, to_root);
     } else if (!output_.empty()) {
-      assemble<Rgb>(session.comm(), frame.radiance, frame.owned, to_root);
+      session.assembler().assemble(session.comm(), frame.radiance, frame.owned, to_root);
     }
-    if (!raw_.empty()) assemble<Key>(session.comm(), *frame.keys, frame.owned, to_root);
+    if (!raw_.empty()) session.assembler().assemble(session.comm(), *frame.keys, frame.owned, to_root);
     const RunStats stats = gather_stats(session, plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;

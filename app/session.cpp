@@ -62,18 +62,35 @@ Lighter& Session::lighter(const RaySettings& settings) {
 Communicator& Session::group(std::span<const int> members) {
   if (static_cast<int>(members.size()) == comm_.size()) return comm_;
   if (!group_.comm || !std::ranges::equal(members, group_.members)) {
+    compositor_.reset();  // both may hold on to the old group
+    keys_ = {};
     group_.comm = comm_.subset(members);
     group_.members.assign(members.begin(), members.end());
   }
   return *group_.comm;
 }
 
-TileLayer<Key>& Session::keys(const FrameLayout& layout) {
-  if (keys_.layout() == layout && keys_.tiles() == layout.tiles()) {
+Compositor& Session::compositor(const std::string& strategy, std::span<const int> members) {
+  (void)group(members);  // a new group ends the old one's strategy
+  if (!compositor_ || strategy_ != strategy) {
+    compositor_ = make_compositor(strategy);
+    strategy_ = strategy;
+  }
+  return *compositor_;
+}
+
+TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& strategy, std::span<const int> members) {
+  const bool shared = members.size() > 1 && compositor(strategy, members).merges_in_place();
+  const bool fits = keys_.layout() == layout && (keys_.peers() != nullptr) == shared &&
+                    (!shared || std::ranges::equal(members, keys_members_));
+  if (fits && layout.tiles() > 0) {
     keys_.clear();
+  } else if (shared) {
+    keys_ = TileLayer<Key>(layout, group(members).share(TileLayer<Key>::bytes_for(layout)));
   } else {
     keys_ = TileLayer<Key>(layout);
   }
+  keys_members_.assign(members.begin(), members.end());
   return keys_;
 }
 

@@ -8,6 +8,8 @@
 #include "app/command.h"
 #include "cluster/assignment.h"
 #include "cluster/counting_communicator.h"
+#include "compositing/assembly.h"
+#include "compositing/compositor.h"
 #include "raster/gl_context.h"
 #include "raster/rasterizer.h"
 #include "rt/lighter.h"
@@ -27,6 +29,7 @@ class Session {
   [[nodiscard]] int threads() const { return share_.threads; }
   [[nodiscard]] const std::string& host() const { return share_.host; }
   [[nodiscard]] const GlContext& gl() const { return *gl_; }
+  [[nodiscard]] Assembler& assembler() { return assembler_; }
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for.
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
@@ -35,8 +38,12 @@ class Session {
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
   /// group. What it sends counts in comm() too.
   [[nodiscard]] Communicator& group(std::span<const int> members);
-  /// A cleared layer of keys of this layout, reused from frame to frame.
-  [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout);
+  /// The strategy of this name with its scratch memory, for that group; kept until another one is asked for.
+  [[nodiscard]] Compositor& compositor(const std::string& strategy, std::span<const int> members);
+  /// A cleared layer of keys of this layout, reused from frame to frame. With a strategy that merges in place, the
+  /// ranks of one host see the layers of their group's members; collective over the group.
+  [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout, const std::string& strategy,
+                                     std::span<const int> members);
 
  private:
   void compare_rasterizers();
@@ -55,7 +62,11 @@ class Session {
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<Lighter> lighter_;
   Group group_;
+  std::string strategy_;
+  std::unique_ptr<Compositor> compositor_;
+  Assembler assembler_;
   TileLayer<Key> keys_;
+  std::vector<int> keys_members_;  ///< the group `keys_` is shared by
 };
 
 }  // namespace hpr

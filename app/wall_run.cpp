@@ -109,7 +109,7 @@ class WallDriver {
     const std::size_t sent_before = session_.comm().bytes_sent();
     const Frame frame = make_frame(session_, plan_, blocks_.views, &times_);
     TileLayer<Rgba8> display = to_display(frame, session_.threads(), run_.options.exposure);
-    assemble<Rgba8>(session_.comm(), display, frame.owned, block_owners(blocks_, shown_by_));
+    session_.assembler().assemble(session_.comm(), display, frame.owned, block_owners(blocks_, shown_by_));
     pictures_.clear();
     for (std::size_t screen = 0; screen < shown_by_.size(); ++screen) {
       pictures_.push_back(shown_by_[screen] == session_.comm().rank() ? join_blocks(display, blocks_, screen)

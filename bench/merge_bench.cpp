@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compositing/merge.h"
+#include "compositing/sparse.h"
 
 // How close the key merge comes to memory speed. A merge of n keys reads two streams and writes one, 3 n words; a copy
 // of n keys reads one and writes one. So the same traffic as a merge is a copy of 1.5 n keys, and both are measured.
@@ -42,6 +43,49 @@ void copy_1080p(benchmark::State& state) {
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(2 * bytes));
 }
 BENCHMARK(copy_1080p)->ArgName("percent")->Arg(100)->Arg(150)->Unit(benchmark::kMillisecond);
+
+/// A layer of which `percent` of the pixels are drawn, scattered.
+std::vector<hpr::Key> scattered_keys(std::int64_t percent) {
+  std::mt19937_64 random(3);
+  std::vector<hpr::Key> keys((kKeys1080p + hpr::kTilePixels - 1) / hpr::kTilePixels * hpr::kTilePixels);
+  for (hpr::Key& key : keys) key = static_cast<std::int64_t>(random() % 100) < percent ? random() | 1U : hpr::kNoKey;
+  return keys;
+}
+
+/// Finding the drawn pixels of a layer and writing them one after the other.
+void pack_1080p(benchmark::State& state) {
+  const std::vector<hpr::Key> keys = scattered_keys(state.range(0));
+  std::vector<hpr::Key> packed(hpr::kTilePixels);
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < keys.size(); i += hpr::kTilePixels) {
+      const auto tile = std::span(keys).subspan(i).first<hpr::kTilePixels>();
+      hpr::TileMask mask;
+      benchmark::DoNotOptimize(hpr::find_drawn(tile, mask));
+      benchmark::DoNotOptimize(hpr::pack_drawn(tile, mask, packed.data()));
+    }
+  }
+}
+BENCHMARK(pack_1080p)->ArgName("percent")->Arg(10)->Arg(50)->Unit(benchmark::kMillisecond);
+
+void merge_packed_1080p(benchmark::State& state) {
+  std::vector<hpr::Key> into = random_keys(1);
+  into.resize((kKeys1080p + hpr::kTilePixels - 1) / hpr::kTilePixels * hpr::kTilePixels);
+  const std::vector<hpr::Key> keys = scattered_keys(state.range(0));
+  std::vector<hpr::TileMask> masks(keys.size() / hpr::kTilePixels);
+  std::vector<std::vector<hpr::Key>> packed(masks.size(), std::vector<hpr::Key>(hpr::kTilePixels));
+  for (std::size_t i = 0; i < masks.size(); ++i) {
+    const auto tile = std::span(keys).subspan(i * hpr::kTilePixels).first<hpr::kTilePixels>();
+    hpr::find_drawn(tile, masks[i]);
+    packed[i].resize(hpr::pack_drawn(tile, masks[i], packed[i].data()));
+  }
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < masks.size(); ++i) {
+      hpr::merge_packed(std::span(into).subspan(i * hpr::kTilePixels).first<hpr::kTilePixels>(), masks[i], packed[i]);
+    }
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(merge_packed_1080p)->ArgName("percent")->Arg(10)->Arg(50)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

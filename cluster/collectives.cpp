@@ -1,5 +1,7 @@
 #include "cluster/collectives.h"
 
+#include <algorithm>
+
 namespace hpr {
 
 void broadcast(Communicator& comm, std::vector<std::byte>& bytes, int root) {
@@ -55,6 +57,28 @@ std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<con
     rest = rest.subspan(sizeof size + size);
   }
   return parts;
+}
+
+std::vector<std::byte> all_gather_equal(Communicator& comm, std::span<const std::byte> bytes) {
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  const auto rank = static_cast<std::size_t>(comm.rank());
+  const std::size_t each = bytes.size();
+  // Those of this rank, of the next one, and so on, as far as known.
+  std::vector<std::byte> known(bytes.begin(), bytes.end());
+  known.reserve(ranks * each);
+  for (std::size_t step = 1; step < ranks; step *= 2) {
+    const std::size_t blocks = std::min(step, ranks - step);
+    const Outgoing out{static_cast<int>((rank + ranks - step) % ranks), std::span(known).first(blocks * each)};
+    const int from = static_cast<int>((rank + step) % ranks);
+    std::vector<std::byte> more;
+    comm.exchange({&out, 1}, {&from, 1}, [&](int /*from*/, std::span<const std::byte> message) {
+      HPR_CHECK(message.size() == blocks * each);
+      more.assign(message.begin(), message.end());
+    });
+    known.insert(known.end(), more.begin(), more.end());
+  }
+  std::ranges::rotate(known, known.end() - static_cast<std::ptrdiff_t>(rank * each));
+  return known;
 }
 
 }  // namespace hpr

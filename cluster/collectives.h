@@ -25,6 +25,11 @@ void barrier(Communicator& comm);
 /// Each rank's bytes, in order of rank, on every rank.
 [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes);
 
+/// Each rank's bytes, as many on every rank, one after the other in order of rank. ceil(log2 P) rounds, after Bruck,
+/// Ho, Kipnis, Upfal and Weathersby, "Efficient Algorithms for All-to-All Communications in Multiport Message-Passing
+/// Systems", 1997.
+[[nodiscard]] std::vector<std::byte> all_gather_equal(Communicator& comm, std::span<const std::byte> bytes);
+
 /// Each rank's value, in order of rank, on every rank.
 template <typename Value>
 [[nodiscard]] std::vector<Value> all_gather_value(Communicator& comm, const Value& value) {

@@ -3,12 +3,34 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "image/tiles.h"
+
 namespace hpr {
+
+/// One message of an exchange, with the bodies that follow it: memory that need not be copied together, and which the
+/// receiver can have put where it belongs.
+struct Outgoing {
+  int to = 0;
+  std::span<const std::byte> message;
+  std::span<const std::span<const std::byte>> bodies = {};
+};
+
+/// Of the message and its bodies.
+[[nodiscard]] inline std::size_t bytes_of(const Outgoing& outgoing) {
+  std::size_t bytes = outgoing.message.size();
+  for (const auto body : outgoing.bodies) bytes += body.size();
+  return bytes;
+}
+
+/// Called with a message that has arrived; the bytes last until the call returns. They start at a multiple of 8. The
+/// call takes the message's bodies, each by one receive() from that rank, in their order.
+using Arrived = std::function<void(int from, std::span<const std::byte> message)>;
 
 /// Point-to-point messages between ranks, of any size. Messages between two ranks arrive in the order sent. No call
 /// waits longer than the communicator's time limit: then it throws Error (Hang) that says which rank it waited for. A
@@ -31,8 +53,11 @@ class Communicator {
   /// Receives a message whose size only the sender knows.
   [[nodiscard]] virtual std::vector<std::byte> receive(int from) = 0;
 
-  /// Sends and receives at once, so two ranks that exchange cannot deadlock. Both sizes may differ.
-  [[nodiscard]] virtual std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) = 0;
+  /// One round of messages: sends all of `out` and receives one message from each rank of `from`, all at once, so that
+  /// no order of calls among the ranks can deadlock. `arrived` is called for one message after the other in whatever
+  /// order they come, while the others are still under way. No rank may stand in `from` twice; several messages to one
+  /// rank are taken by as many calls there. Returns when all of `out` may be reused.
+  virtual void exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) = 0;
 
   /// Collective. values[i] of `root` becomes the largest values[i] of all ranks; those of other ranks are scratch
   /// after.
@@ -42,6 +67,14 @@ class Communicator {
   /// members[i] is rank i. Its messages cannot meet this one's. This one must outlive it. Making it
   /// is the one wait without a time limit under MPI.
   [[nodiscard]] virtual std::unique_ptr<Communicator> subset(std::span<const int> members) = 0;
+
+  /// Collective: `bytes` bytes for each rank (the same number on all), zeroed, which the ranks of one host see of each
+  /// other. Outlives this communicator's calls, not the communicator. Throws Error (Limit) where the host has too
+  /// little shared memory.
+  [[nodiscard]] virtual std::shared_ptr<PeerMemory> share(std::size_t bytes) = 0;
+
+  /// Says that this rank has merged or copied `bytes` bytes of pixels. Only a communicator that models time listens.
+  virtual void worked(std::size_t bytes) { (void)bytes; }
 };
 
 /// How long a wait for another rank may take before it counts as a hang, unless the user says otherwise.

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <numeric>
 #include <stdexcept>
@@ -9,6 +11,7 @@
 #include "cluster/collectives.h"
 #include "cluster/counting_communicator.h"
 #include "cluster/local_communicator.h"
+#include "cluster/test_exchange.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -58,8 +61,9 @@ TEST(LocalRanks, MessagesOfAnySizeArriveWholeAndInOrder) {
 TEST(LocalRanks, ExchangeMayHaveTwoSizesAndAPeerMayBeOneself) {
   run_local_ranks(2, [](Communicator& comm) {
     const std::size_t mine = comm.rank() == 0 ? 0 : 1000;
-    EXPECT_EQ(comm.exchange(message_of(comm.rank(), mine), 1 - comm.rank()), message_of(1 - comm.rank(), 1000 - mine));
-    EXPECT_EQ(comm.exchange(letter('m'), comm.rank()), letter('m'));
+    EXPECT_EQ(test::exchange_with(comm, message_of(comm.rank(), mine), 1 - comm.rank()),
+              message_of(1 - comm.rank(), 1000 - mine));
+    EXPECT_EQ(test::exchange_with(comm, letter('m'), comm.rank()), letter('m'));
   });
 }
 
@@ -298,10 +302,78 @@ TEST(Counting, CountsWhatThisRankSendsAlsoThroughSubsets) {
 
     if (comm.rank() == 2) return;
     const auto part = counting.subset(std::vector<int>{0, 1});
-    (void)part->exchange(message_of(0, 7), 1 - part->rank());
+    (void)test::exchange_with(*part, message_of(0, 7), 1 - part->rank());
     EXPECT_EQ(counting.messages_sent(), 2 + reduced);
     EXPECT_EQ(counting.bytes_sent(), 17 + 32 * reduced);
   });
+}
+
+TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
+  for (const std::uint64_t disorder : {0U, 1U, 2U}) {
+    run_local_ranks({.size = 5, .disorder = disorder}, [](Communicator& comm) {
+      for (int round = 0; round < 20; ++round) {
+        std::vector<std::vector<std::byte>> heads;
+        std::vector<std::vector<std::byte>> parts;
+        std::vector<Outgoing> out;
+        std::vector<int> from;
+        for (int peer = 0; peer < comm.size(); ++peer) {
+          heads.push_back(message_of(comm.rank() + round, 3 + static_cast<std::size_t>(peer)));
+          parts.push_back(message_of(comm.rank() + 7, 100));
+          if (peer != comm.rank()) from.push_back(peer);
+        }
+        const std::array<std::span<const std::byte>, 2> bodies{parts[0], parts[1]};
+        for (const int peer : from) out.push_back({peer, heads[static_cast<std::size_t>(peer)], bodies});
+        std::vector<int> came;
+        comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
+          came.push_back(peer);
+          EXPECT_TRUE(std::ranges::equal(message, message_of(peer + round, 3 + static_cast<std::size_t>(comm.rank()))));
+          for (int body = 0; body < 2; ++body) EXPECT_EQ(comm.receive(peer), message_of(peer + 7, 100));
+        });
+        std::ranges::sort(came);
+        EXPECT_EQ(came, from);
+      }
+    });
+  }
+}
+
+TEST(LocalRanks, RanksOfAHostSeeEachOthersMemoryAndMeet) {
+  run_local_ranks({.size = 5, .ranks_per_host = 2}, [](Communicator& comm) {
+    const auto memory = comm.share(3);
+    EXPECT_EQ(memory->mine().size(), 3U);
+    for (int frame = 0; frame < 50; ++frame) {
+      memory->mine()[1] = static_cast<std::byte>(comm.rank() + frame);
+      memory->meet();
+      for (int peer = 0; peer < comm.size(); ++peer) {
+        const bool here = peer / 2 == comm.rank() / 2;
+        EXPECT_EQ(memory->of(peer).size(), here ? 3U : 0U);
+        if (here) {
+          EXPECT_EQ(memory->of(peer)[1], static_cast<std::byte>(peer + frame));
+        }
+      }
+      memory->meet();
+    }
+  });
+}
+
+TEST(LocalRanks, ARankThatDoesNotComeToAMeetingIsAHangAndOneThatFailsIsLost) {
+  for (const bool fails : {false, true}) {
+    try {
+      run_local_ranks({.size = 2, .hang_timeout = std::chrono::milliseconds(fails ? 60'000 : 100)},
+                      [&](Communicator& comm) {
+                        const auto memory = comm.share(8);
+                        if (comm.rank() == 0) {
+                          memory->meet();
+                        } else if (fails) {
+                          throw Error(ExitCode::Io, "gone");
+                        } else {
+                          std::this_thread::sleep_for(std::chrono::milliseconds(400));
+                        }
+                      });
+      FAIL() << "expected an Error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), fails ? ExitCode::Io : ExitCode::Hang);
+    }
+  }
 }
 
 }  // namespace

@@ -1,54 +1,45 @@
 #pragma once
 
-#include <utility>
-
-#include "cluster/communicator.h"
+#include "cluster/forwarding_communicator.h"
 
 namespace hpr {
 
-/// Passes every message on and counts what this rank sends: the cost model of a strategy, free of timing noise.
-/// A reduce_max counts as the one message of its values that each rank but the root gives away. What goes through a
-/// subset counts here too.
-class CountingCommunicator final : public Communicator {
+/// Counts what this rank sends: the cost model of a strategy, free of timing noise. A message counts as one with all
+/// its bodies; what ranks read of each other's memory does not count. A reduce_max counts as the one
+/// message of its values that each rank but the root gives away. What goes through a subset counts here too.
+class CountingCommunicator final : public ForwardingCommunicator {
  public:
-  explicit CountingCommunicator(Communicator& inner) : inner_(inner) {}
+  explicit CountingCommunicator(Communicator& inner) : ForwardingCommunicator(inner) {}
 
   [[nodiscard]] std::size_t messages_sent() const { return messages_sent_; }
   [[nodiscard]] std::size_t bytes_sent() const { return bytes_sent_; }
 
-  [[nodiscard]] int rank() const override { return inner_.rank(); }
-  [[nodiscard]] int size() const override { return inner_.size(); }
-  [[nodiscard]] std::string_view transport() const override { return inner_.transport(); }
   void send(std::span<const std::byte> message, int to) override {
-    count(message);
-    inner_.send(message, to);
+    count(message.size());
+    inner().send(message, to);
   }
-  void receive(std::span<std::byte> message, int from) override { inner_.receive(message, from); }
-  [[nodiscard]] std::vector<std::byte> receive(int from) override { return inner_.receive(from); }
-  [[nodiscard]] std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) override {
-    count(out);
-    return inner_.exchange(out, peer);
+  void exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) override {
+    for (const Outgoing& outgoing : out) count(bytes_of(outgoing));
+    inner().exchange(out, from, arrived);
   }
   void reduce_max(std::span<std::uint64_t> values, int root) override {
-    if (rank() != root) count(std::as_bytes(values));
-    inner_.reduce_max(values, root);
+    if (rank() != root) count(values.size_bytes());
+    inner().reduce_max(values, root);
   }
   [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override {
-    return std::unique_ptr<Communicator>(new CountingCommunicator(inner_.subset(members), *this));
+    return std::unique_ptr<Communicator>(new CountingCommunicator(inner().subset(members), *this));
   }
 
  private:
   CountingCommunicator(std::unique_ptr<Communicator> part, CountingCommunicator& whole)
-      : owned_(std::move(part)), inner_(*owned_), whole_(&whole) {}
+      : ForwardingCommunicator(std::move(part)), whole_(&whole) {}
 
-  void count(std::span<const std::byte> message) {
+  void count(std::size_t bytes) {
     ++messages_sent_;
-    bytes_sent_ += message.size();
-    if (whole_ != nullptr) whole_->count(message);
+    bytes_sent_ += bytes;
+    if (whole_ != nullptr) whole_->count(bytes);
   }
 
-  std::unique_ptr<Communicator> owned_;  ///< of a subset
-  Communicator& inner_;
   CountingCommunicator* whole_ = nullptr;  ///< what this one is a subset of
   std::size_t messages_sent_ = 0;
   std::size_t bytes_sent_ = 0;

@@ -1,12 +1,20 @@
 #include "cluster/mpi_communicator.h"
 
 #include <fmt/format.h>
+#include <linux/futex.h>
 #include <sched.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <exception>
+#include <limits>
 #include <string>
+#include <thread>
 
+#include "cluster/collectives.h"
 #include "core/check.h"
 #include "core/error.h"
 
@@ -143,12 +151,60 @@ void MpiCommunicator::receive(std::span<std::byte> message, int from) {
   }
 }
 
-std::vector<std::byte> MpiCommunicator::exchange(std::span<const std::byte> out, int peer) {
-  std::vector<MPI_Request> requests;
-  start_send(out, peer, requests);
-  std::vector<std::byte> in = receive(peer);
-  wait(requests, "sending to", peer);
-  return in;
+bool MpiCommunicator::advance(Incoming& incoming) {
+  while (true) {
+    int done = 0;
+    if (incoming.request == MPI_REQUEST_NULL) {
+      MPI_Message part = MPI_MESSAGE_NULL;
+      MPI_Status status;
+      check(MPI_Improbe(incoming.from, kTag, comm_, &done, &part, &status), "MPI_Improbe");
+      if (done == 0) return false;
+      int count = 0;
+      check(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
+      incoming.last_part = static_cast<std::size_t>(count);
+      check(MPI_Imrecv(incoming.buffer.extend(incoming.last_part).data(), count, MPI_BYTE, &part, &incoming.request),
+            "MPI_Imrecv");
+    }
+    check(MPI_Test(&incoming.request, &done, MPI_STATUS_IGNORE), "MPI_Test");
+    if (done == 0) return false;
+    if (incoming.last_part < part_bytes_) return true;
+  }
+}
+
+void MpiCommunicator::exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) {
+  std::vector<MPI_Request> sends;
+  for (const Outgoing& outgoing : out) {
+    start_send(outgoing.message, outgoing.to, sends);
+    for (const auto body : outgoing.bodies) start_send(body, outgoing.to, sends);
+  }
+  std::vector<std::unique_ptr<Incoming>> waited;
+  for (const int rank : from) {
+    if (idle_.empty()) idle_.push_back(std::make_unique<Incoming>());
+    waited.push_back(std::move(idle_.back()));
+    idle_.pop_back();
+    waited.back()->from = rank;
+    waited.back()->buffer.clear();
+  }
+  while (!waited.empty()) {
+    auto whole = waited.end();
+    poll(
+        [&] {
+          // Every message is moved on before one is handed out, so that the network works while this rank merges.
+          for (auto it = waited.begin(); it != waited.end(); ++it) {
+            if (advance(**it)) {
+              whole = it;
+              return true;
+            }
+          }
+          return false;
+        },
+        "waiting for a message from", waited.front()->from);
+    std::unique_ptr<Incoming> message = std::move(*whole);
+    waited.erase(whole);
+    arrived(message->from, message->buffer.bytes());
+    idle_.push_back(std::move(message));
+  }
+  if (!sends.empty()) wait(sends, "sending to", out.front().to);
 }
 
 void MpiCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
@@ -176,6 +232,139 @@ std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> membe
   MPI_Group_free(&some);
   MPI_Group_free(&all);
   return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_));
+}
+
+namespace {
+
+constexpr int kPopulateWrite = 23;  ///< MADV_POPULATE_WRITE of Linux 5.14, which older headers lack
+
+/// One MPI-3 shared window: every rank of the host has a part of it.
+class WindowMemory final : public PeerMemory {
+ public:
+  WindowMemory(MPI_Comm comm, std::size_t bytes, std::chrono::nanoseconds hang_timeout) : hang_timeout_(hang_timeout) {
+    check(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host_), "MPI_Comm_split_type");
+    check(MPI_Comm_size(host_, &ranks_here_), "MPI_Comm_size");
+    MPI_Info info = MPI_INFO_NULL;
+    check(MPI_Info_create(&info), "MPI_Info_create");
+    MPI_Info_set(info, "alloc_shared_noncontig", "true");  // each part starts at a page
+    void* memory = nullptr;
+    const int code =
+        MPI_Win_allocate_shared(static_cast<MPI_Aint>(sizeof(Meeting) + bytes), 1, info, host_, &memory, &window_);
+    MPI_Info_free(&info);
+    if (code != MPI_SUCCESS) {
+      throw Error(ExitCode::Limit, fmt::format("no {} MiB of shared memory for each rank of this host", bytes >> 20U),
+                  "enlarge /dev/shm, or choose another strategy than shared-memory");
+    }
+    check(MPI_Win_lock_all(MPI_MODE_NOCHECK, window_), "MPI_Win_lock_all");
+    const std::span part(static_cast<std::byte*>(memory), sizeof(Meeting) + bytes);
+    std::ranges::fill(part, std::byte{0});
+    mine_ = part.subspan(sizeof(Meeting));
+    find_parts(comm, bytes);
+  }
+  ~WindowMemory() override {
+    // Freeing is collective: after a failure the peers may never come, and the job ends anyway.
+    if (std::uncaught_exceptions() != exceptions_at_birth_) return;
+    MPI_Win_unlock_all(window_);
+    MPI_Win_free(&window_);
+    MPI_Comm_free(&host_);
+  }
+  WindowMemory(const WindowMemory&) = delete;
+  WindowMemory& operator=(const WindowMemory&) = delete;
+
+  [[nodiscard]] std::span<std::byte> mine() override { return mine_; }
+  [[nodiscard]] std::span<std::byte> of(int rank) override { return parts_.at(static_cast<std::size_t>(rank)); }
+
+  void meet() override {
+    MPI_Win_sync(window_);
+    const std::atomic_ref<std::uint32_t> here(meeting_->here);
+    const std::atomic_ref<std::uint32_t> round(meeting_->round);
+    const std::uint32_t now = round.load();
+    if (here.fetch_add(1) + 1 == static_cast<std::uint32_t>(ranks_here_)) {
+      here.store(0);
+      round.store(now + 1);
+      futex(FUTEX_WAKE, std::numeric_limits<int>::max(), nullptr);
+    } else {
+      sleep_past(round, now);
+    }
+    MPI_Win_sync(window_);
+  }
+
+ private:
+  /// At the start of each part; that of the host's first rank is used.
+  struct alignas(64) Meeting {
+    std::uint32_t here;
+    std::uint32_t round;
+  };
+
+  void sleep_past(const std::atomic_ref<std::uint32_t>& round, std::uint32_t now) {
+    const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
+    // Ranks that have a core each come soon; falling asleep and being woken would take longer than that.
+    const int spins = static_cast<unsigned>(ranks_here_) <= std::thread::hardware_concurrency() ? 20'000 : 0;
+    for (int tries = 0; round.load() == now; ++tries) {
+      if (tries < spins) continue;
+      const timespec limit{.tv_sec = 1, .tv_nsec = 0};
+      futex(FUTEX_WAIT, static_cast<int>(now), &limit);
+      if (std::chrono::steady_clock::now() > deadline) {
+        throw Error(ExitCode::Hang, "not all ranks of this host met within the time limit",
+                    "a rank stands still; raise --hang-timeout if it only needs longer");
+      }
+    }
+  }
+  void futex(int operation, int value, const timespec* limit) {
+    ::syscall(SYS_futex, &meeting_->round, operation, value, limit, nullptr, 0);
+  }
+
+  [[nodiscard]] std::byte* part_of(int local) const {
+    MPI_Aint size = 0;
+    int unit = 0;
+    void* start = nullptr;
+    check(MPI_Win_shared_query(window_, local, &size, &unit, &start), "MPI_Win_shared_query");
+    return static_cast<std::byte*>(start);
+  }
+
+  /// The parts of the ranks of `comm` that are on this host.
+  void find_parts(MPI_Comm comm, std::size_t bytes) {
+    MPI_Group all = MPI_GROUP_NULL;
+    MPI_Group here = MPI_GROUP_NULL;
+    check(MPI_Comm_group(comm, &all), "MPI_Comm_group");
+    check(MPI_Comm_group(host_, &here), "MPI_Comm_group");
+    int ranks = 0;
+    check(MPI_Comm_size(comm, &ranks), "MPI_Comm_size");
+    for (int rank = 0; rank < ranks; ++rank) {
+      int local = MPI_UNDEFINED;
+      check(MPI_Group_translate_ranks(all, 1, &rank, here, &local), "MPI_Group_translate_ranks");
+      if (local == MPI_UNDEFINED) {
+        parts_.emplace_back();
+      } else {
+        parts_.emplace_back(part_of(local) + sizeof(Meeting), bytes);
+      }
+    }
+    // Whose tiles a rank merges differs from frame to frame: without this every frame would meet pages it has not
+    // mapped yet. Older kernels lack the call and map them one by one.
+    for (const std::span<std::byte> part : parts_) {
+      if (!part.empty()) (void)::madvise(part.data() - sizeof(Meeting), part.size() + sizeof(Meeting), kPopulateWrite);
+    }
+    meeting_ = reinterpret_cast<Meeting*>(part_of(0));
+    MPI_Group_free(&here);
+    MPI_Group_free(&all);
+  }
+
+  std::chrono::nanoseconds hang_timeout_;
+  MPI_Comm host_ = MPI_COMM_NULL;
+  MPI_Win window_ = MPI_WIN_NULL;
+  int ranks_here_ = 1;
+  std::span<std::byte> mine_;
+  std::vector<std::span<std::byte>> parts_;  ///< per rank
+  Meeting* meeting_ = nullptr;
+  int exceptions_at_birth_ = std::uncaught_exceptions();
+};
+
+}  // namespace
+
+std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
+  auto memory = std::make_shared<WindowMemory>(comm_, bytes, hang_timeout_);
+  barrier(*this);  // every part is zero before any rank writes to one
+  return memory;
 }
 
 std::string mpi_version() {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cluster/communicator.h"
+#include "core/byte_buffer.h"
 
 namespace hpr {
 
@@ -29,11 +30,21 @@ class MpiCommunicator final : public Communicator {
   void send(std::span<const std::byte> message, int to) override;
   void receive(std::span<std::byte> message, int from) override;
   [[nodiscard]] std::vector<std::byte> receive(int from) override;
-  [[nodiscard]] std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) override;
+  void exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) override;
   void reduce_max(std::span<std::uint64_t> values, int root) override;
   [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override;
+  [[nodiscard]] std::shared_ptr<PeerMemory> share(std::size_t bytes) override;
 
  private:
+  /// A message on its way to this rank.
+  struct Incoming {
+    int from = 0;
+    ByteBuffer buffer;
+    std::size_t last_part = 0;  ///< bytes of the part under way
+    MPI_Request request = MPI_REQUEST_NULL;
+  };
+  /// Moves a message on as far as it goes without waiting; whether it is whole.
+  bool advance(Incoming& incoming);
   struct Owned {};  ///< tag: `comm` becomes ours, no duplicate is made
   MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes);
 
@@ -51,7 +62,8 @@ class MpiCommunicator final : public Communicator {
   std::chrono::nanoseconds hang_timeout_;
   int exceptions_at_birth_ = std::uncaught_exceptions();
   std::size_t part_bytes_;
-  bool abandoned_ = false;  ///< a wait was given up with requests under way
+  bool abandoned_ = false;                       ///< a wait was given up with requests under way
+  std::vector<std::unique_ptr<Incoming>> idle_;  ///< memory of messages that have come, for the next ones
 };
 
 /// The MPI library and its version, e.g. "Open MPI v4.1.4"; may be called at any time, also before MPI_Init.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "cluster/forwarding_communicator.h"
 #include "cluster/local_communicator.h"
 #include "core/error.h"
 
@@ -26,30 +27,17 @@ Scene small_scene() {
   return scene;
 }
 
-/// Passes everything on, but changes the last byte of long messages this rank receives: a broken network or build.
-class DamagingCommunicator final : public Communicator {
+/// Changes the last byte of long messages this rank receives: a broken network or build.
+class DamagingCommunicator final : public ForwardingCommunicator {
  public:
-  explicit DamagingCommunicator(Communicator& inner) : inner_(inner) {}
-  [[nodiscard]] int rank() const override { return inner_.rank(); }
-  [[nodiscard]] int size() const override { return inner_.size(); }
-  [[nodiscard]] std::string_view transport() const override { return inner_.transport(); }
-  void send(std::span<const std::byte> message, int to) override { inner_.send(message, to); }
-  void receive(std::span<std::byte> message, int from) override { inner_.receive(message, from); }
+  using ForwardingCommunicator::ForwardingCommunicator;
+  using ForwardingCommunicator::receive;
+
   [[nodiscard]] std::vector<std::byte> receive(int from) override {
-    auto message = inner_.receive(from);
+    auto message = inner().receive(from);
     if (message.size() > 200) message.back() ^= std::byte{1};
     return message;
   }
-  [[nodiscard]] std::vector<std::byte> exchange(std::span<const std::byte> out, int peer) override {
-    return inner_.exchange(out, peer);
-  }
-  void reduce_max(std::span<std::uint64_t> values, int root) override { inner_.reduce_max(values, root); }
-  [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override {
-    return inner_.subset(members);
-  }
-
- private:
-  Communicator& inner_;
 };
 
 /// Runs `body` on `size` ranks and expects every one of them to throw just this.

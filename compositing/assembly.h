@@ -24,68 +24,67 @@ namespace hpr {
 [[nodiscard]] std::vector<std::size_t> decode_choice(std::span<const std::size_t> wanted,
                                                      std::span<const std::byte>& bytes);
 
-/// What of `owned` goes onto the tiles `wanted` elsewhere, as a message; empty when nothing does.
-template <typename Pixel>
-[[nodiscard]] std::vector<std::byte> encode_piece(const TileLayer<Pixel>& layer, std::span<const std::size_t> owned,
-                                                  std::span<const std::size_t> wanted) {
-  std::vector<std::size_t> chosen;
-  std::ranges::set_intersection(wanted, owned, std::back_inserter(chosen));
-  if (chosen.empty()) return {};
-  std::vector<std::byte> bytes = encode_choice(wanted, chosen);
-  append_tiles(bytes, layer, std::span<const std::size_t>(chosen));
-  return bytes;
-}
-
-/// Puts the tiles of a message of encode_piece into `layer` and marks them in `filled`, where none of them may be yet.
-template <typename Pixel>
-void decode_piece(TileLayer<Pixel>& layer, std::span<const std::size_t> wanted, std::span<const std::byte> message,
-                  std::vector<bool>& filled) {
-  if (message.empty()) return;
-  const std::vector<std::size_t> arrived = decode_choice(wanted, message);
-  for (const std::size_t tile : arrived) {
-    if (filled[tile]) throw Error(ExitCode::Internal, "two ranks own one tile of a frame");
-    filled[tile] = true;
-  }
-  decode_tiles(layer, std::span<const std::size_t>(arrived), message);
-}
-
-/// Collective. Brings the tiles to the screens: each rank passes the ascending `owned` tiles it has the result of, no
-/// tile twice among all ranks, and per screen the rank that shows it (the same list on every rank). After it, rank
-/// shown_by[s] holds in `layer` all tiles of screen s; those nobody owns are empty. Other tiles stay as they were.
-///
-/// Cost: one message from every rank to every other rank that shows a screen, empty where nothing of it is owned,
-/// else two bits per tile of its screens and the active tiles.
-template <typename Pixel>
-void assemble(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> owned,
-              std::span<const int> shown_by) {
-  const FrameLayout& layout = layer.layout();
-  HPR_CHECK(shown_by.size() == layout.screens());
-  HPR_CHECK(std::ranges::is_sorted(owned));
-  const auto shows = [&](int rank) { return std::ranges::find(shown_by, rank) != shown_by.end(); };
-  const auto piece_for = [&](int to) { return encode_piece(layer, owned, tiles_shown(layout, shown_by, to)); };
-  const int rank = comm.rank();
-  const bool shows_here = shows(rank);
-  const std::vector<std::size_t> wanted = tiles_shown(layout, shown_by, rank);
-  std::vector<bool> filled(layer.tiles());
-  for (const std::size_t tile : owned) filled[tile] = true;
-
-  // In round r the ranks whose numbers add up to r, modulo their count, meet: every two meet once, nobody waits for two
-  // at a time, and so ranks that send large pieces to each other cannot lock.
-  for (int round = 0; round < comm.size(); ++round) {
-    const int peer = (round - rank + comm.size()) % comm.size();
-    if (peer == rank) continue;
-    if (shows(peer) && shows_here) {
-      decode_piece(layer, wanted, comm.exchange(piece_for(peer), peer), filled);
-    } else if (shows(peer)) {
-      comm.send(piece_for(peer), peer);
-    } else if (shows_here) {
-      decode_piece(layer, wanted, comm.receive(peer), filled);
+/// Brings tiles to screens; keeps the memory of its messages from frame to frame.
+class Assembler {
+ public:
+  /// Collective. Each rank passes the ascending `owned` tiles it has the result of, no tile twice among all ranks, and
+  /// per screen the rank that shows it (the same list on every rank). After it, rank shown_by[s] holds in `layer` all
+  /// tiles of screen s; those nobody owns are empty. Other tiles stay as they were.
+  ///
+  /// Cost: one message from every rank to every other rank that shows a screen, all at once; empty where nothing of it
+  /// is owned, else two bits per tile of its screens and the active tiles, which whole ones among them arrive in place.
+  template <typename Pixel>
+  void assemble(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> owned,
+                std::span<const int> shown_by) {
+    const FrameLayout& layout = layer.layout();
+    HPR_CHECK(shown_by.size() == layout.screens());
+    HPR_CHECK(std::ranges::is_sorted(owned));
+    const auto shows = [&](int rank) { return std::ranges::find(shown_by, rank) != shown_by.end(); };
+    const int ranks = comm.size();
+    const int rank = comm.rank();
+    pieces_.resize(static_cast<std::size_t>(ranks));
+    std::vector<Outgoing> out;
+    std::vector<int> from;
+    for (int step = 1; step < ranks; ++step) {
+      const int to = (rank + step) % ranks;
+      if (shows(to)) {
+        out.push_back(piece_for(to, layer, owned, tiles_shown(layout, shown_by, to)));
+      }
+      if (shows(rank)) from.push_back((rank + ranks - step) % ranks);
+    }
+    const std::vector<std::size_t> wanted = tiles_shown(layout, shown_by, rank);
+    std::vector<bool> filled(layer.tiles());
+    for (const std::size_t tile : owned) filled[tile] = true;
+    comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
+      if (message.empty()) return;
+      const std::vector<std::size_t> arrived = decode_choice(wanted, message);
+      for (const std::size_t tile : arrived) {
+        if (filled[tile]) throw Error(ExitCode::Internal, "two ranks own one tile of a frame");
+        filled[tile] = true;
+      }
+      reader_.replace(comm, peer, message, layer, arrived);
+    });
+    for (const std::size_t tile : wanted) {
+      if (!filled[tile]) layer.clear(tile);
     }
   }
 
-  for (const std::size_t tile : wanted) {
-    if (!filled[tile]) layer.clear(tile);
+ private:
+  /// What of `owned` goes onto the tiles `wanted` of a rank; an empty message when nothing does.
+  template <typename Pixel>
+  [[nodiscard]] Outgoing piece_for(int rank, const TileLayer<Pixel>& layer, std::span<const std::size_t> owned,
+                                   std::span<const std::size_t> wanted) {
+    std::vector<std::size_t> chosen;
+    std::ranges::set_intersection(wanted, owned, std::back_inserter(chosen));
+    if (chosen.empty()) return {rank, {}, {}};
+    TileMessage& piece = pieces_[static_cast<std::size_t>(rank)];
+    piece.start(encode_choice(wanted, chosen));
+    piece.add(layer, chosen);
+    return piece.to(rank);
   }
-}
+
+  std::vector<TileMessage> pieces_;  ///< per rank that shows a screen
+  TileReader reader_;
+};
 
 }  // namespace hpr

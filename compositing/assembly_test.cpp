@@ -59,7 +59,7 @@ void expect_tiles_reach_their_screens(int ranks, const std::vector<int>& shown_b
       // Tiles of others hold scratch, as a strategy leaves it.
       if (owners[tile] == comm.rank() || tile % 2 == 0) fill(layer, tile, owners[tile] != comm.rank());
     }
-    assemble(comm, layer, std::span<const std::size_t>(owned), shown_by);
+    Assembler().assemble(comm, layer, std::span<const std::size_t>(owned), shown_by);
     for (std::size_t tile = 0; tile < kWall.tiles(); ++tile) {
       if (shown_by[kWall.place(tile).screen] != comm.rank()) continue;
       const bool empty = owners[tile] < 0 || tile % 3 == 1;
@@ -89,14 +89,15 @@ TEST(Assembly, PixelsMayBeLight) {
 
 TEST(Assembly, BringsWhatEveryStrategyLeavesToEveryScreen) {
   const std::vector<std::size_t> tiles = test::all_tiles(kWall);
-  for (const auto& compositor : all_compositors()) {
+  for (const auto& listed : all_compositors()) {
     for (const int ranks : {1, 3, 4}) {
       const std::vector<Key> expected = test::expected_keys(ranks, kWall);
       const std::vector<int> shown_by{ranks - 1, 0, 0, ranks / 2};
       run_local_ranks(ranks, [&](Communicator& comm) {
         TileLayer<Key> layer = test::random_layer(comm.rank(), kWall);
-        const TileRun mine = compositor->composite(comm, layer, tiles);
-        assemble(comm, layer, std::span(tiles).subspan(mine.first, mine.count), shown_by);
+        const auto compositor = make_compositor(listed->name());
+        const Composited mine = compositor->composite(comm, layer, tiles);
+        Assembler().assemble(comm, layer, mine.tiles, shown_by);
         for (const std::size_t tile : tiles) {
           if (shown_by[kWall.place(tile).screen] != comm.rank()) continue;
           EXPECT_TRUE(
@@ -114,7 +115,7 @@ TEST(Assembly, SendsOnlyToRanksThatShowSomething) {
     TileLayer<Key> layer(kWall);
     std::vector<std::size_t> owned;
     if (comm.rank() == 3) owned = {0, 1};
-    assemble(counting, layer, std::span<const std::size_t>(owned), std::vector<int>{0, 0, 2, 0});
+    Assembler().assemble(counting, layer, std::span<const std::size_t>(owned), std::vector<int>{0, 0, 2, 0});
     EXPECT_EQ(counting.messages_sent(), comm.rank() % 2 == 0 ? 1U : 2U);
     EXPECT_EQ(counting.bytes_sent() == 0, comm.rank() != 3);
   });
@@ -125,7 +126,8 @@ TEST(Assembly, RefusesTwoOwnersOfOneTile) {
                                [](Communicator& comm) {
                                  TileLayer<Key> layer(kWall);
                                  const std::vector<std::size_t> owned{4};
-                                 assemble(comm, layer, std::span<const std::size_t>(owned), std::vector<int>(4, 0));
+                                 Assembler().assemble(comm, layer, std::span<const std::size_t>(owned),
+                                                      std::vector<int>(4, 0));
                                }),
                Error);
 }

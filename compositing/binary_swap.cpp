@@ -2,8 +2,6 @@
 
 #include <bit>
 
-#include "compositing/tile_codec.h"
-
 namespace hpr {
 namespace {
 
@@ -25,30 +23,28 @@ class Fold {
 
 }  // namespace
 
-TileRun BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const {
+Composited BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                 std::span<const int> /*shown_by*/) {
   const Fold fold(comm.size());
   const int rank = comm.rank();
+  const Activity activity = share_activity(comm, layer, tiles);
   if (fold.paired(rank)) {
     if (rank % 2 == 1) {
-      comm.send(encode_tiles(layer, tiles), rank - 1);
+      folded_.start();
+      folded_.add(layer, tiles);
+      const Outgoing out = folded_.to(rank - 1);
+      comm.exchange({&out, 1}, {}, {});
       return {};
     }
-    merge_encoded(layer, tiles, comm.receive(rank + 1));
+    const int neighbour = rank + 1;
+    comm.exchange({}, {&neighbour, 1}, [&](int from, std::span<const std::byte> message) {
+      reader_.merge(comm, from, message, layer, tiles);
+    });
   }
-
-  const int member = fold.member_of(rank);
-  TileRun mine{0, tiles.size()};
-  for (int bit = 1; bit < fold.members(); bit *= 2) {
-    // Partners agree on all lower bits of their member numbers, so they hold the same run and cut it alike.
-    const int partner = member ^ bit;
-    const TileRun lower{mine.first, mine.count / 2};
-    const TileRun upper{lower.end(), mine.count - lower.count};
-    const TileRun theirs = member < partner ? upper : lower;
-    mine = member < partner ? lower : upper;
-    const auto given = encode_tiles(layer, tiles.subspan(theirs.first, theirs.count));
-    merge_encoded(layer, tiles.subspan(mine.first, mine.count), comm.exchange(given, fold.rank_of(partner)));
-  }
-  return mine;
+  const std::vector<int> twos(static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(fold.members())) - 1), 2);
+  const TileRun mine = rounds_.run(comm, layer, tiles, activity, twos, fold.member_of(rank),
+                                   [&](int member) { return fold.rank_of(member); });
+  return owning(tiles, mine);
 }
 
 }  // namespace hpr

@@ -1,18 +1,29 @@
 #pragma once
 
 #include "compositing/compositor.h"
+#include "compositing/swap_rounds.h"
 
 namespace hpr {
 
-/// Ma, Painter, Hansen and Krogh, "Parallel Volume Rendering Using Binary-Swap Compositing", 1994.
+/// In each round two ranks swap halves of the run they share, until every rank owns a part of the frame. Ma, Painter,
+/// Hansen and Krogh, "Parallel Volume Rendering Using Binary-Swap Compositing", 1994.
 ///
-/// In each of log2 P rounds a rank and its partner halve the tiles they share; each sends the half it gives up and
-/// merges the half it keeps. Cost: log2 P messages and N (1 - 1/P) keys sent per rank, to whole tiles. When P is no
-/// power of two, the excess ranks first hand their whole layer to a neighbour and end up owning nothing.
+/// Ranks past the largest power of two first give their whole layer to a neighbour and own nothing after (fold): one
+/// message more, where telescoping (Moreland, 2011) would keep them busy at the price of unequal pieces.
+///
+/// Cost: log2 P rounds; a rank sends N (1 - 1/P) keys, N the frame's. Before them one bit per tile and rank, in
+/// ceil(log2 P) messages, by which the halves are cut to hold as much to merge each.
 class BinarySwap final : public Compositor {
  public:
   [[nodiscard]] std::string_view name() const override { return "binary-swap"; }
-  TileRun composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const override;
+  using Compositor::composite;
+  Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                       std::span<const int> shown_by) override;
+
+ private:
+  SwapRounds rounds_;
+  TileMessage folded_;
+  TileReader reader_;
 };
 
 }  // namespace hpr

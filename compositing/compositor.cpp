@@ -5,8 +5,12 @@
 #include <string>
 
 #include "compositing/binary_swap.h"
+#include "compositing/direct_send.h"
 #include "compositing/mpi_reduce.h"
+#include "compositing/radix_k.h"
+#include "compositing/ring.h"
 #include "compositing/serial.h"
+#include "compositing/shared_memory.h"
 #include "compositing/tree.h"
 #include "core/error.h"
 #include "core/names.h"
@@ -18,6 +22,10 @@ std::vector<std::unique_ptr<Compositor>> all_compositors() {
   all.push_back(std::make_unique<Serial>());
   all.push_back(std::make_unique<Tree>());
   all.push_back(std::make_unique<BinarySwap>());
+  all.push_back(std::make_unique<RadixK>());
+  all.push_back(std::make_unique<DirectSend>());
+  all.push_back(std::make_unique<Ring>());
+  all.push_back(std::make_unique<SharedMemory>());
   all.push_back(std::make_unique<MpiReduce>());
   return all;
 }
@@ -28,6 +36,8 @@ std::unique_ptr<Compositor> make_compositor(std::string_view name) {
     if (compositor->name() == name) return std::move(compositor);
     choices.emplace_back(compositor->name());
   }
+  constexpr std::string_view kGivenFactors = "radix-k:";
+  if (name.starts_with(kGivenFactors)) return std::make_unique<RadixK>(name.substr(kGivenFactors.size()));
   throw Error(ExitCode::Usage, fmt::format("no compositing strategy is named '{}'", printable(name)),
               unknown_name_hint(printable(name), choices));
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -12,10 +13,19 @@
 
 namespace hpr {
 
+/// What compositing leaves a rank with.
+struct Composited {
+  std::vector<std::size_t> tiles;  ///< the frame's tiles it owns, ascending
+  /// The same on all ranks: every tile is owned by the rank that shows it, there is nothing left to assemble.
+  bool assembled = false;
+};
+
 /// Combines one layer of keys per rank into one frame: sort-last, the nearest surface wins.
 ///
 /// The result of a pixel is the largest key any rank has there. That maximum does not depend on the order of merging,
 /// so every compositor returns the same bits for the same layers.
+///
+/// A compositor keeps scratch memory from frame to frame and belongs to one rank.
 class Compositor {
  public:
   virtual ~Compositor() = default;
@@ -26,17 +36,40 @@ class Compositor {
   /// Whether it can run on so many ranks.
   [[nodiscard]] virtual bool fits(int ranks) const { return ranks >= 1; }
 
+  /// Whether it merges layers that live in the memory of a communicator's share() where they lie. All ranks' layers
+  /// live there then, or none.
+  [[nodiscard]] virtual bool merges_in_place() const { return false; }
+
   /// Collective: every rank of `comm` calls it with layers of one layout and the same ascending list `tiles` of tiles
-  /// of the frame, which take part; other tiles are left alone. Returns the positions in `tiles` this rank ends up
-  /// owning: only those tiles of `layer` hold the result, the other listed ones are scratch (and still zero where
-  /// inactive). The runs of all ranks partition [0, tiles.size()). Bringing them onto a screen is assemble's business.
-  virtual TileRun composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const = 0;
+  /// of the frame, which take part; other tiles are left alone. The tiles all ranks end up owning partition the list:
+  /// only those of `layer` hold the result, the other listed ones are scratch (and still zero where inactive).
+  ///
+  /// `shown_by`: per screen the rank that shows it, the same on all ranks; empty where nobody does. A strategy may put
+  /// tiles straight where they are shown; else bringing them there is assemble's business.
+  [[nodiscard]] virtual Composited composite(Communicator& comm, TileLayer<Key>& layer,
+                                             std::span<const std::size_t> tiles, std::span<const int> shown_by) = 0;
+
+  /// The same, the tiles staying wherever that costs least.
+  [[nodiscard]] Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) {
+    return composite(comm, layer, tiles, {});
+  }
 };
+
+/// The part of a list of tiles a run names.
+[[nodiscard]] inline std::span<const std::size_t> part_of(std::span<const std::size_t> tiles, TileRun run) {
+  return tiles.subspan(run.first, run.count);
+}
+/// A run of a list of tiles, to be owned.
+[[nodiscard]] inline Composited owning(std::span<const std::size_t> tiles, TileRun run) {
+  const auto part = part_of(tiles, run);
+  return {{part.begin(), part.end()}, false};
+}
 
 /// One of every strategy, in the order reports list them.
 [[nodiscard]] std::vector<std::unique_ptr<Compositor>> all_compositors();
 
-/// Throws Error (Usage) with the choices and the nearest one when there is no strategy of that name.
+/// `name` may carry what a strategy is to be set to after a colon: "radix-k:4,2". Throws Error (Usage) with the choices
+/// and the nearest one when there is no strategy of that name.
 [[nodiscard]] std::unique_ptr<Compositor> make_compositor(std::string_view name);
 
 }  // namespace hpr

@@ -18,12 +18,13 @@ namespace {
 /// The promises of Compositor::composite, held against every strategy. A new strategy is tested by being listed.
 class CompositorTest : public testing::TestWithParam<std::tuple<std::string, int>> {
  protected:
-  std::unique_ptr<Compositor> compositor_ = make_compositor(std::get<0>(GetParam()));
+  /// A rank's own.
+  static std::unique_ptr<Compositor> compositor() { return make_compositor(std::get<0>(GetParam())); }
   int ranks_ = std::get<1>(GetParam());
 };
 
 TEST_P(CompositorTest, RunsPartitionTheTilesAndHoldTheSerialMaximum) {
-  ASSERT_TRUE(compositor_->fits(ranks_));
+  ASSERT_TRUE(compositor()->fits(ranks_));
   std::size_t number = 0;
   for (const auto& [layout, tiles] : test::awkward_tile_lists()) {
     SCOPED_TRACE("tile list " + std::to_string(number++));
@@ -34,14 +35,15 @@ TEST_P(CompositorTest, RunsPartitionTheTilesAndHoldTheSerialMaximum) {
     std::mutex mutex;
     run_local_ranks(ranks_, [&, &tiles = tiles, &layout = layout](Communicator& comm) {
       TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-      const TileRun mine = compositor_->composite(comm, layer, tiles);
+      const Composited mine = compositor()->composite(comm, layer, tiles);
       const std::lock_guard lock(mutex);
-      ASSERT_LE(mine.end(), tiles.size());
-      for (std::size_t i = mine.first; i < mine.end(); ++i) {
-        ++owners[i];
-        const auto keys = layer.tile(tiles[i]);
+      EXPECT_TRUE(std::ranges::is_sorted(mine.tiles));
+      for (const std::size_t tile : mine.tiles) {
+        const auto position = std::ranges::lower_bound(tiles, tile) - tiles.begin();
+        ++owners.at(static_cast<std::size_t>(position));
+        const auto keys = layer.tile(tile);
         for (std::size_t p = 0; p < kTilePixels; ++p) {
-          wrong_keys += keys[p] == expected[tiles[i] * kTilePixels + p] ? 0U : 1U;
+          wrong_keys += keys[p] == expected[tile * kTilePixels + p] ? 0U : 1U;
         }
       }
       for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
@@ -62,7 +64,7 @@ TEST_P(CompositorTest, LeavesTilesThatAreNotListedAlone) {
   run_local_ranks(ranks_, [&](Communicator& comm) {
     TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
     const TileLayer<Key> before = test::random_layer(comm.rank(), layout);
-    (void)compositor_->composite(comm, layer, tiles);
+    (void)compositor()->composite(comm, layer, tiles);
     for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
       if (std::ranges::binary_search(tiles, tile)) continue;
       EXPECT_EQ(layer.active(tile), before.active(tile));
@@ -77,11 +79,43 @@ TEST_P(CompositorTest, EqualLayersGiveThatLayer) {
   const TileLayer<Key> same = test::random_layer(0, layout);
   run_local_ranks(ranks_, [&](Communicator& comm) {
     TileLayer<Key> layer = test::random_layer(0, layout);
-    const TileRun mine = compositor_->composite(comm, layer, tiles);
-    for (std::size_t i = mine.first; i < mine.end(); ++i) {
-      EXPECT_TRUE(std::ranges::equal(layer.tile(tiles[i]), same.tile(tiles[i])));
-    }
+    const Composited mine = compositor()->composite(comm, layer, tiles);
+    for (const std::size_t tile : mine.tiles) EXPECT_TRUE(std::ranges::equal(layer.tile(tile), same.tile(tile)));
   });
+}
+
+TEST_P(CompositorTest, LayersMayLiveInSharedMemoryAndTheirScreensBeShown) {
+  const FrameLayout layout({{200, 70}, {65, 65}, {130, 130}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<Key> expected = test::expected_keys(ranks_, layout);
+  const std::vector<int> shown_by{ranks_ - 1, 0, ranks_ / 2};
+  for (const int ranks_per_host : {0, 1, 2, 3}) {
+    SCOPED_TRACE(ranks_per_host);
+    std::vector<int> owners(tiles.size(), 0);
+    std::size_t wrong_tiles = 0;
+    std::size_t astray = 0;  // owned by another rank than the one that shows them, though said to be assembled
+    std::mutex mutex;
+    run_local_ranks({.size = ranks_, .ranks_per_host = ranks_per_host, .disorder = 5}, [&](Communicator& comm) {
+      const auto own = compositor();
+      const auto memory = comm.share(TileLayer<Key>::bytes_for(layout));
+      for (int frame = 0; frame < 3; ++frame) {
+        TileLayer<Key> layer(layout, memory);
+        layer.clear();
+        test::copy_layer(test::random_layer(comm.rank(), layout), layer);
+        const Composited mine = own->composite(comm, layer, tiles, shown_by);
+        const std::lock_guard lock(mutex);
+        for (const std::size_t tile : mine.tiles) {
+          ++owners[tile];
+          const auto want = std::span(expected).subspan(tile * kTilePixels, kTilePixels);
+          wrong_tiles += std::ranges::equal(layer.tile(tile), want) ? 0U : 1U;
+          astray += mine.assembled && shown_by[layout.place(tile).screen] != comm.rank() ? 1U : 0U;
+        }
+      }
+    });
+    EXPECT_EQ(std::ranges::count(owners, 3), static_cast<std::ptrdiff_t>(tiles.size()));
+    EXPECT_EQ(wrong_tiles, 0U);
+    EXPECT_EQ(astray, 0U);
+  }
 }
 
 std::vector<std::string> every_strategy() {
@@ -108,7 +142,10 @@ TEST(MakeCompositor, NamesTheNearestChoiceWhenThereIsNoSuchStrategy) {
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::Usage);
     EXPECT_STREQ(error.what(), "no compositing strategy is named 'binray-swap'");
-    EXPECT_EQ(error.hint(), "did you mean 'binary-swap'? choices: serial, tree, binary-swap, mpi-reduce");
+    EXPECT_EQ(
+        error.hint(),
+        "did you mean 'binary-swap'? choices: serial, tree, binary-swap, radix-k, direct-send, ring, shared-memory, "
+        "mpi-reduce");
   }
 }
 

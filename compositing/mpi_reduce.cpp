@@ -4,7 +4,8 @@
 
 namespace hpr {
 
-TileRun MpiReduce::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const {
+Composited MpiReduce::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                std::span<const int> /*shown_by*/) {
   if (tiles.empty()) return {};
   const bool is_root = comm.rank() == 0;
   const std::size_t stretch = tiles.back() - tiles.front() + 1;
@@ -33,7 +34,7 @@ TileRun MpiReduce::composite(Communicator& comm, TileLayer<Key>& layer, std::spa
     if (!packed.empty()) std::ranges::copy(values.subspan(i * kTilePixels, kTilePixels), tile.begin());
     if (std::ranges::any_of(tile, [](Key key) { return key != kNoKey; })) layer.set_active(tiles[i]);
   }
-  return is_root ? TileRun{0, tiles.size()} : TileRun{};
+  return is_root ? owning(tiles, {0, tiles.size()}) : Composited{};
 }
 
 }  // namespace hpr

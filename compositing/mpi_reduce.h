@@ -11,7 +11,9 @@ namespace hpr {
 class MpiReduce final : public Compositor {
  public:
   [[nodiscard]] std::string_view name() const override { return "mpi-reduce"; }
-  TileRun composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const override;
+  using Compositor::composite;
+  Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                       std::span<const int> shown_by) override;
 };
 
 }  // namespace hpr

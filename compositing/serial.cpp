@@ -1,16 +1,24 @@
 #include "compositing/serial.h"
 
-#include "compositing/tile_codec.h"
+#include <numeric>
 
 namespace hpr {
 
-TileRun Serial::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const {
+Composited Serial::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                             std::span<const int> /*shown_by*/) {
   if (comm.rank() != 0) {
-    comm.send(encode_tiles(layer, tiles), 0);
+    given_.start();
+    given_.add(layer, tiles);
+    const Outgoing out = given_.to(0);
+    comm.exchange({&out, 1}, {}, {});
     return {};
   }
-  for (int from = 1; from < comm.size(); ++from) merge_encoded(layer, tiles, comm.receive(from));
-  return {0, tiles.size()};
+  std::vector<int> others(static_cast<std::size_t>(comm.size()) - 1);
+  std::iota(others.begin(), others.end(), 1);
+  comm.exchange({}, others, [&](int from, std::span<const std::byte> message) {
+    reader_.merge(comm, from, message, layer, tiles);
+  });
+  return owning(tiles, {0, tiles.size()});
 }
 
 }  // namespace hpr

@@ -1,10 +1,11 @@
 #pragma once
 
 #include "compositing/compositor.h"
+#include "compositing/tile_codec.h"
 
 namespace hpr {
 
-/// Every rank sends its layer to rank 0, which merges them in order of rank: the floor any other strategy must beat.
+/// Every rank sends its layer to rank 0, which merges them as they come: the floor any other strategy must beat.
 /// Known as direct send to one rank, and as the naive sort-last of Molnar, Cox, Ellsworth and Fuchs, "A Sorting
 /// Classification of Parallel Rendering", 1994.
 ///
@@ -12,7 +13,13 @@ namespace hpr {
 class Serial final : public Compositor {
  public:
   [[nodiscard]] std::string_view name() const override { return "serial"; }
-  TileRun composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const override;
+  using Compositor::composite;
+  Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                       std::span<const int> shown_by) override;
+
+ private:
+  TileMessage given_;
+  TileReader reader_;
 };
 
 }  // namespace hpr

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -39,6 +40,15 @@ inline TileLayer<Key> random_layer(int rank, const FrameLayout& layout, std::uin
     }
   }
   return layer;
+}
+
+/// Makes the empty layer `to` a copy.
+inline void copy_layer(const TileLayer<Key>& from, TileLayer<Key>& to) {
+  for (std::size_t tile = 0; tile < from.tiles(); ++tile) {
+    if (!from.active(tile)) continue;
+    std::ranges::copy(from.tile(tile), to.tile(tile).begin());
+    to.set_active(tile);
+  }
 }
 
 /// All keys of a frame, tile after tile.

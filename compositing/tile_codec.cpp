@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "compositing/merge.h"
+#include "compositing/sparse.h"
 #include "core/check.h"
 #include "core/error.h"
 
@@ -14,8 +16,18 @@ namespace {
 using Word = std::uint64_t;
 constexpr std::size_t kWordBits = 64;
 
-std::size_t words_for(std::size_t tiles) {
+constexpr std::size_t words_for(std::size_t tiles) {
   return (tiles + kWordBits - 1) / kWordBits;
+}
+
+/// Of the counts of so many active tiles, in whole words.
+constexpr std::size_t count_bytes(std::size_t active) {
+  return (active * sizeof(std::uint16_t) + sizeof(Word) - 1) / sizeof(Word) * sizeof(Word);
+}
+
+/// What follows the head of a message for one tile.
+constexpr std::size_t packed_bytes(std::uint16_t drawn) {
+  return drawn == 0 || drawn > kMostPackedPixels ? 0 : sizeof(TileMask) + drawn * sizeof(Key);
 }
 
 [[noreturn]] void malformed(const std::string& what) {
@@ -23,63 +35,194 @@ std::size_t words_for(std::size_t tiles) {
               "ranks of different builds cannot work together");
 }
 
+/// Whether a tile is surely full enough to travel whole, from every eighth word of it: most are, or hold little.
+bool looks_full(std::span<const Key, kTilePixels> keys) {
+  std::size_t drawn = 0;
+  std::size_t seen = 0;
+  for (std::size_t first = 0; first < kTilePixels; first += 512) {
+    for (const Key key : keys.subspan(first, 64)) drawn += key != kNoKey ? 1U : 0U;
+    seen += 64;
+  }
+  return drawn * kTilePixels > kMostPackedPixels * seen * 9 / 8;
+}
+
+/// Masks and pixels of packed tiles, one after the other, merged where they lie.
+class PackedTiles {
+ public:
+  explicit PackedTiles(std::span<const std::byte> bytes) : next_(bytes.data()) {
+    HPR_CHECK(reinterpret_cast<std::uintptr_t>(next_) % alignof(Key) == 0);
+  }
+
+  void merge_next(std::span<Key> tile, std::uint16_t drawn) {
+    if (drawn == 0) return;
+    TileMask mask;
+    std::memcpy(mask.data(), next_, sizeof mask);
+    merge_packed(tile.first<kTilePixels>(), mask, {reinterpret_cast<const Key*>(next_ + sizeof mask), drawn});
+    next_ += packed_bytes(drawn);
+  }
+
+ private:
+  const std::byte* next_;
+};
+
+/// Every mask marks as many pixels as its tile announced.
+void check_masks(const TileHead& head) {
+  const std::byte* next = head.packed.data();
+  for (const std::uint16_t drawn : head.drawn) {
+    if (packed_bytes(drawn) == 0) continue;
+    TileMask mask;
+    std::memcpy(mask.data(), next, sizeof mask);
+    std::size_t bits = 0;
+    for (const Word word : mask) bits += static_cast<std::size_t>(std::popcount(word));
+    if (bits != drawn) malformed(fmt::format("{} pixels are marked as drawn, {} were announced", bits, drawn));
+    next += packed_bytes(drawn);
+  }
+}
+
 }  // namespace
 
-void append_head(std::vector<std::byte>& bytes, const std::vector<bool>& active, std::size_t pixel_bytes) {
-  std::vector<Word> head(1 + words_for(active.size()));
-  head[0] = static_cast<Word>(TileEncoding::WholeTiles);
-  std::size_t active_tiles = 0;
-  for (std::size_t i = 0; i < active.size(); ++i) {
-    if (!active[i]) continue;
-    head[1 + i / kWordBits] |= Word{1} << (i % kWordBits);
-    ++active_tiles;
+std::vector<Body> bodies_of(std::span<const std::uint16_t> drawn, std::span<const std::size_t> tiles) {
+  std::vector<Body> bodies;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (drawn[i] != kWholeTile) continue;
+    const bool joins = !bodies.empty() && bodies.back().end == i && tiles[i] == tiles[i - 1] + 1 &&
+                       i - bodies.back().first < kTilesOfABody;
+    if (joins) {
+      bodies.back().end = i + 1;
+    } else {
+      bodies.push_back({i, i + 1});
+    }
   }
-  const auto head_bytes = std::as_bytes(std::span(head));
-  bytes.reserve(bytes.size() + head_bytes.size() + active_tiles * kTilePixels * pixel_bytes);
-  bytes.insert(bytes.end(), head_bytes.begin(), head_bytes.end());
+  return bodies;
 }
 
-EncodedTiles parse_encoded(std::span<const std::byte> bytes, std::size_t tiles, std::size_t pixel_bytes) {
+void TileMessage::start(std::span<const std::byte> prefix) {
+  HPR_CHECK(prefix.size() % alignof(Key) == 0);
+  head_.clear();
+  bodies_.clear();
+  head_.append(prefix);
+}
+
+void TileMessage::add_head(std::span<const std::uint16_t> drawn) {
+  std::vector<Word> head(1 + words_for(drawn.size()));
+  head[0] = kTileFormat;
+  std::vector<std::uint16_t> counts;
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    if (drawn[i] == TileHead::kInactive) continue;
+    head[1 + i / kWordBits] |= Word{1} << (i % kWordBits);
+    counts.push_back(drawn[i]);
+  }
+  counts.resize(count_bytes(counts.size()) / sizeof(std::uint16_t));
+  head_.append(std::as_bytes(std::span(head)));
+  head_.append(std::as_bytes(std::span(counts)));
+}
+
+void TileMessage::add(const TileLayer<Key>& layer, std::span<const std::size_t> tiles) {
+  std::vector<std::uint16_t> drawn(tiles.size(), TileHead::kInactive);
+  std::vector<TileMask> masks;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (!layer.active(tiles[i])) continue;
+    const auto keys = layer.tile(tiles[i]).first<kTilePixels>();
+    drawn[i] = kWholeTile;
+    if (looks_full(keys)) continue;
+    TileMask mask;
+    const std::size_t pixels = find_drawn(keys, mask);
+    if (pixels > kMostPackedPixels) continue;
+    drawn[i] = static_cast<std::uint16_t>(pixels);
+    if (pixels > 0) masks.push_back(mask);
+  }
+  add_head(drawn);
+  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMostPackedPixels * sizeof(Key)) +
+                kTilePixels * sizeof(Key));
+  auto mask = masks.begin();
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const std::size_t bytes = packed_bytes(drawn[i]);
+    if (bytes == 0) continue;
+    const std::size_t at = head_.size();
+    std::byte* const room = head_.extend(sizeof *mask + kTilePixels * sizeof(Key)).data();
+    std::memcpy(room, mask->data(), sizeof *mask);
+    const auto* const packed = reinterpret_cast<Key*>(room + sizeof *mask);
+    const std::size_t pixels = pack_drawn(layer.tile(tiles[i]).first<kTilePixels>(), *mask, const_cast<Key*>(packed));
+    HPR_CHECK(pixels == drawn[i]);
+    head_.shrink(at + bytes);
+    ++mask;
+  }
+  add_bodies(layer, tiles, drawn);
+}
+
+TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool packs) {
   std::vector<Word> head(1 + words_for(tiles));
   const std::size_t head_bytes = head.size() * sizeof(Word);
-  if (bytes.size() < head_bytes) {
+  if (message.size() < head_bytes) {
     malformed(
-        fmt::format("{} bytes cannot hold the head of {} tiles, which takes {}", bytes.size(), tiles, head_bytes));
+        fmt::format("{} bytes cannot hold the head of {} tiles, which takes {}", message.size(), tiles, head_bytes));
   }
-  std::memcpy(head.data(), bytes.data(), head_bytes);
-  if (head[0] != static_cast<Word>(TileEncoding::WholeTiles)) malformed(fmt::format("unknown encoding {}", head[0]));
+  std::memcpy(head.data(), message.data(), head_bytes);
+  if (head[0] != kTileFormat) malformed(fmt::format("unknown format {}", head[0]));
+  if (tiles % kWordBits != 0 && head.back() >> (tiles % kWordBits) != 0) {
+    malformed(fmt::format("a tile past the {} of the list is said to be active", tiles));
+  }
 
-  EncodedTiles encoded{std::vector<bool>(tiles), bytes.subspan(head_bytes)};
-  std::size_t active_tiles = 0;
-  for (std::size_t i = 0; i < words_for(tiles) * kWordBits; ++i) {
+  TileHead parsed{std::vector<std::uint16_t>(tiles, TileHead::kInactive), {}};
+  std::size_t active = 0;
+  for (std::size_t i = 0; i < words_for(tiles); ++i) active += static_cast<std::size_t>(std::popcount(head[1 + i]));
+  if (message.size() < head_bytes + count_bytes(active)) malformed("no counts of pixels");
+  const std::byte* count = message.data() + head_bytes;
+  std::size_t expected = 0;
+  for (std::size_t i = 0; i < tiles; ++i) {
     if ((head[1 + i / kWordBits] >> (i % kWordBits) & 1U) == 0) continue;
-    if (i >= tiles) malformed(fmt::format("tile {} of {} is said to be active", i, tiles));
-    encoded.active[i] = true;
-    ++active_tiles;
+    std::uint16_t& drawn = parsed.drawn[i];
+    std::memcpy(&drawn, count, sizeof drawn);
+    count += sizeof drawn;
+    if (drawn != kWholeTile && !(packs && drawn <= kMostPackedPixels)) {
+      malformed(fmt::format("tile {} of {} is said to have {} pixels", i, tiles, drawn));
+    }
+    expected += packed_bytes(drawn);
   }
-  const std::size_t expected = active_tiles * kTilePixels * pixel_bytes;
-  if (encoded.pixels.size() != expected) {
-    malformed(fmt::format("{} active tiles take {} bytes, {} came", active_tiles, expected, encoded.pixels.size()));
+  parsed.packed = message.subspan(head_bytes + count_bytes(active));
+  if (parsed.packed.size() != expected) {
+    malformed(fmt::format("packed tiles take {} bytes, {} came", expected, parsed.packed.size()));
   }
-  return encoded;
+  check_masks(parsed);
+  return parsed;
 }
 
-void merge_encoded(TileLayer<Key>& layer, std::span<const std::size_t> tiles, std::span<const std::byte> bytes) {
-  const EncodedTiles encoded = parse_encoded(bytes, tiles.size(), sizeof(Key));
-  HPR_CHECK(reinterpret_cast<std::uintptr_t>(encoded.pixels.data()) % alignof(Key) == 0);
-  const Key* next = reinterpret_cast<const Key*>(encoded.pixels.data());
+void TileReader::merge(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
+                       std::span<const std::size_t> tiles) {
+  const TileHead head = parse_head(message, tiles.size(), true);
+  PackedTiles packed(head.packed);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (!encoded.active[i]) continue;
-    const std::span<const Key> arrived(next, kTilePixels);
-    const std::size_t tile = tiles[i];
-    // An empty tile takes what came; reading its zeros to merge with them would only touch fresh memory twice.
-    if (layer.active(tile)) {
-      merge_keys(layer.tile(tile), arrived);
+    if (head.drawn[i] == TileHead::kInactive || head.whole(i)) continue;
+    packed.merge_next(layer.tile(tiles[i]), head.drawn[i]);  // an inactive tile is zero, which any key beats
+    layer.set_active(tiles[i]);
+  }
+  std::size_t bytes = head.packed.size();
+  for (const Body body : bodies_of(head.drawn, tiles)) {
+    const auto part = tiles.subspan(body.first, body.end - body.first);
+    const std::span<Key> into = layer.run({part.front(), part.size()});
+    if (std::ranges::none_of(part, [&](std::size_t tile) { return layer.active(tile); })) {
+      comm.receive(std::as_writable_bytes(into), from);
     } else {
-      std::ranges::copy(arrived, layer.tile(tile).begin());
-      layer.set_active(tile);
+      body_.clear();
+      const std::span<std::byte> arrived = body_.extend(into.size_bytes());
+      comm.receive(arrived, from);
+      merge_keys(into, {reinterpret_cast<const Key*>(arrived.data()), into.size()});
     }
-    next += kTilePixels;
+    for (const std::size_t tile : part) layer.set_active(tile);
+    bytes += into.size_bytes();
+  }
+  comm.worked(bytes);
+}
+
+void TileReader::replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
+                         std::span<const std::size_t> tiles) {
+  const TileHead head = parse_head(message, tiles.size(), true);
+  receive_whole(comm, from, head, layer, tiles);
+  PackedTiles packed(head.packed);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (head.drawn[i] == TileHead::kInactive || head.whole(i)) continue;
+    packed.merge_next(layer.tile(tiles[i]), head.drawn[i]);
+    layer.set_active(tiles[i]);
   }
 }
 

@@ -6,75 +6,129 @@
 #include <span>
 #include <vector>
 
+#include "cluster/communicator.h"
+#include "core/byte_buffer.h"
 #include "image/key.h"
 #include "image/tiles.h"
 
-/// Tiles as bytes, for messages between ranks of one run of HPR (never for files: the byte order is the machine's).
+/// Tiles as messages between ranks of one run of HPR (never as files: the byte order is the machine's). A message says
+/// what follows and carries the tiles that are only partly drawn; whole tiles follow it as bodies, which leave from the
+/// layer they lie in and arrive, where they can, in the one they go to.
 ///
-///   8 bytes            how the pixels are written (TileEncoding)
+///   8 bytes            kTileFormat
 ///   8 ceil(n / 64)     one bit per tile of the list, the lowest first: is it active? The bits past the last are 0
-///   4096 pixels        of every active tile, in order of the list
+///   2 bytes each       per active tile how many of its pixels follow, or kWholeTile; zeros up to a multiple of 8
+///   then per active tile that is not whole, in order of the list, unless it has no pixels:
+///     512 bytes        one bit per pixel of the tile: is it drawn?
+///     8 bytes each     the drawn pixels, one after the other
 ///
-/// The list of tiles itself does not travel: sender and receiver both know it.
+///   bodies             the whole tiles, in order of the list; tiles that are neighbours in the frame share one body,
+///   up
+///                      to kTilesOfABody of them
+///
+/// The list of tiles itself does not travel: sender and receiver both know it. Scattered pixels cost 8 bytes and a bit
+/// each, however they lie; a tile so full that packing saves little travels whole, since that is sent and merged
+/// faster.
 namespace hpr {
 
-enum class TileEncoding : std::uint64_t {
-  WholeTiles = 0,  ///< all pixels of every active tile
+inline constexpr std::uint64_t kTileFormat = 3;
+inline constexpr std::uint16_t kWholeTile = 0xFFFF;
+/// Of 4096 pixels. At 3/4 the packed tile takes 77 % of the whole one's bytes.
+inline constexpr std::size_t kMostPackedPixels = kTilePixels * 3 / 4;
+/// So many tiles of keys, half a megabyte, stay in a core's cache between arriving and being merged.
+inline constexpr std::size_t kTilesOfABody = 16;
+
+/// What a message of tiles says about itself.
+struct TileHead {
+  static constexpr std::uint16_t kInactive = 0xFFFE;
+
+  std::vector<std::uint16_t> drawn;   ///< per tile of the list: kInactive, kWholeTile or how many pixels are packed
+  std::span<const std::byte> packed;  ///< masks and pixels of packed tiles, one after the other
+
+  [[nodiscard]] bool whole(std::size_t position) const { return drawn[position] == kWholeTile; }
 };
 
-/// What an encoded run says before its pixels.
-struct EncodedTiles {
-  std::vector<bool> active;           ///< per tile of the list
-  std::span<const std::byte> pixels;  ///< of the active tiles, one after the other
+/// The whole tiles of a list that travel in one body: positions [first, end), neighbours in the frame.
+struct Body {
+  std::size_t first = 0;
+  std::size_t end = 0;
 };
+/// `drawn` as in TileHead.
+[[nodiscard]] std::vector<Body> bodies_of(std::span<const std::uint16_t> drawn, std::span<const std::size_t> tiles);
 
-/// Checks the encoding, the bits and the length of `bytes` for a list of `tiles` tiles whose pixels take `pixel_bytes`
-/// each. Throws Error (Internal): a rank that sends nonsense is a fault of the program.
-[[nodiscard]] EncodedTiles parse_encoded(std::span<const std::byte> bytes, std::size_t tiles, std::size_t pixel_bytes);
+/// A message of tiles in the making; keeps its memory from frame to frame. What it sends of a layer must stay as it is
+/// until the exchange returns.
+class TileMessage {
+ public:
+  /// Starts a message with `prefix` (a multiple of 8 bytes), which the receiver takes off before it reads the tiles.
+  void start(std::span<const std::byte> prefix = {});
 
-/// Appends the encoding's head for tiles of which `active` are, and reserves room for their pixels.
-void append_head(std::vector<std::byte>& bytes, const std::vector<bool>& active, std::size_t pixel_bytes);
-
-/// Appends `tiles` of `layer`. `bytes` holds a multiple of 8 when the keys in it are to be merged where they lie.
-template <typename Pixel>
-void append_tiles(std::vector<std::byte>& bytes, const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
-  std::vector<bool> active(tiles.size());
-  for (std::size_t i = 0; i < tiles.size(); ++i) active[i] = layer.active(tiles[i]);
-  append_head(bytes, active, sizeof(Pixel));
-  for (const std::size_t tile : tiles) {
-    if (!layer.active(tile)) continue;
-    const auto pixels = std::as_bytes(layer.tile(tile));
-    bytes.insert(bytes.end(), pixels.begin(), pixels.end());
-  }
-}
-
-/// The bytes of `tiles` of `layer`.
-template <typename Pixel>
-[[nodiscard]] std::vector<std::byte> encode_tiles(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
-  std::vector<std::byte> bytes;
-  append_tiles(bytes, layer, tiles);
-  return bytes;
-}
-
-/// Makes `tiles` of `layer` what they were where encode_tiles was called; tiles that were empty there become empty.
-template <typename Pixel>
-void decode_tiles(TileLayer<Pixel>& layer, std::span<const std::size_t> tiles, std::span<const std::byte> bytes) {
-  const EncodedTiles encoded = parse_encoded(bytes, tiles.size(), sizeof(Pixel));
-  const std::byte* next = encoded.pixels.data();
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (!encoded.active[i]) {
-      layer.clear(tiles[i]);
-      continue;
+  /// Adds `tiles` of `layer`; once per message. Keys are packed where that pays, other pixels are not.
+  void add(const TileLayer<Key>& layer, std::span<const std::size_t> tiles);
+  template <typename Pixel>
+  void add(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
+    std::vector<std::uint16_t> drawn(tiles.size(), TileHead::kInactive);
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (layer.active(tiles[i])) drawn[i] = kWholeTile;
     }
-    const std::span<Pixel> pixels = layer.tile(tiles[i]);
-    std::memcpy(pixels.data(), next, pixels.size_bytes());
-    layer.set_active(tiles[i]);
-    next += pixels.size_bytes();
+    add_head(drawn);
+    add_bodies(layer, tiles, drawn);
   }
-}
 
-/// Merges encoded keys into `tiles` of `layer`, reading them where they lie: `bytes` starts at a multiple of 8, as
-/// every message in a vector does.
-void merge_encoded(TileLayer<Key>& layer, std::span<const std::size_t> tiles, std::span<const std::byte> bytes);
+  [[nodiscard]] Outgoing to(int rank) const { return {rank, head_.bytes(), bodies_}; }
+  [[nodiscard]] std::span<const std::byte> head() const { return head_.bytes(); }
+
+ private:
+  void add_head(std::span<const std::uint16_t> drawn);
+  template <typename Pixel>
+  void add_bodies(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                  std::span<const std::uint16_t> drawn) {
+    for (const Body body : bodies_of(drawn, tiles))
+      bodies_.push_back(std::as_bytes(layer.run({tiles[body.first], body.end - body.first})));
+  }
+
+  ByteBuffer head_;
+  std::vector<std::span<const std::byte>> bodies_;
+};
+
+/// Checks the format, the bits, the counts and the length of a message for a list of `tiles` tiles. `packs`: whether
+/// tiles may be packed. Throws Error (Internal): a rank that sends nonsense is a fault of the program.
+[[nodiscard]] TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool packs);
+
+/// Reads messages of tiles inside the call an exchange makes for each; keeps its memory from frame to frame.
+class TileReader {
+ public:
+  /// Merges the tiles of a message of keys into `layer`: the nearer surface stays. Tells `comm` of the work.
+  void merge(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
+             std::span<const std::size_t> tiles);
+
+  /// Makes `tiles` of `layer` what they were at the sender; tiles that were empty there become empty.
+  void replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
+               std::span<const std::size_t> tiles);
+  template <typename Pixel>
+  void replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Pixel>& layer,
+               std::span<const std::size_t> tiles) {
+    receive_whole(comm, from, parse_head(message, tiles.size(), false), layer, tiles);
+  }
+
+ private:
+  /// Receives the bodies into the layer and empties the tiles that were empty at the sender.
+  template <typename Pixel>
+  static void receive_whole(Communicator& comm, int from, const TileHead& head, TileLayer<Pixel>& layer,
+                            std::span<const std::size_t> tiles) {
+    for (const Body body : bodies_of(head.drawn, tiles)) {
+      comm.receive(std::as_writable_bytes(layer.run({tiles[body.first], body.end - body.first})), from);
+    }
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (head.whole(i)) {
+        layer.set_active(tiles[i]);
+      } else {
+        layer.clear(tiles[i]);
+      }
+    }
+  }
+
+  ByteBuffer body_;
+};
 
 }  // namespace hpr

@@ -2,21 +2,28 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <numeric>
 #include <random>
+#include <utility>
 
+#include "cluster/local_communicator.h"
+#include "compositing/sparse.h"
 #include "compositing/test_layers.h"
 #include "core/error.h"
+#include "image/color.h"
 
 namespace hpr {
 namespace {
 
 const FrameLayout kLayout({{200, 130}, {64, 1}});
 
-/// Runs `decode`; true when it refuses with Error (Internal).
-template <typename Decode>
-bool refused(Decode decode) {
+/// Runs `parse`; true when it refuses with Error (Internal).
+template <typename Parse>
+bool refused(Parse parse) {
   try {
-    decode();
+    parse();
     return false;
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::Internal);
@@ -24,72 +31,168 @@ bool refused(Decode decode) {
   }
 }
 
-TEST(TileCodec, DecodingGivesBackTheTilesAndEmptiesThoseThatWereEmpty) {
-  const TileLayer<Key> sent = test::random_layer(0, kLayout);
-  const std::vector<std::size_t> tiles{0, 2, 3, 7, 11, 12};
-  TileLayer<Key> layer = test::random_layer(1, kLayout);
-  decode_tiles(layer, std::span(tiles), encode_tiles(sent, std::span(tiles)));
-  const TileLayer<Key> other = test::random_layer(1, kLayout);
+/// Every tile drawn to another degree: nothing, one pixel, few, just packed, just whole, all.
+TileLayer<Key> graded_layer(std::uint64_t seed) {
+  constexpr std::array<std::size_t, 8> kDrawn{0, 1, 7, 63, 2000, kMostPackedPixels, kMostPackedPixels + 1, kTilePixels};
+  std::mt19937_64 random(seed);
+  TileLayer<Key> layer(kLayout);
   for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-    const TileLayer<Key>& expected = std::ranges::binary_search(tiles, tile) ? sent : other;
-    EXPECT_EQ(layer.active(tile), expected.active(tile)) << tile;
-    EXPECT_TRUE(std::ranges::equal(layer.tile(tile), expected.tile(tile))) << tile;
+    if (tile % 5 == 4) continue;
+    layer.set_active(tile);
+    std::vector<std::size_t> pixels(kTilePixels);
+    std::iota(pixels.begin(), pixels.end(), std::size_t{0});
+    std::ranges::shuffle(pixels, random);
+    pixels.resize(kDrawn.at((tile + seed) % kDrawn.size()));
+    for (const std::size_t pixel : pixels) layer.tile(tile)[pixel] = random() | 1U;
+  }
+  return layer;
+}
+
+/// Rank 1 sends `sent` to rank 0, where `read` gets it.
+template <typename Pixel, typename Read>
+void send(const TileLayer<Pixel>& sent, std::span<const std::size_t> tiles, Read read) {
+  run_local_ranks(2, [&](Communicator& comm) {
+    const int peer = 1;
+    TileMessage message;
+    if (comm.rank() == 1) {
+      message.start();
+      message.add(sent, tiles);
+      const Outgoing out = message.to(0);
+      comm.exchange({&out, 1}, {}, {});
+    } else {
+      comm.exchange({}, {&peer, 1}, [&](int from, std::span<const std::byte> arrived) { read(comm, from, arrived); });
+    }
+  });
+}
+
+std::vector<std::byte> head_of(const TileLayer<Key>& layer, std::span<const std::size_t> tiles) {
+  TileMessage message;
+  message.start();
+  message.add(layer, tiles);
+  return {message.head().begin(), message.head().end()};
+}
+
+TEST(TileCodec, ReplacingGivesTheSendersTilesAndEmptiesThoseThatWereEmpty) {
+  const std::vector<std::size_t> tiles{0, 2, 3, 7, 8, 9, 11, 12};
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    const TileLayer<Key> sent = graded_layer(seed);
+    TileLayer<Key> layer = test::random_layer(1, kLayout);
+    send(sent, tiles,
+         [&](Communicator& comm, int from, auto message) { TileReader().replace(comm, from, message, layer, tiles); });
+    const TileLayer<Key> other = test::random_layer(1, kLayout);
+    for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+      const TileLayer<Key>& expected = std::ranges::binary_search(tiles, tile) ? sent : other;
+      EXPECT_EQ(layer.active(tile), expected.active(tile)) << tile;
+      EXPECT_TRUE(std::ranges::equal(layer.tile(tile), expected.tile(tile))) << tile;
+    }
   }
 }
 
 TEST(TileCodec, MergingTakesTheLargerKeyOfEveryPixel) {
   const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
-  TileLayer<Key> layer = test::random_layer(0, kLayout);
-  merge_encoded(layer, tiles, encode_tiles(test::random_layer(1, kLayout), std::span(tiles)));
-  EXPECT_EQ(test::keys_of(layer), test::expected_keys(2, kLayout));
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    const TileLayer<Key> sent = graded_layer(seed);
+    for (const bool empty : {false, true}) {
+      TileLayer<Key> layer = empty ? TileLayer<Key>(kLayout) : graded_layer(seed + 3);
+      std::vector<Key> expected = test::keys_of(layer);
+      const std::vector<Key> arriving = test::keys_of(sent);
+      for (std::size_t i = 0; i < expected.size(); ++i) expected[i] = std::max(expected[i], arriving[i]);
+      send(sent, tiles,
+           [&](Communicator& comm, int from, auto message) { TileReader().merge(comm, from, message, layer, tiles); });
+      EXPECT_EQ(test::keys_of(layer), expected);
+      for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+        EXPECT_TRUE(layer.active(tile) || std::ranges::count(layer.tile(tile), kNoKey) == kTilePixels);
+      }
+    }
+  }
+}
+
+TEST(TileCodec, OtherPixelsTravelWhole) {
+  const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
+  TileLayer<Rgb> sent(kLayout);
+  sent.set_active(3);
+  for (std::size_t i = 0; i < kTilePixels; ++i) sent.tile(3)[i] = {static_cast<float>(i), 2.0F, 3.0F};
+  TileLayer<Rgb> layer(kLayout);
+  layer.set_active(1);
+  layer.tile(1)[5] = {1.0F, 1.0F, 1.0F};
+  send(sent, tiles,
+       [&](Communicator& comm, int from, auto message) { TileReader().replace(comm, from, message, layer, tiles); });
+  EXPECT_EQ(layer.active_tiles(), 1U);
+  EXPECT_EQ(layer.tile(1)[5].r, 0.0F);
+  EXPECT_EQ(layer.tile(3)[4095].r, 4095.0F);
 }
 
 TEST(TileCodec, AnEmptyTileTakesOneBitAndAnEmptyListOneWord) {
   const TileLayer<Key> layer(FrameLayout({{64 * 65, 64}}));
   const std::vector<std::size_t> tiles = test::all_tiles(layer.layout());
-  EXPECT_EQ(encode_tiles(layer, std::span(tiles)).size(), 8U + 2 * 8U);
-  EXPECT_EQ(encode_tiles(layer, std::span(tiles).first(64)).size(), 8U + 8U);
-  EXPECT_EQ(encode_tiles(layer, std::span(tiles).first(0)).size(), 8U);
+  EXPECT_EQ(head_of(layer, std::span(tiles)).size(), 8U + 2 * 8U);
+  EXPECT_EQ(head_of(layer, std::span(tiles).first(64)).size(), 8U + 8U);
+  EXPECT_EQ(head_of(layer, std::span(tiles).first(0)).size(), 8U);
+}
+
+TEST(TileCodec, ScatteredPixelsCostABitOfTheirTileAndEightBytesEach) {
+  for (const std::size_t drawn : {std::size_t{1}, std::size_t{500}, kMostPackedPixels}) {
+    TileLayer<Key> layer(FrameLayout({{64, 64}}));
+    layer.set_active(0);
+    for (std::size_t i = 0; i < drawn; ++i) layer.tile(0)[i * 5 % kTilePixels] = 7 + i;  // 5 and 4096 share no factor
+    const std::vector<std::size_t> tiles{0};
+    EXPECT_EQ(head_of(layer, tiles).size(), 8U + 8U + 8U + 512U + 8 * drawn);
+  }
+}
+
+TEST(TileCodec, WholeNeighboursShareABodyUpToItsSize) {
+  std::vector<std::size_t> tiles(40);
+  std::iota(tiles.begin(), tiles.end(), std::size_t{3});
+  tiles[30] = 200;  // no neighbour of 32
+  for (std::size_t i = 31; i < tiles.size(); ++i) tiles[i] = 170 + i;
+  std::vector<std::uint16_t> drawn(tiles.size(), kWholeTile);
+  drawn[2] = 9;
+  drawn[3] = TileHead::kInactive;
+  const std::vector<Body> bodies = bodies_of(drawn, tiles);
+  ASSERT_EQ(bodies.size(), 4U);
+  const std::vector<std::pair<std::size_t, std::size_t>> expected{{0, 2}, {4, 20}, {20, 30}, {30, 40}};
+  for (std::size_t i = 0; i < bodies.size(); ++i) EXPECT_EQ(std::pair(bodies[i].first, bodies[i].end), expected[i]);
 }
 
 TEST(TileCodec, EveryTruncatedOrLengthenedMessageIsRefused) {
   const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
-  const std::vector<std::byte> whole = encode_tiles(test::random_layer(0, kLayout), std::span(tiles));
+  const std::vector<std::byte> whole = head_of(graded_layer(0), tiles);
   std::mt19937_64 random(1);
   for (int i = 0; i < 400; ++i) {
     const std::size_t size = i < 40 ? static_cast<std::size_t>(i) : random() % whole.size();
-    const std::vector<std::byte> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
-    TileLayer<Key> layer(kLayout);
-    EXPECT_TRUE(refused([&] { merge_encoded(layer, tiles, cut); })) << size;
-    EXPECT_TRUE(refused([&] { decode_tiles(layer, std::span(tiles), cut); })) << size;
-    EXPECT_EQ(layer.active_tiles(), 0U);  // refused before anything was written
+    EXPECT_TRUE(refused([&] { (void)parse_head(std::span(whole).first(size), tiles.size(), true); })) << size;
   }
   std::vector<std::byte> longer = whole;
   longer.push_back(std::byte{0});
-  TileLayer<Key> layer(kLayout);
-  EXPECT_TRUE(refused([&] { merge_encoded(layer, tiles, longer); }));
+  EXPECT_TRUE(refused([&] { (void)parse_head(longer, tiles.size(), true); }));
+  EXPECT_FALSE(refused([&] { (void)parse_head(whole, tiles.size(), true); }));
+  EXPECT_TRUE(refused([&] { (void)parse_head(whole, tiles.size(), false); }));
 }
 
-TEST(TileCodec, FlippedHeadBitsAreRefusedAndFlippedPixelBitsAreOnlyPixels) {
-  const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
-  const std::vector<std::byte> whole = encode_tiles(test::random_layer(0, kLayout), std::span(tiles));
-  for (std::size_t bit = 0; bit < 16 * 8 + 64; ++bit) {
+TEST(TileCodec, EveryFlippedBitOfTheHeadAndTheMasksIsRefused) {
+  TileLayer<Key> layer(FrameLayout({{192, 64}}));
+  for (std::size_t tile = 0; tile < 2; ++tile) {
+    layer.set_active(tile);
+    for (std::size_t i = 0; i < 100; ++i) layer.tile(tile)[i * 7] = 5 + i;
+  }
+  const std::vector<std::size_t> tiles{0, 1, 2};
+  const std::vector<std::byte> whole = head_of(layer, tiles);
+  for (std::size_t bit = 0; bit < (24 + 512) * 8; ++bit) {
+    if (bit >= 20 * 8 && bit < 24 * 8) continue;  // what fills up the counts is not looked at
+    if (bit == 66) continue;                      // the third tile becomes active, with no pixels
     std::vector<std::byte> flipped = whole;
     flipped[bit / 8] ^= std::byte{1} << (bit % 8);
-    TileLayer<Key> layer(kLayout);
-    EXPECT_EQ(refused([&] { merge_encoded(layer, tiles, flipped); }), bit < 16 * 8) << bit;
+    EXPECT_TRUE(refused([&] { (void)parse_head(flipped, tiles.size(), true); })) << bit;
   }
 }
 
 TEST(TileCodec, RandomBytesNeverCrash) {
   std::mt19937_64 random(2);
-  const std::vector<std::size_t> tiles{0, 1, 2};
-  for (int i = 0; i < 2000; ++i) {
-    std::vector<std::byte> bytes(random() % 64);
-    for (std::byte& byte : bytes) byte = static_cast<std::byte>(random() % 3);
-    TileLayer<Key> layer(kLayout);
-    const bool valid_head = bytes.size() == 16 && std::ranges::all_of(bytes, [](auto b) { return b == std::byte{0}; });
-    EXPECT_EQ(refused([&] { merge_encoded(layer, tiles, bytes); }), !valid_head);
+  for (int i = 0; i < 5000; ++i) {
+    std::vector<std::byte> bytes(random() % 96);
+    for (std::byte& byte : bytes) byte = static_cast<std::byte>(random() % 4);
+    if (bytes.size() >= 8 && random() % 2 == 0) std::memcpy(bytes.data(), &kTileFormat, sizeof kTileFormat);
+    (void)refused([&] { (void)parse_head(bytes, 3, true); });
   }
 }
 

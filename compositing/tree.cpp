@@ -1,19 +1,25 @@
 #include "compositing/tree.h"
 
-#include "compositing/tile_codec.h"
-
 namespace hpr {
 
-TileRun Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const {
+Composited Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                           std::span<const int> /*shown_by*/) {
   const int rank = comm.rank();
   for (int step = 1; step < comm.size(); step *= 2) {
     if (rank % (2 * step) != 0) {
-      comm.send(encode_tiles(layer, tiles), rank - step);
+      given_.start();
+      given_.add(layer, tiles);
+      const Outgoing out = given_.to(rank - step);
+      comm.exchange({&out, 1}, {}, {});
       return {};
     }
-    if (rank + step < comm.size()) merge_encoded(layer, tiles, comm.receive(rank + step));
+    const int child = rank + step;
+    if (child >= comm.size()) continue;
+    comm.exchange({}, {&child, 1}, [&](int from, std::span<const std::byte> message) {
+      reader_.merge(comm, from, message, layer, tiles);
+    });
   }
-  return {0, tiles.size()};
+  return owning(tiles, {0, tiles.size()});
 }
 
 }  // namespace hpr

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "compositing/compositor.h"
+#include "compositing/tile_codec.h"
 
 namespace hpr {
 
@@ -12,7 +13,13 @@ namespace hpr {
 class Tree final : public Compositor {
  public:
   [[nodiscard]] std::string_view name() const override { return "tree"; }
-  TileRun composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) const override;
+  using Compositor::composite;
+  Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                       std::span<const int> shown_by) override;
+
+ private:
+  TileMessage given_;
+  TileReader reader_;
 };
 
 }  // namespace hpr

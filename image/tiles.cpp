@@ -1,15 +1,27 @@
 #include "image/tiles.h"
 
+#include <sys/mman.h>
+
 #include <utility>
 
 namespace hpr {
 namespace {
+
+constexpr std::size_t kHugePage = std::size_t{2} << 20U;
 
 int tiles_along(int pixels) {
   return (pixels + kTileSide - 1) / kTileSide;
 }
 
 }  // namespace
+
+void ask_for_huge_pages(void* memory, std::size_t bytes) {
+  const auto start = reinterpret_cast<std::uintptr_t>(memory);
+  const std::uintptr_t first = (start + kHugePage - 1) / kHugePage * kHugePage;
+  const std::uintptr_t end = (start + bytes) / kHugePage * kHugePage;
+  // Where the system has none left, or never gives any, small ones do.
+  if (end > first) (void)::madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
+}
 
 FrameLayout::FrameLayout(std::vector<Size> screens) : sizes_(std::move(screens)) {
   for (const Size& size : sizes_) {

@@ -60,6 +60,25 @@ class FrameLayout {
   std::vector<std::size_t> first_tiles_{0};  ///< per screen, and one past the last
 };
 
+/// Asks the system to back large memory with huge pages: frames are touched all over, and other ranks copy from them.
+void ask_for_huge_pages(void* memory, std::size_t bytes);
+
+/// Memory of every rank of a communicator, of which a rank sees its own and that of the ranks on its host. Layers that
+/// live in it can be merged where they lie. Whoever reads what another rank wrote needs a message between the two, or a
+/// meeting of all, first.
+class PeerMemory {
+ public:
+  virtual ~PeerMemory() = default;
+
+  /// This rank's own.
+  [[nodiscard]] virtual std::span<std::byte> mine() = 0;
+  /// That of a rank; empty when it runs on another host.
+  [[nodiscard]] virtual std::span<std::byte> of(int rank) = 0;
+  /// Collective over the ranks of this host: returns when all of them have called it. Waits asleep, so that ranks that
+  /// still have work find a free core. Throws Error (Hang) past the communicator's time limit.
+  virtual void meet() = 0;
+};
+
 /// One value per pixel of a frame, tile after tile, row-major inside a tile, and a flag per tile that says whether
 /// anything stands in it. Memory comes zeroed from the system and is touched only where tiles are active, so an empty
 /// tile costs its flag. `Pixel{}` must be all zero bytes. Inactive tiles read as zeros.
@@ -69,32 +88,57 @@ class TileLayer {
 
  public:
   TileLayer() = default;
+  /// In memory of its own.
   explicit TileLayer(FrameLayout layout)
-      : layout_(std::move(layout)), active_(layout_.tiles(), 0), pixels_(allocate(layout_.tiles())) {}
+      : layout_(std::move(layout)), memory_(allocate(bytes_for(layout_) + kCacheLine)) {
+    const auto past = reinterpret_cast<std::uintptr_t>(memory_.get()) % kCacheLine;
+    place(memory_.get() + (kCacheLine - past) % kCacheLine);
+  }
+  /// In this rank's part of `peers`, which is zero or holds a layer of this layout: bytes_for(layout) bytes or more.
+  TileLayer(FrameLayout layout, std::shared_ptr<PeerMemory> peers)
+      : layout_(std::move(layout)), peers_(std::move(peers)) {
+    HPR_CHECK(peers_->mine().size() >= bytes_for(layout_));
+    place(peers_->mine().data());
+  }
+  /// The layer of another rank of this host, as it lies in the memory this one lives in.
+  [[nodiscard]] TileLayer of_peer(int rank) const {
+    HPR_CHECK(peers_ && !peers_->of(rank).empty());
+    TileLayer peer;
+    peer.layout_ = layout_;
+    peer.peers_ = peers_;
+    peer.place(peers_->of(rank).data());
+    return peer;
+  }
+  /// Flags, then pixels at a multiple of a cache line.
+  [[nodiscard]] static std::size_t bytes_for(const FrameLayout& layout) {
+    return flag_bytes(layout) + layout.tiles() * kTilePixels * sizeof(Pixel);
+  }
 
   [[nodiscard]] const FrameLayout& layout() const { return layout_; }
-  [[nodiscard]] std::size_t tiles() const { return active_.size(); }
+  /// Whose memory it lives in; null where that is its own.
+  [[nodiscard]] PeerMemory* peers() const { return peers_.get(); }
+  [[nodiscard]] std::size_t tiles() const { return layout_.tiles(); }
   [[nodiscard]] bool active(std::size_t tile) const { return active_[tile] != 0; }
   void set_active(std::size_t tile) { active_[tile] = 1; }
   [[nodiscard]] std::size_t active_tiles() const {
-    return static_cast<std::size_t>(std::count(active_.begin(), active_.end(), std::uint8_t{1}));
+    return static_cast<std::size_t>(std::count(active_, active_ + tiles(), std::uint8_t{1}));
   }
 
   /// The 4096 pixels of a tile. Whoever writes to it also calls set_active.
-  [[nodiscard]] std::span<Pixel> tile(std::size_t tile) { return {pixels_.get() + tile * kTilePixels, kTilePixels}; }
+  [[nodiscard]] std::span<Pixel> tile(std::size_t tile) { return {pixels_ + tile * kTilePixels, kTilePixels}; }
   [[nodiscard]] std::span<const Pixel> tile(std::size_t tile) const {
-    return {pixels_.get() + tile * kTilePixels, kTilePixels};
+    return {pixels_ + tile * kTilePixels, kTilePixels};
   }
   /// The pixels of a run of tiles.
   [[nodiscard]] std::span<Pixel> run(TileRun run) {
-    return {pixels_.get() + run.first * kTilePixels, run.count * kTilePixels};
+    return {pixels_ + run.first * kTilePixels, run.count * kTilePixels};
   }
   [[nodiscard]] std::span<const Pixel> run(TileRun run) const {
-    return {pixels_.get() + run.first * kTilePixels, run.count * kTilePixels};
+    return {pixels_ + run.first * kTilePixels, run.count * kTilePixels};
   }
 
-  [[nodiscard]] Pixel& at(std::size_t screen, int x, int y) { return pixels_.get()[index(screen, x, y)]; }
-  [[nodiscard]] const Pixel& at(std::size_t screen, int x, int y) const { return pixels_.get()[index(screen, x, y)]; }
+  [[nodiscard]] Pixel& at(std::size_t screen, int x, int y) { return pixels_[index(screen, x, y)]; }
+  [[nodiscard]] const Pixel& at(std::size_t screen, int x, int y) const { return pixels_[index(screen, x, y)]; }
 
   /// Makes a tile zero and inactive.
   void clear(std::size_t tile) {
@@ -108,14 +152,25 @@ class TileLayer {
 
  private:
   struct Free {
-    void operator()(Pixel* pixels) const { std::free(pixels); }
+    void operator()(std::byte* bytes) const { std::free(bytes); }
   };
+  static constexpr std::size_t kCacheLine = 64;
+  using Memory = std::unique_ptr<std::byte[], Free>;
 
-  static std::unique_ptr<Pixel[], Free> allocate(std::size_t tiles) {
-    if (tiles == 0) return nullptr;
-    void* const memory = std::calloc(tiles, kTilePixels * sizeof(Pixel));
+  static Memory allocate(std::size_t bytes) {
+    void* const memory = std::calloc(bytes, 1);
     if (memory == nullptr) throw std::bad_alloc();
-    return std::unique_ptr<Pixel[], Free>(static_cast<Pixel*>(memory));
+    ask_for_huge_pages(memory, bytes);
+    return Memory(static_cast<std::byte*>(memory));
+  }
+
+  static std::size_t flag_bytes(const FrameLayout& layout) {
+    return (layout.tiles() + kCacheLine - 1) / kCacheLine * kCacheLine;
+  }
+
+  void place(std::byte* memory) {
+    active_ = reinterpret_cast<std::uint8_t*>(memory);
+    pixels_ = reinterpret_cast<Pixel*>(memory + flag_bytes(layout_));
   }
 
   [[nodiscard]] std::size_t index(std::size_t screen, int x, int y) const {
@@ -125,8 +180,10 @@ class TileLayer {
   }
 
   FrameLayout layout_;
-  std::vector<std::uint8_t> active_;
-  std::unique_ptr<Pixel[], Free> pixels_;
+  Memory memory_;                      ///< of its own, or
+  std::shared_ptr<PeerMemory> peers_;  ///< shared
+  std::uint8_t* active_ = nullptr;
+  Pixel* pixels_ = nullptr;
 };
 
 /// The pixels of one screen, row by row.

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <mpi.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
@@ -12,6 +14,7 @@
 #include "cluster/collectives.h"
 #include "cluster/mpi_communicator.h"
 #include "cluster/scene_distribution.h"
+#include "cluster/test_exchange.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -33,7 +36,7 @@ TEST(Mpi, MessagesOfOddSizesGoRoundTheRing) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{4097}, std::size_t{3'000'001}}) {
     // Ranks take turns: a large send ends only when it is received.
     if (comm.size() == 1) {
-      EXPECT_EQ(comm.exchange(message_of(0, size), 0), message_of(0, size));
+      EXPECT_EQ(test::exchange_with(comm, message_of(0, size), 0), message_of(0, size));
       continue;
     }
     for (int sender = 0; sender < comm.size(); ++sender) {
@@ -58,7 +61,7 @@ TEST(Mpi, MessagesInPartsArriveWholeAndInOrder) {
   const int peer = comm.rank() ^ 1;
   if (peer >= comm.size()) return;
   for (const std::size_t size : {kSmallPart - 1, kSmallPart, kSmallPart + 1, 2 * kSmallPart, 10 * kSmallPart + 3}) {
-    EXPECT_TRUE(comm.exchange(message_of(comm.rank(), size), peer) == message_of(peer, size)) << size;
+    EXPECT_TRUE(test::exchange_with(comm, message_of(comm.rank(), size), peer) == message_of(peer, size)) << size;
     if (comm.rank() < peer) {
       comm.send(message_of(1, size), peer);
       comm.send(message_of(2, 5), peer);
@@ -78,7 +81,7 @@ TEST(Mpi, ExchangeMayHaveTwoSizes) {
       if (comm.rank() != peer && comm.rank() != other) continue;
       const int partner = comm.rank() == peer ? other : peer;
       const auto size_of = [](int rank) { return static_cast<std::size_t>(rank) * 700'001; };
-      EXPECT_TRUE(comm.exchange(message_of(comm.rank(), size_of(comm.rank())), partner) ==
+      EXPECT_TRUE(test::exchange_with(comm, message_of(comm.rank(), size_of(comm.rank())), partner) ==
                   message_of(partner, size_of(partner)));
     }
   }
@@ -195,6 +198,47 @@ TEST(Mpi, TheLongestTimeLimitIsNotTakenForAPassedOne) {
   MpiCommunicator comm(MPI_COMM_WORLD, std::chrono::nanoseconds::max());
   barrier(comm);
   EXPECT_EQ(all_gather_value(comm, 1).size(), static_cast<std::size_t>(comm.size()));
+}
+
+TEST(Mpi, AnExchangeOfManyTakesEachMessageWithItsBodies) {
+  MpiCommunicator comm(MPI_COMM_WORLD, kHangTimeout, kSmallPart);
+  for (const std::size_t size : {std::size_t{0}, std::size_t{5}, kSmallPart, 3 * kSmallPart + 1}) {
+    const Bytes head = message_of(comm.rank(), size);
+    const Bytes part = message_of(comm.rank() + 50, size / 2);
+    const std::array<std::span<const std::byte>, 2> bodies{part, head};
+    std::vector<Outgoing> out;
+    std::vector<int> from;
+    for (int peer = 0; peer < comm.size(); ++peer) {
+      if (peer == comm.rank()) continue;
+      out.push_back({peer, head, bodies});
+      from.push_back(peer);
+    }
+    std::vector<int> came;
+    comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
+      came.push_back(peer);
+      EXPECT_TRUE(std::ranges::equal(message, message_of(peer, size)));
+      Bytes body(size / 2);
+      comm.receive(body, peer);
+      EXPECT_TRUE(body == message_of(peer + 50, size / 2));
+      EXPECT_TRUE(comm.receive(peer) == message_of(peer, size));
+    });
+    std::ranges::sort(came);
+    EXPECT_EQ(came, from);
+  }
+}
+
+TEST(Mpi, RanksOfThisHostSeeEachOthersMemoryAndMeet) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  const auto memory = comm.share(1'000'003);
+  EXPECT_EQ(memory->mine()[1'000'002], std::byte{0});
+  for (int frame = 0; frame < 200; ++frame) {
+    memory->mine()[1'000'002] = static_cast<std::byte>(comm.rank() + frame);
+    memory->meet();
+    for (int peer = 0; peer < comm.size(); ++peer) {
+      EXPECT_EQ(memory->of(peer)[1'000'002], static_cast<std::byte>(peer + frame));
+    }
+    memory->meet();
+  }
 }
 
 }  // namespace

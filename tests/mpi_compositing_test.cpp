@@ -28,9 +28,8 @@ TEST(MpiCompositing, EveryStrategyHoldsTheSerialMaximum) {
     const std::vector<Key> expected = test::expected_keys(comm.size(), layout);
     for (const auto& compositor : all_compositors()) {
       TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-      const TileRun mine = compositor->composite(comm, layer, tiles);
-      EXPECT_EQ(wrong_tiles(layer, std::span(tiles).subspan(mine.first, mine.count), expected), 0U)
-          << compositor->name();
+      const Composited mine = compositor->composite(comm, layer, tiles);
+      EXPECT_EQ(wrong_tiles(layer, mine.tiles, expected), 0U) << compositor->name();
     }
   }
 }
@@ -43,10 +42,29 @@ TEST(MpiCompositing, PiecesOfMegabytesReachSeveralScreens) {
   const std::vector<int> shown_by{0, comm.size() - 1, comm.size() / 2};
   for (const auto& compositor : all_compositors()) {
     TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-    const TileRun mine = compositor->composite(comm, layer, tiles);
-    assemble(comm, layer, std::span(tiles).subspan(mine.first, mine.count), shown_by);
+    const Composited mine = compositor->composite(comm, layer, tiles);
+    Assembler().assemble(comm, layer, mine.tiles, shown_by);
     const std::vector<std::size_t> shown = tiles_shown(layout, shown_by, comm.rank());
     EXPECT_EQ(wrong_tiles(layer, shown, expected), 0U) << compositor->name();
+  }
+}
+
+TEST(MpiCompositing, LayersInSharedMemoryAreMergedInPlaceFrameAfterFrame) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  const FrameLayout layout({{700, 500}, {333, 217}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<int> shown_by{comm.size() - 1, 0};
+  const auto memory = comm.share(TileLayer<Key>::bytes_for(layout));
+  for (const auto& compositor : all_compositors()) {
+    for (std::uint64_t frame = 1; frame <= 3; ++frame) {
+      TileLayer<Key> layer(layout, memory);
+      layer.clear();
+      test::copy_layer(test::random_layer(comm.rank(), layout, frame), layer);
+      const Composited mine = compositor->composite(comm, layer, tiles, shown_by);
+      if (!mine.assembled) Assembler().assemble(comm, layer, mine.tiles, shown_by);
+      const std::vector<std::size_t> shown = tiles_shown(layout, shown_by, comm.rank());
+      EXPECT_EQ(wrong_tiles(layer, shown, test::expected_keys(comm.size(), layout, frame)), 0U) << compositor->name();
+    }
   }
 }
 

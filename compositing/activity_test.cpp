@@ -1,0 +1,77 @@
+#include "compositing/activity.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <random>
+
+#include "cluster/local_communicator.h"
+#include "compositing/test_layers.h"
+
+namespace hpr {
+namespace {
+
+Activity random_activity(int ranks, std::size_t tiles, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<std::uint64_t> bits((tiles + 63) / 64 * static_cast<std::size_t>(ranks));
+  const std::size_t words = (tiles + 63) / 64;
+  for (std::size_t rank = 0; rank < static_cast<std::size_t>(ranks); ++rank) {
+    for (std::size_t i = random() % (tiles + 1); i < tiles; i += 1 + random() % 3) {
+      bits[rank * words + i / 64] |= std::uint64_t{1} << (i % 64);
+    }
+  }
+  return {ranks, tiles, std::move(bits)};
+}
+
+TEST(Activity, EveryRankLearnsWhatEachHasDrawn) {
+  const FrameLayout layout({{700, 500}, {65, 65}});
+  const std::vector<std::size_t> tiles{0, 1, 5, 6, 7, 40, 70, 87, 88, 89, 90, 91};
+  for (const int ranks : {1, 2, 3, 5, 8, 13}) {
+    run_local_ranks(ranks, [&](Communicator& comm) {
+      const Activity activity = share_activity(comm, test::random_layer(comm.rank(), layout), tiles);
+      for (std::size_t i = 0; i < tiles.size(); ++i) {
+        std::uint32_t weight = 0;
+        for (int rank = 0; rank < ranks; ++rank) {
+          const bool active = test::random_layer(rank, layout).active(tiles[i]);
+          EXPECT_EQ(activity.active(rank, i), active);
+          weight += active ? 1 : 0;
+        }
+        EXPECT_EQ(activity.weight(i), weight);
+      }
+    });
+  }
+}
+
+TEST(Activity, CutsAreInOrderCoverTheRunAndAreAsEvenAsTilesAllow) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const int ranks = 1 + static_cast<int>(seed % 9);
+    const Activity activity = random_activity(ranks, 1 + seed * 7 % 300, seed);
+    const TileRun run{seed % 5 % activity.tiles(), activity.tiles() - seed % 5 % activity.tiles()};
+    for (const int parts : {1, 2, 3, 8}) {
+      const std::vector<TileRun> cuts = activity.cut(run, parts);
+      ASSERT_EQ(cuts.size(), static_cast<std::size_t>(parts));
+      std::size_t next = run.first;
+      std::uint64_t all = 0;
+      for (std::size_t i = run.first; i < run.end(); ++i) all += activity.weight(i);
+      for (const TileRun& cut : cuts) {
+        EXPECT_EQ(cut.first, next);
+        next = cut.end();
+        std::uint64_t weight = 0;
+        for (std::size_t i = cut.first; i < cut.end(); ++i) weight += activity.weight(i);
+        // A tile too many at either end, and what empty tiles weigh.
+        const double share = static_cast<double>(all) / parts + static_cast<double>(run.count) / 64.0;
+        EXPECT_LE(static_cast<double>(weight), share + ranks + 1.0);
+      }
+      EXPECT_EQ(next, run.end());
+    }
+  }
+}
+
+TEST(Activity, AListNobodyDrewIntoIsCutEvenly) {
+  const Activity nothing(3, 100, std::vector<std::uint64_t>(6));
+  for (const TileRun& cut : nothing.cut({0, 100}, 4)) EXPECT_EQ(cut.count, 25U);
+  EXPECT_EQ(nothing.cut({10, 0}, 2), (std::vector<TileRun>{{10, 0}, {10, 0}}));
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,71 @@
+#include "compositing/radix_k.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kLargestGroup = 8;
+
+std::vector<int> parse_factors(std::string_view list) {
+  std::vector<int> factors;
+  for (std::string_view rest = list;; rest.remove_prefix(1)) {
+    int factor = 0;
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), factor);
+    const bool ends_well = end == rest.data() + rest.size() || *end == ',';
+    if (error != std::errc() || factor < 2 || !ends_well) {
+      throw Error(ExitCode::Usage, fmt::format("radix-k: '{}' is not a list of factors of 2 or more", printable(list)),
+                  "write it like radix-k:4,2");
+    }
+    factors.push_back(factor);
+    rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+    if (rest.empty()) return factors;
+  }
+}
+
+}  // namespace
+
+RadixK::RadixK(std::string_view factors)
+    : name_(fmt::format("radix-k:{}", factors)), factors_(parse_factors(factors)) {}
+
+bool RadixK::fits(int ranks) const {
+  if (factors_.empty()) return ranks >= 1;
+  std::int64_t product = 1;
+  for (const int factor : factors_) product = std::min<std::int64_t>(product * factor, std::int64_t{1} << 31U);
+  return product == ranks;
+}
+
+std::vector<int> RadixK::factors_for(int ranks) {
+  std::vector<int> primes;
+  for (int prime = 2; ranks > 1; ++prime) {
+    for (; ranks % prime == 0; ranks /= prime) primes.push_back(prime);
+  }
+  // First fit, the largest primes first.
+  std::vector<int> factors;
+  for (auto prime = primes.rbegin(); prime != primes.rend(); ++prime) {
+    const auto room = std::ranges::find_if(factors, [&](int factor) { return factor * *prime <= kLargestGroup; });
+    if (room == factors.end()) {
+      factors.push_back(*prime);
+    } else {
+      *room *= *prime;
+    }
+  }
+  std::ranges::sort(factors, std::greater<>());
+  return factors;
+}
+
+Composited RadixK::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                             std::span<const int> /*shown_by*/) {
+  const Activity activity = share_activity(comm, layer, tiles);
+  const std::vector<int> factors = factors_.empty() ? factors_for(comm.size()) : factors_;
+  return owning(tiles,
+                rounds_.run(comm, layer, tiles, activity, factors, comm.rank(), [](int member) { return member; }));
+}
+
+}  // namespace hpr

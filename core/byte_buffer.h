@@ -1,0 +1,56 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <span>
+
+#include "core/check.h"
+
+namespace hpr {
+
+/// Bytes that grow at their end and are meant to be used again and again: clearing keeps the memory, and new bytes are
+/// not set to zero. A std::vector would write every byte of a message twice and, past the allocator's limit for large
+/// blocks, have the system hand out fresh pages for each one.
+class ByteBuffer {
+ public:
+  [[nodiscard]] std::span<const std::byte> bytes() const { return {memory_.get(), size_}; }
+  [[nodiscard]] std::span<std::byte> bytes() { return {memory_.get(), size_}; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+
+  void clear() { size_ = 0; }
+
+  /// `count` more bytes at the end, unset. Spans handed out before are void when the memory had to grow.
+  std::span<std::byte> extend(std::size_t count) {
+    if (size_ + count > capacity_) reserve(std::max(size_ + count, capacity_ + capacity_ / 2));
+    const std::span<std::byte> added(memory_.get() + size_, count);
+    size_ += count;
+    return added;
+  }
+
+  void append(std::span<const std::byte> more) {
+    if (!more.empty()) std::memcpy(extend(more.size()).data(), more.data(), more.size());
+  }
+
+  /// Gives back bytes of the end.
+  void shrink(std::size_t size) {
+    HPR_CHECK(size <= size_);
+    size_ = size;
+  }
+
+  void reserve(std::size_t capacity) {
+    if (capacity <= capacity_) return;
+    auto grown = std::make_unique_for_overwrite<std::byte[]>(capacity);
+    if (size_ > 0) std::memcpy(grown.get(), memory_.get(), size_);
+    memory_ = std::move(grown);
+    capacity_ = capacity;
+  }
+
+ private:
+  std::unique_ptr<std::byte[]> memory_;
+  std::size_t size_ = 0;
+  std::size_t capacity_ = 0;
+};
+
+}  // namespace hpr
