@@ -5,7 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/bench_net.h"
 #include "app/bench_raster.h"
+#include "app/launcher.h"
+#include "app/machine.h"
 #include "core/parallel.h"
 #include "raster/gl_context.h"
 
@@ -24,11 +27,21 @@ class BenchCommand final : public Command {
     app.require_subcommand(1);
     CLI::App* const raster =
         app.add_subcommand("raster", "a frame with raster only against a bare GL loop of the same mesh and readback");
-    raster->add_flag("--json", json_, "one JSON document");
-    raster->fallthrough();
+    net_ = app.add_subcommand("net", "messages, merging and copying between two ranks, against plain MPI and a copy");
+    for (CLI::App* const bench : {raster, net_}) {
+      bench->add_flag("--json", json_, "one JSON document");
+      bench->fallthrough();
+    }
   }
 
+  [[nodiscard]] bool collective() const override { return net_->parsed(); }
+
   [[nodiscard]] ExitCode run(const Globals& globals) override {
+    return net_->parsed() ? run_net(globals) : run_raster(globals);
+  }
+
+ private:
+  [[nodiscard]] ExitCode run_raster(const Globals& globals) const {
     const int threads = globals.threads > 0 ? globals.threads : usable_cores();
     const auto context =
         make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
@@ -36,12 +49,24 @@ class BenchCommand final : public Command {
     return ExitCode::Done;
   }
 
- private:
+  [[nodiscard]] ExitCode run_net(const Globals& globals) const {
+    Globals pair = globals;
+    if (pair.ranks == 0 && !inside_mpi_job()) pair.ranks = 2;
+    if (pair.ranks == 1)
+      throw Error(ExitCode::Usage, "bench net needs two ranks", "leave --ranks out, or say --ranks 2");
+    return run_ranks(pair, [&](Communicator& comm) {
+      if (comm.size() < 2) throw Error(ExitCode::Usage, "bench net needs two ranks", "mpirun -n 2 hpr bench net");
+      const std::vector<BenchRow> rows = bench_net(comm);
+      if (comm.rank() == 0) print(rows, this_machine().cpu);
+      return ExitCode::Done;
+    });
+  }
+
   void print(const std::vector<BenchRow>& rows, const std::string& machine) const {
     if (!json_) {
-      fmt::print("{:<28} {:>10} {:>10} {:<6} {:>6}\n", "", "ours", "floor", "", "ratio");
+      fmt::print("{:<44} {:>10} {:>10} {:<6} {:>6}\n", "", "ours", "floor", "", "ratio");
       for (const BenchRow& row : rows) {
-        fmt::print("{:<28} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, row.ours, row.floor, row.unit, row.ratio);
+        fmt::print("{:<44} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, row.ours, row.floor, row.unit, row.ratio);
       }
       return;
     }
@@ -54,6 +79,7 @@ class BenchCommand final : public Command {
     fmt::print("{}\n", json.dump(2));
   }
 
+  CLI::App* net_ = nullptr;
   bool json_ = false;
 };
 

@@ -12,10 +12,12 @@
 #include "compositing/compositor.h"
 #include "core/check.h"
 #include "core/hash.h"
-#include "core/stopwatch.h"
 
 namespace hpr {
 namespace {
+
+/// Most tiles a rank merges while speeds are measured: as many as a frame has, so that they leave the cache as it does.
+constexpr std::size_t kMostProbeTiles = 512;
 
 /// What one rank measured in one frame.
 struct Sample {
@@ -117,11 +119,11 @@ Sample one_frame(Contestant& contestant, Assembler& assembler, TileLayer<Key>& l
   wait_for_all(comm, layer.peers());
   const std::size_t bytes_before = comm.bytes_sent();
   const std::size_t messages_before = comm.messages_sent();
-  const Stopwatch watch;
+  const double start = comm.seconds();
   const Composited mine = contestant.compositor->composite(comm, layer, tiles, shown_by);
-  const double composite_ms = watch.ms();
+  const double composited = comm.seconds();
   if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, shown_by);
-  const Sample sample{composite_ms, watch.ms() - composite_ms, comm.bytes_sent() - bytes_before,
+  const Sample sample{(composited - start) * 1e3, (comm.seconds() - composited) * 1e3, comm.bytes_sent() - bytes_before,
                       comm.messages_sent() - messages_before};
   wait_for_all(comm, layer.peers());  // ranks that are done must not take the cores of those that are still timed
   return sample;
@@ -208,6 +210,9 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
   }
   TileLayer<Key> layer = working_layer(comm, pristine.layout(), contestants);
   Assembler assembler;
+  const Load load = share_load(comm, pristine, tiles);
+  const Costs costs =
+      measure_costs(comm, std::clamp<std::size_t>(tiles.size(), 1, kMostProbeTiles)).with_packed(load.packed_share);
 
   for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
     for (Contestant& contestant : contestants) {
@@ -229,6 +234,10 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
     run.frames = settings.frames;
     summarize(samples, run);
     run.differing_pixels = contestant.differing_pixels;
+    if (const auto prediction = contestant.compositor->predict(costs, load)) {
+      run.predicted_ms = prediction->collected(costs, load) * 1e3;
+    }
+    if (contestant.compositor->chosen() != run.strategy) run.chosen = contestant.compositor->chosen();
     run.frame_xxh64 = frame_hash(contestant.frame, input.colors);
     result.runs.push_back(std::move(run));
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,8 @@ struct CompareRun {
   std::uint64_t messages_total = 0;
   double imbalance = 1.0;              ///< composite: slowest rank / mean of ranks, median over frames
   std::uint64_t differing_pixels = 0;  ///< of the worst frame, against the serial maximum of the same layers
+  std::optional<double> predicted_ms;  ///< what the strategy expected of `ms`
+  std::string chosen;                  ///< the strategy at work, where another one chose it
   std::string frame_xxh64;             ///< of the RGBA8 frame where keys are colours, else of the keys
 };
 

@@ -12,8 +12,10 @@
 
 #include "app/compare_report.h"
 #include "app/launcher.h"
+#include "app/simulate_option.h"
 #include "cluster/local_communicator.h"
 #include "cluster/scene_distribution.h"
+#include "cluster/simulated_communicator.h"
 #include "compositing/compositor.h"
 #include "compositing/synthetic.h"
 #include "core/file.h"
@@ -42,6 +44,20 @@ std::vector<std::string> split(std::string_view list) {
     if (comma == std::string_view::npos) return items;
     list.remove_prefix(comma + 1);
   }
+}
+
+/// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".
+std::vector<std::string> split_strategies(std::string_view list) {
+  std::vector<std::string> names;
+  for (const std::string& item : split(list)) {
+    const bool is_number = !item.empty() && item.find_first_not_of("0123456789") == std::string::npos;
+    if (is_number && !names.empty()) {
+      names.back() += "," + item;
+    } else {
+      names.push_back(item);
+    }
+  }
+  return names;
 }
 
 Size parse_size(const std::string& text, const std::string& option, int most) {
@@ -92,14 +108,16 @@ class CompareCommand final : public Command {
     app.add_option("--strategies", strategies_, "all, or names of strategies")
         ->type_name("LIST")
         ->capture_default_str();
-    app.add_option("--frames", frames_, "measured frames")
-        ->type_name("N")
-        ->check(CLI::Range(1, 1'000'000))
-        ->capture_default_str();
+    frames_option_ = app.add_option("--frames", frames_, "measured frames");
+    frames_option_->type_name("N")->check(CLI::Range(1, 1'000'000))->capture_default_str();
     app.add_option("--warmup", warmup_, "frames before the measured ones")
         ->type_name("N")
         ->check(CLI::Range(0, 1'000'000))
         ->capture_default_str();
+    app.add_option("--simulate", simulate_,
+                   "run on threads and reckon what a cluster would take: hosts=64,ranks=512,latency=2us,"
+                   "bandwidth=12.5GB/s[,cores=,overhead=,local-latency=,local-bandwidth=,merge=]")
+        ->type_name("CLUSTER");
     app.add_option("--transport", transport_, "mpi, or threads of one process")
         ->type_name("NAME")
         ->capture_default_str();
@@ -143,6 +161,7 @@ class CompareCommand final : public Command {
       throw Error(ExitCode::Usage, fmt::format("no transport is named '{}'", printable(transport_)),
                   unknown_name_hint(printable(transport_), transports));
     }
+    if (!simulate_.empty()) check_simulation();
     for (const int ranks : rank_counts()) (void)strategies_for(ranks);
     if (inside_mpi_job() && transport_ != "mpi") {
       throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
@@ -157,8 +176,16 @@ class CompareCommand final : public Command {
     }
   }
 
+  void check_simulation() const {
+    if (!ranks_.empty() || transport_ != "mpi" || inside_mpi_job()) {
+      throw Error(ExitCode::Usage, "--simulate excludes --ranks, --transport and mpirun",
+                  "the number of ranks is said by --simulate ranks=N; it runs on threads of one process");
+    }
+  }
+
   /// Empty inside an MPI job unless --ranks is given.
   [[nodiscard]] std::vector<int> rank_counts() const {
+    if (!simulate_.empty()) return {parse_simulation(simulate_).ranks};
     if (!ranks_.empty()) return parse_ranks(ranks_);
     return inside_mpi_job() ? std::vector<int>{} : std::vector<int>{2, 4};
   }
@@ -171,7 +198,7 @@ class CompareCommand final : public Command {
       }
       return names;
     }
-    for (const std::string& name : split(strategies_)) {
+    for (const std::string& name : split_strategies(strategies_)) {
       if (!make_compositor(name)->fits(ranks)) {
         throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, ranks));
       }
@@ -180,7 +207,11 @@ class CompareCommand final : public Command {
     return names;
   }
 
-  [[nodiscard]] CompareSettings settings_for(int ranks) const { return {strategies_for(ranks), frames_, warmup_}; }
+  [[nodiscard]] CompareSettings settings_for(int ranks) const {
+    // Simulated frames are all alike.
+    const bool once = !simulate_.empty() && frames_option_->count() == 0;
+    return {strategies_for(ranks), once ? 1 : frames_, once ? 1 : warmup_};
+  }
 
   /// Inside an MPI job: its ranks are the one number of ranks compared.
   [[nodiscard]] ExitCode run_in_job(const Globals& globals, const CompareInput& input) const {
@@ -213,15 +244,10 @@ class CompareCommand final : public Command {
     for (std::size_t i = 0; i < counts.size(); ++i) {
       const int ranks = counts[i];
       std::vector<CompareRun> runs;
-      if (transport_ == "threads") {
-        const auto body = [&](Communicator& comm) {
-          CompareResult here = compare_strategies(comm, input, settings_for(ranks));
-          if (comm.rank() == 0) {
-            runs = std::move(here.runs);
-            result.frame = std::move(here.frame);
-          }
-        };
-        run_local_ranks(ranks, body, globals.hang_limit());
+      if (transport_ == "threads" || !simulate_.empty()) {
+        CompareResult here = run_threads(globals, input, ranks);
+        runs = std::move(here.runs);
+        result.frame = std::move(here.frame);
       } else {
         std::string output;
         const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()), &output,
@@ -235,6 +261,27 @@ class CompareCommand final : public Command {
       result.runs.insert(result.runs.end(), runs.begin(), runs.end());
     }
     return finish(globals, input, std::move(result));
+  }
+
+  /// Ranks are threads of this process, on a simulated cluster if one is asked for.
+  [[nodiscard]] CompareResult run_threads(const Globals& globals, const CompareInput& input, int ranks) const {
+    CompareResult result;
+    const auto compare = [&](Communicator& comm) {
+      CompareResult here = compare_strategies(comm, input, settings_for(ranks));
+      if (comm.rank() == 0) result = std::move(here);
+    };
+    LocalRanks local{.size = ranks, .hang_timeout = globals.hang_limit()};
+    if (simulate_.empty()) {
+      run_local_ranks(local, compare);
+      return result;
+    }
+    const SimulatedCluster cluster = parse_simulation(simulate_);
+    local.ranks_per_host = cluster.ranks_per_host();
+    run_local_ranks(local, [&](Communicator& comm) {
+      SimulatedCommunicator simulated(comm, cluster);
+      compare(simulated);
+    });
+    return result;
   }
 
   /// Refuses what this host cannot hold, before ranks start to share it.
@@ -281,7 +328,12 @@ class CompareCommand final : public Command {
     if (!synthetic_.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic_});
     arguments.insert(arguments.end(), {"--size", size_, "--tiles", tiles_, "--strategies", strategies_});
     arguments.insert(arguments.end(), {"--frames", std::to_string(frames_), "--warmup", std::to_string(warmup_)});
-    arguments.insert(arguments.end(), {"--transport", transport_, "--seed", std::to_string(globals.seed)});
+    if (simulate_.empty()) {
+      arguments.insert(arguments.end(), {"--transport", transport_});
+    } else {
+      arguments.insert(arguments.end(), {"--simulate", simulate_});
+    }
+    arguments.insert(arguments.end(), {"--seed", std::to_string(globals.seed)});
     return arguments;
   }
 
@@ -308,7 +360,8 @@ class CompareCommand final : public Command {
     for (const CompareRun& run : result.runs) {
       if (counts.empty() || counts.back() != run.ranks) counts.push_back(run.ranks);
     }
-    report.command = fmt::format("hpr {} --ranks {}", fmt::join(input_arguments(globals), " "), fmt::join(counts, ","));
+    report.command = fmt::format("hpr {}", fmt::join(input_arguments(globals), " "));
+    if (simulate_.empty()) report.command += fmt::format(" --ranks {}", fmt::join(counts, ","));
     report.runs = std::move(result.runs);
     write_frame(result.frame, input);
     if (!csv_.empty()) write_file_atomically(csv_, compare_csv(report));
@@ -325,7 +378,9 @@ class CompareCommand final : public Command {
   std::string strategies_ = "all";
   int frames_ = 10;
   int warmup_ = 2;
+  CLI::Option* frames_option_ = nullptr;
   std::string transport_ = "mpi";
+  std::string simulate_;
   std::string csv_;
   bool json_ = false;
   std::string picture_;

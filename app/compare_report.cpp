@@ -14,20 +14,22 @@ namespace {
 using Json = nlohmann::ordered_json;  // keys stay in the order the schema lists them
 
 Json to_json(const CompareRun& run) {
-  return {{"strategy", run.strategy},
-          {"ranks", run.ranks},
-          {"transport", run.transport},
-          {"frames", run.frames},
-          {"ms", {{"min", run.ms.min}, {"median", run.ms.median}, {"p95", run.ms.p95}, {"max", run.ms.max}}},
-          {"ms_composite", {{"median", run.ms_composite}}},
-          {"ms_collect", {{"median", run.ms_collect}}},
-          {"bytes_total", run.bytes_total},
-          {"bytes_max_rank", run.bytes_max_rank},
-          {"messages_total", run.messages_total},
-          {"imbalance", run.imbalance},
-          {"differing_pixels", run.differing_pixels},
-          {"frame_xxh64", run.frame_xxh64},
-          {"predicted_ms", nullptr}};
+  Json json{{"strategy", run.strategy},
+            {"ranks", run.ranks},
+            {"transport", run.transport},
+            {"frames", run.frames},
+            {"ms", {{"min", run.ms.min}, {"median", run.ms.median}, {"p95", run.ms.p95}, {"max", run.ms.max}}},
+            {"ms_composite", {{"median", run.ms_composite}}},
+            {"ms_collect", {{"median", run.ms_collect}}},
+            {"bytes_total", run.bytes_total},
+            {"bytes_max_rank", run.bytes_max_rank},
+            {"messages_total", run.messages_total},
+            {"imbalance", run.imbalance},
+            {"differing_pixels", run.differing_pixels},
+            {"frame_xxh64", run.frame_xxh64},
+            {"predicted_ms", run.predicted_ms ? Json(*run.predicted_ms) : Json()}};
+  if (!run.chosen.empty()) json["chosen"] = run.chosen;
+  return json;
 }
 
 CompareRun run_from(const Json& json) {
@@ -47,6 +49,8 @@ CompareRun run_from(const Json& json) {
   run.imbalance = json.at("imbalance").get<double>();
   run.differing_pixels = json.at("differing_pixels").get<std::uint64_t>();
   run.frame_xxh64 = json.at("frame_xxh64").get<std::string>();
+  if (!json.at("predicted_ms").is_null()) run.predicted_ms = json.at("predicted_ms").get<double>();
+  run.chosen = json.value("chosen", "");
   return run;
 }
 
@@ -76,14 +80,15 @@ std::string compare_table(const CompareReport& report) {
                                  grid_name(report.grid), report.grid.area() == 1 ? "" : "s", report.screen.width,
                                  report.screen.height, report.seed, report.machine.cpu, report.machine.cores,
                                  report.oversubscribed() ? " (fewer than ranks)" : "", report.machine.mpi);
-  text += fmt::format("{:<12} {:>5} {:>9} {:>8} {:>8} {:>8} {:>9} {:>8} {:>9} {:>8} {:>9} {:>9}  {}\n", "strategy",
-                      "ranks", "median ms", "min", "p95", "max", "composite", "collect", "MB sent", "messages",
-                      "imbalance", "differing", "frame");
+  text += fmt::format("{:<13} {:>5} {:>9} {:>9} {:>8} {:>8} {:>8} {:>9} {:>8} {:>9} {:>8} {:>9} {:>9}  {}\n",
+                      "strategy", "ranks", "median ms", "predicted", "min", "p95", "max", "composite", "collect",
+                      "MB sent", "messages", "imbalance", "differing", "frame");
   for (const CompareRun& run : report.runs) {
     text += fmt::format(
-        "{:<12} {:>5} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>9.3f} {:>8.3f} {:>9.2f} {:>8} {:>9.2f} {:>9}  {}\n",
-        run.strategy, run.ranks, run.ms.median, run.ms.min, run.ms.p95, run.ms.max, run.ms_composite, run.ms_collect,
-        megabytes(run.bytes_total), run.messages_total, run.imbalance, run.differing_pixels, run.frame_xxh64);
+        "{:<13} {:>5} {:>9.3f} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>9.3f} {:>8.3f} {:>9.2f} {:>8} {:>9.2f} {:>9}  {}\n",
+        run.strategy, run.ranks, run.ms.median, run.predicted_ms ? fmt::format("{:.3f}", *run.predicted_ms) : "-",
+        run.ms.min, run.ms.p95, run.ms.max, run.ms_composite, run.ms_collect, megabytes(run.bytes_total),
+        run.messages_total, run.imbalance, run.differing_pixels, run.frame_xxh64);
   }
   return text;
 }
@@ -110,12 +115,13 @@ std::string compare_csv(const CompareReport& report) {
   std::string text =
       "strategy,ranks,transport,frames,ms_min,ms_median,ms_p95,ms_max,ms_composite_median,ms_collect_median,bytes_"
       "total,"
-      "bytes_max_rank,messages_total,imbalance,differing_pixels,frame_xxh64\n";
+      "bytes_max_rank,messages_total,imbalance,differing_pixels,frame_xxh64,predicted_ms\n";
   for (const CompareRun& run : report.runs) {
-    text += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{:.4f},{},{}\n", run.strategy,
-                        run.ranks, run.transport, run.frames, run.ms.min, run.ms.median, run.ms.p95, run.ms.max,
-                        run.ms_composite, run.ms_collect, run.bytes_total, run.bytes_max_rank, run.messages_total,
-                        run.imbalance, run.differing_pixels, run.frame_xxh64);
+    text += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{:.4f},{},{},{}\n",
+                        run.strategy, run.ranks, run.transport, run.frames, run.ms.min, run.ms.median, run.ms.p95,
+                        run.ms.max, run.ms_composite, run.ms_collect, run.bytes_total, run.bytes_max_rank,
+                        run.messages_total, run.imbalance, run.differing_pixels, run.frame_xxh64,
+                        run.predicted_ms ? fmt::format("{:.6f}", *run.predicted_ms) : "");
   }
   return text;
 }

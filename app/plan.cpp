@@ -51,7 +51,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   const Choice choice = choose_distribution(settings, session.scene(), ranks);
   plan.distribution = choice.distribution;
   plan.groups = std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
-  plan.strategy = !settings.strategy.empty() ? settings.strategy : "binary-swap";
+  plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
   plan.shading = settings.shading;
   plan.rays = settings.rays;
   plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
@@ -64,7 +64,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   if (plan.mine.group.size() > 1) {
     lines.push_back(fmt::format(
         "composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(),
-        settings.strategy.empty() ? "exact for any rank count, each rank ends with an equal share" : "as asked"));
+        settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked"));
   } else {
     lines.push_back("composite: off (one rank covers each tile)");
   }

@@ -168,7 +168,8 @@ class WallDriver {
   }
 
   [[nodiscard]] std::string strategy() const {
-    return plan_.distribution == Distribution::SortFirst ? std::string(name_of(plan_.distribution)) : plan_.strategy;
+    if (plan_.mine.group.size() == 1) return std::string(name_of(plan_.distribution));
+    return std::string(session_.compositor(plan_.strategy, plan_.mine.group).chosen());
   }
 
   const WallRun& run_;

@@ -73,7 +73,11 @@ class Communicator {
   /// little shared memory.
   [[nodiscard]] virtual std::shared_ptr<PeerMemory> share(std::size_t bytes) = 0;
 
-  /// Says that this rank has merged or copied `bytes` bytes of pixels. Only a communicator that models time listens.
+  /// A clock of this rank, in seconds since some moment: the machine's, or one that models another machine.
+  [[nodiscard]] virtual double seconds() const;
+  /// Whether that clock is a model. Work must then be shared by rule, not by who is free.
+  [[nodiscard]] virtual bool models_time() const { return false; }
+  /// Says that this rank has merged or copied `bytes` bytes of pixels, which a modelled clock takes into account.
   virtual void worked(std::size_t bytes) { (void)bytes; }
 };
 
@@ -82,5 +86,9 @@ inline constexpr std::chrono::seconds kHangTimeout{300};
 
 /// Time limits are cut to this, ten years: a deadline further off would overflow the clock and count as passed.
 inline constexpr std::chrono::nanoseconds kLongestWait = std::chrono::hours{87600};
+
+inline double Communicator::seconds() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace hpr

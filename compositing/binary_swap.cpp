@@ -47,4 +47,13 @@ Composited BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std:
   return owning(tiles, mine);
 }
 
+std::optional<Prediction> BinarySwap::predict(const Costs& costs, const Load& load) const {
+  const Fold fold(load.ranks);
+  const std::vector<int> twos(static_cast<std::size_t>(rounds_of(fold.members())), 2);
+  double seconds = sharing_cost(costs);
+  const int folded = load.ranks - fold.members();
+  if (folded > 0) seconds += costs.message + load.mean_layer * costs.byte(folded);
+  return Prediction{seconds + swap_rounds_cost(costs, load, twos, static_cast<double>(load.ranks) / fold.members())};
+}
+
 }  // namespace hpr

@@ -19,6 +19,7 @@ class BinarySwap final : public Compositor {
   using Compositor::composite;
   Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
                        std::span<const int> shown_by) override;
+  [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
   SwapRounds rounds_;

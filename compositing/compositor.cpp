@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "compositing/auto.h"
 #include "compositing/binary_swap.h"
 #include "compositing/direct_send.h"
 #include "compositing/mpi_reduce.h"
@@ -27,6 +28,7 @@ std::vector<std::unique_ptr<Compositor>> all_compositors() {
   all.push_back(std::make_unique<Ring>());
   all.push_back(std::make_unique<SharedMemory>());
   all.push_back(std::make_unique<MpiReduce>());
+  all.push_back(std::make_unique<Auto>());
   return all;
 }
 

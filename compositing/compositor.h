@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "cluster/communicator.h"
+#include "compositing/cost_model.h"
 #include "image/key.h"
 #include "image/tiles.h"
 
@@ -39,6 +41,16 @@ class Compositor {
   /// Whether it merges layers that live in the memory of a communicator's share() where they lie. All ranks' layers
   /// live there then, or none.
   [[nodiscard]] virtual bool merges_in_place() const { return false; }
+
+  /// What it expects to take (cost_model.h); nothing when it cannot say.
+  [[nodiscard]] virtual std::optional<Prediction> predict(const Costs& costs, const Load& load) const {
+    (void)costs;
+    (void)load;
+    return std::nullopt;
+  }
+
+  /// The strategy at work: another one's name when it chooses among them.
+  [[nodiscard]] virtual std::string_view chosen() const { return name(); }
 
   /// Collective: every rank of `comm` calls it with layers of one layout and the same ascending list `tiles` of tiles
   /// of the frame, which take part; other tiles are left alone. The tiles all ranks end up owning partition the list:

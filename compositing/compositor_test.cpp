@@ -145,7 +145,7 @@ TEST(MakeCompositor, NamesTheNearestChoiceWhenThereIsNoSuchStrategy) {
     EXPECT_EQ(
         error.hint(),
         "did you mean 'binary-swap'? choices: serial, tree, binary-swap, radix-k, direct-send, ring, shared-memory, "
-        "mpi-reduce");
+        "mpi-reduce, auto");
   }
 }
 

@@ -87,4 +87,9 @@ Composited DirectSend::composite(Communicator& comm, TileLayer<Key>& layer, std:
   return {std::move(mine), straight};
 }
 
+std::optional<Prediction> DirectSend::predict(const Costs& costs, const Load& load) const {
+  const int ranks = load.ranks;
+  return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, {&ranks, 1})};
+}
+
 }  // namespace hpr

@@ -37,4 +37,8 @@ Composited MpiReduce::composite(Communicator& comm, TileLayer<Key>& layer, std::
   return is_root ? owning(tiles, {0, tiles.size()}) : Composited{};
 }
 
+std::optional<Prediction> MpiReduce::predict(const Costs& costs, const Load& load) const {
+  return Prediction{costs.message + load.frame * costs.reduce_byte, false};
+}
+
 }  // namespace hpr

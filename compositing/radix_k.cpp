@@ -68,4 +68,9 @@ Composited RadixK::composite(Communicator& comm, TileLayer<Key>& layer, std::spa
                 rounds_.run(comm, layer, tiles, activity, factors, comm.rank(), [](int member) { return member; }));
 }
 
+std::optional<Prediction> RadixK::predict(const Costs& costs, const Load& load) const {
+  const std::vector<int> factors = factors_.empty() ? factors_for(load.ranks) : factors_;
+  return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, factors)};
+}
+
 }  // namespace hpr

@@ -23,6 +23,7 @@ class RadixK final : public Compositor {
   using Compositor::composite;
   Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
                        std::span<const int> shown_by) override;
+  [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
   /// What is chosen for so many ranks, the largest first: prime factors, joined while a product stays at 8 or below.
   [[nodiscard]] static std::vector<int> factors_for(int ranks);

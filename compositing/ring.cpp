@@ -26,4 +26,12 @@ Composited Ring::composite(Communicator& comm, TileLayer<Key>& layer, std::span<
   return owning(tiles, pieces[static_cast<std::size_t>(rank)]);
 }
 
+std::optional<Prediction> Ring::predict(const Costs& costs, const Load& load) const {
+  double seconds = sharing_cost(costs);
+  for (int step = 1; step < load.ranks; ++step) {
+    seconds += costs.message + load.merged(step) / load.ranks * costs.swap_byte;
+  }
+  return Prediction{seconds};
+}
+
 }  // namespace hpr

@@ -21,4 +21,8 @@ Composited Serial::composite(Communicator& comm, TileLayer<Key>& layer, std::spa
   return owning(tiles, {0, tiles.size()});
 }
 
+std::optional<Prediction> Serial::predict(const Costs& costs, const Load& load) const {
+  return Prediction{costs.message + (load.ranks - 1) * load.mean_layer * costs.pull_byte, false};
+}
+
 }  // namespace hpr

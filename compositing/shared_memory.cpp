@@ -61,12 +61,19 @@ class SharedMemory::Host {
 
   /// Starts a frame, after a barrier all ranks of the host came through.
   void start_frame() {
+    took_share_ = false;
     turn_ = (turn_ + 1) % control_of_host_->next.size();
     // The counter of the coming frame: nobody uses it before the next barrier, nor after the last one.
     counter((turn_ + 1) % control_of_host_->next.size()).store(0, std::memory_order_relaxed);
   }
-  /// The next tiles nobody has taken.
-  [[nodiscard]] TileRun take(std::size_t tiles) {
+  /// The next tiles nobody has taken; where time is a model, the next of a fixed share.
+  [[nodiscard]] TileRun take(const Activity& activity) {
+    const std::size_t tiles = activity.tiles();
+    if (comm_.models_time()) {
+      const auto number = static_cast<std::size_t>(std::ranges::find(ranks_, comm_.rank()) - ranks_.begin());
+      if (std::exchange(took_share_, true)) return {tiles, 0};
+      return activity.cut({0, tiles}, static_cast<int>(ranks_.size()))[number];
+    }
     const std::size_t first = counter(turn_).fetch_add(kTilesATurn, std::memory_order_relaxed);
     if (first >= tiles) return {tiles, 0};
     return {first, std::min(kTilesATurn, tiles - first)};
@@ -90,6 +97,7 @@ class SharedMemory::Host {
   std::unique_ptr<Communicator> column_;
   RadixK between_hosts_;
   std::size_t turn_ = 0;
+  bool took_share_ = false;
 };
 
 namespace {
@@ -167,7 +175,7 @@ Composited SharedMemory::composite(Communicator& comm, TileLayer<Key>& layer, st
     for (std::size_t run = 0; run < runs.size(); ++run) owners.insert(owners.end(), runs[run].count, run);
   }
 
-  for (TileRun turn = host_->take(tiles.size()); turn.count > 0; turn = host_->take(tiles.size())) {
+  for (TileRun turn = host_->take(here); turn.count > 0; turn = host_->take(here)) {
     std::size_t bytes = 0;
     for (std::size_t i = turn.first; i < turn.end(); ++i) bytes += merge_tile(layers, here, i, tiles[i], owners[i]);
     comm.worked(bytes);
@@ -199,6 +207,17 @@ void SharedMemory::copy_tiles(const TileLayer<Key>& from, TileLayer<Key>& to, st
       to.clear(tile);
     }
   }
+}
+
+std::optional<Prediction> SharedMemory::predict(const Costs& costs, const Load& load) const {
+  if (costs.read_byte <= 0.0) return std::nullopt;
+  const double per_host = load.drawn_tiles / costs.hosts * costs.read_byte;
+  double seconds = 2.0 * costs.meet + per_host;
+  if (costs.hosts == 1) return Prediction{seconds, false};
+  const int columns = std::max(1, load.ranks / costs.hosts);
+  seconds += 2.0 * sharing_cost(costs) +
+             swap_rounds_cost(costs, load, RadixK::factors_for(costs.hosts), columns, 1.0 / columns);
+  return Prediction{seconds};
 }
 
 }  // namespace hpr

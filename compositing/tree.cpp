@@ -1,5 +1,7 @@
 #include "compositing/tree.h"
 
+#include <algorithm>
+
 namespace hpr {
 
 Composited Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
@@ -20,6 +22,15 @@ Composited Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<
     });
   }
   return owning(tiles, {0, tiles.size()});
+}
+
+std::optional<Prediction> Tree::predict(const Costs& costs, const Load& load) const {
+  double seconds = 0.0;
+  for (int step = 1; step < load.ranks; step *= 2) {
+    const double pairs = std::max(1.0, static_cast<double>(load.ranks) / (2.0 * step));
+    seconds += costs.message + load.merged(step) * costs.byte(pairs);
+  }
+  return Prediction{seconds, false};
 }
 
 }  // namespace hpr

@@ -16,6 +16,7 @@ class Tree final : public Compositor {
   using Compositor::composite;
   Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
                        std::span<const int> shown_by) override;
+  [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
   TileMessage given_;

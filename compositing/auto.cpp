@@ -1,0 +1,74 @@
+#include "compositing/auto.h"
+
+#include <algorithm>
+
+#include "core/check.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kFramesBetweenLooks = 16;
+
+bool on_one_host(Communicator& comm) {
+  const auto memory = comm.share(1);
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    if (memory->of(rank).empty()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string Auto::best(const Costs& costs, const Load& load, bool collects) {
+  std::string name;
+  double least = 0.0;
+  for (const auto& compositor : all_compositors()) {
+    if (compositor->name() == "auto" || !compositor->fits(costs.ranks)) continue;
+    const auto prediction = compositor->predict(costs, load);
+    if (!prediction) continue;
+    const double seconds = collects ? prediction->collected(costs, load) : prediction->composite;
+    if (!name.empty() && seconds >= least) continue;
+    name = compositor->name();
+    least = seconds;
+  }
+  HPR_CHECK(!name.empty());
+  return name;
+}
+
+std::optional<Prediction> Auto::predict(const Costs& costs, const Load& load) const {
+  return make_compositor(best(costs, load, true))->predict(costs, load);
+}
+
+void Auto::choose(Communicator& comm, const TileLayer<Key>& layer, std::span<const std::size_t> tiles, bool collects) {
+  const bool is_new = comm_ != &comm;
+  if (is_new) {
+    used_.clear();
+    chosen_ = nullptr;
+    frames_ = 0;
+    comm_ = &comm;
+    costs_ = {};
+    costs_.ranks = comm.size();
+    if (!on_one_host(comm)) costs_ = measure_costs(comm);
+  }
+  const bool one_host = costs_.hosts == 1;
+  if (!is_new && (one_host || ++frames_ < kFramesBetweenLooks)) return;
+  frames_ = 0;
+  const std::string name = one_host ? "shared-memory" : best_for(comm, layer, tiles, collects);
+  auto same = std::ranges::find(used_, name, [](const auto& compositor) { return compositor->name(); });
+  if (same == used_.end()) same = used_.insert(same, make_compositor(name));
+  chosen_ = same->get();
+}
+
+std::string Auto::best_for(Communicator& comm, const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                           bool collects) const {
+  const Load load = share_load(comm, layer, tiles);
+  return best(costs_.with_packed(load.packed_share), load, collects);
+}
+
+Composited Auto::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                           std::span<const int> shown_by) {
+  choose(comm, layer, tiles, !shown_by.empty());
+  return chosen_->composite(comm, layer, tiles, shown_by);
+}
+
+}  // namespace hpr
