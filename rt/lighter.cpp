@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "rt/direct_light.h"
 #include "rt/pass.h"
 
 namespace hpr {
@@ -46,33 +47,6 @@ constexpr std::size_t kFirstPassStep = 2;
 
 glm::dvec3 to_vector(const Rgb& color) {
   return {color.r, color.g, color.b};
-}
-
-/// Emission into the tile, and what every light would add if nothing stood in its way.
-void gather_direct(TileWork& tile, Wave& wave) {
-  for (const PathPoint& point : wave.points) tile.radiance[point.pixel] += point.throughput * point.material.emission;
-  wave.samples.clear();
-  for (std::uint32_t light = 0; light < tile.lights.size(); ++light) {
-    for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
-      const PathPoint& point = wave.points[i];
-      const LightSample arriving = sample_light(tile.lights[light], point.surface.position, *tile.view);
-      const double cosine = glm::dot(point.surface.shading_normal, arriving.to_light);
-      if (!(cosine > 0.0) || arriving.irradiance == glm::dvec3(0.0)) continue;
-      // A smooth normal at a silhouette may turn away from the viewer; the geometric one never does.
-      const bool facing = glm::dot(point.surface.shading_normal, point.surface.to_viewer) > 0.0;
-      const glm::dvec3& normal = facing ? point.surface.shading_normal : point.surface.geometric_normal;
-      const glm::dvec3 scattered = point.material.brdf.value(normal, arriving.to_light, point.surface.to_viewer);
-      if (scattered == glm::dvec3(0.0)) continue;
-      wave.samples.push_back({i, light, true, arriving.to_light, arriving.distance,
-                              point.throughput * scattered * arriving.irradiance * cosine});
-    }
-  }
-}
-
-void add_direct(TileWork& tile, const Wave& wave) {
-  for (const DirectSample& sample : wave.samples) {
-    if (sample.visible) tile.radiance[wave.points[sample.point].pixel] += sample.radiance;
-  }
 }
 
 /// The first generation: the surfaces the keys of a tile name.
@@ -208,15 +182,23 @@ void Lighter::State::light_tile(Scratch& scratch, const Rect& place, std::span<c
   while (!scratch.wave.points.empty()) {
     scratch.next.depth = scratch.wave.depth + 1;
     scratch.next.points.clear();
-    gather_direct(tile, scratch.wave);
+    add_emission(tile, scratch.wave);
     charge(kDirectStep);
     for (std::size_t i = 0; i < passes.size(); ++i) {
-      passes[i]->run(tile, scratch.wave, scratch.next);
+      passes[i]->spread(tile, scratch.wave, scratch.next);
       charge(kFirstPassStep + i);
     }
-    add_direct(tile, scratch.wave);
+    for (std::size_t light = 0; light < lights.size(); light += kLightsAtOnce) {
+      sample_lights(tile, light, scratch.wave);
+      charge(kDirectStep);
+      for (std::size_t i = 0; i < passes.size(); ++i) {
+        passes[i]->hide(tile, scratch.wave);
+        charge(kFirstPassStep + i);
+      }
+      add_samples(tile, scratch.wave);
+      charge(kDirectStep);
+    }
     std::swap(scratch.wave, scratch.next);
-    charge(kDirectStep);
   }
   store(tile, place, radiance, tile.counts);
 }

@@ -34,7 +34,7 @@ class ReflectionPass final : public Pass {
   [[nodiscard]] const Requirement& requirement(const Requirements& scene) const override { return scene.reflection; }
   [[nodiscard]] bool needs_rays() const override { return true; }
 
-  void run(TileWork& tile, Wave& wave, Wave& next) const override {
+  void spread(TileWork& tile, const Wave& wave, Wave& next) const override {
     if (wave.depth >= tile.max_depth) return;
     struct Mirrored {
       const PathPoint* from;
