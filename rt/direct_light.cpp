@@ -18,10 +18,8 @@ void sample_lights(const TileWork& tile, std::size_t first_light, Wave& wave) {
       const LightSample arriving = sample_light(tile.lights[light], point.surface.position, *tile.view);
       const double cosine = glm::dot(point.surface.shading_normal, arriving.to_light);
       if (!(cosine > 0.0) || arriving.irradiance == glm::dvec3(0.0)) continue;
-      // A smooth normal at a silhouette may turn away from the viewer; the geometric one never does.
-      const bool facing = glm::dot(point.surface.shading_normal, point.surface.to_viewer) > 0.0;
-      const glm::dvec3& normal = facing ? point.surface.shading_normal : point.surface.geometric_normal;
-      const glm::dvec3 scattered = point.material.brdf.value(normal, arriving.to_light, point.surface.to_viewer);
+      const glm::dvec3 scattered =
+          point.material.brdf.value(point.surface.facing_normal(), arriving.to_light, point.surface.to_viewer);
       if (scattered == glm::dvec3(0.0)) continue;
       wave.samples.push_back({i, static_cast<std::uint32_t>(light), true, arriving.to_light,
                               point.throughput * scattered * arriving.irradiance * cosine});
