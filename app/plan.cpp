@@ -72,7 +72,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));
   if (session.scene().lights.empty()) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
-  for (const PassPlan& pass : plan_passes(session.scene(), plan.rays)) {
+  for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
   }
   return plan;

@@ -99,7 +99,7 @@ Camera RenderOptions::choose_camera(const Scene& scene) const {
   return chosen;
 }
 
-FrameSettings RenderOptions::settings(const Globals& globals) const {
+FrameSettings RenderOptions::settings() const {
   FrameSettings settings;
   if (!std::isfinite(fov_degrees) || !std::isfinite(exposure)) {
     throw Error(ExitCode::Usage, "--fov and --exposure take finite numbers", "write e.g. --fov 45");
@@ -111,8 +111,7 @@ FrameSettings RenderOptions::settings(const Globals& globals) const {
   settings.rays.auto_passes = passes == "auto";
   if (passes != "auto" && passes != "none") settings.rays.passes = split_list(passes);
   settings.rays.max_depth = max_depth;
-  settings.rays.seed = globals.seed;
-  (void)plan_passes(Scene{}, settings.rays);  // unknown pass names are found before the scene is loaded
+  (void)plan_passes({}, settings.rays);  // unknown pass names are found before the scene is loaded
   return settings;
 }
 

@@ -278,7 +278,7 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
 ExitCode run_wall(const WallRun& run, const Globals& globals) {
   Wall wall = load_wall(run.wall);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
-  const FrameSettings settings = run.options.settings(globals);
+  const FrameSettings settings = run.options.settings();
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
   return run_ranks(globals, [&](Communicator& comm) {

@@ -103,7 +103,6 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
 struct Lighter::State {
   const Scene& scene;
   RaySettings settings;
-  std::vector<PassPlan> plan;
   RaySpace space;
   Surfaces surfaces;
   std::vector<Light> lights;
@@ -114,18 +113,18 @@ struct Lighter::State {
   RayCounts counts;
   std::vector<PassTime> times;
 
-  State(const Scene& lit, RaySettings chosen);
+  State(const Scene& lit, RaySettings chosen, const Requirements& requirements);
   std::unique_ptr<Scratch> take_scratch();
   void light_tile(Scratch& scratch, const Rect& place, std::span<const Key> keys, std::span<Rgb> radiance) const;
 };
 
-Lighter::State::State(const Scene& lit, RaySettings chosen)
+Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements)
     : scene(lit),
       settings(std::move(chosen)),
-      plan(plan_passes(lit, settings)),
       space(lit.bounds),
       surfaces(lit, space),
       lights(lights_or_headlight(lit)) {
+  const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
   bool needs_rays = false;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -203,8 +202,8 @@ void Lighter::State::light_tile(Scratch& scratch, const Rect& place, std::span<c
   store(tile, place, radiance, tile.counts);
 }
 
-Lighter::Lighter(const Scene& scene, RaySettings settings)
-    : state_(std::make_unique<State>(scene, std::move(settings))) {}
+Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements)) {}
 Lighter::~Lighter() = default;
 Lighter::Lighter(Lighter&&) noexcept = default;
 Lighter& Lighter::operator=(Lighter&&) noexcept = default;
@@ -214,9 +213,6 @@ const RayCounts& Lighter::counts() const {
 }
 const std::vector<PassTime>& Lighter::times() const {
   return state_->times;
-}
-const std::vector<PassPlan>& Lighter::plan() const {
-  return state_->plan;
 }
 
 void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,

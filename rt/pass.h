@@ -11,7 +11,6 @@
 #include "rt/lights.h"
 #include "rt/ray_scene.h"
 #include "rt/surfaces.h"
-#include "scene/requirements.h"
 
 namespace hpr {
 
