@@ -246,7 +246,9 @@ class Linker {
     }
   }
 
+  /// Only of a wall without errors: a screen that could not be read cannot name its window.
   void warn_about_idle_windows() {
+    if (findings_.any_errors()) return;
     std::set<std::string> used;
     for (const DraftScreen& draft : draft_.screens) used.insert(draft.screen.window);
     for (const DraftWindow& draft : draft_.windows) {
