@@ -36,7 +36,7 @@ std::uint64_t triangle_count(const GallerySize& size) {
   const auto n = static_cast<std::uint64_t>(size.n);
   const auto v = 4 * static_cast<std::uint64_t>(size.s);
   constexpr std::uint64_t kRoom = 2 + 10 + 4 + 24 + 240 + 48;
-  constexpr std::uint64_t kKnot = 2 * 256 * 32;
+  constexpr std::uint64_t kKnot = std::uint64_t{2} * 256 * 32;
   return kRoom + 60 * static_cast<std::uint64_t>(size.cases) + 4 * (12 * n * n * balls) + 8 * (20 * power(4, size.k)) +
          4 * kKnot + 4 * (64 * v * v - 8 * v);
 }
