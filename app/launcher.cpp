@@ -128,8 +128,9 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
+    const char* const signal = ::sigdescr_np(code - 128);
     throw Error(ExitCode::Lost,
-                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, ::sigdescr_np(code - 128)),
+                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, signal ? signal : "unknown"),
                 "the system's log may say why (out of memory?); nothing partial was left");
   }
   if (code == 127) {

@@ -91,6 +91,16 @@ TEST(Lighter, ALightThatLiesOnASurfaceIsNotHiddenByIt) {
   for (const Rgb& pixel : lit.image.pixels()) EXPECT_GT(pixel.r, 0.0F);
 }
 
+TEST(Lighter, ALightNearerThanRoundingCastsNoImpossibleRay) {
+  Scene scene = white_floor();
+  // Where rays of this floor start: 4 * 2^-23 of 4 + 8 metres above it.
+  scene.lights = {point_light({0, 5.7e-6, 0}, 1e-10F)};
+  const test::Lit lit = test::light(scene, test::view_from({0, 3, 0}, {0, 0, 0}, {3, 3}, scene, 1e-4, {0, 0, -1}));
+  EXPECT_GT(lit.counts.shadow, 0U);
+  EXPECT_EQ(lit.counts.invalid, 0U);
+  EXPECT_GT(lit.image.at(1, 1).r, 0.0F);
+}
+
 TEST(Lighter, AMirrorShowsTheColourOfWhatItReflectsTimesItsReflectance) {
   Scene scene;
   add_material(scene, test::mirror(0.25F));
@@ -106,6 +116,58 @@ TEST(Lighter, AMirrorShowsTheColourOfWhatItReflectsTimesItsReflectance) {
   EXPECT_NEAR(lit.image.at(2, 2).b, 0.03125F, 1e-6F);
   const test::Lit off = test::light(scene, view, {.passes = {"shadow"}});
   EXPECT_EQ(off.image.at(2, 2), Rgb{});
+}
+
+/// A mirror whose normals pretend that it leans towards a glowing wall on its right, seen from above on the left.
+test::Lit leaning_mirror(const glm::dvec3& to_viewer) {
+  Scene scene;
+  add_material(scene, test::mirror(0.5F));
+  add_material(scene, test::glowing(glm::vec3(2.0F)));
+  Mesh mirror = quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0);
+  mirror.normals.assign(4, glm::vec3(std::sin(0.7F), std::cos(0.7F), 0.0F));
+  place(scene, add_mesh(scene, mirror));
+  place(scene, add_mesh(scene, quad({10, -50, -50}, {0, 100, 0}, {0, 0, 100}, 1)));
+  finish_scene(scene);
+  return test::light(scene, test::view_from(3.0 * to_viewer, {0, 0, 0}, {3, 3}, scene, 1e-4));
+}
+
+double reflected_by_half(double cosine) {
+  return 2.0 * (0.5 + 0.5 * std::pow(1.0 - cosine, 5.0));
+}
+
+TEST(Lighter, AMirrorImageThatASmoothNormalSendsInsideIsBentBackAbove) {
+  const glm::dvec3 to_viewer = glm::normalize(glm::dvec3(-0.5, 0.866, 0.0));
+  const test::Lit lit = leaning_mirror(to_viewer);
+  EXPECT_EQ(lit.counts.reflection, 9U) << "one ray a pixel: none of them meets the mirror again";
+  const double cosine = glm::dot(to_viewer, glm::dvec3(std::sin(0.7), std::cos(0.7), 0.0));
+  EXPECT_NEAR(lit.image.at(1, 1).r, reflected_by_half(cosine), 1e-4);
+}
+
+TEST(Lighter, AMirrorWhoseSmoothNormalTurnsAwayReflectsByItsGeometricOne) {
+  const glm::dvec3 to_viewer = glm::normalize(glm::dvec3(-0.94, 0.342, 0.0));
+  const test::Lit lit = leaning_mirror(to_viewer);
+  EXPECT_EQ(lit.counts.reflection, 9U);
+  EXPECT_NEAR(lit.image.at(1, 1).r, reflected_by_half(to_viewer.y), 1e-4);
+}
+
+TEST(Lighter, AMirrorImageFadesOutWithRoughness) {
+  const auto image_at = [](float roughness) {
+    Scene scene;
+    Material material = test::mirror(1.0F);
+    material.roughness = roughness;
+    add_material(scene, material);
+    add_material(scene, test::glowing(glm::vec3(1.0F)));
+    place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+    place(scene, add_mesh(scene, quad({-50, 10, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
+    scene.lights = {point_light({0, -5, 0}, 1.0F)};  // below: lights nothing that is seen
+    finish_scene(scene);
+    const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {3, 3}, scene, 1e-4, {0, 0, -1});
+    return static_cast<double>(test::light(scene, view).image.at(1, 1).r);
+  };
+  EXPECT_NEAR(image_at(0.0F), 1.0, 1e-6);
+  EXPECT_NEAR(image_at(0.15F), 0.5, 1e-6) << "half way to where the pass stops looking";
+  EXPECT_LT(image_at(0.29F), 0.01);
+  EXPECT_EQ(image_at(0.3F), 0.0);
 }
 
 TEST(Lighter, AMirrorThatFacesNothingShowsTheBackground) {
