@@ -20,6 +20,7 @@ namespace {
 /// The values of `picture` with its channels in the order of `channels`.
 std::vector<float> in_order(const FloatImage& picture, const std::vector<std::string>& channels) {
   std::vector<std::size_t> from;
+  from.reserve(channels.size());
   for (const std::string& channel : channels) {
     from.push_back(static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin()));
   }

@@ -41,8 +41,10 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
   const int null = ::open("/dev/null", O_RDONLY);
   if (null >= 0) ::dup2(null, STDIN_FILENO);
   if (stdout_pipe >= 0) ::dup2(stdout_pipe, STDOUT_FILENO);
+  // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
   for (const auto& [name, value] : extra_env) ::setenv(name.c_str(), value.c_str(), 1);
+  // NOLINTEND(concurrency-mt-unsafe)
   ::execvp(arguments.front(), arguments.data());
   ::_exit(127);
 }
@@ -100,6 +102,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   std::vector<std::string> words{"mpiexec", "-n", std::to_string(ranks), program_path()};
   words.insert(words.end(), args.begin(), args.end());
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
 
@@ -125,8 +128,9 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
+    const char* const signal = ::sigdescr_np(code - 128);
     throw Error(ExitCode::Lost,
-                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, ::strsignal(code - 128)),
+                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, signal ? signal : "unknown"),
                 "the system's log may say why (out of memory?); nothing partial was left");
   }
   if (code == 127) {

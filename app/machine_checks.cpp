@@ -9,12 +9,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include "app/doctor.h"
@@ -78,7 +78,7 @@ Finding check_memory() {
 }
 
 Finding check_embree() {
-  const RTCDevice device = rtcNewDevice(nullptr);
+  auto* const device = rtcNewDevice(nullptr);
   if (device == nullptr) {
     return {{}, FindingStatus::Fail, "Embree opens no device", "apt-get install --reinstall libembree3-3"};
   }
@@ -118,7 +118,8 @@ Finding check_mpi() {
 /// Open MPI keeps the messages of ranks on one host in `folder`.
 Finding check_space(const char* folder, double needed_bytes, const char* remedy) {
   struct statvfs space {};
-  if (::statvfs(folder, &space) != 0) return warn(fmt::format("{}: {}", folder, std::strerror(errno)), remedy);
+  if (::statvfs(folder, &space) != 0)
+    return warn(fmt::format("{}: {}", folder, std::generic_category().message(errno)), remedy);
   const double free_bytes = static_cast<double>(space.f_bavail) * static_cast<double>(space.f_frsize);
   std::string detail = fmt::format("{}: {:.0f} MiB free", folder, free_bytes / kMiB);
   if (::access(folder, W_OK) != 0) return warn(detail + ", but not writable", remedy);

@@ -46,6 +46,7 @@ void declare_globals(CLI::App& app, Globals& globals) {
 
 std::vector<std::string> names_of(const std::vector<std::unique_ptr<Command>>& commands) {
   std::vector<std::string> names;
+  names.reserve(commands.size());
   for (const auto& command : commands) names.emplace_back(command->name());
   return names;
 }
@@ -76,7 +77,7 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
   const CLI::App* const context = deepest(&app, words);
   std::string command = context->get_name();
   for (const CLI::App* above = context->get_parent(); above != nullptr; above = above->get_parent()) {
-    command = above->get_name() + " " + command;
+    command.insert(0, above->get_name() + " ");
   }
   const std::string help = fmt::format("see '{} --help'", command);
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
@@ -92,6 +93,7 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
   const auto subcommands = context->get_subcommands([](const CLI::App*) { return true; });
   if (context != &app && !subcommands.empty() && context->get_require_subcommand_min() > 0) {
     std::vector<std::string> choices;
+    choices.reserve(subcommands.size());
     for (const CLI::App* child : subcommands) choices.push_back(child->get_name());
     const auto word =
         std::ranges::find_if(words.begin() + 1, words.end(), [](const std::string& w) { return !w.starts_with('-'); });
@@ -126,7 +128,7 @@ ExitCode run(const std::vector<std::string>& words) {
   // `hpr help` and `hpr help COMMAND` are other ways to write --help.
   const bool asks_for_help = words.front() == "help";
   std::vector<std::string> parsed(words.begin() + (asks_for_help ? 1 : 0), words.end());
-  if (asks_for_help) parsed.push_back("--help");
+  if (asks_for_help) parsed.emplace_back("--help");
   if (!parsed.front().starts_with('-')) {
     const auto names = names_of(commands);
     if (std::ranges::find(names, parsed.front()) == names.end()) {

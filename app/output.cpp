@@ -76,7 +76,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
   RunStats stats;
   stats.ranks = comm.size();
   stats.plan = plan.explained;
-  stats.passes = plan_passes(session.scene(), plan.rays);
+  stats.passes = plan_passes(session.requirements(), plan.rays);
   stats.ms = slowest(comm, cost.ms);
   stats.times.push_back({"raster", slowest(comm, times.raster_ms)});
   stats.times.push_back({"composite", slowest(comm, times.composite_ms)});

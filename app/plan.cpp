@@ -61,18 +61,16 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   auto& lines = plan.explained;
   lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
                               ranks == 1 ? "" : "s", choice.why));
-  if (plan.mine.group.size() > 1) {
-    lines.push_back(fmt::format(
-        "composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(),
-        settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked"));
-  } else {
-    lines.push_back("composite: off (one rank covers each tile)");
-  }
+  const char* const why =
+      settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
+  lines.push_back(plan.mine.group.size() > 1
+                      ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
+                      : fmt::format("composite: off (one rank covers each tile)"));
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));
   if (session.scene().lights.empty()) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
-  for (const PassPlan& pass : plan_passes(session.scene(), plan.rays)) {
+  for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
   }
   return plan;

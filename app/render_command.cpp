@@ -39,7 +39,7 @@ class RenderCommand final : public Command {
     const Size size{extent->first, extent->second};
     check_size(size, globals);
     if (!inside_mpi_job()) check_outputs(globals);
-    const FrameSettings settings = options_.settings(globals);
+    const FrameSettings settings = options_.settings();
     return run_ranks(globals, [&](Communicator& comm) {
       if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(globals); });
       Session session(comm, globals, [&] { return load_scene(source_, globals.scene_limits()); });

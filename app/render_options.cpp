@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <glm/trigonometric.hpp>
@@ -36,6 +37,22 @@ Shading parse_shading(const std::string& name) {
   throw Error(ExitCode::Usage, fmt::format("unknown shading '{}'", name), unknown_name_hint(name, choices));
 }
 
+/// The first camera of that name, else the one at that index.
+const Camera& find_camera(const Scene& scene, const std::string& wanted) {
+  const auto named = std::ranges::find(scene.cameras, wanted, &Camera::name);
+  if (named != scene.cameras.end()) return *named;
+  std::size_t index = 0;
+  const char* const last = wanted.data() + wanted.size();
+  if (std::from_chars(wanted.data(), last, index).ptr == last && index < scene.cameras.size()) {
+    return scene.cameras[index];
+  }
+  std::vector<std::string> names;
+  names.reserve(scene.cameras.size());
+  for (const Camera& camera : scene.cameras) names.push_back(printable(camera.name));
+  throw Error(ExitCode::Usage, fmt::format("the scene has no camera '{}'", printable(wanted)),
+              names.empty() ? "it has none at all: use --eye and --at" : unknown_name_hint(wanted, names));
+}
+
 }  // namespace
 
 void RenderOptions::declare(CLI::App& app) {
@@ -68,38 +85,22 @@ void RenderOptions::declare(CLI::App& app) {
 }
 
 Camera RenderOptions::choose_camera(const Scene& scene) const {
-  Camera chosen;
   if (!eye.empty()) {
-    chosen = look_at(to_point(eye), to_point(at), to_point(up),
-                     glm::radians(fov_degrees > 0.0 ? fov_degrees : kDefaultFovDegrees));
-    return chosen;
+    return look_at(to_point(eye), to_point(at), to_point(up),
+                   glm::radians(fov_degrees > 0.0 ? fov_degrees : kDefaultFovDegrees));
   }
-  if (camera.empty()) {
-    chosen = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
+  Camera chosen;
+  if (!camera.empty()) {
+    chosen = find_camera(scene, camera);
   } else {
-    std::vector<std::string> names;
-    const Camera* found = nullptr;
-    for (const Camera& candidate : scene.cameras) {
-      if (found == nullptr && candidate.name == camera) found = &candidate;
-      names.push_back(printable(candidate.name));
-    }
-    std::size_t index = 0;
-    const char* const last = camera.data() + camera.size();
-    if (found == nullptr && std::from_chars(camera.data(), last, index).ptr == last && index < scene.cameras.size()) {
-      found = &scene.cameras[index];
-    }
-    if (found == nullptr) {
-      throw Error(ExitCode::Usage, fmt::format("the scene has no camera '{}'", printable(camera)),
-                  names.empty() ? "it has none at all: use --eye and --at" : unknown_name_hint(camera, names));
-    }
-    chosen = *found;
+    chosen = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
   }
   auto* const lens = std::get_if<PerspectiveLens>(&chosen.lens);
   if (fov_degrees > 0.0 && lens != nullptr) lens->vertical_fov_radians = glm::radians(fov_degrees);
   return chosen;
 }
 
-FrameSettings RenderOptions::settings(const Globals& globals) const {
+FrameSettings RenderOptions::settings() const {
   FrameSettings settings;
   if (!std::isfinite(fov_degrees) || !std::isfinite(exposure)) {
     throw Error(ExitCode::Usage, "--fov and --exposure take finite numbers", "write e.g. --fov 45");
@@ -111,8 +112,7 @@ FrameSettings RenderOptions::settings(const Globals& globals) const {
   settings.rays.auto_passes = passes == "auto";
   if (passes != "auto" && passes != "none") settings.rays.passes = split_list(passes);
   settings.rays.max_depth = max_depth;
-  settings.rays.seed = globals.seed;
-  (void)plan_passes(Scene{}, settings.rays);  // unknown pass names are found before the scene is loaded
+  (void)plan_passes({}, settings.rays);  // unknown pass names are found before the scene is loaded
   return settings;
 }
 

@@ -32,7 +32,7 @@ struct RenderOptions {
   [[nodiscard]] Camera choose_camera(const Scene& scene) const;
 
   /// Throws Error (Usage) for unknown names, before any scene is loaded.
-  [[nodiscard]] FrameSettings settings(const Globals& globals) const;
+  [[nodiscard]] FrameSettings settings() const;
 };
 
 }  // namespace hpr

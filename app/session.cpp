@@ -12,7 +12,10 @@
 namespace hpr {
 
 Session::Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load)
-    : comm_(comm), share_(host_share(comm, globals)), scene_(distribute_scene(comm_, load)) {
+    : comm_(comm),
+      share_(host_share(comm, globals)),
+      scene_(distribute_scene(comm_, load)),
+      requirements_(requirements_of(scene_)) {
   if (comm_.rank() == 0) {
     for (const std::string& warning : scene_.warnings)
       log::warning("{}: {}", printable(scene_.name), printable(warning, 400));
@@ -53,7 +56,7 @@ Lighter& Session::lighter(const RaySettings& settings) {
   if (!lighter_ || ray_settings_ != settings) {
     RaySettings own = settings;
     own.threads = share_.threads;
-    lighter_ = std::make_unique<Lighter>(scene_, own);
+    lighter_ = std::make_unique<Lighter>(scene_, own, requirements_);
     ray_settings_ = settings;
   }
   return *lighter_;

@@ -13,6 +13,7 @@
 #include "raster/gl_context.h"
 #include "raster/rasterizer.h"
 #include "rt/lighter.h"
+#include "scene/requirements.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -26,6 +27,7 @@ class Session {
 
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
   [[nodiscard]] const Scene& scene() const { return scene_; }
+  [[nodiscard]] const Requirements& requirements() const { return requirements_; }
   [[nodiscard]] int threads() const { return share_.threads; }
   [[nodiscard]] const std::string& host() const { return share_.host; }
   [[nodiscard]] const GlContext& gl() const { return *gl_; }
@@ -56,6 +58,7 @@ class Session {
   CountingCommunicator comm_;
   HostShare share_;
   Scene scene_;
+  Requirements requirements_;
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;

@@ -279,10 +279,12 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
 ExitCode run_wall(const WallRun& run, const Globals& globals) {
   Wall wall = load_wall(run.wall);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
-  const FrameSettings settings = run.options.settings(globals);
+  const FrameSettings settings = run.options.settings();
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
+  const EmptyFolders tidy(run.folder);
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
   return run_ranks(globals, [&](Communicator& comm) {
+    const EmptyFolders tidy_in_job(run.folder);  // a rank that fails leaves run_ranks only to end the job
     if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(run, wall, globals); });
     Session session(comm, globals, [&] { return load_scene(run.scene, globals.scene_limits()); });
     return drive(run, wall, settings, globals, session);

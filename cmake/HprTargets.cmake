@@ -1,13 +1,12 @@
-# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ... [TEST_LABELS ...] [TEST_TIMEOUT s]):
-# one folder, one static library, its unit tests beside it.
+# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ...): one folder, one static library, its unit tests
+# beside it.
 function(hpr_library name)
-  cmake_parse_arguments(ARG "" "TEST_TIMEOUT" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS;TEST_LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS" ${ARGN})
   add_library(hpr_${name} STATIC ${ARG_SOURCES})
   add_library(hpr::${name} ALIAS hpr_${name})
   target_link_libraries(hpr_${name} PUBLIC hpr::options ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
   if(ARG_TESTS AND BUILD_TESTING)
-    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name}
-                  LABELS ${ARG_TEST_LABELS} TIMEOUT ${ARG_TEST_TIMEOUT})
+    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name})
   endif()
 endfunction()
 
@@ -40,9 +39,15 @@ function(hpr_unit_test target)
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${environment_script})
 endfunction()
 
-# hpr_mpi_test(name RANKS 1 2 3 ...): the same executable under mpiexec, once per rank count.
+# hpr_mpi_test(name DEPENDS ... RANKS 1 2 3 ...): name.cpp with the main of tests/mpi_main.cpp, under mpiexec once per rank
+# count. Built but not run for sanitizers, which the MPI library is not built for; there ranks are threads.
 function(hpr_mpi_test name)
-  cmake_parse_arguments(ARG "" "" "RANKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "DEPENDS;RANKS" ${ARGN})
+  add_executable(${name} ${name}.cpp ${PROJECT_SOURCE_DIR}/tests/mpi_main.cpp)
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gtest)
+  if(HPR_SANITIZE)
+    return()
+  endif()
   foreach(ranks IN LISTS ARG_RANKS)
     add_test(NAME ${name}.np${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${MPIEXEC_PREFLAGS}
              $<TARGET_FILE:${name}>)

@@ -166,4 +166,16 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
   if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
 }
 
+EmptyFolders::EmptyFolders(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (std::filesystem::path path = folder; !path.empty() && !std::filesystem::exists(path, error);
+       path = path.parent_path()) {
+    missing_.push_back(path);
+  }
+}
+
+EmptyFolders::~EmptyFolders() {
+  for (const std::filesystem::path& path : missing_) ::rmdir(path.c_str());  // refuses what is not empty
+}
+
 }  // namespace hpr

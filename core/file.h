@@ -23,4 +23,17 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 /// writable: asked before long work.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
+/// Tidies up after a run that ends before it wrote anything: when this goes, those folders on the way to and including
+/// `folder` that were missing when it came, and are empty, are removed.
+class EmptyFolders {
+ public:
+  explicit EmptyFolders(const std::filesystem::path& folder);
+  ~EmptyFolders();
+  EmptyFolders(const EmptyFolders&) = delete;
+  EmptyFolders& operator=(const EmptyFolders&) = delete;
+
+ private:
+  std::vector<std::filesystem::path> missing_;  ///< the innermost first
+};
+
 }  // namespace hpr

@@ -159,6 +159,26 @@ TEST_F(FileTest, AnExistingFileIsOverwrittenOnlyWhenAsked) {
   EXPECT_EQ(text_of(path("a")), "text");
 }
 
+TEST_F(FileTest, FoldersMadeAndLeftEmptyAreRemoved) {
+  {
+    const EmptyFolders tidy(path("a/b/c/"));
+    fs::create_directories(path("a/b/c"));
+  }
+  EXPECT_EQ(files(), 0U);
+  {
+    const EmptyFolders tidy(path("a/b/c"));
+    fs::create_directories(path("a/b/c"));
+    write_file_atomically(path("a/file"), "text");
+  }
+  EXPECT_TRUE(fs::exists(path("a/file")));
+  EXPECT_FALSE(fs::exists(path("a/b")));
+  fs::create_directory(path("mine"));
+  { const EmptyFolders tidy(path("mine")); }
+  { const EmptyFolders tidy(path("never/made")); }
+  { const EmptyFolders tidy(""); }
+  EXPECT_TRUE(fs::exists(path("mine")));
+}
+
 TEST_F(FileTest, AFolderThatForbidsWritingIsRefusedBeforeTheWork) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   fs::create_directory(path("closed"));

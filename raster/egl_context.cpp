@@ -99,7 +99,7 @@ std::vector<EglDevice> list_devices(const char* client_extensions) {
     return {};
   std::vector<EglDevice> devices;
   for (int i = 0; i < count; ++i) {
-    const EGLDeviceEXT handle = handles.at(static_cast<std::size_t>(i));
+    auto* const handle = handles.at(static_cast<std::size_t>(i));
     const char* const extensions = query_string == nullptr ? nullptr : query_string(handle, EGL_EXTENSIONS);
     devices.push_back({handle, i, has_extension(extensions, "EGL_MESA_device_software")});
   }
@@ -153,7 +153,7 @@ std::unique_ptr<GlContext> try_attempt(const Attempt& attempt) {
   };
   const auto get_display =
       reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
-  const EGLDisplay display = get_display(attempt.platform, attempt.native, nullptr);
+  auto* const display = get_display(attempt.platform, attempt.native, nullptr);
   if (display == EGL_NO_DISPLAY) throw fail("no display");
   if (eglInitialize(display, nullptr, nullptr) != EGL_TRUE) throw fail("the display does not start");
   const char* const extensions = eglQueryString(display, EGL_EXTENSIONS);
@@ -166,7 +166,7 @@ std::unique_ptr<GlContext> try_attempt(const Attempt& attempt) {
   constexpr std::array<EGLint, 7> kAttributes{
       EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kAttributes.data());
+  auto* const context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kAttributes.data());
   if (context == EGL_NO_CONTEXT) throw fail("no OpenGL 4.5 core context");
   auto made = std::make_unique<EglContext>(display, context, attempt.what);
   made->load();

@@ -55,40 +55,49 @@ struct ChunkRun {
   std::size_t last = 0;
 };
 
-/// Appends the triangles of `ranges` with their vertices; other corners share whatever vertex has their position.
+/// Where each of a mesh's vertices stands in Geometry::vertices; kNowhere if it does not yet.
+using VertexPlaces = std::vector<std::uint32_t>;
+constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+
+/// Appends triangles [first, last): each owns the vertex of its last corner, other corners share whatever vertex has
+/// their position.
+void append_chunk(const Mesh& mesh, std::uint32_t first, std::uint32_t last, VertexPlaces& place, Geometry& geometry) {
+  Chunk chunk{first, last - first, static_cast<std::uint32_t>(geometry.triangles.size()), {}};
+  const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
+  chunk.box = {start, start};
+  const auto add_vertex = [&](std::uint32_t vertex, std::uint32_t triangle) {
+    place[vertex] = static_cast<std::uint32_t>(geometry.vertices.size());
+    geometry.vertices.push_back({mesh.positions[vertex], triangle});
+  };
+  const auto own_corner = static_cast<std::uint32_t>(geometry.vertices.size());
+  for (std::uint32_t t = first; t < last; ++t) add_vertex(mesh.triangles[t].z, t);
+  for (std::uint32_t t = first; t < last; ++t) {
+    glm::uvec3 moved(0U, 0U, own_corner + (t - first));
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t vertex = mesh.triangles[t][corner];
+      chunk.box.add({mesh.positions[vertex], mesh.positions[vertex]});
+      if (corner == 2) continue;
+      if (place[vertex] == kNowhere) add_vertex(vertex, t);  // nobody's last corner so far
+      moved[corner] = place[vertex];
+    }
+    geometry.triangles.push_back(moved);
+  }
+  geometry.chunks.push_back(chunk);
+}
+
+/// Appends the triangles of `ranges` in chunks, with borders at fixed multiples, so that instances that share a mesh
+/// share its chunks.
 ChunkRun append_mesh(const Mesh& mesh, const std::vector<SurfaceRange>& ranges, Geometry& geometry) {
-  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> place(mesh.positions.size(), kNone);
-  const ChunkRun run{geometry.chunks.size(), 0};
+  VertexPlaces place(mesh.positions.size(), kNowhere);
+  const std::size_t first_chunk = geometry.chunks.size();
   for (const SurfaceRange& range : ranges) {
-    // Borders at fixed multiples, so that instances that share a mesh share its chunks.
     for (std::uint32_t first = range.first; first < range.last;) {
       const std::uint32_t last = std::min(range.last, (first / kChunkTriangles + 1) * kChunkTriangles);
-      Chunk chunk{first, last - first, static_cast<std::uint32_t>(geometry.triangles.size()), {}};
-      const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
-      chunk.box = {start, start};
-      const auto add_vertex = [&](std::uint32_t vertex, std::uint32_t triangle) {
-        place[vertex] = static_cast<std::uint32_t>(geometry.vertices.size());
-        geometry.vertices.push_back({mesh.positions[vertex], triangle});
-      };
-      const auto own_corner = static_cast<std::uint32_t>(geometry.vertices.size());
-      for (std::uint32_t t = first; t < last; ++t) add_vertex(mesh.triangles[t].z, t);
-      for (std::uint32_t t = first; t < last; ++t) {
-        glm::uvec3 moved(0U, 0U, own_corner + (t - first));
-        for (int corner = 0; corner < 3; ++corner) {
-          const std::uint32_t vertex = mesh.triangles[t][corner];
-          chunk.box.add({mesh.positions[vertex], mesh.positions[vertex]});
-          if (corner == 2) continue;
-          if (place[vertex] == kNone) add_vertex(vertex, t);  // nobody's last corner so far
-          moved[corner] = place[vertex];
-        }
-        geometry.triangles.push_back(moved);
-      }
-      geometry.chunks.push_back(chunk);
+      append_chunk(mesh, first, last, place, geometry);
       first = last;
     }
   }
-  return {run.first, geometry.chunks.size()};
+  return {first_chunk, geometry.chunks.size()};
 }
 
 /// Cuts one instance's part into pieces along the chunks of its mesh.

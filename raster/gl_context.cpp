@@ -33,6 +33,7 @@ std::unique_ptr<GlContext> make_gl_context(const GlOptions& options) {
                 unknown_name_hint(options.backend, choices));
   }
   // llvmpipe reads it when its screen is made, which is with the first context.
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): contexts are made before a process starts threads that read the environment
   if (options.threads > 0) setenv("LP_NUM_THREADS", std::to_string(options.threads).c_str(), 1);
 
   if (options.backend != "auto") return make_one(options.backend, options);

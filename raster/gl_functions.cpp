@@ -32,11 +32,13 @@ std::string_view error_name(GLenum error) {
 
 GlFunctions load_gl_functions(const std::function<GlProc(const char*)>& get) {
   GlFunctions gl;
-#define HPR_GL_LOAD(name, type)                                           \
-  gl.name = reinterpret_cast<type>(get("gl" #name));                      \
-  if (gl.name == nullptr)                                                 \
-    throw Error(ExitCode::NoDevice, "OpenGL lacks the function gl" #name, \
+  const auto load = [&]<typename Function>(Function& function, const char* name) {
+    function = reinterpret_cast<Function>(get(name));
+    if (function != nullptr) return;
+    throw Error(ExitCode::NoDevice, fmt::format("OpenGL lacks the function {}", name),
                 "HPR needs OpenGL 4.5: update the graphics driver");
+  };
+#define HPR_GL_LOAD(name, type) load(gl.name, "gl" #name);
   HPR_GL_FUNCTIONS(HPR_GL_LOAD)
 #undef HPR_GL_LOAD
   return gl;

@@ -55,12 +55,12 @@ void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> wor
   const Rows rows{depths.data(), words.data(), pixels};
   const int first_column = pixels.x0 / kTileSide;
   const int first_row = pixels.y0 / kTileSide;
-  const auto columns = static_cast<std::size_t>((pixels.x1 - 1) / kTileSide - first_column + 1);
-  const auto tile_rows = static_cast<std::size_t>((pixels.y1 - 1) / kTileSide - first_row + 1);
+  const int last_column = (pixels.x1 - 1) / kTileSide;
+  const int tile_rows = (pixels.y1 - 1) / kTileSide - first_row + 1;
 
-  parallel_for(threads, tile_rows, [&](std::size_t row) {
-    for (std::size_t column = 0; column < columns; ++column) {
-      const int x0 = (first_column + static_cast<int>(column)) * kTileSide;
+  parallel_for(threads, static_cast<std::size_t>(tile_rows), [&](std::size_t row) {
+    for (int column = first_column; column <= last_column; ++column) {
+      const int x0 = column * kTileSide;
       const int y0 = (first_row + static_cast<int>(row)) * kTileSide;
       const Rect rect = intersection(pixels, {x0, y0, x0 + kTileSide, y0 + kTileSide});
       if (!any_drawn(rows, rect)) continue;
@@ -70,7 +70,7 @@ void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> wor
       for (int y = rect.y0; y < rect.y1; ++y) {
         const std::size_t from = rows.index(rect.x0, y);
         write_row(rows.depths + from, rows.words + from, static_cast<std::size_t>(rect.width()),
-                  keys + (y - y0) * kTileSide + (rect.x0 - x0));
+                  keys + std::ptrdiff_t{kTileSide} * (y - y0) + (rect.x0 - x0));
       }
       layer.set_active(tile);
     }

@@ -9,6 +9,9 @@
 #include "core/error.h"
 #include "raster/gl_functions.h"
 #include "raster/raster_test_scenes.h"
+#include "scene/generated.h"
+#include "scene/gltf_test_tools.h"
+#include "scene/gltf_writer.h"
 
 namespace hpr {
 namespace {
@@ -61,6 +64,21 @@ TEST_P(RasterizerTest, AQuadCoversTheRightPixelsAtTheRightDepth) {
         EXPECT_EQ(key_surface(key), right > up ? 0U : 1U) << x << ' ' << y;
       }
     }
+  }
+}
+
+TEST_P(RasterizerTest, AWrittenAndLoadedSceneHasTheSameKeys) {
+  const Scene scene = generate_scene("gallery?s=1&k=1&n=2");
+  const test::TemporaryFolder folder;
+  const std::vector<std::byte> file = encode_glb(scene);
+  const Scene loaded =
+      load_gltf(folder.write("scene.glb", {reinterpret_cast<const char*>(file.data()), file.size()}), {});
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    const Size size{160, 120};
+    const Image<Key> image = draw_all(*context_, scene, make_view(scene.cameras[i], size, scene.bounds));
+    EXPECT_GT(covered(image), 10000U);
+    EXPECT_TRUE(draw_all(*context_, loaded, make_view(loaded.cameras.at(i), size, loaded.bounds)) == image)
+        << scene.cameras[i].name;
   }
 }
 

@@ -98,6 +98,25 @@ TEST(Brdf, HasNoMirrorHighlightWhenPerfectlySmoothAndAFiniteOneWhenNearlySo) {
   }
 }
 
+TEST(Brdf, LosesOfItsDiffuseLightWhatIsLetThrough) {
+  const auto value = [](double transmission) {
+    const Brdf brdf{.base_color = glm::dvec3(0.5), .roughness = 0.4, .transmission = transmission};
+    return brdf.value(kUp, direction(0.4, 1.0), direction(0.7, 2.0)).g;
+  };
+  const double specular = value(1.0);
+  EXPECT_GT(specular, 0.0);
+  EXPECT_GT(value(0.0), 1.5 * specular);
+  EXPECT_NEAR(value(0.25), specular + 0.75 * (value(0.0) - specular), 1e-12);
+}
+
+TEST(Brdf, AnIndexOfRefractionOfZeroReflectsEverything) {
+  Material material;
+  material.ior = 0.0F;
+  EXPECT_EQ(evaluate_material(Scene{}, material, {}).brdf.dielectric_f0, 1.0);
+  material.ior = 1.5F;
+  EXPECT_NEAR(evaluate_material(Scene{}, material, {}).brdf.dielectric_f0, 0.04, 1e-12);
+}
+
 TEST(Brdf, IsZeroBehindTheSurfaceAndFiniteAtGrazingAngles) {
   for (const double roughness : {0.0, 1e-3, 0.5, 1.0}) {
     EXPECT_EQ(metal(roughness).value(kUp, -kUp, kUp), glm::dvec3(0.0));

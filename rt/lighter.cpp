@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "rt/direct_light.h"
 #include "rt/pass.h"
 
 namespace hpr {
@@ -46,33 +47,6 @@ constexpr std::size_t kFirstPassStep = 2;
 
 glm::dvec3 to_vector(const Rgb& color) {
   return {color.r, color.g, color.b};
-}
-
-/// Emission into the tile, and what every light would add if nothing stood in its way.
-void gather_direct(TileWork& tile, Wave& wave) {
-  for (const PathPoint& point : wave.points) tile.radiance[point.pixel] += point.throughput * point.material.emission;
-  wave.samples.clear();
-  for (std::uint32_t light = 0; light < tile.lights.size(); ++light) {
-    for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
-      const PathPoint& point = wave.points[i];
-      const LightSample arriving = sample_light(tile.lights[light], point.surface.position, *tile.view);
-      const double cosine = glm::dot(point.surface.shading_normal, arriving.to_light);
-      if (!(cosine > 0.0) || arriving.irradiance == glm::dvec3(0.0)) continue;
-      // A smooth normal at a silhouette may turn away from the viewer; the geometric one never does.
-      const bool facing = glm::dot(point.surface.shading_normal, point.surface.to_viewer) > 0.0;
-      const glm::dvec3& normal = facing ? point.surface.shading_normal : point.surface.geometric_normal;
-      const glm::dvec3 scattered = point.material.brdf.value(normal, arriving.to_light, point.surface.to_viewer);
-      if (scattered == glm::dvec3(0.0)) continue;
-      wave.samples.push_back({i, light, true, arriving.to_light, arriving.distance,
-                              point.throughput * scattered * arriving.irradiance * cosine});
-    }
-  }
-}
-
-void add_direct(TileWork& tile, const Wave& wave) {
-  for (const DirectSample& sample : wave.samples) {
-    if (sample.visible) tile.radiance[wave.points[sample.point].pixel] += sample.radiance;
-  }
 }
 
 /// The first generation: the surfaces the keys of a tile name.
@@ -129,7 +103,6 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
 struct Lighter::State {
   const Scene& scene;
   RaySettings settings;
-  std::vector<PassPlan> plan;
   RaySpace space;
   Surfaces surfaces;
   std::vector<Light> lights;
@@ -140,18 +113,18 @@ struct Lighter::State {
   RayCounts counts;
   std::vector<PassTime> times;
 
-  State(const Scene& lit, RaySettings chosen);
+  State(const Scene& lit, RaySettings chosen, const Requirements& requirements);
   std::unique_ptr<Scratch> take_scratch();
   void light_tile(Scratch& scratch, const Rect& place, std::span<const Key> keys, std::span<Rgb> radiance) const;
 };
 
-Lighter::State::State(const Scene& lit, RaySettings chosen)
+Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements)
     : scene(lit),
       settings(std::move(chosen)),
-      plan(plan_passes(lit, settings)),
       space(lit.bounds),
       surfaces(lit, space),
       lights(lights_or_headlight(lit)) {
+  const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
   bool needs_rays = false;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -208,21 +181,29 @@ void Lighter::State::light_tile(Scratch& scratch, const Rect& place, std::span<c
   while (!scratch.wave.points.empty()) {
     scratch.next.depth = scratch.wave.depth + 1;
     scratch.next.points.clear();
-    gather_direct(tile, scratch.wave);
+    add_emission(tile, scratch.wave);
     charge(kDirectStep);
     for (std::size_t i = 0; i < passes.size(); ++i) {
-      passes[i]->run(tile, scratch.wave, scratch.next);
+      passes[i]->spread(tile, scratch.wave, scratch.next);
       charge(kFirstPassStep + i);
     }
-    add_direct(tile, scratch.wave);
+    for (std::size_t light = 0; light < lights.size(); light += kLightsAtOnce) {
+      sample_lights(tile, light, scratch.wave);
+      charge(kDirectStep);
+      for (std::size_t i = 0; i < passes.size(); ++i) {
+        passes[i]->hide(tile, scratch.wave);
+        charge(kFirstPassStep + i);
+      }
+      add_samples(tile, scratch.wave);
+      charge(kDirectStep);
+    }
     std::swap(scratch.wave, scratch.next);
-    charge(kDirectStep);
   }
   store(tile, place, radiance, tile.counts);
 }
 
-Lighter::Lighter(const Scene& scene, RaySettings settings)
-    : state_(std::make_unique<State>(scene, std::move(settings))) {}
+Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements)) {}
 Lighter::~Lighter() = default;
 Lighter::Lighter(Lighter&&) noexcept = default;
 Lighter& Lighter::operator=(Lighter&&) noexcept = default;
@@ -232,9 +213,6 @@ const RayCounts& Lighter::counts() const {
 }
 const std::vector<PassTime>& Lighter::times() const {
   return state_->times;
-}
-const std::vector<PassPlan>& Lighter::plan() const {
-  return state_->plan;
 }
 
 void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,

@@ -10,6 +10,7 @@
 #include "image/color.h"
 #include "image/key.h"
 #include "image/tiles.h"
+#include "scene/requirements.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
@@ -20,7 +21,6 @@ struct RaySettings {
   bool auto_passes = true;               ///< with no names: what the scene requires; false: none
   int max_depth = 8;                     ///< mirrors in a row
   int threads = 1;
-  std::uint64_t seed = 1;
 
   bool operator==(const RaySettings&) const = default;
 };
@@ -54,8 +54,9 @@ struct PassTime {
 
 [[nodiscard]] std::vector<std::string> all_pass_names();
 
-/// Every pass, in the order they run. Throws Error (Usage) for a name in `settings` that is no pass.
-[[nodiscard]] std::vector<PassPlan> plan_passes(const Scene& scene, const RaySettings& settings);
+/// Every pass, in the order they run, for a scene that requires so much. Throws Error (Usage) for a name in `settings`
+/// that is no pass.
+[[nodiscard]] std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings);
 
 /// Turns keys into radiance: reconstructs the surface each key names, adds emission and direct light, then what the
 /// planned passes add. A pixel's value depends on its key, its view and the scene only; threads, tile lists and ranks
@@ -63,8 +64,9 @@ struct PassTime {
 class Lighter {
  public:
   /// Builds the ray scene if a planned pass needs one. The scene must outlive this. Throws Error: Usage for an unknown
-  /// pass, NoDevice when Embree fails.
-  Lighter(const Scene& scene, RaySettings settings);
+  /// pass, NoDevice when Embree fails. Finding out what a scene requires looks at every texel once.
+  Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements);
+  Lighter(const Scene& scene, const RaySettings& settings) : Lighter(scene, settings, requirements_of(scene)) {}
   ~Lighter();
   Lighter(const Lighter&) = delete;
   Lighter& operator=(const Lighter&) = delete;
@@ -80,7 +82,6 @@ class Lighter {
   /// Of the last light().
   [[nodiscard]] const RayCounts& counts() const;
   [[nodiscard]] const std::vector<PassTime>& times() const;
-  [[nodiscard]] const std::vector<PassPlan>& plan() const;
 
  private:
   struct State;

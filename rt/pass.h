@@ -11,7 +11,6 @@
 #include "rt/lights.h"
 #include "rt/ray_scene.h"
 #include "rt/surfaces.h"
-#include "scene/requirements.h"
 
 namespace hpr {
 
@@ -29,11 +28,11 @@ struct DirectSample {
   std::uint32_t light = 0;
   bool visible = true;
   glm::dvec3 to_light{0.0};
-  double distance = 0.0;
   glm::dvec3 radiance{0.0};  ///< reflected towards the viewer
 };
 
-/// All points of one tile that are equally many bounces from the eye, and the light sampled for them.
+/// All points of one tile that are equally many bounces from the eye, and the light sampled for them, a few lights at a
+/// time.
 struct Wave {
   int depth = 0;
   std::vector<PathPoint> points;
@@ -70,9 +69,11 @@ class Pass {
 
   [[nodiscard]] virtual bool needs_rays() const = 0;
 
-  /// Reads the points of `wave`; may hide its direct samples, add to the tile's radiance, and put the points its rays
-  /// reach into `next`.
-  virtual void run(TileWork& tile, Wave& wave, Wave& next) const = 0;
+  /// Once per wave: reads its points; may add to the tile's radiance and put the points its rays reach into `next`.
+  virtual void spread(TileWork& /*tile*/, const Wave& /*wave*/, Wave& /*next*/) const {}
+
+  /// Once per handful of lights: may hide direct samples of `wave`.
+  virtual void hide(TileWork& /*tile*/, Wave& /*wave*/) const {}
 };
 
 /// All passes there are, in the order they run.

@@ -19,7 +19,7 @@ std::vector<std::string> all_pass_names() {
   return names;
 }
 
-std::vector<PassPlan> plan_passes(const Scene& scene, const RaySettings& settings) {
+std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings) {
   const std::vector<std::string> names = all_pass_names();
   for (const std::string& wanted : settings.passes) {
     if (std::ranges::find(names, wanted) == names.end()) {
@@ -27,11 +27,10 @@ std::vector<PassPlan> plan_passes(const Scene& scene, const RaySettings& setting
                   unknown_name_hint(wanted, names));
     }
   }
-  const Requirements requirements = requirements_of(scene);
   std::vector<PassPlan> plan;
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());
-    const Requirement& requirement = pass->requirement(requirements);
+    const Requirement& requirement = pass->requirement(scene);
     const bool named = std::ranges::find(settings.passes, name) != settings.passes.end();
     const bool wanted = named || (settings.passes.empty() && settings.auto_passes);
     plan.push_back(

@@ -19,7 +19,7 @@ Scene scene_with(const Material& material, std::size_t lights) {
 }
 
 bool runs(const Scene& scene, const RaySettings& settings, const std::string& name) {
-  const std::vector<PassPlan> plan = plan_passes(scene, settings);
+  const std::vector<PassPlan> plan = plan_passes(requirements_of(scene), settings);
   return std::ranges::find(plan, name, &PassPlan::name)->runs;
 }
 
@@ -41,13 +41,14 @@ TEST(Passes, RunWhenNamedAndNotWhenOthersAre) {
 }
 
 TEST(Passes, SayWhy) {
-  for (const PassPlan& plan : plan_passes(scene_with(test::matte(), 2), {})) EXPECT_FALSE(plan.why.empty());
-  EXPECT_EQ(plan_passes(scene_with(test::matte(), 2), {})[0].why, "2 lights cast shadows");
+  for (const PassPlan& plan : plan_passes(requirements_of(scene_with(test::matte(), 2)), {}))
+    EXPECT_FALSE(plan.why.empty());
+  EXPECT_EQ(plan_passes(requirements_of(scene_with(test::matte(), 2)), {})[0].why, "2 lights cast shadows");
 }
 
 TEST(Passes, AnUnknownNameIsRefusedWithTheNearest) {
   try {
-    (void)plan_passes(Scene{}, {.passes = {"shadwo"}});
+    (void)plan_passes({}, {.passes = {"shadwo"}});
     FAIL() << "accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::Usage);

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <glm/matrix.hpp>
 #include <limits>
-#include <string>
 
 #include "core/check.h"
 #include "core/error.h"
@@ -46,19 +45,30 @@ using OwnedDevice = Owned<RTCDevice, rtcReleaseDevice>;
 using OwnedScene = Owned<RTCScene, rtcReleaseScene>;
 using OwnedGeometry = Owned<RTCGeometry, rtcReleaseGeometry>;
 
-/// Embree reports through a callback that must not throw; the first message waits here until a call has returned.
-struct Failure {
-  std::string message;
-  static void note(void* self, RTCError code, const char* text) {
-    auto& message = static_cast<Failure*>(self)->message;
-    if (message.empty()) message = fmt::format("Embree error {}: {}", static_cast<int>(code), text ? text : "");
+/// Embree reports through a callback, perhaps from several of its threads and perhaps because memory ran out: it
+/// neither throws nor allocates. The first report waits here until the call that brought it has returned.
+class Failure {
+ public:
+  static void note(void* self, RTCError code, const char* text) noexcept {
+    auto& failure = *static_cast<Failure*>(self);
+    if (failure.noted_.exchange(true)) return;
+    failure.code_ = code;
+    if (text == nullptr) return;
+    const std::size_t length = std::min(std::strlen(text), failure.text_.size() - 1);
+    std::copy_n(text, length, failure.text_.begin());
   }
+
   void check() const {
-    if (!message.empty()) {
-      throw Error(ExitCode::NoDevice, "cannot build the ray scene: " + message,
-                  "give the process more memory, or render without ray passes: --passes none");
-    }
+    if (!noted_) return;
+    throw Error(ExitCode::NoDevice,
+                fmt::format("cannot build the ray scene: Embree error {}: {}", static_cast<int>(code_), text_.data()),
+                "give the process more memory, or render without ray passes: --passes none");
   }
+
+ private:
+  std::atomic<bool> noted_ = false;
+  RTCError code_ = RTC_ERROR_NONE;
+  std::array<char, 256> text_{};
 };
 
 struct TriangleData {

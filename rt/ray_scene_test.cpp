@@ -94,6 +94,16 @@ TEST(RayScene, SurvivesEveryKindOfImpossibleRayAndCountsThem) {
   }
 }
 
+TEST(RayScene, ARayOfNoReachIsSoundAndMeetsNothing) {
+  const Scene scene = facing_quad();
+  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  RayBatch batch;
+  batch.push({0, 0, 1}, {0, 0, -1}, 0.0);  // what a light right on the surface gives
+  std::vector<std::uint8_t> blocked(1);
+  EXPECT_EQ(rays.occluded(batch, blocked), 0U);
+  EXPECT_EQ(blocked[0], 0);
+}
+
 TEST(RayScene, BlocksOnlyUpToTheRaysReach) {
   const Scene scene = facing_quad();
   const RayScene rays(scene, RaySpace(scene.bounds), 1);

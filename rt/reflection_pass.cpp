@@ -7,7 +7,8 @@
 namespace hpr {
 namespace {
 
-/// Below it a path cannot change an 8-bit picture of scenes whose radiance is below 250.
+/// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
+/// step, 1 / (2 * 255 * 12.92).
 constexpr double kLeastThroughput = 1.0 / 65536.0;
 
 /// How much of a mirror image a surface of some roughness keeps. An approximation in place of sampling the lobe: the
@@ -20,8 +21,7 @@ double sharpness(double roughness) {
 /// The mirrored direction, bent back above the surface where an interpolated normal would send it inside.
 glm::dvec3 mirrored(const SurfacePoint& surface) {
   const glm::dvec3& view = surface.to_viewer;
-  const double cosine = glm::dot(surface.shading_normal, view);
-  const glm::dvec3& normal = cosine > 0.0 ? surface.shading_normal : surface.geometric_normal;
+  const glm::dvec3& normal = surface.facing_normal();
   const glm::dvec3 direction = 2.0 * glm::dot(normal, view) * normal - view;
   const double height = glm::dot(direction, surface.geometric_normal);
   return height < 0.0 ? direction - 2.0 * height * surface.geometric_normal : direction;
@@ -34,7 +34,7 @@ class ReflectionPass final : public Pass {
   [[nodiscard]] const Requirement& requirement(const Requirements& scene) const override { return scene.reflection; }
   [[nodiscard]] bool needs_rays() const override { return true; }
 
-  void run(TileWork& tile, Wave& wave, Wave& next) const override {
+  void spread(TileWork& tile, const Wave& wave, Wave& next) const override {
     if (wave.depth >= tile.max_depth) return;
     struct Mirrored {
       const PathPoint* from;
@@ -46,7 +46,7 @@ class ReflectionPass final : public Pass {
     for (const PathPoint& point : wave.points) {
       const Brdf& brdf = point.material.brdf;
       if (brdf.roughness >= kMirrorRoughness) continue;
-      const double cosine = std::max(glm::dot(point.surface.shading_normal, point.surface.to_viewer), 0.0);
+      const double cosine = std::max(glm::dot(point.surface.facing_normal(), point.surface.to_viewer), 0.0);
       const glm::dvec3 throughput = point.throughput * brdf.fresnel(cosine) * sharpness(brdf.roughness);
       if (std::max({throughput.r, throughput.g, throughput.b}) < kLeastThroughput) continue;
       rays.push_back({&point, mirrored(point.surface), throughput});

@@ -13,7 +13,7 @@ class ShadowPass final : public Pass {
   [[nodiscard]] const Requirement& requirement(const Requirements& scene) const override { return scene.shadow; }
   [[nodiscard]] bool needs_rays() const override { return true; }
 
-  void run(TileWork& tile, Wave& wave, Wave& /*next*/) const override {
+  void hide(TileWork& tile, Wave& wave) const override {
     tile.batch.clear();
     for (const DirectSample& sample : wave.samples) {
       if (casts_shadows(tile.lights[sample.light])) push(tile, wave.points[sample.point].surface, sample);

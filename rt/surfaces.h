@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -36,6 +37,12 @@ struct SurfacePoint {
   double offset = 0.0;  ///< metres by which ray origins must leave the surface along the geometric normal
   std::array<glm::vec2, 2> uv{};
   std::uint32_t material = 0;
+
+  /// The normal to shade with. A smooth one at a silhouette may turn away from the viewer; the geometric one never does
+  /// and stands in for it there.
+  [[nodiscard]] const glm::dvec3& facing_normal() const {
+    return glm::dot(shading_normal, to_viewer) > 0.0 ? shading_normal : geometric_normal;
+  }
 };
 
 /// Surface ids -> triangles -> points. Keeps per instance what every one of its triangles needs.

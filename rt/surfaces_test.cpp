@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
+#include "rt/ray_scene.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -43,6 +44,29 @@ TEST(Surfaces, TurnNormalsToTheViewersSide) {
   const SurfacePoint point = meet(one_triangle(), 0, {0.5, 1.0, -3.0}, {0.0, 0.0, 1.0});
   EXPECT_EQ(point.geometric_normal, glm::dvec3(0.0, 0.0, -1.0));
   EXPECT_EQ(point.shading_normal, glm::dvec3(0.0, 0.0, -1.0));
+}
+
+TEST(Surfaces, ShadeByTheGeometricNormalWhereTheSmoothOneTurnsAway) {
+  Scene scene = one_triangle();
+  scene.meshes[0].normals.assign(3, glm::normalize(glm::vec3(1.0F, 0.0F, 1.0F)));
+  const SurfacePoint from_right = meet(scene, 0, {3.5, 1.0, 1.0}, {-3.0, 0.0, -1.0});
+  EXPECT_EQ(from_right.facing_normal(), from_right.shading_normal);
+  const SurfacePoint from_left = meet(scene, 0, {-2.5, 1.0, 1.0}, {3.0, 0.0, -1.0});
+  EXPECT_GT(glm::dot(from_left.shading_normal, glm::dvec3(0.0, 0.0, 1.0)), 0.7);
+  EXPECT_EQ(from_left.facing_normal(), glm::dvec3(0.0, 0.0, 1.0));
+}
+
+TEST(Surfaces, LeaveMoreRoomWhereARayIsCarriedIntoADistortedMesh) {
+  Scene scene = one_triangle();
+  const double plain = meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -1.0}).offset;
+  EXPECT_GT(plain, 0.0);
+  // Two instances share the mesh; rays of the second are divided by 8 along one axis and come back.
+  test::place(scene, 0, glm::scale(glm::dmat4(1.0), {8.0, 1.0, 1.0}));
+  finish_scene(scene);
+  const SurfacePoint point = meet(scene, 1, {0.5, 1.0, 3.0}, {0.0, 0.0, -1.0});
+  const double world = 8.0 + 16.0;  // from the scene's middle to the corner, and the longest edge
+  EXPECT_DOUBLE_EQ(distortion(glm::dmat3(scene.instances[1].to_world)), 1.0);
+  EXPECT_GE(point.offset, kOriginSteps * kFloatStep * (world + 8.0 * 4.0));
 }
 
 TEST(Surfaces, KeepThePointOnTheTriangleWhenTheRayPassesBeside) {

@@ -102,12 +102,10 @@ glm::dmat4 place_in_belt(int i) {
   return matrix;
 }
 
-Scene make_asteroids(const OptionReader& options) {
+void fill_asteroids(Scene& scene, const OptionReader& options) {
   const int level = options.integer("k", 3, 1, 7);
   const int count = options.integer("count", 80, 1, kLargestCount);
   const auto seed = static_cast<std::uint32_t>(options.integer("seed", 1, 0, 1'000'000'000));
-  Scene scene;
-  scene.name = "asteroids";
   scene.background = {0.004F, 0.005F, 0.008F};
   const std::uint32_t stone = add_material(scene, plastic("rock", {0.36F, 0.31F, 0.27F}, 0.9F));
   const std::uint32_t mirror = add_material(scene, metal("mirror metal", {0.9F, 0.88F, 0.85F}, 0.0F));
@@ -139,8 +137,6 @@ Scene make_asteroids(const OptionReader& options) {
   add_camera(scene, "main", {0, 30, 190}, {0, 0, 40}, {0, 1, 0}, 45.0);
   add_camera(scene, "belt", {100, 2, 20}, {80, 0, -60}, {0, 1, 0}, 50.0);
   add_camera(scene, "above", {0, 330, 1}, {0, 0, 0}, {0, 0, -1}, 50.0);
-  finish_scene(scene);
-  return scene;
 }
 
 /// The coarsest level that needs no more than a thousand asteroids, and as many as fit.
@@ -162,10 +158,7 @@ Generator asteroids_generator() {
                        {"count", "asteroids, 1 to 1000000 (default 80)"},
                        {"seed", "of the rocks' shapes, 0 to 1000000000 (default 1)"}};
   generator.sized = sized;
-  generator.make = [described = generator](const GeneratorOptions& options) {
-    return make_asteroids(OptionReader(described, options));
-  };
-  return generator;
+  return filled_by(std::move(generator), fill_asteroids);
 }
 
 }  // namespace hpr

@@ -53,11 +53,9 @@ Mesh block(const Quad& top) {
   return mesh;
 }
 
-Scene make_cornell(const OptionReader& options) {
+void fill_cornell(Scene& scene, const OptionReader& options) {
   const std::string variant = options.choice("variant", {"plain", "mirror", "glass"});
   const std::string lamp = options.choice("lamp", {"hole", "coplanar"});
-  Scene scene;
-  scene.name = "cornell";
 
   // Linear sRGB of the measured spectra under the measured lamp.
   const std::uint32_t white = add_material(scene, plastic("white", {0.739F, 0.735F, 0.751F}, 1.0F));
@@ -68,25 +66,22 @@ Scene make_cornell(const OptionReader& options) {
   glow.emissive = kLampRadiance;
   const std::uint32_t lamp_paint = add_material(scene, std::move(glow));
 
-  const auto add = [&](Mesh mesh, std::string name, std::uint32_t material) {
-    add_instance(scene, add_mesh(scene, std::move(mesh), std::move(name), material));
-  };
-  add(single(kFloor), "floor", white);
-  add(single(kLamp), "lamp", lamp_paint);
-  add(lamp == "hole" ? ceiling_with_hole() : single(kCeiling), "ceiling", white);
-  add(single(kBack), "back", white);
-  add(single(kRight), "right", green);
-  add(single(kLeft), "left", red);
+  add_single(scene, single(kFloor), "floor", white);
+  add_single(scene, single(kLamp), "lamp", lamp_paint);
+  add_single(scene, lamp == "hole" ? ceiling_with_hole() : single(kCeiling), "ceiling", white);
+  add_single(scene, single(kBack), "back", white);
+  add_single(scene, single(kRight), "right", green);
+  add_single(scene, single(kLeft), "left", red);
   if (variant == "glass") {
     const std::uint32_t clear = add_material(scene, glass("glass", 1.5F));
     const std::uint32_t ball = add_mesh(scene, shapes::icosphere(5), "glass sphere", clear);
     add_instance(scene, ball, shapes::placed({0.190, 0.090, 0.190}, 0.090));
   } else {
-    add(block(kShortTop), "short block", white);
+    add_single(scene, block(kShortTop), "short block", white);
   }
   const std::uint32_t tall =
       variant == "mirror" ? add_material(scene, metal("mirror", {0.95F, 0.95F, 0.95F}, 0.0F)) : white;
-  add(block(kTallTop), "tall block", tall);
+  add_single(scene, block(kTallTop), "tall block", tall);
 
   // What the lamp sends straight down, from one point a centimetre below it.
   constexpr float kLampArea = 0.130F * 0.105F;
@@ -94,8 +89,6 @@ Scene make_cornell(const OptionReader& options) {
   // 25 mm of film behind a 35 mm lens.
   add_camera(scene, "main", {0.278, 0.273, -0.800}, {0.278, 0.273, 0.0}, {0, 1, 0}, 39.3076518);
   add_camera(scene, "corner", {0.480, 0.480, -0.300}, {0.200, 0.150, 0.300}, {0, 1, 0}, 55.0);
-  finish_scene(scene);
-  return scene;
 }
 
 }  // namespace
@@ -107,10 +100,7 @@ Generator cornell_generator() {
   generator.options = {
       {"variant", "plain, mirror (the tall block) or glass (a sphere for the short block) (default plain)"},
       {"lamp", "hole: cut out of the ceiling; coplanar: in one plane with it, as published (default hole)"}};
-  generator.make = [described = generator](const GeneratorOptions& options) {
-    return make_cornell(OptionReader(described, options));
-  };
-  return generator;
+  return filled_by(std::move(generator), fill_cornell);
 }
 
 }  // namespace hpr

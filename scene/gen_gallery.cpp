@@ -2,7 +2,6 @@
 
 #include <array>
 
-#include "core/check.h"
 #include "scene/generators.h"
 #include "scene/patterns.h"
 #include "scene/portable_math.h"
@@ -37,7 +36,7 @@ std::uint64_t triangle_count(const GallerySize& size) {
   const auto n = static_cast<std::uint64_t>(size.n);
   const auto v = 4 * static_cast<std::uint64_t>(size.s);
   constexpr std::uint64_t kRoom = 2 + 10 + 4 + 24 + 240 + 48;
-  constexpr std::uint64_t kKnot = 2 * 256 * 32;
+  constexpr std::uint64_t kKnot = std::uint64_t{2} * 256 * 32;
   return kRoom + 60 * static_cast<std::uint64_t>(size.cases) + 4 * (12 * n * n * balls) + 8 * (20 * power(4, size.k)) +
          4 * kKnot + 4 * (64 * v * v - 8 * v);
 }
@@ -55,10 +54,6 @@ std::int32_t add_texture(Scene& scene, std::string name, Image<Rgba8> image, boo
   texture.nearest = nearest;
   scene.textures.push_back(std::move(texture));
   return static_cast<std::int32_t>(scene.textures.size() - 1);
-}
-
-void add_single(Scene& scene, Mesh mesh, std::string name, std::uint32_t material) {
-  add_instance(scene, add_mesh(scene, std::move(mesh), std::move(name), material));
 }
 
 void add_room(Scene& scene) {
@@ -239,22 +234,17 @@ void add_cameras(Scene& scene) {
   add_camera(scene, "exhibit", {2.4, 1.75, 0.3}, {2.4, 1.45, -2.5}, up, 40.0);
 }
 
-Scene make_gallery(const OptionReader& options) {
+void fill_gallery(Scene& scene, const OptionReader& options) {
   GallerySize size;
   size.s = options.integer("s", size.s, 1, 5);
   size.k = options.integer("k", size.k, 0, 8);
   size.n = options.integer("n", size.n, 1, 64);
   size.cases = options.integer("cases", size.cases, 0, 4);
-  Scene scene;
-  scene.name = "gallery";
   add_room(scene);
   add_paintings(scene);
   add_exhibits(scene, size);
   add_stand_ins(scene, options.integer("lights", 4, 0, kPanels));
   add_cameras(scene);
-  finish_scene(scene);
-  HPR_CHECK(scene.triangles == triangle_count(size));
-  return scene;
 }
 
 GeneratorOptions sized(std::uint64_t triangles) {
@@ -284,10 +274,7 @@ Generator gallery_generator() {
       {"cases", "glass cases over the vases, 0 to 4 (default 0); a renderer without refraction draws them opaque"},
       {"lights", "point lights that stand for the 12 emissive panels, 0 to 12 (default 4)"}};
   generator.sized = sized;
-  generator.make = [described = generator](const GeneratorOptions& options) {
-    return make_gallery(OptionReader(described, options));
-  };
-  return generator;
+  return filled_by(std::move(generator), fill_gallery);
 }
 
 }  // namespace hpr

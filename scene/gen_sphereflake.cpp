@@ -43,11 +43,9 @@ std::uint64_t sphere_count(int size) {
   return count;
 }
 
-Scene make_sphereflake(const OptionReader& options) {
+void fill_sphereflake(Scene& scene, const OptionReader& options) {
   const int size = options.integer("s", 4, 0, 6);
   const int n = options.integer("n", 4, 1, 64);
-  Scene scene;
-  scene.name = "sphereflake";
   scene.background = {0.078F, 0.361F, 0.753F};
 
   const std::uint32_t floor_paint = add_material(scene, plastic("floor", {1.0F, 0.75F, 0.33F}, 1.0F));
@@ -59,24 +57,17 @@ Scene make_sphereflake(const OptionReader& options) {
   Mesh floor;
   shapes::add_quad(floor, {from_spd({-12, -12, -0.5}), from_spd({-12, 12, -0.5}), from_spd({12, 12, -0.5}),
                            from_spd({12, -12, -0.5})});
-  add_instance(scene, add_mesh(scene, std::move(floor), "floor", floor_paint));
+  add_single(scene, std::move(floor), "floor", floor_paint);
   const std::uint32_t sphere = add_mesh(scene, shapes::cube_sphere(n), "sphere", sphere_paint);
   for (const FlakeSphere& s : sphereflake(size)) {
     add_instance(scene, sphere, shapes::placed(from_spd(s.center), s.radius));
   }
 
-  // The databases' lights do not fade with distance: each gets the candela that give its irradiance at the origin.
   const std::array<glm::dvec3, 3> lights{{{4, 3, 2}, {1, -4, 4}, {-3, 1, 5}}};
-  for (const glm::dvec3& light : lights) {
-    const double irradiance = std::numbers::pi * std::sqrt(3.0) / 6.0;
-    add_point_light(scene, "light", from_spd(light),
-                    glm::vec3(static_cast<float>(irradiance * glm::dot(light, light))));
-  }
+  for (const glm::dvec3& light : lights) add_spd_light(scene, light, std::numbers::pi * std::sqrt(3.0) / 6.0);
   const glm::dvec3 up = from_spd({0, 0, 1});
   add_camera(scene, "main", from_spd({2.1, 1.3, 1.7}), {0, 0, 0}, up, 45.0);
   add_camera(scene, "close", from_spd({0.9, 0.5, 0.9}), from_spd({0, 0, 0.25}), up, 45.0);
-  finish_scene(scene);
-  return scene;
 }
 
 GeneratorOptions sized(std::uint64_t triangles) {
@@ -115,10 +106,7 @@ Generator sphereflake_generator() {
   generator.options = {{"s", "generations after the first sphere, 0 to 6 (default 4: 7381 spheres)"},
                        {"n", "squares along a cube face of each sphere: 12 n^2 triangles, 1 to 64 (default 4)"}};
   generator.sized = sized;
-  generator.make = [described = generator](const GeneratorOptions& options) {
-    return make_sphereflake(OptionReader(described, options));
-  };
-  return generator;
+  return filled_by(std::move(generator), fill_sphereflake);
 }
 
 }  // namespace hpr

@@ -55,11 +55,9 @@ void add_tetrahedron(Mesh& mesh, const glm::dvec3& center, double half) {
   }
 }
 
-Scene make_tetra(const OptionReader& options) {
+void fill_tetra(Scene& scene, const OptionReader& options) {
   const int size = options.integer("s", 6, 1, kLargestSize);
   const int in_mesh = std::min(size, kMeshSize);
-  Scene scene;
-  scene.name = "tetra";
   scene.background = {0.078F, 0.361F, 0.753F};
   const std::uint32_t paint = add_material(scene, plastic("tetrahedron", {0.8F, 0.16F, 0.16F}, 1.0F));
 
@@ -72,14 +70,9 @@ Scene make_tetra(const OptionReader& options) {
     add_instance(scene, block, shapes::placed(from_spd(center), std::ldexp(1.0, in_mesh - size)));
   }
 
-  // The database's light does not fade with distance: its candela give the same irradiance at the origin.
-  const glm::dvec3 light(2, -18, -5);
-  add_point_light(scene, "light", from_spd(light),
-                  glm::vec3(static_cast<float>(std::numbers::pi * 0.5 * glm::dot(light, light))));
+  add_spd_light(scene, {2, -18, -5}, std::numbers::pi * 0.5);
   add_camera(scene, "main", from_spd({1.022846, -3.177154, -2.174512}), from_spd({-0.004103, -0.004103, 0.216539}),
              from_spd({-0.816497, -0.816497, 0.816497}), 45.0);
-  finish_scene(scene);
-  return scene;
 }
 
 GeneratorOptions sized(std::uint64_t triangles) {
@@ -98,10 +91,7 @@ Generator tetra_generator() {
   generator.summary = "Haines' \"tetra\": Sierpinski's pyramid of 4^s tiny triangles, mostly empty space";
   generator.options = {{"s", "levels, 1 to 12 (default 6: 4096 triangles; above 8 the mesh is instanced)"}};
   generator.sized = sized;
-  generator.make = [described = generator](const GeneratorOptions& options) {
-    return make_tetra(OptionReader(described, options));
-  };
-  return generator;
+  return filled_by(std::move(generator), fill_tetra);
 }
 
 }  // namespace hpr

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
 
 #include "core/error.h"
 #include "core/names.h"
 #include "scene/generators.h"
+#include "scene/sphereflake.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -106,6 +108,17 @@ std::string OptionReader::choice(const std::string& key, const std::vector<std::
   return found->second;
 }
 
+Generator filled_by(Generator generator, void (*fill)(Scene& scene, const OptionReader& options)) {
+  generator.make = [described = generator, fill](const GeneratorOptions& options) {
+    Scene scene;
+    scene.name = described.name;
+    fill(scene, OptionReader(described, options));
+    finish_scene(scene);
+    return scene;
+  };
+  return generator;
+}
+
 GeneratorOptions nearest_size(const std::vector<SceneSize>& sizes, std::uint64_t triangles) {
   const auto distance = [&](const SceneSize& size) {
     return size.triangles > triangles ? size.triangles - triangles : triangles - size.triangles;
@@ -127,6 +140,10 @@ std::uint32_t add_mesh(Scene& scene, Mesh mesh, std::string name, std::uint32_t 
   return static_cast<std::uint32_t>(scene.meshes.size() - 1);
 }
 
+void add_single(Scene& scene, Mesh mesh, std::string name, std::uint32_t material) {
+  add_instance(scene, add_mesh(scene, std::move(mesh), std::move(name), material));
+}
+
 void add_instance(Scene& scene, std::uint32_t mesh, const glm::dmat4& to_world) {
   Instance instance;
   instance.mesh = mesh;
@@ -140,6 +157,11 @@ void add_point_light(Scene& scene, std::string name, const glm::dvec3& position,
   light.position = position;
   light.intensity = intensity;
   scene.lights.push_back(std::move(light));
+}
+
+void add_spd_light(Scene& scene, const glm::dvec3& position, double irradiance) {
+  const double candela = irradiance * glm::dot(position, position);
+  add_point_light(scene, "light", from_spd(position), glm::vec3(static_cast<float>(candela)));
 }
 
 void add_camera(Scene& scene, std::string name, const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up,

@@ -32,6 +32,9 @@ class OptionReader {
   const GeneratorOptions& options_;
 };
 
+/// Completes a generator by the function that fills its scene, which then gets the generator's name and is finished.
+[[nodiscard]] Generator filled_by(Generator generator, void (*fill)(Scene& scene, const OptionReader& options));
+
 /// A size a generator can make.
 struct SceneSize {
   std::uint64_t triangles = 0;
@@ -43,8 +46,13 @@ struct SceneSize {
 /// Adds to `scene` and returns the index.
 [[nodiscard]] std::uint32_t add_material(Scene& scene, Material material);
 [[nodiscard]] std::uint32_t add_mesh(Scene& scene, Mesh mesh, std::string name, std::uint32_t material);
+/// A mesh with one instance, where it is.
+void add_single(Scene& scene, Mesh mesh, std::string name, std::uint32_t material);
 void add_instance(Scene& scene, std::uint32_t mesh, const glm::dmat4& to_world = glm::dmat4(1.0));
 void add_point_light(Scene& scene, std::string name, const glm::dvec3& position, const glm::vec3& intensity);
+/// A light of the Standard Procedural Databases, which do not fade with distance: as many candela as give `irradiance`
+/// at the origin. `position` is in the databases' coordinates.
+void add_spd_light(Scene& scene, const glm::dvec3& position, double irradiance);
 void add_camera(Scene& scene, std::string name, const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up,
                 double vertical_fov_degrees);
 

@@ -11,6 +11,11 @@
 
 namespace hpr {
 
+inline constexpr std::string_view kRepairHint = "repair the file";
+/// For files whose meshes are compressed (Draco, meshopt): what writes the same scene uncompressed.
+inline constexpr std::string_view kDecompressHint =
+    "decompress it: npx @gltf-transform/cli copy IN.glb OUT.glb, or export it without compression";
+
 /// What all steps of loading one glTF file share: its name for messages, its limits, and the warnings so far.
 class GltfContext {
  public:
@@ -20,7 +25,7 @@ class GltfContext {
   [[nodiscard]] const SceneLimits& limits() const { return limits_; }
 
   /// Throws Error(code): "NAME: WHERE: WHAT". `where` is a path into the document, e.g. "accessors[3].count".
-  [[noreturn]] void fail(std::string_view where, std::string_view what, std::string_view hint = "repair the file",
+  [[noreturn]] void fail(std::string_view where, std::string_view what, std::string_view hint = kRepairHint,
                          ExitCode code = ExitCode::BadInput) const;
 
   /// Keeps a warning once; after the hundredth only the number of further ones is kept.

@@ -59,10 +59,13 @@ void check_extensions(nlohmann::json& document, GltfContext& context) {
       root.warn("extensionsRequired", fmt::format("{} is not supported; surfaces may look different", name));
       continue;
     }
-    const bool compressed = name.find("compression") != std::string::npos;
-    root.fail("extensionsRequired",
-              compressed ? fmt::format("the meshes are compressed with {}, which HPR cannot read", printable(name))
-                         : fmt::format("the scene requires {}, which HPR does not know", printable(name)));
+    if (name.find("compression") != std::string::npos) {
+      root.fail("extensionsRequired",
+                fmt::format("the meshes are compressed with {}, which HPR cannot read", printable(name)),
+                kDecompressHint);
+    }
+    root.fail("extensionsRequired", fmt::format("the scene requires {}, which HPR does not know", printable(name)),
+              "export it without this extension");
   }
   for (const std::string& name : used) {
     if (required.contains(name) || contains(kSupported, name)) continue;

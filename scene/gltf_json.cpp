@@ -39,10 +39,10 @@ std::string GltfItem::path() const {
   return above.empty() ? here : fmt::format("{}.{}", above, here);
 }
 
-void GltfItem::fail(std::string_view key, std::string_view what) const {
+void GltfItem::fail(std::string_view key, std::string_view what, std::string_view hint) const {
   const std::string above = path();
-  if (above.empty() || key.empty()) context_->fail(above.empty() ? key : std::string_view(above), what);
-  context_->fail(fmt::format("{}.{}", above, key), what);
+  if (above.empty() || key.empty()) context_->fail(above.empty() ? key : std::string_view(above), what, hint);
+  context_->fail(fmt::format("{}.{}", above, key), what, hint);
 }
 
 void GltfItem::warn(std::string_view key, std::string_view what) const {

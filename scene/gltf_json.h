@@ -27,7 +27,7 @@ class GltfItem {
   [[nodiscard]] std::string path() const;
   [[nodiscard]] bool has(const char* key) const { return value_->contains(key); }
 
-  [[noreturn]] void fail(std::string_view key, std::string_view what) const;
+  [[noreturn]] void fail(std::string_view key, std::string_view what, std::string_view hint = kRepairHint) const;
   void warn(std::string_view key, std::string_view what) const;
 
   /// A member object; none when it is absent.

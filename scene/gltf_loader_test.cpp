@@ -106,6 +106,14 @@ TEST(GltfLoader, TransformsComposeFromTheRootDown) {
   EXPECT_NEAR(glm::distance(p, glm::dvec3(10 - 3, 3, 4)), 0.0, 1e-12);
 }
 
+TEST(GltfLoader, ARotationThatIsNoUnitQuaternionTurnsAndDoesNotScale) {
+  auto document = triangle();
+  document.node()["rotation"] = {0, 2, 0, 2};
+  const Scene scene = load(document.json);
+  EXPECT_TRUE(test::warns_of(scene, "no unit quaternion"));
+  EXPECT_NEAR(glm::distance(glm::dvec3(scene.instances[0].to_world[0]), glm::dvec3(0, 0, -1)), 0.0, 1e-12);
+}
+
 TEST(GltfLoader, NodesThatShareAMeshAreInstances) {
   auto document = triangle();
   document.json["nodes"] = {{{"mesh", 0}}, {{"mesh", 0}, {"translation", {1, 2, 3}}}};
@@ -215,6 +223,59 @@ TEST(GltfLoader, SkinsPutVerticesWhereTheirJointsAre) {
   EXPECT_EQ(positions[0], glm::vec3(0, 0, 1));
   EXPECT_EQ(positions[1], glm::vec3(1, 0, 3));
   EXPECT_EQ(positions[2], glm::vec3(0, 1, 2));
+}
+
+TEST(GltfLoader, WeightsOfASkinThatDoNotAddUpToOneAreScaled) {
+  auto document = triangle();
+  document.primitive()["attributes"]["JOINTS_0"] =
+      document.add(std::vector<std::uint8_t>{0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0}, "VEC4", 5121, 3);
+  document.primitive()["attributes"]["WEIGHTS_0"] =
+      document.add(std::vector<float>{1, 3, 0, 0, 0.25F, 0.25F, 0, 0, 0, 0.5F, 0, 0}, "VEC4", 5126, 3);
+  document.json["nodes"] = {{{"mesh", 0}, {"skin", 0}}, {{"translation", {0, 0, 0}}}, {{"translation", {0, 0, 4}}}};
+  document.json["scenes"][0]["nodes"] = {0, 1, 2};
+  document.json["skins"] = {{{"joints", {1, 2}}}};
+  const Scene scene = load(document.json);
+  const auto& positions = scene.meshes.at(0).positions;
+  EXPECT_EQ(positions[0], glm::vec3(0, 0, 3));
+  EXPECT_EQ(positions[1], glm::vec3(1, 0, 2));
+  EXPECT_EQ(positions[2], glm::vec3(0, 1, 4));
+}
+
+TEST(GltfLoader, NormalsALittleOffUnitLengthAreMadeUnit) {
+  auto document = triangle();
+  document.primitive()["attributes"]["NORMAL"] = document.add_vec3({0, 0, 1.02F, 0, 0, 0.98F, 0, 0, 1});
+  EXPECT_EQ(load(document.json).meshes[0].normals, std::vector<glm::vec3>(3, glm::vec3(0, 0, 1)));
+}
+
+TEST(GltfLoader, TheLeastNormalizedIntegerIsMinusOne) {
+  auto document = triangle();
+  const int normals =
+      document.add(std::vector<std::int8_t>{0, 0, -128, 0, 0, 0, -127, 0, 0, 0, 127, 0}, "VEC3", 5120, 3);
+  document.json["accessors"][static_cast<std::size_t>(normals)]["normalized"] = true;
+  document.json["bufferViews"][static_cast<std::size_t>(normals)]["byteStride"] = 4;
+  document.json["extensionsUsed"] = {"KHR_mesh_quantization"};
+  document.primitive()["attributes"]["NORMAL"] = normals;
+  const int uv = document.add(std::vector<std::int8_t>{-128, 127, 0, 0, 0, 127, 0, 0, -127, 0, 0, 0}, "VEC2", 5120, 3);
+  document.json["accessors"][static_cast<std::size_t>(uv)]["normalized"] = true;
+  document.json["bufferViews"][static_cast<std::size_t>(uv)]["byteStride"] = 4;
+  document.primitive()["attributes"]["TEXCOORD_0"] = uv;
+  const Scene scene = load(document.json);
+  EXPECT_EQ(scene.meshes[0].uvs[0][0], glm::vec2(-1, 1));
+  EXPECT_EQ(scene.meshes[0].uvs[0][2], glm::vec2(-1, 0));
+  EXPECT_EQ(scene.meshes[0].normals[0], glm::vec3(0, 0, -1));
+}
+
+TEST(GltfLoader, ACameraUnderAShearStillHasAxesAtRightAngles) {
+  auto document = triangle();
+  document.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
+  document.json["nodes"].push_back({{"camera", 0}, {"matrix", {1, 0, 0, 0, 0.5, 2, 1, 0, 0, 0, 3, 0, 0, 0, 0, 1}}});
+  document.json["scenes"][0]["nodes"] = {0, 1};
+  const glm::dmat3 axes = load(document.json).cameras.at(0).axes;
+  EXPECT_NEAR(glm::distance(axes[2], glm::dvec3(0, 0, 1)), 0.0, 1e-12) << "where it looks stays";
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) EXPECT_NEAR(glm::dot(axes[i], axes[j]), i == j ? 1.0 : 0.0, 1e-12) << i << j;
+  }
+  EXPECT_GT(axes[1].y, 0.9);
 }
 
 TEST(GltfLoader, TextureTransformsFollowTheExampleOfTheExtension) {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace hpr {
@@ -51,6 +52,14 @@ class PrimitiveBuilder {
       data_.context().fail(where_ + ".attributes.POSITION",
                            fmt::format("vertex {} is not finite", bad - positions.begin()));
     }
+  }
+
+  /// Triangles name their vertices in 32 bits.
+  void check_vertex_count(std::size_t vertices) const {
+    constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+    if (vertices <= kMost) return;
+    data_.context().fail(where_, fmt::format("needs {} vertices; a mesh may have {}", vertices, kMost),
+                         "divide the mesh", ExitCode::Limit);
   }
 
   void compare_bounds(const Vectors& positions) const {
@@ -103,6 +112,7 @@ class PrimitiveBuilder {
       }
     }
     const std::size_t count = primitive_.indices >= 0 ? indices.size() : vertices;
+    check_vertex_count(vertices);
     const bool list = primitive_.mode == TINYGLTF_MODE_TRIANGLES;
     if (count < 3 || (list && count % 3 != 0)) {
       data_.context().warn(where_, fmt::format("{} vertices make no whole number of triangles", count));
@@ -187,6 +197,7 @@ class PrimitiveBuilder {
   /// One face, one normal: every triangle gets vertices of its own.
   void make_flat(Mesh& mesh) const {
     const std::size_t corners = mesh.triangles.size() * 3;
+    check_vertex_count(corners);
     const auto sets = std::ranges::count_if(mesh.uvs, [](const auto& uvs) { return !uvs.empty(); });
     data_.context().charge(corners * (2 * sizeof(glm::vec3) + static_cast<std::size_t>(sets) * sizeof(glm::vec2)),
                            "a mesh without normals");

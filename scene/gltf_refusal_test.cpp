@@ -112,6 +112,22 @@ TEST(GltfRefusal, UnknownRequiredExtensionsAreNamed) {
   expect_refused(document.json, "XYZ_unheard_of");
 }
 
+TEST(GltfRefusal, CompressedMeshesAreRefusedWithTheToolThatUnpacksThem) {
+  for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}) {
+    auto document = triangle();
+    document.json["extensionsUsed"] = {name};
+    document.json["extensionsRequired"] = {name};
+    expect_refused(document.json, name);
+    EXPECT_NE(refusal(document.json).hint.find("gltf-transform"), std::string::npos);
+  }
+  auto document = triangle();
+  document.primitive()["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
+  EXPECT_EQ(refusal(document.json).code, ExitCode::Done) << "there are uncompressed data as well";
+  document.json["accessors"][0].erase("bufferView");
+  expect_refused(document.json, "meshes[0].primitives[0]");
+  EXPECT_NE(refusal(document.json).hint.find("gltf-transform"), std::string::npos);
+}
+
 TEST(GltfRefusal, SparseAccessorsStayInsideTheirAccessor) {
   auto document = triangle();
   const int where = document.add_indices({3});

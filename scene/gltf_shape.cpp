@@ -95,7 +95,7 @@ void check_compression(const GltfItem& primitive) {
   if (!extensions || !extensions->has(kDraco)) return;
   for (const auto& [name, accessor] : primitive.value()["attributes"].items()) {
     if (!primitive.top("accessors", accessor.get<std::size_t>()).contains("bufferView")) {
-      primitive.fail("", fmt::format("is compressed with {}, which HPR cannot read", kDraco));
+      primitive.fail("", fmt::format("is compressed with {}, which HPR cannot read", kDraco), kDecompressHint);
     }
   }
 }

@@ -103,16 +103,17 @@ inline Scene load(const nlohmann::json& json, const SceneLimits& limits = {}) {
   return load_gltf(folder.write("scene.gltf", json.dump()), limits);
 }
 
-/// What loading `json` complains of: the exit code and the message.
+/// What loading `json` complains of.
 struct Refusal {
   ExitCode code = ExitCode::Done;
   std::string message;
+  std::string hint;
 };
 inline Refusal refusal(const nlohmann::json& json, const SceneLimits& limits = {}) {
   try {
     (void)load(json, limits);
   } catch (const Error& error) {
-    return {error.code(), error.what()};
+    return {error.code(), error.what(), error.hint()};
   }
   return {};
 }

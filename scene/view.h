@@ -61,7 +61,7 @@ struct Ray {
 /// Cuts a view into blocks no larger than `limit` pixels a side (a multiple of 64); one block when it already fits.
 [[nodiscard]] std::vector<View> split_into_blocks(const View& view, int limit);
 
-/// What GL can draw at once, less a margin: viewports past 16384 are clamped silently.
+/// The largest side GL draws at once, a multiple of a tile's: llvmpipe clamps larger viewports silently.
 inline constexpr int kRasterLimit = 16384;
 
 }  // namespace hpr

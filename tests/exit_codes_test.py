@@ -162,6 +162,10 @@ def main():
     expect_error("missing scene", ["render", "none.glb", "-o", "a.png", *SMALL], [4], ["none.glb"])
     expect_error("missing scene, two ranks", ["render", "none.glb", "-o", "a.png", *SMALL, "--ranks", "2"], [4],
                  ["none.glb"])
+    expect_error("missing scene, wall's folder made", ["wall", "run", "2x1@16x16", "none.glb", "-o", "a/b"], [4],
+                 ["none.glb"])
+    expect_error("missing scene, wall's folder made, two ranks",
+                 ["wall", "run", "2x1@16x16", "none.glb", "-o", "a/b", "--ranks", "2"], [4], ["none.glb"])
     expect_error("missing wall", ["wall", "check", "none.toml"], [4], ["none.toml"])
     expect_error("missing folder", ["render", "gen:gallery", "-o", "none/a.png", *SMALL], [4], ["none"])
     expect_error("existing picture", ["render", "gen:gallery", "-o", "a.png", *SMALL], [4], ["--force"],

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <vector>
@@ -243,26 +242,3 @@ TEST(Mpi, RanksOfThisHostSeeEachOthersMemoryAndMeet) {
 
 }  // namespace
 }  // namespace hpr
-
-int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
-  testing::InitGoogleTest(&argc, argv);
-  int rank = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  if (rank != 0) {
-    // One account of each test is enough; other ranks still print what failed.
-    auto& listeners = testing::UnitTest::GetInstance()->listeners();
-    struct FailuresOnly : testing::EmptyTestEventListener {
-      void OnTestPartResult(const testing::TestPartResult& result) override {
-        if (result.failed())
-          std::fprintf(stderr, "%s:%d: %s\n", result.file_name(), result.line_number(), result.message());
-      }
-    };
-    delete listeners.Release(listeners.default_result_printer());
-    listeners.Append(new FailuresOnly);
-  }
-  int failed = RUN_ALL_TESTS();
-  MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
-  MPI_Finalize();
-  return failed;
-}

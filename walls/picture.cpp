@@ -55,45 +55,52 @@ struct Layout {
   double height = 0.0;
 };
 
+/// Planes that stand side by side in the picture: ceilings face down, floors up, the rest stands.
+struct Row {
+  std::vector<const Plane*> planes;
+  double width = 0.0;
+  double height = 0.0;
+};
+
+/// Ceilings, what stands, floors: from the top, each with `margin` between its planes.
+std::array<Row, 3> rows_of(const std::vector<Plane>& planes, double margin) {
+  constexpr double kLying = 0.7;
+  std::array<Row, 3> rows;
+  for (const Plane& plane : planes) {
+    const double facing = plane.extent.axes[2].y;
+    Row& row = rows[facing < -kLying ? 0 : facing > kLying ? 2 : 1];
+    row.width += plane.extent.width + (row.planes.empty() ? 0.0 : margin);
+    row.height = std::max(row.height, plane.extent.height);
+    row.planes.push_back(&plane);
+  }
+  return rows;
+}
+
 Layout layout_of(const Wall& wall) {
-  const WallExtent whole = wall_extent(wall);
-  Layout layout{std::vector<Box>(wall.screens.size()), {}, 0.0, 0.0};
   std::vector<Plane> planes;
   for (auto& screens : wall_planes(wall)) {
     const WallExtent extent = wall_extent(screens_of(wall, screens));
     planes.push_back({std::move(screens), extent});
   }
-  layout.planes.resize(planes.size());
-  // Rows of planes: ceilings face down, floors up, the rest stands.
-  constexpr double kLying = 0.7;
-  std::array<std::vector<const Plane*>, 3> rows;
-  for (const Plane& plane : planes) {
-    const double facing = plane.extent.axes[2].y;
-    rows[facing < -kLying ? 0 : facing > kLying ? 2 : 1].push_back(&plane);
-  }
+  const WallExtent whole = wall_extent(wall);
   const double margin = planes.size() > 1 ? 0.05 * (whole.width + whole.height) : 0.0;
-  std::array<double, 3> widths{};
-  for (std::size_t r = 0; r < 3; ++r) {
-    for (const Plane* const plane : rows[r]) widths[r] += plane->extent.width + (plane == rows[r].front() ? 0 : margin);
-  }
-  layout.width = std::ranges::max(widths);
-  double y = 0.0;
-  for (std::size_t r = 0; r < 3; ++r) {
-    if (rows[r].empty()) continue;
-    if (y > 0.0) y += margin;
-    double x = 0.5 * (layout.width - widths[r]);
-    double tallest = 0.0;
-    for (const Plane* const plane : rows[r]) tallest = std::max(tallest, plane->extent.height);
-    for (const Plane* const plane : rows[r]) {
-      const double top = y + 0.5 * (tallest - plane->extent.height);
+  const std::array<Row, 3> rows = rows_of(planes, margin);
+
+  Layout layout{std::vector<Box>(wall.screens.size()), std::vector<Box>(planes.size()), 0.0, 0.0};
+  layout.width = std::ranges::max_element(rows, {}, &Row::width)->width;
+  for (const Row& row : rows) {
+    if (row.planes.empty()) continue;
+    if (layout.height > 0.0) layout.height += margin;
+    double x = 0.5 * (layout.width - row.width);
+    for (const Plane* const plane : row.planes) {
+      const double top = layout.height + 0.5 * (row.height - plane->extent.height);
       lay_out(wall, *plane, x, top, layout.boxes);
       layout.planes[static_cast<std::size_t>(plane - planes.data())] = {x, top, plane->extent.width,
                                                                         plane->extent.height};
       x += plane->extent.width + margin;
     }
-    y += tallest;
+    layout.height += row.height;
   }
-  layout.height = y;
   return layout;
 }
 

@@ -60,7 +60,8 @@ struct Wall {
   double near_m = 0.0;             ///< 0: the camera's
   double clamp_distance_m = 0.01;  ///< an eye nearer to a screen's plane is moved back to this distance
   Rgba8 gap_color{32, 32, 36, 255};
-  std::uint64_t hash = 0;  ///< XXH64 of expand_wall(): equal walls, however written, have equal hashes
+  std::uint64_t hash =
+      0;  ///< XXH64 of expand_wall() but for the name: equal walls, however written or called, have equal hashes
 };
 
 /// Metres.

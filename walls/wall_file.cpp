@@ -131,7 +131,9 @@ void finish_wall(Wall& wall) {
     const WallExtent extent = wall_extent(wall);
     wall.viewer = extent.middle + extent.axes[2] * extent.height;
   }
-  const std::string text = expand_wall(wall);
+  Wall nameless = wall;
+  nameless.name.clear();
+  const std::string text = expand_wall(nameless);
   wall.hash = xxh64(std::as_bytes(std::span(text)));
 }
 

@@ -352,6 +352,22 @@ TEST(WallFile, TheHashChangesWithWhatIsSeenAndNotWithComments) {
   EXPECT_NE(parse_wall(grid_text("gap_m = [0.010, 0.0101]\n"), "t.toml").wall.hash, hash);
 }
 
+TEST(WallFile, TheHashDoesNotChangeWithTheName) {
+  const std::string text = grid_text("gap_m = [0.010, 0.010]\n");
+  const WallReading reading = parse_wall(text, "t.toml");
+  EXPECT_EQ(parse_wall(text, "other.toml").wall.hash, reading.wall.hash);
+  EXPECT_EQ(parse_wall("name = \"lobby\"\n" + text, "t.toml").wall.hash, reading.wall.hash);
+  EXPECT_NE(parse_wall(text, "other.toml").wall.name, reading.wall.name);
+}
+
+TEST(WallFile, AScreenThatCannotBeReadDoesNotMakeItsWindowIdle) {
+  const std::string text =
+      "hpr_wall = 1\nwindows = [{ id = \"w\" }]\n[[surfaces]]\nid = \"a\"\n[surfaces.grid]\ncolumns = 0\n"
+      "rows = 1\ntile_pixels = [64, 36]\ntile_size_m = [0.64, 0.36]\nwindows = [\"w\"]\n";
+  EXPECT_NE(errors_of(text), "");
+  EXPECT_EQ(warnings_of(text), "");
+}
+
 TEST(WallFile, AScaledWallKeepsItsMetres) {
   const std::string examples = std::filesystem::path(HPR_WALL_EXAMPLES);
   const Wall wall = scale_wall(load_wall(examples + "/wall-6x3-4k.toml"), 0.0625);

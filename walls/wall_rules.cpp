@@ -85,14 +85,14 @@ class Linker {
       for (const DraftNode& n : draft_.nodes) ids.push_back(n.node.id);
       findings_.error(
           draft.node_place,
-          fmt::format("window \"{}\" is on node \"{}\", which does not exist", window.id, printable(window.node)),
+          fmt::format(R"(window "{}" is on node "{}", which does not exist)", window.id, printable(window.node)),
           offered(window.node, ids, "the wall has no nodes"));
       return;
     }
     const std::vector<std::string>& gpus = node->node.gpus;
     if (window.gpu.empty() || std::ranges::find(gpus, window.gpu) != gpus.end()) return;
     findings_.error(draft.gpu_place,
-                    fmt::format("window \"{}\" is on gpu \"{}\", which node \"{}\" does not have", window.id,
+                    fmt::format(R"(window "{}" is on gpu "{}", which node "{}" does not have)", window.id,
                                 printable(window.gpu), window.node),
                     offered(window.gpu, gpus, "the node lists no gpus"));
   }
@@ -114,7 +114,7 @@ class Linker {
       const DraftWindow* const other = owners.emplace(rank, &draft).first->second;
       if (other->window.node != draft.window.node) {
         findings_.error(draft.rank_place,
-                        fmt::format("rank {} is wanted on two nodes, \"{}\" and \"{}\"", rank, other->window.node,
+                        fmt::format(R"(rank {} is wanted on two nodes, "{}" and "{}")", rank, other->window.node,
                                     draft.window.node),
                         "ranks count from 0 over the whole job; a rank runs on one node");
       }
@@ -131,7 +131,7 @@ class Linker {
         if (a.rect.empty() || b.rect.empty() || both.empty()) continue;
         findings_.error(
             draft_.windows[i].place,
-            fmt::format("tile driven twice: windows \"{}\" and \"{}\" overlap by {} x {} pixels on one display", a.id,
+            fmt::format(R"(tile driven twice: windows "{}" and "{}" overlap by {} x {} pixels on one display)", a.id,
                         b.id, both.width(), both.height()),
             "move one of them: rect = [x, y, width, height]");
       }
@@ -152,7 +152,7 @@ class Linker {
         std::vector<std::string> ids;
         for (const auto& [id, window] : windows_) ids.push_back(id);
         findings_.error(draft.window_place,
-                        fmt::format("screen \"{}\" is shown in window \"{}\", which does not exist", screen.id,
+                        fmt::format(R"(screen "{}" is shown in window "{}", which does not exist)", screen.id,
                                     printable(screen.window)),
                         offered(screen.window, ids, "the wall has no windows"));
         continue;
@@ -179,7 +179,7 @@ class Linker {
     const bool fills = viewport == inside;
     if (placed ? intersection(viewport, inside) == viewport : fills) return;
     findings_.error(draft.place,
-                    fmt::format("screen \"{}\" needs {} x {} pixels at ({}, {}) of window \"{}\", which has {} x {}",
+                    fmt::format(R"(screen "{}" needs {} x {} pixels at ({}, {}) of window "{}", which has {} x {})",
                                 screen.id, viewport.width(), viewport.height(), viewport.x0, viewport.y0, window.id,
                                 inside.width(), inside.height()),
                     "give the window that size, or the screen a viewport = [x, y, width, height] inside it");
@@ -199,7 +199,7 @@ class Linker {
       const WallScreen& first = other->second->screen;
       const bool two_nodes = first.node != draft.screen.node;
       findings_.error(draft.place,
-                      two_nodes ? fmt::format("screen \"{}\" is driven by two nodes, \"{}\" and \"{}\"", id, first.node,
+                      two_nodes ? fmt::format(R"(screen "{}" is driven by two nodes, "{}" and "{}")", id, first.node,
                                               draft.screen.node)
                                 : fmt::format("there are two screens \"{}\"", id),
                       fmt::format("the other is in line {}; give each its own id", other->second->place.line));
@@ -218,7 +218,7 @@ class Linker {
         const bool told = placed_[i] && placed_[j];
         findings_.error(
             draft.window_place,
-            fmt::format("tile driven twice: window \"{}\" shows screens \"{}\" and \"{}\"{}", draft.screen.window,
+            fmt::format(R"(tile driven twice: window "{}" shows screens "{}" and "{}"{})", draft.screen.window,
                         other.id, draft.screen.id, told ? " in overlapping viewports" : ""),
             "give each screen its own window, or its own viewport = [x, y, width, height] in it");
         break;
@@ -238,15 +238,17 @@ class Linker {
                           glm::distance(a.screen.lower_right, b.screen.lower_right) < near_enough &&
                           glm::distance(a.screen.upper_left, b.screen.upper_left) < near_enough;
         if (!same) continue;
-        findings_.error(b.place,
-                        fmt::format("tile driven twice: screens \"{}\" and \"{}\" are the same rectangle", a.screen.id,
-                                    b.screen.id),
-                        "remove one, or give them different eyes");
+        findings_.error(
+            b.place,
+            fmt::format(R"(tile driven twice: screens "{}" and "{}" are the same rectangle)", a.screen.id, b.screen.id),
+            "remove one, or give them different eyes");
       }
     }
   }
 
+  /// Only of a wall without errors: a screen that could not be read cannot name its window.
   void warn_about_idle_windows() {
+    if (findings_.any_errors()) return;
     std::set<std::string> used;
     for (const DraftScreen& draft : draft_.screens) used.insert(draft.screen.window);
     for (const DraftWindow& draft : draft_.windows) {

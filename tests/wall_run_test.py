@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""One wall, however many ranks drive it: a wall run by 1, 2 and 4 ranks has the same hashes in its manifest.
+
+usage: wall_run_test.py HPR
+
+Prints what differs or is missing and leaves with 1.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+HPR = os.path.abspath(sys.argv[1])
+SCENE = "gen:gallery"
+
+
+def run(arguments, folder):
+    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    if result.returncode != 0:
+        print(f"hpr {' '.join(arguments)} left with {result.returncode}:\n{result.stderr[-2000:]}")
+    return result
+
+
+def one_wall(folder):
+    bad = 0
+    expected = None
+    for ranks in (1, 2, 4):
+        out = folder / f"wall-{ranks}"
+        result = run(["wall", "run", "3x2@160x120", SCENE, "--display", "file", "-o", out.name, "--ranks", str(ranks)], folder)
+        if result.returncode != 0:
+            bad += 1
+            continue
+        manifest = json.loads((out / "manifest.json").read_text())
+        if manifest.get("schema") != "hpr.wall-run/1":
+            print(f"schema {manifest.get('schema')!r}")
+            bad += 1
+        screens = {s["id"]: (s["width"], s["height"], s["xxh64"]) for s in manifest["frames"][0]["screens"]}
+        states = {s["state"] for s in manifest["frames"][0]["screens"]}
+        files = {p.name for p in out.iterdir()}
+        wanted = {f"{name}.png" for name in screens} | {"wall.png", "manifest.json"}
+        if len(screens) != 6 or states != {"fresh"} or not wanted <= files:
+            print(f"{ranks} ranks: {len(screens)} screens, states {states}, missing {wanted - files}")
+            bad += 1
+        hashes = (screens, manifest["scene_hash"], manifest["wall_hash"])
+        expected = expected or hashes
+        if hashes != expected:
+            print(f"{ranks} ranks: another wall than with 1: {hashes} instead of {expected}")
+            bad += 1
+        if len({screen[2] for screen in screens.values()}) < 2:
+            print(f"{ranks} ranks: all screens show the same")
+            bad += 1
+    return bad
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="hpr-wall-run-") as scratch:
+        return 1 if one_wall(pathlib.Path(scratch)) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
