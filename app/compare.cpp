@@ -27,6 +27,25 @@ struct Sample {
   std::uint64_t messages = 0;
 };
 
+/// Sort-first beside the strategies: every rank has drawn tiles of its own, and nothing is composited.
+class NothingToComposite final : public Compositor {
+ public:
+  explicit NothingToComposite(std::vector<std::size_t> drawn) : drawn_(std::move(drawn)) {}
+
+  [[nodiscard]] std::string_view name() const override { return kSortFirst; }
+  using Compositor::composite;
+  Composited composite(Communicator& /*comm*/, TileLayer<Key>& /*layer*/, std::span<const std::size_t> /*tiles*/,
+                       std::span<const int> /*shown_by*/) override {
+    return {drawn_, false};
+  }
+  [[nodiscard]] std::optional<Prediction> predict(const Costs& /*costs*/, const Load& /*load*/) const override {
+    return Prediction{};
+  }
+
+ private:
+  std::vector<std::size_t> drawn_;
+};
+
 /// One strategy under comparison on this rank.
 struct Contestant {
   std::unique_ptr<CountingCommunicator> comm;
@@ -34,6 +53,7 @@ struct Contestant {
   std::vector<Sample> samples;         ///< per measured frame
   std::uint64_t differing_pixels = 0;  ///< rank 0: of the worst frame
   Image<Key> frame;                    ///< rank 0: the last one
+  TileLayer<Key> own_layer;            ///< what it starts from where that is not the layer of all strategies
 };
 
 /// Makes `layer` equal to `pristine` again, in the memory it has.
@@ -206,7 +226,15 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
 
   std::vector<Contestant> contestants;
   for (const std::string& name : settings.strategies) {
-    contestants.push_back({std::make_unique<CountingCommunicator>(comm), make_compositor(name), {}, 0, {}});
+    Contestant& contestant = contestants.emplace_back();
+    contestant.comm = std::make_unique<CountingCommunicator>(comm);
+    if (name == kSortFirst) {
+      DrawnTiles drawn = input.sort_first(comm);
+      contestant.compositor = std::make_unique<NothingToComposite>(std::move(drawn.tiles));
+      contestant.own_layer = std::move(drawn.layer);
+    } else {
+      contestant.compositor = make_compositor(name);
+    }
   }
   TileLayer<Key> layer = working_layer(comm, pristine.layout(), contestants);
   Assembler assembler;
@@ -216,7 +244,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
 
   for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
     for (Contestant& contestant : contestants) {
-      restore(layer, pristine);
+      restore(layer, contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine);
       const Sample sample = one_frame(contestant, assembler, layer, tiles);
       if (frame >= 0) contestant.samples.push_back(sample);
       if (is_root) inspect(layer, expected, input, contestant);

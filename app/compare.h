@@ -14,6 +14,15 @@
 
 namespace hpr {
 
+/// Tiles one rank has drawn all of.
+struct DrawnTiles {
+  TileLayer<Key> layer;
+  std::vector<std::size_t> tiles;  ///< ascending
+};
+
+/// The name under which compare_strategies runs CompareInput::sort_first, beside the strategies' own.
+inline constexpr const char* kSortFirst = "sort-first";
+
 /// What is composited: one layer of keys per rank over a wall of equal screens.
 struct CompareInput {
   std::string name;    ///< "dense", or the scene as the user wrote it
@@ -22,6 +31,8 @@ struct CompareInput {
   bool colors = true;  ///< the keys' low words are RGBA8 (synthetic layers, local shading), not surfaces
   /// Collective: this rank's layer, laid out by grid_layout(screen, grid).
   std::function<TileLayer<Key>(Communicator&)> layer;
+  /// Collective, where the input can also be drawn sort-first: the tiles that are this rank's, drawn whole.
+  std::function<DrawnTiles(Communicator&)> sort_first = nullptr;
 };
 
 struct CompareSettings {

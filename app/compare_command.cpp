@@ -196,10 +196,16 @@ class CompareCommand final : public Command {
       for (const auto& compositor : all_compositors()) {
         if (compositor->fits(ranks)) names.emplace_back(compositor->name());
       }
+      if (!scene_.empty()) names.emplace_back(kSortFirst);
       return names;
     }
     for (const std::string& name : split_strategies(strategies_)) {
-      if (!make_compositor(name)->fits(ranks)) {
+      if (name == kSortFirst) {
+        if (scene_.empty()) {
+          throw Error(ExitCode::Usage, "sort-first draws a scene, and there is none",
+                      "name a scene instead of --synthetic");
+        }
+      } else if (!make_compositor(name)->fits(ranks)) {
         throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, ranks));
       }
       names.push_back(name);

@@ -10,16 +10,18 @@
 namespace hpr {
 namespace {
 
-TileLayer<Key> draw_share(Communicator& comm, const std::string& scene, const Wall& wall, const Globals& globals) {
+/// Collective: this rank's share of a frame, drawn.
+DrawnTiles draw_share(Communicator& comm, const std::string& scene, const Wall& wall, const Globals& globals,
+                      Distribution distribution) {
   Session session(comm, globals, [&] { return load_scene(scene, globals.scene_limits()); });
   const std::vector<View> views =
       wall_views(wall, RenderOptions{}.choose_camera(session.scene()), session.scene().bounds);
   FrameSettings settings;
-  settings.distribution = Distribution::SortLast;
+  settings.distribution = distribution;
   const FramePlan plan = plan_frame(session, settings, views);
   TileLayer<Key> layer(plan.layout);
   rasterize(session, plan, views, layer);
-  return layer;
+  return {std::move(layer), plan.tiles};
 }
 
 }  // namespace
@@ -31,7 +33,12 @@ CompareInput scene_layers(const std::string& scene, Size screen, Size grid, cons
   input.screen = screen;
   input.grid = grid;
   input.colors = false;
-  input.layer = [scene, wall, globals](Communicator& comm) { return draw_share(comm, scene, wall, globals); };
+  input.layer = [=](Communicator& comm) {
+    return draw_share(comm, scene, wall, globals, Distribution::SortLast).layer;
+  };
+  input.sort_first = [=](Communicator& comm) {
+    return draw_share(comm, scene, wall, globals, Distribution::SortFirst);
+  };
   return input;
 }
 

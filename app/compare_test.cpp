@@ -138,6 +138,34 @@ TEST(Compare, CountsThePixelsAStrategyGetsWrong) {
   });
 }
 
+/// Every third tile of the frame that all ranks' layers make, but for `missing`.
+DrawnTiles every_third_tile(Communicator& comm, Size size, std::size_t missing) {
+  DrawnTiles drawn{TileLayer<Key>(FrameLayout({size})), {}};
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    const TileLayer<Key> layer = synthetic_layer(SyntheticKind::Dense, rank, size, 1);
+    for (std::size_t tile = static_cast<std::size_t>(comm.rank()); tile < layer.tiles(); tile += 3) {
+      if (tile == missing) continue;
+      std::ranges::transform(layer.tile(tile), drawn.layer.tile(tile), drawn.layer.tile(tile).begin(),
+                             [](Key a, Key b) { return std::max(a, b); });
+      drawn.layer.set_active(tile);
+      if (rank == 0) drawn.tiles.push_back(tile);
+    }
+  }
+  return drawn;
+}
+
+TEST(Compare, SortFirstIsCheckedAgainstTheSameFrame) {
+  for (const std::size_t missing : {std::size_t{99}, std::size_t{4}}) {
+    CompareInput input = synthetic_input(SyntheticKind::Dense, {256, 128}, {1, 1});
+    input.sort_first = [&](Communicator& comm) { return every_third_tile(comm, {256, 128}, missing); };
+    const CompareResult result = compare_on_threads(3, input, {{"serial", kSortFirst}, 2, 1});
+    EXPECT_EQ(result.runs[0].differing_pixels, 0U);
+    EXPECT_EQ(result.runs[1].strategy, "sort-first");
+    EXPECT_EQ(result.runs[1].differing_pixels, missing == 4 ? kTilePixels : 0U);
+    EXPECT_LT(result.runs[1].bytes_total, result.runs[0].bytes_total);
+  }
+}
+
 TEST(SpreadOf, TakesTheMiddleAndTheNearestRank) {
   const Spread one = spread_of({3.0});
   EXPECT_EQ(one.min, 3.0);

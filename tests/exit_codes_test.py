@@ -154,6 +154,16 @@ def main():
     expect_error("unknown backend", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--backend", "nonsense"], [2],
                  ["egl", "osmesa"])
     expect_error("unknown strategy", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--strategy", "tre"], [2], ["tree"])
+    dense = ["compare", "--synthetic", "dense", "--size", "64x48", "--frames", "1"]
+    expect_error("factors of another number of ranks", [*dense, "--ranks", "4", "--strategies", "radix-k:3"], [2],
+                 ["radix-k:3", "4"])
+    expect_error("no factors", [*dense, "--ranks", "4", "--strategies", "tree,radix-k:2,x"], [2], ["x"])
+    expect_error("sort-first without a scene", [*dense, "--ranks", "2", "--strategies", "sort-first"], [2], ["scene"])
+    expect_error("unknown key of a cluster", [*dense, "--simulate", "hosts=2,latencey=2us"], [2], ["latency"])
+    expect_error("fewer ranks than hosts", [*dense, "--simulate", "hosts=4,ranks=2"], [2], ["hosts"])
+    expect_error("simulated ranks counted twice", [*dense, "--simulate", "hosts=1,ranks=2", "--ranks", "2"], [2],
+                 ["--ranks"])
+    expect_error("bench net of one rank", ["bench", "net", "--ranks", "1"], [2], ["two ranks"])
     expect_error("unknown distribution", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--distribute", "sort-fist"],
                  [2], ["sort-first"])
     expect_error("unknown generator", ["render", "gen:galery", "-o", "a.png", *SMALL], [2], ["gallery"])
