@@ -120,6 +120,29 @@ void inspect(const TileLayer<Key>& layer, std::span<const Key> expected, const C
   contestant.frame = wall_image(layer, input);
 }
 
+/// The memory frames are composited in: one where ranks of one host can merge in place, for the strategies that do so,
+/// and one of this rank's own, which messages leave faster (it has large pages).
+class WorkingLayers {
+ public:
+  /// Collective.
+  WorkingLayers(Communicator& comm, const FrameLayout& layout, const std::vector<Contestant>& contestants)
+      : own_(layout) {
+    const bool in_place = std::ranges::any_of(
+        contestants, [](const Contestant& contestant) { return contestant.compositor->merges_in_place(); });
+    if (in_place) shared_ = TileLayer<Key>(layout, comm.share(TileLayer<Key>::bytes_for(layout)));
+  }
+
+  [[nodiscard]] TileLayer<Key>& of(const Compositor& compositor) {
+    return compositor.merges_in_place() ? shared_ : own_;
+  }
+  /// For meetings; null where no strategy merges in place.
+  [[nodiscard]] PeerMemory* peers() const { return shared_.peers(); }
+
+ private:
+  TileLayer<Key> own_;
+  TileLayer<Key> shared_;
+};
+
 /// Collective. Where all ranks are on one host they wait asleep, so that those that come late find a core.
 void wait_for_all(Communicator& comm, PeerMemory* peers) {
   bool one_host = peers != nullptr;
@@ -132,11 +155,12 @@ void wait_for_all(Communicator& comm, PeerMemory* peers) {
 }
 
 /// Collective: one frame of one strategy, from the ranks' layers to the whole frame on rank 0.
-Sample one_frame(Contestant& contestant, Assembler& assembler, TileLayer<Key>& layer,
+Sample one_frame(Contestant& contestant, Assembler& assembler, WorkingLayers& layers,
                  std::span<const std::size_t> tiles) {
+  TileLayer<Key>& layer = layers.of(*contestant.compositor);
   const std::vector<int> shown_by(layer.layout().screens(), 0);
   CountingCommunicator& comm = *contestant.comm;
-  wait_for_all(comm, layer.peers());
+  wait_for_all(comm, layers.peers());
   const std::size_t bytes_before = comm.bytes_sent();
   const std::size_t messages_before = comm.messages_sent();
   const double start = comm.seconds();
@@ -145,17 +169,8 @@ Sample one_frame(Contestant& contestant, Assembler& assembler, TileLayer<Key>& l
   if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, shown_by);
   const Sample sample{(composited - start) * 1e3, (comm.seconds() - composited) * 1e3, comm.bytes_sent() - bytes_before,
                       comm.messages_sent() - messages_before};
-  wait_for_all(comm, layer.peers());  // ranks that are done must not take the cores of those that are still timed
+  wait_for_all(comm, layers.peers());  // ranks that are done must not take the cores of those that are still timed
   return sample;
-}
-
-/// Collective: memory to composite in, where ranks of one host can merge in place if any strategy does so.
-TileLayer<Key> working_layer(Communicator& comm, const FrameLayout& layout,
-                             const std::vector<Contestant>& contestants) {
-  const bool in_place = std::ranges::any_of(
-      contestants, [](const Contestant& contestant) { return contestant.compositor->merges_in_place(); });
-  if (!in_place) return TileLayer<Key>(layout);
-  return {layout, comm.share(TileLayer<Key>::bytes_for(layout))};
 }
 
 /// `ranks`: per rank its samples, one per frame.
@@ -236,7 +251,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
       contestant.compositor = make_compositor(name);
     }
   }
-  TileLayer<Key> layer = working_layer(comm, pristine.layout(), contestants);
+  WorkingLayers layers(comm, pristine.layout(), contestants);
   Assembler assembler;
   const Load load = share_load(comm, pristine, tiles);
   const Costs costs =
@@ -244,8 +259,9 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
 
   for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
     for (Contestant& contestant : contestants) {
+      TileLayer<Key>& layer = layers.of(*contestant.compositor);
       restore(layer, contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine);
-      const Sample sample = one_frame(contestant, assembler, layer, tiles);
+      const Sample sample = one_frame(contestant, assembler, layers, tiles);
       if (frame >= 0) contestant.samples.push_back(sample);
       if (is_root) inspect(layer, expected, input, contestant);
     }

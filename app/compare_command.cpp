@@ -295,9 +295,9 @@ class CompareCommand final : public Command {
     const auto pages = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES));
     const std::uint64_t physical = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
     const std::uint64_t limit = parse_bytes(globals.limit_mem).value_or(physical);
-    // Every rank keeps its layer and a copy to work on; rank 0 also the expected frame, one that arrives and the image.
+    // Every rank keeps its layer and two to work on; rank 0 also the expected frame, one that arrives and the image.
     const std::uint64_t layer = grid_layout(input.screen, input.grid).tiles() * kTilePixels * sizeof(Key);
-    const std::uint64_t needed = layer * (2 * static_cast<std::uint64_t>(ranks) + 3);
+    const std::uint64_t needed = layer * (3 * static_cast<std::uint64_t>(ranks) + 3);
     if (needed <= limit) return;
     throw Error(
         ExitCode::Limit,

@@ -6,6 +6,7 @@
 
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
+#include "core/error.h"
 #include "core/log.h"
 #include "core/names.h"
 
@@ -84,17 +85,28 @@ Compositor& Session::compositor(const std::string& strategy, std::span<const int
 
 TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& strategy, std::span<const int> members) {
   const bool shared = members.size() > 1 && compositor(strategy, members).merges_in_place();
-  const bool fits = keys_.layout() == layout && (keys_.peers() != nullptr) == shared &&
-                    (!shared || std::ranges::equal(members, keys_members_));
+  const bool fits = keys_.layout() == layout && keys_shared_ == shared && std::ranges::equal(members, keys_members_);
   if (fits && layout.tiles() > 0) {
     keys_.clear();
-  } else if (shared) {
-    keys_ = TileLayer<Key>(layout, group(members).share(TileLayer<Key>::bytes_for(layout)));
-  } else {
-    keys_ = TileLayer<Key>(layout);
+    return keys_;
   }
+  keys_ = {};  // before as much is taken again
+  keys_ = shared ? shared_layer(layout, strategy, members) : TileLayer<Key>(layout);
+  keys_shared_ = shared;
   keys_members_.assign(members.begin(), members.end());
   return keys_;
+}
+
+TileLayer<Key> Session::shared_layer(const FrameLayout& layout, const std::string& strategy,
+                                     std::span<const int> members) {
+  try {
+    return {layout, group(members).share(TileLayer<Key>::bytes_for(layout))};
+  } catch (const Error& error) {
+    // All ranks of the group failed alike. Whoever leaves the choice of strategy to us gets another one.
+    if (error.code() != ExitCode::Limit || strategy != "auto") throw;
+    if (comm_.rank() == 0) log::warning("{}; compositing by messages", error.what());
+    return TileLayer<Key>(layout);
+  }
 }
 
 }  // namespace hpr

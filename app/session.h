@@ -49,6 +49,8 @@ class Session {
 
  private:
   void compare_rasterizers();
+  [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
+                                            std::span<const int> members);
 
   struct Group {
     std::vector<int> members;
@@ -69,7 +71,8 @@ class Session {
   std::unique_ptr<Compositor> compositor_;
   Assembler assembler_;
   TileLayer<Key> keys_;
-  std::vector<int> keys_members_;  ///< the group `keys_` is shared by
+  bool keys_shared_ = false;       ///< whether they were meant to be
+  std::vector<int> keys_members_;  ///< the group `keys_` was made for
 };
 
 }  // namespace hpr

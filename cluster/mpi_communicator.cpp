@@ -4,6 +4,7 @@
 #include <linux/futex.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/statvfs.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -361,7 +362,31 @@ class WindowMemory final : public PeerMemory {
 
 }  // namespace
 
+namespace {
+
+/// Where Open MPI keeps shared windows. More than it has room for would end in a bus error when first touched.
+constexpr const char* kSharedMemoryFolder = "/dev/shm";
+
+std::uint64_t free_shared_memory() {
+  struct statvfs there {};
+  if (::statvfs(kSharedMemoryFolder, &there) != 0) return std::numeric_limits<std::uint64_t>::max();  // it is elsewhere
+  return static_cast<std::uint64_t>(there.f_bavail) * there.f_frsize;
+}
+
+}  // namespace
+
 std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
+  // Every rank of the host will take as much; all ranks must decide alike, so the tightest host decides.
+  constexpr std::uint64_t kBookkeeping = std::uint64_t{1} << 20U;
+  const std::vector<std::uint64_t> room = all_gather_value(*this, free_shared_memory());
+  const std::uint64_t least = std::ranges::min(room);
+  const std::uint64_t needed = (bytes + kBookkeeping) * static_cast<std::uint64_t>(size_);
+  if (needed > least) {
+    throw Error(ExitCode::Limit,
+                fmt::format("{} ranks need {} MiB of shared memory, {} has {} MiB left", size_, needed >> 20U,
+                            kSharedMemoryFolder, least >> 20U),
+                "enlarge /dev/shm (docker run --shm-size), or choose another strategy than shared-memory");
+  }
   auto memory = std::make_shared<WindowMemory>(comm_, bytes, hang_timeout_);
   barrier(*this);  // every part is zero before any rank writes to one
   return memory;

@@ -26,13 +26,15 @@ Activity random_activity(int ranks, std::size_t tiles, std::uint64_t seed) {
 TEST(Activity, EveryRankLearnsWhatEachHasDrawn) {
   const FrameLayout layout({{700, 500}, {65, 65}});
   const std::vector<std::size_t> tiles{0, 1, 5, 6, 7, 40, 70, 87, 88, 89, 90, 91};
+  std::vector<TileLayer<Key>> layers;
+  for (int rank = 0; rank < 13; ++rank) layers.push_back(test::random_layer(rank, layout));
   for (const int ranks : {1, 2, 3, 5, 8, 13}) {
     run_local_ranks(ranks, [&](Communicator& comm) {
-      const Activity activity = share_activity(comm, test::random_layer(comm.rank(), layout), tiles);
+      const Activity activity = share_activity(comm, layers[static_cast<std::size_t>(comm.rank())], tiles);
       for (std::size_t i = 0; i < tiles.size(); ++i) {
         std::uint32_t weight = 0;
         for (int rank = 0; rank < ranks; ++rank) {
-          const bool active = test::random_layer(rank, layout).active(tiles[i]);
+          const bool active = layers[static_cast<std::size_t>(rank)].active(tiles[i]);
           EXPECT_EQ(activity.active(rank, i), active);
           weight += active ? 1 : 0;
         }

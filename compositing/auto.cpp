@@ -9,21 +9,21 @@ namespace {
 
 constexpr int kFramesBetweenLooks = 16;
 
-bool on_one_host(Communicator& comm) {
-  const auto memory = comm.share(1);
-  for (int rank = 0; rank < comm.size(); ++rank) {
-    if (memory->of(rank).empty()) return false;
+bool on_one_host(int ranks, PeerMemory& memory) {
+  for (int rank = 0; rank < ranks; ++rank) {
+    if (memory.of(rank).empty()) return false;
   }
   return true;
 }
 
 }  // namespace
 
-std::string Auto::best(const Costs& costs, const Load& load, bool collects) {
+std::string Auto::best(const Costs& costs, const Load& load, bool collects, bool in_place) {
   std::string name;
   double least = 0.0;
   for (const auto& compositor : all_compositors()) {
     if (compositor->name() == "auto" || !compositor->fits(costs.ranks)) continue;
+    if (compositor->merges_in_place() && !in_place) continue;
     const auto prediction = compositor->predict(costs, load);
     if (!prediction) continue;
     const double seconds = collects ? prediction->collected(costs, load) : prediction->composite;
@@ -36,24 +36,24 @@ std::string Auto::best(const Costs& costs, const Load& load, bool collects) {
 }
 
 std::optional<Prediction> Auto::predict(const Costs& costs, const Load& load) const {
-  return make_compositor(best(costs, load, true))->predict(costs, load);
+  return make_compositor(best(costs, load, true, true))->predict(costs, load);
 }
 
 void Auto::choose(Communicator& comm, const TileLayer<Key>& layer, std::span<const std::size_t> tiles, bool collects) {
-  const bool is_new = comm_ != &comm;
+  const bool in_place = layer.peers() != nullptr;
+  const bool is_new = comm_ != &comm || in_place_ != in_place;
   if (is_new) {
     used_.clear();
     chosen_ = nullptr;
     frames_ = 0;
     comm_ = &comm;
-    costs_ = {};
-    costs_.ranks = comm.size();
-    if (!on_one_host(comm)) costs_ = measure_costs(comm);
+    in_place_ = in_place;
+    all_in_place_ = in_place && on_one_host(comm.size(), *layer.peers());
+    if (!all_in_place_) costs_ = measure_costs(comm);
   }
-  const bool one_host = costs_.hosts == 1;
-  if (!is_new && (one_host || ++frames_ < kFramesBetweenLooks)) return;
+  if (!is_new && (all_in_place_ || ++frames_ < kFramesBetweenLooks)) return;
   frames_ = 0;
-  const std::string name = one_host ? "shared-memory" : best_for(comm, layer, tiles, collects);
+  const std::string name = all_in_place_ ? "shared-memory" : best_for(comm, layer, tiles, collects);
   auto same = std::ranges::find(used_, name, [](const auto& compositor) { return compositor->name(); });
   if (same == used_.end()) same = used_.insert(same, make_compositor(name));
   chosen_ = same->get();
@@ -62,7 +62,7 @@ void Auto::choose(Communicator& comm, const TileLayer<Key>& layer, std::span<con
 std::string Auto::best_for(Communicator& comm, const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
                            bool collects) const {
   const Load load = share_load(comm, layer, tiles);
-  return best(costs_.with_packed(load.packed_share), load, collects);
+  return best(costs_.with_packed(load.packed_share), load, collects, in_place_);
 }
 
 Composited Auto::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,

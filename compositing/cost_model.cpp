@@ -12,12 +12,13 @@
 #include "compositing/sparse.h"
 #include "compositing/tile_codec.h"
 #include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {
 
 constexpr double kTileBytes = static_cast<double>(kTilePixels * sizeof(Key));
-constexpr int kRepetitions = 5;
+constexpr int kRepetitions = 3;
 
 /// A layer drawn all over.
 TileLayer<Key> full_layer(const FrameLayout& layout, int rank) {
@@ -106,25 +107,33 @@ class Probe {
   }
 
   void look_at_hosts(Costs& costs, double bytes) {
-    const auto memory = comm_.share(TileLayer<Key>::bytes_for(layer_.layout()));
+    const auto meeting = comm_.share(1);
     int first = 0;
-    while (memory->of(first).empty()) ++first;
-    std::vector<int> hosts = all_gather_value(comm_, first);
+    while (meeting->of(first).empty()) ++first;
+    std::vector<int> hosts = all_gather_value(comm_, first);  // a host is named by its first rank
     std::ranges::sort(hosts);
     costs.hosts = static_cast<int>(std::unique(hosts.begin(), hosts.end()) - hosts.begin());
-    costs.meet = seconds([&] { memory->meet(); });
-    // Every rank merges as much as it would in a frame, out of the memory of another rank of its host.
-    TileLayer<Key> mine(layer_.layout(), memory);
+    costs.meet = seconds([&] { meeting->meet(); });
+    try {
+      TileLayer<Key> mine(layer_.layout(), comm_.share(TileLayer<Key>::bytes_for(layer_.layout())));
+      const double ranks_here = static_cast<double>(comm_.size()) / costs.hosts;
+      costs.read_byte = std::max(0.0, merging_in_place(mine) - costs.meet) / (bytes * ranks_here);
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::Limit) throw;  // too little shared memory, on all ranks alike: none is used
+    }
+  }
+
+  /// Every rank merges a whole layer out of the memory of another rank of its host.
+  double merging_in_place(const TileLayer<Key>& mine) {
+    PeerMemory& memory = *mine.peers();
     int neighbour = (comm_.rank() + 1) % comm_.size();
-    while (memory->of(neighbour).empty()) neighbour = (neighbour + 1) % comm_.size();
+    while (memory.of(neighbour).empty()) neighbour = (neighbour + 1) % comm_.size();
     const TileLayer<Key> theirs = mine.of_peer(neighbour);
-    const double all_at_once = seconds([&] {
-      memory->meet();
+    return seconds([&] {
+      memory.meet();
       merge_keys(other_.run({0, tiles_.size()}), theirs.run({0, tiles_.size()}));
       comm_.worked(theirs.run({0, tiles_.size()}).size_bytes());
     });
-    const double per_host = static_cast<double>(comm_.size()) / costs.hosts;
-    costs.read_byte = std::max(0.0, all_at_once - costs.meet) / (bytes * per_host);
   }
 
   Communicator& comm_;

@@ -13,7 +13,7 @@
 #include "compositing/test_layers.h"
 
 // Random sets of layers, each composited by every strategy on ranks that delay and reorder their messages. The
-// environment variable HPR_RANDOM_SETS says how many (400 by default; the ctest `compositing_random_layers` takes
+// environment variable HPR_RANDOM_SETS says how many (150 by default; the ctest `compositing_random_layers` takes
 // 10 000).
 namespace hpr {
 namespace {
@@ -100,7 +100,7 @@ std::string faults(const Case& one) {
 
 TEST(RandomLayers, EveryStrategyGivesTheNearestKeysOfEverySet) {
   const char* const sets = std::getenv("HPR_RANDOM_SETS");  // NOLINT(concurrency-mt-unsafe): nothing sets variables
-  const std::uint64_t count = sets != nullptr ? std::stoull(sets) : 400;
+  const std::uint64_t count = sets != nullptr ? std::stoull(sets) : 150;
   for (std::uint64_t seed = 0; seed < count; ++seed) {
     const Case one(seed);
     ASSERT_EQ(faults(one), "") << "seed " << seed << ", " << one.ranks.size << " ranks";
