@@ -191,12 +191,13 @@ void TileReader::merge(Communicator& comm, int from, std::span<const std::byte> 
                        std::span<const std::size_t> tiles) {
   const TileHead head = parse_head(message, tiles.size(), true);
   PackedTiles packed(head.packed);
+  std::size_t bytes = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (head.drawn[i] == TileHead::kInactive || head.whole(i)) continue;
     packed.merge_next(layer.tile(tiles[i]), head.drawn[i]);  // an inactive tile is zero, which any key beats
     layer.set_active(tiles[i]);
+    bytes += kTilePixels * sizeof(Key);  // it goes through all of the tile
   }
-  std::size_t bytes = head.packed.size();
   for (const Body body : bodies_of(head.drawn, tiles)) {
     const auto part = tiles.subspan(body.first, body.end - body.first);
     const std::span<Key> into = layer.run({part.front(), part.size()});
