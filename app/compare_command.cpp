@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "app/compare_html.h"
 #include "app/compare_report.h"
 #include "app/launcher.h"
 #include "app/simulate_option.h"
@@ -122,6 +123,7 @@ class CompareCommand final : public Command {
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--csv", csv_, "write one line per run to this file")->type_name("FILE");
+    app.add_option("--html", html_, "write the result as one page with plots and drawings")->type_name("FILE");
     app.add_flag("--json", json_, "print the result as JSON (schema hpr.compare/1) instead of a table");
     app.add_option("-o,--output", picture_, "write the composited frame of the last number of ranks")
         ->type_name("FILE.png");
@@ -171,7 +173,7 @@ class CompareCommand final : public Command {
     if (!picture_.empty() && !picture_.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
     }
-    for (const std::string& path : {csv_, picture_, raw_}) {
+    for (const std::string& path : {csv_, html_, picture_, raw_}) {
       if (!path.empty()) check_writable(path, globals.force);
     }
   }
@@ -371,6 +373,7 @@ class CompareCommand final : public Command {
     report.runs = std::move(result.runs);
     write_frame(result.frame, input);
     if (!csv_.empty()) write_file_atomically(csv_, compare_csv(report));
+    if (!html_.empty()) write_file_atomically(html_, compare_html(report, draw_strategies(report.runs)));
     std::fputs((json_ ? compare_json(report) : compare_table(report)).c_str(), stdout);
     return verdict_on(report.runs);
   }
@@ -388,6 +391,7 @@ class CompareCommand final : public Command {
   std::string transport_ = "mpi";
   std::string simulate_;
   std::string csv_;
+  std::string html_;
   bool json_ = false;
   std::string picture_;
   std::string raw_;
