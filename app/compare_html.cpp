@@ -1,6 +1,7 @@
 #include "app/compare_html.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <hpr/version.h>
 
 #include <algorithm>
@@ -97,7 +98,8 @@ std::string summary(const CompareReport& report) {
 }
 
 std::string row(const CompareRun& run, bool is_fastest) {
-  std::string cells = fmt::format("<th scope=\"row\">{}</th><td>{}</td>", escape_markup(run.strategy), run.ranks);
+  const std::string name = run.chosen.empty() ? run.strategy : fmt::format("{} ({})", run.strategy, run.chosen);
+  std::string cells = fmt::format("<th scope=\"row\">{}</th><td>{}</td>", escape_markup(name), run.ranks);
   for (const double ms : {run.ms.median, run.ms.min, run.ms.p95, run.ms.max, run.ms_composite, run.ms_collect}) {
     cells += fmt::format("<td>{:.3f}</td>", ms);
   }
@@ -143,13 +145,16 @@ std::string schedules(const std::vector<StrategyDrawing>& drawings) {
       "merge in place there, whoever is free taking the next tiles.</p>\n<div class=\"schedules\">\n";
   for (const StrategyDrawing& drawing : drawings) {
     const std::string name = escape_markup(drawing.strategy);
-    text += drawing.ranks == 0
-                ? fmt::format(
-                      "<section>\n<h3>{}</h3>\n<p>Not drawn: it runs on no number of ranks up to {} compared "
-                      "here.</p>\n",
-                      name, kMostRanksDrawn)
-                : fmt::format("<section>\n<h3>{} on {} rank{}</h3>\n{}", name, drawing.ranks,
-                              drawing.ranks == 1 ? "" : "s", drawing.svg);
+    text += "<section>\n";
+    if (!drawing.chosen.empty()) {
+      text += fmt::format("<h3>{}</h3>\n<p>It chose {}.</p>\n", name, escape_markup(drawing.chosen));
+    } else if (drawing.ranks == 0) {
+      text += fmt::format("<h3>{}</h3>\n<p>Not drawn: it runs on no number of ranks up to {} compared here.</p>\n",
+                          name, kMostRanksDrawn);
+    } else {
+      text +=
+          fmt::format("<h3>{} on {} rank{}</h3>\n{}", name, drawing.ranks, drawing.ranks == 1 ? "" : "s", drawing.svg);
+    }
     text += "</section>\n";
   }
   return text + "</div>\n";
@@ -165,17 +170,27 @@ int ranks_to_draw(const Compositor& compositor, const std::vector<CompareRun>& r
   return most;
 }
 
+/// "tree, ring": what a strategy chose in its place, on whatever number of ranks.
+std::string choices_of(std::string_view strategy, const std::vector<CompareRun>& runs) {
+  std::vector<std::string> choices;
+  for (const CompareRun& run : runs) {
+    if (run.strategy != strategy || run.chosen.empty()) continue;
+    if (std::ranges::find(choices, run.chosen) == choices.end()) choices.push_back(run.chosen);
+  }
+  return fmt::format("{}", fmt::join(choices, ", "));
+}
+
 }  // namespace
 
 std::vector<StrategyDrawing> draw_strategies(const std::vector<CompareRun>& runs) {
   std::vector<StrategyDrawing> drawings;
   for (const CompareRun& run : runs) {
     if (std::ranges::find(drawings, run.strategy, &StrategyDrawing::strategy) != drawings.end()) continue;
-    const int ranks = ranks_to_draw(*make_compositor(run.strategy), runs);
-    StrategyDrawing drawing{run.strategy, ranks, {}};
-    if (ranks > 0) {
-      drawing.svg =
-          draw_schedule(run.strategy, record_frame([&] { return make_compositor(run.strategy); }, {.size = ranks}));
+    StrategyDrawing drawing{
+        run.strategy, ranks_to_draw(*make_compositor(run.strategy), runs), {}, choices_of(run.strategy, runs)};
+    if (drawing.ranks > 0 && drawing.chosen.empty()) {
+      const auto make = [&] { return make_compositor(run.strategy); };
+      drawing.svg = draw_schedule(run.strategy, record_frame(make, {.size = drawing.ranks}));
     }
     drawings.push_back(std::move(drawing));
   }

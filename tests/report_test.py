@@ -52,7 +52,7 @@ def run(folder, *arguments):
     return subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=40, check=False)
 
 
-def check_page(text, strategies, rows):
+def check_page(text, drawn, rows):
     reader = Balance()
     reader.feed(text)
     reader.close()
@@ -64,7 +64,7 @@ def check_page(text, strategies, rows):
     page = ElementTree.fromstring(text)
     expect(len(page.findall(".//tbody/tr")) == rows, "one row per run")
     drawings = page.findall(f".//{SVG}svg")
-    expect(len(drawings) == 2 + strategies, f"{len(drawings)} drawings for {strategies} strategies and 2 plots")
+    expect(len(drawings) == 2 + drawn, f"{len(drawings)} drawings for {drawn} strategies and 2 plots")
     for drawing in drawings:
         for part in ("title", "desc"):
             found = drawing.find(SVG + part)
@@ -83,10 +83,12 @@ def main():
         expect(names.returncode == 0, f"left with {names.returncode}: {names.stderr}")
         csv = (folder / "r.csv").read_text().splitlines()[1:]
         strategies = {line.split(",")[0] for line in csv}
-        expect(len(csv) == 3 * len(strategies) and len(strategies) >= 8, "every strategy ran on every count")
+        expect(len(csv) == 3 * len(strategies) and len(strategies) >= 9, "every strategy ran on every count")
         page = (folder / "r.html").read_text()
-        check_page(page, len(strategies), len(csv))
-        for name in strategies:
+        drawn = strategies - {"auto"}  # which says what it chose
+        check_page(page, len(drawn), len(csv))
+        expect("<p>It chose shared-memory.</p>" in page, "auto says what it chose")
+        for name in drawn:
             expect(f"<h3>{name} on 5 ranks</h3>" in page, f"{name} is drawn on 5 ranks")
         expect(sorted(p.name for p in folder.iterdir()) == ["r.csv", "r.html"], "nothing else is left")
 
@@ -95,7 +97,7 @@ def main():
         expect((folder / "r.html").read_text() == page, "a refused report stays as it was")
         forced = run(folder, *COMPARE, "--transport", "threads", "--ranks", "2", "--html", "r.html", "--force")
         expect(forced.returncode == 0, f"--force: left with {forced.returncode}")
-        check_page((folder / "r.html").read_text(), len(strategies), len(strategies))
+        check_page((folder / "r.html").read_text(), len(drawn), len(strategies))
 
         hostile = "a<b>&\"'.glb"
         made = run(folder, "scene", "make", "tetra", "-o", hostile)
