@@ -146,11 +146,8 @@ std::string schedules(const std::vector<StrategyDrawing>& drawings) {
   for (const StrategyDrawing& drawing : drawings) {
     const std::string name = escape_markup(drawing.strategy);
     text += "<section>\n";
-    if (!drawing.chosen.empty()) {
-      text += fmt::format("<h3>{}</h3>\n<p>It chose {}.</p>\n", name, escape_markup(drawing.chosen));
-    } else if (drawing.ranks == 0) {
-      text += fmt::format("<h3>{}</h3>\n<p>Not drawn: it runs on no number of ranks up to {} compared here.</p>\n",
-                          name, kMostRanksDrawn);
+    if (drawing.svg.empty()) {
+      text += fmt::format("<h3>{}</h3>\n<p>{}</p>\n", name, escape_markup(drawing.remark));
     } else {
       text +=
           fmt::format("<h3>{} on {} rank{}</h3>\n{}", name, drawing.ranks, drawing.ranks == 1 ? "" : "s", drawing.svg);
@@ -180,19 +177,25 @@ std::string choices_of(std::string_view strategy, const std::vector<CompareRun>&
   return fmt::format("{}", fmt::join(choices, ", "));
 }
 
+StrategyDrawing draw_strategy(const std::string& strategy, const std::vector<CompareRun>& runs) {
+  if (strategy == kSortFirst) return {strategy, 0, {}, "Every rank draws tiles of its own: only the collect is left."};
+  const std::string choices = choices_of(strategy, runs);
+  if (!choices.empty()) return {strategy, 0, {}, fmt::format("It chose {}.", choices)};
+  const auto make = [&] { return make_compositor(strategy); };
+  const int ranks = ranks_to_draw(*make(), runs);
+  if (ranks == 0) {
+    return {strategy, 0, {}, fmt::format("It runs on no number of ranks up to {} compared here.", kMostRanksDrawn)};
+  }
+  return {strategy, ranks, draw_schedule(strategy, record_frame(make, {.size = ranks})), {}};
+}
+
 }  // namespace
 
 std::vector<StrategyDrawing> draw_strategies(const std::vector<CompareRun>& runs) {
   std::vector<StrategyDrawing> drawings;
   for (const CompareRun& run : runs) {
     if (std::ranges::find(drawings, run.strategy, &StrategyDrawing::strategy) != drawings.end()) continue;
-    StrategyDrawing drawing{
-        run.strategy, ranks_to_draw(*make_compositor(run.strategy), runs), {}, choices_of(run.strategy, runs)};
-    if (drawing.ranks > 0 && drawing.chosen.empty()) {
-      const auto make = [&] { return make_compositor(run.strategy); };
-      drawing.svg = draw_schedule(run.strategy, record_frame(make, {.size = drawing.ranks}));
-    }
-    drawings.push_back(std::move(drawing));
+    drawings.push_back(draw_strategy(run.strategy, runs));
   }
   return drawings;
 }

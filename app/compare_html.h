@@ -10,9 +10,9 @@ namespace hpr {
 /// What a strategy does with a frame, recorded from it.
 struct StrategyDrawing {
   std::string strategy;
-  int ranks = 0;       ///< 0: it runs on no number of ranks that can be drawn
+  int ranks = 0;       ///< that it is drawn on
   std::string svg;     ///< of draw_schedule; empty when it is not drawn
-  std::string chosen;  ///< the strategies it chose in its place, which have drawings of their own
+  std::string remark;  ///< why not
 };
 
 /// One per strategy of `runs`, on the largest number of ranks compared but 16 at most, which is as much as a drawing
