@@ -5,11 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
 
+#include "app/compare_html.h"
+#include "app/compare_options.h"
 #include "app/compare_report.h"
 #include "app/launcher.h"
 #include "app/simulate_option.h"
@@ -17,6 +18,7 @@
 #include "cluster/scene_distribution.h"
 #include "cluster/simulated_communicator.h"
 #include "compositing/compositor.h"
+#include "compositing/plugin.h"
 #include "compositing/synthetic.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -28,63 +30,11 @@ namespace {
 
 /// Set for the MPI jobs `hpr compare` starts: rank 0 prints its runs as JSON for the process that started the job.
 constexpr const char* kHandOverVariable = "HPR_COMPARE_HAND_OVER";
-constexpr int kMostRanks = 4096;
 constexpr int kLargestSide = 16384;
 constexpr int kMostScreensASide = 256;
 
 bool hands_over() {
   return std::getenv(kHandOverVariable) != nullptr;  // NOLINT(concurrency-mt-unsafe): nothing sets variables
-}
-
-std::vector<std::string> split(std::string_view list) {
-  std::vector<std::string> items;
-  while (true) {
-    const auto comma = list.find(',');
-    items.emplace_back(list.substr(0, comma));
-    if (comma == std::string_view::npos) return items;
-    list.remove_prefix(comma + 1);
-  }
-}
-
-/// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".
-std::vector<std::string> split_strategies(std::string_view list) {
-  std::vector<std::string> names;
-  for (const std::string& item : split(list)) {
-    const bool is_number = !item.empty() && item.find_first_not_of("0123456789") == std::string::npos;
-    if (is_number && !names.empty()) {
-      names.back() += "," + item;
-    } else {
-      names.push_back(item);
-    }
-  }
-  return names;
-}
-
-Size parse_size(const std::string& text, const std::string& option, int most) {
-  const auto extent = parse_extent(text);
-  if (!extent) {
-    throw Error(ExitCode::Usage, fmt::format("{}: '{}' is not two positive integers", option, printable(text)),
-                fmt::format("write it like {} 3x2", option));
-  }
-  if (extent->first > most || extent->second > most) {
-    throw Error(ExitCode::Limit, fmt::format("{}: {} is more than {} a side", option, printable(text), most));
-  }
-  return {extent->first, extent->second};
-}
-
-std::vector<int> parse_ranks(const std::string& list) {
-  std::vector<int> ranks;
-  for (const std::string& item : split(list)) {
-    int value = 0;
-    const auto [end, failure] = std::from_chars(item.data(), item.data() + item.size(), value);
-    if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMostRanks) {
-      throw Error(ExitCode::Usage,
-                  fmt::format("--ranks: '{}' is not a number of ranks from 1 to {}", printable(item), kMostRanks),
-                  "write it like --ranks 1,2,4,8");
-    }
-    ranks.push_back(value);
-  }
-  return ranks;
 }
 
 class CompareCommand final : public Command {
@@ -108,6 +58,8 @@ class CompareCommand final : public Command {
     app.add_option("--strategies", strategies_, "all, or names of strategies")
         ->type_name("LIST")
         ->capture_default_str();
+    app.add_option("--plugin", plugin_, "a shared object with one more strategy (docs/compositing.md)")
+        ->type_name("FILE.so");
     frames_option_ = app.add_option("--frames", frames_, "measured frames");
     frames_option_->type_name("N")->check(CLI::Range(1, 1'000'000))->capture_default_str();
     app.add_option("--warmup", warmup_, "frames before the measured ones")
@@ -122,6 +74,7 @@ class CompareCommand final : public Command {
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--csv", csv_, "write one line per run to this file")->type_name("FILE");
+    app.add_option("--html", html_, "write the result as one page with plots and drawings")->type_name("FILE");
     app.add_flag("--json", json_, "print the result as JSON (schema hpr.compare/1) instead of a table");
     app.add_option("-o,--output", picture_, "write the composited frame of the last number of ranks")
         ->type_name("FILE.png");
@@ -129,6 +82,7 @@ class CompareCommand final : public Command {
   }
 
   ExitCode run(const Globals& globals) override {
+    if (!plugin_.empty()) load_compositor_plugin(plugin_);
     const CompareInput input = make_input(globals);
     check_options(globals);
     return inside_mpi_job() ? run_in_job(globals, input) : run_here(globals, input);
@@ -171,7 +125,7 @@ class CompareCommand final : public Command {
     if (!picture_.empty() && !picture_.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
     }
-    for (const std::string& path : {csv_, picture_, raw_}) {
+    for (const std::string& path : {csv_, html_, picture_, raw_}) {
       if (!path.empty()) check_writable(path, globals.force);
     }
   }
@@ -332,6 +286,7 @@ class CompareCommand final : public Command {
     std::vector<std::string> arguments{"compare"};
     if (!scene_.empty()) arguments.push_back(scene_);
     if (!synthetic_.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic_});
+    if (!plugin_.empty()) arguments.insert(arguments.end(), {"--plugin", plugin_});
     arguments.insert(arguments.end(), {"--size", size_, "--tiles", tiles_, "--strategies", strategies_});
     arguments.insert(arguments.end(), {"--frames", std::to_string(frames_), "--warmup", std::to_string(warmup_)});
     if (simulate_.empty()) {
@@ -371,6 +326,7 @@ class CompareCommand final : public Command {
     report.runs = std::move(result.runs);
     write_frame(result.frame, input);
     if (!csv_.empty()) write_file_atomically(csv_, compare_csv(report));
+    if (!html_.empty()) write_file_atomically(html_, compare_html(report, draw_strategies(report.runs)));
     std::fputs((json_ ? compare_json(report) : compare_table(report)).c_str(), stdout);
     return verdict_on(report.runs);
   }
@@ -382,12 +338,14 @@ class CompareCommand final : public Command {
   std::string tiles_ = "1x1";
   std::string ranks_;
   std::string strategies_ = "all";
+  std::string plugin_;
   int frames_ = 10;
   int warmup_ = 2;
   CLI::Option* frames_option_ = nullptr;
   std::string transport_ = "mpi";
   std::string simulate_;
   std::string csv_;
+  std::string html_;
   bool json_ = false;
   std::string picture_;
   std::string raw_;

@@ -17,6 +17,29 @@
 #include "core/names.h"
 
 namespace hpr {
+namespace {
+
+/// What register_compositor was given: state of the program, as its list of strategies is.
+std::vector<MakeCompositor>& registered() {
+  static std::vector<MakeCompositor> all;
+  return all;
+}
+
+}  // namespace
+
+void register_compositor(MakeCompositor make) {
+  const auto added = make();
+  const std::string name(added->name());
+  if (name.empty() || name.find_first_of(",: ") != std::string::npos) {
+    throw Error(ExitCode::BadInput, fmt::format("'{}' cannot be the name of a strategy", printable(name)),
+                "take letters, digits and hyphens");
+  }
+  for (const auto& compositor : all_compositors()) {
+    if (compositor->name() != name) continue;
+    throw Error(ExitCode::BadInput, fmt::format("there is a strategy named '{}' already", printable(name)));
+  }
+  registered().push_back(std::move(make));
+}
 
 std::vector<std::unique_ptr<Compositor>> all_compositors() {
   std::vector<std::unique_ptr<Compositor>> all;
@@ -29,6 +52,7 @@ std::vector<std::unique_ptr<Compositor>> all_compositors() {
   all.push_back(std::make_unique<SharedMemory>());
   all.push_back(std::make_unique<MpiReduce>());
   all.push_back(std::make_unique<Auto>());
+  for (const MakeCompositor& make : registered()) all.push_back(make());
   return all;
 }
 

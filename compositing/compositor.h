@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -77,7 +78,13 @@ class Compositor {
   return {{part.begin(), part.end()}, false};
 }
 
-/// One of every strategy, in the order reports list them.
+using MakeCompositor = std::function<std::unique_ptr<Compositor>()>;
+
+/// Adds a strategy to those all_compositors and make_compositor know: before ranks start. Throws Error (BadInput) when
+/// its name is taken, empty, or holds a comma, a colon or a space, which lists of strategies are written with.
+void register_compositor(MakeCompositor make);
+
+/// One of every strategy, in the order reports list them; registered ones are the last.
 [[nodiscard]] std::vector<std::unique_ptr<Compositor>> all_compositors();
 
 /// `name` may carry what a strategy is to be set to after a colon: "radix-k:4,2". Throws Error (Usage) with the choices

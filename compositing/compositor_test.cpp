@@ -2,138 +2,53 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <mutex>
 #include <string>
-#include <tuple>
 #include <vector>
 
-#include "cluster/local_communicator.h"
-#include "compositing/test_layers.h"
+#include "compositing/compositor_contract.h"
 #include "core/error.h"
 
 namespace hpr {
 namespace {
 
-/// The promises of Compositor::composite, held against every strategy. A new strategy is tested by being listed.
-class CompositorTest : public testing::TestWithParam<std::tuple<std::string, int>> {
- protected:
-  /// A rank's own.
-  static std::unique_ptr<Compositor> compositor() { return make_compositor(std::get<0>(GetParam())); }
-  int ranks_ = std::get<1>(GetParam());
+using test::CompositorContract;
+
+/// A new strategy is tested by being listed.
+std::vector<test::ContractCase> every_strategy() {
+  std::vector<test::ContractCase> cases;
+  for (const auto& compositor : all_compositors()) {
+    const std::string name(compositor->name());
+    const auto own = test::contract_cases([name] { return make_compositor(name); });
+    cases.insert(cases.end(), own.begin(), own.end());
+  }
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryStrategy, CompositorContract, testing::ValuesIn(every_strategy()),
+                         test::contract_case_name);
+
+TEST(AllCompositors, FitEveryNumberOfRanks) {
+  EXPECT_EQ(every_strategy().size(), 10 * all_compositors().size());
+}
+
+class Named final : public Compositor {
+ public:
+  explicit Named(std::string name) : name_(std::move(name)) {}
+  [[nodiscard]] std::string_view name() const override { return name_; }
+  Composited composite(Communicator& /*comm*/, TileLayer<Key>& /*layer*/, std::span<const std::size_t> tiles,
+                       std::span<const int> /*shown_by*/) override {
+    return owning(tiles, {0, tiles.size()});
+  }
+
+ private:
+  std::string name_;
 };
 
-TEST_P(CompositorTest, RunsPartitionTheTilesAndHoldTheSerialMaximum) {
-  ASSERT_TRUE(compositor()->fits(ranks_));
-  std::size_t number = 0;
-  for (const auto& [layout, tiles] : test::awkward_tile_lists()) {
-    SCOPED_TRACE("tile list " + std::to_string(number++));
-    const std::vector<Key> expected = test::expected_keys(ranks_, layout);
-    std::vector<int> owners(tiles.size(), 0);
-    std::size_t wrong_keys = 0;
-    std::size_t hidden_tiles = 0;  // hold keys but are not marked as active: they would be lost on the way to a screen
-    std::mutex mutex;
-    run_local_ranks(ranks_, [&, &tiles = tiles, &layout = layout](Communicator& comm) {
-      TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-      const Composited mine = compositor()->composite(comm, layer, tiles);
-      const std::lock_guard lock(mutex);
-      EXPECT_TRUE(std::ranges::is_sorted(mine.tiles));
-      for (const std::size_t tile : mine.tiles) {
-        const auto position = std::ranges::lower_bound(tiles, tile) - tiles.begin();
-        ++owners.at(static_cast<std::size_t>(position));
-        const auto keys = layer.tile(tile);
-        for (std::size_t p = 0; p < kTilePixels; ++p) {
-          wrong_keys += keys[p] == expected[tile * kTilePixels + p] ? 0U : 1U;
-        }
-      }
-      for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-        if (!layer.active(tile) && std::ranges::any_of(layer.tile(tile), [](Key key) { return key != kNoKey; })) {
-          ++hidden_tiles;
-        }
-      }
-    });
-    EXPECT_EQ(std::ranges::count(owners, 1), static_cast<std::ptrdiff_t>(tiles.size()));
-    EXPECT_EQ(wrong_keys, 0U);
-    EXPECT_EQ(hidden_tiles, 0U);
+TEST(RegisterCompositor, RefusesNamesThatAreTakenOrCannotStandInAList) {
+  for (const char* name : {"tree", "", "a,b", "a b", "radix-k:2"}) {
+    EXPECT_THROW(register_compositor([name] { return std::make_unique<Named>(name); }), Error) << name;
   }
 }
-
-TEST_P(CompositorTest, LeavesTilesThatAreNotListedAlone) {
-  const FrameLayout layout({{200, 70}, {65, 65}});
-  const std::vector<std::size_t> tiles{1, 2, 5, 8};
-  run_local_ranks(ranks_, [&](Communicator& comm) {
-    TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-    const TileLayer<Key> before = test::random_layer(comm.rank(), layout);
-    (void)compositor()->composite(comm, layer, tiles);
-    for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-      if (std::ranges::binary_search(tiles, tile)) continue;
-      EXPECT_EQ(layer.active(tile), before.active(tile));
-      EXPECT_TRUE(std::ranges::equal(layer.tile(tile), before.tile(tile)));
-    }
-  });
-}
-
-TEST_P(CompositorTest, EqualLayersGiveThatLayer) {
-  const FrameLayout layout({{130, 70}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
-  const TileLayer<Key> same = test::random_layer(0, layout);
-  run_local_ranks(ranks_, [&](Communicator& comm) {
-    TileLayer<Key> layer = test::random_layer(0, layout);
-    const Composited mine = compositor()->composite(comm, layer, tiles);
-    for (const std::size_t tile : mine.tiles) EXPECT_TRUE(std::ranges::equal(layer.tile(tile), same.tile(tile)));
-  });
-}
-
-TEST_P(CompositorTest, LayersMayLiveInSharedMemoryAndTheirScreensBeShown) {
-  const FrameLayout layout({{200, 70}, {65, 65}, {130, 130}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
-  const std::vector<Key> expected = test::expected_keys(ranks_, layout);
-  const std::vector<int> shown_by{ranks_ - 1, 0, ranks_ / 2};
-  for (const int ranks_per_host : {0, 1, 2, 3}) {
-    SCOPED_TRACE(ranks_per_host);
-    std::vector<int> owners(tiles.size(), 0);
-    std::size_t wrong_tiles = 0;
-    std::size_t astray = 0;  // owned by another rank than the one that shows them, though said to be assembled
-    std::mutex mutex;
-    run_local_ranks({.size = ranks_, .ranks_per_host = ranks_per_host, .disorder = 5}, [&](Communicator& comm) {
-      const auto own = compositor();
-      const auto memory = comm.share(TileLayer<Key>::bytes_for(layout));
-      for (int frame = 0; frame < 3; ++frame) {
-        TileLayer<Key> layer(layout, memory);
-        layer.clear();
-        test::copy_layer(test::random_layer(comm.rank(), layout), layer);
-        const Composited mine = own->composite(comm, layer, tiles, shown_by);
-        const std::lock_guard lock(mutex);
-        for (const std::size_t tile : mine.tiles) {
-          ++owners[tile];
-          const auto want = std::span(expected).subspan(tile * kTilePixels, kTilePixels);
-          wrong_tiles += std::ranges::equal(layer.tile(tile), want) ? 0U : 1U;
-          astray += mine.assembled && shown_by[layout.place(tile).screen] != comm.rank() ? 1U : 0U;
-        }
-      }
-    });
-    EXPECT_EQ(std::ranges::count(owners, 3), static_cast<std::ptrdiff_t>(tiles.size()));
-    EXPECT_EQ(wrong_tiles, 0U);
-    EXPECT_EQ(astray, 0U);
-  }
-}
-
-std::vector<std::string> every_strategy() {
-  std::vector<std::string> names;
-  for (const auto& compositor : all_compositors()) names.emplace_back(compositor->name());
-  return names;
-}
-
-std::string case_name(const testing::TestParamInfo<std::tuple<std::string, int>>& info) {
-  std::string name = std::get<0>(info.param) + "_" + std::to_string(std::get<1>(info.param)) + "_ranks";
-  std::ranges::replace(name, '-', '_');
-  return name;
-}
-
-INSTANTIATE_TEST_SUITE_P(EveryStrategy, CompositorTest,
-                         testing::Combine(testing::ValuesIn(every_strategy()),
-                                          testing::Values(1, 2, 3, 4, 5, 7, 8, 12, 16, 17)),
-                         case_name);
 
 TEST(MakeCompositor, NamesTheNearestChoiceWhenThereIsNoSuchStrategy) {
   try {

@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 
-FOLDERS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "app", "tests", "bench"]
+FOLDERS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "app", "tests", "bench", "docs"]
 LONGEST = 400
 
 
