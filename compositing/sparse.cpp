@@ -121,6 +121,50 @@ constexpr LaneTable kSources = [] {
   return sources;
 }();
 
+std::uint32_t bits_of(Rgba8Premultiplied pixel) {
+  return std::bit_cast<std::uint32_t>(pixel);
+}
+std::uint64_t bits_of(RgbaPremultiplied pixel) {
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(pixel);
+  return halves[0] | halves[1];
+}
+
+template <typename Pixel>
+std::size_t find_colored(std::span<const Pixel, kTilePixels> tile, TileMask& mask) {
+  std::size_t drawn = 0;
+  for (std::size_t word = 0; word < mask.size(); ++word) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < 64; ++i) bits |= std::uint64_t{bits_of(tile[word * 64 + i]) != 0} << i;
+    mask[word] = bits;
+    drawn += static_cast<std::size_t>(std::popcount(bits));
+  }
+  return drawn;
+}
+
+template <typename Pixel>
+std::size_t pack_colored(std::span<const Pixel, kTilePixels> tile, const TileMask& mask, Pixel* packed) {
+  std::size_t count = 0;
+  for (std::size_t word = 0; word < mask.size(); ++word) {
+    if (mask[word] == 0) continue;
+    // No branch on a pixel: an undrawn one is written and then written over.
+    for (std::size_t i = 0; i < 64; ++i) {
+      packed[count] = tile[word * 64 + i];
+      count += mask[word] >> i & 1U;
+    }
+  }
+  return count;
+}
+
+template <typename Pixel>
+void unpack_colored(std::span<const Pixel> packed, const TileMask& mask, std::span<Pixel, kTilePixels> tile) {
+  const Pixel* next = packed.data();
+  for (std::size_t word = 0; word < mask.size(); ++word) {
+    for (std::uint64_t rest = mask[word]; rest != 0; rest &= rest - 1) {
+      tile[word * 64 + static_cast<std::size_t>(std::countr_zero(rest))] = *next++;
+    }
+  }
+}
+
 }  // namespace
 
 std::size_t find_drawn(std::span<const Key, kTilePixels> tile, TileMask& mask) {
@@ -141,6 +185,29 @@ void merge_packed(std::span<Key, kTilePixels> tile, const TileMask& mask, std::s
       key = std::max(key, *next++);
     }
   }
+}
+
+std::size_t find_drawn(std::span<const Rgba8Premultiplied, kTilePixels> tile, TileMask& mask) {
+  return find_colored(tile, mask);
+}
+std::size_t find_drawn(std::span<const RgbaPremultiplied, kTilePixels> tile, TileMask& mask) {
+  return find_colored(tile, mask);
+}
+std::size_t pack_drawn(std::span<const Rgba8Premultiplied, kTilePixels> tile, const TileMask& mask,
+                       Rgba8Premultiplied* packed) {
+  return pack_colored(tile, mask, packed);
+}
+std::size_t pack_drawn(std::span<const RgbaPremultiplied, kTilePixels> tile, const TileMask& mask,
+                       RgbaPremultiplied* packed) {
+  return pack_colored(tile, mask, packed);
+}
+void unpack_drawn(std::span<const Rgba8Premultiplied> packed, const TileMask& mask,
+                  std::span<Rgba8Premultiplied, kTilePixels> tile) {
+  unpack_colored(packed, mask, tile);
+}
+void unpack_drawn(std::span<const RgbaPremultiplied> packed, const TileMask& mask,
+                  std::span<RgbaPremultiplied, kTilePixels> tile) {
+  unpack_colored(packed, mask, tile);
 }
 
 }  // namespace hpr
