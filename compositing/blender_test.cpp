@@ -407,6 +407,26 @@ TEST(Blenders, SharedMemorySendsNoPixelsWhereHostsHoldRunsOfTheOrder) {
   EXPECT_EQ(bytes_sent(2, {3, 0, 2, 1}), 3U * 64U);  // to and fro between hosts: direct send
 }
 
+TEST(Blenders, PiecesGoStraightToTheirScreensWhereThoseShareTheWorkEvenly) {
+  const FrameLayout layout({{256, 128}, {256, 128}, {256, 128}, {256, 128}});
+  const std::vector<int> shown_by{2, 0, 3, 1};
+  const std::vector<int> order{1, 3, 0, 2};
+  for (const char* name : {"direct-send", "shared-memory"}) {
+    run_local_ranks(4, [&](Communicator& comm) {
+      TileLayer<Rgba8Premultiplied> layer(layout);
+      for (const std::size_t tile : test::all_tiles(layout)) {
+        layer.set_active(tile);
+        std::ranges::fill(layer.tile(tile), Rgba8Premultiplied{1, 1, 1, 1});
+      }
+      const auto blender = make_blender<Rgba8Premultiplied>(name);
+      const Composited mine = blender->blend(comm, layer, test::all_tiles(layout), order, shown_by);
+      EXPECT_TRUE(mine.assembled) << name;
+      EXPECT_EQ(mine.tiles.size(), 8U) << name;
+      for (const std::size_t tile : mine.tiles) EXPECT_EQ(shown_by[layout.place(tile).screen], comm.rank()) << name;
+    });
+  }
+}
+
 TEST(Blenders, EmptyTilesCostABitAndScatteredPixelsWhatTheyHold) {
   const FrameLayout layout({{4096, 2048}});
   const std::vector<std::size_t> tiles = test::all_tiles(layout);
