@@ -1,14 +1,11 @@
 #include "app/compare.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <memory>
 #include <numeric>
 
-#include "cluster/collectives.h"
-#include "cluster/counting_communicator.h"
-#include "compositing/assembly.h"
+#include "app/compare_measure.h"
+#include "app/compare_over.h"
 #include "compositing/compositor.h"
 #include "core/check.h"
 #include "core/hash.h"
@@ -18,14 +15,6 @@ namespace {
 
 /// Most tiles a rank merges while speeds are measured: as many as a frame has, so that they leave the cache as it does.
 constexpr std::size_t kMostProbeTiles = 512;
-
-/// What one rank measured in one frame.
-struct Sample {
-  double composite_ms = 0.0;
-  double collect_ms = 0.0;
-  std::uint64_t bytes = 0;
-  std::uint64_t messages = 0;
-};
 
 /// Sort-first beside the strategies: every rank has drawn tiles of its own, and nothing is composited.
 class NothingToComposite final : public Compositor {
@@ -55,18 +44,6 @@ struct Contestant {
   Image<Key> frame;                    ///< rank 0: the last one
   TileLayer<Key> own_layer;            ///< what it starts from where that is not the layer of all strategies
 };
-
-/// Makes `layer` equal to `pristine` again, in the memory it has.
-void restore(TileLayer<Key>& layer, const TileLayer<Key>& pristine) {
-  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-    if (!pristine.active(tile)) {
-      layer.clear(tile);
-      continue;
-    }
-    std::ranges::copy(pristine.tile(tile), layer.tile(tile).begin());
-    layer.set_active(tile);
-  }
-}
 
 /// Collective. On rank 0 the largest key per pixel over all ranks' layers, from whole layers merged one after the other
 /// by comparing keys: nothing of it is shared with what is tested.
@@ -101,117 +78,11 @@ std::uint64_t count_differing(const TileLayer<Key>& layer, std::span<const Key> 
   return differing;
 }
 
-Image<Key> wall_image(const TileLayer<Key>& layer, const CompareInput& input) {
-  const Size screen = input.screen;
-  Image<Key> wall(Size{screen.width * input.grid.width, screen.height * input.grid.height});
-  for (std::size_t i = 0; i < layer.layout().screens(); ++i) {
-    const Image<Key> part = to_image(layer, i);
-    const int left = static_cast<int>(i) % input.grid.width * screen.width;
-    const int top = static_cast<int>(i) / input.grid.width * screen.height;
-    for (int y = 0; y < screen.height; ++y) std::ranges::copy(part.row(y), wall.row(top + y).begin() + left);
-  }
-  return wall;
-}
-
 /// Rank 0, after each frame: how many pixels are wrong, and the frame itself.
 void inspect(const TileLayer<Key>& layer, std::span<const Key> expected, const CompareInput& input,
              Contestant& contestant) {
   contestant.differing_pixels = std::max(contestant.differing_pixels, count_differing(layer, expected));
   contestant.frame = wall_image(layer, input);
-}
-
-/// The memory frames are composited in: one where ranks of one host can merge in place, for the strategies that do so,
-/// and one of this rank's own, which messages leave faster (it has large pages).
-class WorkingLayers {
- public:
-  /// Collective.
-  WorkingLayers(Communicator& comm, const FrameLayout& layout, const std::vector<Contestant>& contestants)
-      : own_(layout) {
-    const bool in_place = std::ranges::any_of(
-        contestants, [](const Contestant& contestant) { return contestant.compositor->merges_in_place(); });
-    if (in_place) shared_ = TileLayer<Key>(layout, comm.share(TileLayer<Key>::bytes_for(layout)));
-  }
-
-  [[nodiscard]] TileLayer<Key>& of(const Compositor& compositor) {
-    return compositor.merges_in_place() ? shared_ : own_;
-  }
-  /// For meetings; null where no strategy merges in place.
-  [[nodiscard]] PeerMemory* peers() const { return shared_.peers(); }
-
- private:
-  TileLayer<Key> own_;
-  TileLayer<Key> shared_;
-};
-
-/// Collective. Where all ranks are on one host they wait asleep, so that those that come late find a core.
-void wait_for_all(Communicator& comm, PeerMemory* peers) {
-  bool one_host = peers != nullptr;
-  for (int rank = 0; one_host && rank < comm.size(); ++rank) one_host = !peers->of(rank).empty();
-  if (one_host) {
-    peers->meet();
-  } else {
-    barrier(comm);
-  }
-}
-
-/// Collective: one frame of one strategy, from the ranks' layers to the whole frame on rank 0.
-Sample one_frame(Contestant& contestant, Assembler& assembler, WorkingLayers& layers,
-                 std::span<const std::size_t> tiles) {
-  TileLayer<Key>& layer = layers.of(*contestant.compositor);
-  const std::vector<int> shown_by(layer.layout().screens(), 0);
-  CountingCommunicator& comm = *contestant.comm;
-  wait_for_all(comm, layers.peers());
-  const std::size_t bytes_before = comm.bytes_sent();
-  const std::size_t messages_before = comm.messages_sent();
-  const double start = comm.seconds();
-  const Composited mine = contestant.compositor->composite(comm, layer, tiles, shown_by);
-  const double composited = comm.seconds();
-  if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, shown_by);
-  const Sample sample{(composited - start) * 1e3, (comm.seconds() - composited) * 1e3, comm.bytes_sent() - bytes_before,
-                      comm.messages_sent() - messages_before};
-  wait_for_all(comm, layers.peers());  // ranks that are done must not take the cores of those that are still timed
-  return sample;
-}
-
-/// `ranks`: per rank its samples, one per frame.
-void summarize(const std::vector<std::vector<Sample>>& ranks, CompareRun& run) {
-  const std::size_t frames = ranks.front().size();
-  std::vector<double> total(frames);
-  std::vector<double> composite(frames);
-  std::vector<double> collect(frames);
-  std::vector<double> imbalance(frames);
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    double sum = 0.0;
-    for (const auto& samples : ranks) {
-      const Sample& sample = samples[frame];
-      total[frame] = std::max(total[frame], sample.composite_ms + sample.collect_ms);
-      composite[frame] = std::max(composite[frame], sample.composite_ms);
-      collect[frame] = std::max(collect[frame], sample.collect_ms);
-      sum += sample.composite_ms;
-    }
-    const double mean = sum / static_cast<double>(ranks.size());
-    imbalance[frame] = mean > 0.0 ? composite[frame] / mean : 1.0;
-  }
-  run.ms = spread_of(total);
-  run.ms_composite = spread_of(composite).median;
-  run.ms_collect = spread_of(collect).median;
-  run.imbalance = spread_of(imbalance).median;
-  // Every frame sends the same.
-  for (const auto& samples : ranks) {
-    run.bytes_total += samples.back().bytes;
-    run.bytes_max_rank = std::max(run.bytes_max_rank, samples.back().bytes);
-    run.messages_total += samples.back().messages;
-  }
-}
-
-/// Collective: every rank's samples on rank 0.
-std::vector<std::vector<Sample>> gather_samples(Communicator& comm, const std::vector<Sample>& samples) {
-  std::vector<std::vector<Sample>> all;
-  for (const auto& bytes : gather(comm, std::as_bytes(std::span(samples)))) {
-    all.emplace_back(bytes.size() / sizeof(Sample));
-    std::memcpy(all.back().data(), bytes.data(), bytes.size());
-  }
-  return all;
 }
 
 std::string frame_hash(const Image<Key>& frame, bool colors) {
@@ -222,17 +93,9 @@ std::string frame_hash(const Image<Key>& frame, bool colors) {
 
 }  // namespace
 
-Spread spread_of(std::vector<double> values) {
-  HPR_CHECK(!values.empty());
-  std::ranges::sort(values);
-  const std::size_t count = values.size();
-  const double median = (values[(count - 1) / 2] + values[count / 2]) / 2.0;
-  const auto nearest_rank = static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(count)));
-  return {values.front(), median, values[nearest_rank - 1], values.back()};
-}
-
 CompareResult compare_strategies(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
   HPR_CHECK(!settings.strategies.empty() && settings.frames > 0 && settings.warmup >= 0);
+  if (settings.operation != CompareOperator::Nearest) return compare_blenders(comm, input, settings);
   const TileLayer<Key> pristine = input.layer(comm);
   std::vector<std::size_t> tiles(pristine.tiles());
   std::iota(tiles.begin(), tiles.end(), std::size_t{0});
@@ -251,7 +114,9 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
       contestant.compositor = make_compositor(name);
     }
   }
-  WorkingLayers layers(comm, pristine.layout(), contestants);
+  const bool in_place = std::ranges::any_of(
+      contestants, [](const Contestant& contestant) { return contestant.compositor->merges_in_place(); });
+  WorkingLayers<Key> layers(comm, pristine.layout(), in_place);
   Assembler assembler;
   const Load load = share_load(comm, pristine, tiles);
   const Costs costs =
@@ -259,9 +124,13 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
 
   for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
     for (Contestant& contestant : contestants) {
-      TileLayer<Key>& layer = layers.of(*contestant.compositor);
+      Compositor& compositor = *contestant.compositor;
+      TileLayer<Key>& layer = layers.of(compositor.merges_in_place());
       restore(layer, contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine);
-      const Sample sample = one_frame(contestant, assembler, layers, tiles);
+      const Sample sample =
+          measure_frame(*contestant.comm, assembler, layer, layers.peers(), [&](std::span<const int> shown_by) {
+            return compositor.composite(*contestant.comm, layer, tiles, shown_by);
+          });
       if (frame >= 0) contestant.samples.push_back(sample);
       if (is_root) inspect(layer, expected, input, contestant);
     }

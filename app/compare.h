@@ -35,10 +35,18 @@ struct CompareInput {
   std::function<DrawnTiles(Communicator&)> sort_first = nullptr;
 };
 
+/// How the pixels of two layers become one.
+enum class CompareOperator {
+  Nearest,   ///< the larger key
+  Over8,     ///< premultiplied RGBA8 `over`
+  OverFloat  ///< premultiplied float RGBA `over`
+};
+
 struct CompareSettings {
   std::vector<std::string> strategies;  ///< names; each must fit the number of ranks
   int frames = 10;
   int warmup = 2;  ///< frames before the measured ones
+  CompareOperator operation = CompareOperator::Nearest;
 };
 
 /// Milliseconds over the measured frames.
@@ -64,7 +72,9 @@ struct CompareRun {
   std::uint64_t bytes_max_rank = 0;  ///< by the rank that sends most
   std::uint64_t messages_total = 0;
   double imbalance = 1.0;              ///< composite: slowest rank / mean of ranks, median over frames
-  std::uint64_t differing_pixels = 0;  ///< of the worst frame, against the serial maximum of the same layers
+  std::uint64_t differing_pixels = 0;  ///< of the worst frame, against the serial result of the same layers:
+                                       ///< other keys, or colours further off than rounding explains
+  std::optional<double> max_error;  ///< `over`: largest difference of a channel to the serial result, 1 is full light
   std::optional<double> predicted_ms;  ///< what the strategy expected of `ms`
   std::string chosen;                  ///< the strategy at work, where another one chose it
   std::string frame_xxh64;             ///< of the RGBA8 frame where keys are colours, else of the keys
@@ -72,12 +82,17 @@ struct CompareRun {
 
 struct CompareResult {
   std::vector<CompareRun> runs;  ///< in order of settings.strategies
-  Image<Key> frame;              ///< the wall as the first strategy composited it
+  Image<Key> frame;              ///< the wall as the first strategy composited it; empty for `over`
+  Image<Rgba8> picture;          ///< `over`: the same as it is shown on black
 };
 
 /// Collective. Composites the same layers with every strategy, frame after frame in turns so that what disturbs the
 /// machine disturbs all alike, and collects each frame on rank 0, where every frame is checked key by key against a
 /// maximum computed without merge kernel, codec and strategies. The result stands on rank 0; elsewhere it is empty.
+///
+/// For `over` the layers are made from the keys: their colours, with an alpha from a hash of pixel and rank, ranks
+/// being in order of visibility. Frames are checked against blending front to back, within the bounds of
+/// docs/numerics.md.
 [[nodiscard]] CompareResult compare_strategies(Communicator& comm, const CompareInput& input,
                                                const CompareSettings& settings);
 

@@ -17,6 +17,7 @@
 #include "cluster/local_communicator.h"
 #include "cluster/scene_distribution.h"
 #include "cluster/simulated_communicator.h"
+#include "compositing/blender.h"
 #include "compositing/compositor.h"
 #include "compositing/plugin.h"
 #include "compositing/synthetic.h"
@@ -55,6 +56,12 @@ class CompareCommand final : public Command {
     app.add_option("--tiles", tiles_, "screens of the wall")->type_name("CxR")->capture_default_str();
     app.add_option("--ranks", ranks_, "numbers of ranks to run on (2,4; inside an MPI job: that job's)")
         ->type_name("LIST");
+    app.add_option(
+           "--operator", operator_,
+           "nearest: the nearest surface; over8, overf: translucent layers, ranks from front to back, in 8 bits or "
+           "floats a channel")
+        ->type_name("NAME")
+        ->capture_default_str();
     app.add_option("--strategies", strategies_, "all, or names of strategies")
         ->type_name("LIST")
         ->capture_default_str();
@@ -116,6 +123,7 @@ class CompareCommand final : public Command {
                   unknown_name_hint(printable(transport_), transports));
     }
     if (!simulate_.empty()) check_simulation();
+    check_operator();
     for (const int ranks : rank_counts()) (void)strategies_for(ranks);
     if (inside_mpi_job() && transport_ != "mpi") {
       throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
@@ -127,6 +135,22 @@ class CompareCommand final : public Command {
     }
     for (const std::string& path : {csv_, html_, picture_, raw_}) {
       if (!path.empty()) check_writable(path, globals.force);
+    }
+  }
+
+  [[nodiscard]] CompareOperator operation() const {
+    if (operator_ == "nearest") return CompareOperator::Nearest;
+    return operator_ == "over8" ? CompareOperator::Over8 : CompareOperator::OverFloat;
+  }
+
+  void check_operator() const {
+    const std::vector<std::string> operators{"nearest", "over8", "overf"};
+    if (std::ranges::find(operators, operator_) == operators.end()) {
+      throw Error(ExitCode::Usage, fmt::format("no operator is named '{}'", printable(operator_)),
+                  unknown_name_hint(printable(operator_), operators));
+    }
+    if (operation() != CompareOperator::Nearest && !raw_.empty()) {
+      throw Error(ExitCode::Usage, "--raw writes keys, and translucent layers have none", "take -o FILE.png");
     }
   }
 
@@ -147,19 +171,26 @@ class CompareCommand final : public Command {
   [[nodiscard]] std::vector<std::string> strategies_for(int ranks) const {
     std::vector<std::string> names;
     if (strategies_ == "all") {
-      for (const auto& compositor : all_compositors()) {
-        if (compositor->fits(ranks)) names.emplace_back(compositor->name());
+      const auto add_fitting = [&](const auto& strategies) {
+        for (const auto& strategy : strategies) {
+          if (strategy->fits(ranks)) names.emplace_back(strategy->name());
+        }
+      };
+      if (operation() == CompareOperator::Nearest) {
+        add_fitting(all_compositors());
+        if (!scene_.empty()) names.emplace_back(kSortFirst);
+      } else {
+        add_fitting(all_blenders<RgbaPremultiplied>());
       }
-      if (!scene_.empty()) names.emplace_back(kSortFirst);
       return names;
     }
     for (const std::string& name : split_strategies(strategies_)) {
-      if (name == kSortFirst) {
+      if (name == kSortFirst && operation() == CompareOperator::Nearest) {
         if (scene_.empty()) {
           throw Error(ExitCode::Usage, "sort-first draws a scene, and there is none",
                       "name a scene instead of --synthetic");
         }
-      } else if (!make_compositor(name)->fits(ranks)) {
+      } else if (!fits(name, ranks)) {
         throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, ranks));
       }
       names.push_back(name);
@@ -167,10 +198,16 @@ class CompareCommand final : public Command {
     return names;
   }
 
+  /// Throws Error (Usage) when no strategy of that name can do what is asked for.
+  [[nodiscard]] bool fits(const std::string& name, int ranks) const {
+    if (operation() == CompareOperator::Nearest) return make_compositor(name)->fits(ranks);
+    return make_blender<RgbaPremultiplied>(name)->fits(ranks);
+  }
+
   [[nodiscard]] CompareSettings settings_for(int ranks) const {
     // Simulated frames are all alike.
     const bool once = !simulate_.empty() && frames_option_->count() == 0;
-    return {strategies_for(ranks), once ? 1 : frames_, once ? 1 : warmup_};
+    return {strategies_for(ranks), once ? 1 : frames_, once ? 1 : warmup_, operation()};
   }
 
   /// Inside an MPI job: its ranks are the one number of ranks compared.
@@ -188,7 +225,7 @@ class CompareCommand final : public Command {
         if (!hands_over()) {
           return std::vector{static_cast<std::byte>(finish(globals, input, std::move(result)))};
         }
-        write_frame(result.frame, input);
+        write_frame(result, input);
         std::fputs(runs_to_json(result.runs).c_str(), stdout);
         return std::vector{static_cast<std::byte>(verdict_on(result.runs))};
       });
@@ -208,6 +245,7 @@ class CompareCommand final : public Command {
         CompareResult here = run_threads(globals, input, ranks);
         runs = std::move(here.runs);
         result.frame = std::move(here.frame);
+        result.picture = std::move(here.picture);
       } else {
         std::string output;
         const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()), &output,
@@ -245,12 +283,13 @@ class CompareCommand final : public Command {
   }
 
   /// Refuses what this host cannot hold, before ranks start to share it.
-  static void check_memory(const Globals& globals, const CompareInput& input, int ranks) {
+  void check_memory(const Globals& globals, const CompareInput& input, int ranks) const {
     const auto pages = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES));
     const std::uint64_t physical = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
     const std::uint64_t limit = parse_bytes(globals.limit_mem).value_or(physical);
     // Every rank keeps its layer and two to work on; rank 0 also the expected frame, one that arrives and the image.
-    const std::uint64_t layer = grid_layout(input.screen, input.grid).tiles() * kTilePixels * sizeof(Key);
+    const std::uint64_t pixel = operation() == CompareOperator::OverFloat ? sizeof(RgbaPremultiplied) : sizeof(Key);
+    const std::uint64_t layer = grid_layout(input.screen, input.grid).tiles() * kTilePixels * pixel;
     const std::uint64_t needed = layer * (3 * static_cast<std::uint64_t>(ranks) + 3);
     if (needed <= limit) return;
     throw Error(
@@ -288,6 +327,7 @@ class CompareCommand final : public Command {
     if (!synthetic_.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic_});
     if (!plugin_.empty()) arguments.insert(arguments.end(), {"--plugin", plugin_});
     arguments.insert(arguments.end(), {"--size", size_, "--tiles", tiles_, "--strategies", strategies_});
+    if (operation() != CompareOperator::Nearest) arguments.insert(arguments.end(), {"--operator", operator_});
     arguments.insert(arguments.end(), {"--frames", std::to_string(frames_), "--warmup", std::to_string(warmup_)});
     if (simulate_.empty()) {
       arguments.insert(arguments.end(), {"--transport", transport_});
@@ -303,11 +343,12 @@ class CompareCommand final : public Command {
     return differ ? ExitCode::CheckFailed : ExitCode::Done;
   }
 
-  /// Writes the files that were asked for; `frame` is empty where a job has written them.
-  void write_frame(const Image<Key>& frame, const CompareInput& input) const {
-    if (frame.pixels().empty()) return;
-    if (!picture_.empty()) write_png(picture_, frame_colors(frame, input.colors));
-    if (!raw_.empty()) write_file_atomically(raw_, std::as_bytes(frame.pixels()));
+  /// Writes the files that were asked for; the result is without frames where a job has written them.
+  void write_frame(const CompareResult& result, const CompareInput& input) const {
+    if (!result.picture.pixels().empty() && !picture_.empty()) write_png(picture_, result.picture);
+    if (result.frame.pixels().empty()) return;
+    if (!picture_.empty()) write_png(picture_, frame_colors(result.frame, input.colors));
+    if (!raw_.empty()) write_file_atomically(raw_, std::as_bytes(result.frame.pixels()));
   }
 
   [[nodiscard]] ExitCode finish(const Globals& globals, const CompareInput& input, CompareResult result) const {
@@ -316,6 +357,7 @@ class CompareCommand final : public Command {
     report.screen = input.screen;
     report.grid = input.grid;
     report.input = input.name;
+    report.operation = operator_;
     report.seed = globals.seed;
     std::vector<int> counts;
     for (const CompareRun& run : result.runs) {
@@ -324,7 +366,7 @@ class CompareCommand final : public Command {
     report.command = fmt::format("hpr {}", fmt::join(input_arguments(globals), " "));
     if (simulate_.empty()) report.command += fmt::format(" --ranks {}", fmt::join(counts, ","));
     report.runs = std::move(result.runs);
-    write_frame(result.frame, input);
+    write_frame(result, input);
     if (!csv_.empty()) write_file_atomically(csv_, compare_csv(report));
     if (!html_.empty()) write_file_atomically(html_, compare_html(report, draw_strategies(report.runs)));
     std::fputs((json_ ? compare_json(report) : compare_table(report)).c_str(), stdout);
@@ -337,6 +379,7 @@ class CompareCommand final : public Command {
   std::string size_ = "1920x1080";
   std::string tiles_ = "1x1";
   std::string ranks_;
+  std::string operator_ = "nearest";
   std::string strategies_ = "all";
   std::string plugin_;
   int frames_ = 10;

@@ -29,6 +29,7 @@ Json to_json(const CompareRun& run) {
             {"frame_xxh64", run.frame_xxh64},
             {"predicted_ms", run.predicted_ms ? Json(*run.predicted_ms) : Json()}};
   if (!run.chosen.empty()) json["chosen"] = run.chosen;
+  if (run.max_error) json["max_error"] = *run.max_error;
   return json;
 }
 
@@ -51,6 +52,7 @@ CompareRun run_from(const Json& json) {
   run.frame_xxh64 = json.at("frame_xxh64").get<std::string>();
   if (!json.at("predicted_ms").is_null()) run.predicted_ms = json.at("predicted_ms").get<double>();
   run.chosen = json.value("chosen", "");
+  if (json.contains("max_error")) run.max_error = json.at("max_error").get<double>();
   return run;
 }
 
@@ -89,6 +91,7 @@ std::string compare_table(const CompareReport& report) {
         run.strategy, run.ranks, run.ms.median, run.predicted_ms ? fmt::format("{:.3f}", *run.predicted_ms) : "-",
         run.ms.min, run.ms.p95, run.ms.max, run.ms_composite, run.ms_collect, megabytes(run.bytes_total),
         run.messages_total, run.imbalance, run.differing_pixels, run.frame_xxh64);
+    if (run.max_error) text.insert(text.size() - 1, fmt::format("  max error {:.3g}", *run.max_error));
   }
   return text;
 }
@@ -105,6 +108,7 @@ std::string compare_json(const CompareReport& report) {
         {"oversubscribed", report.oversubscribed()}}},
       {"image", {{"width", report.screen.width}, {"height", report.screen.height}, {"tiles", grid_name(report.grid)}}},
       {"input", report.input},
+      {"operator", report.operation},
       {"seed", report.seed},
       {"runs", to_json(report.runs)}};
   // Names may come from the command line in any bytes; what is no UTF-8 is replaced.
@@ -115,13 +119,14 @@ std::string compare_csv(const CompareReport& report) {
   std::string text =
       "strategy,ranks,transport,frames,ms_min,ms_median,ms_p95,ms_max,ms_composite_median,ms_collect_median,bytes_"
       "total,"
-      "bytes_max_rank,messages_total,imbalance,differing_pixels,frame_xxh64,predicted_ms\n";
+      "bytes_max_rank,messages_total,imbalance,differing_pixels,frame_xxh64,predicted_ms,max_error\n";
   for (const CompareRun& run : report.runs) {
-    text += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{:.4f},{},{},{}\n",
+    text += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{:.4f},{},{},{},{}\n",
                         run.strategy, run.ranks, run.transport, run.frames, run.ms.min, run.ms.median, run.ms.p95,
                         run.ms.max, run.ms_composite, run.ms_collect, run.bytes_total, run.bytes_max_rank,
                         run.messages_total, run.imbalance, run.differing_pixels, run.frame_xxh64,
-                        run.predicted_ms ? fmt::format("{:.6f}", *run.predicted_ms) : "");
+                        run.predicted_ms ? fmt::format("{:.6f}", *run.predicted_ms) : "",
+                        run.max_error ? fmt::format("{:.6g}", *run.max_error) : "");
   }
   return text;
 }

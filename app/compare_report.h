@@ -17,6 +17,7 @@ struct CompareReport {
   Size screen;
   Size grid;
   std::string input;
+  std::string operation = "nearest";  ///< nearest, over8 or overf
   std::uint64_t seed = 1;
   std::vector<CompareRun> runs;
 

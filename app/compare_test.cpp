@@ -10,7 +10,9 @@
 #include "app/compare_report.h"
 #include "cluster/forwarding_communicator.h"
 #include "cluster/local_communicator.h"
+#include "compositing/blender.h"
 #include "compositing/compositor.h"
+#include "compositing/over.h"
 #include "compositing/synthetic.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -166,6 +168,45 @@ TEST(Compare, SortFirstIsCheckedAgainstTheSameFrame) {
   }
 }
 
+CompareSettings every_blender(CompareOperator operation) {
+  CompareSettings settings{{}, 2, 1, operation};
+  for (const auto& blender : all_blenders<RgbaPremultiplied>()) settings.strategies.emplace_back(blender->name());
+  return settings;
+}
+
+TEST(Compare, TranslucentLayersAreHeldToTheSerialResult) {
+  for (const SyntheticKind kind : all_synthetic_kinds()) {
+    for (const CompareOperator operation : {CompareOperator::Over8, CompareOperator::OverFloat}) {
+      const auto result = compare_on_threads(5, synthetic_input(kind, {100, 70}, {2, 1}), every_blender(operation));
+      ASSERT_EQ(result.runs.size(), 6U);
+      EXPECT_EQ(result.picture.size(), (Size{200, 70}));
+      const double bound = operation == CompareOperator::Over8 ? over_error_bound<Rgba8Premultiplied>(5) / 255.0
+                                                               : over_error_bound<RgbaPremultiplied>(5);
+      for (const CompareRun& run : result.runs) {
+        EXPECT_EQ(run.differing_pixels, 0U) << run.strategy;
+        ASSERT_TRUE(run.max_error);
+        EXPECT_LE(*run.max_error, 2.0 * bound) << run.strategy;
+        if (run.strategy != "serial" && run.strategy != "direct-send" && run.strategy != "shared-memory") continue;
+        EXPECT_EQ(*run.max_error, 0.0) << run.strategy;
+        EXPECT_EQ(run.frame_xxh64, result.runs.front().frame_xxh64) << run.strategy;
+      }
+    }
+  }
+}
+
+TEST(Compare, CountsTheTranslucentPixelsAStrategyGetsWrong) {
+  run_local_ranks(2, [](Communicator& comm) {
+    DamagingCommunicator damaging(comm);
+    for (const CompareOperator operation : {CompareOperator::Over8, CompareOperator::OverFloat}) {
+      const auto result = compare_strategies(damaging, synthetic_input(SyntheticKind::Dense, {128, 64}, {1, 1}),
+                                             {{"serial", "tree", "binary-swap"}, 2, 1, operation});
+      for (const CompareRun& run : result.runs) {
+        EXPECT_EQ(run.differing_pixels > 0, run.strategy == "binary-swap") << run.strategy;
+      }
+    }
+  });
+}
+
 TEST(SpreadOf, TakesTheMiddleAndTheNearestRank) {
   const Spread one = spread_of({3.0});
   EXPECT_EQ(one.min, 3.0);
@@ -225,11 +266,22 @@ TEST(CompareReport, JsonHasEveryKeyOfTheSchema) {
   EXPECT_EQ(json.at("runs"), expected);
 }
 
+TEST(CompareReport, JsonHasTheErrorOfTranslucentFrames) {
+  CompareReport report = example_report();
+  EXPECT_FALSE(nlohmann::json::parse(compare_json(report)).at("runs").at(0).contains("max_error"));
+  report.operation = "over8";
+  report.runs.front().max_error = 0.25;
+  const auto json = nlohmann::json::parse(compare_json(report));
+  EXPECT_EQ(json.at("operator"), "over8");
+  EXPECT_EQ(json.at("runs").at(0).at("max_error"), 0.25);
+}
+
 TEST(CompareReport, RunsSurviveTheWayFromAJobToItsStarter) {
   CompareReport report = example_report();
   report.runs.push_back(report.runs.front());
   report.runs.back().strategy = "serial";
   report.runs.back().ms.median = 0.1 + 0.2;
+  report.runs.back().max_error = 0.3;
   CompareReport back = report;
   back.runs = runs_from_json(runs_to_json(report.runs));
   EXPECT_EQ(compare_json(back), compare_json(report));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compositing/merge.h"
+#include "compositing/over.h"
 #include "compositing/sparse.h"
 
 // How close the key merge comes to memory speed. A merge of n keys reads two streams and writes one, 3 n words; a copy
@@ -86,6 +87,72 @@ void merge_packed_1080p(benchmark::State& state) {
   }
 }
 BENCHMARK(merge_packed_1080p)->ArgName("percent")->Arg(10)->Arg(50)->Unit(benchmark::kMillisecond);
+
+template <typename Pixel>
+std::vector<Pixel> random_colors(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<Pixel> pixels(kKeys1080p);
+  using Channel = decltype(Pixel::a);
+  const auto up_to = [&](Channel most) {
+    return static_cast<Channel>(static_cast<double>(most) * static_cast<double>(random() % 1000) / 1000.0);
+  };
+  constexpr Channel kOne = sizeof(Channel) == 1 ? Channel{255} : Channel{1};
+  for (Pixel& pixel : pixels) {
+    const Channel a = up_to(kOne);
+    pixel = {up_to(a), up_to(a), up_to(a), a};
+  }
+  return pixels;
+}
+
+template <typename Pixel>
+void over_1080p(benchmark::State& state) {
+  const std::vector<Pixel> front = random_colors<Pixel>(1);
+  std::vector<Pixel> back = random_colors<Pixel>(2);
+  for (auto _ : state) {
+    hpr::composite_over(std::span<const Pixel>(front), std::span<const Pixel>(back), std::span(back));
+    benchmark::ClobberMemory();
+  }
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(3 * kKeys1080p * sizeof(Pixel)));
+}
+BENCHMARK_TEMPLATE(over_1080p, hpr::Rgba8Premultiplied)->Unit(benchmark::kMillisecond);
+BENCHMARK_TEMPLATE(over_1080p, hpr::RgbaPremultiplied)->Unit(benchmark::kMillisecond);
+
+/// The bytes `over` moves, two streams read and one written, as a copy.
+template <typename Pixel>
+void copy_as_over_1080p(benchmark::State& state) {
+  const std::vector<Pixel> from(kKeys1080p * 3 / 2, Pixel{1, 1, 1, 1});
+  std::vector<Pixel> into(from.size());
+  for (auto _ : state) {
+    std::memcpy(into.data(), from.data(), from.size() * sizeof(Pixel));
+    benchmark::ClobberMemory();
+  }
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(2 * from.size() * sizeof(Pixel)));
+}
+BENCHMARK_TEMPLATE(copy_as_over_1080p, hpr::Rgba8Premultiplied)->Unit(benchmark::kMillisecond);
+BENCHMARK_TEMPLATE(copy_as_over_1080p, hpr::RgbaPremultiplied)->Unit(benchmark::kMillisecond);
+
+/// Finding and packing the drawn pixels of a layer of colours, and unpacking them.
+template <typename Pixel>
+void pack_and_unpack_1080p(benchmark::State& state) {
+  std::mt19937_64 random(3);
+  std::vector<Pixel> pixels(kKeys1080p / hpr::kTilePixels * hpr::kTilePixels);
+  for (Pixel& pixel : pixels) {
+    if (static_cast<std::int64_t>(random() % 100) < state.range(0)) pixel = {1, 1, 1, 1};
+  }
+  std::vector<Pixel> packed(hpr::kTilePixels);
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < pixels.size(); i += hpr::kTilePixels) {
+      const auto tile = std::span(pixels).subspan(i).template first<hpr::kTilePixels>();
+      hpr::TileMask mask;
+      benchmark::DoNotOptimize(hpr::find_drawn(std::span<const Pixel, hpr::kTilePixels>(tile), mask));
+      const std::size_t count = hpr::pack_drawn(std::span<const Pixel, hpr::kTilePixels>(tile), mask, packed.data());
+      hpr::unpack_drawn(std::span<const Pixel>(packed).first(count), mask, tile);
+    }
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK_TEMPLATE(pack_and_unpack_1080p, hpr::Rgba8Premultiplied)->Arg(10)->Arg(50)->Unit(benchmark::kMillisecond);
+BENCHMARK_TEMPLATE(pack_and_unpack_1080p, hpr::RgbaPremultiplied)->Arg(10)->Arg(50)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

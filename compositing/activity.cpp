@@ -54,15 +54,11 @@ std::vector<TileRun> Activity::cut(TileRun run, int parts) const {
   return runs;
 }
 
-Activity share_activity(Communicator& comm, const TileLayer<Key>& layer, std::span<const std::size_t> tiles) {
-  std::vector<std::uint64_t> mine((tiles.size() + kWordBits - 1) / kWordBits);
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (layer.active(tiles[i])) mine[i / kWordBits] |= std::uint64_t{1} << (i % kWordBits);
-  }
-  const std::vector<std::byte> bytes = all_gather_equal(comm, std::as_bytes(std::span(mine)));
+Activity share_activity(Communicator& comm, std::span<const std::uint64_t> bits, std::size_t tiles) {
+  const std::vector<std::byte> bytes = all_gather_equal(comm, std::as_bytes(bits));
   std::vector<std::uint64_t> all(bytes.size() / sizeof(std::uint64_t));
   if (!bytes.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
-  return {comm.size(), tiles.size(), std::move(all)};
+  return {comm.size(), tiles, std::move(all)};
 }
 
 }  // namespace hpr

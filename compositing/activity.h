@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "cluster/communicator.h"
-#include "image/key.h"
 #include "image/tiles.h"
 
 namespace hpr {
@@ -43,8 +42,23 @@ class Activity {
   std::vector<std::uint32_t> weights_;  ///< per tile of the list
 };
 
-/// Collective: one bit per tile and rank, gathered in ceil(log2 P) rounds.
-[[nodiscard]] Activity share_activity(Communicator& comm, const TileLayer<Key>& layer,
-                                      std::span<const std::size_t> tiles);
+/// One bit per tile of a list, the lowest first, in whole words: has `layer` anything there?
+template <typename Pixel>
+[[nodiscard]] std::vector<std::uint64_t> active_bits(const TileLayer<Pixel>& layer,
+                                                     std::span<const std::size_t> tiles) {
+  std::vector<std::uint64_t> bits((tiles.size() + 63) / 64);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (layer.active(tiles[i])) bits[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
+  return bits;
+}
+
+/// Collective: the bits of a list of `tiles` tiles of every rank, gathered in ceil(log2 P) rounds.
+[[nodiscard]] Activity share_activity(Communicator& comm, std::span<const std::uint64_t> bits, std::size_t tiles);
+template <typename Pixel>
+[[nodiscard]] Activity share_activity(Communicator& comm, const TileLayer<Pixel>& layer,
+                                      std::span<const std::size_t> tiles) {
+  return share_activity(comm, active_bits(layer, tiles), tiles.size());
+}
 
 }  // namespace hpr

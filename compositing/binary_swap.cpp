@@ -23,8 +23,9 @@ class Fold {
 
 }  // namespace
 
-Composited BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                                 std::span<const int> /*shown_by*/) {
+template <typename Pixel>
+Composited BinarySwapSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer,
+                                          std::span<const std::size_t> tiles, std::span<const int> /*shown_by*/) {
   const Fold fold(comm.size());
   const int rank = comm.rank();
   const Activity activity = share_activity(comm, layer, tiles);
@@ -37,14 +38,21 @@ Composited BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std:
       return {};
     }
     const int neighbour = rank + 1;
-    comm.exchange({}, {&neighbour, 1}, [&](int from, std::span<const std::byte> message) {
-      reader_.merge(comm, from, message, layer, tiles);
-    });
+    merger_.exchange(comm, {}, {&neighbour, 1}, layer, tiles);
   }
   const std::vector<int> twos(static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(fold.members())) - 1), 2);
   const TileRun mine = rounds_.run(comm, layer, tiles, activity, twos, fold.member_of(rank),
                                    [&](int member) { return fold.rank_of(member); });
   return owning(tiles, mine);
+}
+
+template class BinarySwapSchedule<Key>;
+template class BinarySwapSchedule<Rgba8Premultiplied>;
+template class BinarySwapSchedule<RgbaPremultiplied>;
+
+Composited BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                 std::span<const int> shown_by) {
+  return schedule_.run(comm, layer, tiles, shown_by);
 }
 
 std::optional<Prediction> BinarySwap::predict(const Costs& costs, const Load& load) const {

@@ -5,6 +5,19 @@
 
 namespace hpr {
 
+/// The messages of binary swap, for any kind of pixel.
+template <typename Pixel>
+class BinarySwapSchedule {
+ public:
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> shown_by);
+
+ private:
+  SwapRounds<Pixel> rounds_;
+  TileMessage folded_;
+  PieceMerger<Pixel> merger_;
+};
+
 /// In each round two ranks swap halves of the run they share, until every rank owns a part of the frame. Ma, Painter,
 /// Hansen and Krogh, "Parallel Volume Rendering Using Binary-Swap Compositing", 1994.
 ///
@@ -22,9 +35,7 @@ class BinarySwap final : public Compositor {
   [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
-  SwapRounds rounds_;
-  TileMessage folded_;
-  TileReader reader_;
+  BinarySwapSchedule<Key> schedule_;
 };
 
 }  // namespace hpr

@@ -52,8 +52,9 @@ std::vector<std::size_t> tiles_at(std::span<const std::size_t> tiles, const std:
 
 }  // namespace
 
-Composited DirectSend::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                                 std::span<const int> shown_by) {
+template <typename Pixel>
+Composited DirectSendSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer,
+                                          std::span<const std::size_t> tiles, std::span<const int> shown_by) {
   const int ranks = comm.size();
   const int rank = comm.rank();
   const Activity activity = share_activity(comm, layer, tiles);
@@ -82,9 +83,17 @@ Composited DirectSend::composite(Communicator& comm, TileLayer<Key>& layer, std:
     if (draws_into(sender, rank)) from.push_back(sender);
   }
   std::vector<std::size_t> mine = tiles_at(tiles, pieces[static_cast<std::size_t>(rank)]);
-  comm.exchange(out, from,
-                [&](int peer, std::span<const std::byte> message) { reader_.merge(comm, peer, message, layer, mine); });
+  merger_.exchange(comm, out, from, layer, mine);
   return {std::move(mine), straight};
+}
+
+template class DirectSendSchedule<Key>;
+template class DirectSendSchedule<Rgba8Premultiplied>;
+template class DirectSendSchedule<RgbaPremultiplied>;
+
+Composited DirectSend::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                 std::span<const int> shown_by) {
+  return schedule_.run(comm, layer, tiles, shown_by);
 }
 
 std::optional<Prediction> DirectSend::predict(const Costs& costs, const Load& load) const {

@@ -2,9 +2,22 @@
 
 #include "compositing/activity.h"
 #include "compositing/compositor.h"
+#include "compositing/piece_merger.h"
 #include "compositing/tile_codec.h"
 
 namespace hpr {
+
+/// The messages of direct send, for any kind of pixel.
+template <typename Pixel>
+class DirectSendSchedule {
+ public:
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> shown_by);
+
+ private:
+  std::vector<TileMessage> given_;  ///< per rank
+  PieceMerger<Pixel> merger_;
+};
 
 /// Every rank owns a piece of the frame and gets it from all others at once. Hsu, "Segmented Ray Casting for Data
 /// Parallel Volume Rendering", 1993; Neumann, "Communication Costs for Parallel Volume-Rendering Algorithms", 1994.
@@ -23,8 +36,7 @@ class DirectSend final : public Compositor {
   [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
-  std::vector<TileMessage> given_;  ///< per rank
-  TileReader reader_;
+  DirectSendSchedule<Key> schedule_;
 };
 
 }  // namespace hpr

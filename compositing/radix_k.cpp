@@ -13,7 +13,9 @@ namespace {
 
 constexpr int kLargestGroup = 8;
 
-std::vector<int> parse_factors(std::string_view list) {
+}  // namespace
+
+std::vector<int> parse_radix_factors(std::string_view list) {
   std::vector<int> factors;
   for (std::string_view rest = list;; rest.remove_prefix(1)) {
     int factor = 0;
@@ -29,16 +31,20 @@ std::vector<int> parse_factors(std::string_view list) {
   }
 }
 
-}  // namespace
-
 RadixK::RadixK(std::string_view factors)
-    : name_(fmt::format("radix-k:{}", factors)), factors_(parse_factors(factors)) {}
+    : name_(fmt::format("radix-k:{}", factors)), schedule_(parse_radix_factors(factors)) {}
 
-bool RadixK::fits(int ranks) const {
+template <typename Pixel>
+bool RadixKSchedule<Pixel>::fits(int ranks) const {
   if (factors_.empty()) return ranks >= 1;
   std::int64_t product = 1;
   for (const int factor : factors_) product = std::min<std::int64_t>(product * factor, std::int64_t{1} << 31U);
   return product == ranks;
+}
+
+template <typename Pixel>
+std::vector<int> RadixKSchedule<Pixel>::factors(int ranks) const {
+  return factors_.empty() ? RadixK::factors_for(ranks) : factors_;
 }
 
 std::vector<int> RadixK::factors_for(int ranks) {
@@ -60,17 +66,25 @@ std::vector<int> RadixK::factors_for(int ranks) {
   return factors;
 }
 
-Composited RadixK::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                             std::span<const int> /*shown_by*/) {
+template <typename Pixel>
+Composited RadixKSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                                      std::span<const int> /*shown_by*/) {
   const Activity activity = share_activity(comm, layer, tiles);
-  const std::vector<int> factors = factors_.empty() ? factors_for(comm.size()) : factors_;
-  return owning(tiles,
-                rounds_.run(comm, layer, tiles, activity, factors, comm.rank(), [](int member) { return member; }));
+  return owning(tiles, rounds_.run(comm, layer, tiles, activity, factors(comm.size()), comm.rank(),
+                                   [](int member) { return member; }));
+}
+
+template class RadixKSchedule<Key>;
+template class RadixKSchedule<Rgba8Premultiplied>;
+template class RadixKSchedule<RgbaPremultiplied>;
+
+Composited RadixK::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                             std::span<const int> shown_by) {
+  return schedule_.run(comm, layer, tiles, shown_by);
 }
 
 std::optional<Prediction> RadixK::predict(const Costs& costs, const Load& load) const {
-  const std::vector<int> factors = factors_.empty() ? factors_for(load.ranks) : factors_;
-  return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, factors)};
+  return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, schedule_.factors(load.ranks))};
 }
 
 }  // namespace hpr

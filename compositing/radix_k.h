@@ -5,6 +5,28 @@
 
 namespace hpr {
 
+/// "4,2". Throws Error (Usage) when it is not a list of factors of 2 or more.
+[[nodiscard]] std::vector<int> parse_radix_factors(std::string_view list);
+
+/// The messages of radix-k, for any kind of pixel.
+template <typename Pixel>
+class RadixKSchedule {
+ public:
+  /// Factors chosen for the number of ranks, or given ones.
+  RadixKSchedule() = default;
+  explicit RadixKSchedule(std::vector<int> factors) : factors_(std::move(factors)) {}
+
+  [[nodiscard]] bool fits(int ranks) const;
+  /// What is used for so many ranks.
+  [[nodiscard]] std::vector<int> factors(int ranks) const;
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> shown_by);
+
+ private:
+  std::vector<int> factors_;
+  SwapRounds<Pixel> rounds_;
+};
+
 /// In round i groups of k_i ranks swap parts of the run they share, each rank sending k_i - 1 of them, where
 /// k_1 k_2 ... = P: binary swap for all twos, direct send for the one factor P. Peterka, Goodell, Ross, Shen and
 /// Thakur, "A Configurable Algorithm for Parallel Image-Compositing Applications", 2009.
@@ -19,7 +41,7 @@ class RadixK final : public Compositor {
   explicit RadixK(std::string_view factors);
 
   [[nodiscard]] std::string_view name() const override { return name_; }
-  [[nodiscard]] bool fits(int ranks) const override;
+  [[nodiscard]] bool fits(int ranks) const override { return schedule_.fits(ranks); }
   using Compositor::composite;
   Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
                        std::span<const int> shown_by) override;
@@ -30,8 +52,7 @@ class RadixK final : public Compositor {
 
  private:
   std::string name_ = "radix-k";
-  std::vector<int> factors_;  ///< given ones
-  SwapRounds rounds_;
+  RadixKSchedule<Key> schedule_;
 };
 
 }  // namespace hpr

@@ -4,8 +4,9 @@
 
 namespace hpr {
 
-Composited Serial::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                             std::span<const int> /*shown_by*/) {
+template <typename Pixel>
+Composited SerialSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                                      std::span<const int> /*shown_by*/) {
   if (comm.rank() != 0) {
     given_.start();
     given_.add(layer, tiles);
@@ -15,10 +16,17 @@ Composited Serial::composite(Communicator& comm, TileLayer<Key>& layer, std::spa
   }
   std::vector<int> others(static_cast<std::size_t>(comm.size()) - 1);
   std::iota(others.begin(), others.end(), 1);
-  comm.exchange({}, others, [&](int from, std::span<const std::byte> message) {
-    reader_.merge(comm, from, message, layer, tiles);
-  });
+  merger_.exchange(comm, {}, others, layer, tiles);
   return owning(tiles, {0, tiles.size()});
+}
+
+template class SerialSchedule<Key>;
+template class SerialSchedule<Rgba8Premultiplied>;
+template class SerialSchedule<RgbaPremultiplied>;
+
+Composited Serial::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                             std::span<const int> shown_by) {
+  return schedule_.run(comm, layer, tiles, shown_by);
 }
 
 std::optional<Prediction> Serial::predict(const Costs& costs, const Load& load) const {

@@ -1,9 +1,22 @@
 #pragma once
 
 #include "compositing/compositor.h"
+#include "compositing/piece_merger.h"
 #include "compositing/tile_codec.h"
 
 namespace hpr {
+
+/// The messages of the serial strategy, for any kind of pixel.
+template <typename Pixel>
+class SerialSchedule {
+ public:
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> shown_by);
+
+ private:
+  TileMessage given_;
+  PieceMerger<Pixel> merger_;
+};
 
 /// Every rank sends its layer to rank 0, which merges them as they come: the floor any other strategy must beat.
 /// Known as direct send to one rank, and as the naive sort-last of Molnar, Cox, Ellsworth and Fuchs, "A Sorting
@@ -19,8 +32,7 @@ class Serial final : public Compositor {
   [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
-  TileMessage given_;
-  TileReader reader_;
+  SerialSchedule<Key> schedule_;
 };
 
 }  // namespace hpr

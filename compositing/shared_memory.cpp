@@ -6,9 +6,10 @@
 #include <utility>
 
 #include "cluster/collectives.h"
+#include "cluster/renumbered_communicator.h"
 #include "compositing/activity.h"
 #include "compositing/merge.h"
-#include "compositing/radix_k.h"
+#include "compositing/piece_merger.h"
 #include "core/check.h"
 
 namespace hpr {
@@ -19,10 +20,9 @@ constexpr std::size_t kTilesATurn = 4;
 
 }  // namespace
 
-/// Who is where, and the counter by which the ranks of this host share their work.
-class SharedMemory::Host {
+class HostRanks {
  public:
-  explicit Host(Communicator& comm) : comm_(comm), control_(comm.share(sizeof(Control))) {
+  explicit HostRanks(Communicator& comm) : comm_(comm), control_(comm.share(sizeof(Control))) {
     int first = 0;
     while (control_->of(first).empty()) ++first;
     control_of_host_ = reinterpret_cast<Control*>(control_->of(first).data());
@@ -43,10 +43,9 @@ class SharedMemory::Host {
     columns_ = std::ranges::min(hosts_, {}, &std::vector<int>::size).size();
     const auto number = static_cast<std::size_t>(std::ranges::find(ranks_, comm.rank()) - ranks_.begin());
     if (number >= columns_) return;
-    std::vector<int> members;
-    for (const auto& ranks : hosts_) members.push_back(ranks[number]);
-    std::ranges::sort(members);
-    column_ = comm.subset(members);
+    for (const auto& ranks : hosts_) column_ranks_.push_back(ranks[number]);
+    std::ranges::sort(column_ranks_);
+    column_ = comm.subset(column_ranks_);
   }
 
   [[nodiscard]] bool belongs_to(const Communicator& comm) const { return &comm_ == &comm; }
@@ -55,7 +54,15 @@ class SharedMemory::Host {
   [[nodiscard]] std::size_t columns() const { return columns_; }
   /// Null for a rank no other host has a peer for.
   [[nodiscard]] Communicator* column() { return column_.get(); }
-  [[nodiscard]] Compositor& between_hosts() { return between_hosts_; }
+  /// The rank in the whole communicator of each rank of the column, ascending.
+  [[nodiscard]] const std::vector<int>& column_ranks() const { return column_ranks_; }
+
+  /// Whether no host's ranks have another host's among them in this order.
+  [[nodiscard]] bool holds_runs_of(std::span<const int> order) const {
+    std::size_t changes = 0;
+    for (std::size_t i = 1; i < order.size(); ++i) changes += host_of(order[i]) != host_of(order[i - 1]) ? 1U : 0U;
+    return changes + 1 == hosts_.size();
+  }
 
   void meet() { control_->meet(); }
 
@@ -84,6 +91,10 @@ class SharedMemory::Host {
     std::array<std::size_t, 2> next;  ///< position in the list of tiles, of this frame and the coming one
   };
 
+  [[nodiscard]] std::size_t host_of(int rank) const {
+    const auto has = [&](const std::vector<int>& ranks) { return std::ranges::find(ranks, rank) != ranks.end(); };
+    return static_cast<std::size_t>(std::ranges::find_if(hosts_, has) - hosts_.begin());
+  }
   [[nodiscard]] std::atomic_ref<std::size_t> counter(std::size_t turn) const {
     return std::atomic_ref(control_of_host_->next.at(turn));
   }
@@ -94,8 +105,8 @@ class SharedMemory::Host {
   std::vector<std::vector<int>> hosts_;  ///< the ranks of each
   std::vector<int> ranks_;               ///< of this host, ascending
   std::size_t columns_ = 0;
+  std::vector<int> column_ranks_;
   std::unique_ptr<Communicator> column_;
-  RadixK between_hosts_;
   std::size_t turn_ = 0;
   bool took_share_ = false;
 };
@@ -103,102 +114,78 @@ class SharedMemory::Host {
 namespace {
 
 /// Which tiles the ranks of this host have drawn into.
-Activity look_at(std::span<const TileLayer<Key>> layers, std::span<const std::size_t> tiles) {
-  const std::size_t words = (tiles.size() + 63) / 64;
-  std::vector<std::uint64_t> bits(words * layers.size());
-  for (std::size_t rank = 0; rank < layers.size(); ++rank) {
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      if (layers[rank].active(tiles[i])) bits[rank * words + i / 64] |= std::uint64_t{1} << (i % 64);
-    }
+template <typename Pixel>
+Activity look_at(std::span<const TileLayer<Pixel>> layers, std::span<const std::size_t> tiles) {
+  std::vector<std::uint64_t> bits;
+  for (const TileLayer<Pixel>& layer : layers) {
+    const std::vector<std::uint64_t> own = active_bits(layer, tiles);
+    bits.insert(bits.end(), own.begin(), own.end());
   }
   return {static_cast<int>(layers.size()), tiles.size(), std::move(bits)};
 }
 
-/// Merges what all layers hold of a tile into that of `owner`, all indices into `layers`; flags stay as they are, since
-/// others may be looking at them. Returns the bytes read.
-std::size_t merge_tile(std::span<TileLayer<Key>> layers, const Activity& activity, std::size_t position,
-                       std::size_t tile, std::size_t owner) {
-  const std::span<Key> into = layers[owner].tile(tile);
-  bool filled = activity.active(static_cast<int>(owner), position);
-  std::size_t bytes = 0;
-  for (std::size_t other = 0; other < layers.size(); ++other) {
-    if (other == owner || !activity.active(static_cast<int>(other), position)) continue;
-    const std::span<const Key> from = std::as_const(layers[other]).tile(tile);
-    if (filled) {
-      merge_keys(into, from);
-    } else {
-      std::ranges::copy(from, into.begin());
-    }
-    filled = true;
-    bytes += from.size_bytes();
-  }
-  return bytes;
-}
+/// Merges what all layers hold of tiles into the layer of one of them, flags staying as they are, since others may be
+/// looking at them. `order`: the indices of the layers from front to back.
+template <typename Pixel>
+class TileMerger {
+ public:
+  TileMerger(std::span<TileLayer<Pixel>> layers, std::span<const std::size_t> order, const Activity& activity)
+      : layers_(layers), order_(order), activity_(activity) {}
 
-}  // namespace
-
-SharedMemory::SharedMemory() = default;
-SharedMemory::~SharedMemory() = default;
-
-Composited SharedMemory::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                                   std::span<const int> shown_by) {
-  if (!host_ || !host_->belongs_to(comm)) {
-    host_ = std::make_unique<Host>(comm);
-    copy_ = {};
-  }
-  const bool in_place = layer.peers() != nullptr;
-  if (!in_place) {
-    if (copy_.peers() == nullptr || copy_.layout() != layer.layout()) {
-      copy_ = TileLayer<Key>(layer.layout(), comm.share(TileLayer<Key>::bytes_for(layer.layout())));
-    }
-    copy_tiles(layer, copy_, tiles);
-  }
-  TileLayer<Key>& shared = in_place ? layer : copy_;
-  std::vector<TileLayer<Key>> layers;
-  for (const int rank : host_->ranks()) layers.push_back(shared.of_peer(rank));
-  const auto index_of = [&](int rank) {
-    return static_cast<std::size_t>(std::ranges::find(host_->ranks(), rank) - host_->ranks().begin());
-  };
-
-  host_->meet();  // all layers are drawn
-  host_->start_frame();
-  const Activity here = look_at(layers, tiles);
-  const bool straight = host_->alone() && !shown_by.empty();
-  std::vector<std::size_t> owners;  // per position, as an index of a layer
-  if (straight) {
-    for (const std::size_t tile : tiles) owners.push_back(index_of(shown_by[shared.layout().place(tile).screen]));
-  } else {
-    // Hosts must cut alike, so between hosts all ranks' tiles are weighed.
-    const auto runs =
-        host_->alone() ? here.cut({0, tiles.size()}, comm.size())
-                       : share_activity(comm, shared, tiles).cut({0, tiles.size()}, static_cast<int>(host_->columns()));
-    for (std::size_t run = 0; run < runs.size(); ++run) owners.insert(owners.end(), runs[run].count, run);
-  }
-
-  for (TileRun turn = host_->take(here); turn.count > 0; turn = host_->take(here)) {
+  /// Into that of `owner`. Returns the bytes read.
+  std::size_t merge(std::size_t position, std::size_t tile, std::size_t owner) {
+    const std::span<Pixel> into = layers_[owner].tile(tile);
+    fold_.start(into, activity_.active(static_cast<int>(owner), position));
     std::size_t bytes = 0;
-    for (std::size_t i = turn.first; i < turn.end(); ++i) bytes += merge_tile(layers, here, i, tiles[i], owners[i]);
-    comm.worked(bytes);
+    for (const std::size_t index : order_) {
+      if (!activity_.active(static_cast<int>(index), position)) continue;
+      const std::span<const Pixel> content = std::as_const(layers_[index]).tile(tile);
+      fold_.add(content);
+      if (index != owner) bytes += content.size_bytes();
+    }
+    fold_.finish();
+    return bytes;
   }
-  host_->meet();  // all tiles are merged, and nobody reads this rank's layer any more
 
-  std::vector<std::size_t> mine;
-  const std::size_t self = index_of(comm.rank());
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (owners[i] != self) continue;
-    mine.push_back(tiles[i]);
-    if (here.weight(i) > 0) shared.set_active(tiles[i]);
-  }
-  Composited result{std::move(mine), straight};
-  if (!host_->alone()) {
-    result = host_->column() == nullptr ? Composited{}
-                                        : host_->between_hosts().composite(*host_->column(), shared, result.tiles);
-  }
-  if (!in_place) copy_tiles(shared, layer, result.tiles);
-  return result;
-}
+ private:
+  std::span<TileLayer<Pixel>> layers_;
+  std::span<const std::size_t> order_;
+  const Activity& activity_;
+  TileFold<Pixel> fold_;
+};
 
-void SharedMemory::copy_tiles(const TileLayer<Key>& from, TileLayer<Key>& to, std::span<const std::size_t> tiles) {
+/// Keys in any order, straight where they belong.
+template <>
+class TileMerger<Key> {
+ public:
+  TileMerger(std::span<TileLayer<Key>> layers, std::span<const std::size_t> /*order*/, const Activity& activity)
+      : layers_(layers), activity_(activity) {}
+
+  std::size_t merge(std::size_t position, std::size_t tile, std::size_t owner) {
+    const std::span<Key> into = layers_[owner].tile(tile);
+    bool filled = activity_.active(static_cast<int>(owner), position);
+    std::size_t bytes = 0;
+    for (std::size_t other = 0; other < layers_.size(); ++other) {
+      if (other == owner || !activity_.active(static_cast<int>(other), position)) continue;
+      const std::span<const Key> from = std::as_const(layers_[other]).tile(tile);
+      if (filled) {
+        merge_keys(into, from);
+      } else {
+        std::ranges::copy(from, into.begin());
+      }
+      filled = true;
+      bytes += from.size_bytes();
+    }
+    return bytes;
+  }
+
+ private:
+  std::span<TileLayer<Key>> layers_;
+  const Activity& activity_;
+};
+
+template <typename Pixel>
+void copy_tiles(const TileLayer<Pixel>& from, TileLayer<Pixel>& to, std::span<const std::size_t> tiles) {
   for (const std::size_t tile : tiles) {
     if (from.active(tile)) {
       std::ranges::copy(from.tile(tile), to.tile(tile).begin());
@@ -207,6 +194,116 @@ void SharedMemory::copy_tiles(const TileLayer<Key>& from, TileLayer<Key>& to, st
       to.clear(tile);
     }
   }
+}
+
+std::size_t place_in(std::span<const int> list, int value) {
+  return static_cast<std::size_t>(std::ranges::find(list, value) - list.begin());
+}
+
+}  // namespace
+
+template <typename Pixel>
+SharedMemorySchedule<Pixel>::SharedMemorySchedule() = default;
+template <typename Pixel>
+SharedMemorySchedule<Pixel>::~SharedMemorySchedule() = default;
+
+template <typename Pixel>
+Composited SharedMemorySchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer,
+                                            std::span<const std::size_t> tiles, std::span<const int> order,
+                                            std::span<const int> shown_by) {
+  if (!host_ || !host_->belongs_to(comm)) {
+    host_ = std::make_unique<HostRanks>(comm);
+    copy_ = {};
+  }
+  if (!order.empty() && !host_->holds_runs_of(order)) {
+    RenumberedCommunicator ordered(comm, order);
+    std::vector<int> shown_at;
+    for (const int rank : shown_by) shown_at.push_back(static_cast<int>(place_in(order, rank)));
+    return out_of_order_.run(ordered, layer, tiles, shown_at);
+  }
+  const bool in_place = layer.peers() != nullptr;
+  if (!in_place) {
+    if (copy_.peers() == nullptr || copy_.layout() != layer.layout()) {
+      copy_ = TileLayer<Pixel>(layer.layout(), comm.share(TileLayer<Pixel>::bytes_for(layer.layout())));
+    }
+    copy_tiles(layer, copy_, tiles);
+  }
+  TileLayer<Pixel>& shared = in_place ? layer : copy_;
+  Composited result = merge_on_host(comm, shared, tiles, order, shown_by);
+  if (!host_->alone()) result = merge_between_hosts(shared, result, order);
+  if (!in_place) copy_tiles(shared, layer, result.tiles);
+  return result;
+}
+
+template <typename Pixel>
+Composited SharedMemorySchedule<Pixel>::merge_on_host(Communicator& comm, TileLayer<Pixel>& shared,
+                                                      std::span<const std::size_t> tiles, std::span<const int> order,
+                                                      std::span<const int> shown_by) {
+  std::vector<TileLayer<Pixel>> layers;
+  for (const int rank : host_->ranks()) layers.push_back(shared.of_peer(rank));
+  std::vector<std::size_t> front_to_back;
+  for (const int rank : order) {
+    const std::size_t index = place_in(host_->ranks(), rank);
+    if (index < layers.size()) front_to_back.push_back(index);
+  }
+
+  host_->meet();  // all layers are drawn
+  host_->start_frame();
+  const Activity here = look_at<Pixel>(layers, tiles);
+  const bool straight = host_->alone() && !shown_by.empty();
+  std::vector<std::size_t> owners;  // per position, as an index of a layer
+  if (straight) {
+    for (const std::size_t tile : tiles) {
+      owners.push_back(place_in(host_->ranks(), shown_by[shared.layout().place(tile).screen]));
+    }
+  } else {
+    // Hosts must cut alike, so between hosts all ranks' tiles are weighed.
+    const auto runs =
+        host_->alone() ? here.cut({0, tiles.size()}, comm.size())
+                       : share_activity(comm, shared, tiles).cut({0, tiles.size()}, static_cast<int>(host_->columns()));
+    for (std::size_t run = 0; run < runs.size(); ++run) owners.insert(owners.end(), runs[run].count, run);
+  }
+
+  TileMerger<Pixel> merger(layers, front_to_back, here);
+  for (TileRun turn = host_->take(here); turn.count > 0; turn = host_->take(here)) {
+    std::size_t bytes = 0;
+    for (std::size_t i = turn.first; i < turn.end(); ++i) bytes += merger.merge(i, tiles[i], owners[i]);
+    comm.worked(bytes);
+  }
+  host_->meet();  // all tiles are merged, and nobody reads this rank's layer any more
+
+  std::vector<std::size_t> mine;
+  const std::size_t self = place_in(host_->ranks(), comm.rank());
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (owners[i] != self) continue;
+    mine.push_back(tiles[i]);
+    if (here.weight(i) > 0) shared.set_active(tiles[i]);
+  }
+  return {std::move(mine), straight};
+}
+
+template <typename Pixel>
+Composited SharedMemorySchedule<Pixel>::merge_between_hosts(TileLayer<Pixel>& shared, const Composited& of_host,
+                                                            std::span<const int> order) {
+  Communicator* const column = host_->column();
+  if (column == nullptr) return {};
+  if (order.empty()) return between_hosts_.run(*column, shared, of_host.tiles, {});
+  std::vector<int> hosts;  // the column's ranks, front to back
+  for (const int rank : order) {
+    const std::size_t member = place_in(host_->column_ranks(), rank);
+    if (member < host_->column_ranks().size()) hosts.push_back(static_cast<int>(member));
+  }
+  RenumberedCommunicator ordered(*column, hosts);
+  return between_hosts_.run(ordered, shared, of_host.tiles, {});
+}
+
+template class SharedMemorySchedule<Key>;
+template class SharedMemorySchedule<Rgba8Premultiplied>;
+template class SharedMemorySchedule<RgbaPremultiplied>;
+
+Composited SharedMemory::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                   std::span<const int> shown_by) {
+  return schedule_.run(comm, layer, tiles, {}, shown_by);
 }
 
 std::optional<Prediction> SharedMemory::predict(const Costs& costs, const Load& load) const {

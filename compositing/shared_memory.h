@@ -5,8 +5,35 @@
 #include <vector>
 
 #include "compositing/compositor.h"
+#include "compositing/direct_send.h"
+#include "compositing/radix_k.h"
 
 namespace hpr {
+
+/// Which ranks are on which host, and the counter by which those of this host share their work.
+class HostRanks;
+
+/// The shared-memory strategy for any kind of pixel.
+template <typename Pixel>
+class SharedMemorySchedule {
+ public:
+  SharedMemorySchedule();
+  ~SharedMemorySchedule();
+
+  /// `order`: the ranks from front to back, which only colours ask for; keys have none.
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> order, std::span<const int> shown_by);
+
+ private:
+  Composited merge_on_host(Communicator& comm, TileLayer<Pixel>& shared, std::span<const std::size_t> tiles,
+                           std::span<const int> order, std::span<const int> shown_by);
+  Composited merge_between_hosts(TileLayer<Pixel>& shared, const Composited& of_host, std::span<const int> order);
+
+  std::unique_ptr<HostRanks> host_;         ///< of the communicator of the last call
+  TileLayer<Pixel> copy_;                   ///< of layers that live elsewhere
+  RadixKSchedule<Pixel> between_hosts_;     ///< of a run of the order on each
+  DirectSendSchedule<Pixel> out_of_order_;  ///< where the order runs to and fro between hosts
+};
 
 /// The ranks of a host merge each other's layers where they lie, without a message: whoever is free takes the next
 /// tiles, reads them in all layers and writes the nearest keys into the layer of the rank that is to own them, straight
@@ -20,8 +47,6 @@ namespace hpr {
 /// among the ranks as they find time, so that ranks that wait for a core hold nobody up.
 class SharedMemory final : public Compositor {
  public:
-  SharedMemory();
-  ~SharedMemory() override;
   [[nodiscard]] std::string_view name() const override { return "shared-memory"; }
   [[nodiscard]] bool merges_in_place() const override { return true; }
   using Compositor::composite;
@@ -30,11 +55,7 @@ class SharedMemory final : public Compositor {
   [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
-  class Host;
-  static void copy_tiles(const TileLayer<Key>& from, TileLayer<Key>& to, std::span<const std::size_t> tiles);
-
-  std::unique_ptr<Host> host_;  ///< of the communicator of the last call
-  TileLayer<Key> copy_;         ///< of layers that live elsewhere
+  SharedMemorySchedule<Key> schedule_;
 };
 
 }  // namespace hpr

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "image/key.h"
+#include "image/premultiplied.h"
 #include "image/tiles.h"
 
 /// Tiles that are partly drawn: which pixels are, and those alone.
@@ -14,14 +15,26 @@ namespace hpr {
 /// One bit per pixel of a tile, the lowest first: is anything there?
 using TileMask = std::array<std::uint64_t, kTilePixels / 64>;
 
-/// Fills `mask`; returns how many pixels of the tile are drawn.
+/// Fills `mask`; returns how many pixels of the tile are drawn: have a bit that is not zero.
 std::size_t find_drawn(std::span<const Key, kTilePixels> tile, TileMask& mask);
+std::size_t find_drawn(std::span<const Rgba8Premultiplied, kTilePixels> tile, TileMask& mask);
+std::size_t find_drawn(std::span<const RgbaPremultiplied, kTilePixels> tile, TileMask& mask);
 
 /// Writes the drawn pixels of a tile one after the other to `packed`, which has room for kTilePixels of them: the ones
 /// past the last are scratch. Returns how many there are.
 std::size_t pack_drawn(std::span<const Key, kTilePixels> tile, const TileMask& mask, Key* packed);
+std::size_t pack_drawn(std::span<const Rgba8Premultiplied, kTilePixels> tile, const TileMask& mask,
+                       Rgba8Premultiplied* packed);
+std::size_t pack_drawn(std::span<const RgbaPremultiplied, kTilePixels> tile, const TileMask& mask,
+                       RgbaPremultiplied* packed);
 
 /// Merges packed pixels, as many as `mask` marks, into a tile: the nearer surface stays.
 void merge_packed(std::span<Key, kTilePixels> tile, const TileMask& mask, std::span<const Key> packed);
+
+/// Writes packed pixels, as many as `mask` marks, to where they were; the other pixels of the tile stay.
+void unpack_drawn(std::span<const Rgba8Premultiplied> packed, const TileMask& mask,
+                  std::span<Rgba8Premultiplied, kTilePixels> tile);
+void unpack_drawn(std::span<const RgbaPremultiplied> packed, const TileMask& mask,
+                  std::span<RgbaPremultiplied, kTilePixels> tile);
 
 }  // namespace hpr

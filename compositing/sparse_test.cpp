@@ -72,5 +72,42 @@ TEST(Sparse, MergingPackedPixelsIsThePixelwiseMaximum) {
   }
 }
 
+template <typename Pixel>
+class SparseColors : public testing::Test {};
+using PixelTypes = testing::Types<Rgba8Premultiplied, RgbaPremultiplied>;
+TYPED_TEST_SUITE(SparseColors, PixelTypes);
+
+TYPED_TEST(SparseColors, PackingAndUnpackingGivesTheTileBack) {
+  std::mt19937_64 random(3);
+  using Channel = decltype(TypeParam::a);
+  for (const unsigned percent : {0U, 1U, 50U, 100U}) {
+    std::vector<TypeParam> tile(kTilePixels);
+    std::size_t drawn = 0;
+    for (TypeParam& pixel : tile) {
+      if (random() % 100 >= percent) continue;
+      // One channel is enough, whichever it is.
+      const auto value = static_cast<Channel>(1 + random() % 200);
+      const auto which = random() % 4;
+      pixel = {which == 0 ? value : Channel{}, which == 1 ? value : Channel{}, which == 2 ? value : Channel{},
+               which == 3 ? value : Channel{}};
+      ++drawn;
+    }
+    const auto whole = std::span<const TypeParam>(tile).template first<kTilePixels>();
+    on_every_instruction_set([&] {
+      TileMask mask;
+      ASSERT_EQ(find_drawn(whole, mask), drawn);
+      std::vector<TypeParam> packed(kTilePixels);
+      ASSERT_EQ(pack_drawn(whole, mask, packed.data()), drawn);
+      packed.resize(drawn);
+      packed.shrink_to_fit();  // reading past the last would be seen by the address sanitizer
+      std::vector<TypeParam> back(kTilePixels);
+      const TypeParam guard{7, 7, 7, 7};  // pixels that are not drawn stay
+      for (std::size_t i = 0; i < kTilePixels; ++i) back[i] = tile[i] == TypeParam{} ? guard : TypeParam{};
+      unpack_drawn(std::span<const TypeParam>(packed), mask, std::span(back).template first<kTilePixels>());
+      for (std::size_t i = 0; i < kTilePixels; ++i) ASSERT_EQ(back[i], tile[i] == TypeParam{} ? guard : tile[i]) << i;
+    });
+  }
+}
+
 }  // namespace
 }  // namespace hpr

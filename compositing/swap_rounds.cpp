@@ -2,9 +2,10 @@
 
 namespace hpr {
 
-TileRun SwapRounds::run(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                        const Activity& activity, std::span<const int> factors, int member,
-                        const std::function<int(int)>& rank_of) {
+template <typename Pixel>
+TileRun SwapRounds<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                               const Activity& activity, std::span<const int> factors, int member,
+                               const std::function<int(int)>& rank_of) {
   TileRun mine{0, tiles.size()};
   int stride = 1;
   for (const int factor : factors) {
@@ -25,12 +26,14 @@ TileRun SwapRounds::run(Communicator& comm, TileLayer<Key>& layer, std::span<con
       from.push_back(peer);
     }
     mine = parts[static_cast<std::size_t>(digit)];
-    comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
-      reader_.merge(comm, peer, message, layer, tiles.subspan(mine.first, mine.count));
-    });
+    merger_.exchange(comm, out, from, layer, tiles.subspan(mine.first, mine.count));
     stride *= factor;
   }
   return mine;
 }
+
+template class SwapRounds<Key>;
+template class SwapRounds<Rgba8Premultiplied>;
+template class SwapRounds<RgbaPremultiplied>;
 
 }  // namespace hpr

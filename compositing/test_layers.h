@@ -43,7 +43,8 @@ inline TileLayer<Key> random_layer(int rank, const FrameLayout& layout, std::uin
 }
 
 /// Makes the empty layer `to` a copy.
-inline void copy_layer(const TileLayer<Key>& from, TileLayer<Key>& to) {
+template <typename Pixel>
+void copy_layer(const TileLayer<Pixel>& from, TileLayer<Pixel>& to) {
   for (std::size_t tile = 0; tile < from.tiles(); ++tile) {
     if (!from.active(tile)) continue;
     std::ranges::copy(from.tile(tile), to.tile(tile).begin());

@@ -25,22 +25,18 @@ constexpr std::size_t count_bytes(std::size_t active) {
   return (active * sizeof(std::uint16_t) + sizeof(Word) - 1) / sizeof(Word) * sizeof(Word);
 }
 
-/// What follows the head of a message for one tile.
-constexpr std::size_t packed_bytes(std::uint16_t drawn) {
-  return drawn == 0 || drawn > kMostPackedPixels ? 0 : sizeof(TileMask) + drawn * sizeof(Key);
-}
-
 [[noreturn]] void malformed(const std::string& what) {
   throw Error(ExitCode::Internal, "a message of tiles is malformed: " + what,
               "ranks of different builds cannot work together");
 }
 
 /// Whether a tile is surely full enough to travel whole, from every eighth word of it: most are, or hold little.
-bool looks_full(std::span<const Key, kTilePixels> keys) {
+template <typename Pixel>
+bool looks_full(std::span<const Pixel, kTilePixels> tile) {
   std::size_t drawn = 0;
   std::size_t seen = 0;
   for (std::size_t first = 0; first < kTilePixels; first += 512) {
-    for (const Key key : keys.subspan(first, 64)) drawn += key != kNoKey ? 1U : 0U;
+    for (const Pixel pixel : tile.subspan(first, 64)) drawn += pixel != Pixel{} ? 1U : 0U;
     seen += 64;
   }
   return drawn * kTilePixels > kMostPackedPixels * seen * 9 / 8;
@@ -58,7 +54,7 @@ class PackedTiles {
     TileMask mask;
     std::memcpy(mask.data(), next_, sizeof mask);
     merge_packed(tile.first<kTilePixels>(), mask, {reinterpret_cast<const Key*>(next_ + sizeof mask), drawn});
-    next_ += packed_bytes(drawn);
+    next_ += packed_bytes(drawn, sizeof(Key));
   }
 
  private:
@@ -66,16 +62,16 @@ class PackedTiles {
 };
 
 /// Every mask marks as many pixels as its tile announced.
-void check_masks(const TileHead& head) {
+void check_masks(const TileHead& head, std::size_t pixel_bytes) {
   const std::byte* next = head.packed.data();
   for (const std::uint16_t drawn : head.drawn) {
-    if (packed_bytes(drawn) == 0) continue;
+    if (packed_bytes(drawn, pixel_bytes) == 0) continue;
     TileMask mask;
     std::memcpy(mask.data(), next, sizeof mask);
     std::size_t bits = 0;
     for (const Word word : mask) bits += static_cast<std::size_t>(std::popcount(word));
     if (bits != drawn) malformed(fmt::format("{} pixels are marked as drawn, {} were announced", bits, drawn));
-    next += packed_bytes(drawn);
+    next += packed_bytes(drawn, pixel_bytes);
   }
 }
 
@@ -117,32 +113,33 @@ void TileMessage::add_head(std::span<const std::uint16_t> drawn) {
   head_.append(std::as_bytes(std::span(counts)));
 }
 
-void TileMessage::add(const TileLayer<Key>& layer, std::span<const std::size_t> tiles) {
+template <typename Pixel>
+void TileMessage::add_packed(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
   std::vector<std::uint16_t> drawn(tiles.size(), TileHead::kInactive);
   std::vector<TileMask> masks;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (!layer.active(tiles[i])) continue;
-    const auto keys = layer.tile(tiles[i]).first<kTilePixels>();
+    const auto tile = layer.tile(tiles[i]).template first<kTilePixels>();
     drawn[i] = kWholeTile;
-    if (looks_full(keys)) continue;
+    if (looks_full(tile)) continue;
     TileMask mask;
-    const std::size_t pixels = find_drawn(keys, mask);
+    const std::size_t pixels = find_drawn(tile, mask);
     if (pixels > kMostPackedPixels) continue;
     drawn[i] = static_cast<std::uint16_t>(pixels);
     if (pixels > 0) masks.push_back(mask);
   }
   add_head(drawn);
-  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMostPackedPixels * sizeof(Key)) +
-                kTilePixels * sizeof(Key));
+  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMostPackedPixels * sizeof(Pixel)) +
+                kTilePixels * sizeof(Pixel));
   auto mask = masks.begin();
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const std::size_t bytes = packed_bytes(drawn[i]);
+    const std::size_t bytes = packed_bytes(drawn[i], sizeof(Pixel));
     if (bytes == 0) continue;
     const std::size_t at = head_.size();
-    std::byte* const room = head_.extend(sizeof *mask + kTilePixels * sizeof(Key)).data();
+    std::byte* const room = head_.extend(sizeof *mask + kTilePixels * sizeof(Pixel)).data();
     std::memcpy(room, mask->data(), sizeof *mask);
-    const auto* const packed = reinterpret_cast<Key*>(room + sizeof *mask);
-    const std::size_t pixels = pack_drawn(layer.tile(tiles[i]).first<kTilePixels>(), *mask, const_cast<Key*>(packed));
+    auto* const packed = reinterpret_cast<Pixel*>(room + sizeof *mask);
+    const std::size_t pixels = pack_drawn(layer.tile(tiles[i]).template first<kTilePixels>(), *mask, packed);
     HPR_CHECK(pixels == drawn[i]);
     head_.shrink(at + bytes);
     ++mask;
@@ -150,7 +147,11 @@ void TileMessage::add(const TileLayer<Key>& layer, std::span<const std::size_t> 
   add_bodies(layer, tiles, drawn);
 }
 
-TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool packs) {
+template void TileMessage::add_packed(const TileLayer<Key>&, std::span<const std::size_t>);
+template void TileMessage::add_packed(const TileLayer<Rgba8Premultiplied>&, std::span<const std::size_t>);
+template void TileMessage::add_packed(const TileLayer<RgbaPremultiplied>&, std::span<const std::size_t>);
+
+TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool packs, std::size_t pixel_bytes) {
   std::vector<Word> head(1 + words_for(tiles));
   const std::size_t head_bytes = head.size() * sizeof(Word);
   if (message.size() < head_bytes) {
@@ -177,13 +178,13 @@ TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool 
     if (drawn != kWholeTile && !(packs && drawn <= kMostPackedPixels)) {
       malformed(fmt::format("tile {} of {} is said to have {} pixels", i, tiles, drawn));
     }
-    expected += packed_bytes(drawn);
+    expected += packed_bytes(drawn, pixel_bytes);
   }
   parsed.packed = message.subspan(head_bytes + count_bytes(active));
   if (parsed.packed.size() != expected) {
     malformed(fmt::format("packed tiles take {} bytes, {} came", expected, parsed.packed.size()));
   }
-  check_masks(parsed);
+  check_masks(parsed, pixel_bytes);
   return parsed;
 }
 
@@ -225,6 +226,29 @@ void TileReader::replace(Communicator& comm, int from, std::span<const std::byte
     packed.merge_next(layer.tile(tiles[i]), head.drawn[i]);
     layer.set_active(tiles[i]);
   }
+}
+
+template <typename Pixel>
+void TileReader::replace_packed(Communicator& comm, int from, std::span<const std::byte> message,
+                                TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
+  const TileHead head = parse_head(message, tiles.size(), true, sizeof(Pixel));
+  receive_whole(comm, from, head, layer, tiles);
+  const std::byte* next = head.packed.data();
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (head.drawn[i] == TileHead::kInactive || head.whole(i)) continue;
+    if (head.drawn[i] > 0) unpack_tile(next, head.drawn[i], layer.tile(tiles[i]));
+    layer.set_active(tiles[i]);
+    next += packed_bytes(head.drawn[i], sizeof(Pixel));
+  }
+}
+
+void TileReader::replace(Communicator& comm, int from, std::span<const std::byte> message,
+                         TileLayer<Rgba8Premultiplied>& layer, std::span<const std::size_t> tiles) {
+  replace_packed(comm, from, message, layer, tiles);
+}
+void TileReader::replace(Communicator& comm, int from, std::span<const std::byte> message,
+                         TileLayer<RgbaPremultiplied>& layer, std::span<const std::size_t> tiles) {
+  replace_packed(comm, from, message, layer, tiles);
 }
 
 }  // namespace hpr

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "cluster/communicator.h"
+#include "compositing/sparse.h"
 #include "core/byte_buffer.h"
 #include "image/key.h"
+#include "image/premultiplied.h"
 #include "image/tiles.h"
 
 /// Tiles as messages between ranks of one run of HPR (never as files: the byte order is the machine's). A message says
@@ -20,11 +22,11 @@
 ///   2 bytes each       per active tile how many of its pixels follow, or kWholeTile; zeros up to a multiple of 8
 ///   then per active tile that is not whole, in order of the list, unless it has no pixels:
 ///     512 bytes        one bit per pixel of the tile: is it drawn?
-///     8 bytes each     the drawn pixels, one after the other
+///     8 bytes each     the drawn pixels, one after the other (keys; others take their size), up to a multiple of 8
+///     bytes
 ///
 ///   bodies             the whole tiles, in order of the list; tiles that are neighbours in the frame share one body,
-///   up
-///                      to kTilesOfABody of them
+///                      up to kTilesOfABody of them
 ///
 /// The list of tiles itself does not travel: sender and receiver both know it. Scattered pixels cost 8 bytes and a bit
 /// each, however they lie; a tile so full that packing saves little travels whole, since that is sent and merged
@@ -37,6 +39,21 @@ inline constexpr std::uint16_t kWholeTile = 0xFFFF;
 inline constexpr std::size_t kMostPackedPixels = kTilePixels * 3 / 4;
 /// So many tiles of keys, half a megabyte, stay in a core's cache between arriving and being merged.
 inline constexpr std::size_t kTilesOfABody = 16;
+
+/// What follows the head of a message for one tile of which so many pixels are packed; nothing for the others.
+[[nodiscard]] constexpr std::size_t packed_bytes(std::uint16_t drawn, std::size_t pixel_bytes) {
+  if (drawn == 0 || drawn > kMostPackedPixels) return 0;
+  return sizeof(TileMask) + (drawn * pixel_bytes + 7) / 8 * 8;
+}
+
+/// Puts the drawn pixels of one tile of a message, `packed` as that says, where they were; the others stay.
+template <typename Pixel>
+void unpack_tile(const std::byte* packed, std::uint16_t drawn, std::span<Pixel> tile) {
+  TileMask mask;
+  std::memcpy(mask.data(), packed, sizeof mask);
+  unpack_drawn(std::span(reinterpret_cast<const Pixel*>(packed + sizeof mask), drawn), mask,
+               tile.template first<kTilePixels>());
+}
 
 /// What a message of tiles says about itself.
 struct TileHead {
@@ -63,8 +80,10 @@ class TileMessage {
   /// Starts a message with `prefix` (a multiple of 8 bytes), which the receiver takes off before it reads the tiles.
   void start(std::span<const std::byte> prefix = {});
 
-  /// Adds `tiles` of `layer`; once per message. Keys are packed where that pays, other pixels are not.
-  void add(const TileLayer<Key>& layer, std::span<const std::size_t> tiles);
+  /// Adds `tiles` of `layer`; once per message. Pixels that are composited are packed where that pays, others are not.
+  void add(const TileLayer<Key>& layer, std::span<const std::size_t> tiles) { add_packed(layer, tiles); }
+  void add(const TileLayer<Rgba8Premultiplied>& layer, std::span<const std::size_t> tiles) { add_packed(layer, tiles); }
+  void add(const TileLayer<RgbaPremultiplied>& layer, std::span<const std::size_t> tiles) { add_packed(layer, tiles); }
   template <typename Pixel>
   void add(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
     std::vector<std::uint16_t> drawn(tiles.size(), TileHead::kInactive);
@@ -79,6 +98,8 @@ class TileMessage {
   [[nodiscard]] std::span<const std::byte> head() const { return head_.bytes(); }
 
  private:
+  template <typename Pixel>
+  void add_packed(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles);
   void add_head(std::span<const std::uint16_t> drawn);
   template <typename Pixel>
   void add_bodies(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
@@ -92,8 +113,10 @@ class TileMessage {
 };
 
 /// Checks the format, the bits, the counts and the length of a message for a list of `tiles` tiles. `packs`: whether
-/// tiles may be packed. Throws Error (Internal): a rank that sends nonsense is a fault of the program.
-[[nodiscard]] TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool packs);
+/// tiles may be packed, in pixels of so many bytes. Throws Error (Internal): a rank that sends nonsense is a fault of
+/// the program.
+[[nodiscard]] TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool packs,
+                                  std::size_t pixel_bytes = sizeof(Key));
 
 /// Reads messages of tiles inside the call an exchange makes for each; keeps its memory from frame to frame.
 class TileReader {
@@ -105,6 +128,10 @@ class TileReader {
   /// Makes `tiles` of `layer` what they were at the sender; tiles that were empty there become empty.
   void replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
                std::span<const std::size_t> tiles);
+  void replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Rgba8Premultiplied>& layer,
+               std::span<const std::size_t> tiles);
+  void replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<RgbaPremultiplied>& layer,
+               std::span<const std::size_t> tiles);
   template <typename Pixel>
   void replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Pixel>& layer,
                std::span<const std::size_t> tiles) {
@@ -112,6 +139,10 @@ class TileReader {
   }
 
  private:
+  template <typename Pixel>
+  static void replace_packed(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Pixel>& layer,
+                             std::span<const std::size_t> tiles);
+
   /// Receives the bodies into the layer and empties the tiles that were empty at the sender.
   template <typename Pixel>
   static void receive_whole(Communicator& comm, int from, const TileHead& head, TileLayer<Pixel>& layer,

@@ -4,8 +4,9 @@
 
 namespace hpr {
 
-Composited Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                           std::span<const int> /*shown_by*/) {
+template <typename Pixel>
+Composited TreeSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                                    std::span<const int> /*shown_by*/) {
   const int rank = comm.rank();
   for (int step = 1; step < comm.size(); step *= 2) {
     if (rank % (2 * step) != 0) {
@@ -17,11 +18,18 @@ Composited Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<
     }
     const int child = rank + step;
     if (child >= comm.size()) continue;
-    comm.exchange({}, {&child, 1}, [&](int from, std::span<const std::byte> message) {
-      reader_.merge(comm, from, message, layer, tiles);
-    });
+    merger_.exchange(comm, {}, {&child, 1}, layer, tiles);
   }
   return owning(tiles, {0, tiles.size()});
+}
+
+template class TreeSchedule<Key>;
+template class TreeSchedule<Rgba8Premultiplied>;
+template class TreeSchedule<RgbaPremultiplied>;
+
+Composited Tree::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                           std::span<const int> shown_by) {
+  return schedule_.run(comm, layer, tiles, shown_by);
 }
 
 std::optional<Prediction> Tree::predict(const Costs& costs, const Load& load) const {

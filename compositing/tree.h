@@ -1,9 +1,22 @@
 #pragma once
 
 #include "compositing/compositor.h"
+#include "compositing/piece_merger.h"
 #include "compositing/tile_codec.h"
 
 namespace hpr {
+
+/// The messages of the tree, for any kind of pixel.
+template <typename Pixel>
+class TreeSchedule {
+ public:
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> shown_by);
+
+ private:
+  TileMessage given_;
+  PieceMerger<Pixel> merger_;
+};
 
 /// A binary tree with rank 0 at its root, as in Shaw, Green and Schaeffer, "A VLSI Architecture for Image Composition",
 /// 1988: in round k the ranks that differ in bit k pair off, the higher one hands its layer down and is done.
@@ -19,8 +32,7 @@ class Tree final : public Compositor {
   [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
 
  private:
-  TileMessage given_;
-  TileReader reader_;
+  TreeSchedule<Key> schedule_;
 };
 
 }  // namespace hpr

@@ -1,0 +1,295 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <string>
+#include <tuple>
+
+#include "cluster/counting_communicator.h"
+#include "cluster/local_communicator.h"
+#include "compositing/blender.h"
+#include "compositing/over.h"
+#include "compositing/test_blenders.h"
+#include "compositing/test_layers.h"
+#include "compositing/test_over.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// One thin layer over another over ... in doubles, whose own error is 2^-29 of what is measured.
+std::vector<std::array<double, 4>> exact_over(std::span<const int> order, const FrameLayout& layout, bool bytes,
+                                              std::uint64_t seed) {
+  std::vector<std::array<double, 4>> result(layout.tiles() * kTilePixels);
+  const auto blend = [&](const auto& pixels, double one) {
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      auto& front = result[i];
+      const double through = 1.0 - front[3] / one;
+      front[0] += through * static_cast<double>(pixels[i].r);
+      front[1] += through * static_cast<double>(pixels[i].g);
+      front[2] += through * static_cast<double>(pixels[i].b);
+      front[3] += through * static_cast<double>(pixels[i].a);
+    }
+  };
+  for (const int rank : order) {
+    if (bytes) {
+      blend(test::pixels_of(test::random_colors<Rgba8Premultiplied>(rank, layout, seed)), 255.0);
+    } else {
+      blend(test::pixels_of(test::random_colors<RgbaPremultiplied>(rank, layout, seed)), 1.0);
+    }
+  }
+  return result;
+}
+
+/// The largest distance from the exact result that any strategy reaches.
+template <typename Pixel>
+double largest_error(int ranks, std::uint64_t seed) {
+  const FrameLayout layout({{200, 130}});
+  const std::vector<int> order = test::random_order(ranks, seed);
+  const auto exact = exact_over(order, layout, std::is_same_v<Pixel, Rgba8Premultiplied>, seed);
+  double largest = 0.0;
+  for (const std::string& name : test::every_blender()) {
+    const std::vector<Pixel> frame = test::blended<Pixel>(name, {.size = ranks}, order, layout, seed);
+    for (std::size_t i = 0; i < frame.size(); ++i) {
+      const std::array<double, 4> have{static_cast<double>(frame[i].r), static_cast<double>(frame[i].g),
+                                       static_cast<double>(frame[i].b), static_cast<double>(frame[i].a)};
+      for (std::size_t c = 0; c < 4; ++c) largest = std::max(largest, std::abs(have[c] - exact[i][c]));
+    }
+  }
+  return largest;
+}
+
+TEST(OverErrors, StayWithinTheirBoundAndComeNearEnoughForItToSaySomething) {
+  for (int ranks = 2; ranks <= 9; ++ranks) {
+    const double bytes = largest_error<Rgba8Premultiplied>(ranks, 1);
+    EXPECT_LE(bytes, over_error_bound<Rgba8Premultiplied>(ranks)) << ranks;
+    EXPECT_GE(bytes, over_error_bound<Rgba8Premultiplied>(ranks) / 8) << ranks;
+    const double floats = largest_error<RgbaPremultiplied>(ranks, 2);
+    EXPECT_LE(floats, over_error_bound<RgbaPremultiplied>(ranks)) << ranks;
+    EXPECT_GE(floats, over_error_bound<RgbaPremultiplied>(ranks) / 50) << ranks;
+  }
+}
+
+TEST(Blenders, BrightColorsKeepTheBoundTimesTheirBrightness) {
+  constexpr float kBrightness = 1024.0F;
+  constexpr int kRanks = 7;
+  const FrameLayout layout({{100, 64}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<int> order = test::random_order(kRanks, 4);
+  const auto bright = [&](int rank) {
+    TileLayer<RgbaPremultiplied> layer = test::random_colors<RgbaPremultiplied>(rank, layout);
+    for (RgbaPremultiplied& pixel : layer.run({0, layer.tiles()})) {
+      pixel = {pixel.r * kBrightness, pixel.g * kBrightness, pixel.b * kBrightness, pixel.a};
+    }
+    return layer;
+  };
+  std::vector<RgbaPremultiplied> expected = test::pixels_of(bright(order.front()));
+  for (std::size_t place = 1; place < order.size(); ++place) {
+    const auto back = test::pixels_of(bright(order[place]));
+    for (std::size_t i = 0; i < expected.size(); ++i) expected[i] = test::over_by_definition(expected[i], back[i]);
+  }
+  double largest = 0.0;
+  for (const std::string& name : test::every_blender()) {
+    test::Outcome<RgbaPremultiplied> outcome(layout);
+    run_local_ranks(kRanks, [&](Communicator& comm) {
+      TileLayer<RgbaPremultiplied> layer = bright(comm.rank());
+      const Composited mine = make_blender<RgbaPremultiplied>(name)->blend(comm, layer, tiles, order, {});
+      outcome.add(layer, mine, {}, comm.rank());
+    });
+    largest = std::max(largest, test::largest_difference<RgbaPremultiplied>(outcome.frame, expected, tiles));
+  }
+  const double bound = test::kAnyAssociation * kBrightness * over_error_bound<RgbaPremultiplied>(kRanks);
+  EXPECT_LE(largest, bound);
+  EXPECT_GT(largest, over_error_bound<RgbaPremultiplied>(kRanks));  // that of colours up to 1 would not do
+}
+
+TEST(Blenders, TheOrderOfArrivalChangesNoBit) {
+  const FrameLayout layout({{200, 130}});
+  const std::vector<int> order = test::random_order(6, 2);
+  for (const std::string& name : test::every_blender()) {
+    const auto once = test::blended<RgbaPremultiplied>(name, {.size = 6, .ranks_per_host = 2}, order, layout);
+    for (std::uint64_t disorder = 1; disorder <= 8; ++disorder) {
+      const LocalRanks ranks{.size = 6, .ranks_per_host = 2, .disorder = disorder};
+      const auto again = test::blended<RgbaPremultiplied>(name, ranks, order, layout);
+      EXPECT_EQ(std::memcmp(once.data(), again.data(), once.size() * sizeof once[0]), 0) << name << ' ' << disorder;
+    }
+  }
+}
+
+TEST(Blenders, RadixKWithOneFactorBlendsFrontToBackAndWithOthersWithinTheBound) {
+  const FrameLayout layout({{200, 130}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<int> order = test::random_order(12, 9);
+  const auto serial = test::serial_over<Rgba8Premultiplied>(order, layout);
+  for (const char* name : {"radix-k:12", "radix-k:4,3", "radix-k:2,3,2"}) {
+    EXPECT_TRUE(make_blender<Rgba8Premultiplied>(name)->fits(12));
+    EXPECT_FALSE(make_blender<Rgba8Premultiplied>(name)->fits(8));
+    const auto frame = test::blended<Rgba8Premultiplied>(name, {.size = 12, .disorder = 3}, order, layout);
+    const double largest = test::largest_difference<Rgba8Premultiplied>(frame, serial, tiles);
+    if (std::string_view(name) == "radix-k:12") {
+      EXPECT_EQ(largest, 0.0);
+    } else {
+      EXPECT_LE(largest, test::kAnyAssociation * over_error_bound<Rgba8Premultiplied>(12)) << name;
+      EXPECT_GT(largest, 0.0) << name;
+    }
+  }
+}
+
+TEST(Blenders, AllEqualTransparentOrOpaqueLayers) {
+  const FrameLayout layout({{70, 70}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<int> order{2, 0, 4, 1, 3};
+  for (const std::string& name : test::every_blender()) {
+    for (const float alpha : {0.0F, 1.0F}) {
+      run_local_ranks(5, [&](Communicator& comm) {
+        TileLayer<RgbaPremultiplied> layer(layout);
+        for (const std::size_t tile : tiles) {
+          layer.set_active(tile);
+          // Opaque: the frontmost alone is seen. Light without alpha: all of it adds up.
+          const float light = alpha == 0.0F ? 1.0F : static_cast<float>(comm.rank());
+          std::ranges::fill(layer.tile(tile), RgbaPremultiplied{light, light, light, alpha});
+        }
+        const Composited mine = make_blender<RgbaPremultiplied>(name)->blend(comm, layer, tiles, order, {});
+        const float light = alpha == 0.0F ? 5.0F : 2.0F;
+        for (const std::size_t tile : mine.tiles) {
+          for (const RgbaPremultiplied pixel : layer.tile(tile)) {
+            ASSERT_EQ(pixel, (RgbaPremultiplied{light, light, light, alpha})) << name;
+          }
+        }
+      });
+    }
+  }
+}
+
+TEST(Blenders, WhatIsNoNumberStaysInItsPixel) {
+  const FrameLayout layout({{70, 70}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<int> order{2, 0, 4, 1, 3};
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const std::string& name : test::every_blender()) {
+    run_local_ranks(5, [&](Communicator& comm) {
+      TileLayer<RgbaPremultiplied> layer(layout);
+      for (const std::size_t tile : tiles) {
+        layer.set_active(tile);
+        std::ranges::fill(layer.tile(tile), RgbaPremultiplied{0.25F, 0.25F, 0.25F, 0.5F});
+        if (comm.rank() == 4) layer.tile(tile)[7] = {nan, nan, nan, nan};
+      }
+      const Composited mine = make_blender<RgbaPremultiplied>(name)->blend(comm, layer, tiles, order, {});
+      for (const std::size_t tile : mine.tiles) {
+        for (std::size_t i = 0; i < kTilePixels; ++i) {
+          ASSERT_EQ(std::isnan(layer.tile(tile)[i].g), i == 7) << name << ' ' << i;
+        }
+      }
+    });
+  }
+}
+
+TEST(Blenders, RefuseWhatIsNoOrderOfTheRanks) {
+  const FrameLayout layout({{70, 70}});
+  for (const std::string& name : test::every_blender()) {
+    for (const std::vector<int>& order :
+         std::vector<std::vector<int>>{{}, {0, 1}, {0, 1, 1}, {0, 1, 3}, {-1, 0, 1}, {0, 1, 2, 3}}) {
+      run_local_ranks(3, [&](Communicator& comm) {
+        TileLayer<Rgba8Premultiplied> layer(layout);
+        try {
+          (void)make_blender<Rgba8Premultiplied>(name)->blend(comm, layer, test::all_tiles(layout), order, {});
+          ADD_FAILURE() << name << " took it";
+        } catch (const Error& error) {
+          EXPECT_EQ(error.code(), ExitCode::Internal);
+        }
+      });
+    }
+  }
+}
+
+TEST(Blenders, SharedMemorySendsNoPixelsWhereHostsHoldRunsOfTheOrder) {
+  const FrameLayout layout({{512, 512}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const auto bytes_sent = [&](int ranks_per_host, const std::vector<int>& order) {
+    std::size_t bytes = 0;
+    std::mutex mutex;
+    run_local_ranks({.size = 4, .ranks_per_host = ranks_per_host}, [&](Communicator& comm) {
+      CountingCommunicator counting(comm);
+      TileLayer<Rgba8Premultiplied> layer(layout);
+      for (const std::size_t tile : tiles) {
+        layer.set_active(tile);
+        std::ranges::fill(layer.tile(tile), Rgba8Premultiplied{1, 2, 3, 4});
+      }
+      (void)make_blender<Rgba8Premultiplied>("shared-memory")->blend(counting, layer, tiles, order, {});
+      const std::lock_guard lock(mutex);
+      bytes += counting.bytes_sent();
+    });
+    return bytes / (kTilePixels * sizeof(Rgba8Premultiplied));
+  };
+  EXPECT_EQ(bytes_sent(0, {3, 0, 2, 1}), 0U);        // tiles
+  EXPECT_EQ(bytes_sent(2, {3, 2, 0, 1}), 64U);       // every tile once: half a frame each way
+  EXPECT_EQ(bytes_sent(2, {3, 0, 2, 1}), 3U * 64U);  // to and fro between hosts: direct send
+}
+
+TEST(Blenders, PiecesGoStraightToTheirScreensWhereThoseShareTheWorkEvenly) {
+  const FrameLayout layout({{256, 128}, {256, 128}, {256, 128}, {256, 128}});
+  const std::vector<int> shown_by{2, 0, 3, 1};
+  const std::vector<int> order{1, 3, 0, 2};
+  for (const char* name : {"direct-send", "shared-memory"}) {
+    run_local_ranks(4, [&](Communicator& comm) {
+      TileLayer<Rgba8Premultiplied> layer(layout);
+      for (const std::size_t tile : test::all_tiles(layout)) {
+        layer.set_active(tile);
+        std::ranges::fill(layer.tile(tile), Rgba8Premultiplied{1, 1, 1, 1});
+      }
+      const auto blender = make_blender<Rgba8Premultiplied>(name);
+      const Composited mine = blender->blend(comm, layer, test::all_tiles(layout), order, shown_by);
+      EXPECT_TRUE(mine.assembled) << name;
+      EXPECT_EQ(mine.tiles.size(), 8U) << name;
+      for (const std::size_t tile : mine.tiles) EXPECT_EQ(shown_by[layout.place(tile).screen], comm.rank()) << name;
+    });
+  }
+}
+
+TEST(Blenders, EmptyTilesCostABitAndScatteredPixelsWhatTheyHold) {
+  const FrameLayout layout({{4096, 2048}});
+  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  run_local_ranks(2, [&](Communicator& comm) {
+    CountingCommunicator counting(comm);
+    TileLayer<Rgba8Premultiplied> layer(layout);
+    if (comm.rank() == 1) {
+      layer.set_active(77);
+      for (std::size_t i = 0; i < 101; ++i) layer.tile(77)[i * 5] = {1, 2, 3, 4};
+    }
+    (void)make_blender<Rgba8Premultiplied>("serial")->blend(counting, layer, tiles, std::vector<int>{0, 1}, {});
+    const std::size_t packed = 8 + 512 + 408;  // count, mask, 101 pixels up to a multiple of 8
+    EXPECT_EQ(counting.bytes_sent(), comm.rank() == 1 ? 8 + 2048 / 8 + packed : 0U);
+  });
+}
+
+TEST(MakeBlender, RefusesStrategiesThatKeepNoOrderByName) {
+  for (const char* name : {"ring", "mpi-reduce", "auto"}) {
+    try {
+      (void)make_blender<Rgba8Premultiplied>(name);
+      FAIL() << "expected an Error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::Usage);
+      EXPECT_EQ(error.what(), std::string("strategy '") + name +
+                                  "' is none of those that keep the order of the layers, as `over` needs");
+      EXPECT_EQ(error.hint(), "choices: serial, tree, binary-swap, radix-k, direct-send, shared-memory");
+    }
+  }
+  EXPECT_THROW((void)make_blender<Rgba8Premultiplied>("binray-swap"), Error);
+  EXPECT_THROW((void)make_blender<Rgba8Premultiplied>("radix-k:1"), Error);
+}
+
+TEST(MakeBlender, NamesAreThoseOfCompositors) {
+  for (const std::string& name : test::every_blender()) {
+    EXPECT_EQ(make_compositor(name)->name(), name);
+    EXPECT_EQ(make_compositor(name)->merges_in_place(), make_blender<RgbaPremultiplied>(name)->merges_in_place());
+  }
+}
+
+}  // namespace
+}  // namespace hpr
