@@ -211,6 +211,32 @@ Point draw_strategy(SvgDrawing& drawing, const std::vector<CompareRun>& runs, co
   return last;
 }
 
+void draw_bytes_axis(SvgDrawing& drawing, const Scale& bytes, bool some_send_nothing) {
+  for (const double tick : bytes.ticks()) draw_tick_below(drawing, bytes.at(tick), fmt::format("{:g}", tick));
+  if (some_send_nothing) {
+    draw_tick_below(drawing, kNothingSent, "0");
+    drawing.line({kNothingSent + 30, kTop}, {kNothingSent + 30, kBottom}, {"#444444", 1.0, "2 4"});
+  }
+  drawing.text({(kLeft + kRight) / 2, kBottom + 42}, "MB sent for a frame, all ranks", Anchor::Middle, 13);
+}
+
+/// The runs of strategy number `index`, each with its number of ranks. Returns where the last one stands.
+Point draw_marks(SvgDrawing& drawing, const std::vector<CompareRun>& runs, std::size_t index, const Scale& bytes,
+                 const Scale& times) {
+  Point last{kLeft, kBottom};
+  for (const CompareRun& run : runs) {
+    if (run.ms.median <= 0.0) continue;
+    const double x = run.bytes_total == 0 ? kNothingSent : bytes.at(static_cast<double>(run.bytes_total) / 1e6);
+    last = {x, times.at(run.ms.median)};
+    draw_mark(drawing, look(index), last);
+    // On either side in turns: strategies often send the same.
+    const bool right = index % 2 == 0;
+    drawing.text({last.x + (right ? 8 : -8), last.y + 4}, fmt::format("{}", run.ranks),
+                 right ? Anchor::Start : Anchor::End, 11);
+  }
+  return last;
+}
+
 std::string fastest_text(const std::vector<CompareRun>& runs) {
   const auto& best = *std::ranges::min_element(runs, {}, [](const CompareRun& run) { return run.ms.median; });
   return fmt::format("The fastest run is {} on {} ranks with {:.3g} ms; the table has all figures.", best.strategy,
@@ -262,29 +288,14 @@ std::string plot_time_against_bytes(const std::vector<CompareRun>& all_runs) {
   const Scale bytes = Scale::of(std::move(megabytes), some_send_nothing ? kNothingSent + 60 : kLeft + 20, kRight - 20);
   const Scale times = Scale::of(times_of(runs), kBottom, kTop);
   draw_time_axis(drawing, times);
-  for (const double tick : bytes.ticks()) draw_tick_below(drawing, bytes.at(tick), fmt::format("{:g}", tick));
-  if (some_send_nothing) {
-    draw_tick_below(drawing, kNothingSent, "0");
-    drawing.line({kNothingSent + 30, kTop}, {kNothingSent + 30, kBottom}, {"#444444", 1.0, "2 4"});
-  }
-  drawing.text({(kLeft + kRight) / 2, kBottom + 42}, "MB sent for a frame, all ranks", Anchor::Middle, 13);
+  draw_bytes_axis(drawing, bytes, some_send_nothing);
 
   const auto names = strategies_of(all_runs);
   std::vector<Label> labels;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto own = runs_of(runs, names[i]);
     if (own.empty()) continue;
-    Point last{kLeft, kBottom};
-    for (const CompareRun& run : own) {
-      if (run.ms.median <= 0.0) continue;
-      const double x = run.bytes_total == 0 ? kNothingSent : bytes.at(static_cast<double>(run.bytes_total) / 1e6);
-      last = {x, times.at(run.ms.median)};
-      draw_mark(drawing, look(i), last);
-      // On either side in turns: strategies often send the same.
-      const bool right = i % 2 == 0;
-      drawing.text({last.x + (right ? 8 : -8), last.y + 4}, fmt::format("{}", run.ranks),
-                   right ? Anchor::Start : Anchor::End, 11);
-    }
+    const Point last = draw_marks(drawing, own, i, bytes, times);
     labels.push_back({last, i, names[i]});
   }
   draw_labels(drawing, std::move(labels), false);

@@ -26,8 +26,9 @@ class Replay {
     join_works();
     std::ranges::sort(schedule_.transfers);
     std::ranges::sort(schedule_.gatherings);
-    const auto twice = std::ranges::unique(schedule_.gatherings);  // every member has told of it
-    schedule_.gatherings.erase(twice.begin(), twice.end());
+    auto& gatherings = schedule_.gatherings;
+    gatherings.erase(std::unique(gatherings.begin(), gatherings.end()),
+                     gatherings.end());  // every member has told of it
     return std::move(schedule_);
   }
 
