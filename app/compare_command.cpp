@@ -12,11 +12,10 @@
 #include "app/compare_html.h"
 #include "app/compare_options.h"
 #include "app/compare_report.h"
+#include "app/compare_threads.h"
 #include "app/launcher.h"
 #include "app/simulate_option.h"
-#include "cluster/local_communicator.h"
 #include "cluster/scene_distribution.h"
-#include "cluster/simulated_communicator.h"
 #include "compositing/blender.h"
 #include "compositing/compositor.h"
 #include "compositing/plugin.h"
@@ -242,7 +241,7 @@ class CompareCommand final : public Command {
       const int ranks = counts[i];
       std::vector<CompareRun> runs;
       if (transport_ == "threads" || !simulate_.empty()) {
-        CompareResult here = run_threads(globals, input, ranks);
+        CompareResult here = compare_on_threads(ranks, simulate_, globals.hang_limit(), input, settings_for(ranks));
         runs = std::move(here.runs);
         result.frame = std::move(here.frame);
         result.picture = std::move(here.picture);
@@ -259,27 +258,6 @@ class CompareCommand final : public Command {
       result.runs.insert(result.runs.end(), runs.begin(), runs.end());
     }
     return finish(globals, input, std::move(result));
-  }
-
-  /// Ranks are threads of this process, on a simulated cluster if one is asked for.
-  [[nodiscard]] CompareResult run_threads(const Globals& globals, const CompareInput& input, int ranks) const {
-    CompareResult result;
-    const auto compare = [&](Communicator& comm) {
-      CompareResult here = compare_strategies(comm, input, settings_for(ranks));
-      if (comm.rank() == 0) result = std::move(here);
-    };
-    LocalRanks local{.size = ranks, .hang_timeout = globals.hang_limit()};
-    if (simulate_.empty()) {
-      run_local_ranks(local, compare);
-      return result;
-    }
-    const SimulatedCluster cluster = parse_simulation(simulate_);
-    local.ranks_per_host = cluster.ranks_per_host();
-    run_local_ranks(local, [&](Communicator& comm) {
-      SimulatedCommunicator simulated(comm, cluster);
-      compare(simulated);
-    });
-    return result;
   }
 
   /// Refuses what this host cannot hold, before ranks start to share it.

@@ -1,21 +1,15 @@
 #include "cluster/mpi_communicator.h"
 
 #include <fmt/format.h>
-#include <linux/futex.h>
 #include <sched.h>
-#include <sys/mman.h>
-#include <sys/statvfs.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <exception>
-#include <limits>
 #include <string>
-#include <thread>
 
 #include "cluster/collectives.h"
+#include "cluster/mpi_error.h"
+#include "cluster/window_memory.h"
 #include "core/check.h"
 #include "core/error.h"
 
@@ -24,16 +18,6 @@ namespace {
 
 constexpr int kTag = 0;
 
-void check(int code, const char* call) {
-  if (code == MPI_SUCCESS) return;
-  std::string text(MPI_MAX_ERROR_STRING, '\0');
-  int length = 0;
-  MPI_Error_string(code, text.data(), &length);
-  text.resize(static_cast<std::size_t>(length));
-  throw Error(ExitCode::Lost, fmt::format("{}: {}", call, text),
-              "see the other ranks' messages; a host or rank may be gone");
-}
-
 }  // namespace
 
 MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes)
@@ -41,7 +25,7 @@ MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_
           Owned{},
           [&] {
             MPI_Comm copy = MPI_COMM_NULL;
-            check(MPI_Comm_dup(parent, &copy), "MPI_Comm_dup");
+            check_mpi(MPI_Comm_dup(parent, &copy), "MPI_Comm_dup");
             return copy;
           }(),
           hang_timeout, part_bytes) {}
@@ -50,9 +34,9 @@ MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nano
                                  std::size_t part_bytes)
     : comm_(comm), hang_timeout_(std::min(hang_timeout, kLongestWait)), part_bytes_(part_bytes) {
   HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kLargestPart);
-  check(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
-  check(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
-  check(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
+  check_mpi(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  check_mpi(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
+  check_mpi(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
 }
 
 MpiCommunicator::~MpiCommunicator() {
@@ -82,8 +66,8 @@ void MpiCommunicator::wait(std::vector<MPI_Request>& requests, std::string_view 
   poll(
       [&] {
         int all = 0;
-        check(MPI_Testall(static_cast<int>(requests.size()), requests.data(), &all, MPI_STATUSES_IGNORE),
-              "MPI_Testall");
+        check_mpi(MPI_Testall(static_cast<int>(requests.size()), requests.data(), &all, MPI_STATUSES_IGNORE),
+                  "MPI_Testall");
         return all != 0;
       },
       doing, peer);
@@ -94,8 +78,8 @@ void MpiCommunicator::start_send(std::span<const std::byte> message, int to, std
     // The last part is the first one shorter than a full one; it may be empty.
     const auto part = message.first(std::min(message.size(), part_bytes_));
     requests.push_back(MPI_REQUEST_NULL);
-    check(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, kTag, comm_, &requests.back()),
-          "MPI_Isend");
+    check_mpi(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, kTag, comm_, &requests.back()),
+              "MPI_Isend");
     if (part.size() < part_bytes_) return;
     message = message.subspan(part_bytes_);
   }
@@ -112,12 +96,12 @@ std::size_t MpiCommunicator::next_part(int from, MPI_Message& part) {
   poll(
       [&] {
         int found = 0;
-        check(MPI_Improbe(from, kTag, comm_, &found, &part, &status), "MPI_Improbe");
+        check_mpi(MPI_Improbe(from, kTag, comm_, &found, &part, &status), "MPI_Improbe");
         return found != 0;
       },
       "waiting for a message from", from);
   int count = 0;
-  check(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
+  check_mpi(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
   return static_cast<std::size_t>(count);
 }
 
@@ -128,8 +112,9 @@ std::vector<std::byte> MpiCommunicator::receive(int from) {
     const std::size_t size = next_part(from, part);
     message.resize(message.size() + size);
     std::vector<MPI_Request> request{MPI_REQUEST_NULL};
-    check(MPI_Imrecv(message.data() + (message.size() - size), static_cast<int>(size), MPI_BYTE, &part, request.data()),
-          "MPI_Imrecv");
+    check_mpi(
+        MPI_Imrecv(message.data() + (message.size() - size), static_cast<int>(size), MPI_BYTE, &part, request.data()),
+        "MPI_Imrecv");
     wait(request, "receiving from", from);
     if (size < part_bytes_) return message;
   }
@@ -145,7 +130,7 @@ void MpiCommunicator::receive(std::span<std::byte> message, int from) {
                                                   message.size(), from, done + size));
     }
     std::vector<MPI_Request> request{MPI_REQUEST_NULL};
-    check(MPI_Imrecv(message.data() + done, static_cast<int>(size), MPI_BYTE, &part, request.data()), "MPI_Imrecv");
+    check_mpi(MPI_Imrecv(message.data() + done, static_cast<int>(size), MPI_BYTE, &part, request.data()), "MPI_Imrecv");
     wait(request, "receiving from", from);
     done += size;
     if (size < part_bytes_) return;
@@ -158,15 +143,16 @@ bool MpiCommunicator::advance(Incoming& incoming) {
     if (incoming.request == MPI_REQUEST_NULL) {
       MPI_Message part = MPI_MESSAGE_NULL;
       MPI_Status status;
-      check(MPI_Improbe(incoming.from, kTag, comm_, &done, &part, &status), "MPI_Improbe");
+      check_mpi(MPI_Improbe(incoming.from, kTag, comm_, &done, &part, &status), "MPI_Improbe");
       if (done == 0) return false;
       int count = 0;
-      check(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
+      check_mpi(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
       incoming.last_part = static_cast<std::size_t>(count);
-      check(MPI_Imrecv(incoming.buffer.extend(incoming.last_part).data(), count, MPI_BYTE, &part, &incoming.request),
-            "MPI_Imrecv");
+      check_mpi(
+          MPI_Imrecv(incoming.buffer.extend(incoming.last_part).data(), count, MPI_BYTE, &part, &incoming.request),
+          "MPI_Imrecv");
     }
-    check(MPI_Test(&incoming.request, &done, MPI_STATUS_IGNORE), "MPI_Test");
+    check_mpi(MPI_Test(&incoming.request, &done, MPI_STATUS_IGNORE), "MPI_Test");
     if (done == 0) return false;
     if (incoming.last_part < part_bytes_) return true;
   }
@@ -214,9 +200,9 @@ void MpiCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
   while (!values.empty()) {
     const auto part = values.first(std::min(values.size(), most));
     std::vector<MPI_Request> request{MPI_REQUEST_NULL};
-    check(MPI_Ireduce(part.data(), result.data(), static_cast<int>(part.size()), MPI_UINT64_T, MPI_MAX, root, comm_,
-                      request.data()),
-          "MPI_Ireduce");
+    check_mpi(MPI_Ireduce(part.data(), result.data(), static_cast<int>(part.size()), MPI_UINT64_T, MPI_MAX, root, comm_,
+                          request.data()),
+              "MPI_Ireduce");
     wait(request, "reducing to", root);
     if (rank_ == root) std::copy_n(result.begin(), part.size(), part.begin());
     values = values.subspan(part.size());
@@ -227,153 +213,13 @@ std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> membe
   MPI_Group all = MPI_GROUP_NULL;
   MPI_Group some = MPI_GROUP_NULL;
   MPI_Comm comm = MPI_COMM_NULL;
-  check(MPI_Comm_group(comm_, &all), "MPI_Comm_group");
-  check(MPI_Group_incl(all, static_cast<int>(members.size()), members.data(), &some), "MPI_Group_incl");
-  check(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
+  check_mpi(MPI_Comm_group(comm_, &all), "MPI_Comm_group");
+  check_mpi(MPI_Group_incl(all, static_cast<int>(members.size()), members.data(), &some), "MPI_Group_incl");
+  check_mpi(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
   MPI_Group_free(&some);
   MPI_Group_free(&all);
   return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_));
 }
-
-namespace {
-
-constexpr int kPopulateWrite = 23;  ///< MADV_POPULATE_WRITE of Linux 5.14, which older headers lack
-
-/// One MPI-3 shared window: every rank of the host has a part of it.
-class WindowMemory final : public PeerMemory {
- public:
-  WindowMemory(MPI_Comm comm, std::size_t bytes, std::chrono::nanoseconds hang_timeout) : hang_timeout_(hang_timeout) {
-    check(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host_), "MPI_Comm_split_type");
-    check(MPI_Comm_size(host_, &ranks_here_), "MPI_Comm_size");
-    MPI_Info info = MPI_INFO_NULL;
-    check(MPI_Info_create(&info), "MPI_Info_create");
-    MPI_Info_set(info, "alloc_shared_noncontig", "true");  // each part starts at a page
-    void* memory = nullptr;
-    const int code =
-        MPI_Win_allocate_shared(static_cast<MPI_Aint>(sizeof(Meeting) + bytes), 1, info, host_, &memory, &window_);
-    MPI_Info_free(&info);
-    if (code != MPI_SUCCESS) {
-      throw Error(ExitCode::Limit, fmt::format("no {} MiB of shared memory for each rank of this host", bytes >> 20U),
-                  "enlarge /dev/shm, or choose another strategy than shared-memory");
-    }
-    check(MPI_Win_lock_all(MPI_MODE_NOCHECK, window_), "MPI_Win_lock_all");
-    const std::span part(static_cast<std::byte*>(memory), sizeof(Meeting) + bytes);
-    std::ranges::fill(part, std::byte{0});
-    mine_ = part.subspan(sizeof(Meeting));
-    find_parts(comm, bytes);
-  }
-  ~WindowMemory() override {
-    // Freeing is collective: after a failure the peers may never come, and the job ends anyway.
-    if (std::uncaught_exceptions() != exceptions_at_birth_) return;
-    MPI_Win_unlock_all(window_);
-    MPI_Win_free(&window_);
-    MPI_Comm_free(&host_);
-  }
-  WindowMemory(const WindowMemory&) = delete;
-  WindowMemory& operator=(const WindowMemory&) = delete;
-
-  [[nodiscard]] std::span<std::byte> mine() override { return mine_; }
-  [[nodiscard]] std::span<std::byte> of(int rank) override { return parts_.at(static_cast<std::size_t>(rank)); }
-
-  void meet() override {
-    MPI_Win_sync(window_);
-    const std::atomic_ref<std::uint32_t> here(meeting_->here);
-    const std::atomic_ref<std::uint32_t> round(meeting_->round);
-    const std::uint32_t now = round.load();
-    if (here.fetch_add(1) + 1 == static_cast<std::uint32_t>(ranks_here_)) {
-      here.store(0);
-      round.store(now + 1);
-      futex(FUTEX_WAKE, std::numeric_limits<int>::max(), nullptr);
-    } else {
-      sleep_past(round, now);
-    }
-    MPI_Win_sync(window_);
-  }
-
- private:
-  /// At the start of each part; that of the host's first rank is used.
-  struct alignas(64) Meeting {
-    std::uint32_t here;
-    std::uint32_t round;
-  };
-
-  void sleep_past(const std::atomic_ref<std::uint32_t>& round, std::uint32_t now) {
-    const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
-    // Ranks that have a core each come soon; falling asleep and being woken would take longer than that.
-    const int spins = static_cast<unsigned>(ranks_here_) <= std::thread::hardware_concurrency() ? 20'000 : 0;
-    for (int tries = 0; round.load() == now; ++tries) {
-      if (tries < spins) continue;
-      const timespec limit{.tv_sec = 1, .tv_nsec = 0};
-      futex(FUTEX_WAIT, static_cast<int>(now), &limit);
-      if (std::chrono::steady_clock::now() > deadline) {
-        throw Error(ExitCode::Hang, "not all ranks of this host met within the time limit",
-                    "a rank stands still; raise --hang-timeout if it only needs longer");
-      }
-    }
-  }
-  void futex(int operation, int value, const timespec* limit) {
-    ::syscall(SYS_futex, &meeting_->round, operation, value, limit, nullptr, 0);
-  }
-
-  [[nodiscard]] std::byte* part_of(int local) const {
-    MPI_Aint size = 0;
-    int unit = 0;
-    void* start = nullptr;
-    check(MPI_Win_shared_query(window_, local, &size, &unit, &start), "MPI_Win_shared_query");
-    return static_cast<std::byte*>(start);
-  }
-
-  /// The parts of the ranks of `comm` that are on this host.
-  void find_parts(MPI_Comm comm, std::size_t bytes) {
-    MPI_Group all = MPI_GROUP_NULL;
-    MPI_Group here = MPI_GROUP_NULL;
-    check(MPI_Comm_group(comm, &all), "MPI_Comm_group");
-    check(MPI_Comm_group(host_, &here), "MPI_Comm_group");
-    int ranks = 0;
-    check(MPI_Comm_size(comm, &ranks), "MPI_Comm_size");
-    for (int rank = 0; rank < ranks; ++rank) {
-      int local = MPI_UNDEFINED;
-      check(MPI_Group_translate_ranks(all, 1, &rank, here, &local), "MPI_Group_translate_ranks");
-      if (local == MPI_UNDEFINED) {
-        parts_.emplace_back();
-      } else {
-        parts_.emplace_back(part_of(local) + sizeof(Meeting), bytes);
-      }
-    }
-    // Whose tiles a rank merges differs from frame to frame: without this every frame would meet pages it has not
-    // mapped yet. Older kernels lack the call and map them one by one.
-    for (const std::span<std::byte> part : parts_) {
-      if (!part.empty()) (void)::madvise(part.data() - sizeof(Meeting), part.size() + sizeof(Meeting), kPopulateWrite);
-    }
-    meeting_ = reinterpret_cast<Meeting*>(part_of(0));
-    MPI_Group_free(&here);
-    MPI_Group_free(&all);
-  }
-
-  std::chrono::nanoseconds hang_timeout_;
-  MPI_Comm host_ = MPI_COMM_NULL;
-  MPI_Win window_ = MPI_WIN_NULL;
-  int ranks_here_ = 1;
-  std::span<std::byte> mine_;
-  std::vector<std::span<std::byte>> parts_;  ///< per rank
-  Meeting* meeting_ = nullptr;
-  int exceptions_at_birth_ = std::uncaught_exceptions();
-};
-
-}  // namespace
-
-namespace {
-
-/// Where Open MPI keeps shared windows. More than it has room for would end in a bus error when first touched.
-constexpr const char* kSharedMemoryFolder = "/dev/shm";
-
-std::uint64_t free_shared_memory() {
-  struct statvfs there {};
-  if (::statvfs(kSharedMemoryFolder, &there) != 0) return std::numeric_limits<std::uint64_t>::max();  // it is elsewhere
-  return static_cast<std::uint64_t>(there.f_bavail) * there.f_frsize;
-}
-
-}  // namespace
 
 std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
   // Every rank of the host will take as much; all ranks must decide alike, so the tightest host decides.
@@ -387,7 +233,7 @@ std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
                             kSharedMemoryFolder, least >> 20U),
                 "enlarge /dev/shm (docker run --shm-size), or choose another strategy than shared-memory");
   }
-  auto memory = std::make_shared<WindowMemory>(comm_, bytes, hang_timeout_);
+  auto memory = make_window_memory(comm_, bytes, hang_timeout_);
   barrier(*this);  // every part is zero before any rank writes to one
   return memory;
 }
@@ -395,7 +241,7 @@ std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
 std::string mpi_version() {
   std::string text(MPI_MAX_LIBRARY_VERSION_STRING, '\0');
   int length = 0;
-  check(MPI_Get_library_version(text.data(), &length), "MPI_Get_library_version");
+  check_mpi(MPI_Get_library_version(text.data(), &length), "MPI_Get_library_version");
   text.resize(static_cast<std::size_t>(length));
   // What follows the first comma or line break says who built it, where and when.
   return text.substr(0, text.find_first_of(",\n"));

@@ -36,23 +36,11 @@ class Assembler {
   template <typename Pixel>
   void assemble(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> owned,
                 std::span<const int> shown_by) {
-    const FrameLayout& layout = layer.layout();
-    HPR_CHECK(shown_by.size() == layout.screens());
+    HPR_CHECK(shown_by.size() == layer.layout().screens());
     HPR_CHECK(std::ranges::is_sorted(owned));
-    const auto shows = [&](int rank) { return std::ranges::find(shown_by, rank) != shown_by.end(); };
-    const int ranks = comm.size();
-    const int rank = comm.rank();
-    pieces_.resize(static_cast<std::size_t>(ranks));
-    std::vector<Outgoing> out;
-    std::vector<int> from;
-    for (int step = 1; step < ranks; ++step) {
-      const int to = (rank + step) % ranks;
-      if (shows(to)) {
-        out.push_back(piece_for(to, layer, owned, tiles_shown(layout, shown_by, to)));
-      }
-      if (shows(rank)) from.push_back((rank + ranks - step) % ranks);
-    }
-    const std::vector<std::size_t> wanted = tiles_shown(layout, shown_by, rank);
+    const std::vector<std::size_t> wanted = tiles_shown(layer.layout(), shown_by, comm.rank());
+    const std::vector<Outgoing> out = pieces_of(comm, layer, owned, shown_by);
+    const std::vector<int> from = shows(shown_by, comm.rank()) ? others(comm) : std::vector<int>{};
     std::vector<bool> filled(layer.tiles());
     for (const std::size_t tile : owned) filled[tile] = true;
     comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
@@ -70,6 +58,28 @@ class Assembler {
   }
 
  private:
+  [[nodiscard]] static bool shows(std::span<const int> shown_by, int rank) {
+    return std::ranges::find(shown_by, rank) != shown_by.end();
+  }
+  /// All ranks but this one, from the next one on, so that not all send to the same one first.
+  [[nodiscard]] static std::vector<int> others(const Communicator& comm) {
+    std::vector<int> ranks;
+    for (int step = 1; step < comm.size(); ++step) ranks.push_back((comm.rank() + step) % comm.size());
+    return ranks;
+  }
+
+  /// A message for every other rank that shows a screen.
+  template <typename Pixel>
+  [[nodiscard]] std::vector<Outgoing> pieces_of(const Communicator& comm, const TileLayer<Pixel>& layer,
+                                                std::span<const std::size_t> owned, std::span<const int> shown_by) {
+    pieces_.resize(static_cast<std::size_t>(comm.size()));
+    std::vector<Outgoing> out;
+    for (const int to : others(comm)) {
+      if (shows(shown_by, to)) out.push_back(piece_for(to, layer, owned, tiles_shown(layer.layout(), shown_by, to)));
+    }
+    return out;
+  }
+
   /// What of `owned` goes onto the tiles `wanted` of a rank; an empty message when nothing does.
   template <typename Pixel>
   [[nodiscard]] Outgoing piece_for(int rank, const TileLayer<Pixel>& layer, std::span<const std::size_t> owned,

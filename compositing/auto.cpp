@@ -36,7 +36,10 @@ std::string Auto::best(const Costs& costs, const Load& load, bool collects, bool
 }
 
 std::optional<Prediction> Auto::predict(const Costs& costs, const Load& load) const {
-  return make_compositor(best(costs, load, true, true))->predict(costs, load);
+  // As it chooses: without looking at costs where all ranks share memory.
+  const bool all_in_place = costs.hosts == 1 && costs.read_byte > 0.0;
+  const std::string name = all_in_place ? "shared-memory" : best(costs, load, true, true);
+  return make_compositor(name)->predict(costs, load);
 }
 
 void Auto::choose(Communicator& comm, const TileLayer<Key>& layer, std::span<const std::size_t> tiles, bool collects) {

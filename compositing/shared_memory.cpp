@@ -200,6 +200,16 @@ std::size_t place_in(std::span<const int> list, int value) {
   return static_cast<std::size_t>(std::ranges::find(list, value) - list.begin());
 }
 
+/// The places in `list` of those ranks of `order` that stand there, in that order.
+std::vector<std::size_t> places_of(std::span<const int> order, std::span<const int> list) {
+  std::vector<std::size_t> places;
+  for (const int rank : order) {
+    const std::size_t place = place_in(list, rank);
+    if (place < list.size()) places.push_back(place);
+  }
+  return places;
+}
+
 }  // namespace
 
 template <typename Pixel>
@@ -241,11 +251,7 @@ Composited SharedMemorySchedule<Pixel>::merge_on_host(Communicator& comm, TileLa
                                                       std::span<const int> shown_by) {
   std::vector<TileLayer<Pixel>> layers;
   for (const int rank : host_->ranks()) layers.push_back(shared.of_peer(rank));
-  std::vector<std::size_t> front_to_back;
-  for (const int rank : order) {
-    const std::size_t index = place_in(host_->ranks(), rank);
-    if (index < layers.size()) front_to_back.push_back(index);
-  }
+  const std::vector<std::size_t> front_to_back = places_of(order, host_->ranks());
 
   host_->meet();  // all layers are drawn
   host_->start_frame();

@@ -19,6 +19,8 @@ class SharedMemorySchedule {
  public:
   SharedMemorySchedule();
   ~SharedMemorySchedule();
+  SharedMemorySchedule(const SharedMemorySchedule&) = delete;
+  SharedMemorySchedule& operator=(const SharedMemorySchedule&) = delete;
 
   /// `order`: the ranks from front to back, which only colours ask for; keys have none.
   Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,

@@ -1,0 +1,32 @@
+#include "app/compare_threads.h"
+
+#include <utility>
+
+#include "app/simulate_option.h"
+#include "cluster/local_communicator.h"
+#include "cluster/simulated_communicator.h"
+
+namespace hpr {
+
+CompareResult compare_on_threads(int ranks, const std::string& simulate, std::chrono::nanoseconds hang_timeout,
+                                 const CompareInput& input, const CompareSettings& settings) {
+  CompareResult result;
+  const auto compare = [&](Communicator& comm) {
+    CompareResult here = compare_strategies(comm, input, settings);
+    if (comm.rank() == 0) result = std::move(here);
+  };
+  LocalRanks local{.size = ranks, .hang_timeout = hang_timeout};
+  if (simulate.empty()) {
+    run_local_ranks(local, compare);
+    return result;
+  }
+  const SimulatedCluster cluster = parse_simulation(simulate);
+  local.ranks_per_host = cluster.ranks_per_host();
+  run_local_ranks(local, [&](Communicator& comm) {
+    SimulatedCommunicator simulated(comm, cluster);
+    compare(simulated);
+  });
+  return result;
+}
+
+}  // namespace hpr
