@@ -51,7 +51,7 @@ function(hpr_mpi_test name)
   foreach(ranks IN LISTS ARG_RANKS)
     add_test(NAME ${name}.np${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${MPIEXEC_PREFLAGS}
              $<TARGET_FILE:${name}>)
-    set_tests_properties(${name}.np${ranks} PROPERTIES LABELS mpi PROCESSORS ${ranks} TIMEOUT 60
+    set_tests_properties(${name}.np${ranks} PROPERTIES LABELS mpi PROCESSORS ${ranks} TIMEOUT 180
       ENVIRONMENT "${HPR_TEST_ENVIRONMENT}")
   endforeach()
 endfunction()
