@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cstring>
 #include <functional>
-#include <numeric>
 
 #include "cluster/collectives.h"
 #include "compositing/merge.h"
+#include "compositing/synthetic.h"
 #include "compositing/tile_codec.h"
 #include "core/stopwatch.h"
 #include "image/tiles.h"
@@ -102,22 +102,15 @@ BenchRow large_message_row(Communicator& comm) {
 BenchRow tiles_row(Communicator& comm) {
   const FrameLayout layout({{1920, 1080}});
   TileLayer<Key> layer(layout);
-  std::vector<std::size_t> tiles(layer.tiles());
-  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
-  for (const std::size_t tile : tiles) {
-    std::ranges::fill(layer.tile(tile), make_key(0.5F, static_cast<std::uint32_t>(comm.rank())));
-    layer.set_active(tile);
-  }
+  draw_everywhere(layer, comm.rank());
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   TileMessage message;
   TileReader reader;
   const int sender = 1;
   const double ours = median_ms([&] {
     barrier(comm);
     if (comm.rank() == 1) {
-      message.start();
-      message.add(layer, tiles);
-      const Outgoing out = message.to(0);
-      comm.exchange({&out, 1}, {}, {});
+      message.send(comm, layer, tiles, 0);
     } else if (comm.rank() == 0) {
       comm.exchange({}, {&sender, 1}, [&](int from, std::span<const std::byte> arrived) {
         reader.merge(comm, from, arrived, layer, tiles);

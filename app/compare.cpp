@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <numeric>
 
 #include "app/compare_measure.h"
 #include "app/compare_over.h"
@@ -97,8 +96,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
   HPR_CHECK(!settings.strategies.empty() && settings.frames > 0 && settings.warmup >= 0);
   if (settings.operation != CompareOperator::Nearest) return compare_blenders(comm, input, settings);
   const TileLayer<Key> pristine = input.layer(comm);
-  std::vector<std::size_t> tiles(pristine.tiles());
-  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+  const std::vector<std::size_t> tiles = all_tiles(pristine.layout());
   const std::vector<Key> expected = serial_maximum(comm, pristine);
   const bool is_root = comm.rank() == 0;
 
@@ -126,7 +124,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
     for (Contestant& contestant : contestants) {
       Compositor& compositor = *contestant.compositor;
       TileLayer<Key>& layer = layers.of(compositor.merges_in_place());
-      restore(layer, contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine);
+      copy_tiles(contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine, layer, tiles);
       const Sample sample =
           measure_frame(*contestant.comm, assembler, layer, layers.peers(), [&](std::span<const int> shown_by) {
             return compositor.composite(*contestant.comm, layer, tiles, shown_by);

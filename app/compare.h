@@ -56,8 +56,6 @@ struct Spread {
   double p95 = 0.0;
   double max = 0.0;
 };
-/// `values` is not empty.
-[[nodiscard]] Spread spread_of(std::vector<double> values);
 
 /// One strategy on one number of ranks.
 struct CompareRun {

@@ -89,6 +89,7 @@ class CompareCommand final : public Command {
 
   ExitCode run(const Globals& globals) override {
     if (!plugin_.empty()) load_compositor_plugin(plugin_);
+    if (!simulate_.empty() && frames_option_->count() == 0) frames_ = warmup_ = 1;  // simulated frames are all alike
     const CompareInput input = make_input(globals);
     check_options(globals);
     return inside_mpi_job() ? run_in_job(globals, input) : run_here(globals, input);
@@ -204,9 +205,7 @@ class CompareCommand final : public Command {
   }
 
   [[nodiscard]] CompareSettings settings_for(int ranks) const {
-    // Simulated frames are all alike.
-    const bool once = !simulate_.empty() && frames_option_->count() == 0;
-    return {strategies_for(ranks), once ? 1 : frames_, once ? 1 : warmup_, operation()};
+    return {strategies_for(ranks), frames_, warmup_, operation()};
   }
 
   /// Inside an MPI job: its ranks are the one number of ranks compared.

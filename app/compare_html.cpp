@@ -55,6 +55,7 @@ std::string header(const CompareReport& report) {
                                   ? std::string("one screen")
                                   : fmt::format("{}x{} screens", report.grid.width, report.grid.height);
   text += entry("Wall", fmt::format("{} of {}x{} pixels", screens, report.screen.width, report.screen.height));
+  text += entry("Operator", report.operation);
   text += entry("Machine", report.machine.cpu);
   text += entry("Cores", fmt::format("{}{}", report.machine.cores,
                                      report.oversubscribed() ? ", oversubscribed" : ", not oversubscribed"));
@@ -91,7 +92,9 @@ std::string summary(const CompareReport& report) {
                         ranks == 1 ? "" : "s", escape_markup(run.strategy), ms);
   }
   const auto wrong = std::ranges::count_if(report.runs, [](const CompareRun& run) { return run.differing_pixels > 0; });
-  text += wrong == 0 ? std::string("<li>Every frame of every run is right, key by key.</li>\n</ul>\n")
+  const char* const right =
+      report.operation == "nearest" ? "is right, key by key" : "is as near the serial result as rounding allows";
+  text += wrong == 0 ? fmt::format("<li>Every frame of every run {}.</li>\n</ul>\n", right)
                      : fmt::format("<li><strong>{} {} from the serial composite.</strong></li>\n</ul>\n", wrong,
                                    wrong == 1 ? "run differs" : "runs differ");
   return text;

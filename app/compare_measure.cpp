@@ -10,9 +10,7 @@
 namespace hpr {
 
 void wait_for_all(Communicator& comm, PeerMemory* peers) {
-  bool one_host = peers != nullptr;
-  for (int rank = 0; one_host && rank < comm.size(); ++rank) one_host = !peers->of(rank).empty();
-  if (one_host) {
+  if (peers != nullptr && shared_by_all(*peers, comm.size())) {
     peers->meet();
   } else {
     barrier(comm);

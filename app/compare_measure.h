@@ -22,18 +22,8 @@ struct Sample {
   std::uint64_t messages = 0;
 };
 
-/// Makes `layer` equal to `pristine` again, in the memory it has.
-template <typename Pixel>
-void restore(TileLayer<Pixel>& layer, const TileLayer<Pixel>& pristine) {
-  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-    if (!pristine.active(tile)) {
-      layer.clear(tile);
-      continue;
-    }
-    std::ranges::copy(pristine.tile(tile), layer.tile(tile).begin());
-    layer.set_active(tile);
-  }
-}
+/// `values` is not empty.
+[[nodiscard]] Spread spread_of(std::vector<double> values);
 
 /// The screens side by side.
 template <typename Pixel>

@@ -168,8 +168,7 @@ CompareRun run_of(Contestant<Pixel>& contestant, Communicator& comm, int frames,
 template <typename Pixel>
 CompareResult compare(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
   const TileLayer<Pixel> pristine = translucent_layer<Pixel>(input.layer(comm), comm.rank());
-  std::vector<std::size_t> tiles(pristine.tiles());
-  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+  const std::vector<std::size_t> tiles = all_tiles(pristine.layout());
   std::vector<int> order(static_cast<std::size_t>(comm.size()));
   std::iota(order.begin(), order.end(), 0);
   const std::vector<Pixel> expected = serial_over(comm, pristine);
@@ -187,7 +186,7 @@ CompareResult compare(Communicator& comm, const CompareInput& input, const Compa
     for (Contestant<Pixel>& contestant : contestants) {
       Blender<Pixel>& blender = *contestant.blender;
       TileLayer<Pixel>& layer = layers.of(blender.merges_in_place());
-      restore(layer, pristine);
+      copy_tiles(pristine, layer, tiles);
       const Sample sample =
           measure_frame(*contestant.comm, assembler, layer, layers.peers(), [&](std::span<const int> shown_by) {
             return blender.blend(*contestant.comm, layer, tiles, order, shown_by);

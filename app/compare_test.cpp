@@ -7,6 +7,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "app/compare_measure.h"
 #include "app/compare_report.h"
 #include "cluster/forwarding_communicator.h"
 #include "cluster/local_communicator.h"

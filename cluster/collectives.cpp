@@ -59,6 +59,12 @@ std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<con
   return parts;
 }
 
+std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory) {
+  int first = 0;
+  while (memory.of(first).empty()) ++first;
+  return all_gather_value(comm, first);
+}
+
 std::vector<std::byte> all_gather_equal(Communicator& comm, std::span<const std::byte> bytes) {
   const auto ranks = static_cast<std::size_t>(comm.size());
   const auto rank = static_cast<std::size_t>(comm.rank());

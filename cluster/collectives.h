@@ -30,6 +30,9 @@ void barrier(Communicator& comm);
 /// Systems", 1997.
 [[nodiscard]] std::vector<std::byte> all_gather_equal(Communicator& comm, std::span<const std::byte> bytes);
 
+/// Collective: per rank the first rank of the host it shares `memory` with.
+[[nodiscard]] std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory);
+
 /// Each rank's value, in order of rank, on every rank.
 template <typename Value>
 [[nodiscard]] std::vector<Value> all_gather_value(Communicator& comm, const Value& value) {

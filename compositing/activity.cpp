@@ -29,13 +29,6 @@ Activity::Activity(int ranks, std::size_t tiles, std::vector<std::uint64_t> bits
   }
 }
 
-bool Activity::any(int rank, TileRun run) const {
-  for (std::size_t position = run.first; position < run.end(); ++position) {
-    if (active(rank, position)) return true;
-  }
-  return false;
-}
-
 std::vector<TileRun> Activity::cut(TileRun run, int parts) const {
   const auto cost = [&](std::size_t position) { return 1 + kActiveWeight * weights_[position]; };
   std::uint64_t all = 0;

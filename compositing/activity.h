@@ -22,8 +22,6 @@ class Activity {
   [[nodiscard]] bool active(int rank, std::size_t position) const {
     return (word(rank, position / 64) >> (position % 64) & 1U) != 0;
   }
-  /// Whether a rank has drawn into any tile of a run of the list.
-  [[nodiscard]] bool any(int rank, TileRun run) const;
   /// Ranks that have drawn into a tile of the list.
   [[nodiscard]] std::uint32_t weight(std::size_t position) const { return weights_[position]; }
 

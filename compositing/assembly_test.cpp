@@ -88,7 +88,7 @@ TEST(Assembly, PixelsMayBeLight) {
 }
 
 TEST(Assembly, BringsWhatEveryStrategyLeavesToEveryScreen) {
-  const std::vector<std::size_t> tiles = test::all_tiles(kWall);
+  const std::vector<std::size_t> tiles = all_tiles(kWall);
   for (const auto& listed : all_compositors()) {
     for (const int ranks : {1, 3, 4}) {
       const std::vector<Key> expected = test::expected_keys(ranks, kWall);

@@ -9,13 +9,6 @@ namespace {
 
 constexpr int kFramesBetweenLooks = 16;
 
-bool on_one_host(int ranks, PeerMemory& memory) {
-  for (int rank = 0; rank < ranks; ++rank) {
-    if (memory.of(rank).empty()) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 std::string Auto::best(const Costs& costs, const Load& load, bool collects, bool in_place) {
@@ -51,7 +44,7 @@ void Auto::choose(Communicator& comm, const TileLayer<Key>& layer, std::span<con
     frames_ = 0;
     comm_ = &comm;
     in_place_ = in_place;
-    all_in_place_ = in_place && on_one_host(comm.size(), *layer.peers());
+    all_in_place_ = in_place && shared_by_all(*layer.peers(), comm.size());
     if (!all_in_place_) costs_ = measure_costs(comm);
   }
   if (!is_new && (all_in_place_ || ++frames_ < kFramesBetweenLooks)) return;

@@ -12,6 +12,10 @@ class Fold {
       : members_(static_cast<int>(std::bit_floor(static_cast<unsigned>(ranks)))), pairs_(ranks - members_) {}
 
   [[nodiscard]] int members() const { return members_; }
+  /// The factors of the rounds.
+  [[nodiscard]] std::vector<int> twos() const {
+    return std::vector<int>(static_cast<std::size_t>(rounds_of(members_)), 2);
+  }
   [[nodiscard]] bool paired(int rank) const { return rank < 2 * pairs_; }
   [[nodiscard]] int member_of(int rank) const { return paired(rank) ? rank / 2 : rank - pairs_; }
   [[nodiscard]] int rank_of(int member) const { return member < pairs_ ? 2 * member : member + pairs_; }
@@ -31,17 +35,13 @@ Composited BinarySwapSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& 
   const Activity activity = share_activity(comm, layer, tiles);
   if (fold.paired(rank)) {
     if (rank % 2 == 1) {
-      folded_.start();
-      folded_.add(layer, tiles);
-      const Outgoing out = folded_.to(rank - 1);
-      comm.exchange({&out, 1}, {}, {});
+      folded_.send(comm, layer, tiles, rank - 1);
       return {};
     }
     const int neighbour = rank + 1;
     merger_.exchange(comm, {}, {&neighbour, 1}, layer, tiles);
   }
-  const std::vector<int> twos(static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(fold.members())) - 1), 2);
-  const TileRun mine = rounds_.run(comm, layer, tiles, activity, twos, fold.member_of(rank),
+  const TileRun mine = rounds_.run(comm, layer, tiles, activity, fold.twos(), fold.member_of(rank),
                                    [&](int member) { return fold.rank_of(member); });
   return owning(tiles, mine);
 }
@@ -57,11 +57,11 @@ Composited BinarySwap::composite(Communicator& comm, TileLayer<Key>& layer, std:
 
 std::optional<Prediction> BinarySwap::predict(const Costs& costs, const Load& load) const {
   const Fold fold(load.ranks);
-  const std::vector<int> twos(static_cast<std::size_t>(rounds_of(fold.members())), 2);
   double seconds = sharing_cost(costs);
   const int folded = load.ranks - fold.members();
   if (folded > 0) seconds += costs.message + load.mean_layer * costs.byte(folded);
-  return Prediction{seconds + swap_rounds_cost(costs, load, twos, static_cast<double>(load.ranks) / fold.members())};
+  return Prediction{seconds +
+                    swap_rounds_cost(costs, load, fold.twos(), static_cast<double>(load.ranks) / fold.members())};
 }
 
 }  // namespace hpr

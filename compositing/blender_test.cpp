@@ -9,7 +9,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -81,7 +80,7 @@ class BlenderTest : public testing::TestWithParam<std::tuple<std::string, int>> 
   void check_frames_in_shared_memory(int ranks_per_host) const {
     constexpr std::uint64_t kFrames = 3;
     const FrameLayout layout({{200, 70}, {65, 65}, {130, 130}});
-    const std::vector<std::size_t> tiles = test::all_tiles(layout);
+    const std::vector<std::size_t> tiles = all_tiles(layout);
     const std::vector<int> shown_by{ranks_ - 1, 0, ranks_ / 2};
     std::vector<std::unique_ptr<test::Outcome<Pixel>>> outcomes;
     for (std::uint64_t frame = 0; frame < kFrames; ++frame)
@@ -91,8 +90,7 @@ class BlenderTest : public testing::TestWithParam<std::tuple<std::string, int>> 
       const auto memory = comm.share(TileLayer<Pixel>::bytes_for(layout));
       for (std::uint64_t frame = 0; frame < kFrames; ++frame) {
         TileLayer<Pixel> layer(layout, memory);
-        layer.clear();
-        test::copy_layer(test::random_colors<Pixel>(comm.rank(), layout, frame), layer);
+        copy_tiles(test::random_colors<Pixel>(comm.rank(), layout, frame), layer, all_tiles(layout));
         const Composited mine = own->blend(comm, layer, tiles, test::random_order(ranks_, frame), shown_by);
         outcomes[frame]->add(layer, mine, shown_by, comm.rank());
       }

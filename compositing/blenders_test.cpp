@@ -7,7 +7,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -80,7 +79,7 @@ TEST(Blenders, BrightColorsKeepTheBoundTimesTheirBrightness) {
   constexpr float kBrightness = 1024.0F;
   constexpr int kRanks = 7;
   const FrameLayout layout({{100, 64}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> order = test::random_order(kRanks, 4);
   const auto bright = [&](int rank) {
     TileLayer<RgbaPremultiplied> layer = test::random_colors<RgbaPremultiplied>(rank, layout);
@@ -124,7 +123,7 @@ TEST(Blenders, TheOrderOfArrivalChangesNoBit) {
 
 TEST(Blenders, RadixKWithOneFactorBlendsFrontToBackAndWithOthersWithinTheBound) {
   const FrameLayout layout({{200, 130}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> order = test::random_order(12, 9);
   const auto serial = test::serial_over<Rgba8Premultiplied>(order, layout);
   for (const char* name : {"radix-k:12", "radix-k:4,3", "radix-k:2,3,2"}) {
@@ -143,7 +142,7 @@ TEST(Blenders, RadixKWithOneFactorBlendsFrontToBackAndWithOthersWithinTheBound) 
 
 TEST(Blenders, AllEqualTransparentOrOpaqueLayers) {
   const FrameLayout layout({{70, 70}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> order{2, 0, 4, 1, 3};
   for (const std::string& name : test::every_blender()) {
     for (const float alpha : {0.0F, 1.0F}) {
@@ -169,7 +168,7 @@ TEST(Blenders, AllEqualTransparentOrOpaqueLayers) {
 
 TEST(Blenders, WhatIsNoNumberStaysInItsPixel) {
   const FrameLayout layout({{70, 70}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> order{2, 0, 4, 1, 3};
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (const std::string& name : test::every_blender()) {
@@ -198,7 +197,7 @@ TEST(Blenders, RefuseWhatIsNoOrderOfTheRanks) {
       run_local_ranks(3, [&](Communicator& comm) {
         TileLayer<Rgba8Premultiplied> layer(layout);
         try {
-          (void)make_blender<Rgba8Premultiplied>(name)->blend(comm, layer, test::all_tiles(layout), order, {});
+          (void)make_blender<Rgba8Premultiplied>(name)->blend(comm, layer, all_tiles(layout), order, {});
           ADD_FAILURE() << name << " took it";
         } catch (const Error& error) {
           EXPECT_EQ(error.code(), ExitCode::Internal);
@@ -210,7 +209,7 @@ TEST(Blenders, RefuseWhatIsNoOrderOfTheRanks) {
 
 TEST(Blenders, SharedMemorySendsNoPixelsWhereHostsHoldRunsOfTheOrder) {
   const FrameLayout layout({{512, 512}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const auto bytes_sent = [&](int ranks_per_host, const std::vector<int>& order) {
     std::size_t bytes = 0;
     std::mutex mutex;
@@ -239,12 +238,12 @@ TEST(Blenders, PiecesGoStraightToTheirScreensWhereThoseShareTheWorkEvenly) {
   for (const char* name : {"direct-send", "shared-memory"}) {
     run_local_ranks(4, [&](Communicator& comm) {
       TileLayer<Rgba8Premultiplied> layer(layout);
-      for (const std::size_t tile : test::all_tiles(layout)) {
+      for (const std::size_t tile : all_tiles(layout)) {
         layer.set_active(tile);
         std::ranges::fill(layer.tile(tile), Rgba8Premultiplied{1, 1, 1, 1});
       }
       const auto blender = make_blender<Rgba8Premultiplied>(name);
-      const Composited mine = blender->blend(comm, layer, test::all_tiles(layout), order, shown_by);
+      const Composited mine = blender->blend(comm, layer, all_tiles(layout), order, shown_by);
       EXPECT_TRUE(mine.assembled) << name;
       EXPECT_EQ(mine.tiles.size(), 8U) << name;
       for (const std::size_t tile : mine.tiles) EXPECT_EQ(shown_by[layout.place(tile).screen], comm.rank()) << name;
@@ -254,7 +253,7 @@ TEST(Blenders, PiecesGoStraightToTheirScreensWhereThoseShareTheWorkEvenly) {
 
 TEST(Blenders, EmptyTilesCostABitAndScatteredPixelsWhatTheyHold) {
   const FrameLayout layout({{4096, 2048}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   run_local_ranks(2, [&](Communicator& comm) {
     CountingCommunicator counting(comm);
     TileLayer<Rgba8Premultiplied> layer(layout);

@@ -125,8 +125,7 @@ TEST_P(CompositorContract, LayersMayLiveInSharedMemoryAndTheirScreensBeShown) {
       const auto memory = comm.share(TileLayer<Key>::bytes_for(layout));
       for (int frame = 0; frame < 3; ++frame) {
         TileLayer<Key> layer(layout, memory);
-        layer.clear();
-        copy_layer(random_layer(comm.rank(), layout), layer);
+        copy_tiles(random_layer(comm.rank(), layout), layer, all_tiles(layout));
         const Composited mine = own->composite(comm, layer, tiles, shown_by);
         const std::lock_guard lock(mutex);
         for (const std::size_t tile : mine.tiles) {

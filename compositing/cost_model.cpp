@@ -4,12 +4,12 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
-#include <numeric>
 #include <vector>
 
 #include "cluster/collectives.h"
 #include "compositing/merge.h"
 #include "compositing/sparse.h"
+#include "compositing/synthetic.h"
 #include "compositing/tile_codec.h"
 #include "core/check.h"
 #include "core/error.h"
@@ -20,24 +20,16 @@ namespace {
 constexpr double kTileBytes = static_cast<double>(kTilePixels * sizeof(Key));
 constexpr int kRepetitions = 3;
 
-/// A layer drawn all over.
-TileLayer<Key> full_layer(const FrameLayout& layout, int rank) {
-  TileLayer<Key> layer(layout);
-  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-    std::ranges::fill(layer.tile(tile), make_key(0.5F, static_cast<std::uint32_t>(rank)));
-    layer.set_active(tile);
-  }
-  return layer;
-}
-
 /// The measurements behind Costs, each taken by all ranks together.
 class Probe {
  public:
   Probe(Communicator& comm, std::size_t tiles)
       : comm_(comm),
-        layer_(full_layer(FrameLayout({{kTileSide * static_cast<int>(tiles), kTileSide}}), comm.rank())),
-        tiles_(tiles) {
-    std::iota(tiles_.begin(), tiles_.end(), std::size_t{0});
+        layer_(FrameLayout({{kTileSide * static_cast<int>(tiles), kTileSide}})),
+        other_(layer_.layout()),
+        tiles_(all_tiles(layer_.layout())) {
+    draw_everywhere(layer_, comm.rank());
+    draw_everywhere(other_, comm.rank() + 1);
   }
 
   Costs measure() {
@@ -87,7 +79,6 @@ class Probe {
       message_.add(layer_, tiles_);
       out.push_back(message_.to(to));
     }
-    if (other_.tiles() == 0) other_ = full_layer(layer_.layout(), comm_.rank() + 1);
     const std::vector<int> senders(receives ? 1 : 0, from);
     comm_.exchange(out, senders, [&](int peer, std::span<const std::byte> message) {
       if (merges) {
@@ -108,9 +99,7 @@ class Probe {
 
   void look_at_hosts(Costs& costs, double bytes) {
     const auto meeting = comm_.share(1);
-    int first = 0;
-    while (meeting->of(first).empty()) ++first;
-    std::vector<int> hosts = all_gather_value(comm_, first);  // a host is named by its first rank
+    std::vector<int> hosts = hosts_of(comm_, *meeting);
     std::ranges::sort(hosts);
     costs.hosts = static_cast<int>(std::unique(hosts.begin(), hosts.end()) - hosts.begin());
     costs.meet = seconds([&] { meeting->meet(); });

@@ -80,8 +80,7 @@ std::string faults(const Case& one) {
     Assembler assembler;
     for (const auto& compositor : all_compositors()) {
       TileLayer<Key> layer(one.layout, memory);
-      layer.clear();
-      test::copy_layer(one.layers[static_cast<std::size_t>(comm.rank())], layer);
+      copy_tiles(one.layers[static_cast<std::size_t>(comm.rank())], layer, all_tiles(one.layout));
       const Composited mine = compositor->composite(comm, layer, one.tiles, one.shown_by);
       if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, one.shown_by);
       for (const std::size_t tile : one.tiles) {

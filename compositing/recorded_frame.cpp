@@ -1,10 +1,8 @@
 #include "compositing/recorded_frame.h"
 
-#include <algorithm>
-#include <numeric>
-
 #include "cluster/recording_communicator.h"
 #include "compositing/assembly.h"
+#include "compositing/synthetic.h"
 
 namespace hpr {
 namespace {
@@ -12,19 +10,11 @@ namespace {
 /// 64 tiles: a power of two, so that halves of halves stay whole.
 constexpr Size kFrame{512, 512};
 
-void draw_everywhere(TileLayer<Key>& layer, int rank) {
-  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-    layer.set_active(tile);
-    std::ranges::fill(layer.tile(tile), make_key(0.5F, static_cast<std::uint32_t>(rank)));
-  }
-}
-
 }  // namespace
 
 RecordedFrame record_frame(const std::function<std::unique_ptr<Compositor>()>& make, const LocalRanks& ranks) {
   const FrameLayout layout({kFrame});
-  std::vector<std::size_t> tiles(layout.tiles());
-  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> shown_by{0};
   const auto size = static_cast<std::size_t>(ranks.size);
   std::vector<std::vector<Deed>> composite(size);

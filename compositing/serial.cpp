@@ -8,10 +8,7 @@ template <typename Pixel>
 Composited SerialSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
                                       std::span<const int> /*shown_by*/) {
   if (comm.rank() != 0) {
-    given_.start();
-    given_.add(layer, tiles);
-    const Outgoing out = given_.to(0);
-    comm.exchange({&out, 1}, {}, {});
+    given_.send(comm, layer, tiles, 0);
     return {};
   }
   std::vector<int> others(static_cast<std::size_t>(comm.size()) - 1);

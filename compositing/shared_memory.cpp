@@ -23,10 +23,9 @@ constexpr std::size_t kTilesATurn = 4;
 class HostRanks {
  public:
   explicit HostRanks(Communicator& comm) : comm_(comm), control_(comm.share(sizeof(Control))) {
-    int first = 0;
-    while (control_->of(first).empty()) ++first;
+    const std::vector<int> hosts = hosts_of(comm, *control_);
+    const int first = hosts[static_cast<std::size_t>(comm.rank())];
     control_of_host_ = reinterpret_cast<Control*>(control_->of(first).data());
-    const std::vector<int> hosts = all_gather_value(comm, first);  // a host is named by its first rank
     std::vector<int> names(hosts);
     std::ranges::sort(names);
     names.erase(std::unique(names.begin(), names.end()), names.end());
@@ -184,18 +183,6 @@ class TileMerger<Key> {
   const Activity& activity_;
 };
 
-template <typename Pixel>
-void copy_tiles(const TileLayer<Pixel>& from, TileLayer<Pixel>& to, std::span<const std::size_t> tiles) {
-  for (const std::size_t tile : tiles) {
-    if (from.active(tile)) {
-      std::ranges::copy(from.tile(tile), to.tile(tile).begin());
-      to.set_active(tile);
-    } else {
-      to.clear(tile);
-    }
-  }
-}
-
 std::size_t place_in(std::span<const int> list, int value) {
   return static_cast<std::size_t>(std::ranges::find(list, value) - list.begin());
 }
@@ -294,12 +281,8 @@ Composited SharedMemorySchedule<Pixel>::merge_between_hosts(TileLayer<Pixel>& sh
   Communicator* const column = host_->column();
   if (column == nullptr) return {};
   if (order.empty()) return between_hosts_.run(*column, shared, of_host.tiles, {});
-  std::vector<int> hosts;  // the column's ranks, front to back
-  for (const int rank : order) {
-    const std::size_t member = place_in(host_->column_ranks(), rank);
-    if (member < host_->column_ranks().size()) hosts.push_back(static_cast<int>(member));
-  }
-  RenumberedCommunicator ordered(*column, hosts);
+  const std::vector<std::size_t> hosts = places_of(order, host_->column_ranks());  // front to back
+  RenumberedCommunicator ordered(*column, std::vector<int>(hosts.begin(), hosts.end()));
   return between_hosts_.run(ordered, shared, of_host.tiles, {});
 }
 

@@ -103,10 +103,13 @@ std::size_t pack_bytes(const std::uint32_t* tile, const std::uint64_t* mask, std
   return pack_by(tile, mask, packed, reinterpret_cast<const std::int32_t*>(sources));
 }
 
-/// As merge_runs, for pixels that replace what stands there.
-std::size_t unpack_runs(std::uint32_t* tile, const std::uint64_t* mask, const std::uint32_t*& packed,
-                        const std::uint32_t* end, const std::uint32_t* places) {
-  const LanesOf<std::uint32_t> lanes;
+/// Brings packed pixels to their places: `combine` makes the new vector of those in place, the packed ones brought to
+/// their lanes, and which lanes those are. Returns how many words of the mask are done: the last few pixels, which no
+/// whole vector can be loaded of, are left.
+template <typename Index, typename Lane, typename Combine>
+HWY_INLINE std::size_t spread_runs(Lane* tile, const std::uint64_t* mask, const Lane*& packed, const Lane* end,
+                                   const Lane* places, const Combine& combine) {
+  const LanesOf<Lane> lanes;
   const std::size_t step = hn::Lanes(lanes);
   for (std::size_t word = 0; word < kTilePixels / 64; ++word) {
     if (mask[word] == 0) continue;
@@ -114,39 +117,31 @@ std::size_t unpack_runs(std::uint32_t* tile, const std::uint64_t* mask, const st
     for (std::size_t i = 0; i < 64; i += step) {
       const auto bits = static_cast<std::uint8_t>((mask[word] >> i) & ((1U << step) - 1U));
       if (bits == 0) continue;
-      const auto place =
-          hn::SetTableIndices(lanes, reinterpret_cast<const std::int32_t*>(places + std::size_t{bits} * 8));
+      // Lane n takes the packed pixel that as many drawn lanes precede.
+      const auto place = hn::SetTableIndices(lanes, reinterpret_cast<const Index*>(places + std::size_t{bits} * 8));
       const auto pixels = hn::TableLookupLanes(hn::LoadU(lanes, packed), place);
-      std::uint32_t* const into = tile + word * 64 + i;
-      hn::StoreU(hn::IfThenElse(hn::LoadMaskBits(lanes, &bits), pixels, hn::LoadU(lanes, into)), lanes, into);
+      Lane* const into = tile + word * 64 + i;
+      hn::StoreU(combine(hn::LoadU(lanes, into), pixels, hn::LoadMaskBits(lanes, &bits)), lanes, into);
       packed += std::popcount(bits);
     }
   }
   return kTilePixels / 64;
 }
 
-/// Returns how many words of the mask are merged: the last few keys, which no whole vector can be loaded of, are left.
+/// Packed pixels replace what stands there.
+std::size_t unpack_runs(std::uint32_t* tile, const std::uint64_t* mask, const std::uint32_t*& packed,
+                        const std::uint32_t* end, const std::uint32_t* places) {
+  return spread_runs<std::int32_t>(tile, mask, packed, end, places, [](auto in_place, auto pixels, auto drawn) {
+    return hn::IfThenElse(drawn, pixels, in_place);
+  });
+}
+
+/// The larger key stays.
 std::size_t merge_runs(Key* tile, const std::uint64_t* mask, const Key*& packed, const Key* end,
                        const std::uint64_t* places) {
-  const Lanes lanes;
-  const std::size_t step = hn::Lanes(lanes);
-  for (std::size_t word = 0; word < kTilePixels / 64; ++word) {
-    if (mask[word] == 0) continue;
-    if (static_cast<std::size_t>(end - packed) < 64 + step) return word;
-    for (std::size_t i = 0; i < 64; i += step) {
-      const auto bits = static_cast<std::uint8_t>((mask[word] >> i) & ((1U << step) - 1U));
-      if (bits == 0) continue;
-      // Lane n takes the packed key that as many drawn lanes precede.
-      const auto place =
-          hn::SetTableIndices(lanes, reinterpret_cast<const std::int64_t*>(places + std::size_t{bits} * 8));
-      const auto keys = hn::TableLookupLanes(hn::LoadU(lanes, packed), place);
-      const auto drawn = hn::LoadMaskBits(lanes, &bits);
-      Key* const into = tile + word * 64 + i;
-      hn::StoreU(hn::Max(hn::LoadU(lanes, into), hn::IfThenElseZero(drawn, keys)), lanes, into);
-      packed += std::popcount(bits);
-    }
-  }
-  return kTilePixels / 64;
+  return spread_runs<std::int64_t>(tile, mask, packed, end, places, [](auto in_place, auto keys, auto drawn) {
+    return hn::Max(in_place, hn::IfThenElseZero(drawn, keys));
+  });
 }
 
 }  // namespace HWY_NAMESPACE

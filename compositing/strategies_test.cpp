@@ -36,7 +36,7 @@ std::vector<Sent> traffic(Compositor& (*strategy)(int), int ranks, bool shares_a
   run_local_ranks(ranks, [&](Communicator& comm) {
     CountingCommunicator counting(comm);
     TileLayer<Key> layer = synthetic_layer(SyntheticKind::Dense, comm.rank(), kFrame, 1);
-    const std::vector<std::size_t> tiles = test::all_tiles(layer.layout());
+    const std::vector<std::size_t> tiles = all_tiles(layer.layout());
     const Composited mine = strategy(comm.rank()).composite(counting, layer, tiles);
     const std::size_t sharing =
         shares_activity ? static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(ranks - 1))) : 0;
@@ -144,7 +144,7 @@ TEST(Strategies, SharedMemorySendsNoPixelsOnOneHost) {
     SharedMemory strategy;
     for (int frame = 0; frame < 3; ++frame) {
       TileLayer<Key> layer = synthetic_layer(SyntheticKind::Dense, comm.rank(), kFrame, 1);
-      (void)strategy.composite(counting, layer, test::all_tiles(layer.layout()));
+      (void)strategy.composite(counting, layer, all_tiles(layer.layout()));
     }
     EXPECT_LT(counting.bytes_sent(), 1000U);  // who is where, once
   });
@@ -153,7 +153,7 @@ TEST(Strategies, SharedMemorySendsNoPixelsOnOneHost) {
 TEST(Strategies, EmptyTilesCostABitAndDirectSendSendsNothingOfThem) {
   run_local_ranks(4, [](Communicator& comm) {
     TileLayer<Key> layer(FrameLayout({{4096, 2048}}));
-    const std::vector<std::size_t> tiles = test::all_tiles(layer.layout());
+    const std::vector<std::size_t> tiles = all_tiles(layer.layout());
     CountingCommunicator swap(comm);
     (void)BinarySwap().composite(swap, layer, tiles);
     const std::size_t sharing = 3 * tiles.size() / 8;  // one rank's bits, then two ranks'
@@ -182,7 +182,7 @@ TEST(Strategies, PiecesGoStraightToTheirScreensWhereThoseShareTheWorkEvenly) {
   for (const auto& strategy : {instance<DirectSend>, instance<SharedMemory>}) {
     run_local_ranks(4, [&](Communicator& comm) {
       TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-      const Composited mine = strategy(comm.rank()).composite(comm, layer, test::all_tiles(layout), shown_by);
+      const Composited mine = strategy(comm.rank()).composite(comm, layer, all_tiles(layout), shown_by);
       EXPECT_TRUE(mine.assembled);
       for (const std::size_t tile : mine.tiles) EXPECT_EQ(shown_by[layout.place(tile).screen], comm.rank());
       EXPECT_EQ(mine.tiles.size(), 8U);
@@ -194,7 +194,7 @@ TEST(Strategies, DirectSendDoesNotPileTheWorkOnARankThatShowsEverything) {
   const FrameLayout layout({{512, 256}});
   run_local_ranks(4, [&](Communicator& comm) {
     TileLayer<Key> layer = test::random_layer(comm.rank(), layout);
-    const Composited mine = DirectSend().composite(comm, layer, test::all_tiles(layout), std::vector<int>{0});
+    const Composited mine = DirectSend().composite(comm, layer, all_tiles(layout), std::vector<int>{0});
     EXPECT_FALSE(mine.assembled);
     EXPECT_NEAR(static_cast<double>(mine.tiles.size()), 8.0, 4.0);
   });
@@ -205,7 +205,7 @@ TEST(Strategies, ARankTakesNoPartWhereItDrewNothing) {
   run_local_ranks(3, [&](Communicator& comm) {
     CountingCommunicator counting(comm);
     TileLayer<Key> layer = layer_on_screen(layout, static_cast<std::size_t>(comm.rank()), comm.rank());
-    const Composited mine = DirectSend().composite(counting, layer, test::all_tiles(layout), std::vector<int>{0, 1, 2});
+    const Composited mine = DirectSend().composite(counting, layer, all_tiles(layout), std::vector<int>{0, 1, 2});
     EXPECT_TRUE(mine.assembled);
     EXPECT_EQ(counting.messages_sent(), 2U);  // activity alone
   });

@@ -203,4 +203,11 @@ FrameLayout grid_layout(Size screen, Size grid) {
   return FrameLayout(std::vector<Size>(grid.area(), screen));
 }
 
+void draw_everywhere(TileLayer<Key>& layer, int rank) {
+  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+    std::ranges::fill(layer.tile(tile), make_key(0.5F, static_cast<std::uint32_t>(rank)));
+    layer.set_active(tile);
+  }
+}
+
 }  // namespace hpr

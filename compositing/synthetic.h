@@ -33,6 +33,9 @@ enum class SyntheticKind {
 /// top.
 [[nodiscard]] TileLayer<Key> synthetic_wall(SyntheticKind kind, int rank, Size screen, Size grid, std::uint32_t seed);
 
+/// Draws `rank` over every pixel, at one depth: a full layer that costs nothing to make.
+void draw_everywhere(TileLayer<Key>& layer, int rank);
+
 /// The layout of `grid` equal screens, in the order of synthetic_wall.
 [[nodiscard]] FrameLayout grid_layout(Size screen, Size grid);
 

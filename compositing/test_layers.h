@@ -42,16 +42,6 @@ inline TileLayer<Key> random_layer(int rank, const FrameLayout& layout, std::uin
   return layer;
 }
 
-/// Makes the empty layer `to` a copy.
-template <typename Pixel>
-void copy_layer(const TileLayer<Pixel>& from, TileLayer<Pixel>& to) {
-  for (std::size_t tile = 0; tile < from.tiles(); ++tile) {
-    if (!from.active(tile)) continue;
-    std::ranges::copy(from.tile(tile), to.tile(tile).begin());
-    to.set_active(tile);
-  }
-}
-
 /// All keys of a frame, tile after tile.
 inline std::vector<Key> keys_of(const TileLayer<Key>& layer) {
   const auto keys = layer.run({0, layer.tiles()});
@@ -75,12 +65,6 @@ struct TileList {
   FrameLayout layout;
   std::vector<std::size_t> tiles;
 };
-
-inline std::vector<std::size_t> all_tiles(const FrameLayout& layout) {
-  std::vector<std::size_t> tiles;
-  for (std::size_t tile = 0; tile < layout.tiles(); ++tile) tiles.push_back(tile);
-  return tiles;
-}
 
 /// One pixel, odd sizes, exact tiles, several screens, fewer tiles than ranks, subsets with and without holes, nothing.
 inline std::vector<TileList> awkward_tile_lists() {

@@ -94,6 +94,15 @@ class TileMessage {
     add_bodies(layer, tiles, drawn);
   }
 
+  /// Sends `tiles` of `layer` as a message of their own.
+  template <typename Pixel>
+  void send(Communicator& comm, const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles, int rank) {
+    start();
+    add(layer, tiles);
+    const Outgoing out = to(rank);
+    comm.exchange({&out, 1}, {}, {});
+  }
+
   [[nodiscard]] Outgoing to(int rank) const { return {rank, head_.bytes(), bodies_}; }
   [[nodiscard]] std::span<const std::byte> head() const { return head_.bytes(); }
 

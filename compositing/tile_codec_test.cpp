@@ -89,7 +89,7 @@ TEST(TileCodec, ReplacingGivesTheSendersTilesAndEmptiesThoseThatWereEmpty) {
 }
 
 TEST(TileCodec, MergingTakesTheLargerKeyOfEveryPixel) {
-  const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
+  const std::vector<std::size_t> tiles = all_tiles(kLayout);
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
     const TileLayer<Key> sent = graded_layer(seed);
     for (const bool empty : {false, true}) {
@@ -108,7 +108,7 @@ TEST(TileCodec, MergingTakesTheLargerKeyOfEveryPixel) {
 }
 
 TEST(TileCodec, OtherPixelsTravelWhole) {
-  const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
+  const std::vector<std::size_t> tiles = all_tiles(kLayout);
   TileLayer<Rgb> sent(kLayout);
   sent.set_active(3);
   for (std::size_t i = 0; i < kTilePixels; ++i) sent.tile(3)[i] = {static_cast<float>(i), 2.0F, 3.0F};
@@ -124,7 +124,7 @@ TEST(TileCodec, OtherPixelsTravelWhole) {
 
 TEST(TileCodec, AnEmptyTileTakesOneBitAndAnEmptyListOneWord) {
   const TileLayer<Key> layer(FrameLayout({{64 * 65, 64}}));
-  const std::vector<std::size_t> tiles = test::all_tiles(layer.layout());
+  const std::vector<std::size_t> tiles = all_tiles(layer.layout());
   EXPECT_EQ(head_of(layer, std::span(tiles)).size(), 8U + 2 * 8U);
   EXPECT_EQ(head_of(layer, std::span(tiles).first(64)).size(), 8U + 8U);
   EXPECT_EQ(head_of(layer, std::span(tiles).first(0)).size(), 8U);
@@ -155,7 +155,7 @@ TEST(TileCodec, WholeNeighboursShareABodyUpToItsSize) {
 }
 
 TEST(TileCodec, EveryTruncatedOrLengthenedMessageIsRefused) {
-  const std::vector<std::size_t> tiles = test::all_tiles(kLayout);
+  const std::vector<std::size_t> tiles = all_tiles(kLayout);
   const std::vector<std::byte> whole = head_of(graded_layer(0), tiles);
   std::mt19937_64 random(1);
   for (int i = 0; i < 400; ++i) {

@@ -10,10 +10,7 @@ Composited TreeSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer,
   const int rank = comm.rank();
   for (int step = 1; step < comm.size(); step *= 2) {
     if (rank % (2 * step) != 0) {
-      given_.start();
-      given_.add(layer, tiles);
-      const Outgoing out = given_.to(rank - step);
-      comm.exchange({&out, 1}, {}, {});
+      given_.send(comm, layer, tiles, rank - step);
       return {};
     }
     const int child = rank + step;

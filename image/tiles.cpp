@@ -2,6 +2,7 @@
 
 #include <sys/mman.h>
 
+#include <numeric>
 #include <utility>
 
 namespace hpr {
@@ -21,6 +22,19 @@ void ask_for_huge_pages(void* memory, std::size_t bytes) {
   const std::uintptr_t end = (start + bytes) / kHugePage * kHugePage;
   // Where the system has none left, or never gives any, small ones do.
   if (end > first) (void)::madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
+}
+
+bool shared_by_all(PeerMemory& memory, int ranks) {
+  for (int rank = 0; rank < ranks; ++rank) {
+    if (memory.of(rank).empty()) return false;
+  }
+  return true;
+}
+
+std::vector<std::size_t> all_tiles(const FrameLayout& layout) {
+  std::vector<std::size_t> tiles(layout.tiles());
+  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+  return tiles;
 }
 
 FrameLayout::FrameLayout(std::vector<Size> screens) : sizes_(std::move(screens)) {

@@ -79,6 +79,9 @@ class PeerMemory {
   virtual void meet() = 0;
 };
 
+/// Whether all ranks of the communicator that `memory` came from, which has so many, run on this host.
+[[nodiscard]] bool shared_by_all(PeerMemory& memory, int ranks);
+
 /// One value per pixel of a frame, tile after tile, row-major inside a tile, and a flag per tile that says whether
 /// anything stands in it. Memory comes zeroed from the system and is touched only where tiles are active, so an empty
 /// tile costs its flag. `Pixel{}` must be all zero bytes. Inactive tiles read as zeros.
@@ -185,6 +188,22 @@ class TileLayer {
   std::uint8_t* active_ = nullptr;
   Pixel* pixels_ = nullptr;
 };
+
+/// Every tile of a frame.
+[[nodiscard]] std::vector<std::size_t> all_tiles(const FrameLayout& layout);
+
+/// Makes `tiles` of `to` what they are in `from`, a layer of the same layout.
+template <typename Pixel>
+void copy_tiles(const TileLayer<Pixel>& from, TileLayer<Pixel>& to, std::span<const std::size_t> tiles) {
+  for (const std::size_t tile : tiles) {
+    if (from.active(tile)) {
+      std::ranges::copy(from.tile(tile), to.tile(tile).begin());
+      to.set_active(tile);
+    } else {
+      to.clear(tile);
+    }
+  }
+}
 
 /// The pixels of one screen, row by row.
 template <typename Pixel>

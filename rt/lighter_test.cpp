@@ -163,7 +163,7 @@ TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
   const Scene instanced = busy_scene(false);
   const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {96, 64}, instanced, 0.7);
   const TileLayer<Key> keys = test::cast_keys(instanced, std::span(&view, 1));
-  const std::vector<std::size_t> tiles = test::all_tiles(keys.layout());
+  const std::vector<std::size_t> tiles = all_tiles(keys.layout());
   TileLayer<Rgb> a(keys.layout());
   TileLayer<Rgb> b(keys.layout());
   const Scene flattened = busy_scene(true);
@@ -187,7 +187,7 @@ TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
   const View right = test::view_from({3.3, 1.5, 6}, {0, -0.2, 0}, {70, 64}, scene, 0.7);
   const std::vector<View> views{left, right};
   const TileLayer<Key> keys = test::cast_keys(scene, views);
-  const std::vector<std::size_t> tiles = test::all_tiles(keys.layout());
+  const std::vector<std::size_t> tiles = all_tiles(keys.layout());
   TileLayer<Rgb> whole(keys.layout());
   TileLayer<Rgb> threaded(keys.layout());
   TileLayer<Rgb> split(keys.layout());

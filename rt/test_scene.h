@@ -4,7 +4,6 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <vector>
 
 #include "image/key.h"
@@ -147,12 +146,6 @@ inline TileLayer<Key> cast_keys(const Scene& scene, std::span<const View> views)
     }
   }
   return keys;
-}
-
-inline std::vector<std::size_t> all_tiles(const FrameLayout& layout) {
-  std::vector<std::size_t> tiles(layout.tiles());
-  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
-  return tiles;
 }
 
 struct Lit {

@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
-#include <numeric>
 #include <string>
 
 namespace hpr {

@@ -39,7 +39,7 @@ TEST(MpiCompositing, EveryStrategyHoldsTheSerialMaximum) {
 TEST(MpiCompositing, PiecesOfMegabytesReachSeveralScreens) {
   MpiCommunicator comm(MPI_COMM_WORLD);
   const FrameLayout layout({{700, 500}, {700, 500}, {333, 217}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<Key> expected = test::expected_keys(comm.size(), layout);
   const std::vector<int> shown_by{0, comm.size() - 1, comm.size() / 2};
   for (const auto& compositor : all_compositors()) {
@@ -54,14 +54,13 @@ TEST(MpiCompositing, PiecesOfMegabytesReachSeveralScreens) {
 TEST(MpiCompositing, LayersInSharedMemoryAreMergedInPlaceFrameAfterFrame) {
   MpiCommunicator comm(MPI_COMM_WORLD);
   const FrameLayout layout({{700, 500}, {333, 217}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> shown_by{comm.size() - 1, 0};
   const auto memory = comm.share(TileLayer<Key>::bytes_for(layout));
   for (const auto& compositor : all_compositors()) {
     for (std::uint64_t frame = 1; frame <= 3; ++frame) {
       TileLayer<Key> layer(layout, memory);
-      layer.clear();
-      test::copy_layer(test::random_layer(comm.rank(), layout, frame), layer);
+      copy_tiles(test::random_layer(comm.rank(), layout, frame), layer, all_tiles(layout));
       const Composited mine = compositor->composite(comm, layer, tiles, shown_by);
       if (!mine.assembled) Assembler().assemble(comm, layer, mine.tiles, shown_by);
       const std::vector<std::size_t> shown = tiles_shown(layout, shown_by, comm.rank());
@@ -110,14 +109,13 @@ TEST(MpiCompositing, EveryBlenderHoldsTheSerialResultWithinItsBound) {
 template <typename Pixel>
 void check_blending_in_place(Communicator& comm) {
   const FrameLayout layout({{200, 130}, {333, 217}});
-  const std::vector<std::size_t> tiles = test::all_tiles(layout);
+  const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> shown_by{comm.size() - 1, 0};
   const auto memory = comm.share(TileLayer<Pixel>::bytes_for(layout));
   for (const auto& blender : all_blenders<Pixel>()) {
     for (std::uint64_t frame = 1; frame <= 2; ++frame) {
       TileLayer<Pixel> layer(layout, memory);
-      layer.clear();
-      test::copy_layer(test::random_colors<Pixel>(comm.rank(), layout, frame), layer);
+      copy_tiles(test::random_colors<Pixel>(comm.rank(), layout, frame), layer, all_tiles(layout));
       const std::vector<int> order = test::random_order(comm.size(), frame);
       const Composited mine = blender->blend(comm, layer, tiles, order, shown_by);
       if (!mine.assembled) Assembler().assemble(comm, layer, mine.tiles, shown_by);

@@ -21,7 +21,7 @@ class WideTree final : public hpr::Compositor {
     for (int step = 1; step < comm.size(); step *= kWidth) {
       const int first = comm.rank() / (step * kWidth) * (step * kWidth);
       if (comm.rank() != first) {
-        give(comm, layer, tiles, first);
+        message_.send(comm, layer, tiles, first);
         return {};
       }
       std::vector<int> children;
@@ -38,14 +38,6 @@ class WideTree final : public hpr::Compositor {
 
  private:
   static constexpr int kWidth = 4;
-
-  void give(hpr::Communicator& comm, const hpr::TileLayer<hpr::Key>& layer, std::span<const std::size_t> tiles,
-            int to) {
-    message_.start();
-    message_.add(layer, tiles);
-    const hpr::Outgoing out = message_.to(to);
-    comm.exchange({&out, 1}, {}, {});
-  }
 
   hpr::TileMessage message_;  // both keep their memory from frame to frame
   hpr::TileReader reader_;
