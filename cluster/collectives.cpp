@@ -38,53 +38,55 @@ std::vector<std::vector<std::byte>> gather(Communicator& comm, std::span<const s
   return all;
 }
 
-std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes) {
-  auto parts = gather(comm, bytes);
-  std::vector<std::byte> packed;
-  for (const auto& part : parts) {
-    const std::uint64_t size = part.size();
-    const auto header = std::as_bytes(std::span(&size, 1));
-    packed.insert(packed.end(), header.begin(), header.end());
-    packed.insert(packed.end(), part.begin(), part.end());
-  }
-  broadcast(comm, packed);
-  if (comm.rank() == 0) return parts;
-  for (std::span<const std::byte> rest = packed; !rest.empty();) {
+namespace {
+
+void append_part(std::vector<std::byte>& message, std::span<const std::byte> part) {
+  const std::uint64_t size = part.size();
+  const auto head = std::as_bytes(std::span(&size, 1));
+  message.insert(message.end(), head.begin(), head.end());
+  message.insert(message.end(), part.begin(), part.end());
+}
+
+/// Appends the `count` parts of a message to `parts`.
+void take_parts(std::span<const std::byte> message, std::size_t count, std::vector<std::vector<std::byte>>& parts) {
+  for (std::size_t i = 0; i < count; ++i) {
     std::uint64_t size = 0;
-    std::memcpy(&size, rest.data(), sizeof size);
-    const auto part = rest.subspan(sizeof size, size);
-    parts.emplace_back(part.begin(), part.end());
-    rest = rest.subspan(sizeof size + size);
+    HPR_CHECK(message.size() >= sizeof size);
+    std::memcpy(&size, message.data(), sizeof size);
+    message = message.subspan(sizeof size);
+    HPR_CHECK(message.size() >= size);
+    parts.emplace_back(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(size));
+    message = message.subspan(size);
   }
-  return parts;
+  HPR_CHECK(message.empty());
+}
+
+}  // namespace
+
+std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes) {
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  const auto rank = static_cast<std::size_t>(comm.rank());
+  // Those of this rank, of the next one, and so on, as far as known.
+  std::vector<std::vector<std::byte>> known;
+  known.reserve(ranks);
+  known.emplace_back(bytes.begin(), bytes.end());
+  for (std::size_t step = 1; step < ranks; step *= 2) {
+    const std::size_t count = std::min(step, ranks - step);
+    std::vector<std::byte> message;
+    for (std::size_t i = 0; i < count; ++i) append_part(message, known[i]);
+    const Outgoing out{static_cast<int>((rank + ranks - step) % ranks), message};
+    const int from = static_cast<int>((rank + step) % ranks);
+    comm.exchange({&out, 1}, {&from, 1},
+                  [&](int /*from*/, std::span<const std::byte> arrived) { take_parts(arrived, count, known); });
+  }
+  std::ranges::rotate(known, known.end() - static_cast<std::ptrdiff_t>(rank));
+  return known;
 }
 
 std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory) {
   int first = 0;
   while (memory.of(first).empty()) ++first;
   return all_gather_value(comm, first);
-}
-
-std::vector<std::byte> all_gather_equal(Communicator& comm, std::span<const std::byte> bytes) {
-  const auto ranks = static_cast<std::size_t>(comm.size());
-  const auto rank = static_cast<std::size_t>(comm.rank());
-  const std::size_t each = bytes.size();
-  // Those of this rank, of the next one, and so on, as far as known.
-  std::vector<std::byte> known(bytes.begin(), bytes.end());
-  known.reserve(ranks * each);
-  for (std::size_t step = 1; step < ranks; step *= 2) {
-    const std::size_t blocks = std::min(step, ranks - step);
-    const Outgoing out{static_cast<int>((rank + ranks - step) % ranks), std::span(known).first(blocks * each)};
-    const int from = static_cast<int>((rank + step) % ranks);
-    std::vector<std::byte> more;
-    comm.exchange({&out, 1}, {&from, 1}, [&](int /*from*/, std::span<const std::byte> message) {
-      HPR_CHECK(message.size() == blocks * each);
-      more.assign(message.begin(), message.end());
-    });
-    known.insert(known.end(), more.begin(), more.end());
-  }
-  std::ranges::rotate(known, known.end() - static_cast<std::ptrdiff_t>(rank * each));
-  return known;
 }
 
 }  // namespace hpr

@@ -22,13 +22,10 @@ void barrier(Communicator& comm);
 [[nodiscard]] std::vector<std::vector<std::byte>> gather(Communicator& comm, std::span<const std::byte> bytes,
                                                          int root = 0);
 
-/// Each rank's bytes, in order of rank, on every rank.
+/// Each rank's bytes, in order of rank, on every rank, in ceil(log2 P) rounds of one message each: Bruck, Ho, Kipnis,
+/// Upfal and Weathersby, "Efficient Algorithms for All-to-All Communications in Multiport Message-Passing Systems",
+/// 1997; each part brings its size along.
 [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes);
-
-/// Each rank's bytes, as many on every rank, one after the other in order of rank. ceil(log2 P) rounds, after Bruck,
-/// Ho, Kipnis, Upfal and Weathersby, "Efficient Algorithms for All-to-All Communications in Multiport Message-Passing
-/// Systems", 1997.
-[[nodiscard]] std::vector<std::byte> all_gather_equal(Communicator& comm, std::span<const std::byte> bytes);
 
 /// Collective: per rank the first rank of the host it shares `memory` with.
 [[nodiscard]] std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory);

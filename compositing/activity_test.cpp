@@ -12,14 +12,14 @@ namespace {
 
 Activity random_activity(int ranks, std::size_t tiles, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  std::vector<std::uint64_t> bits((tiles + 63) / 64 * static_cast<std::size_t>(ranks));
-  const std::size_t words = (tiles + 63) / 64;
+  const std::size_t words = (tiles + 15) / 16;
+  std::vector<std::uint64_t> fills(words * static_cast<std::size_t>(ranks));
   for (std::size_t rank = 0; rank < static_cast<std::size_t>(ranks); ++rank) {
     for (std::size_t i = random() % (tiles + 1); i < tiles; i += 1 + random() % 3) {
-      bits[rank * words + i / 64] |= std::uint64_t{1} << (i % 64);
+      fills[rank * words + i / 16] |= kFullTile << (4 * (i % 16));
     }
   }
-  return {ranks, tiles, std::move(bits)};
+  return {ranks, tiles, std::move(fills)};
 }
 
 TEST(Activity, EveryRankLearnsWhatEachHasDrawn) {
@@ -68,8 +68,26 @@ TEST(Activity, CutsAreInOrderCoverTheRunAndAreAsEvenAsTilesAllow) {
   }
 }
 
+TEST(Activity, PiecesAreCutByPixelsNotByTiles) {
+  // The left half of the frame is full, of the right half every tile holds a sixteenth.
+  const FrameLayout layout({{64 * 32, 64}});
+  TileLayer<Key> layer(layout);
+  for (std::size_t tile = 0; tile < 32; ++tile) {
+    const auto pixels = layer.tile(tile);
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      if (tile < 16 || i % kTileSide < 4) pixels[i] = make_key(0.5F, 1);
+    }
+    layer.set_active(tile);
+  }
+  run_local_ranks(3, [&](Communicator& comm) {
+    const std::vector<TileRun> cuts = share_activity(comm, layer, all_tiles(layout)).cut({0, 32}, 2);
+    EXPECT_GE(cuts[0].count, 8U);
+    EXPECT_LE(cuts[0].count, 10U) << "ten full tiles weigh as much as six and sixteen nearly empty ones";
+  });
+}
+
 TEST(Activity, AListNobodyDrewIntoIsCutEvenly) {
-  const Activity nothing(3, 100, std::vector<std::uint64_t>(6));
+  const Activity nothing(3, 100, std::vector<std::uint64_t>(21));
   for (const TileRun& cut : nothing.cut({0, 100}, 4)) EXPECT_EQ(cut.count, 25U);
   EXPECT_EQ(nothing.cut({10, 0}, 2), (std::vector<TileRun>{{10, 0}, {10, 0}}));
 }

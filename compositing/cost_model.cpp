@@ -133,15 +133,6 @@ class Probe {
   TileReader reader_;
 };
 
-/// The share of a tile that is drawn, from every eighth run of 64 pixels.
-double drawn_share(std::span<const Key> tile) {
-  std::size_t drawn = 0;
-  for (std::size_t first = 0; first < kTilePixels; first += 512) {
-    for (const Key key : tile.subspan(first, 64)) drawn += key != kNoKey ? 1U : 0U;
-  }
-  return static_cast<double>(drawn) / (static_cast<double>(kTilePixels) / 8.0);
-}
-
 }  // namespace
 
 Costs Costs::with_packed(double share) const {
@@ -181,16 +172,13 @@ Load share_load(Communicator& comm, const TileLayer<Key>& layer, std::span<const
   } mine;
   for (const std::size_t tile : tiles) {
     if (!layer.active(tile)) continue;
-    const double share = drawn_share(layer.tile(tile));
+    const double share = sampled_share<Key>(layer.tile(tile));
     const bool packs = share * kTilePixels <= kMostPackedPixels;
     (packs ? mine.packed : mine.whole) += kTileBytes * (packs ? share + 1.0 / 64.0 : 1.0);
   }
   const Activity activity = share_activity(comm, layer, tiles);
-  const std::vector<std::byte> gathered = all_gather_equal(comm, std::as_bytes(std::span(&mine, 1)));
-  std::vector<Bytes> layers(static_cast<std::size_t>(comm.size()));
-  std::memcpy(layers.data(), gathered.data(), gathered.size());
   Bytes all;
-  for (const Bytes& bytes : layers) {
+  for (const Bytes& bytes : all_gather_value(comm, mine)) {
     all.whole += bytes.whole;
     all.packed += bytes.packed;
   }

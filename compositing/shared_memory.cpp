@@ -115,12 +115,13 @@ namespace {
 /// Which tiles the ranks of this host have drawn into.
 template <typename Pixel>
 Activity look_at(std::span<const TileLayer<Pixel>> layers, std::span<const std::size_t> tiles) {
-  std::vector<std::uint64_t> bits;
+  std::vector<std::uint64_t> fills;
   for (const TileLayer<Pixel>& layer : layers) {
-    const std::vector<std::uint64_t> own = active_bits(layer, tiles);
-    bits.insert(bits.end(), own.begin(), own.end());
+    // Work on a host goes to who is free: counting pixels would buy nothing.
+    const std::vector<std::uint64_t> own = tile_fills(layer, tiles, false);
+    fills.insert(fills.end(), own.begin(), own.end());
   }
-  return {static_cast<int>(layers.size()), tiles.size(), std::move(bits)};
+  return {static_cast<int>(layers.size()), tiles.size(), std::move(fills)};
 }
 
 /// Merges what all layers hold of tiles into the layer of one of them, flags staying as they are, since others may be

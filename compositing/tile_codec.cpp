@@ -30,16 +30,10 @@ constexpr std::size_t count_bytes(std::size_t active) {
               "ranks of different builds cannot work together");
 }
 
-/// Whether a tile is surely full enough to travel whole, from every eighth word of it: most are, or hold little.
+/// Whether a tile is surely full enough to travel whole: most are, or hold little.
 template <typename Pixel>
 bool looks_full(std::span<const Pixel, kTilePixels> tile) {
-  std::size_t drawn = 0;
-  std::size_t seen = 0;
-  for (std::size_t first = 0; first < kTilePixels; first += 512) {
-    for (const Pixel pixel : tile.subspan(first, 64)) drawn += pixel != Pixel{} ? 1U : 0U;
-    seen += 64;
-  }
-  return drawn * kTilePixels > kMostPackedPixels * seen * 9 / 8;
+  return sampled_share<Pixel>(tile) * kTilePixels > static_cast<double>(kMostPackedPixels) * 9.0 / 8.0;
 }
 
 /// Masks and pixels of packed tiles, one after the other, merged where they lie.
