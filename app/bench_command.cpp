@@ -7,6 +7,8 @@
 
 #include "app/bench_net.h"
 #include "app/bench_raster.h"
+#include "app/bench_rays.h"
+#include "app/bench_scene.h"
 #include "app/launcher.h"
 #include "app/machine.h"
 #include "core/parallel.h"
@@ -28,7 +30,16 @@ class BenchCommand final : public Command {
     CLI::App* const raster =
         app.add_subcommand("raster", "a frame with raster only against a bare GL loop of the same mesh and readback");
     net_ = app.add_subcommand("net", "messages, merging and copying between two ranks, against plain MPI and a copy");
-    for (CLI::App* const bench : {raster, net_}) {
+    rays_ = app.add_subcommand("rays", "rays of one thread as passes trace them, against a bare Embree loop");
+    CLI::Option* const scene = rays_->add_option("scene", scene_, "another scene to trace");
+    rays_->add_option("--triangles", triangles_, "of the largest mesh of the scene made for it")
+        ->check(CLI::Range(100, 100'000'000))
+        ->capture_default_str()
+        ->excludes(scene);
+    rays_->add_option("--side", side_, "pixels of the square picture, a multiple of 64")
+        ->check(CLI::Range(64, 8192))
+        ->capture_default_str();
+    for (CLI::App* const bench : {raster, net_, rays_}) {
       bench->add_flag("--json", json_, "one JSON document");
       bench->fallthrough();
     }
@@ -37,6 +48,7 @@ class BenchCommand final : public Command {
   [[nodiscard]] bool collective() const override { return net_->parsed(); }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
+    if (rays_->parsed()) return run_rays(globals);
     return net_->parsed() ? run_net(globals) : run_raster(globals);
   }
 
@@ -46,6 +58,12 @@ class BenchCommand final : public Command {
     const auto context =
         make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
     print(bench_raster(*context, threads), context->description());
+    return ExitCode::Done;
+  }
+
+  [[nodiscard]] ExitCode run_rays(const Globals& globals) const {
+    const Scene scene = scene_.empty() ? ray_bench_scene(triangles_) : load_scene(scene_, globals.scene_limits());
+    print(bench_rays(scene, side_ / kTileSide * kTileSide), this_machine().cpu);
     return ExitCode::Done;
   }
 
@@ -80,6 +98,10 @@ class BenchCommand final : public Command {
   }
 
   CLI::App* net_ = nullptr;
+  CLI::App* rays_ = nullptr;
+  std::string scene_;
+  std::uint64_t triangles_ = 1'000'000;
+  int side_ = 1024;
   bool json_ = false;
 };
 

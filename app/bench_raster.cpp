@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <glm/geometric.hpp>
-#include <numbers>
 #include <string_view>
 
+#include "app/bench_scene.h"
 #include "core/stopwatch.h"
 #include "raster/gl_functions.h"
 #include "raster/gl_objects.h"
@@ -22,33 +20,6 @@ namespace {
 
 constexpr Size kFrame{1920, 1080};
 constexpr int kFrames = 15;
-
-/// A sphere of 2 columns (rows - 1) triangles, its radius waved by a tenth.
-Scene displaced_sphere(std::uint32_t rows, std::uint32_t columns) {
-  Scene scene;
-  Mesh& mesh = scene.meshes.emplace_back();
-  for (std::uint32_t row = 0; row <= rows; ++row) {
-    for (std::uint32_t column = 0; column <= columns; ++column) {
-      const double theta = std::numbers::pi * row / rows;
-      const double phi = 2.0 * std::numbers::pi * column / columns;
-      const glm::dvec3 direction(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
-      const double radius = 1.0 + 0.1 * std::sin(7.0 * phi) * std::sin(9.0 * theta);
-      mesh.positions.emplace_back(radius * direction);
-      mesh.normals.emplace_back(direction);
-    }
-  }
-  for (std::uint32_t row = 0; row < rows; ++row) {
-    for (std::uint32_t column = 0; column < columns; ++column) {
-      const std::uint32_t corner = row * (columns + 1) + column;
-      const std::uint32_t below = corner + columns + 1;
-      if (row > 0) mesh.triangles.emplace_back(corner, corner + 1, below);
-      if (row + 1 < rows) mesh.triangles.emplace_back(corner + 1, below + 1, below);
-    }
-  }
-  scene.instances.push_back({});
-  finish_scene(scene);
-  return scene;
-}
 
 View view_of(const Scene& scene) {
   const Camera camera = look_at({0.3, 0.4, 3.2}, {0.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.7);
@@ -140,7 +111,10 @@ double median(std::vector<double> values) {
 }
 
 BenchRow bench_sphere(GlContext& context, std::uint32_t rows, std::uint32_t columns, int threads) {
-  const Scene scene = displaced_sphere(rows, columns);
+  Scene scene;
+  scene.meshes.push_back(displaced_sphere(rows, columns));
+  scene.instances.push_back({});
+  finish_scene(scene);
   const View view = view_of(scene);
   TileLayer<Key> layer(FrameLayout({kFrame}));
   Rasterizer rasterizer(context, scene, std::array{SurfaceRange{0, scene.triangles}}, threads);

@@ -10,8 +10,27 @@
 // (app/plan.cpp); the last arrow, tiles to screens, is taken by whoever shows the frame (app/output.cpp).
 namespace hpr {
 
+namespace {
+
+/// The rectangles of a screen this rank's group covers.
+std::vector<Rect> parts_of(const FramePlan& plan, std::size_t screen) {
+  std::vector<Rect> parts;
+  for (const ScreenRect& rect : plan.mine.area) {
+    if (rect.screen == screen) parts.push_back(rect.pixels);
+  }
+  return parts;
+}
+
+}  // namespace
+
 void prepare(Session& session, const FramePlan& plan) {
-  if (!plan.mine.area.empty()) (void)session.rasterizer(plan.mine.objects);
+  if (!plan.mine.area.empty()) {
+    if (plan.primary == Primary::Rays) {
+      (void)session.primary_rays(plan.mine.objects);
+    } else {
+      (void)session.rasterizer(plan.mine.objects);
+    }
+  }
   if (plan.lit || plan.shading == Shading::Local) (void)session.lighter(plan.rays);
   if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
 }
@@ -19,12 +38,22 @@ void prepare(Session& session, const FramePlan& plan) {
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys) {
   Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
   for (std::size_t screen = 0; screen < views.size(); ++screen) {
-    std::vector<Rect> parts;
-    for (const ScreenRect& rect : plan.mine.area) {
-      if (rect.screen == screen) parts.push_back(rect.pixels);
-    }
+    const std::vector<Rect> parts = parts_of(plan, screen);
     if (!parts.empty()) rasterizer.draw(views[screen], screen, parts, keys);
   }
+}
+
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
+                              TileLayer<Key>& keys) {
+  PrimaryRays& rays = session.primary_rays(plan.mine.objects);
+  PrimaryRayStats stats;
+  for (std::size_t screen = 0; screen < views.size(); ++screen) {
+    const std::vector<Rect> parts = parts_of(plan, screen);
+    if (parts.empty()) continue;
+    rays.draw(views[screen], screen, parts, keys);
+    stats += rays.stats();
+  }
+  return stats;
 }
 
 namespace {
@@ -51,26 +80,73 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
   }
 }
 
+/// Moves keys to where their tiles' sums are.
+void bring_home(Session& session, const FramePlan& plan, std::optional<TileHomes>& homes, Frame& frame) {
+  if (!homes) homes.emplace(session.comm(), plan.layout, frame.owned);
+  if (plan.distribution == Distribution::SortFirst) return;
+  homes->bring(session.comm(), *frame.keys, frame.owned);
+  frame.owned = homes->mine();
+}
+
+void mark_rank(const Session& session, Frame& frame) {
+  const auto layer = frame.aovs.single.find(Aov::Rank);
+  if (layer == frame.aovs.single.end()) return;
+  for (const std::size_t tile : frame.owned) {
+    std::ranges::fill(layer->second.tile(tile), static_cast<float>(session.rank()));
+    layer->second.set_active(tile);
+  }
+}
+
 }  // namespace
 
-Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times) {
+FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
+  primary_ms += other.primary_ms;
+  primary += other.primary;
+  composite_ms += other.composite_ms;
+  if (passes.empty()) {
+    passes = other.passes;
+  } else {
+    for (std::size_t i = 0; i < other.passes.size(); ++i) passes.at(i).ms += other.passes[i].ms;
+  }
+  rays += other.rays;
+  samples += other.samples;
+  return *this;
+}
+
+Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
+                 const FrameSample& sample) {
   FrameTimes taken;
   Stopwatch watch;
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
-  rasterize(session, plan, views, keys);
-  taken.raster_ms = watch.ms();
+  if (plan.primary == Primary::Rays) {
+    taken.primary = trace_primary(session, plan, views, keys);
+  } else {
+    rasterize(session, plan, views, keys);
+  }
+  taken.primary_ms = watch.ms();
 
-  if (plan.shading == Shading::Local) shade_local(session.lighter(plan.rays), views, keys, plan.tiles);
+  const bool lights = plan.lit || plan.shading == Shading::Local;
+  if (lights) session.lighter(plan.rays).send_photons(session.comm(), sample.number);
+  if (plan.shading == Shading::Local) {
+    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
+  }
 
   watch.restart();
-  Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys)};
+  Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
+  if (sample.homes != nullptr) bring_home(session, plan, *sample.homes, frame);
   taken.composite_ms = watch.ms();
 
   if (plan.shading == Shading::Local) {
     unpack_colors(keys, frame.owned, session.scene().background, frame.radiance);
   } else if (plan.lit) {
-    session.lighter(plan.rays).light(views, keys, frame.owned, frame.radiance);
+    session.lighter(plan.rays).light(views, keys, frame.owned, frame.aovs.output(frame.radiance), sample.number);
+    mark_rank(session, frame);
   }
+  if (lights) {
+    taken.passes = session.lighter(plan.rays).times();
+    taken.rays = session.lighter(plan.rays).counts();
+  }
+  taken.samples = 1;
   if (times != nullptr) *times = taken;
   return frame;
 }

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "app/aov.h"
 #include "app/session.h"
+#include "app/tile_homes.h"
 #include "cluster/assignment.h"
 #include "image/tiles.h"
 #include "rt/lighter.h"
@@ -18,14 +20,24 @@ enum class Shading {
   Local,     ///< each rank lights what it drew, and colours are composited: the classic order
 };
 
+/// What makes the keys.
+enum class Primary {
+  Raster,  ///< OpenGL
+  Rays,    ///< Embree, one ray through each pixel's centre; other surfaces are seen at some edges
+  Auto,    ///< whichever a measurement finds quicker
+};
+
 /// How a frame is made; every choice gives the same picture, but for local shading: it has 8 bits a channel, and
 /// coplanar surfaces of different ranks show the brighter colour.
 struct FrameSettings {
   std::optional<Distribution> distribution;  ///< none: chosen by plan_frame
   int groups = 0;                            ///< of Hybrid; 0: default_groups
   std::string strategy;                      ///< empty: chosen by plan_frame
+  Primary primary = Primary::Raster;
   Shading shading = Shading::Deferred;
   RaySettings rays;
+  bool photons_fit_frame = false;  ///< no more photons a sample than the frame has pixels
+  std::vector<Aov> aovs;           ///< with deferred shading only
 };
 
 /// Who does what in a frame; computed alike on every rank.
@@ -33,8 +45,10 @@ struct FramePlan {
   Distribution distribution = Distribution::SortFirst;
   int groups = 1;
   std::string strategy;
+  Primary primary = Primary::Raster;  ///< never Auto
   Shading shading = Shading::Deferred;
   RaySettings rays;
+  std::vector<Aov> aovs;
   bool lit = true;  ///< false: only the keys are wanted, no light is spent on them
   FrameLayout layout;
   Assignment mine;                     ///< this rank's part
@@ -42,6 +56,7 @@ struct FramePlan {
   std::vector<std::string> explained;  ///< one line per decision, with its reason
 };
 
+/// Collective, as it may measure (`Primary::Auto`).
 [[nodiscard]] FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views);
 
 /// A finished frame, in the memory of the ranks that own its tiles.
@@ -49,12 +64,19 @@ struct Frame {
   TileLayer<Key>* keys = nullptr;  ///< the session's, valid until its next frame
   TileLayer<Rgb> radiance;         ///< of owned tiles
   std::vector<std::size_t> owned;  ///< tiles this rank lit, ascending
+  AovLayers aovs;                  ///< of owned tiles
 };
 
-/// What a frame took on this rank, besides its ray passes (Lighter::times).
+/// What a frame took on this rank; of several samples, added up.
 struct FrameTimes {
-  double raster_ms = 0.0;
+  double primary_ms = 0.0;  ///< the keys, drawn or traced
+  PrimaryRayStats primary;
   double composite_ms = 0.0;
+  std::vector<PassTime> passes;  ///< summed over threads
+  RayCounts rays;
+  int samples = 0;
+
+  FrameTimes& operator+=(const FrameTimes& other);
 };
 
 /// Makes what a frame needs and successive frames share: geometry on the GPU, the ray scene, the group's communicator.
@@ -63,9 +85,18 @@ void prepare(Session& session, const FramePlan& plan);
 
 /// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
+/// The same by rays. Returns what it took.
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
+                              TileLayer<Key>& keys);
+
+/// Which frame of several that are one picture's samples.
+struct FrameSample {
+  SampleNumber number;
+  std::optional<TileHomes>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
+};
 
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
 [[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,
-                               FrameTimes* times = nullptr);
+                               FrameTimes* times = nullptr, const FrameSample& sample = {});
 
 }  // namespace hpr

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -48,6 +49,50 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
   ::execvp(arguments.front(), arguments.data());
   ::_exit(127);
 }
+
+// The handler reaches nothing but globals.
+std::atomic<pid_t> launched = 0;
+std::atomic<int> early = 0;  ///< a signal that came before there was anybody to pass it to
+
+extern "C" void pass_on(int signal) {
+  const int error = errno;
+  const pid_t to = launched.load();
+  if (to > 0) {
+    ::kill(to, signal);
+  } else {
+    early.store(signal);
+  }
+  errno = error;
+}
+
+/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks.
+class PassedSignals {
+ public:
+  PassedSignals() {
+    launched.store(0);
+    early.store(0);
+    struct sigaction action {};
+    action.sa_handler = pass_on;
+    action.sa_flags = SA_RESTART;
+    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &action, &before_[i]);
+  }
+  ~PassedSignals() {
+    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
+  }
+  PassedSignals(const PassedSignals&) = delete;
+  PassedSignals& operator=(const PassedSignals&) = delete;
+
+  static void to(pid_t child) {
+    launched.store(child);
+    if (const int signal = early.exchange(0); signal != 0) ::kill(child, signal);
+  }
+  /// The child was waited for: its number may soon be another process's.
+  static void to_nobody() { launched.store(0); }
+
+ private:
+  static constexpr std::array kSignals{SIGUSR1, SIGUSR2};
+  std::array<struct sigaction, kSignals.size()> before_{};
+};
 
 std::string read_to_end(int pipe) {
   std::string text;
@@ -110,11 +155,13 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   if (captured_stdout != nullptr && ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   }
+  const PassedSignals passed;
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   if (child == 0) become(arguments, extra_env, pipe[1], parent);
+  PassedSignals::to(child);
 
   if (captured_stdout != nullptr) {
     ::close(pipe[1]);
@@ -125,6 +172,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   while (::waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
   }
+  PassedSignals::to_nobody();
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {

@@ -18,7 +18,8 @@ namespace hpr {
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
 /// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through; their stdout passes
 /// through or, when `captured_stdout` is given, is collected there. Returns mpiexec's exit code. The job ends when this
-/// process does. Throws Error: Io when mpiexec cannot be started, Lost when a rank or mpiexec itself was killed.
+/// process does; SIGUSR1 and SIGUSR2 are passed on to its ranks. Throws Error: Io when mpiexec cannot be started, Lost
+/// when a rank or mpiexec itself was killed.
 int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout = nullptr,
                 const std::map<std::string, std::string>& extra_env = {});
 

@@ -78,15 +78,18 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
   stats.plan = plan.explained;
   stats.passes = plan_passes(session.requirements(), plan.rays);
   stats.ms = slowest(comm, cost.ms);
-  stats.times.push_back({"raster", slowest(comm, times.raster_ms)});
-  stats.times.push_back({"composite", slowest(comm, times.composite_ms)});
-  if (plan.lit || plan.shading == Shading::Local) {
-    const Lighter& lighter = session.lighter(plan.rays);
-    // The lighter adds up what its threads took; a frame waits for them side by side.
-    for (const PassTime& pass : lighter.times())
-      stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads())});
-    for (const RayCounts& counts : all_gather_value(comm, lighter.counts())) stats.rays += counts;
+  stats.times.push_back({plan.primary == Primary::Rays ? "primary-rays" : "raster", slowest(comm, times.primary_ms)});
+  for (const PrimaryRayStats& traced : all_gather_value(comm, times.primary)) {
+    stats.rays.primary += traced.rays;
+    stats.rays.invalid += traced.invalid;
   }
+  stats.times.push_back({"composite", slowest(comm, times.composite_ms)});
+  // The lighter adds up what its threads took; a frame waits for them side by side.
+  for (const PassTime& pass : times.passes) {
+    stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads())});
+  }
+  for (const RayCounts& counts : all_gather_value(comm, times.rays)) stats.rays += counts;
+  stats.samples = times.samples;
   for (const std::size_t sent : all_gather_value(comm, cost.bytes_sent)) stats.bytes_sent += sent;
   stats.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
   return stats;
@@ -99,20 +102,24 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
     passes.push_back(
         {{"name", time.name}, {"ms", time.ms}, {"why", plan == stats.passes.end() ? "every frame" : plan->why}});
   }
-  const nlohmann::ordered_json json{{"schema", "hpr.stats/1"},
-                                    {"ms", stats.ms},
-                                    {"plan", stats.plan},
-                                    {"passes", passes},
-                                    {"rays",
-                                     {{"primary", stats.rays.primary},
-                                      {"shadow", stats.rays.shadow},
-                                      {"reflection", stats.rays.reflection},
-                                      {"refraction", stats.rays.refraction},
-                                      {"ambient-occlusion", stats.rays.ambient_occlusion},
-                                      {"photon", stats.rays.photon}}},
-                                    {"bytes_sent", stats.bytes_sent},
-                                    {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
-                                    {"ranks", stats.ranks}};
+  const nlohmann::ordered_json json{
+      {"schema", "hpr.stats/1"},
+      {"ms", stats.ms},
+      {"samples", stats.samples},
+      {"ms_per_sample", stats.ms / std::max(stats.samples, 1)},
+      {"estimated_relmse", stats.relmse ? nlohmann::ordered_json(*stats.relmse) : nlohmann::ordered_json(nullptr)},
+      {"plan", stats.plan},
+      {"passes", passes},
+      {"rays",
+       {{"primary", stats.rays.primary},
+        {"shadow", stats.rays.shadow},
+        {"reflection", stats.rays.reflection},
+        {"refraction", stats.rays.refraction},
+        {"ambient-occlusion", stats.rays.ambient_occlusion},
+        {"photon", stats.rays.photon}}},
+      {"bytes_sent", stats.bytes_sent},
+      {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
+      {"ranks", stats.ranks}};
   write_file_atomically(path, json.dump(2) + "\n");
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "app/frame.h"
+#include "app/primary_choice.h"
+#include "scene/surface_ranges.h"
 
 namespace hpr {
 namespace {
@@ -39,6 +41,14 @@ std::vector<std::size_t> tiles_in(const FrameLayout& layout, const std::vector<S
   return tiles;
 }
 
+/// A map finer than the pixels that look at it is wasted work: progressive samples add up to the same.
+std::uint32_t photons_for(std::uint32_t most, std::span<const View> views) {
+  constexpr std::size_t kFewest = 1000;
+  std::size_t pixels = 0;
+  for (const View& view : views) pixels += view.size().area();
+  return static_cast<std::uint32_t>(std::min<std::size_t>(most, std::max(pixels, kFewest)));
+}
+
 }  // namespace
 
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
@@ -52,10 +62,18 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.distribution = choice.distribution;
   plan.groups = std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
+  plan.primary = settings.primary;
   plan.shading = settings.shading;
   plan.rays = settings.rays;
+  if (settings.photons_fit_frame) plan.rays.photons = photons_for(plan.rays.photons, views);
+  plan.aovs = settings.aovs;
   plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
                                plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
+  // Surfaces of partial coverage have no keys: light finds them before what the keys name.
+  if (!covering_surfaces(session.scene(), true).empty()) {
+    plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),
+                                      covering_surfaces(session.scene(), false));
+  }
   plan.tiles = tiles_in(plan.layout, plan.mine.area);
 
   auto& lines = plan.explained;
@@ -66,12 +84,19 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   lines.push_back(plan.mine.group.size() > 1
                       ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
                       : fmt::format("composite: off (one rank covers each tile)"));
+  const char* const asked = plan.primary == Primary::Raster ? "unless asked for rays or a choice" : "as asked";
+  const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
+  lines.push_back(fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));
-  if (session.scene().lights.empty()) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
+  if (!gives_light(session.scene())) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
+    if (pass.runs && pass.name == "photon") {
+      lines.push_back(fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
+                                  settings.photons_fit_frame ? "of the quality, but no more than pixels" : "as asked"));
+    }
   }
   return plan;
 }

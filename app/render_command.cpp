@@ -3,18 +3,21 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 #include <set>
 
+#include "app/frame_sampler.h"
 #include "app/launcher.h"
 #include "app/output.h"
+#include "app/picture_files.h"
 #include "app/render_options.h"
+#include "app/run_identity.h"
+#include "app/signals.h"
 #include "cluster/scene_distribution.h"
-#include "compositing/assembly.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/units.h"
-#include "image/image_io.h"
 
 namespace hpr {
 namespace {
@@ -27,9 +30,15 @@ class RenderCommand final : public Command {
 
   void declare(CLI::App& app) override {
     app.add_option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("-o,--output", output_, "the picture: .png or .exr");
+    app.add_option("-o,--output", files_.picture, "the picture: .png or .exr");
     app.add_option("--size", size_, "pixels of the picture")->capture_default_str()->type_name("WxH");
-    app.add_option("--raw", raw_, "write the keys: per pixel a 64-bit word, depth above surface, row 0 at the top");
+    app.add_option("--raw", files_.raw,
+                   "write the keys: per pixel a 64-bit word, depth above surface, row 0 at the top");
+    app.add_option(
+           "--checkpoint", checkpoint_,
+           "where SIGUSR1 (and stop) and SIGUSR2 (and go on) put the samples so far (default: OUTPUT.checkpoint)")
+        ->type_name("FILE");
+    app.add_flag("--resume", resume_, "go on with the samples of the checkpoint");
     options_.declare(app);
   }
 
@@ -38,87 +47,102 @@ class RenderCommand final : public Command {
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
     const Size size{extent->first, extent->second};
     check_size(size, globals);
+    const FrameSettings settings = options_.settings(globals.seed);
+    const Sampling sampling = options_.sampling();
+    files_.aovs = settings.aovs;
+    files_.exposure = options_.exposure;
+    if (checkpoint_.empty() && !files_.picture.empty()) checkpoint_ = files_.picture + ".checkpoint";
+    if (!sampling.sums()) checkpoint_.clear();
     if (!inside_mpi_job()) check_outputs(globals);
-    const FrameSettings settings = options_.settings();
+    watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
       if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(globals); });
-      Session session(comm, globals, [&] { return load_scene(source_, globals.scene_limits()); });
-      return draw(session, settings, size);
+      Session session(comm, globals, [&] { return options_.load(source_, globals); });
+      return draw(session, globals, settings, sampling, size);
     });
   }
 
  private:
   void check_outputs(const Globals& globals) const {
-    if (output_.empty() && raw_.empty() && options_.stats.empty() && !options_.explain) {
+    if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty() && !options_.explain) {
       throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");
     }
-    if (!output_.empty() && !output_.ends_with(".png") && !output_.ends_with(".exr")) {
-      throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", output_),
+    if (!files_.picture.empty() && !files_.picture.ends_with(".png") && !files_.picture.ends_with(".exr")) {
+      throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", files_.picture),
                   "name a .png or .exr file");
     }
-    if (!raw_.empty() && options_.shading == "local") {
+    if (!files_.raw.empty() && options_.shading == "local") {
       throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
                   "use --shading deferred");
     }
-    if (output_.ends_with(".exr") && options_.shading == "local") {
-      log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those", output_);
+    if (files_.picture.ends_with(".exr") && options_.shading == "local") {
+      log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those",
+                   files_.picture);
+    }
+    if (!files_.aovs.empty() && files_.picture.empty()) {
+      throw Error(ExitCode::Usage, "--aov needs a picture its layers go with", "name one with -o");
+    }
+    if (resume_ && checkpoint_.empty()) {
+      throw Error(ExitCode::Usage, "--resume goes on with the samples of a picture of several",
+                  "ask for more with --spp, and name the picture with -o or the file with --checkpoint");
     }
     std::set<std::filesystem::path> paths;
-    for (const std::string& path : {output_, raw_, options_.stats}) {
+    const std::string beside = files_.is_png() ? files_.aov_file() : "";
+    for (const std::string& path : {files_.picture, files_.raw, options_.stats, beside, checkpoint_}) {
       if (!path.empty() && !paths.insert(std::filesystem::weakly_canonical(path)).second) {
         throw Error(ExitCode::Usage, fmt::format("'{}' is named for two results", path), "give each its own name");
       }
-      if (!path.empty()) check_writable(path, globals.force);
+      if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
     }
   }
 
-  ExitCode draw(Session& session, const FrameSettings& settings, Size size) {
+  ExitCode draw(Session& session, const Globals& globals, const FrameSettings& settings, const Sampling& sampling,
+                Size size) {
     const View view = make_view(options_.choose_camera(session.scene()), size, session.scene().bounds);
     const Blocks blocks = cut_blocks(std::span(&view, 1));
     FramePlan plan = plan_frame(session, settings, blocks.views);
-    plan.lit = !output_.empty() || !options_.stats.empty();
+    plan.lit = !files_.picture.empty() || !options_.stats.empty();
     const bool speaks = session.comm().rank() == 0;
     if (options_.explain && speaks) {
       for (const std::string& line : plan.explained) fmt::print("{}\n", line);
     }
-    if (output_.empty() && raw_.empty() && options_.stats.empty()) return ExitCode::Done;
+    if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty()) return ExitCode::Done;
 
     prepare(session, plan);
     const Stopwatch watch;
     const std::size_t sent_before = session.comm().bytes_sent();
     FrameTimes times;
-    Frame frame = make_frame(session, plan, blocks.views, &times);
-    const std::vector<int> to_root(blocks.views.size(), 0);
-    // A PNG holds display colours, a third of the bytes of the radiance an EXR holds.
-    TileLayer<Rgba8> display;
-    if (output_.ends_with(".png")) {
-      display = to_display(frame, session.threads(), options_.exposure);
-      session.assembler().assemble(session.comm(), display, frame.owned, to_root);
-    } else if (!output_.empty()) {
-      session.assembler().assemble(session.comm(), frame.radiance, frame.owned, to_root);
+    Frame whole;
+    std::optional<FrameSampler> sampler;
+    if (sampling.sums()) {
+      sampler.emplace(session, plan, sampling, 0, !files_.raw.empty());
+      Progress progress(speaks ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
+      const CheckpointSettings checkpoint{checkpoint_, resume_, identity_of(session, plan, blocks.views, sampling)};
+      if (!sampler->draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
+      times = sampler->times();
+    } else {
+      whole = make_frame(session, plan, blocks.views, &times);
     }
-    if (!raw_.empty()) session.assembler().assemble(session.comm(), *frame.keys, frame.owned, to_root);
-    const RunStats stats = gather_stats(session, plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
+    const CollectedPicture picture(session, sampler ? sampler->frame() : whole, blocks, files_);
+    RunStats stats = gather_stats(session, plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
+    if (sampler) stats.relmse = sampler->reached_so_far().relmse;
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;
-      if (!raw_.empty()) write_file_atomically(raw_, std::as_bytes(join_blocks(*frame.keys, blocks, 0).pixels()));
-      if (output_.ends_with(".png")) {
-        write_png(output_, join_blocks(display, blocks, 0));
-      } else if (!output_.empty()) {
-        write_image(output_, join_blocks(frame.radiance, blocks, 0), {{"hpr:scene", session.scene().name}});
-      }
+      picture.write(session.scene().name);
       if (!options_.stats.empty()) write_stats(options_.stats, stats);
     });
-    if (speaks)
-      log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms", session.scene().triangles, size.width, size.height,
-                stats.ranks, stats.ms);
+    if (speaks) {
+      log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms{}", session.scene().triangles, size.width, size.height,
+                stats.ranks, stats.ms, sampler ? fmt::format(", {} samples", sampler->reached_so_far().samples) : "");
+    }
     return ExitCode::Done;
   }
 
   std::string source_;
-  std::string output_;
   std::string size_ = "1280x720";
-  std::string raw_;
+  PictureFiles files_;
+  std::string checkpoint_;
+  bool resume_ = false;
   RenderOptions options_;
 };
 

@@ -8,13 +8,18 @@
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "app/output.h"
+#include "app/quality.h"
 #include "compositing/compositor.h"
 #include "core/names.h"
+#include "scene/environment.h"
+#include "scene/load_scene.h"
 
 namespace hpr {
 namespace {
 
 constexpr double kDefaultFovDegrees = 45.0;
+constexpr int kReferenceDepth = 64;
 
 glm::dvec3 to_point(const std::vector<double>& values) {
   return {values[0], values[1], values[2]};
@@ -35,6 +40,15 @@ Shading parse_shading(const std::string& name) {
   if (name == "local") return Shading::Local;
   const std::vector<std::string> choices{"deferred", "local"};
   throw Error(ExitCode::Usage, fmt::format("unknown shading '{}'", name), unknown_name_hint(name, choices));
+}
+
+Primary parse_primary(const std::string& name) {
+  if (name == "raster") return Primary::Raster;
+  if (name == "rays") return Primary::Rays;
+  if (name == "auto") return Primary::Auto;
+  const std::vector<std::string> choices{"raster", "rays", "auto"};
+  throw Error(ExitCode::Usage, fmt::format("nothing called '{}' makes keys", printable(name)),
+              unknown_name_hint(name, choices));
 }
 
 /// The first camera of that name, else the one at that index.
@@ -66,10 +80,9 @@ void RenderOptions::declare(CLI::App& app) {
   by_at->needs(by_eye);
   point("--up", up, "which way is up")->needs(by_eye);
   app.add_option("--fov", fov_degrees, "vertical angle in degrees")->check(CLI::Range(0.001, 179.0));
-  app.add_option("--passes", passes, "auto, none, or a list of ray passes")->capture_default_str();
-  app.add_option("--max-depth", max_depth, "reflections of reflections")
-      ->check(CLI::Range(1, 64))
+  app.add_option("--primary", primary, "what finds the visible surfaces: raster, rays, or auto, which measures both")
       ->capture_default_str();
+  declare_light(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -82,6 +95,33 @@ void RenderOptions::declare(CLI::App& app) {
       ->capture_default_str();
   app.add_flag("--explain", explain, "print the plan of the frame and why");
   app.add_option("--stats", stats, "write what the frame took as JSON")->type_name("FILE.json");
+}
+
+void RenderOptions::declare_light(CLI::App& app) {
+  app.add_option("--quality", quality, "draft, good or best: what the options of light are that are not given")
+      ->capture_default_str();
+  app.add_option("--spp", spp, "samples of a pixel: a number, until:60s or until:relmse=1e-3")->type_name("N");
+  app.add_option("--filter", filter,
+                 "how samples make up a pixel: box, triangle, gaussian, b-spline or mitchell (default: the centre for "
+                 "one sample, box for more)");
+  app.add_option("--passes", passes, "auto, none, or a list of ray passes")->capture_default_str();
+  app.add_option("--max-depth", max_depth, "reflections and refractions in a row")->check(CLI::Range(1, 64));
+  app.add_option("--environment", environment,
+                 "light from all around: a latitude-longitude picture, or one radiance R,G,B; replaces the scene's own")
+      ->type_name("FILE|R,G,B");
+  app.add_option("--light-samples", light_samples, "rays to surfaces that emit and the environment, per point")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--glossy-cutoff", glossy_cutoff, "specular surfaces at least this rough are not followed by rays")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--photons", photons, "sent per sample, where the scene requires any")
+      ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
+  app.add_flag("--reference", reference, "path tracing in place of the passes: slow, and the ground truth");
+  app.add_flag("--no-terminator-fix", no_terminator_fix,
+               "shadow rays leave from the triangles, not the smooth surface they stand for");
+  app.add_option("--aov", aov,
+                 "layers of the .exr, or of FILE.aov.exr beside a .png: a list of depth, id, normal, albedo, direct, "
+                 "shadow, reflection, refraction, ambient-occlusion, photon, rank, cost")
+      ->type_name("LIST");
 }
 
 Camera RenderOptions::choose_camera(const Scene& scene) const {
@@ -100,7 +140,21 @@ Camera RenderOptions::choose_camera(const Scene& scene) const {
   return chosen;
 }
 
-FrameSettings RenderOptions::settings() const {
+Scene RenderOptions::load(const std::string& source, const Globals& globals) const {
+  Scene scene = load_scene(source, globals.scene_limits());
+  if (!environment.empty()) scene.environment = load_environment(environment, picture_limits(globals));
+  return scene;
+}
+
+Sampling RenderOptions::sampling() const {
+  Sampling sampling;
+  sampling.goal = spp ? parse_sample_goal(*spp) : parse_sample_goal(std::to_string(find_quality(quality).samples));
+  if (!filter.empty()) sampling.filter = parse_pixel_filter(filter);
+  check_sampling(sampling);
+  return sampling;
+}
+
+FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   FrameSettings settings;
   if (!std::isfinite(fov_degrees) || !std::isfinite(exposure)) {
     throw Error(ExitCode::Usage, "--fov and --exposure take finite numbers", "write e.g. --fov 45");
@@ -108,10 +162,32 @@ FrameSettings RenderOptions::settings() const {
   if (distribute != "auto") settings.distribution = parse_distribution(distribute);
   settings.groups = groups;
   if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
+  settings.primary = parse_primary(primary);
   settings.shading = parse_shading(shading);
   settings.rays.auto_passes = passes == "auto";
   if (passes != "auto" && passes != "none") settings.rays.passes = split_list(passes);
-  settings.rays.max_depth = max_depth;
+  const Quality& defaults = find_quality(quality);
+  settings.rays.seed = seed;
+  settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);
+  settings.rays.light_samples = light_samples.value_or(defaults.light_samples);
+  settings.rays.glossy_cutoff = glossy_cutoff.value_or(defaults.glossy_cutoff);
+  settings.rays.photons = photons.value_or(defaults.photons);
+  settings.photons_fit_frame = !photons;
+  settings.rays.global_photons =
+      defaults.global_photons || std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
+  settings.rays.reference = reference;
+  settings.rays.terminator_fix = !no_terminator_fix;
+  settings.aovs = parse_aovs(aov);
+  const bool splits = std::ranges::any_of(
+      settings.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
+  if (reference && (splits || settings.shading == Shading::Local)) {
+    throw Error(ExitCode::Usage, "--reference has no light of its own passes to show or to composite",
+                "with it, use --shading deferred and of --aov only depth, id and rank");
+  }
+  if (!settings.aovs.empty() && settings.shading == Shading::Local) {
+    throw Error(ExitCode::Usage, "--aov needs surfaces, which --shading local replaces by colours",
+                "use --shading deferred");
+  }
   (void)plan_passes({}, settings.rays);  // unknown pass names are found before the scene is loaded
   return settings;
 }

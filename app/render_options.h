@@ -1,10 +1,13 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "app/frame.h"
+#include "app/samples.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -16,8 +19,19 @@ struct RenderOptions {
   std::vector<double> at;
   std::vector<double> up{0.0, 1.0, 0.0};
   double fov_degrees = 0.0;
+  std::string primary = "raster";
   std::string passes = "auto";
-  int max_depth = 8;
+  std::string quality = "good";
+  std::optional<std::string> spp;  ///< these take the quality's value where they are not given
+  std::optional<int> max_depth;
+  std::optional<int> light_samples;
+  std::optional<double> glossy_cutoff;
+  std::optional<std::uint32_t> photons;
+  std::string filter;
+  std::string aov;
+  std::string environment;
+  bool reference = false;
+  bool no_terminator_fix = false;
   std::string distribute = "auto";
   int groups = 0;
   std::string strategy = "auto";
@@ -28,11 +42,19 @@ struct RenderOptions {
 
   void declare(CLI::App& app);
 
+  /// The scene with the light these options give it.
+  [[nodiscard]] Scene load(const std::string& source, const Globals& globals) const;
+
   /// The camera the user means: by --eye and --at, by name or index, else the scene's first, else one that frames it.
   [[nodiscard]] Camera choose_camera(const Scene& scene) const;
 
-  /// Throws Error (Usage) for unknown names, before any scene is loaded.
-  [[nodiscard]] FrameSettings settings() const;
+  /// Throws Error (Usage) for unknown names, before any scene is loaded. `seed`: of everything random.
+  [[nodiscard]] FrameSettings settings(std::uint64_t seed) const;
+  /// The same.
+  [[nodiscard]] Sampling sampling() const;
+
+ private:
+  void declare_light(CLI::App& app);
 };
 
 }  // namespace hpr

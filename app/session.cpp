@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "scene/surface_ranges.h"
 
 namespace hpr {
 
@@ -53,11 +54,34 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
   return *rasterizer_;
 }
 
+PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects) {
+  if (!primary_rays_ || !std::ranges::equal(objects, traced_objects_)) {
+    primary_rays_.reset();
+    traced_share_.reset();  // frees its memory before the next one takes some
+    traced_objects_.assign(objects.begin(), objects.end());
+    const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_surfaces(scene_, false);
+    if (!everything) {
+      traced_share_ = std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, traced_objects_);
+    }
+    primary_rays_ = std::make_unique<PrimaryRays>(scene_, everything ? ray_scene() : *traced_share_, share_.threads);
+  }
+  return *primary_rays_;
+}
+
+const RayScene& Session::ray_scene() {
+  if (!ray_scene_) {
+    ray_scene_ =
+        std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, covering_surfaces(scene_, false));
+  }
+  return *ray_scene_;
+}
+
 Lighter& Session::lighter(const RaySettings& settings) {
   if (!lighter_ || ray_settings_ != settings) {
     RaySettings own = settings;
     own.threads = share_.threads;
-    lighter_ = std::make_unique<Lighter>(scene_, own, requirements_);
+    lighter_ =
+        std::make_unique<Lighter>(scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(); });
     ray_settings_ = settings;
   }
   return *lighter_;

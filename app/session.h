@@ -13,6 +13,8 @@
 #include "raster/gl_context.h"
 #include "raster/rasterizer.h"
 #include "rt/lighter.h"
+#include "rt/primary_rays.h"
+#include "rt/ray_scene.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 
@@ -26,6 +28,7 @@ class Session {
   Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load);
 
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
+  [[nodiscard]] int rank() const { return comm_.rank(); }
   [[nodiscard]] const Scene& scene() const { return scene_; }
   [[nodiscard]] const Requirements& requirements() const { return requirements_; }
   [[nodiscard]] int threads() const { return share_.threads; }
@@ -35,6 +38,11 @@ class Session {
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for.
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
+  /// The primary rays through `objects`; kept until other objects are asked for.
+  [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects);
+  /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
+  /// asked for.
+  [[nodiscard]] const RayScene& ray_scene();
   /// The lighter of these settings; kept until others are asked for.
   [[nodiscard]] Lighter& lighter(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
@@ -64,6 +72,10 @@ class Session {
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
+  std::unique_ptr<RayScene> ray_scene_;
+  std::vector<SurfaceRange> traced_objects_;
+  std::unique_ptr<RayScene> traced_share_;  ///< of primary_rays_; none where ray_scene_ is
+  std::unique_ptr<PrimaryRays> primary_rays_;
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<Lighter> lighter_;
   Group group_;

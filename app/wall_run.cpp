@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 
+#include "app/frame_sampler.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
@@ -87,7 +89,8 @@ class WallDriver {
         screens_(wall_views(wall, run.options.choose_camera(session.scene()), session.scene().bounds)),
         blocks_(cut_blocks(screens_)),
         plan_(plan_frame(session, settings, blocks_.views)),
-        shown_by_(owners_of(wall, hosts_of(session.comm(), session.host()))) {
+        shown_by_(owners_of(wall, hosts_of(session.comm(), session.host()))),
+        sampling_(run.options.sampling()) {
     agree_on_failure(session_.comm(), [&] {
       if (shows_any()) display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
     });
@@ -102,12 +105,23 @@ class WallDriver {
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
   [[nodiscard]] const FrameTimes& times() const { return times_; }
   [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
+  [[nodiscard]] std::optional<double> relmse() const { return relmse_; }
 
-  /// Collective. Draws one frame and shows each screen on the rank it belongs to.
-  void draw(std::uint64_t number) {
+  /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
+  void draw(std::uint64_t number, Progress& progress) {
     const Stopwatch watch;
     const std::size_t sent_before = session_.comm().bytes_sent();
-    const Frame frame = make_frame(session_, plan_, blocks_.views, &times_);
+    std::optional<FrameSampler> sampler;
+    Frame whole;
+    if (sampling_.sums()) {
+      sampler.emplace(session_, plan_, sampling_, number, false);
+      (void)sampler->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
+      times_ = sampler->times();
+      relmse_ = sampler->reached_so_far().relmse;
+    } else {
+      whole = make_frame(session_, plan_, blocks_.views, &times_, {{number, 0}, nullptr});
+    }
+    const Frame& frame = sampler ? sampler->frame() : whole;
     TileLayer<Rgba8> display = to_display(frame, session_.threads(), run_.options.exposure);
     session_.assembler().assemble(session_.comm(), display, frame.owned, block_owners(blocks_, shown_by_));
     pictures_.clear();
@@ -182,7 +196,9 @@ class WallDriver {
   std::unique_ptr<Display> display_;
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
   RunManifest manifest_;
+  Sampling sampling_;
   FrameTimes times_;
+  std::optional<double> relmse_;
   FrameCost last_cost_;
 };
 
@@ -231,13 +247,18 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   }
   prepare(session, driver.plan());
   {
-    Progress progress(speaks ? globals.progress : "none", "frame", static_cast<std::size_t>(run.frames));
+    const std::string mode = speaks ? globals.progress : "none";
+    const Sampling sampling = run.options.sampling();
+    Progress progress(sampling.sums() ? "none" : mode, "frame", static_cast<std::size_t>(run.frames));
     for (int frame = 0; frame < run.frames; ++frame) {
-      driver.draw(static_cast<std::uint64_t>(frame));
+      Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}/{}: sample", frame + 1, run.frames),
+                       sampling.goal.samples.value_or(0));
+      driver.draw(static_cast<std::uint64_t>(frame), samples);
       progress.step(fmt::format("{:.1f} ms", driver.last_cost().ms));
     }
   }
-  const RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
+  RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
+  stats.relmse = driver.relmse();
   std::vector<Image<Rgba8>> pictures;
   if (run.display == "file" || !run.picture.empty()) pictures = driver.collect_pictures();
   agree_on_failure(session.comm(), [&] {
@@ -279,14 +300,18 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
 ExitCode run_wall(const WallRun& run, const Globals& globals) {
   Wall wall = load_wall(run.wall);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
-  const FrameSettings settings = run.options.settings();
+  const FrameSettings settings = run.options.settings(globals.seed);
+  if (!settings.aovs.empty()) {
+    throw Error(ExitCode::Usage, "a wall has no AOVs", "use --aov with render");
+  }
+  (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   const EmptyFolders tidy(run.folder);
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
   return run_ranks(globals, [&](Communicator& comm) {
     const EmptyFolders tidy_in_job(run.folder);  // a rank that fails leaves run_ranks only to end the job
     if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(run, wall, globals); });
-    Session session(comm, globals, [&] { return load_scene(run.scene, globals.scene_limits()); });
+    Session session(comm, globals, [&] { return run.options.load(run.scene, globals); });
     return drive(run, wall, settings, globals, session);
   });
 }

@@ -21,7 +21,8 @@ std::vector<std::byte> encode(const char* format, const OIIO::ImageSpec& spec, c
   if (!output)
     throw Error(ExitCode::Internal, fmt::format("OpenImageIO cannot write {}", format), "reinstall libopenimageio2.4");
   // On some formats only has_error() knows that a write failed although every call returned true.
-  const bool done = output->open(std::string("memory.") + format, spec) && output->write_image(spec.format, pixels) &&
+  const OIIO::TypeDesc type = spec.channelformats.empty() ? spec.format : OIIO::TypeDesc(OIIO::TypeDesc::UNKNOWN);
+  const bool done = output->open(std::string("memory.") + format, spec) && output->write_image(type, pixels) &&
                     output->close() && !output->has_error();
   if (!done)
     throw Error(ExitCode::Io, fmt::format("cannot encode {}: {}", format, output->geterror()),
@@ -38,6 +39,8 @@ const char* sniff(std::span<const std::byte> bytes) {
   const auto starts_with = [&](const auto& magic) {
     return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
   };
+  constexpr std::array<unsigned char, 2> kRadiance{'#', '?'};
+  if (starts_with(kRadiance)) return "hdr";
   return starts_with(kPng) ? "png" : starts_with(kJpeg) ? "jpeg" : starts_with(kExr) ? "openexr" : nullptr;
 }
 
@@ -59,11 +62,13 @@ void check_limits(const OIIO::ImageSpec& spec, const std::string& name, const Im
 /// An opened picture whose size was checked before a pixel is allocated.
 class Input {
  public:
-  Input(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits, bool exr_allowed)
+  Input(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits, bool floats_allowed)
       : name_(name), memory_(const_cast<std::byte*>(bytes.data()), bytes.size()) {
     const char* const format = sniff(bytes);
-    if (format == nullptr || (!exr_allowed && std::strcmp(format, "openexr") == 0)) {
-      throw Error(ExitCode::BadInput, fmt::format("{}: not a PNG{} or JPEG picture", name, exr_allowed ? ", EXR" : ""),
+    const bool floats = format != nullptr && (std::strcmp(format, "openexr") == 0 || std::strcmp(format, "hdr") == 0);
+    if (format == nullptr || (floats && !floats_allowed)) {
+      throw Error(ExitCode::BadInput,
+                  fmt::format("{}: not a PNG{} or JPEG picture", name, floats_allowed ? ", EXR, Radiance" : ""),
                   "convert the picture");
     }
     OIIO::ImageSpec config;
@@ -85,6 +90,13 @@ class Input {
     std::vector<Value> values(static_cast<std::size_t>(spec().width) * static_cast<std::size_t>(spec().height) *
                               static_cast<std::size_t>(spec().nchannels));
     if (!input_->read_image(0, 0, 0, spec().nchannels, type, values.data()) || input_->has_error()) fail();
+    return values;
+  }
+
+  template <typename Value>
+  [[nodiscard]] std::vector<Value> channel(int index, OIIO::TypeDesc type) {
+    std::vector<Value> values(static_cast<std::size_t>(spec().width) * static_cast<std::size_t>(spec().height));
+    if (!input_->read_image(0, 0, index, index + 1, type, values.data()) || input_->has_error()) fail();
     return values;
   }
 
@@ -124,20 +136,28 @@ class OiioCodec final : public ImageCodec {
     spec.attribute("DateTime", "1970:01:01 00:00:00");  // the same picture is the same file, whenever it is written
     for (const auto& [key, value] : attributes) spec.attribute(key, value);
 
+    // Every channel has four bytes: they are laid side by side as words, whatever they mean.
     const auto channels = static_cast<std::size_t>(spec.nchannels);
-    std::vector<float> values(image.pixels().size() * channels);
-    for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-      float* out = &values[i * channels];
-      const Rgb color = image.pixels()[i];
-      *out++ = color.r;
-      *out++ = color.g;
-      *out++ = color.b;
-      for (const ExrLayer& layer : layers) {
-        const std::size_t count = layer.channels.size();
-        out = std::copy_n(layer.values.data() + i * count, count, out);
+    std::vector<std::uint32_t> words(image.pixels().size() * channels);
+    const auto lay = [&](std::size_t first, std::size_t count, const auto* values) {
+      for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+        std::memcpy(&words[i * channels + first], values + i * count, count * sizeof(std::uint32_t));
       }
+    };
+    lay(0, 3, reinterpret_cast<const float*>(image.pixels().data()));
+    std::size_t first = 3;
+    for (const ExrLayer& layer : layers) {
+      const std::size_t count = layer.channels.size();
+      if (layer.integers.empty()) {
+        lay(first, count, layer.values.data());
+      } else {
+        lay(first, count, layer.integers.data());
+        spec.channelformats.resize(channels, OIIO::TypeDesc::FLOAT);
+        std::fill_n(spec.channelformats.begin() + static_cast<std::ptrdiff_t>(first), count, OIIO::TypeDesc::UINT);
+      }
+      first += count;
     }
-    return encode("exr", spec, values.data());
+    return encode("exr", spec, words.data());
   }
 
   [[nodiscard]] Image<Rgba8> decode(std::span<const std::byte> bytes, const std::string& name,
@@ -163,6 +183,18 @@ class OiioCodec final : public ImageCodec {
     return {{input.spec().width, input.spec().height},
             input.spec().channelnames,
             input.values<float>(OIIO::TypeDesc::FLOAT)};
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> decode_integers(std::span<const std::byte> bytes, const std::string& name,
+                                                           const std::string& channel,
+                                                           const ImageLimits& limits) const override {
+    Input input(bytes, name, limits, true);
+    const int index = input.spec().channelindex(channel);
+    if (index < 0 || input.spec().channelformat(index) != OIIO::TypeDesc::UINT) {
+      throw Error(ExitCode::BadInput, fmt::format("{}: there is no integer channel '{}'", name, channel),
+                  "name one the file has");
+    }
+    return input.channel<std::uint32_t>(index, OIIO::TypeDesc::UINT);
   }
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -20,6 +21,9 @@ class ImageCodec {
                                             const ImageLimits& limits) const = 0;
   [[nodiscard]] virtual FloatImage decode_float(std::span<const std::byte> bytes, const std::string& name,
                                                 const ImageLimits& limits) const = 0;
+  [[nodiscard]] virtual std::vector<std::uint32_t> decode_integers(std::span<const std::byte> bytes,
+                                                                   const std::string& name, const std::string& channel,
+                                                                   const ImageLimits& limits) const = 0;
 };
 
 }  // namespace hpr

@@ -13,6 +13,8 @@
 namespace hpr {
 namespace {
 
+constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30U;
+
 /// Opens the module from lib/ beside the program's folder, where build and installation put it, else from wherever the
 /// loader searches. The path comes first because a sanitizer's dlopen does not see the program's own search path.
 void* open_module() {
@@ -52,7 +54,8 @@ std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
 std::vector<std::byte> encode_exr(const Image<Rgb>& image, const std::map<std::string, std::string>& attributes,
                                   std::span<const ExrLayer> layers) {
   for (const ExrLayer& layer : layers) {
-    HPR_CHECK(layer.values.size() == image.pixels().size() * layer.channels.size());
+    HPR_CHECK(layer.values.empty() || layer.integers.empty());
+    HPR_CHECK(layer.values.size() + layer.integers.size() == image.pixels().size() * layer.channels.size());
   }
   return codec().encode_exr(image, attributes, layers);
 }
@@ -62,8 +65,12 @@ Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& n
 }
 
 FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits) {
-  constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30U;
   return codec().decode_float(read_file(path, kLargestFile), path.string(), limits);
+}
+
+std::vector<std::uint32_t> read_integers(const std::filesystem::path& path, const std::string& channel,
+                                         const ImageLimits& limits) {
+  return codec().decode_integers(read_file(path, kLargestFile), path.string(), channel, limits);
 }
 
 void write_image(const std::filesystem::path& path, const Image<Rgb>& image,

@@ -19,8 +19,8 @@ struct ImageLimits {
   std::uint64_t pixels = std::uint64_t{1} << 27;  ///< 128 Mi
 };
 
-/// A picture read from a file: `values` [height][width][channels], linear for EXR, the stored level / 255 for PNG and
-/// JPEG.
+/// A picture read from a file: `values` [height][width][channels], linear for EXR and Radiance (.hdr), the stored level
+/// / 255 for PNG and JPEG.
 struct FloatImage {
   Size size;
   std::vector<std::string> channels;
@@ -29,8 +29,9 @@ struct FloatImage {
 
 /// One more channel set of an EXR file, e.g. depth or surface ids; floats survive bit by bit.
 struct ExrLayer {
-  std::vector<std::string> channels;  ///< e.g. {"normal.X", "normal.Y", "normal.Z"}
-  std::vector<float> values;          ///< [height][width][channels]
+  std::vector<std::string> channels;         ///< e.g. {"normal.X", "normal.Y", "normal.Z"}
+  std::vector<float> values;                 ///< [height][width][channels]
+  std::vector<std::uint32_t> integers = {};  ///< in place of `values`: the channels are unsigned integers
 };
 
 /// PNG, 8 bit RGBA, sRGB.
@@ -47,8 +48,13 @@ struct ExrLayer {
 [[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name,
                                         const ImageLimits& limits);
 
-/// Reads a PNG, JPEG or EXR file. Throws Error (Io, BadInput, Limit).
+/// Reads a PNG, JPEG, EXR or Radiance (.hdr) file. Throws Error (Io, BadInput, Limit).
 [[nodiscard]] FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits);
+
+/// One unsigned integer channel of an EXR file, [height][width], bit by bit; read_image gives such channels as shares
+/// of 2^32 - 1. Throws Error as read_image does, and BadInput when there is no such channel.
+[[nodiscard]] std::vector<std::uint32_t> read_integers(const std::filesystem::path& path, const std::string& channel,
+                                                       const ImageLimits& limits);
 
 /// Writes `image` atomically as PNG (through to_srgb) or EXR, by the extension of `path`; throws Error (Usage) for
 /// others.

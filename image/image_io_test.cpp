@@ -242,6 +242,25 @@ TEST(ImageIo, ExrGivesBackEveryBitOfEveryFloat) {
   EXPECT_EQ(channel(read, "normal.Y")[3], -3.0F);
 }
 
+TEST(ImageIo, ExrIntegersKeepTheirBitsBesideFloats) {
+  const Image<Rgb> image({3, 1}, {0.5F, -1e30F, std::numeric_limits<float>::denorm_min()});
+  const std::vector<std::uint32_t> ids{0U, 0x01000001U, 0xFFFFFFFFU};  // the middle one is no float
+  const std::vector<ExrLayer> layers{{{"id.X"}, {}, ids}, {{"depth.Z"}, {1.0F, 2.0F, 3.0F}}};
+  const Bytes file = encode_exr(image, {}, layers);
+  const FloatImage floats = through_file(file, ".exr");
+  EXPECT_EQ(bits_of(channel(floats, "R")), bits_of(std::vector<float>(3, 0.5F)));
+  EXPECT_EQ(bits_of(channel(floats, "B")), bits_of(std::vector<float>(3, std::numeric_limits<float>::denorm_min())));
+  EXPECT_EQ(channel(floats, "depth.Z"), (std::vector<float>{1.0F, 2.0F, 3.0F}));
+
+  const auto path = std::filesystem::temp_directory_path() / "hpr-image-test-integers.exr";
+  write_file_atomically(path, file);
+  EXPECT_EQ(read_integers(path, "id.X", {}), ids);
+  for (const char* const absent : {"depth.Z", "none"}) {
+    EXPECT_THROW((void)read_integers(path, absent, {}), Error) << absent;
+  }
+  std::filesystem::remove(path);
+}
+
 TEST(ImageIo, ExrPastTheLimitIsRefused) {
   const Bytes file = encode_exr(Image<Rgb>({4, 3}), {});
   EXPECT_EQ(code_of([&] { (void)through_file(file, ".exr", {.side = 4, .pixels = 12}); }), ExitCode::Done);

@@ -7,47 +7,10 @@
 #include <limits>
 
 #include "core/error.h"
+#include "scene/surface_ranges.h"
 
 namespace hpr {
 namespace {
-
-/// Sorted, disjoint and not touching, inside [0, end).
-std::vector<SurfaceRange> merged(std::vector<SurfaceRange> ranges, std::uint32_t end) {
-  for (SurfaceRange& range : ranges) range.last = std::min(range.last, end);
-  std::erase_if(ranges, [](const SurfaceRange& range) { return range.first >= range.last; });
-  std::ranges::sort(ranges, {}, &SurfaceRange::first);
-  std::vector<SurfaceRange> result;
-  for (const SurfaceRange& range : ranges) {
-    if (!result.empty() && range.first <= result.back().last) {
-      result.back().last = std::max(result.back().last, range.last);
-    } else {
-      result.push_back(range);
-    }
-  }
-  return result;
-}
-
-/// Part of an instance: triangles [range.first, range.last) of its mesh.
-struct InstanceRange {
-  std::uint32_t instance = 0;
-  SurfaceRange range;
-};
-
-std::vector<InstanceRange> split_by_instance(const Scene& scene, const std::vector<SurfaceRange>& ranges) {
-  std::vector<InstanceRange> parts;
-  for (const SurfaceRange& range : ranges) {
-    for (std::uint32_t instance = locate_surface(scene, range.first).instance; instance < scene.instances.size();
-         ++instance) {
-      const std::uint32_t base = scene.instances[instance].first_surface;
-      if (base >= range.last) break;
-      const auto count = static_cast<std::uint32_t>(scene.mesh_of(scene.instances[instance]).triangles.size());
-      const std::uint32_t first = std::max(range.first, base) - base;
-      const std::uint32_t last = std::min(range.last - base, count);
-      if (first < last) parts.push_back({instance, {first, last}});
-    }
-  }
-  return parts;
-}
 
 /// Where a mesh's chunks stand in Geometry::chunks.
 struct ChunkRun {
@@ -121,14 +84,15 @@ void append_pieces(const InstanceRange& part, const ChunkRun& run, Geometry& geo
 }  // namespace
 
 Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> objects) {
-  const std::vector<SurfaceRange> ranges = merged({objects.begin(), objects.end()}, scene.triangles);
+  const std::vector<SurfaceRange> ranges = merged_ranges({objects.begin(), objects.end()}, scene.triangles);
   const std::vector<InstanceRange> parts = split_by_instance(scene, ranges);
 
   std::vector<std::vector<SurfaceRange>> wanted(scene.meshes.size());
   for (const InstanceRange& part : parts) wanted[scene.instances[part.instance].mesh].push_back(part.range);
   std::uint64_t triangles = 0;
   for (std::size_t mesh = 0; mesh < wanted.size(); ++mesh) {
-    wanted[mesh] = merged(std::move(wanted[mesh]), static_cast<std::uint32_t>(scene.meshes[mesh].triangles.size()));
+    wanted[mesh] =
+        merged_ranges(std::move(wanted[mesh]), static_cast<std::uint32_t>(scene.meshes[mesh].triangles.size()));
     for (const SurfaceRange& range : wanted[mesh]) triangles += range.count();
   }
   // Indirect draws address the index buffer with 32 bits, three indices a triangle.

@@ -1,35 +1,107 @@
 #include "rt/direct_light.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 namespace hpr {
 
-void add_emission(TileWork& tile, const Wave& wave) {
-  for (const PathPoint& point : wave.points) tile.radiance[point.pixel] += point.throughput * point.material.emission;
+double share_of_ray(const TileWork& tile, double pdf, double light_pdf) {
+  if (!(pdf > 0.0)) return 1.0;
+  const double lights = light_pdf * tile.settings.light_samples;
+  return pdf / (pdf + lights);
 }
 
-void sample_lights(const TileWork& tile, std::size_t first_light, Wave& wave) {
-  wave.samples.clear();
-  const std::size_t end = std::min(first_light + kLightsAtOnce, tile.lights.size());
-  for (std::size_t light = first_light; light < end; ++light) {
-    for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
-      const PathPoint& point = wave.points[i];
-      const LightSample arriving = sample_light(tile.lights[light], point.surface.position, *tile.view);
-      const double cosine = glm::dot(point.surface.shading_normal, arriving.to_light);
-      if (!(cosine > 0.0) || arriving.irradiance == glm::dvec3(0.0)) continue;
-      const glm::dvec3 scattered =
-          point.material.brdf.value(point.surface.facing_normal(), arriving.to_light, point.surface.to_viewer);
-      if (scattered == glm::dvec3(0.0)) continue;
-      wave.samples.push_back({i, static_cast<std::uint32_t>(light), true, arriving.to_light,
-                              point.throughput * scattered * arriving.irradiance * cosine});
+void add_emission(TileWork& tile, const Wave& wave) {
+  for (const PathPoint& point : wave.points) {
+    if (point.material.emission == glm::dvec3(0.0)) continue;
+    double share = 1.0;
+    if (point.seen_pdf > 0.0) {
+      share = share_of_ray(
+          tile, point.seen_pdf,
+          tile.lights.surface_pdf_one(point.seen_from, point.seen_normal, point.surface.surface, point.surface));
+    }
+    tile.add(point.pixel, point.component, share * point.throughput * point.material.emission);
+  }
+}
+
+bool DirectLight::sample_next() {
+  wave_.samples.clear();
+  if (light_ < tile_.lights.listed()) {
+    sample_listed();
+    return true;
+  }
+  if (tile_.lights.has_sampled() && round_ < tile_.settings.light_samples) {
+    sample_others();
+    return true;
+  }
+  return false;
+}
+
+void DirectLight::sample_listed() {
+  const std::size_t end = std::min(light_ + kLightsAtOnce, tile_.lights.listed());
+  for (; light_ < end; ++light_) {
+    const bool fixed = tile_.lights.listed_is_fixed(light_);
+    for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
+      PathPoint& point = wave_.points[i];
+      const glm::dvec2 u = fixed ? glm::dvec2(0.0) : point.sampler.two();
+      add(i, tile_.lights.sample_listed(light_, point.surface.position, *tile_.view, u));
     }
   }
 }
 
+void DirectLight::sample_others() {
+  for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
+    PathPoint& point = wave_.points[i];
+    const double choice = point.sampler.one();
+    const glm::dvec2 u = point.sampler.two();
+    auto light = tile_.lights.sample_one(point.surface.position, light_normal(point), *tile_.view, choice, u);
+    if (!light) continue;
+    light->weight /= tile_.settings.light_samples;
+    add(i, *light);
+  }
+  ++round_;
+}
+
+void DirectLight::add(std::uint32_t index, const LightSample& light) {
+  if (light.weight == glm::dvec3(0.0)) return;
+  const PathPoint& point = wave_.points[index];
+  glm::dvec3 scattered(0.0);
+  if (!(light.pdf > 0.0)) {
+    scattered = point.bsdf.reflected(light.to_light) + point.bsdf.value(Lobe::Transmission, light.to_light);
+  } else {
+    scattered = shared_scattering(point, light);
+  }
+  const double cosine = std::abs(glm::dot(point.material.normal, light.to_light));
+  const glm::dvec3 radiance = point.throughput * scattered * light.weight * cosine;
+  if (radiance == glm::dvec3(0.0)) return;
+  wave_.samples.push_back({index, 1.0F, light, radiance});
+}
+
+glm::dvec3 DirectLight::shared_scattering(const PathPoint& point, const LightSample& light) const {
+  glm::dvec3 scattered(0.0);
+  for (const Lobe lobe : kLobes) {
+    const glm::dvec3 value = point.bsdf.value(lobe, light.to_light);
+    if (value == glm::dvec3(0.0)) continue;
+    const double share = point.may_follow[static_cast<std::size_t>(lobe)]
+                             ? 1.0 - share_of_ray(tile_, point.bsdf.pdf(lobe, light.to_light), light.pdf)
+                             : 1.0;
+    scattered += share * value;
+  }
+  return scattered;
+}
+
 void add_samples(TileWork& tile, const Wave& wave) {
   for (const DirectSample& sample : wave.samples) {
-    if (sample.visible) tile.radiance[wave.points[sample.point].pixel] += sample.radiance;
+    const PathPoint& point = wave.points[sample.point];
+    const glm::dvec3 arriving = static_cast<double>(sample.visible) * sample.radiance;
+    if (point.component != Component::Direct || !tile.wants_components) {
+      tile.add(point.pixel, point.component, arriving);
+      continue;
+    }
+    tile.radiance[point.pixel] += arriving;
+    tile.components[static_cast<std::size_t>(Component::Direct)][point.pixel] += sample.radiance;
+    tile.components[static_cast<std::size_t>(Component::Shadow)][point.pixel] += arriving - sample.radiance;
   }
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #if __has_include(<embree3/rtcore.h>)
 #include <embree3/rtcore.h>
 #else
@@ -9,48 +11,85 @@
 /// The few calls that differ between Embree 3 and 4, under one name each.
 namespace hpr::embree {
 
+/// Rays we trace at once: as wide as AVX2, the instruction set all ranks keep to. Embree takes sixteen as well, but
+/// copies them into packets of eight first.
+inline constexpr std::size_t kWidth = 8;
+using RayPacket = RTCRay8;
+using HitPacket = RTCRayHit8;
+
+/// What Embree should be quick at: coherent are neighbouring primary rays, and nothing else.
+enum class Rays { Incoherent, Coherent };
+
 #if RTC_VERSION_MAJOR >= 4
-using Context = RTCRayQueryContext;
+/// The query's own context first: filters are handed its address.
+struct Context {
+  RTCRayQueryContext query;
+  RTCRayQueryFlags flags;
+};
 inline constexpr RTCSceneFlags kFilterFlag = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
 
-inline void start(Context& context) {
-  rtcInitRayQueryContext(&context);
+inline void start(Context& context, Rays rays) {
+  rtcInitRayQueryContext(&context.query);
+  context.flags = rays == Rays::Coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
 }
 
-inline void intersect16(const int* valid, RTCScene scene, Context& context, RTCFilterFunctionN filter,
-                        RTCRayHit16& rays) {
+inline RTCIntersectArguments closest_arguments(Context& context, RTCFilterFunctionN filter) {
   RTCIntersectArguments arguments;
   rtcInitIntersectArguments(&arguments);
-  arguments.context = &context;
-  arguments.flags =
-      static_cast<RTCRayQueryFlags>(RTC_RAY_QUERY_FLAG_INCOHERENT | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
+  arguments.context = &context.query;
+  arguments.flags = static_cast<RTCRayQueryFlags>(context.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
   arguments.filter = filter;
+  return arguments;
+}
+inline RTCOccludedArguments occluded_arguments(Context& context) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.context = &context.query;
+  arguments.flags = context.flags;
+  return arguments;
+}
+
+inline void intersect(const int* valid, RTCScene scene, Context& context, RTCFilterFunctionN filter, RTCRayHit8& rays) {
+  RTCIntersectArguments arguments = closest_arguments(context, filter);
+  rtcIntersect8(valid, scene, &rays, &arguments);
+}
+inline void intersect(const int* valid, RTCScene scene, Context& context, RTCFilterFunctionN filter,
+                      RTCRayHit16& rays) {
+  RTCIntersectArguments arguments = closest_arguments(context, filter);
   rtcIntersect16(valid, scene, &rays, &arguments);
 }
 
-inline void occluded16(const int* valid, RTCScene scene, Context& context, RTCRay16& rays) {
-  RTCOccludedArguments arguments;
-  rtcInitOccludedArguments(&arguments);
-  arguments.context = &context;
-  arguments.flags = RTC_RAY_QUERY_FLAG_INCOHERENT;
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {
+  RTCOccludedArguments arguments = occluded_arguments(context);
+  rtcOccluded8(valid, scene, &rays, &arguments);
+}
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay16& rays) {
+  RTCOccludedArguments arguments = occluded_arguments(context);
   rtcOccluded16(valid, scene, &rays, &arguments);
 }
 #else
 using Context = RTCIntersectContext;
 inline constexpr RTCSceneFlags kFilterFlag = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
 
-inline void start(Context& context) {
+inline void start(Context& context, Rays rays) {
   rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  context.flags = rays == Rays::Coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
 }
 
-inline void intersect16(const int* valid, RTCScene scene, Context& context, RTCFilterFunctionN filter,
-                        RTCRayHit16& rays) {
+inline void intersect(const int* valid, RTCScene scene, Context& context, RTCFilterFunctionN filter, RTCRayHit8& rays) {
+  context.filter = filter;
+  rtcIntersect8(valid, scene, &context, &rays);
+}
+inline void intersect(const int* valid, RTCScene scene, Context& context, RTCFilterFunctionN filter,
+                      RTCRayHit16& rays) {
   context.filter = filter;
   rtcIntersect16(valid, scene, &context, &rays);
 }
 
-inline void occluded16(const int* valid, RTCScene scene, Context& context, RTCRay16& rays) {
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {
+  rtcOccluded8(valid, scene, &context, &rays);
+}
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay16& rays) {
   rtcOccluded16(valid, scene, &context, &rays);
 }
 #endif

@@ -1,10 +1,9 @@
 #include "rt/lighter.h"
 
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -13,30 +12,22 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "rt/denormals.h"
 #include "rt/direct_light.h"
+#include "rt/first_points.h"
 #include "rt/pass.h"
+#include "rt/path_tracer.h"
+#include "rt/photon_maps.h"
 
 namespace hpr {
 namespace {
 
-/// Denormal numbers read and written as zero while it lives, as Embree advises; the thread's own mode returns after.
-class FlushDenormals {
- public:
-  FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040U); }
-  ~FlushDenormals() { _mm_setcsr(before_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned int before_;
-};
-
 /// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
 struct Scratch {
-  explicit Scratch(TileWork tile_work, std::size_t times) : work(std::move(tile_work)), ms(times, 0.0) {}
+  Scratch(TileWork tile_work, std::size_t times) : work(std::move(tile_work)), ms(times, 0.0) {}
   TileWork work;
+  std::vector<std::vector<PathPoint>> waiting;  ///< by depth
   Wave wave;
-  Wave next;
   std::vector<double> ms;
 };
 
@@ -45,45 +36,74 @@ constexpr std::size_t kSurfaceStep = 0;
 constexpr std::size_t kDirectStep = 1;
 constexpr std::size_t kFirstPassStep = 2;
 
-glm::dvec3 to_vector(const Rgb& color) {
-  return {color.r, color.g, color.b};
+Rgb to_rgb(const glm::dvec3& sum) {
+  return {static_cast<float>(sum.r), static_cast<float>(sum.g), static_cast<float>(sum.b)};
 }
 
-/// The first generation: the surfaces the keys of a tile name.
-void resolve(TileWork& tile, const Rect& place, std::span<const Key> keys, Wave& wave) {
-  const glm::dvec3 background = to_vector(tile.scene.background);
-  WorldTriangle triangle;
-  for (int y = 0; y < place.height(); ++y) {
-    for (int x = 0; x < place.width(); ++x) {
-      const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
-      if (keys[pixel] == kNoKey) {
-        tile.radiance[pixel] = background;
-        continue;
-      }
-      tile.surfaces.load(key_surface(keys[pixel]), triangle);
-      const Ray ray = view_ray(*tile.view, place.x0 + x + 0.5, place.y0 + y + 0.5);
-      PathPoint& point = wave.points.emplace_back();
-      point.surface = tile.surfaces.meet(triangle, ray.origin, ray.direction);
-      point.material = evaluate_material(tile.scene, tile.scene.materials[point.surface.material], point.surface.uv);
-      point.pixel = pixel;
+bool is_finite(const Rgb& color) {
+  return std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b);
+}
+
+/// The tile's sums as pixels. Light that is no finite number is black, in all layers.
+void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output) {
+  const auto each = [&](auto&& body) {
+    for (int y = 0; y < job.place.height(); ++y) {
+      for (int x = 0; x < job.place.width(); ++x)
+        body(static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x));
+    }
+  };
+  const auto start = [&](auto* layer) {
+    const auto pixels = layer->tile(index);
+    std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
+    return pixels;
+  };
+  const auto colors = start(output.radiance);
+  each([&](std::size_t i) {
+    const Rgb color = to_rgb(tile.radiance[i]);
+    if (is_finite(color)) {
+      colors[i] = color;
+    } else {
+      ++tile.counts.not_finite;
+    }
+  });
+  for (std::size_t part = 0; part < kComponents; ++part) {
+    if (output.components.at(part) == nullptr) continue;
+    const auto pixels = start(output.components.at(part));
+    each([&](std::size_t i) {
+      const Rgb color = to_rgb(tile.components[part][i]);
+      if (is_finite(color) && is_finite(to_rgb(tile.radiance[i]))) pixels[i] = color;
+    });
+  }
+  if (output.cost != nullptr) {
+    const auto pixels = start(output.cost);
+    each([&](std::size_t i) { pixels[i] = tile.cost[i]; });
+  }
+}
+
+/// Normal and base colour of what each pixel sees, of several surfaces each by its share.
+void store_first_surfaces(const std::vector<PathPoint>& points, std::size_t index, const LightOutput& output) {
+  for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
+    if (layer == nullptr) continue;
+    const auto pixels = layer->tile(index);
+    std::ranges::fill(pixels, Rgb{});
+    for (const PathPoint& point : points) {
+      const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
+      const Rgb part = to_rgb(point.throughput * value);
+      Rgb& sum = pixels[point.pixel];
+      sum = {sum.r + part.r, sum.g + part.g, sum.b + part.b};
     }
   }
 }
 
-void store(const TileWork& tile, const Rect& place, std::span<Rgb> pixels, RayCounts& counts) {
-  std::ranges::fill(pixels, Rgb{});
-  for (int y = 0; y < place.height(); ++y) {
-    for (int x = 0; x < place.width(); ++x) {
-      const auto i = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
-      const glm::dvec3& sum = tile.radiance[i];
-      const Rgb color{static_cast<float>(sum.r), static_cast<float>(sum.g), static_cast<float>(sum.b)};
-      if (std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b)) {
-        pixels[i] = color;
-      } else {
-        ++counts.not_finite;
-      }
-    }
-  }
+void set_active(const LightOutput& output, std::size_t tile) {
+  const auto activate = [&](auto* layer) {
+    if (layer != nullptr) layer->set_active(tile);
+  };
+  activate(output.radiance);
+  for (TileLayer<Rgb>* layer : output.components) activate(layer);
+  activate(output.normal);
+  activate(output.albedo);
+  activate(output.cost);
 }
 
 }  // namespace
@@ -105,40 +125,105 @@ struct Lighter::State {
   RaySettings settings;
   RaySpace space;
   Surfaces surfaces;
-  std::vector<Light> lights;
+  LightSet lights;
   std::vector<std::unique_ptr<Pass>> passes;  ///< those that run
-  std::optional<RayScene> rays;
+  std::array<bool, kLobes.size()> followed_lobes{};
+  std::optional<RayScene> own_opaque;
+  const RayScene* opaque = nullptr;
+  std::optional<RayScene> holed;
+  std::optional<RayWalk> rays;
+  std::optional<RayScene> whole;  ///< for photons; only where `opaque` is not all
+  std::optional<PhotonSender> photons;
+  std::optional<PathTracer> reference;
   std::vector<std::unique_ptr<Scratch>> idle;
   std::mutex mutex;
   RayCounts counts;
+  double photon_ms = 0.0;  ///< spent on sending, since light() last told
   std::vector<PassTime> times;
 
-  State(const Scene& lit, RaySettings chosen, const Requirements& requirements);
+  State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source);
+  void build_rays(const RaySource& source);
+  void build_photons();
+  void build_reference();
+  /// What rays meet that decide about coverage themselves.
+  const RayScene& whole_scene();
+  void trace_reference(std::span<const View> views, std::span<const std::size_t> tiles, const LightOutput& output,
+                       const SampleNumber& number);
+  const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   std::unique_ptr<Scratch> take_scratch();
-  void light_tile(Scratch& scratch, const Rect& place, std::span<const Key> keys, std::span<Rgb> radiance) const;
+  void light_tile(Scratch& scratch, const TileJob& job, std::size_t index, const LightOutput& output) const;
+  void light_wave(Scratch& scratch) const;
 };
 
-Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements)
-    : scene(lit),
-      settings(std::move(chosen)),
-      space(lit.bounds),
-      surfaces(lit, space),
-      lights(lights_or_headlight(lit)) {
+Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source)
+    : scene(lit), settings(std::move(chosen)), space(lit.bounds), surfaces(lit, space), lights(lit) {
   const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
-  bool needs_rays = false;
+  bool needs_rays = settings.reference || !covering_surfaces(lit, true).empty();
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!plan[i].runs) continue;
     needs_rays = needs_rays || all[i]->needs_rays();
+    if (const Lobe* lobe = all[i]->follows()) followed_lobes[static_cast<std::size_t>(*lobe)] = true;
     passes.push_back(std::move(all[i]));
   }
-  if (needs_rays) {
-    rays.emplace(scene, space, settings.threads);
-    if (rays->skipped_triangles() > 0) {
-      log::warning("{} triangles lie beyond what rays can reach; no ray meets them", rays->skipped_triangles());
-    }
+  if (needs_rays) build_rays(source);
+  if (std::ranges::any_of(passes, [](const auto& pass) { return pass->gathers_photons(); })) build_photons();
+  if (settings.reference) build_reference();
+}
+
+void Lighter::State::build_rays(const RaySource& source) {
+  opaque = source ? &source() : &own_opaque.emplace(scene, space, settings.threads, covering_surfaces(scene, false));
+  std::uint64_t skipped = opaque->skipped_triangles();
+  if (const std::vector<SurfaceRange> surfaces_with_holes = covering_surfaces(scene, true);
+      !surfaces_with_holes.empty()) {
+    holed.emplace(scene, space, settings.threads, surfaces_with_holes);
+    skipped += holed->skipped_triangles();
   }
-  if (scene.lights.empty()) log::info("the scene has no lights; it is lit by a headlight");
+  rays.emplace(scene, surfaces, space, *opaque, holed ? &*holed : nullptr);
+  if (skipped > 0) log::warning("{} triangles lie beyond what rays can reach; no ray meets them", skipped);
+}
+
+void Lighter::State::build_photons() {
+  if (settings.photons == 0) settings.photons = kPhotons;
+  photons.emplace(scene, surfaces, space, whole_scene(), lights, settings);
+}
+
+void Lighter::State::build_reference() {
+  PathSettings own;
+  own.seed = settings.seed;
+  own.max_depth = settings.max_depth;
+  own.spread_in_pixel = false;  // views are jittered
+  own.threads = settings.threads;
+  reference.emplace(scene, whole_scene(), lights, own);
+}
+
+const RayScene& Lighter::State::whole_scene() {
+  if (!holed) return *opaque;
+  if (!whole) whole.emplace(scene, space, settings.threads);
+  return *whole;
+}
+
+void Lighter::State::trace_reference(std::span<const View> views, std::span<const std::size_t> tiles,
+                                     const LightOutput& output, const SampleNumber& number) {
+  const Stopwatch watch;
+  reference->trace(views, tiles, number, *output.radiance);
+  const PathCounts& traced = reference->counts();
+  counts = {};
+  counts.primary = traced.primary;
+  counts.shadow = traced.shadow;
+  counts.reflection = traced.diffuse + traced.reflection;
+  counts.refraction = traced.transmission;
+  counts.invalid = traced.invalid;
+  counts.not_finite = traced.not_finite;
+  times = {{"reference", watch.ms() * settings.threads}};
+}
+
+const PhotonMaps* Lighter::State::send_photons(const SampleNumber& number, Communicator* comm) {
+  if (!photons) return nullptr;
+  const Stopwatch watch;
+  const PhotonMaps& maps = photons->send(number, comm);
+  photon_ms += watch.ms();
+  return &maps;
 }
 
 std::unique_ptr<Scratch> Lighter::State::take_scratch() {
@@ -152,58 +237,73 @@ std::unique_ptr<Scratch> Lighter::State::take_scratch() {
   }
   return std::make_unique<Scratch>(TileWork{.scene = scene,
                                             .surfaces = surfaces,
-                                            .space = space,
                                             .rays = rays ? &*rays : nullptr,
                                             .lights = lights,
-                                            .max_depth = settings.max_depth,
-                                            .radiance = {},
-                                            .counts = {},
-                                            .batch = {},
-                                            .blocked = {},
-                                            .hits = {}},
+                                            .settings = settings,
+                                            .followed_lobes = followed_lobes},
                                    kFirstPassStep + passes.size());
 }
 
-void Lighter::State::light_tile(Scratch& scratch, const Rect& place, std::span<const Key> keys,
-                                std::span<Rgb> radiance) const {
-  const FlushDenormals mode;
+void Lighter::State::light_wave(Scratch& scratch) const {
   TileWork& tile = scratch.work;
+  Wave& wave = scratch.wave;
   Stopwatch watch;
   const auto charge = [&](std::size_t step) {
     scratch.ms[step] += watch.ms();
     watch.restart();
   };
-  tile.radiance.assign(kTilePixels, glm::dvec3(0.0));
-  scratch.wave.depth = 0;
-  scratch.wave.points.clear();
-  resolve(tile, place, keys, scratch.wave);
-  charge(kSurfaceStep);
-  while (!scratch.wave.points.empty()) {
-    scratch.next.depth = scratch.wave.depth + 1;
-    scratch.next.points.clear();
-    add_emission(tile, scratch.wave);
-    charge(kDirectStep);
+  const auto for_each_pass = [&](const auto& body) {
     for (std::size_t i = 0; i < passes.size(); ++i) {
-      passes[i]->spread(tile, scratch.wave, scratch.next);
+      body(*passes[i]);
       charge(kFirstPassStep + i);
     }
-    for (std::size_t light = 0; light < lights.size(); light += kLightsAtOnce) {
-      sample_lights(tile, light, scratch.wave);
-      charge(kDirectStep);
-      for (std::size_t i = 0; i < passes.size(); ++i) {
-        passes[i]->hide(tile, scratch.wave);
-        charge(kFirstPassStep + i);
-      }
-      add_samples(tile, scratch.wave);
-      charge(kDirectStep);
-    }
-    std::swap(scratch.wave, scratch.next);
+  };
+  add_emission(tile, wave);
+  charge(kDirectStep);
+  const std::size_t depth = wave.points.front().depth + 1U;
+  if (scratch.waiting.size() <= depth) scratch.waiting.resize(depth + 1);
+  for_each_pass([&](const Pass& pass) { pass.spread(tile, wave, scratch.waiting[depth]); });
+  for (DirectLight light(tile, wave); light.sample_next();) {
+    charge(kDirectStep);
+    for_each_pass([&](const Pass& pass) { pass.hide(tile, wave); });
+    add_samples(tile, wave);
+    charge(kDirectStep);
   }
-  store(tile, place, radiance, tile.counts);
 }
 
-Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements)
-    : state_(std::make_unique<State>(scene, std::move(settings), requirements)) {}
+void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_t index,
+                                const LightOutput& output) const {
+  const DenormalsAsZero mode;
+  TileWork& tile = scratch.work;
+  tile.wants_components = std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
+  tile.wants_cost = output.cost != nullptr;
+  tile.radiance.assign(kTilePixels, glm::dvec3(0.0));
+  if (tile.wants_components) {
+    for (auto& part : tile.components) part.assign(kTilePixels, glm::dvec3(0.0));
+  }
+  if (tile.wants_cost) tile.cost.assign(kTilePixels, 0.0F);
+  if (scratch.waiting.empty()) scratch.waiting.resize(1);
+
+  const Stopwatch watch;
+  find_first_points(tile, job, scratch.waiting[0]);
+  store_first_surfaces(scratch.waiting[0], index, output);
+  scratch.ms[kSurfaceStep] += watch.ms();
+
+  // Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
+  while (true) {
+    const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
+                                              [](const auto& points) { return !points.empty(); });
+    if (deepest == scratch.waiting.rend()) break;
+    const auto first = deepest->size() > kTilePixels ? deepest->end() - kTilePixels : deepest->begin();
+    scratch.wave.points.assign(first, deepest->end());
+    deepest->erase(first, deepest->end());
+    light_wave(scratch);
+  }
+  store(tile, job, index, output);
+}
+
+Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays)) {}
 Lighter::~Lighter() = default;
 Lighter::Lighter(Lighter&&) noexcept = default;
 Lighter& Lighter::operator=(Lighter&&) noexcept = default;
@@ -216,20 +316,25 @@ const std::vector<PassTime>& Lighter::times() const {
 }
 
 void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
-                    TileLayer<Rgb>& radiance) {
+                    const LightOutput& output, const SampleNumber& number) {
   const FrameLayout& layout = keys.layout();
-  HPR_CHECK(radiance.layout() == layout);
   HPR_CHECK(views.size() == layout.screens());
   for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
 
   State& state = *state_;
+  if (state.reference) {
+    state.trace_reference(views, tiles, output, number);
+    return;
+  }
+  const PhotonMaps* const photons = state.send_photons(number, nullptr);
   parallel_for(state.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);
-    radiance.set_active(tile);
+    set_active(output, tile);
     std::unique_ptr<Scratch> scratch = state.take_scratch();
     scratch->work.view = &views[place.screen];
-    state.light_tile(*scratch, place.pixels, keys.tile(tile), radiance.tile(tile));
+    scratch->work.photons = photons;
+    state.light_tile(*scratch, {place.pixels, number, keys.tile(tile)}, tile, output);
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });
@@ -237,20 +342,31 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
   state.counts = {};
   std::vector<double> ms(kFirstPassStep + state.passes.size(), 0.0);
   for (const auto& scratch : state.idle) {
-    state.counts += scratch->work.counts;
-    for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += scratch->ms[i];
+    state.counts += std::exchange(scratch->work.counts, {});
+    for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
   }
-  state.idle.clear();
+  if (state.photons) {
+    const PhotonCounts sent = state.photons->take_counts();
+    state.counts.photon = sent.rays;
+    state.counts.invalid += sent.invalid;
+  }
   state.times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
   for (std::size_t i = 0; i < state.passes.size(); ++i) {
-    state.times.push_back({std::string(state.passes[i]->name()), ms[kFirstPassStep + i]});
+    double& spent = ms[kFirstPassStep + i];
+    // Threads send together what they gather one by one: times are summed over threads.
+    if (state.passes[i]->gathers_photons()) spent += std::exchange(state.photon_ms, 0.0) * state.settings.threads;
+    state.times.push_back({std::string(state.passes[i]->name()), spent});
   }
 }
 
+void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
+  (void)state_->send_photons(number, &comm);
+}
+
 void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
-                 std::span<const std::size_t> tiles) {
+                 std::span<const std::size_t> tiles, const SampleNumber& number) {
   TileLayer<Rgb> radiance(keys.layout());
-  lighter.light(views, keys, tiles, radiance);
+  lighter.light(views, keys, tiles, {.radiance = &radiance}, number);
   for (const std::size_t tile : tiles) {
     const std::span<const Rgb> colors = radiance.tile(tile);
     const std::span<Key> words = keys.tile(tile);

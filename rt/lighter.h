@@ -1,29 +1,52 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "cluster/communicator.h"
 #include "image/color.h"
 #include "image/key.h"
 #include "image/tiles.h"
+#include "rt/sampler.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
 namespace hpr {
 
+class RayScene;
+
+/// What decides how light is worked out. The same settings give the same picture on any number of ranks and threads.
 struct RaySettings {
   std::vector<std::string> passes = {};  ///< by name; empty: as `auto_passes` says
   bool auto_passes = true;               ///< with no names: what the scene requires; false: none
-  int max_depth = 8;                     ///< mirrors in a row
+  int max_depth = 8;                     ///< reflections and refractions in a row
+  int light_samples = 1;                 ///< rays per point and sample towards emitting surfaces and the environment
+  double glossy_cutoff = 0.3;            ///< specular lobes of at least this roughness are not followed by rays
+  std::uint32_t photons = 0;             ///< sent per sample; 0: kPhotons, and only where the pass is named
+  bool global_photons = false;           ///< also those that were scattered by rough surfaces only: all indirect light
+  double photon_radius = 0.0;            ///< metres; 0: chosen from the photons' density
+  int occlusion_rays = 4;                ///< of the ambient-occlusion pass, per point and sample
+  double ambient = 0.2;                  ///< radiance that pass lets in where nothing is near
+  bool terminator_fix = true;            ///< lifts the origins of shadow rays onto the smooth surface normals pretend
+  bool reference = false;                ///< path tracing in place of all passes, paths of max_depth segments
+  std::uint64_t seed = 1;                ///< of all randomness
   int threads = 1;
 
   bool operator==(const RaySettings&) const = default;
 };
+
+/// Photons sent per sample where the pass is named and nothing says how many.
+inline constexpr std::uint32_t kPhotons = 200'000;
+
+/// Below this roughness specular lobes are followed by rays, unless settings say otherwise.
+inline constexpr double kGlossyCutoff = 0.3;
 
 /// Whether a pass runs for a scene, for --explain and --stats.
 struct PassPlan {
@@ -58,14 +81,39 @@ struct PassTime {
 /// that is no pass.
 [[nodiscard]] std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings);
 
+/// Parts of a pixel's colour; they sum to it.
+enum class Component : std::uint8_t {
+  Direct,            ///< emission, and light as if nothing stood in its way
+  Shadow,            ///< what of that is blocked: never above 0
+  Reflection,        ///< all that arrives by the first surface's specular reflection
+  Refraction,        ///< all that arrives through the first surface
+  AmbientOcclusion,  ///< of the first surface
+  Photon,            ///< of the first surface
+};
+inline constexpr std::size_t kComponents = 6;
+
+/// Layers a frame is lit into, all of one layout; null where not wanted.
+struct LightOutput {
+  TileLayer<Rgb>* radiance = nullptr;
+  std::array<TileLayer<Rgb>*, kComponents> components{};
+  TileLayer<Rgb>* normal = nullptr;  ///< unit length, world, on the viewer's side; 0 where nothing is seen
+  TileLayer<Rgb>* albedo = nullptr;  ///< base colour of the first surface
+  TileLayer<float>* cost = nullptr;  ///< rays traced for the pixel
+};
+
 /// Turns keys into radiance: reconstructs the surface each key names, adds emission and direct light, then what the
 /// planned passes add. A pixel's value depends on its key, its view and the scene only; threads, tile lists and ranks
 /// change no bit.
 class Lighter {
  public:
-  /// Builds the ray scene if a planned pass needs one. The scene must outlive this. Throws Error: Usage for an unknown
-  /// pass, NoDevice when Embree fails. Finding out what a scene requires looks at every texel once.
-  Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements);
+  /// Where rays through the surfaces that cover all behind them come from (covering_surfaces); asked once, and only if
+  /// a planned pass needs them. They outlive the lighter.
+  using RaySource = std::function<const RayScene&()>;
+
+  /// Builds a ray scene of its own if a planned pass needs one and there is no `rays`. The scene must outlive this.
+  /// Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires looks at
+  /// every texel once.
+  Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {});
   Lighter(const Scene& scene, const RaySettings& settings) : Lighter(scene, settings, requirements_of(scene)) {}
   ~Lighter();
   Lighter(const Lighter&) = delete;
@@ -73,11 +121,16 @@ class Lighter {
   Lighter(Lighter&&) noexcept;
   Lighter& operator=(Lighter&&) noexcept;
 
+  /// Collective over `comm`, whose ranks light parts of one frame with the same settings: sends the photons of the
+  /// sample that is lit next, if a planned pass needs any, every rank its share. Without this call light() sends all of
+  /// them itself; pictures are the same.
+  void send_photons(Communicator& comm, const SampleNumber& number = {});
+
   /// Lights the pixels of `tiles` (indices into the layout of `keys`; screen i of it is seen by views[i], of equal
-  /// size) and makes them active. The background stands where a key is 0. `radiance` has the same layout; its other
-  /// tiles stay as they are. Values are finite.
+  /// size) and makes them active in all layers of `output`, whose other tiles stay as they are. The background stands
+  /// where a key is 0. Values are finite.
   void light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
-             TileLayer<Rgb>& radiance);
+             const LightOutput& output, const SampleNumber& number = {});
 
   /// Of the last light().
   [[nodiscard]] const RayCounts& counts() const;
@@ -92,6 +145,6 @@ class Lighter {
 /// nearest key carries its pixel's colour. Pixels without a key stay so. Of equal depths on different ranks the larger
 /// colour word wins, so coplanar surfaces may look different with another number of ranks.
 void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
-                 std::span<const std::size_t> tiles);
+                 std::span<const std::size_t> tiles, const SampleNumber& number = {});
 
 }  // namespace hpr

@@ -167,8 +167,8 @@ TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
   TileLayer<Rgb> a(keys.layout());
   TileLayer<Rgb> b(keys.layout());
   const Scene flattened = busy_scene(true);
-  Lighter(instanced, {}).light(std::span(&view, 1), keys, tiles, a);
-  Lighter(flattened, {}).light(std::span(&view, 1), keys, tiles, b);
+  Lighter(instanced, {}).light(std::span(&view, 1), keys, tiles, {.radiance = &a});
+  Lighter(flattened, {}).light(std::span(&view, 1), keys, tiles, {.radiance = &b});
   int differing = 0;
   for (const std::size_t tile : tiles) {
     for (std::size_t i = 0; i < kTilePixels; ++i) {
@@ -177,8 +177,9 @@ TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
       differing += std::abs(p.r - q.r) + std::abs(p.g - q.g) + std::abs(p.b - q.b) > 1e-5F * (1.0F + p.r) ? 1 : 0;
     }
   }
-  // Vertices are rounded to float in one of them: a ray at a silhouette or a shadow's edge may fall on its other side.
-  EXPECT_LE(differing, 3);
+  // Vertices are rounded to float in one of them: a ray at a silhouette or a shadow's edge may fall on its other side,
+  // and so may those that go on from mirrors.
+  EXPECT_LE(differing, 6);
 }
 
 TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
@@ -192,16 +193,16 @@ TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
   TileLayer<Rgb> threaded(keys.layout());
   TileLayer<Rgb> split(keys.layout());
   Lighter one(scene, {.threads = 1});
-  one.light(views, keys, tiles, whole);
+  one.light(views, keys, tiles, {.radiance = &whole});
   const RayCounts counts = one.counts();
   EXPECT_GT(counts.reflection, 100U);
   EXPECT_GT(counts.shadow, 100U);
   Lighter two(scene, {.threads = 2});
-  two.light(views, keys, tiles, threaded);
+  two.light(views, keys, tiles, {.radiance = &threaded});
   EXPECT_EQ(two.counts(), counts);
   RayCounts summed;
   for (auto tile = tiles.rbegin(); tile != tiles.rend(); ++tile) {
-    one.light(views, keys, std::span(&*tile, 1), split);
+    one.light(views, keys, std::span(&*tile, 1), {.radiance = &split});
     summed += one.counts();
   }
   EXPECT_EQ(summed, counts);
@@ -225,8 +226,8 @@ TEST(Lighter, APixelDoesNotDependOnItsNeighbours) {
   TileLayer<Rgb> all(keys.layout());
   TileLayer<Rgb> some(keys.layout());
   Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, tiles, all);
-  lighter.light(std::span(&view, 1), sparse, tiles, some);
+  lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &all});
+  lighter.light(std::span(&view, 1), sparse, tiles, {.radiance = &some});
   for (std::size_t i = 0; i < kTilePixels; ++i) {
     if (sparse.tile(0)[i] != kNoKey) {
       ASSERT_EQ(all.tile(0)[i], some.tile(0)[i]) << i;
@@ -281,7 +282,7 @@ TEST(Lighter, LocalShadingPutsTheDisplayColourIntoTheKeys) {
   const std::vector<std::size_t> tiles{0};
   TileLayer<Rgb> radiance(keys.layout());
   Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, tiles, radiance);
+  lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &radiance});
   shade_local(lighter, std::span(&view, 1), keys, tiles);
   for (std::size_t i = 0; i < kTilePixels; ++i) {
     if (before[i] == kNoKey) {

@@ -1,63 +1,89 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <string_view>
 #include <vector>
 
-#include "rt/brdf.h"
+#include "rt/bsdf.h"
+#include "rt/light_set.h"
 #include "rt/lighter.h"
-#include "rt/lights.h"
-#include "rt/ray_scene.h"
+#include "rt/ray_walk.h"
+#include "rt/sampler.h"
 #include "rt/surfaces.h"
 
 namespace hpr {
 
-/// A surface some pixel sees, directly or after reflections.
+/// A surface some pixel sees, directly or after reflections and refractions.
 struct PathPoint {
   SurfacePoint surface;
   MaterialPoint material;
-  glm::dvec3 throughput{1.0};  ///< what of its radiance reaches the pixel
-  std::uint32_t pixel = 0;     ///< of the tile
+  Bsdf bsdf;
+  glm::dvec3 throughput{1.0};   ///< what of its radiance reaches the pixel
+  glm::dvec3 medium{0.0};       ///< 1/m: absorption on the viewer's side
+  glm::dvec3 seen_from{0.0};    ///< the place before, where lights were sampled
+  glm::dvec3 seen_normal{0.0};  ///< and its normal
+  double seen_pdf = 0.0;        ///< density with which the way here was chosen; 0: it was the only one
+  /// Per lobe: 0 when no ray follows it, else the inverse of the probability that one does.
+  std::array<float, kLobes.size()> follows{};
+  std::array<bool, kLobes.size()> may_follow{};  ///< whether one might have
+  Sampler sampler;
+  std::uint32_t pixel = 0;                  ///< of the tile
+  std::uint16_t depth = 0;                  ///< bounces from the eye
+  Component component = Component::Direct;  ///< where its light counts
 };
 
 /// Light that would fall on a point if nothing stood between.
 struct DirectSample {
   std::uint32_t point = 0;  ///< index into Wave::points
-  std::uint32_t light = 0;
-  bool visible = true;
-  glm::dvec3 to_light{0.0};
-  glm::dvec3 radiance{0.0};  ///< reflected towards the viewer
+  float visible = 1.0F;     ///< share that passes what stands between
+  LightSample light;
+  glm::dvec3 radiance{0.0};  ///< reflected towards the viewer and brought to the pixel
 };
 
-/// All points of one tile that are equally many bounces from the eye, and the light sampled for them, a few lights at a
-/// time.
+/// Points of one tile that are worked on together, and the light sampled for them, a few lights at a time.
 struct Wave {
-  int depth = 0;
   std::vector<PathPoint> points;
   std::vector<DirectSample> samples;  ///< light by light, inside a light in the order of points
 };
+
+struct PhotonMaps;
 
 /// What passes need and write while one thread lights one tile.
 struct TileWork {
   const Scene& scene;
   const Surfaces& surfaces;
-  const RaySpace& space;
-  const RayScene* rays;  ///< null when no pass needs rays
-  std::span<const Light> lights;
-  int max_depth;
-  const View* view = nullptr;  ///< of the tile at hand
+  const RayWalk* rays;  ///< null when no pass needs rays
+  const LightSet& lights;
+  const RaySettings& settings;
+  std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
+  const PhotonMaps* photons = nullptr;               ///< null when none were sent
+  const View* view = nullptr;                        ///< of the tile at hand
+  bool wants_components = false;
+  bool wants_cost = false;
 
-  std::vector<glm::dvec3> radiance;  ///< per pixel of the tile, summed in a fixed order
-  RayCounts counts;
-  RayBatch batch;
-  std::vector<std::uint8_t> blocked;
-  std::vector<std::uint32_t> hits;
+  std::vector<glm::dvec3> radiance = {};                             ///< per pixel of the tile, summed in a fixed order
+  std::array<std::vector<glm::dvec3>, kComponents> components = {};  ///< likewise, when wanted
+  std::vector<float> cost = {};                                      ///< rays per pixel, when wanted
+  RayCounts counts = {};
+  WalkScratch scratch = {};
+  std::vector<RayRequest> requests = {};
+
+  /// Adds light that reaches a pixel.
+  void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
+    radiance[pixel] += light;
+    if (wants_components) components[static_cast<std::size_t>(component)][pixel] += light;
+  }
+  void charge_ray(std::uint32_t pixel) {
+    if (wants_cost) cost[pixel] += 1.0F;
+  }
 };
 
-/// One kind of ray-traced light. Passes see one generation of points at a time and keep no state between calls, so a
-/// pass is shared by all threads.
+/// One kind of ray-traced light. Passes see a wave of points at a time and keep no state between calls, so a pass is
+/// shared by all threads.
 class Pass {
  public:
   virtual ~Pass() = default;
@@ -65,12 +91,22 @@ class Pass {
   [[nodiscard]] virtual std::string_view name() const = 0;
 
   /// Whether the scene can show what this pass adds.
-  [[nodiscard]] virtual const Requirement& requirement(const Requirements& scene) const = 0;
+  [[nodiscard]] virtual const Requirement& requirement(const Requirements& scene,
+                                                       const RaySettings& settings) const = 0;
 
-  [[nodiscard]] virtual bool needs_rays() const = 0;
+  /// Whether it runs where the scene requires it and nobody names it.
+  [[nodiscard]] virtual bool runs_by_default(const RaySettings& /*settings*/) const { return true; }
+
+  [[nodiscard]] virtual bool needs_rays() const { return true; }
+
+  /// The lobe of a surface whose light this pass brings by following it; none for other passes.
+  [[nodiscard]] virtual const Lobe* follows() const { return nullptr; }
+
+  /// Whether it needs TileWork::photons.
+  [[nodiscard]] virtual bool gathers_photons() const { return false; }
 
   /// Once per wave: reads its points; may add to the tile's radiance and put the points its rays reach into `next`.
-  virtual void spread(TileWork& /*tile*/, const Wave& /*wave*/, Wave& /*next*/) const {}
+  virtual void spread(TileWork& /*tile*/, const Wave& /*wave*/, std::vector<PathPoint>& /*next*/) const {}
 
   /// Once per handful of lights: may hide direct samples of `wave`.
   virtual void hide(TileWork& /*tile*/, Wave& /*wave*/) const {}
@@ -81,10 +117,32 @@ class Pass {
 
 [[nodiscard]] std::unique_ptr<Pass> make_shadow_pass();
 [[nodiscard]] std::unique_ptr<Pass> make_reflection_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_refraction_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_ambient_occlusion_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_photon_pass();
 
-/// Where rays leave a point on its viewer's side, in ray space.
-[[nodiscard]] inline glm::dvec3 ray_origin(const TileWork& tile, const SurfacePoint& point, const glm::dvec3& lift) {
-  return tile.space.from_world(point.position + lift + point.offset * point.geometric_normal);
+/// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
+/// step, 1 / (2 * 255 * 12.92).
+inline constexpr double kLeastThroughput = 1.0 / 65536.0;
+
+/// Where rays leave a surface towards `direction`: off it, on that side.
+[[nodiscard]] inline glm::dvec3 ray_origin(const SurfacePoint& point, const glm::dvec3& direction) {
+  const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  return point.position + side * point.offset * point.geometric_normal;
 }
+
+/// The normal that lights are chosen by: none where they may shine through.
+[[nodiscard]] glm::dvec3 light_normal(const PathPoint& point);
+
+/// The component that light from a followed lobe of `point` counts in.
+[[nodiscard]] Component component_after(const PathPoint& point, Component first);
+
+/// Completes a point whose surface, throughput, sampler, depth and medium are set: reads its material and decides which
+/// lobes are followed.
+void finish_point(const TileWork& tile, PathPoint& point);
+
+/// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach.
+void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
+                 std::vector<PathPoint>& next);
 
 }  // namespace hpr

@@ -10,6 +10,10 @@ std::vector<std::unique_ptr<Pass>> make_all_passes() {
   std::vector<std::unique_ptr<Pass>> passes;
   passes.push_back(make_shadow_pass());
   passes.push_back(make_reflection_pass());
+  passes.push_back(make_refraction_pass());
+  passes.push_back(make_ambient_occlusion_pass());
+  passes.push_back(make_photon_pass());
+
   return passes;
 }
 
@@ -30,9 +34,13 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
   std::vector<PassPlan> plan;
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());
-    const Requirement& requirement = pass->requirement(scene);
+    const Requirement& requirement = pass->requirement(scene, settings);
     const bool named = std::ranges::find(settings.passes, name) != settings.passes.end();
-    const bool wanted = named || (settings.passes.empty() && settings.auto_passes);
+    const bool wanted = named || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(settings));
+    if (settings.reference) {
+      plan.push_back({name, false, "the reference traces whole paths instead"});
+      continue;
+    }
     plan.push_back(
         {name, wanted && requirement.needed, wanted ? requirement.why : "not asked for: " + requirement.why});
   }

@@ -9,17 +9,17 @@
 #include <cstring>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "rt/embree_compat.h"
+#include "scene/surface_ranges.h"
 
 namespace hpr {
 namespace {
 
-constexpr std::size_t kWidth = 16;
-/// Embree's own limit is the square root of the largest float; past it (or at NaN) builds with assertions abort.
-constexpr float kFarthest = 1.8e18F;
 constexpr double kMostDistortion = 16.0;
 
 template <typename Handle, void (*release)(Handle)>
@@ -71,45 +71,68 @@ class Failure {
   std::array<char, 256> text_{};
 };
 
-struct TriangleData {
-  float* vertices;           ///< [count][3]
-  std::uint32_t* triangles;  ///< [count][3]
-};
-
-OwnedGeometry new_triangles(RTCDevice device, std::size_t vertices, std::size_t triangles, TriangleData& data) {
-  OwnedGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-  data.vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
-                                                              RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
-  data.triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles));
-  return geometry;
-}
-
 bool tracable(const float* p) {
-  return std::abs(p[0]) < kFarthest && std::abs(p[1]) < kFarthest && std::abs(p[2]) < kFarthest;
+  return std::abs(p[0]) < kFarthestRay && std::abs(p[1]) < kFarthestRay && std::abs(p[2]) < kFarthestRay;
 }
 
-/// Fills one geometry; place(position) gives ray-space coordinates. Triangles out of float's reach keep their number
-/// but lose their extent, so that primitive ids stay surface ids. Returns how many.
-template <typename Place>
-std::uint64_t fill(const Mesh& mesh, TriangleData data, Place&& place) {
-  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    const glm::dvec3 p = place(mesh.positions[i]);
-    for (int axis = 0; axis < 3; ++axis)
-      data.vertices[3 * i + static_cast<std::size_t>(axis)] = static_cast<float>(p[axis]);
-  }
-  std::uint64_t skipped = 0;
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const glm::uvec3& t = mesh.triangles[i];
-    const bool usable = tracable(data.vertices + 3 * std::size_t{t.x}) &&
-                        tracable(data.vertices + 3 * std::size_t{t.y}) &&
-                        tracable(data.vertices + 3 * std::size_t{t.z});
-    if (!usable) ++skipped;
-    for (int corner = 0; corner < 3; ++corner) {
-      data.triangles[3 * i + static_cast<std::size_t>(corner)] = usable ? t[corner] : t.x;
+/// Triangles [range.first, range.last) of a mesh, and the vertices they use, numbered anew unless all triangles are
+/// meant.
+struct MeshPart {
+  const Mesh& mesh;
+  SurfaceRange range;
+  std::vector<std::uint32_t> vertices;  ///< of the mesh; empty: all, in their order
+  std::vector<std::uint32_t> place;     ///< of a mesh's vertex among those
+
+  MeshPart(const Mesh& of, SurfaceRange triangles) : mesh(of), range(triangles) {
+    if (range.count() == mesh.triangles.size()) return;
+    constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+    place.assign(mesh.positions.size(), kNowhere);
+    for (std::uint32_t i = range.first; i < range.last; ++i) {
+      for (int corner = 0; corner < 3; ++corner) {
+        std::uint32_t& vertex = place[mesh.triangles[i][corner]];
+        if (vertex != kNowhere) continue;
+        vertex = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(mesh.triangles[i][corner]);
+      }
     }
   }
-  return skipped;
+
+  [[nodiscard]] std::size_t vertex_count() const { return vertices.empty() ? mesh.positions.size() : vertices.size(); }
+  [[nodiscard]] const glm::vec3& position(std::size_t i) const {
+    return mesh.positions[vertices.empty() ? i : vertices[i]];
+  }
+  [[nodiscard]] glm::uvec3 triangle(std::uint32_t i) const {
+    const glm::uvec3& t = mesh.triangles[range.first + i];
+    return vertices.empty() ? t : glm::uvec3(place[t.x], place[t.y], place[t.z]);
+  }
+};
+
+/// Fills one geometry; where(position) gives ray-space coordinates. Triangles out of float's reach keep their number
+/// but lose their extent, so that primitive ids stay surface ids; `skipped` counts them.
+template <typename Where>
+OwnedGeometry make_triangles(RTCDevice device, const Failure& failure, const MeshPart& part, std::uint64_t& skipped,
+                             Where&& where) {
+  OwnedGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+  auto* const vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), part.vertex_count()));
+  auto* const triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), part.range.count()));
+  failure.check();
+  for (std::size_t i = 0; i < part.vertex_count(); ++i) {
+    const glm::dvec3 p = where(part.position(i));
+    for (int axis = 0; axis < 3; ++axis) vertices[3 * i + static_cast<std::size_t>(axis)] = static_cast<float>(p[axis]);
+  }
+  for (std::uint32_t i = 0; i < part.range.count(); ++i) {
+    const glm::uvec3 t = part.triangle(i);
+    const bool usable = tracable(vertices + 3 * std::size_t{t.x}) && tracable(vertices + 3 * std::size_t{t.y}) &&
+                        tracable(vertices + 3 * std::size_t{t.z});
+    if (!usable) ++skipped;
+    for (int corner = 0; corner < 3; ++corner) {
+      triangles[3 * std::size_t{i} + static_cast<std::size_t>(corner)] = usable ? t[corner] : t.x;
+    }
+  }
+  rtcCommitGeometry(geometry.get());
+  return geometry;
 }
 
 RTCSceneFlags scene_flags() {
@@ -117,49 +140,23 @@ RTCSceneFlags scene_flags() {
   return static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | embree::kFilterFlag);
 }
 
-/// What the tie filter knows of the sixteen rays in flight. The Embree context comes first: the filter is handed its
-/// address.
-struct Closest {
-  embree::Context context;
-  const std::uint32_t* first_surfaces;
-  std::array<float, kWidth> distance;
-  std::array<std::uint32_t, kWidth> surface;
-};
-
-/// Robust traversal offers candidates at the distance already found as well; of those the lowest surface id stays.
-void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
-  auto& closest = *reinterpret_cast<Closest*>(arguments->context);
-  for (unsigned int i = 0; i < arguments->N; ++i) {
-    if (arguments->valid[i] != -1) continue;
-    const unsigned int lane = RTCRayN_id(arguments->ray, arguments->N, i);
-    const unsigned int outer = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
-    const unsigned int instance =
-        outer != RTC_INVALID_GEOMETRY_ID ? outer : RTCHitN_geomID(arguments->hit, arguments->N, i);
-    const std::uint32_t surface = closest.first_surfaces[instance] + RTCHitN_primID(arguments->hit, arguments->N, i);
-    const float distance = RTCRayN_tfar(arguments->ray, arguments->N, i);
-    if (distance == closest.distance[lane] && surface >= closest.surface[lane]) {
-      arguments->valid[i] = 0;
-    } else {
-      closest.distance[lane] = distance;
-      closest.surface[lane] = surface;
-    }
-  }
-}
-
 }  // namespace
+
+/// A mesh's triangles as several instances may show them.
+using SharedPart = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  // mesh, first and last triangle
 
 struct RayScene::Embree {
   Failure failure;
   OwnedDevice device;
-  std::vector<OwnedScene> shared;  ///< per mesh; empty where the mesh is in `top` itself
+  std::map<SharedPart, OwnedScene> shared;
   OwnedScene top;
-  std::vector<std::uint32_t> first_surfaces;  ///< per instance
+  std::vector<RayGeometry> geometries;
   std::uint64_t skipped = 0;
 
   void start(int threads);
-  void add_shared_mesh(const Mesh& mesh, OwnedScene& scene);
+  RTCScene shared_part(const Scene& scene, const InstanceRange& part);
   void add_instance(const Instance& instance, unsigned int id, RTCScene shared_mesh, const RaySpace& space);
-  void add_triangles(const Mesh& mesh, const Instance& instance, unsigned int id, const RaySpace& space);
+  void add_triangles(const Scene& scene, const InstanceRange& part, unsigned int id, const RaySpace& space);
 };
 
 void RayScene::Embree::start(int threads) {
@@ -176,17 +173,18 @@ void RayScene::Embree::start(int threads) {
   rtcSetDeviceErrorFunction(device.get(), &Failure::note, &failure);
 }
 
-void RayScene::Embree::add_shared_mesh(const Mesh& mesh, OwnedScene& scene) {
-  TriangleData data{};
-  const OwnedGeometry geometry = new_triangles(device.get(), mesh.positions.size(), mesh.triangles.size(), data);
+RTCScene RayScene::Embree::shared_part(const Scene& scene, const InstanceRange& part) {
+  const std::uint32_t mesh = scene.instances[part.instance].mesh;
+  OwnedScene& made = shared[{mesh, part.range.first, part.range.last}];
+  if (made.get() != nullptr) return made.get();
+  const OwnedGeometry geometry = make_triangles(device.get(), failure, MeshPart(scene.meshes[mesh], part.range),
+                                                skipped, [](const glm::vec3& p) { return glm::dvec3(p); });
+  made = OwnedScene(rtcNewScene(device.get()));
+  rtcSetSceneFlags(made.get(), scene_flags());
+  rtcAttachGeometryByID(made.get(), geometry.get(), 0);
+  rtcCommitScene(made.get());
   failure.check();
-  skipped += fill(mesh, data, [](const glm::vec3& p) { return glm::dvec3(p); });
-  rtcCommitGeometry(geometry.get());
-  scene = OwnedScene(rtcNewScene(device.get()));
-  rtcSetSceneFlags(scene.get(), scene_flags());
-  rtcAttachGeometryByID(scene.get(), geometry.get(), 0);
-  rtcCommitScene(scene.get());
-  failure.check();
+  return made.get();
 }
 
 void RayScene::Embree::add_instance(const Instance& instance, unsigned int id, RTCScene shared_mesh,
@@ -206,34 +204,34 @@ void RayScene::Embree::add_instance(const Instance& instance, unsigned int id, R
   rtcAttachGeometryByID(top.get(), geometry.get(), id);
 }
 
-void RayScene::Embree::add_triangles(const Mesh& mesh, const Instance& instance, unsigned int id,
+void RayScene::Embree::add_triangles(const Scene& scene, const InstanceRange& part, unsigned int id,
                                      const RaySpace& space) {
-  TriangleData data{};
-  const OwnedGeometry geometry = new_triangles(device.get(), mesh.positions.size(), mesh.triangles.size(), data);
-  failure.check();
-  skipped += fill(mesh, data, [&](const glm::vec3& p) { return space.from_world(world_position(instance, p)); });
-  rtcCommitGeometry(geometry.get());
+  const Instance& instance = scene.instances[part.instance];
+  const OwnedGeometry geometry =
+      make_triangles(device.get(), failure, MeshPart(scene.mesh_of(instance), part.range), skipped,
+                     [&](const glm::vec3& p) { return space.from_world(world_position(instance, p)); });
   rtcAttachGeometryByID(top.get(), geometry.get(), id);
 }
 
-RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads) : embree_(std::make_unique<Embree>()) {
+RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads)
+    : RayScene(scene, space, threads, std::array{SurfaceRange{0, scene.triangles}}) {}
+
+RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects)
+    : space_(space), embree_(std::make_unique<Embree>()) {
   embree_->start(threads);
   embree_->top = OwnedScene(rtcNewScene(embree_->device.get()));
   rtcSetSceneFlags(embree_->top.get(), scene_flags());
-  embree_->shared.resize(scene.meshes.size());
+  // By the whole scene, whatever the share: an instance is traced by the same numbers on every rank.
   const std::vector<std::uint8_t> is_shared = shared_instances(scene);
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const Instance& instance = scene.instances[i];
-    const Mesh& mesh = scene.mesh_of(instance);
-    embree_->first_surfaces.push_back(instance.first_surface);
-    if (mesh.triangles.empty()) continue;
-    const auto id = static_cast<unsigned int>(i);
-    if (is_shared[i] != 0) {
-      OwnedScene& shared_mesh = embree_->shared[instance.mesh];
-      if (shared_mesh.get() == nullptr) embree_->add_shared_mesh(mesh, shared_mesh);
-      embree_->add_instance(instance, id, shared_mesh.get(), space);
+  for (const InstanceRange& part :
+       split_by_instance(scene, merged_ranges({objects.begin(), objects.end()}, scene.triangles))) {
+    const Instance& instance = scene.instances[part.instance];
+    const auto id = static_cast<unsigned int>(embree_->geometries.size());
+    embree_->geometries.push_back({part.instance, part.range.first, instance.first_surface + part.range.first});
+    if (is_shared[part.instance] != 0) {
+      embree_->add_instance(instance, id, embree_->shared_part(scene, part), space);
     } else {
-      embree_->add_triangles(mesh, instance, id, space);
+      embree_->add_triangles(scene, part, id, space);
     }
   }
   rtcCommitScene(embree_->top.get());
@@ -246,97 +244,12 @@ std::uint64_t RayScene::skipped_triangles() const {
   return embree_->skipped;
 }
 
-void RayBatch::push(const glm::dvec3& origin, const glm::dvec3& direction, double reach) {
-  const std::size_t lane = size_ % kWidth;
-  if (size_ / kWidth == packets_.size()) packets_.emplace_back();
-  Packet& packet = packets_[size_ / kWidth];
-  for (int axis = 0; axis < 3; ++axis) {
-    packet.origin[axis][lane] = static_cast<float>(origin[axis]);
-    packet.direction[axis][lane] = static_cast<float>(direction[axis]);
-  }
-  packet.reach[lane] = static_cast<float>(reach);
-  ++size_;
+RTCSceneTy* RayScene::embree() const {
+  return embree_->top.get();
 }
 
-namespace {
-
-/// Copies a packet into Embree's form and marks with -1 the lanes Embree may see; returns how many of the first `count`
-/// it may not.
-template <typename Packet>
-std::uint64_t load(const Packet& packet, std::size_t count, RTCRay16& rays, int* valid) {
-  std::memcpy(rays.org_x, packet.origin, sizeof packet.origin);
-  static_assert(offsetof(RTCRay16, org_z) == 2 * sizeof(rays.org_x));
-  std::memcpy(rays.dir_x, packet.direction, sizeof packet.direction);
-  static_assert(offsetof(RTCRay16, dir_z) - offsetof(RTCRay16, dir_x) == 2 * sizeof(rays.dir_x));
-  std::memcpy(rays.tfar, packet.reach, sizeof packet.reach);
-  int usable_lanes = 0;
-  for (std::size_t i = 0; i < kWidth; ++i) {
-    float largest = 0.0F;
-    bool ordered = true;
-    for (int axis = 0; axis < 3; ++axis) {
-      // Comparisons with NaN are false, so NaN fails here too.
-      ordered &= std::abs(packet.origin[axis][i]) < kFarthest && std::abs(packet.direction[axis][i]) < kFarthest;
-      largest = std::max(largest, std::abs(packet.direction[axis][i]));
-    }
-    const bool usable = i < count && ordered && largest > 0.0F && packet.reach[i] >= 0.0F;
-    valid[i] = usable ? -1 : 0;
-    usable_lanes += usable ? 1 : 0;
-    if (!usable) {
-      // The mask alone does not do: where Embree has no native packet of this width it goes by tnear <= tfar instead,
-      // and its assertions look at every lane. So these hold a harmless ray that ends before it begins.
-      rays.org_x[i] = rays.org_y[i] = rays.org_z[i] = 0.0F;
-      rays.dir_x[i] = rays.dir_y[i] = rays.dir_z[i] = 1.0F;
-      rays.tfar[i] = -1.0F;
-    }
-    rays.tnear[i] = 0.0F;
-    rays.time[i] = 0.0F;
-    rays.mask[i] = 0xFFFFFFFFU;
-    rays.id[i] = static_cast<unsigned int>(i);
-    rays.flags[i] = 0;
-  }
-  return count - static_cast<std::uint64_t>(usable_lanes);
-}
-
-}  // namespace
-
-std::uint64_t RayScene::occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const {
-  HPR_CHECK(blocked.size() == rays.size());
-  embree::Context context;
-  embree::start(context);
-  RTCRay16 packet;
-  alignas(64) std::array<int, kWidth> valid;
-  std::uint64_t invalid = 0;
-  for (std::size_t first = 0; first < rays.size(); first += kWidth) {
-    const std::size_t count = std::min(kWidth, rays.size() - first);
-    invalid += load(rays.packets_[first / kWidth], count, packet, valid.data());
-    embree::occluded16(valid.data(), embree_->top.get(), context, packet);
-    // Embree marks a blocked ray by a negative tfar.
-    for (std::size_t i = 0; i < count; ++i) blocked[first + i] = valid[i] != 0 && packet.tfar[i] < 0.0F ? 1 : 0;
-  }
-  return invalid;
-}
-
-std::uint64_t RayScene::closest(const RayBatch& rays, std::span<std::uint32_t> surfaces) const {
-  HPR_CHECK(surfaces.size() == rays.size());
-  Closest closest;
-  embree::start(closest.context);
-  closest.first_surfaces = embree_->first_surfaces.data();
-  RTCRayHit16 packet;
-  alignas(64) std::array<int, kWidth> valid;
-  std::uint64_t invalid = 0;
-  for (std::size_t first = 0; first < rays.size(); first += kWidth) {
-    const std::size_t count = std::min(kWidth, rays.size() - first);
-    invalid += load(rays.packets_[first / kWidth], count, packet.ray, valid.data());
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-      packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-    }
-    closest.distance.fill(std::numeric_limits<float>::quiet_NaN());
-    closest.surface.fill(kNoSurface);
-    embree::intersect16(valid.data(), embree_->top.get(), closest.context, &keep_lowest_surface, packet);
-    std::copy_n(closest.surface.begin(), count, surfaces.begin() + static_cast<std::ptrdiff_t>(first));
-  }
-  return invalid;
+std::span<const RayGeometry> RayScene::geometries() const {
+  return embree_->geometries;
 }
 
 double distortion(const glm::dmat3& linear) {

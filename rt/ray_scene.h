@@ -10,9 +10,14 @@
 #include "rt/ray_space.h"
 #include "scene/scene.h"
 
+struct RTCSceneTy;
+
 namespace hpr {
 
 inline constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
+
+/// Embree's own limit is the square root of the largest float; past it (or at NaN) builds with assertions abort.
+inline constexpr float kFarthestRay = 1.8e18F;
 
 /// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
 class RayBatch {
@@ -23,9 +28,9 @@ class RayBatch {
 
  private:
   friend class RayScene;
-  static constexpr std::size_t kWidth = 16;
-  /// Sixteen rays as Embree reads them.
-  struct alignas(64) Packet {
+  static constexpr std::size_t kWidth = 8;
+  /// Eight rays as Embree reads them.
+  struct alignas(32) Packet {
     float origin[3][kWidth];
     float direction[3][kWidth];
     float reach[kWidth];
@@ -33,6 +38,16 @@ class RayBatch {
 
   std::size_t size_ = 0;
   std::vector<Packet> packets_;
+};
+
+/// Whether rays that share a packet go the same way; Embree is quicker when told so rightly. No answer depends on it.
+enum class Coherence { Low, High };
+
+/// What one geometry of Embree's scene shows: a run of triangles of an instance, counted by primitive id.
+struct RayGeometry {
+  std::uint32_t instance = 0;
+  std::uint32_t first_triangle = 0;  ///< of the instance's mesh
+  std::uint32_t first_surface = 0;
 };
 
 /// The scene as Embree holds it: meshes used once go in as world triangles, shared ones as instances of a sub-scene.
@@ -43,6 +58,8 @@ class RayScene {
  public:
   /// Builds with `threads` threads. The scene may go afterwards. Throws Error (NoDevice) when Embree fails.
   RayScene(const Scene& scene, const RaySpace& space, int threads);
+  /// Only the surfaces of `objects`, ranges in any order. Each is met at the same distance as in the whole scene.
+  RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects);
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
@@ -51,13 +68,21 @@ class RayScene {
   [[nodiscard]] std::uint64_t occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
 
   /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
-  [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces) const;
+  [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces,
+                                      Coherence coherence = Coherence::Low) const;
 
   /// Triangles left out because their world positions are beyond what float holds.
   [[nodiscard]] std::uint64_t skipped_triangles() const;
 
+  /// For those in rt/ who ask Embree themselves. Geometry ids of its top level index geometries(); where it holds
+  /// instances, only instance ids do.
+  [[nodiscard]] RTCSceneTy* embree() const;
+  [[nodiscard]] std::span<const RayGeometry> geometries() const;
+  [[nodiscard]] const RaySpace& space() const { return space_; }
+
  private:
   struct Embree;
+  RaySpace space_;
   std::unique_ptr<Embree> embree_;
 };
 

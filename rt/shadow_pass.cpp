@@ -1,48 +1,55 @@
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 
 #include "rt/pass.h"
 
 namespace hpr {
 namespace {
 
-/// Hard shadows: one ray per direct sample of a light that casts.
+/// Shadows, hard and soft: one ray per direct sample. Lights with an extent are sampled at a place of chance, so that
+/// their shadows soften.
 class ShadowPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "shadow"; }
-  [[nodiscard]] const Requirement& requirement(const Requirements& scene) const override { return scene.shadow; }
-  [[nodiscard]] bool needs_rays() const override { return true; }
+  [[nodiscard]] const Requirement& requirement(const Requirements& scene,
+                                               const RaySettings& /*settings*/) const override {
+    return scene.shadow;
+  }
 
   void hide(TileWork& tile, Wave& wave) const override {
-    tile.batch.clear();
-    for (const DirectSample& sample : wave.samples) {
-      if (casts_shadows(tile.lights[sample.light])) push(tile, wave.points[sample.point].surface, sample);
+    tile.requests.clear();
+    for (std::uint32_t i = 0; i < wave.samples.size(); ++i) {
+      const DirectSample& sample = wave.samples[i];
+      if (!sample.light.casts_shadows) continue;
+      const PathPoint& point = wave.points[sample.point];
+      tile.requests.push_back(towards(tile, point, sample.light));
+      tile.requests.back().owner = i;
+      tile.charge_ray(point.pixel);
     }
-    tile.blocked.resize(tile.batch.size());
-    tile.counts.shadow += tile.batch.size();
-    tile.counts.invalid += tile.rays->occluded(tile.batch, tile.blocked);
-    std::size_t ray = 0;
-    for (DirectSample& sample : wave.samples) {
-      if (casts_shadows(tile.lights[sample.light])) sample.visible = tile.blocked[ray++] == 0;
-    }
+    std::vector<float> passed(tile.requests.size());
+    tile.counts.shadow += tile.requests.size();
+    tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
+    for (std::size_t i = 0; i < passed.size(); ++i) wave.samples[tile.requests[i].owner].visible = passed[i];
   }
 
  private:
-  static void push(TileWork& tile, const SurfacePoint& surface, const DirectSample& sample) {
-    const glm::dvec3 origin = ray_origin(tile, surface, surface.lift);
-    const Light& light = tile.lights[sample.light];
-    if (light.type == LightType::Directional) {
-      tile.batch.push(origin, sample.to_light, std::numeric_limits<double>::infinity());
-      return;
-    }
+  static RayRequest towards(const TileWork& tile, const PathPoint& point, const LightSample& light) {
+    RayRequest ray;
+    ray.origin = ray_origin(point.surface, light.to_light);
+    const bool viewers_side = glm::dot(light.to_light, point.surface.geometric_normal) > 0.0;
+    if (tile.settings.terminator_fix && viewers_side) ray.origin += point.surface.lift;
+    ray.direction = light.to_light;
+    ray.reach = light.distance;
+    if (!std::isfinite(light.distance)) return ray;
     // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies
     // on a surface is not hidden by it.
-    const glm::dvec3 goal = tile.space.from_world(light.position);
-    const glm::dvec3 way = goal - origin;
+    const glm::dvec3 way = light.goal - ray.origin;
     const double distance = glm::length(way);
-    const double size = std::max({std::abs(goal.x), std::abs(goal.y), std::abs(goal.z), 1.0});
-    const double reach = distance * (1.0 - kOriginSteps * kFloatStep) - kOriginSteps * kFloatStep * size;
-    tile.batch.push(origin, distance > 0.0 ? way / distance : sample.to_light, std::max(reach, 0.0));
+    const double step = kOriginSteps * kFloatStep;
+    ray.reach = std::max(distance * (1.0 - step) - step * tile.rays->size_of(light.goal), 0.0);
+    if (distance > 0.0) ray.direction = way / distance;
+    return ray;
   }
 };
 

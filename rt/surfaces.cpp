@@ -6,6 +6,7 @@
 
 #include "core/check.h"
 #include "rt/ray_scene.h"
+#include "rt/texture.h"
 
 namespace hpr {
 namespace {
@@ -70,7 +71,9 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space) : scene_(scene), s
   for (std::size_t i = 0; i < placed_.size(); ++i) {
     const glm::dmat4& to_world = scene.instances[i].to_world;
     const glm::dmat3 linear(to_world);
-    placed_[i].normal_matrix = cofactors(linear / std::max(row_sum_norm(linear), 1e-300));
+    const glm::dmat3 scaled = linear / std::max(row_sum_norm(linear), 1e-300);
+    placed_[i].normal_matrix = cofactors(scaled);
+    placed_[i].mirrored = glm::determinant(scaled) < 0.0;
     if (shared[i] == 0) continue;
     placed_[i].distortion = distortion(linear);
     placed_[i].reach = row_sum_norm(linear) * mesh_reach[scene.instances[i].mesh] +
@@ -124,7 +127,9 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   SurfacePoint point;
   point.position = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
   point.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
-  point.geometric_normal = glm::dot(triangle.normal, point.to_viewer) < 0.0 ? -triangle.normal : triangle.normal;
+  const bool against_winding = glm::dot(triangle.normal, point.to_viewer) < 0.0;
+  point.geometric_normal = against_winding ? -triangle.normal : triangle.normal;
+  point.inside = against_winding != placed_[triangle.instance].mirrored;
   const auto& corner = triangle.normals;
   const glm::dvec3 smooth = unit(b0 * corner[0] + at.x * corner[1] + at.y * corner[2], triangle.normal);
   const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
@@ -134,7 +139,7 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   // tangent planes are, as far as they lie above the triangle.
   const glm::dvec3 in_triangle = at.x * triangle.e1 + at.y * triangle.e2;
   const std::array<glm::dvec3, 3> from_corner{in_triangle, in_triangle - triangle.e1, in_triangle - triangle.e2};
-  const std::array<double, 3> weight{b0, at.x, at.y};
+  const Weights weight{b0, at.x, at.y};
   for (std::size_t i = 0; i < 3; ++i) {
     const glm::dvec3 normal = side * corner[i];
     point.lift -= weight[i] * std::min(0.0, glm::dot(from_corner[i], normal)) * normal;
@@ -149,8 +154,56 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
     point.uv[set] = glm::vec2(b0 * glm::dvec2(uvs[corners.x]) + at.x * glm::dvec2(uvs[corners.y]) +
                               at.y * glm::dvec2(uvs[corners.z]));
   }
+  if (!mesh.colors.empty()) {
+    point.color = b0 * glm::dvec4(mesh.colors[corners.x]) + at.x * glm::dvec4(mesh.colors[corners.y]) +
+                  at.y * glm::dvec4(mesh.colors[corners.z]);
+  }
+  point.surface = triangle.surface;
   point.material = mesh.material;
+  if (scene_.materials[mesh.material].normal_texture.present()) add_tangents(triangle, weight, point);
   return point;
+}
+
+void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const {
+  const Instance& instance = scene_.instances[triangle.instance];
+  const Mesh& mesh = scene_.mesh_of(instance);
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  // Seen from behind, the mapped normal turns round as a whole.
+  const double side = point.inside ? -1.0 : 1.0;
+  if (!mesh.tangents.empty()) {
+    glm::dvec3 along(0.0);
+    glm::dvec3 normal(0.0);
+    for (int corner = 0; corner < 3; ++corner) {
+      const double weight = weights[static_cast<std::size_t>(corner)];
+      along += weight * glm::dvec3(mesh.tangents[corners[corner]]);
+      normal += weight * glm::dvec3(mesh.normals[corners[corner]]);
+    }
+    // glTF 2.0, section 3.7.2.1; both carried into the world, so that mirroring mirrors them.
+    const glm::dvec3 across = static_cast<double>(mesh.tangents[corners.x].w) * glm::cross(normal, along);
+    const glm::dmat3 linear(instance.to_world);
+    const glm::dvec3 tangent = unit(linear * along, glm::dvec3(0.0));
+    const glm::dvec3 bitangent = unit(linear * across, glm::dvec3(0.0));
+    if (tangent != glm::dvec3(0.0) && bitangent != glm::dvec3(0.0)) {
+      point.tangent = side * tangent;
+      point.bitangent = side * bitangent;
+      return;
+    }
+  }
+  const TextureRef& map = scene_.materials[mesh.material].normal_texture;
+  const auto& uvs = mesh.uvs[std::min<std::size_t>(map.uv_set, mesh.uvs.size() - 1)];
+  if (uvs.empty()) return;
+  const glm::dvec2 uv0 = transformed_uv(map, uvs[corners.x]);
+  const glm::dvec2 d1 = transformed_uv(map, uvs[corners.y]) - uv0;
+  const glm::dvec2 d2 = transformed_uv(map, uvs[corners.z]) - uv0;
+  // Positions as a linear function of u and v, times the determinant of the differences.
+  const double turn = d1.x * d2.y - d1.y * d2.x < 0.0 ? -1.0 : 1.0;
+  const glm::dvec3 by_u = turn * (d2.y * triangle.e1 - d1.y * triangle.e2);
+  const glm::dvec3 by_v = turn * (d1.x * triangle.e2 - d2.x * triangle.e1);
+  const glm::dvec3& normal = point.shading_normal;
+  point.tangent = side * unit(by_u - glm::dot(by_u, normal) * normal, glm::dvec3(0.0));
+  point.bitangent = glm::cross(normal, point.tangent);
+  // The map's y points up, v points down.
+  if (side * glm::dot(point.bitangent, by_v) > 0.0) point.bitangent = -point.bitangent;
 }
 
 }  // namespace hpr

@@ -6,6 +6,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <vector>
 
 #include "rt/ray_space.h"
@@ -36,7 +37,15 @@ struct SurfacePoint {
   glm::dvec3 lift{0.0};
   double offset = 0.0;  ///< metres by which ray origins must leave the surface along the geometric normal
   std::array<glm::vec2, 2> uv{};
+  glm::dvec4 color{1.0};  ///< interpolated of the vertices, linear RGBA; 1 where they have none
+  /// World, for normal maps: where the map's x and y point, so that x tangent + y bitangent + z shading_normal is on
+  /// the viewer's side. Of unit length and at right angles but for what the file's own tangents are not; zero where
+  /// the material has no normal map or the surface no texture coordinates.
+  glm::dvec3 tangent{0.0};
+  glm::dvec3 bitangent{0.0};
+  std::uint32_t surface = 0xFFFFFFFFU;
   std::uint32_t material = 0;
+  bool inside = false;  ///< the viewer is behind the face, by its winding; mirroring instances swap it
 
   /// The normal to shade with. A smooth one at a silhouette may turn away from the viewer; the geometric one never does
   /// and stands in for it there.
@@ -60,9 +69,15 @@ class Surfaces {
                                   const glm::dvec3& direction) const;
 
  private:
+  /// Barycentric coordinates of a triangle's corners.
+  using Weights = std::array<double, 3>;
+
+  void add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const;
+
   struct Placed {
     glm::dmat3 normal_matrix{
         1.0};                 ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
+    bool mirrored = false;    ///< turns windings round
     double distortion = 0.0;  ///< 0: not instanced in the ray scene
     double reach = 0.0;       ///< metres: |A| |vertex| + distortion |translation| of the instanced mesh
   };

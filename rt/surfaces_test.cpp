@@ -107,6 +107,32 @@ TEST(Surfaces, TransformNormalsByTheInverseTransposeAndUnderMirroring) {
   EXPECT_LT(glm::length(meet(scene, 2, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - glm::dvec3(0, 1, 0)), 1e-7);
 }
 
+TEST(Surfaces, KnowWhichSideOfAFaceTheViewerIsOn) {
+  const glm::dmat4 mirror = glm::scale(glm::dmat4(1.0), {-1.0, 1.0, 1.0});
+  for (const double size : {1.0, 1e-120, 1e15}) {
+    const glm::dmat4 scale = glm::scale(glm::dmat4(1.0), glm::dvec3(size));
+    const auto inside = [&](const glm::dmat4& to_world, double x, double z) {
+      return meet(one_triangle(scale * to_world), 0, size * glm::dvec3(x, 1.0, z), {0.0, 0.0, -z}).inside;
+    };
+    EXPECT_FALSE(inside(glm::dmat4(1.0), 0.5, 3.0)) << size;
+    EXPECT_TRUE(inside(glm::dmat4(1.0), 0.5, -3.0)) << size;
+    // Mirroring turns windings round, not the front of a thing.
+    EXPECT_FALSE(inside(mirror, -0.5, 3.0)) << size;
+    EXPECT_TRUE(inside(mirror, -0.5, -3.0)) << size;
+  }
+}
+
+TEST(Surfaces, InterpolateVertexColorsAndTellTheirNumber) {
+  Scene scene = one_triangle();
+  EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).color, glm::dvec4(1.0));
+  EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).surface, 0U);
+  scene.meshes[0].colors = {{1, 0, 0, 1}, {0, 1, 0, 0}, {0, 0, 1, 0.5F}};
+  EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).color, glm::dvec4(0.5, 0.25, 0.25, 0.625));
+  test::place(scene, 0);
+  finish_scene(scene);
+  EXPECT_EQ(meet(scene, 1, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).surface, 1U);
+}
+
 TEST(Surfaces, FindTheInstanceOfAnyIdInAnyOrder) {
   Scene scene;
   const std::uint32_t square = test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0));

@@ -43,6 +43,24 @@ inline Material glowing(glm::vec3 radiance) {
   return material;
 }
 
+/// Smooth and colourless: `thickness` 0 is a sheet, anything else bounds a volume.
+inline Material clear_glass(float ior, float thickness) {
+  Material material;
+  material.metallic = 0.0F;
+  material.roughness = 0.0F;
+  material.transmission = 1.0F;
+  material.ior = ior;
+  material.thickness = thickness;
+  return material;
+}
+
+inline Environment even_light(const Rgb& radiance) {
+  Environment environment;
+  environment.image = Image<Rgb>({1, 1});
+  environment.image.at(0, 0) = radiance;
+  return environment;
+}
+
 inline std::uint32_t add_mesh(Scene& scene, Mesh mesh) {
   if (mesh.normals.empty()) mesh.normals = smooth_normals(mesh.positions, mesh.triangles);
   scene.meshes.push_back(std::move(mesh));
@@ -157,8 +175,23 @@ inline Lit light(const Scene& scene, const View& view, const RaySettings& settin
   const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
   TileLayer<Rgb> radiance(keys.layout());
   Lighter lighter(scene, settings);
-  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), radiance);
+  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
   return {to_image(radiance, 0), lighter.counts()};
+}
+
+/// The mean of a pixel over many samples.
+inline glm::dvec3 mean_pixel(const Scene& scene, const View& view, int x, int y, std::uint32_t samples,
+                             const RaySettings& settings = {}) {
+  const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
+  Lighter lighter(scene, settings);
+  glm::dvec3 sum(0.0);
+  for (std::uint32_t sample = 0; sample < samples; ++sample) {
+    TileLayer<Rgb> radiance(keys.layout());
+    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
+    const Rgb& color = radiance.at(0, x, y);
+    sum += glm::dvec3(color.r, color.g, color.b);
+  }
+  return sum / static_cast<double>(samples);
 }
 
 inline View view_from(const glm::dvec3& eye, const glm::dvec3& at, Size size, const Scene& scene, double fov = 0.8,

@@ -11,7 +11,6 @@ namespace {
 
 using Quad = std::array<glm::dvec3, 4>;
 
-constexpr glm::dvec3 kLampCenter{278.0, 548.8, 279.5};
 constexpr Quad kFloor{{{552.8, 0, 0}, {0, 0, 0}, {0, 0, 559.2}, {549.6, 0, 559.2}}};
 constexpr Quad kLamp{{{343, 548.8, 227}, {343, 548.8, 332}, {213, 548.8, 332}, {213, 548.8, 227}}};
 constexpr Quad kCeiling{{{556, 548.8, 0}, {556, 548.8, 559.2}, {0, 548.8, 559.2}, {0, 548.8, 0}}};
@@ -83,9 +82,6 @@ void fill_cornell(Scene& scene, const OptionReader& options) {
       variant == "mirror" ? add_material(scene, metal("mirror", {0.95F, 0.95F, 0.95F}, 0.0F)) : white;
   add_single(scene, block(kTallTop), "tall block", tall);
 
-  // What the lamp sends straight down, from one point a centimetre below it.
-  constexpr float kLampArea = 0.130F * 0.105F;
-  add_point_light(scene, "lamp stand-in", kLampCenter * 1e-3 - glm::dvec3(0, 0.01, 0), kLampRadiance * kLampArea);
   // 25 mm of film behind a 35 mm lens.
   add_camera(scene, "main", {0.278, 0.273, -0.800}, {0.278, 0.273, 0.0}, {0, 1, 0}, 39.3076518);
   add_camera(scene, "corner", {0.480, 0.480, -0.300}, {0.200, 0.150, 0.300}, {0, 1, 0}, 55.0);

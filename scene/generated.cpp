@@ -190,6 +190,7 @@ Material glass(std::string name, float ior) {
   Material material = plastic(std::move(name), glm::vec3(1.0F), 0.0F);
   material.transmission = 1.0F;
   material.ior = ior;
+  material.thickness = 1.0F;
   return material;
 }
 

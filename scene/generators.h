@@ -59,7 +59,7 @@ void add_camera(Scene& scene, std::string name, const glm::dvec3& eye, const glm
 /// Dielectric, diffuse when rough.
 [[nodiscard]] Material plastic(std::string name, const glm::vec3& color, float roughness);
 [[nodiscard]] Material metal(std::string name, const glm::vec3& color, float roughness);
-/// Smooth and clear, of index of refraction `ior`.
+/// Smooth and clear, of index of refraction `ior`; solid, so its surfaces are to be closed.
 [[nodiscard]] Material glass(std::string name, float ior);
 
 }  // namespace hpr

@@ -13,18 +13,18 @@
 namespace hpr {
 namespace {
 
-constexpr std::array<std::string_view, 7> kSupported{
+constexpr std::array<std::string_view, 9> kSupported{
     "EXT_mesh_gpu_instancing", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
-    "KHR_materials_ior",       "KHR_materials_transmission", "KHR_mesh_quantization",
-    "KHR_texture_transform"};
+    "KHR_materials_ior",       "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_materials_volume",    "KHR_mesh_quantization",      "KHR_texture_transform"};
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
-constexpr std::array<std::string_view, 12> kLooks{
+constexpr std::array<std::string_view, 10> kLooks{
     "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion", "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_unlit",
-    "KHR_materials_variants",   "KHR_materials_volume",      "KHR_xmp_json_ld"};
+    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_variants",
+    "KHR_xmp_json_ld"};
 
 bool contains(const auto& names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();

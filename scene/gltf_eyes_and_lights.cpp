@@ -27,6 +27,11 @@ std::optional<glm::dmat3> orthonormal(const glm::dmat4& matrix) {
   return glm::dmat3(*level, glm::cross(*back, *level), *back);
 }
 
+/// A number of a JSON object that check_shape has looked at; 0 when it isn't there.
+double number_of(const tinygltf::Value& object, const char* key) {
+  return object.IsObject() && object.Has(key) ? object.Get(key).GetNumberAsDouble() : 0.0;
+}
+
 }  // namespace
 
 std::optional<Light> light_of(const GltfData& data, int node, const glm::dmat4& to_world) {
@@ -51,6 +56,11 @@ std::optional<Light> light_of(const GltfData& data, int node, const glm::dmat4& 
   to.range = light.range;
   to.inner_cone_radians = static_cast<float>(light.spot.innerConeAngle);
   to.outer_cone_radians = static_cast<float>(light.spot.outerConeAngle);
+  if (to.type == LightType::Directional) {
+    to.angular_radius_radians = static_cast<float>(number_of(light.extras, "angularRadius"));
+  } else {
+    to.radius = number_of(light.extras, "radius");
+  }
   return to;
 }
 

@@ -176,7 +176,8 @@ class SceneBuilder {
     if (mesh.material >= scene_.materials.size()) return;
     const Material& material = scene_.materials[mesh.material];
     for (const TextureRef* ref :
-         {&material.base_color_texture, &material.metallic_roughness_texture, &material.emissive_texture}) {
+         {&material.base_color_texture, &material.metallic_roughness_texture, &material.emissive_texture,
+          &material.normal_texture, &material.occlusion_texture, &material.transmission_texture}) {
       if (ref->present() && mesh.uvs[ref->uv_set].empty()) {
         context().warn(where, fmt::format("has no TEXCOORD_{} for the texture of its material", ref->uv_set));
       }

@@ -164,6 +164,30 @@ TEST(GltfLoader, LightsAndCamerasStandWhereTheirNodesPutThem) {
   EXPECT_EQ(std::get<PerspectiveLens>(scene.cameras[0].lens).vertical_fov_radians, 0.6);
 }
 
+/// A document whose one node has this light.
+Scene load_light(const json& light) {
+  auto document = triangle();
+  document.json["extensions"]["KHR_lights_punctual"]["lights"] = {light};
+  document.json["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  document.json["scenes"][0]["nodes"] = {0, 1};
+  return load(document.json);
+}
+
+TEST(GltfLoader, ExtrasGiveLightsAnExtent) {
+  EXPECT_EQ(load_light({{"type", "point"}, {"extras", {{"radius", 2}}}}).lights.at(0).radius, 2.0);
+  EXPECT_EQ(load_light({{"type", "point"}, {"extras", "anything"}}).lights.at(0).radius, 0.0);
+  const Scene sun = load_light({{"type", "directional"}, {"extras", {{"angularRadius", 0.25}, {"radius", 3}}}});
+  EXPECT_EQ(sun.lights.at(0).angular_radius_radians, 0.25F);
+  EXPECT_EQ(sun.lights.at(0).radius, 0.0);
+  EXPECT_TRUE(sun.warnings.empty());
+  for (const json& radius : {json(-1.0), json("wide"), json(1e300), json(nullptr)}) {
+    const Scene scene = load_light({{"type", "point"}, {"extras", {{"radius", radius}}}});
+    EXPECT_EQ(scene.lights.at(0).radius, 0.0) << radius;
+    ASSERT_EQ(scene.warnings.size(), 1U) << radius;
+    EXPECT_NE(scene.warnings[0].find("radius"), std::string::npos) << scene.warnings[0];
+  }
+}
+
 TEST(GltfLoader, MaterialsKeepTheirFactorsAndExtensions) {
   auto document = triangle();
   document.json["materials"] = json::parse(R"([{"name": "glass", "doubleSided": true, "alphaMode": "MASK",

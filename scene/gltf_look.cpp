@@ -71,12 +71,9 @@ glm::vec3 color_of(const std::vector<double>& values, double fallback) {
 void GltfLook::build(Scene& scene) {
   const auto& materials = data_.model().materials;
   data_.context().charge(materials.size() * sizeof(Material), "the materials");
-  bool detail_maps = false;
   for (std::size_t i = 0; i < materials.size(); ++i) {
     scene.materials.push_back(material(materials[i], fmt::format("materials[{}]", i), scene));
-    detail_maps = detail_maps || materials[i].normalTexture.index >= 0 || materials[i].occlusionTexture.index >= 0;
   }
-  if (detail_maps) data_.context().warn("", "normal and occlusion textures are ignored");
 }
 
 Material GltfLook::material(const tinygltf::Material& from, const std::string& where, Scene& scene) {
@@ -94,30 +91,58 @@ Material GltfLook::material(const tinygltf::Material& from, const std::string& w
   to.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::Mask
                   : from.alphaMode == "BLEND" ? AlphaMode::Blend
                                               : AlphaMode::Opaque;
-  if (to.alpha_mode != AlphaMode::Opaque) {
-    data_.context().warn("", "alpha masks and blending are not drawn yet: surfaces are opaque");
-  }
   to.alpha_cutoff = static_cast<float>(from.alphaCutoff);
   to.double_sided = from.doubleSided;
+  add_detail(from, where, scene, to);
+  add_extensions(from, where, scene, to);
+  return to;
+}
+
+void GltfLook::add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
+  to.normal_texture = texture_ref(from.normalTexture, where + ".normalTexture", scene);
+  to.normal_scale = static_cast<float>(from.normalTexture.scale);
+  to.occlusion_texture = texture_ref(from.occlusionTexture, where + ".occlusionTexture", scene);
+  to.occlusion_strength = static_cast<float>(from.occlusionTexture.strength);
+}
+
+void GltfLook::add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
   if (const auto* strength = extension(from.extensions, "KHR_materials_emissive_strength")) {
     to.emissive *= static_cast<float>(number_in(*strength, "emissiveStrength", 1.0));
   }
   if (const auto* transmission = extension(from.extensions, "KHR_materials_transmission")) {
     to.transmission = static_cast<float>(number_in(*transmission, "transmissionFactor", 0.0));
-    if (transmission->Has("transmissionTexture")) data_.context().warn("", "transmission textures are ignored");
+    if (transmission->Has("transmissionTexture")) {
+      const tinygltf::Value& info = transmission->Get("transmissionTexture");
+      tinygltf::ExtensionMap extensions;
+      if (info.Has("extensions")) extensions = info.Get("extensions").Get<tinygltf::Value::Object>();
+      to.transmission_texture =
+          texture_ref(info.Get("index").GetNumberAsInt(), static_cast<int>(number_in(info, "texCoord", 0.0)),
+                      extensions, where + ".KHR_materials_transmission.transmissionTexture", scene);
+    }
   }
-  if (to.transmission > 0.0F) data_.context().warn("", "transmission is not drawn yet: clear surfaces look dark");
   if (const auto* ior = extension(from.extensions, "KHR_materials_ior")) {
     to.ior = static_cast<float>(number_in(*ior, "ior", 1.5));
   }
-  return to;
+  if (const auto* volume = extension(from.extensions, "KHR_materials_volume")) {
+    // The texture of the thickness is for renderers that cannot look where light leaves again.
+    to.thickness = static_cast<float>(number_in(*volume, "thicknessFactor", 0.0));
+    to.attenuation_distance = static_cast<float>(
+        number_in(*volume, "attenuationDistance", static_cast<double>(Material{}.attenuation_distance)));
+    if (volume->Has("attenuationColor")) {
+      for (int c = 0; c < 3; ++c) {
+        to.attenuation_color[c] = static_cast<float>(volume->Get("attenuationColor").Get(c).GetNumberAsDouble());
+      }
+    }
+  }
+  to.unlit = extension(from.extensions, "KHR_materials_unlit") != nullptr;
 }
 
-TextureRef GltfLook::texture_ref(const tinygltf::TextureInfo& info, const std::string& where, Scene& scene) {
+TextureRef GltfLook::texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
+                                 const std::string& where, Scene& scene) {
   TextureRef ref;
-  if (info.index < 0) return ref;
-  ref.uv_set = static_cast<std::uint32_t>(info.texCoord);
-  if (const auto* transform = extension(info.extensions, "KHR_texture_transform")) {
+  if (index < 0) return ref;
+  ref.uv_set = static_cast<std::uint32_t>(uv_set);
+  if (const auto* transform = extension(extensions, "KHR_texture_transform")) {
     ref.transform = uv_transform(*transform);
     if (transform->Has("texCoord"))
       ref.uv_set = static_cast<std::uint32_t>(transform->Get("texCoord").GetNumberAsInt());
@@ -127,7 +152,7 @@ TextureRef GltfLook::texture_ref(const tinygltf::TextureInfo& info, const std::s
                          fmt::format("uses TEXCOORD_{}; only 0 and 1 are read, the texture is left out", ref.uv_set));
     return {};
   }
-  ref.texture = texture(info.index, where, scene);
+  ref.texture = texture(index, where, scene);
   return ref.present() ? ref : TextureRef{};
 }
 

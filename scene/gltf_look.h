@@ -28,7 +28,15 @@ class GltfLook {
   using SamplerKey = std::tuple<int, Wrap, Wrap, bool>;
 
   [[nodiscard]] Material material(const tinygltf::Material& from, const std::string& where, Scene& scene);
-  [[nodiscard]] TextureRef texture_ref(const tinygltf::TextureInfo& info, const std::string& where, Scene& scene);
+  void add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to);
+  void add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to);
+  /// The three kinds of texture info differ in what they say beside these.
+  [[nodiscard]] TextureRef texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
+                                       const std::string& where, Scene& scene);
+  template <typename Info>
+  [[nodiscard]] TextureRef texture_ref(const Info& info, const std::string& where, Scene& scene) {
+    return texture_ref(info.index, info.texCoord, info.extensions, where, scene);
+  }
   [[nodiscard]] std::int32_t texture(int index, const std::string& where, Scene& scene);
   [[nodiscard]] std::optional<Image<Rgba8>> picture(int image);
 

@@ -34,6 +34,12 @@ class PrimitiveBuilder {
       mesh.normals = data_.vec3s(found->second);
     }
     read_uvs(mesh);
+    read_colors(mesh);
+    // Tangents without normals are to be ignored (glTF 2.0, section 3.7.2.1).
+    if (const auto found = primitive_.attributes.find("TANGENT");
+        found != primitive_.attributes.end() && !mesh.normals.empty()) {
+      mesh.tangents = data_.vec4s(found->second);
+    }
     mesh.triangles = read_triangles(mesh.positions.size());
     morph(mesh, pose.weights);
     if (!pose.joints.empty()) skin(mesh, pose.joints);
@@ -41,6 +47,7 @@ class PrimitiveBuilder {
       make_flat(mesh);
     } else {
       repair_normals(mesh);
+      repair_tangents(mesh);
     }
     return mesh;
   }
@@ -101,6 +108,27 @@ class PrimitiveBuilder {
     }
   }
 
+  void read_colors(Mesh& mesh) const {
+    const auto found = primitive_.attributes.find("COLOR_0");
+    if (found == primitive_.attributes.end()) return;
+    if (data_.accessor(found->second).type == TINYGLTF_TYPE_VEC4) {
+      mesh.colors = data_.vec4s(found->second);
+    } else {
+      const Vectors opaque = data_.vec3s(found->second);
+      data_.context().charge(opaque.size() * sizeof(glm::vec4), "vertex colours");
+      for (const glm::vec3& color : opaque) mesh.colors.emplace_back(color, 1.0F);
+    }
+    bool odd = false;
+    for (glm::vec4& color : mesh.colors) {
+      for (int c = 0; c < 4; ++c) {
+        if (color[c] >= 0.0F && color[c] <= 1.0F) continue;
+        color[c] = std::isnan(color[c]) ? 1.0F : std::clamp(color[c], 0.0F, 1.0F);
+        odd = true;
+      }
+    }
+    if (odd) data_.context().warn(where_ + ".attributes.COLOR_0", "some values lie outside of 0 to 1; brought into it");
+  }
+
   [[nodiscard]] std::vector<glm::uvec3> read_triangles(std::size_t vertices) const {
     std::vector<std::uint32_t> indices;
     if (primitive_.indices >= 0) {
@@ -127,17 +155,21 @@ class PrimitiveBuilder {
     bool moved = false;
     for (std::size_t t = 0; t < count; ++t) {
       if (weights[t] == 0.0) continue;
-      const auto add = [&](const char* name, Vectors& to) {
+      const auto add = [&](const char* name, auto& to) {
         const auto found = primitive_.targets[t].find(name);
         if (found == primitive_.targets[t].end() || to.empty()) return;
         const Vectors deltas = data_.vec3s(found->second);
         for (std::size_t i = 0; i < to.size(); ++i) {
-          to[i] = glm::vec3(glm::dvec3(to[i]) + weights[t] * glm::dvec3(deltas[i]));
+          // Targets of tangents leave their sign alone.
+          for (int axis = 0; axis < 3; ++axis) {
+            to[i][axis] = static_cast<float>(double{to[i][axis]} + weights[t] * double{deltas[i][axis]});
+          }
         }
         moved = true;
       };
       add("POSITION", mesh.positions);
       add("NORMAL", mesh.normals);
+      add("TANGENT", mesh.tangents);
     }
     if (moved) check_positions(mesh.positions);
   }
@@ -189,6 +221,10 @@ class PrimitiveBuilder {
         const double length = glm::length(normal);
         mesh.normals[i] = length > 0.0 ? glm::vec3(normal / length) : glm::vec3(0.0F);
       }
+      if (!mesh.tangents.empty()) {
+        glm::vec4& tangent = mesh.tangents[i];
+        tangent = glm::vec4(glm::vec3(glm::dmat3(blend) * glm::dvec3(tangent)), tangent.w);
+      }
     }
     if (odd) data_.context().warn(where_ + ".attributes.WEIGHTS_0", "some vertices have no usable weights");
     check_positions(mesh.positions);
@@ -199,11 +235,14 @@ class PrimitiveBuilder {
     const std::size_t corners = mesh.triangles.size() * 3;
     check_vertex_count(corners);
     const auto sets = std::ranges::count_if(mesh.uvs, [](const auto& uvs) { return !uvs.empty(); });
-    data_.context().charge(corners * (2 * sizeof(glm::vec3) + static_cast<std::size_t>(sets) * sizeof(glm::vec2)),
-                           "a mesh without normals");
+    const std::size_t colored = mesh.colors.empty() ? 0 : sizeof(glm::vec4);
+    data_.context().charge(
+        corners * (2 * sizeof(glm::vec3) + static_cast<std::size_t>(sets) * sizeof(glm::vec2) + colored),
+        "a mesh without normals");
     Mesh flat;
     flat.positions.reserve(corners);
     flat.normals.reserve(corners);
+    if (!mesh.colors.empty()) flat.colors.reserve(corners);
     for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
       if (!mesh.uvs[set].empty()) flat.uvs[set].reserve(corners);
     }
@@ -218,6 +257,7 @@ class PrimitiveBuilder {
       for (int corner = 0; corner < 3; ++corner) {
         flat.positions.push_back(mesh.positions[triangle[corner]]);
         flat.normals.push_back(normal);
+        if (!mesh.colors.empty()) flat.colors.push_back(mesh.colors[triangle[corner]]);
         for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
           if (!mesh.uvs[set].empty()) flat.uvs[set].push_back(mesh.uvs[set][triangle[corner]]);
         }
@@ -250,6 +290,25 @@ class PrimitiveBuilder {
       mesh.normals[i] = smooth[i];
     }
     if (scaled) data_.context().warn(where_ + ".attributes.NORMAL", "some normals are no unit vectors; made so");
+  }
+
+  /// Tangents become unit length with a sign of 1 or -1, or zero where they have no direction. Those that are unit
+  /// vectors but for rounding keep their bits.
+  void repair_tangents(Mesh& mesh) const {
+    bool odd = false;
+    for (glm::vec4& tangent : mesh.tangents) {
+      const glm::dvec3 along(tangent);
+      const double square = glm::dot(along, along);
+      const float sign = tangent.w < 0.0F ? -1.0F : 1.0F;
+      odd = odd || !(std::abs(square - 1.0) < 0.2) || tangent.w != sign;
+      tangent.w = sign;
+      if (std::abs(square - 1.0) < 1e-6) continue;
+      const bool directed = square > 0.0 && std::isfinite(square);
+      tangent = glm::vec4(directed ? glm::vec3(along / std::sqrt(square)) : glm::vec3(0.0F), sign);
+    }
+    if (odd) {
+      data_.context().warn(where_ + ".attributes.TANGENT", "some tangents are no unit vectors with a sign; made so");
+    }
   }
 
   const GltfData& data_;

@@ -56,7 +56,10 @@ class PrimitiveCheck {
 
   void check_vector(int index, const std::string& where) const {
     data_.require_type(index, {TINYGLTF_TYPE_VEC3}, where);
-    const tinygltf::Accessor& accessor = data_.accessor(index);
+    check_components(data_.accessor(index), where);
+  }
+
+  void check_components(const tinygltf::Accessor& accessor, const std::string& where) const {
     if (is_float(accessor)) return;
     if (accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
       data_.context().fail(where, "is not made of floats");
@@ -71,12 +74,14 @@ class PrimitiveCheck {
       check_vector(index, where);
     } else if (name == "TANGENT") {
       data_.require_type(index, {TINYGLTF_TYPE_VEC4}, where);
+      check_components(accessor, where);
     } else if (name.starts_with("TEXCOORD_")) {
       data_.require_type(index, {TINYGLTF_TYPE_VEC2}, where);
       if (!is_fraction(accessor) && !quantized_) warn(where, "is made neither of floats nor of normalised integers");
     } else if (name.starts_with("COLOR_")) {
       data_.require_type(index, {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, where);
-      warn("", "vertex colours are ignored");
+      if (!is_fraction(accessor)) data_.context().fail(where, "must be floats or normalised integers");
+      if (name != "COLOR_0") warn("", "vertex colours past the first are ignored");
     } else if (name.starts_with("JOINTS_")) {
       data_.require_type(index, {TINYGLTF_TYPE_VEC4}, where);
       if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE &&

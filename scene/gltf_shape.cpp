@@ -18,6 +18,7 @@ constexpr auto kRequired = Presence::Required;
 constexpr auto kOptional = Presence::Optional;
 /// Radiance, intensity and the like are held to what sums and squares of single precision can carry.
 constexpr double kBrightest = 1e12;
+constexpr double kLargestRadius = 1e12;  // of a light, metres
 
 void check_asset(const GltfItem& root) {
   const auto asset = root.object("asset", kRequired);
@@ -187,18 +188,19 @@ void check_scenes(const GltfItem& root) {
   });
 }
 
-void check_texture_info(const GltfItem& material, const char* key) {
-  const auto info = material.object(key);
-  if (!info) return;
+std::optional<GltfItem> check_texture_info(const GltfItem& material, const char* key) {
+  auto info = material.object(key);
+  if (!info) return info;
   info->index("index", "textures", kRequired);
   info->whole("texCoord", kOptional, 0, 1000);
   const auto extensions = info->object("extensions");
   const auto transform = extensions ? extensions->object("KHR_texture_transform") : std::nullopt;
-  if (!transform) return;
+  if (!transform) return info;
   transform->numbers("offset", 2, -1e6, 1e6);
   transform->numbers("scale", 2, -1e6, 1e6);
   transform->number("rotation");
   transform->whole("texCoord", kOptional, 0, 1000);
+  return info;
 }
 
 void check_textures(const GltfItem& root) {
@@ -216,6 +218,28 @@ void check_textures(const GltfItem& root) {
   });
 }
 
+void check_material_extensions(const GltfItem& extensions) {
+  if (const auto emissive = extensions.object("KHR_materials_emissive_strength")) {
+    emissive->clamped("emissiveStrength", 0.0, kBrightest);
+  }
+  if (const auto transmission = extensions.object("KHR_materials_transmission")) {
+    transmission->clamped("transmissionFactor", 0.0, 1.0);
+    check_texture_info(*transmission, "transmissionTexture");
+  }
+  if (const auto refraction = extensions.object("KHR_materials_ior")) {
+    // 0 is allowed and means a mirror at every angle.
+    if (const auto ior = refraction->number("ior"); ior && *ior != 0.0) refraction->clamped("ior", 1.0, 1000.0);
+  }
+  if (const auto volume = extensions.object("KHR_materials_volume")) {
+    volume->clamped("thicknessFactor", 0.0, GltfItem::kLargest);
+    check_texture_info(*volume, "thicknessTexture");
+    // The extension wants more than 0; what lets light less far is black to every picture.
+    volume->clamped("attenuationDistance", 1e-12, GltfItem::kLargest);
+    volume->numbers("attenuationColor", 3, 0.0, 1.0);
+  }
+  (void)extensions.object("KHR_materials_unlit");
+}
+
 void check_materials(const GltfItem& root) {
   root.each("materials", kOptional, [](const GltfItem& material) {
     material.text("name");
@@ -226,7 +250,11 @@ void check_materials(const GltfItem& root) {
       check_texture_info(*pbr, "baseColorTexture");
       check_texture_info(*pbr, "metallicRoughnessTexture");
     }
-    for (const char* key : {"normalTexture", "occlusionTexture", "emissiveTexture"}) check_texture_info(material, key);
+    check_texture_info(material, "emissiveTexture");
+    if (const auto normal = check_texture_info(material, "normalTexture")) normal->clamped("scale", -1e6, 1e6);
+    if (const auto occlusion = check_texture_info(material, "occlusionTexture")) {
+      occlusion->clamped("strength", 0.0, 1.0);
+    }
     material.numbers("emissiveFactor", 3, 0.0, 1.0);
     material.clamped("alphaCutoff", 0.0, GltfItem::kLargest);
     material.flag("doubleSided");
@@ -235,19 +263,7 @@ void check_materials(const GltfItem& root) {
       material.warn("alphaMode", fmt::format("\"{}\" is unknown; taken as OPAQUE", printable(*mode)));
       material.value()["alphaMode"] = "OPAQUE";
     }
-    const auto extensions = material.object("extensions");
-    if (!extensions) return;
-    if (const auto emissive = extensions->object("KHR_materials_emissive_strength")) {
-      emissive->clamped("emissiveStrength", 0.0, kBrightest);
-    }
-    if (const auto transmission = extensions->object("KHR_materials_transmission")) {
-      transmission->clamped("transmissionFactor", 0.0, 1.0);
-      check_texture_info(*transmission, "transmissionTexture");
-    }
-    if (const auto refraction = extensions->object("KHR_materials_ior")) {
-      // 0 is allowed and means a mirror at every angle.
-      if (const auto ior = refraction->number("ior"); ior && *ior != 0.0) refraction->clamped("ior", 1.0, 1000.0);
-    }
+    if (const auto extensions = material.object("extensions")) check_material_extensions(*extensions);
   });
 }
 
@@ -285,6 +301,22 @@ void check_cameras(const GltfItem& root) {
   });
 }
 
+/// A number in a light's `extras` that gives it an extent. Extras may hold anything, so what is no such number is left
+/// out with a warning instead of refused.
+void check_extent(const GltfItem& light, const char* key, double high) {
+  if (!light.has("extras")) return;
+  nlohmann::json& extras = light.value()["extras"];
+  if (!extras.is_object() || !extras.contains(key)) return;
+  nlohmann::json& value = extras[key];
+  const double number = value.is_number() ? value.get<double>() : -1.0;
+  if (number >= 0.0 && number <= high) {
+    value = number;  // tinygltf keeps integers in 32 bits
+    return;
+  }
+  light.warn("extras", fmt::format("has a {} that is no number from 0 to {:.4g}; left out", key, high));
+  extras.erase(key);
+}
+
 void check_lights(const GltfItem& root) {
   const auto extensions = root.object("extensions");
   const auto punctual = extensions ? extensions->object("KHR_lights_punctual") : std::nullopt;
@@ -302,6 +334,8 @@ void check_lights(const GltfItem& root) {
       light.warn("range", fmt::format("is {}; taken as unbounded", *range));
       light.value().erase("range");
     }
+    check_extent(light, "radius", kLargestRadius);
+    check_extent(light, "angularRadius", std::numbers::pi / 2);
     const auto spot = light.object("spot", *type == "spot" ? kRequired : kOptional);
     if (!spot) return;
     const double outer = spot->clamped("outerConeAngle", 1e-4, std::numbers::pi / 2).value_or(std::numbers::pi / 4);

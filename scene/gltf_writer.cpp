@@ -25,7 +25,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 static_assert(std::endian::native == std::endian::little, "glTF buffers are little-endian");
-static_assert(sizeof(glm::vec2) == 8 && sizeof(glm::vec3) == 12 && sizeof(glm::uvec3) == 12);
+static_assert(sizeof(glm::vec2) == 8 && sizeof(glm::vec3) == 12 && sizeof(glm::vec4) == 16 && sizeof(glm::uvec3) == 12);
 
 constexpr int kFloat = 5126;
 constexpr int kUnsignedInt = 5125;
@@ -133,6 +133,41 @@ Json texture_info(const TextureRef& reference, Document& document) {
   return info;
 }
 
+void write_detail(const Material& material, Json& element, Document& document) {
+  if (material.normal_texture.present()) {
+    Json& info = element["normalTexture"] = texture_info(material.normal_texture, document);
+    if (material.normal_scale != Material{}.normal_scale) info["scale"] = material.normal_scale;
+  }
+  if (material.occlusion_texture.present()) {
+    Json& info = element["occlusionTexture"] = texture_info(material.occlusion_texture, document);
+    if (material.occlusion_strength != Material{}.occlusion_strength) info["strength"] = material.occlusion_strength;
+  }
+}
+
+/// What light meets that goes through the surface.
+void write_glass(const Material& material, Json& element, Document& document) {
+  const auto extend = [&](const char* name, Json value) {
+    element["extensions"][name] = std::move(value);
+    document.extensions.insert(name);
+  };
+  const Material plain;
+  if (material.transmission > 0.0F) {
+    Json glass{{"transmissionFactor", material.transmission}};
+    if (material.transmission_texture.present()) {
+      glass["transmissionTexture"] = texture_info(material.transmission_texture, document);
+    }
+    extend("KHR_materials_transmission", std::move(glass));
+  }
+  if (material.ior != plain.ior) extend("KHR_materials_ior", {{"ior", material.ior}});
+  Json volume = Json::object();
+  if (material.thickness > 0.0F) volume["thicknessFactor"] = material.thickness;
+  if (material.attenuation_color != plain.attenuation_color) {
+    volume["attenuationColor"] = numbers(material.attenuation_color);
+  }
+  if (std::isfinite(material.attenuation_distance)) volume["attenuationDistance"] = material.attenuation_distance;
+  if (!volume.empty()) extend("KHR_materials_volume", std::move(volume));
+}
+
 void write_materials(const Scene& scene, Document& document) {
   for (const Material& material : scene.materials) {
     Json surface{{"baseColorFactor", numbers(material.base_color)},
@@ -158,10 +193,9 @@ void write_materials(const Scene& scene, Document& document) {
     if (material.emissive_texture.present()) {
       element["emissiveTexture"] = texture_info(material.emissive_texture, document);
     }
-    if (material.transmission > 0.0F) {
-      extend("KHR_materials_transmission", {{"transmissionFactor", material.transmission}});
-    }
-    if (material.ior != Material{}.ior) extend("KHR_materials_ior", {{"ior", material.ior}});
+    write_detail(material, element, document);
+    write_glass(material, element, document);
+    if (material.unlit) extend("KHR_materials_unlit", Json::object());
     if (material.alpha_mode == AlphaMode::Blend) element["alphaMode"] = "BLEND";
     if (material.alpha_mode == AlphaMode::Mask) {
       element["alphaMode"] = "MASK";
@@ -197,6 +231,8 @@ std::vector<std::size_t> write_meshes(const Scene& scene, Document& document) {
         attributes[fmt::format("TEXCOORD_{}", set)] = document.add_accessor(mesh.uvs[set], "VEC2");
       }
     }
+    if (!mesh.colors.empty()) attributes["COLOR_0"] = document.add_accessor(mesh.colors, "VEC4");
+    if (!mesh.tangents.empty()) attributes["TANGENT"] = document.add_accessor(mesh.tangents, "VEC4");
     const std::size_t view = document.add_view(std::as_bytes(std::span(mesh.triangles)), kIndexBuffer);
     const std::size_t indices = document.add("accessors", {{"bufferView", view},
                                                            {"componentType", kUnsignedInt},
@@ -232,6 +268,8 @@ void write_lights(const Scene& scene, Document& document) {
     const float strength = strength_of(light.intensity);
     Json element{{"name", light.name}, {"color", numbers(light.intensity / strength)}, {"intensity", strength}};
     if (light.range > 0.0) element["range"] = light.range;
+    if (light.radius > 0.0) element["extras"]["radius"] = light.radius;
+    if (light.angular_radius_radians > 0.0F) element["extras"]["angularRadius"] = light.angular_radius_radians;
     Json node{{"name", light.name}};
     if (light.type == LightType::Point) {
       element["type"] = "point";

@@ -16,10 +16,19 @@ struct Requirements {
   Requirement shadow;
   Requirement reflection;
   Requirement refraction;
-  Requirement photon;
+  Requirement photon;             ///< caustics: light that smooth surfaces bundle
+  Requirement indirect;           ///< light that rough surfaces scatter on to others
+  Requirement ambient_occlusion;  ///< a cheap stand-in for that
 };
 
 [[nodiscard]] Requirements requirements_of(const Scene& scene);
+
+/// Whether a material sends out light anywhere: a textured one does where a texel isn't black.
+[[nodiscard]] bool emits(const Scene& scene, const Material& material);
+
+/// Whether the scene has any light of its own: punctual lights, visible surfaces that emit, an environment that isn't
+/// black. A scene without gets a headlight.
+[[nodiscard]] bool gives_light(const Scene& scene);
 
 /// A surface mirrors visibly below this roughness; above it the reflection pass leaves it alone.
 inline constexpr float kMirrorRoughness = 0.3F;

@@ -35,6 +35,31 @@ TEST(Requirements, ShadowsNeedALightThatCasts) {
   EXPECT_EQ(one.why, "1 light casts shadows");
 }
 
+TEST(Requirements, EmittingSurfacesAndTheEnvironmentAreLights) {
+  Material glowing = rough(1.0F);
+  glowing.emissive = {0.0F, 0.5F, 0.0F};
+  Scene scene = scene_of(glowing, {Light{}});
+  EXPECT_EQ(requirements_of(scene).shadow.why, "2 lights cast shadows");
+  scene.environment = Environment{Image<Rgb>({1, 1}, {0, 0, 1})};
+  EXPECT_EQ(requirements_of(scene).shadow.why, "3 lights cast shadows");
+  scene.environment->scale = 0.0;
+  scene.lights.clear();
+  EXPECT_EQ(requirements_of(scene).shadow.why, "1 light casts shadows");
+  EXPECT_TRUE(gives_light(scene));
+
+  scene.textures.emplace_back();
+  scene.textures[0].image = Image<Rgba8>({2, 2}, Rgba8{255, 0, 255, 255});
+  scene.materials[0].emissive_texture.texture = 0;
+  EXPECT_FALSE(gives_light(scene)) << "a green light under a texture without green";
+  EXPECT_FALSE(requirements_of(scene).shadow.needed);
+  scene.textures[0].image.at(1, 1).g = 1;
+  EXPECT_TRUE(gives_light(scene));
+  scene.instances.clear();
+  EXPECT_FALSE(gives_light(scene)) << "no surface shows the material";
+  scene.environment->scale = 1.0;
+  EXPECT_TRUE(gives_light(scene));
+}
+
 TEST(Requirements, ReflectionsNeedAMaterialBelowTheMirrorRoughness) {
   EXPECT_TRUE(requirements_of(scene_of(rough(0.0F))).reflection.needed);
   EXPECT_TRUE(requirements_of(scene_of(rough(0.29F))).reflection.needed);

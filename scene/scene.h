@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -40,7 +41,8 @@ struct TextureRef {
 
 enum class AlphaMode : std::uint8_t { Opaque, Mask, Blend };
 
-/// glTF 2.0 metallic-roughness (specification, appendix B), with KHR_materials_transmission, _ior, _emissive_strength.
+/// glTF 2.0 metallic-roughness (specification, appendix B), with KHR_materials_transmission, _volume, _ior, _unlit,
+/// _emissive_strength.
 struct Material {
   std::string name;
   glm::vec4 base_color{1.0F};
@@ -50,21 +52,36 @@ struct Material {
   TextureRef metallic_roughness_texture;  ///< linear: roughness in G, metallic in B
   glm::vec3 emissive{0.0F};               ///< radiance, strength multiplied in
   TextureRef emissive_texture;            ///< sRGB
+  TextureRef normal_texture;              ///< linear: a normal in the tangent frame, [0, 1] standing for [-1, 1]
+  float normal_scale = 1.0F;              ///< of its x and y
+  TextureRef occlusion_texture;           ///< linear: in R, the share of ambient light that arrives
+  float occlusion_strength = 1.0F;        ///< 0: the texture has no effect
   float transmission = 0.0F;
+  TextureRef transmission_texture;  ///< linear, in R
   float ior = 1.5F;
+  /// Above 0, the surface bounds a volume; else it is a thin sheet. Rays find out themselves how thick the volume is.
+  float thickness = 0.0F;
+  /// What is left of white light after `attenuation_distance` metres of the volume.
+  glm::vec3 attenuation_color{1.0F};
+  float attenuation_distance = std::numeric_limits<float>::infinity();
   AlphaMode alpha_mode = AlphaMode::Opaque;
   float alpha_cutoff = 0.5F;
   bool double_sided = false;
+  bool unlit = false;  ///< shows its base colour, whatever the light
 };
 
-/// Triangles of one material in their own coordinates. All positions and normals are finite, all indices in range.
+/// Triangles of one material in their own coordinates. All vertex data are finite, all indices in range.
 struct Mesh {
   std::string name;
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;             ///< unit length, one per position
   std::array<std::vector<glm::vec2>, 2> uvs;  ///< per set: one per position, or none at all
-  std::vector<glm::uvec3> triangles;          ///< may be degenerate
-  std::uint32_t material = 0;                 ///< index into Scene::materials, always valid
+  std::vector<glm::vec4> colors;              ///< linear RGBA in [0, 1], one per position, or none at all
+  /// One per position, or none at all: the way of growing u, of unit length (zero where unknown), and the sign w with
+  /// which w normal x tangent is the way of falling v.
+  std::vector<glm::vec4> tangents;
+  std::vector<glm::uvec3> triangles;  ///< may be degenerate
+  std::uint32_t material = 0;         ///< index into Scene::materials, always valid
 };
 
 /// A mesh placed in the world. Triangle t of it has the surface id first_surface + t.
@@ -81,7 +98,7 @@ enum class LightType : std::uint8_t {
   Headlight,  ///< constant irradiance from beside the eye, wherever it is, casting no shadow: for scenes without lights
 };
 
-/// KHR_lights_punctual. Candela and lux are taken as W/sr and W/m^2.
+/// KHR_lights_punctual, to which `extras` may give an extent. Candela and lux are taken as W/sr and W/m^2.
 struct Light {
   std::string name;
   LightType type = LightType::Point;
@@ -91,6 +108,19 @@ struct Light {
   double range = 0.0;         ///< metres; 0: unbounded
   float inner_cone_radians = 0.0F;
   float outer_cone_radians = 0.7853982F;
+  /// Metres. Point and spot lights with a radius are spheres of uniform radiance, intensity / (pi radius^2); extras
+  /// `radius`.
+  double radius = 0.0;
+  /// Of the disc in the sky a directional light comes from, up to pi/2; extras `angularRadius`.
+  float angular_radius_radians = 0.0F;
+};
+
+/// Light from all around, infinitely far away. The image's rows go from straight up (+y) to straight down, its columns
+/// once around: the middle one lies along -z, the columns right of it towards +x.
+struct Environment {
+  Image<Rgb> image;               ///< radiance, finite and not negative; one pixel: the same everywhere
+  double rotation_radians = 0.0;  ///< turns it about +y, counterclockwise as seen from above
+  double scale = 1.0;             ///< the image is multiplied by it; not negative
 };
 
 struct PerspectiveLens {
@@ -122,9 +152,10 @@ struct Scene {
   std::vector<Material> materials;  ///< never empty once finished
   std::vector<Texture> textures;
   std::vector<Instance> instances;  ///< in ascending order of first_surface
-  std::vector<Light> lights;        ///< empty: the renderer adds a headlight and says so
+  std::vector<Light> lights;        ///< see gives_light for when the renderer adds a headlight
   std::vector<Camera> cameras;
-  Rgb background;                     ///< radiance where no surface is
+  Rgb background;  ///< radiance where no surface is and no environment; lights nothing
+  std::optional<Environment> environment;
   std::vector<std::string> warnings;  ///< what was odd but could be drawn
   std::uint32_t triangles = 0;        ///< of all instances: the number of surface ids
   Bounds bounds;                      ///< of all instances; low == high == 0 when there is nothing

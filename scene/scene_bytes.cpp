@@ -46,12 +46,16 @@ template <typename Archive>
 void serialize(Archive& archive, Size& s) {
   archive(s.width, s.height);
 }
+template <typename Archive, typename Pixel>
+void serialize(Archive& archive, Image<Pixel>& image) {
+  Size size = image.size();
+  archive(size);
+  if (size != image.size()) image = Image<Pixel>(size);
+  archive(cereal::binary_data(image.pixels().data(), image.pixels().size_bytes()));
+}
 template <typename Archive>
 void serialize(Archive& archive, Texture& t) {
-  Size size = t.image.size();
-  archive(t.name, size, t.wrap_s, t.wrap_t, t.nearest);
-  if (size != t.image.size()) t.image = Image<Rgba8>(size);
-  archive(cereal::binary_data(t.image.pixels().data(), t.image.pixels().size_bytes()));
+  archive(t.name, t.wrap_s, t.wrap_t, t.nearest, t.image);
 }
 template <typename Archive>
 void serialize(Archive& archive, TextureRef& t) {
@@ -60,7 +64,9 @@ void serialize(Archive& archive, TextureRef& t) {
 template <typename Archive>
 void serialize(Archive& archive, Material& m) {
   archive(m.name, m.base_color, m.base_color_texture, m.metallic, m.roughness, m.metallic_roughness_texture, m.emissive,
-          m.emissive_texture, m.transmission, m.ior, m.alpha_mode, m.alpha_cutoff, m.double_sided);
+          m.emissive_texture, m.normal_texture, m.normal_scale, m.occlusion_texture, m.occlusion_strength,
+          m.transmission, m.transmission_texture, m.ior, m.thickness, m.attenuation_color, m.attenuation_distance,
+          m.alpha_mode, m.alpha_cutoff, m.double_sided, m.unlit);
 }
 template <typename Archive>
 void serialize(Archive& archive, Mesh& m) {
@@ -69,6 +75,8 @@ void serialize(Archive& archive, Mesh& m) {
   bulk(archive, m.normals);
   bulk(archive, m.uvs[0]);
   bulk(archive, m.uvs[1]);
+  bulk(archive, m.colors);
+  bulk(archive, m.tangents);
   bulk(archive, m.triangles);
 }
 template <typename Archive>
@@ -77,7 +85,12 @@ void serialize(Archive& archive, Instance& i) {
 }
 template <typename Archive>
 void serialize(Archive& archive, Light& l) {
-  archive(l.name, l.type, l.position, l.direction, l.intensity, l.range, l.inner_cone_radians, l.outer_cone_radians);
+  archive(l.name, l.type, l.position, l.direction, l.intensity, l.range, l.inner_cone_radians, l.outer_cone_radians,
+          l.radius, l.angular_radius_radians);
+}
+template <typename Archive>
+void serialize(Archive& archive, Environment& e) {
+  archive(e.image, e.rotation_radians, e.scale);
 }
 template <typename Archive>
 void serialize(Archive& archive, PerspectiveLens& l) {
@@ -97,8 +110,8 @@ void serialize(Archive& archive, Bounds& b) {
 }
 template <typename Archive>
 void serialize(Archive& archive, Scene& s) {
-  archive(s.name, s.meshes, s.materials, s.textures, s.instances, s.lights, s.cameras, s.background, s.warnings,
-          s.triangles, s.bounds);
+  archive(s.name, s.meshes, s.materials, s.textures, s.instances, s.lights, s.cameras, s.background, s.environment,
+          s.warnings, s.triangles, s.bounds);
 }
 
 namespace {

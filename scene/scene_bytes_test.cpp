@@ -19,6 +19,8 @@ Scene full_scene() {
   mesh.normals.assign(3, {0, 0, 1});
   mesh.uvs[0] = {{0, 0}, {1, 0}, {0, 1}};
   mesh.uvs[1] = {{0, 0}, {2, 0}, {0, 2}};
+  mesh.colors.assign(3, {0.1F, 0.2F, 0.3F, 0.4F});
+  mesh.tangents.assign(3, {1, 0, 0, -1});
   mesh.triangles = {{0, 1, 2}};
   mesh.material = 1;
   scene.meshes = {mesh, Mesh{}};
@@ -31,11 +33,20 @@ Scene full_scene() {
   material.metallic_roughness_texture.texture = 0;
   material.emissive = {1, 2, 3};
   material.emissive_texture.texture = 0;
+  material.normal_texture.texture = 0;
+  material.normal_scale = 0.6F;
+  material.occlusion_texture.texture = 0;
+  material.occlusion_strength = 0.7F;
   material.transmission = 0.5F;
+  material.transmission_texture.texture = 0;
   material.ior = 1.3F;
+  material.thickness = 0.2F;
+  material.attenuation_color = {0.5F, 0.6F, 0.7F};
+  material.attenuation_distance = 3.0F;
   material.alpha_mode = AlphaMode::Mask;
   material.alpha_cutoff = 0.4F;
   material.double_sided = true;
+  material.unlit = true;
   scene.materials = {Material{}, material};
   Texture texture{.name = "texture", .image = Image<Rgba8>({2, 3}, {1, 2, 3, 4})};
   texture.wrap_s = Wrap::ClampToEdge;
@@ -52,10 +63,13 @@ Scene full_scene() {
                         .intensity = {4, 5, 6},
                         .range = 7.0,
                         .inner_cone_radians = 0.1F,
-                        .outer_cone_radians = 0.2F}};
+                        .outer_cone_radians = 0.2F,
+                        .radius = 0.3,
+                        .angular_radius_radians = 0.4F}};
   scene.cameras = {Camera{.name = "a", .eye = {1, 2, 3}, .axes = glm::dmat3(1.0), .lens = PerspectiveLens{1.0, 0.1}},
                    Camera{.name = "b", .eye = {}, .axes = glm::dmat3(1.0), .lens = OrthographicLens{1, 2, 3, 4}}};
   scene.background = {0.1F, 0.2F, 0.3F};
+  scene.environment = Environment{Image<Rgb>({2, 1}, {1, 2, 3}), 0.5, 2.0};
   scene.warnings = {"odd"};
   finish_scene(scene);
   return scene;
@@ -76,6 +90,9 @@ TEST(SceneBytes, ComeBackAsTheSameScene) {
   EXPECT_EQ(copy.lights[0].type, LightType::Spot);
   EXPECT_EQ(std::get<PerspectiveLens>(copy.cameras[0].lens).near_distance, 0.1);
   EXPECT_EQ(std::get<OrthographicLens>(copy.cameras[1].lens).far_distance, 4.0);
+  ASSERT_TRUE(copy.environment.has_value());
+  EXPECT_EQ(copy.environment->image, scene.environment->image);
+  EXPECT_EQ(copy.lights[0].radius, 0.3);
   EXPECT_EQ(copy.warnings, scene.warnings);
 }
 
@@ -96,6 +113,8 @@ TEST(ContentHash, ChangesWithEveryField) {
       {"uv 0", [](Scene& s) { s.meshes[0].uvs[0][0].x = 0.5F; }},
       {"uv 1", [](Scene& s) { s.meshes[0].uvs[1][2].y = 0.5F; }},
       {"uv set moved", [](Scene& s) { std::swap(s.meshes[0].uvs[0], s.meshes[0].uvs[1]); }},
+      {"vertex color", [](Scene& s) { s.meshes[0].colors[1].a = 0.5F; }},
+      {"tangent", [](Scene& s) { s.meshes[0].tangents[2].w = 1.0F; }},
       {"triangle", [](Scene& s) { s.meshes[0].triangles[0].x = 2; }},
       {"mesh material", [](Scene& s) { s.meshes[0].material = 0; }},
       {"mesh removed", [](Scene& s) { s.meshes.pop_back(); }},
@@ -109,11 +128,20 @@ TEST(ContentHash, ChangesWithEveryField) {
       {"metallic-roughness texture", [](Scene& s) { s.materials[1].metallic_roughness_texture.texture = -1; }},
       {"emissive", [](Scene& s) { s.materials[1].emissive.y = 0.9F; }},
       {"emissive texture", [](Scene& s) { s.materials[1].emissive_texture.texture = -1; }},
+      {"normal texture", [](Scene& s) { s.materials[1].normal_texture.texture = -1; }},
+      {"normal scale", [](Scene& s) { s.materials[1].normal_scale = 0.9F; }},
+      {"occlusion texture", [](Scene& s) { s.materials[1].occlusion_texture.texture = -1; }},
+      {"occlusion strength", [](Scene& s) { s.materials[1].occlusion_strength = 0.9F; }},
       {"transmission", [](Scene& s) { s.materials[1].transmission = 0.9F; }},
+      {"transmission texture", [](Scene& s) { s.materials[1].transmission_texture.texture = -1; }},
+      {"thickness", [](Scene& s) { s.materials[1].thickness = 0.9F; }},
+      {"attenuation color", [](Scene& s) { s.materials[1].attenuation_color.b = 0.9F; }},
+      {"attenuation distance", [](Scene& s) { s.materials[1].attenuation_distance = 0.9F; }},
       {"ior", [](Scene& s) { s.materials[1].ior = 1.9F; }},
       {"alpha mode", [](Scene& s) { s.materials[1].alpha_mode = AlphaMode::Blend; }},
       {"alpha cutoff", [](Scene& s) { s.materials[1].alpha_cutoff = 0.9F; }},
       {"double sided", [](Scene& s) { s.materials[1].double_sided = false; }},
+      {"unlit", [](Scene& s) { s.materials[1].unlit = false; }},
       {"texture name", [](Scene& s) { s.textures[0].name += "x"; }},
       {"texel", [](Scene& s) { s.textures[0].image.at(1, 2).a = 5; }},
       {"texture shape",
@@ -134,6 +162,8 @@ TEST(ContentHash, ChangesWithEveryField) {
       {"light range", [](Scene& s) { s.lights[0].range = 1; }},
       {"inner cone", [](Scene& s) { s.lights[0].inner_cone_radians = 0; }},
       {"outer cone", [](Scene& s) { s.lights[0].outer_cone_radians = 1; }},
+      {"light radius", [](Scene& s) { s.lights[0].radius = 1; }},
+      {"light angular radius", [](Scene& s) { s.lights[0].angular_radius_radians = 1; }},
       {"camera name", [](Scene& s) { s.cameras[0].name += "x"; }},
       {"camera eye", [](Scene& s) { s.cameras[0].eye.x = 9; }},
       {"camera axes", [](Scene& s) { s.cameras[0].axes[1][2] = 9; }},
@@ -163,6 +193,14 @@ TEST(ContentHash, ChangesWithEveryField) {
        }},
       {"background r", [](Scene& s) { s.background.r = 1; }},
       {"background b", [](Scene& s) { s.background.b = 1; }},
+      {"no environment", [](Scene& s) { s.environment.reset(); }},
+      {"environment texel", [](Scene& s) { s.environment->image.at(1, 0).g = 5; }},
+      {"environment shape",
+       [](Scene& s) {
+         s.environment->image = Image<Rgb>({1, 2}, {1, 2, 3});
+       }},
+      {"environment rotation", [](Scene& s) { s.environment->rotation_radians = 0.6; }},
+      {"environment scale", [](Scene& s) { s.environment->scale = 1.0; }},
       {"warnings", [](Scene& s) { s.warnings.clear(); }},
       {"triangles", [](Scene& s) { s.triangles = 1; }},
       {"bounds low", [](Scene& s) { s.bounds.low.y = -1; }},

@@ -20,8 +20,8 @@ double near_plane(double wanted, const Bounds& bounds) {
 }  // namespace
 
 Ray view_ray(const View& view, double x, double y) {
-  const double px = view.left + (view.right - view.left) * ((view.block.x0 + x) / view.screen.width);
-  const double py = view.top - (view.top - view.bottom) * ((view.block.y0 + y) / view.screen.height);
+  const double px = view.left + (view.right - view.left) * ((view.block.x0 + x + view.jitter.x) / view.screen.width);
+  const double py = view.top - (view.top - view.bottom) * ((view.block.y0 + y + view.jitter.y) / view.screen.height);
   if (view.orthographic) return {view.eye + view.axes * glm::dvec3(px, py, 0.0), -view.axes[2]};
   return {view.eye, view.axes * glm::dvec3(px, py, -1.0)};
 }
@@ -29,10 +29,10 @@ Ray view_ray(const View& view, double x, double y) {
 glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin) {
   const double width = view.right - view.left;
   const double height = view.top - view.bottom;
-  const double l = view.left + width * view.block.x0 / view.screen.width;
-  const double r = view.left + width * view.block.x1 / view.screen.width;
-  const double t = view.top - height * view.block.y0 / view.screen.height;
-  const double b = view.top - height * view.block.y1 / view.screen.height;
+  const double l = view.left + width * (view.block.x0 + view.jitter.x) / view.screen.width;
+  const double r = view.left + width * (view.block.x1 + view.jitter.x) / view.screen.width;
+  const double t = view.top - height * (view.block.y0 + view.jitter.y) / view.screen.height;
+  const double b = view.top - height * (view.block.y1 + view.jitter.y) / view.screen.height;
 
   glm::dmat4 clip_from_eye(0.0);  // glm: [column][row]
   clip_from_eye[0][0] = 2.0 / (r - l);
@@ -59,6 +59,11 @@ glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin) {
 double reversed_depth(const View& view, double distance) {
   if (view.orthographic) return (view.far_distance - distance) / (view.far_distance - view.near_distance);
   return view.near_distance / distance;
+}
+
+double view_distance(const View& view, double depth) {
+  if (view.orthographic) return view.far_distance - depth * (view.far_distance - view.near_distance);
+  return view.near_distance / depth;
 }
 
 View make_view(const Camera& camera, Size size, const Bounds& bounds) {

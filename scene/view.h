@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -27,6 +29,9 @@ struct View {
   bool orthographic = false;
   Size screen;  ///< pixels of the whole screen
   Rect block;   ///< the part of it this view draws; pixel (x, y) of the view is pixel (block.x0 + x, block.y0 + y)
+  std::uint32_t screen_number = 0;  ///< which screen of the wall: its blocks have the same one, and so the same noise
+  /// Pixels from its centre, to the right and down, at which every pixel is looked through.
+  glm::dvec2 jitter{0.0};
 
   [[nodiscard]] Size size() const { return {block.width(), block.height()}; }
 };
@@ -36,15 +41,19 @@ struct Ray {
   glm::dvec3 direction{0.0};  ///< not normalised: one metre along the view axis (perspective)
 };
 
-/// The ray through (x, y) of the view, in pixels from its upper left corner: pixel centres are at + 0.5.
+/// The ray through (x, y) of the view, in pixels from its upper left corner: pixel centres are at + 0.5. The jitter is
+/// added to the place, so asked for a centre, it is the ray of that pixel's sample.
 [[nodiscard]] Ray view_ray(const View& view, double x, double y);
 
 /// World relative to `origin` -> clip space, for a depth range of [0, 1] reversed: near is 1, infinity (or the
-/// orthographic far plane) is 0. y points up, as GL has it. Multiply with model matrices in double before rounding.
+/// orthographic far plane) is 0. y points up, as GL has it; pixel centres show what
+/// lies at the jittered places. Multiply with model matrices in double before rounding.
 [[nodiscard]] glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin);
 
 /// The depth a point at `distance` metres along the view axis has in keys.
 [[nodiscard]] double reversed_depth(const View& view, double distance);
+/// The distance that has this depth; infinite for a depth of 0 in perspective.
+[[nodiscard]] double view_distance(const View& view, double depth);
 
 /// A camera's view on a screen of `size` pixels. The vertical angle is kept, the horizontal one follows from the
 /// aspect; an orthographic camera keeps its half height. near_distance is the camera's, or 1e-4 of the scene's extent.

@@ -66,6 +66,15 @@ TEST(View, DepthIsReversed) {
   EXPECT_EQ(reversed_depth(box, box.far_distance), 0.0);
 }
 
+TEST(View, DepthsTellTheDistance) {
+  for (const bool orthographic : {false, true}) {
+    const View view = turned_view(orthographic);
+    for (const double distance : {0.5, 1.0, 39.0}) {
+      EXPECT_NEAR(view_distance(view, reversed_depth(view, distance)), distance, 1e-13 * 40.0);
+    }
+  }
+}
+
 TEST(View, RowZeroIsTheTop) {
   const View view = make_view(look_at({0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 0.5 * std::numbers::pi), {200, 100}, {});
   const glm::dvec3 upper_left = view_ray(view, 0, 0).direction;
@@ -90,6 +99,33 @@ TEST(View, BlocksAreThePixelsOfTheWholeAndTheirRaysAreTheSameBits) {
       }
     }
     for (const int count : covered.pixels()) ASSERT_EQ(count, 1);
+  }
+}
+
+TEST(View, AJitteredViewLooksThroughOtherPlacesOfTheSamePixels) {
+  for (const bool orthographic : {false, true}) {
+    const View plain = turned_view(orthographic);
+    View jittered = plain;
+    jittered.jitter = {0.3125, -0.4375};  // to the right and up, exact in binary
+    const Ray ray = view_ray(jittered, 20.5, 30.5);
+    const Ray same = view_ray(plain, 20.8125, 30.0625);
+    EXPECT_TRUE(ray.origin == same.origin && ray.direction == same.direction);
+    for (const View& view : split_into_blocks(jittered, 128)) {
+      const Ray seen = view_ray(view, 20.5, 30.5);
+      const glm::dvec3 place = project(view, seen.origin + 2.0 * seen.direction, {100, -50, 3});
+      EXPECT_NEAR(place.x, 20.5, 1e-9);
+      EXPECT_NEAR(place.y, 30.5, 1e-9);
+    }
+  }
+}
+
+TEST(View, BlocksKeepTheirScreensNumberAndJitter) {
+  View view = turned_view(false);
+  view.screen_number = 7;
+  view.jitter = {0.25, 0.125};
+  for (const View& block : split_into_blocks(view, 64)) {
+    EXPECT_EQ(block.screen_number, 7U);
+    EXPECT_EQ(block.jitter, view.jitter);
   }
 }
 

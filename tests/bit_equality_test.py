@@ -3,9 +3,10 @@
 
 usage: bit_equality_test.py HPR [--full]
 
-Renders gen:gallery and compares the hashes of the visibility keys (--raw) and of the EXR file's bytes. Without --full, so
-few small pictures that every two values of different options meet in one of them, and the first once more; with it,
-every combination at 1280x1024. Prints the hashes, the number of runs and what differs, and leaves with 1 if anything does.
+Renders gen:gallery, its visible surfaces found by OpenGL, by rays, and with every pass and four samples, and compares the hashes of the visibility
+keys (--raw) and of the EXR file's bytes. Without --full, so few small pictures that every two values of different options
+meet in one of them, and the first once more; with it, every combination at 1280x1024. Prints the hashes, the number of
+runs and what differs, and leaves with 1 if anything does.
 """
 
 import hashlib
@@ -20,7 +21,13 @@ import tempfile
 HPR = os.path.abspath(sys.argv[1])
 FULL = sys.argv[2:] == ["--full"]
 SCENE = "gen:gallery"
-SIZE = (1280, 1024) if FULL else (320, 256)
+SIZE = (1280, 1024) if FULL else (256, 192)
+FEW = ["--photons", "5000"]
+WAYS = {
+    "raster": FEW,
+    "rays": ["--primary", "rays", *FEW],
+    "all passes": ["--passes", "shadow,reflection,refraction,ambient-occlusion,photon", "--spp", "4", *FEW],
+}
 
 
 def hpr(arguments, folder):
@@ -66,12 +73,12 @@ def covering(runs):
     return [*chosen, runs[0]]
 
 
-def digests(run, folder):
+def digests(way, run, folder):
     """The hashes of one run's keys and picture, or what went wrong."""
     ranks, distribution, strategy, threads, backend = run
     result = hpr(["render", SCENE, "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", distribution,
-                  "--strategy", strategy, "--threads", threads, "--backend", backend, "--raw", "a.keys", "-o", "a.exr",
-                  "--force"], folder)
+                  "--strategy", strategy, "--threads", threads, "--backend", backend, *WAYS[way], "--raw", "a.keys",
+                  "-o", "a.exr", "--force"], folder)
     if result.returncode != 0:
         return f"left with {result.returncode}: {result.stderr[-2000:]}"
     keys = (folder / "a.keys").read_bytes()
@@ -81,21 +88,31 @@ def digests(run, folder):
     return tuple(hashlib.sha256(data).hexdigest()[:16] for data in (keys, picture))
 
 
+def differing(way, runs, folder):
+    """How many runs differ from the first."""
+    expected = digests(way, runs[0], folder)
+    print(f"{way} {' '.join(runs[0])}: {expected}")
+    bad = int(isinstance(expected, str))
+    for run in runs[1:]:
+        found = digests(way, run, folder)
+        if found != expected:
+            print(f"{way} {' '.join(run)}: {found}")
+            bad += 1
+    print(f"{way}: {len(runs)} runs, {bad} differ from the first")
+    return bad
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-bits-") as scratch:
         folder = pathlib.Path(scratch)
-        runs = list(itertools.product(("1", "2", "3", "4", "7"), choices_of("--distribute", folder),
-                                      choices_of("--strategy", folder), ("1", "2"), usable_backends(folder)))
-        runs = runs if FULL else covering(runs)
-        expected = digests(runs[0], folder)
-        print(f"{' '.join(runs[0])}: {expected}")
-        bad = int(isinstance(expected, str))
-        for run in runs[1:]:
-            found = digests(run, folder)
-            if found != expected:
-                print(f"{' '.join(run)}: {found}")
-                bad += 1
-    print(f"{len(runs)} runs, {bad} differ from the first")
+        ranks, threads = ("1", "2", "3", "4", "7"), ("1", "2")
+        distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
+        drawn = list(itertools.product(ranks, distributions, choices_of("--strategy", folder), threads, backends))
+        traced = list(itertools.product(ranks, distributions, ("auto",), threads, backends[:1]))
+        lit = list(itertools.product(ranks, distributions if FULL else ("sort-first", "sort-last"), ("auto",), threads,
+                                     backends[:1]))
+        bad = sum(differing(way, runs if FULL else covering(runs), folder)
+                  for way, runs in (("raster", drawn), ("rays", traced), ("all passes", lit)))
     return 1 if bad else 0
 
 

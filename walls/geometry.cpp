@@ -131,6 +131,7 @@ std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bound
   views.reserve(wall.screens.size());
   for (const WallScreen& screen : wall.screens) {
     views.push_back(screen_view(shared, screen, placement, wall.clamp_distance_m));
+    views.back().screen_number = static_cast<std::uint32_t>(views.size() - 1);
   }
   return views;
 }

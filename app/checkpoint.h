@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/film.h"
+#include "app/samples.h"
+
+namespace hpr {
+
+/// Names and values of everything that decides the bits of a picture, but for the number of samples. How the work is
+/// spread over ranks and threads is not among them.
+using RunIdentity = std::vector<std::pair<std::string, std::string>>;
+
+/// Where a run's sums go when it is stopped, and what it is.
+struct CheckpointSettings {
+  std::filesystem::path path;  ///< empty: none is written
+  bool resume = false;         ///< begin with what stands there
+  RunIdentity identity;
+};
+
+/// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the
+/// counters, every layer's active tiles, and the XXH64 of all that.
+[[nodiscard]] std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film,
+                                                       const SampleProgress& progress);
+
+/// Fills `film`, a new one of the same layout and content. `name` stands in errors. Throws Error (BadInput) when
+/// `bytes` are no checkpoint, damaged, of another version, or of a run with another identity: then the error names what
+/// differs. Nothing of damaged bytes but the header is looked at.
+[[nodiscard]] SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name,
+                                               const RunIdentity& identity, Film& film);
+
+}  // namespace hpr

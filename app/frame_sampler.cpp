@@ -1,0 +1,132 @@
+#include "app/frame_sampler.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "app/signals.h"
+#include "cluster/collectives.h"
+#include "cluster/scene_distribution.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/stopwatch.h"
+
+namespace hpr {
+namespace {
+
+/// What ranks tell each other between samples.
+struct Word {
+  Request request = Request::None;
+  double seconds = 0.0;  ///< rank 0's clock is everybody's
+};
+
+Word agree(Communicator& comm, const Word& mine) {
+  const std::vector<Word> all = all_gather_value(comm, mine);
+  Word agreed = all.front();
+  for (const Word& each : all) agreed.request = std::max(agreed.request, each.request);
+  return agreed;
+}
+
+std::string describe(const SampleGoal& goal, const SampleProgress& so_far) {
+  std::string text = fmt::format("{:.1f} s", so_far.seconds);
+  if (so_far.relmse) text += fmt::format(", relMSE about {:.2g}", *so_far.relmse);
+  if (const auto left = seconds_left(goal, so_far)) text += fmt::format(", {:.0f} s left", *left);
+  return text;
+}
+
+}  // namespace
+
+FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame,
+                           bool keeps_keys)
+    : session_(session),
+      plan_(plan),
+      sampling_(sampling),
+      number_(frame),
+      film_(plan.layout, {plan.aovs, keeps_keys}),
+      keeps_keys_(keeps_keys) {}
+
+void FrameSampler::load(const CheckpointSettings& checkpoint) {
+  struct Start {
+    Film::Counters counters;
+    double seconds = 0.0;
+    double relmse = -1.0;
+  };
+  Start start;
+  check_on_root(session_.comm(), [&] {
+    const auto bytes = read_file(checkpoint.path, std::numeric_limits<std::uint64_t>::max());
+    const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity, film_);
+    start = {film_.counters(), found.seconds, found.relmse.value_or(-1.0)};
+  });
+  start = all_gather_value(session_.comm(), start).front();
+  film_.set_counters(start.counters);
+  so_far_ = {start.counters.samples, start.seconds, {}};
+  if (start.relmse >= 0.0) so_far_.relmse = start.relmse;
+  scattered_ = false;
+  if (session_.rank() == 0) log::info("going on after {} samples", so_far_.samples);
+}
+
+void FrameSampler::write(const CheckpointSettings& checkpoint) {
+  const std::vector<int> to_root(plan_.layout.screens(), 0);
+  film_.each_layer([&](auto& layer) {
+    if (layer.tiles() > 0) session_.assembler().assemble(session_.comm(), layer, homes_->mine(), to_root);
+  });
+  agree_on_failure(session_.comm(), [&] {
+    if (session_.rank() != 0) return;
+    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity, film_, so_far_));
+    log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
+  });
+}
+
+void FrameSampler::add_sample(std::span<const View> views) {
+  const FilterSample look = look_through(sampling_, {plan_.rays.seed, number_}, film_.samples());
+  std::vector<View> jittered(views.begin(), views.end());
+  for (View& view : jittered) view.jitter = look.offset;
+  FrameTimes taken;
+  const Frame frame = make_frame(session_, plan_, jittered, &taken, {{number_, film_.samples()}, &homes_});
+  if (!scattered_) {
+    film_.each_layer([&](auto& layer) {
+      if (layer.tiles() > 0) homes_->scatter(session_.comm(), layer);
+    });
+    scattered_ = true;
+  }
+  film_.add({frame.radiance, frame.aovs, *frame.keys}, look.weight, homes_->mine(), session_.threads());
+  times_ += taken;
+  frame_.keys = frame.keys;
+}
+
+bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
+  if (checkpoint.resume) load(checkpoint);
+  const double before = so_far_.seconds;
+  const Stopwatch watch;
+  while (!reached(sampling_, so_far_)) {
+    add_sample(views);
+    const Word word = agree(session_.comm(), {take_request(), before + 1e-3 * watch.ms()});
+    so_far_.samples = film_.samples();
+    so_far_.seconds = word.seconds;
+    if (is_milestone(so_far_.samples) && so_far_.samples > 1) {
+      so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
+    }
+    progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
+    if (word.request == Request::None || checkpoint.path.empty() || reached(sampling_, so_far_)) continue;
+    write(checkpoint);
+    if (word.request == Request::Stop) return false;
+  }
+  finish();
+  return true;
+}
+
+void FrameSampler::finish() {
+  if (!homes_) {  // a checkpoint that had reached the goal: rank 0 has it all
+    const std::vector<std::size_t> all = session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
+    homes_.emplace(session_.comm(), plan_.layout, all);
+  }
+  frame_.owned = homes_->mine();
+  frame_.radiance = TileLayer<Rgb>(plan_.layout);
+  frame_.aovs = AovLayers(plan_.layout, plan_.aovs);
+  film_.resolve(frame_.owned, session_.threads(), frame_.radiance, frame_.aovs);
+  if (keeps_keys_) frame_.keys = &film_.keys();
+}
+
+}  // namespace hpr

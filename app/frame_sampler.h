@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "app/checkpoint.h"
+#include "app/film.h"
+#include "app/frame.h"
+#include "app/progress.h"
+#include "app/samples.h"
+
+namespace hpr {
+
+/// Makes one frame of many: draws samples, each a frame seen through its own place of the pixels, until the goal is
+/// reached, and takes their mean.
+class FrameSampler {
+ public:
+  /// `frame`: its number, by which its noise differs from other frames'. `keeps_keys`: frame().keys are those of the
+  /// first sample; else they are the last one's.
+  FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame, bool keeps_keys);
+
+  /// Collective. views[i] is screen i of the plan's layout. Between samples all ranks ask each other for signals (see
+  /// Request). False when it stopped before its goal: then a checkpoint was written. Throws Error as decode_checkpoint
+  /// does, and Io.
+  [[nodiscard]] bool draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress);
+
+  /// After draw() returned true: the means. Valid as long as this.
+  [[nodiscard]] Frame& frame() { return frame_; }
+  /// Summed over the samples this run drew.
+  [[nodiscard]] const FrameTimes& times() const { return times_; }
+  [[nodiscard]] const SampleProgress& reached_so_far() const { return so_far_; }
+
+ private:
+  void load(const CheckpointSettings& checkpoint);
+  void write(const CheckpointSettings& checkpoint);
+  void add_sample(std::span<const View> views);
+  void finish();
+
+  Session& session_;
+  const FramePlan& plan_;
+  Sampling sampling_;
+  std::uint64_t number_;
+  Film film_;
+  bool keeps_keys_;
+  bool scattered_ = true;  ///< false: rank 0 alone has the sums of a checkpoint
+  std::optional<TileHomes> homes_;
+  SampleProgress so_far_;
+  Frame frame_;
+  FrameTimes times_;
+};
+
+}  // namespace hpr

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/frame.h"
+#include "app/output.h"
+
+namespace hpr {
+
+/// The files one picture may become; empty names are not written.
+struct PictureFiles {
+  std::string picture;    ///< .png or .exr
+  std::string raw;        ///< keys
+  double exposure = 0.0;  ///< stops, of a .png
+  std::vector<Aov> aovs;
+
+  [[nodiscard]] bool is_png() const { return picture.ends_with(".png"); }
+  /// Where AOVs go: into the .exr, or FILE.aov.exr beside a .png. Empty when there are none.
+  [[nodiscard]] std::string aov_file() const;
+};
+
+/// A frame of one screen on its way to its files.
+class CollectedPicture {
+ public:
+  /// Collective. Brings what the files need of `frame` to rank 0. `blocks` are the screen's; both must outlive this.
+  CollectedPicture(Session& session, Frame& frame, const Blocks& blocks, PictureFiles files);
+
+  /// On rank 0. Throws Error (Io).
+  void write(const std::string& scene_name) const;
+
+ private:
+  [[nodiscard]] std::vector<ExrLayer> exr_layers() const;
+
+  const Frame& frame_;
+  const Blocks& blocks_;
+  PictureFiles files_;
+  TileLayer<Rgba8> display_;  ///< where a .png is wanted
+};
+
+}  // namespace hpr

@@ -1,0 +1,124 @@
+#include <benchmark/benchmark.h>
+
+#include <cstring>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "rt/photon_map.h"
+
+// A million photons on the walls of a room: sorting them into a map, and gathering about 50 at a place. The floor of a
+// build is to move each photon once to where it belongs, a scattered copy; that of a gather is to read and sum fifty
+// photons that lie side by side somewhere.
+namespace {
+
+constexpr std::size_t kPhotons = 1'000'000;
+constexpr double kGathered = 50.0;
+
+struct Place {
+  glm::dvec3 position;
+  glm::dvec3 normal;
+};
+
+/// On the faces of the cube [-1, 1]^3, from inside.
+Place random_place(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> side(-1.0, 1.0);
+  const auto axis = static_cast<int>(random() % 3);
+  Place place{{side(random), side(random), side(random)}, glm::dvec3(0.0)};
+  place.position[axis] = random() % 2 == 0 ? -1.0 : 1.0;
+  place.normal[axis] = -place.position[axis];
+  return place;
+}
+
+std::vector<hpr::Photon> photons_of_a_room() {
+  std::mt19937_64 random(1);
+  std::vector<hpr::Photon> photons(kPhotons);
+  for (hpr::Photon& photon : photons) {
+    const Place place = random_place(random);
+    for (int axis = 0; axis < 3; ++axis)
+      photon.position[static_cast<std::size_t>(axis)] = static_cast<float>(place.position[axis]);
+    photon.normal = hpr::pack_direction(place.normal);
+    photon.direction = hpr::pack_direction(place.normal - 0.5 * place.position);
+    photon.flux = {1e-6F, 2e-6F, 3e-6F};
+  }
+  return photons;
+}
+
+hpr::RaySpace room_space() {
+  return hpr::RaySpace(hpr::Bounds{glm::dvec3(-1.0), glm::dvec3(1.0)});
+}
+
+double room_radius() {
+  return std::sqrt(kGathered * 24.0 / (std::numbers::pi * static_cast<double>(kPhotons)));
+}
+
+void photon_build(benchmark::State& state) {
+  const std::vector<hpr::Photon> photons = photons_of_a_room();
+  for (auto _ : state) {
+    const hpr::PhotonMap map(photons, room_space(), room_radius());
+    benchmark::DoNotOptimize(map.size());
+  }
+}
+BENCHMARK(photon_build)->Unit(benchmark::kMillisecond);
+
+/// Every photon to a random place of its own.
+void photon_scattered_copy(benchmark::State& state) {
+  const std::vector<hpr::Photon> photons = photons_of_a_room();
+  std::vector<std::uint32_t> to(kPhotons);
+  std::iota(to.begin(), to.end(), 0U);
+  std::shuffle(to.begin(), to.end(), std::mt19937_64(2));
+  for (auto _ : state) {
+    const auto copy = std::make_unique_for_overwrite<hpr::Photon[]>(kPhotons);
+    for (std::size_t i = 0; i < kPhotons; ++i) copy[to[i]] = photons[i];
+    benchmark::DoNotOptimize(copy.get());
+  }
+}
+BENCHMARK(photon_scattered_copy)->Unit(benchmark::kMillisecond);
+
+void photon_gather(benchmark::State& state) {
+  const hpr::PhotonMap map(photons_of_a_room(), room_space(), room_radius());
+  std::mt19937_64 random(3);
+  std::vector<Place> places(1 << 16);
+  for (Place& place : places) place = random_place(random);
+  if (state.range(0) != 0) {
+    // As neighbouring pixels come: a walk over one wall.
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto row = static_cast<double>(i / 256);
+      const auto column = static_cast<double>(i % 256);
+      places[i] = {{column / 128.0 - 1.0, -1.0, row / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
+    }
+  }
+  std::size_t gathered = 0;
+  for (const Place& place : places) gathered += map.count(place.position, place.normal, hpr::PhotonSide::Front);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const Place& place = places[i++ % places.size()];
+    benchmark::DoNotOptimize(
+        map.gather(place.position, place.normal, hpr::PhotonSide::Front,
+                   [&](const glm::dvec3& from) { return glm::dvec3(glm::dot(from, place.normal)); }));
+  }
+  state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(places.size());
+}
+BENCHMARK(photon_gather)->ArgName("neighbours")->Arg(0)->Arg(1);
+
+void photon_sum_side_by_side(benchmark::State& state) {
+  const std::vector<hpr::Photon> photons = photons_of_a_room();
+  std::mt19937_64 random(4);
+  std::vector<std::size_t> firsts(1 << 16);
+  for (std::size_t& first : firsts) first = random() % (kPhotons - 50);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    glm::dvec3 sum(0.0);
+    const std::span<const hpr::Photon> fifty = std::span(photons).subspan(firsts[i++ % firsts.size()], 50);
+    for (const hpr::Photon& photon : fifty) {
+      const glm::dvec3 from = hpr::unpack_direction(photon.direction);
+      sum += from.x * glm::dvec3(photon.flux[0], photon.flux[1], photon.flux[2]);
+    }
+    benchmark::DoNotOptimize(sum);
+  }
+}
+BENCHMARK(photon_sum_side_by_side);
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <span>
+#include <string_view>
+
+namespace hpr {
+
+/// How the samples of a pixel and its surroundings make up the pixel. Separable; widths in pixels.
+enum class PixelFilter : std::uint8_t {
+  Box,       ///< radius 0.5: the mean over the pixel
+  Triangle,  ///< radius 1
+  Gaussian,  ///< exp(-2 x^2), standard deviation 0.5, cut at radius 1.5
+  BSpline,   ///< cubic B-spline, radius 2, variance 1/3
+  Mitchell,  ///< B = C = 1/3, radius 2 (Mitchell and Netravali, "Reconstruction Filters in Computer Graphics", 1988)
+};
+
+[[nodiscard]] std::string_view name_of(PixelFilter filter);
+[[nodiscard]] std::span<const PixelFilter> all_pixel_filters();
+/// Throws Error (Usage) with the choices and the nearest one.
+[[nodiscard]] PixelFilter parse_pixel_filter(std::string_view name);
+
+/// A place to look through, and what the radiance seen there counts.
+struct FilterSample {
+  glm::dvec2 offset{0.0};  ///< pixels from the centre
+  double weight = 1.0;     ///< 1, or -1 where the filter is negative
+};
+
+/// Importance sampling of a filter (Ernst, Stamminger, Greiner, "Filter Importance Sampling", 2006): offsets have the
+/// density |f|, so that a pixel is the sum of weight times radiance over the sum of weights, and no sample belongs to
+/// two pixels. `u` in [0, 1)^2; monotone in each of its components.
+[[nodiscard]] FilterSample sample_filter(PixelFilter filter, const glm::dvec2& u);
+
+/// How many samples of a (0, 2)-sequence a filter needs for the sum of weights to be positive, and to stay so. 1 where
+/// no weight is negative. Mitchell's negative lobes hold 1.64 % of |f| on each side, which is less than a sixteenth:
+/// of 16 such samples at most one per side and axis, 4 in all, count -1.
+[[nodiscard]] int least_samples(PixelFilter filter);
+
+}  // namespace hpr

@@ -1,0 +1,126 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "rt/lighter.h"
+#include "rt/ray_walk.h"
+#include "rt/test_scene.h"
+
+// Surfaces of partial coverage: alpha MASK and BLEND.
+namespace hpr {
+namespace {
+
+using test::add_material;
+using test::add_mesh;
+using test::place;
+using test::quad;
+
+Material veil(float alpha, float radiance) {
+  Material material = test::glowing(glm::vec3(radiance));
+  material.alpha_mode = AlphaMode::Blend;
+  material.base_color.a = alpha;
+  return material;
+}
+
+void add_wall(Scene& scene, float z, const Material& material) {
+  const std::uint32_t index = add_material(scene, material);
+  place(scene, add_mesh(scene, quad({-500, -500, z}, {1000, 0, 0}, {0, 1000, 0}, index)));
+}
+
+/// Keys of the opaque surfaces alone, as the raster makes them.
+TileLayer<Key> opaque_keys(const Scene& scene, const View& view) {
+  Scene opaque = scene;
+  for (Instance& instance : opaque.instances) {
+    if (scene.materials[scene.mesh_of(instance).material].alpha_mode != AlphaMode::Opaque)
+      instance.to_world = glm::dmat4(0.0);
+  }
+  return test::cast_keys(opaque, std::span(&view, 1));
+}
+
+Rgb seen(const Scene& scene, const RaySettings& settings = {}) {
+  const View view = test::view_from({0, 0, 5}, {0, 0, 0}, {1, 1}, scene, 1e-4);
+  const TileLayer<Key> keys = opaque_keys(scene, view);
+  TileLayer<Rgb> color(keys.layout());
+  Lighter lighter(scene, settings);
+  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color});
+  return color.at(0, 0, 0);
+}
+
+TEST(Coverage, VeilsAreMixedByTheirAlphaNearestFirst) {
+  Scene scene;
+  add_wall(scene, -5, test::glowing(glm::vec3(8.0F)));
+  add_wall(scene, 0, veil(0.25F, 2.0F));
+  add_wall(scene, 1, veil(0.5F, 4.0F));
+  finish_scene(scene);
+  EXPECT_NEAR(seen(scene).g, 0.5 * 4.0 + 0.5 * (0.25 * 2.0 + 0.75 * 8.0), 1e-5);
+}
+
+TEST(Coverage, AVeilBeforeNothingLetsTheBackgroundThrough) {
+  Scene scene;
+  add_wall(scene, 0, veil(0.25F, 2.0F));
+  scene.background = {1.0F, 3.0F, 5.0F};
+  finish_scene(scene);
+  EXPECT_NEAR(seen(scene).g, 0.25 * 2.0 + 0.75 * 3.0, 1e-5);
+}
+
+TEST(Coverage, AVeilBehindAnOpaqueWallIsNotSeen) {
+  Scene scene;
+  add_wall(scene, 0, test::glowing(glm::vec3(8.0F)));
+  add_wall(scene, -1, veil(0.5F, 2.0F));
+  finish_scene(scene);
+  EXPECT_EQ(seen(scene).g, 8.0F);
+}
+
+TEST(Coverage, AMaskCoversAllOrNothingAtItsCutoff) {
+  for (const float alpha : {0.49F, 0.5F, 0.51F}) {
+    Scene scene;
+    add_wall(scene, -5, test::glowing(glm::vec3(8.0F)));
+    Material mask = veil(alpha, 2.0F);
+    mask.alpha_mode = AlphaMode::Mask;
+    add_wall(scene, 0, mask);
+    finish_scene(scene);
+    EXPECT_EQ(seen(scene).g, alpha < 0.5F ? 8.0F : 2.0F) << alpha;
+  }
+}
+
+TEST(Coverage, AVeilCastsAShadowOfItsAlpha) {
+  Scene scene;
+  add_wall(scene, -5, test::matte());
+  Material dark = veil(0.75F, 0.0F);
+  const std::uint32_t index = add_material(scene, dark);
+  place(scene, add_mesh(scene, quad({1, -50, -50}, {0, 0, 100}, {0, 100, 0}, index)));
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = glm::normalize(glm::vec3(-1.0F, 0.0F, -1.0F));
+  scene.lights = {sun};
+  finish_scene(scene);
+  const double full = std::cos(std::numbers::pi / 4.0) / std::numbers::pi;
+  EXPECT_NEAR(seen(scene).g, 0.25 * full, 1e-4);
+  EXPECT_NEAR(seen(scene, {.passes = {"reflection"}}).g, full, 1e-4);
+}
+
+TEST(Coverage, AMirrorShowsAVeilByItsAlphaInTheMean) {
+  Scene scene;
+  add_wall(scene, 0, test::mirror(1.0F));
+  add_wall(scene, 20, test::glowing(glm::vec3(8.0F)));
+  add_wall(scene, 10, veil(0.25F, 2.0F));
+  finish_scene(scene);
+  const View view = test::view_from({0, 0, 5}, {0, 0, 0}, {1, 1}, scene, 1e-4);
+  // cast_keys meets the mirror first: the veil is behind the eye.
+  EXPECT_NEAR(test::mean_pixel(scene, view, 0, 0, 1024).g, 0.25 * 2.0 + 0.75 * 8.0, 0.02);
+}
+
+TEST(Coverage, SurfacesAreSortedByWhetherTheyCover) {
+  Scene scene;
+  add_wall(scene, 0, test::matte());
+  add_wall(scene, 1, test::matte());
+  add_wall(scene, 2, veil(0.5F, 1.0F));
+  add_wall(scene, 3, test::matte());
+  finish_scene(scene);
+  EXPECT_EQ(covering_surfaces(scene, false), (std::vector<SurfaceRange>{{0, 4}, {6, 8}}));
+  EXPECT_EQ(covering_surfaces(scene, true), (std::vector<SurfaceRange>{{4, 6}}));
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,106 @@
+#include "rt/first_points.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <limits>
+
+namespace hpr {
+namespace {
+
+PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, const SurfacePoint& surface,
+                      double share) {
+  PathPoint point;
+  point.surface = surface;
+  point.throughput = glm::dvec3(share);
+  const View& view = *tile.view;
+  point.sampler = Sampler(pixel_stream({tile.settings.seed, job.number.frame}, view.screen_number,
+                                       view.block.x0 + job.place.x0 + x, view.block.y0 + job.place.y0 + y),
+                          job.number.sample);
+  point.pixel = static_cast<std::uint32_t>(y * kTileSide + x);
+  finish_point(tile, point);
+  return point;
+}
+
+/// See find_first_points.
+class FirstPoints {
+ public:
+  FirstPoints(TileWork& tile, const TileJob& job, std::vector<PathPoint>& points)
+      : tile_(tile), job_(job), points_(points) {}
+
+  void find() {
+    if (tile_.rays != nullptr && tile_.rays->has_holes()) look_through_holes();
+    WorldTriangle triangle;
+    for (int y = 0; y < job_.place.height(); ++y) {
+      for (int x = 0; x < job_.place.width(); ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+        const double share = left_.empty() ? 1.0 : left_[pixel];
+        if (share < kLeastThroughput) continue;
+        const Ray ray = ray_of(x, y);
+        if (job_.keys[pixel] == kNoKey) {
+          tile_.add(static_cast<std::uint32_t>(pixel), Component::Direct,
+                    share * tile_.lights.environment(glm::normalize(ray.direction)));
+          continue;
+        }
+        tile_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
+        points_.push_back(
+            first_point(tile_, job_, x, y, tile_.surfaces.meet(triangle, ray.origin, ray.direction), share));
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] Ray ray_of(int x, int y) const {
+    return view_ray(*tile_.view, job_.place.x0 + x + 0.5, job_.place.y0 + y + 0.5);
+  }
+
+  /// Rays go from the near plane to the surface the key names: what they meet covers a share of what lies behind.
+  void look_through_holes() {
+    left_.assign(kTilePixels, 1.0);
+    tile_.requests.clear();
+    WorldTriangle triangle;
+    for (int y = 0; y < job_.place.height(); ++y) {
+      for (int x = 0; x < job_.place.width(); ++x) {
+        const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
+        const Ray ray = ray_of(x, y);
+        RayRequest request;
+        request.origin = ray.origin + ray.direction * tile_.view->near_distance;
+        request.direction = glm::normalize(ray.direction);
+        request.reach = std::numeric_limits<double>::infinity();
+        if (job_.keys[pixel] != kNoKey) {
+          tile_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
+          const SurfacePoint behind = tile_.surfaces.meet(triangle, ray.origin, ray.direction);
+          request.reach = std::max(0.0, glm::dot(behind.position - request.origin, request.direction));
+        }
+        request.owner = pixel;
+        tile_.requests.push_back(request);
+        tile_.charge_ray(pixel);
+      }
+    }
+    tile_.counts.primary += tile_.requests.size();
+    std::vector<RayRequest> rays = std::move(tile_.requests);
+    tile_.rays->visit_holed(rays, tile_.scratch, [&](std::size_t i, const SurfacePoint& surface, double coverage) {
+      const std::uint32_t pixel = rays[i].owner;
+      const double share = left_[pixel] * coverage;
+      if (share >= kLeastThroughput) {
+        points_.push_back(first_point(tile_, job_, static_cast<int>(pixel) % kTileSide,
+                                      static_cast<int>(pixel) / kTileSide, surface, share));
+      }
+      left_[pixel] *= 1.0 - coverage;
+      return left_[pixel] >= kLeastThroughput;
+    });
+    tile_.requests = std::move(rays);
+  }
+
+  TileWork& tile_;
+  const TileJob& job_;
+  std::vector<PathPoint>& points_;
+  std::vector<double> left_;  ///< per pixel: the share not yet covered; empty where nothing covers in part
+};
+
+}  // namespace
+
+void find_first_points(TileWork& tile, const TileJob& job, std::vector<PathPoint>& points) {
+  FirstPoints(tile, job, points).find();
+}
+
+}  // namespace hpr

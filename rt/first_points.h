@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "image/key.h"
+#include "rt/pass.h"
+
+namespace hpr {
+
+/// A tile, where it lies and what it becomes.
+struct TileJob {
+  Rect place;
+  SampleNumber number;
+  std::span<const Key> keys;
+};
+
+/// The first generation of points: the surfaces the keys of a tile name, and those of partial coverage before them,
+/// each with the share of the pixel it covers. Adds the background where neither is.
+void find_first_points(TileWork& tile, const TileJob& job, std::vector<PathPoint>& points);
+
+}  // namespace hpr

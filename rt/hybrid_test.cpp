@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "rt/lighter.h"
+#include "rt/test_scene.h"
+
+// All passes together, held to the reference: light is neither lost between them nor counted twice.
+namespace hpr {
+namespace {
+
+using test::add_material;
+using test::add_mesh;
+using test::place;
+using test::quad;
+
+/// A closed room of coloured walls under a lamp, with something in the middle.
+Scene room(const Material& thing, bool is_sheet) {
+  Scene scene;
+  const std::uint32_t white = add_material(scene, test::matte(glm::vec3(0.7F)));
+  const std::uint32_t red = add_material(scene, test::matte({0.6F, 0.1F, 0.1F}));
+  const std::uint32_t green = add_material(scene, test::matte({0.1F, 0.5F, 0.1F}));
+  Material glow = test::matte(glm::vec3(0.7F));
+  glow.emissive = glm::vec3(12.0F, 10.0F, 8.0F);
+  const std::uint32_t lamp = add_material(scene, glow);
+  const std::uint32_t special = add_material(scene, thing);
+  const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b, std::uint32_t material) {
+    place(scene, add_mesh(scene, quad(corner, a, b, material)));
+  };
+  side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white);
+  side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0}, white);
+  side({-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, red);
+  side({1, -1, -1}, {0, 0, 2}, {0, 2, 0}, green);
+  side({-1, -1, -1}, {0, 0, 2}, {2, 0, 0}, white);
+  side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, white);
+  side({-0.4F, 0.98F, -0.4F}, {0.8F, 0, 0}, {0, 0, 0.8F}, lamp);
+  if (is_sheet) {
+    side({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, special);
+  } else {
+    place(scene, add_mesh(scene, test::sphere(0.45, 64, special)),
+          glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
+  }
+  finish_scene(scene);
+  return scene;
+}
+
+glm::dvec3 mean_of(const Scene& scene, const RaySettings& settings, std::uint32_t samples) {
+  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  Lighter lighter(scene, settings);
+  glm::dvec3 sum(0.0);
+  for (std::uint32_t sample = 0; sample < samples; ++sample) {
+    TileLayer<Rgb> radiance(keys.layout());
+    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
+    for (int y = 0; y < 16; ++y) {
+      for (int x = 0; x < 16; ++x) {
+        const Rgb& color = radiance.at(0, x, y);
+        sum += glm::dvec3(color.r, color.g, color.b);
+      }
+    }
+  }
+  return sum / (256.0 * samples);
+}
+
+void expect_the_same_light(const Scene& scene) {
+  const glm::dvec3 reference = mean_of(scene, {.max_depth = 64, .terminator_fix = false, .reference = true}, 512);
+  const glm::dvec3 hybrid =
+      mean_of(scene, {.max_depth = 24, .photons = 20'000, .global_photons = true, .terminator_fix = false}, 48);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
+}
+
+TEST(Hybrid, AMatteBall) {
+  expect_the_same_light(room(test::matte({0.3F, 0.4F, 0.6F}), false));
+}
+
+TEST(Hybrid, AMirrorBall) {
+  expect_the_same_light(room(test::mirror(0.9F), false));
+}
+
+TEST(Hybrid, APolishedMetalBallThatRaysFollow) {
+  Material metal = test::mirror(0.9F);
+  metal.roughness = 0.2F;
+  expect_the_same_light(room(metal, false));
+}
+
+TEST(Hybrid, ARoughMetalBallThatPhotonsLight) {
+  Material metal = test::mirror(0.9F);
+  metal.roughness = 0.5F;
+  expect_the_same_light(room(metal, false));
+}
+
+TEST(Hybrid, AGlassBall) {
+  expect_the_same_light(room(test::clear_glass(1.5F, 1.0F), false));
+}
+
+TEST(Hybrid, AClearSheet) {
+  expect_the_same_light(room(test::clear_glass(1.5F, 0.0F), true));
+}
+
+TEST(Hybrid, AFrostedSheet) {
+  Material sheet = test::clear_glass(1.5F, 0.0F);
+  sheet.roughness = 0.6F;
+  expect_the_same_light(room(sheet, true));
+}
+
+TEST(Hybrid, AVeil) {
+  Material veil = test::matte({0.8F, 0.8F, 0.2F});
+  veil.alpha_mode = AlphaMode::Mask;  // cast_keys has no coverage: a mask that covers all, but by way of coverage
+  expect_the_same_light(room(veil, true));
+}
+
+}  // namespace
+}  // namespace hpr

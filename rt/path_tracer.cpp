@@ -1,0 +1,150 @@
+#include "rt/path_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "rt/denormals.h"
+#include "rt/path_wave.h"
+
+namespace hpr {
+namespace {
+
+/// Paths that go together. Enough to fill packets for some bounces, few enough to stay in the second-level cache.
+constexpr int kRowsAtOnce = 16;
+
+bool has_coverage(const Scene& scene) {
+  return std::ranges::any_of(scene.materials, [](const Material& m) { return m.alpha_mode != AlphaMode::Opaque; });
+}
+
+/// The path of one pixel, at the eye. The near plane cuts as it does in rasterised pictures.
+Path path_from_eye(const View& view, const PathSettings& settings, int x, int y, const SampleNumber& number) {
+  Path path;
+  path.sampler =
+      Sampler(pixel_stream({settings.seed, number.frame}, view.screen_number, view.block.x0 + x, view.block.y0 + y),
+              number.sample);
+  const glm::dvec2 place = settings.spread_in_pixel ? path.sampler.two() : glm::dvec2(0.5);
+  const Ray ray = view_ray(view, x + place.x, y + place.y);
+  path.origin = ray.origin + view.near_distance * ray.direction;
+  path.direction = glm::normalize(ray.direction);
+  path.reach = view.orthographic ? view.far_distance - view.near_distance : std::numeric_limits<double>::infinity();
+  return path;
+}
+
+Rgb to_pixel(const glm::dvec3& radiance, PathCounts& counts) {
+  const Rgb color{static_cast<float>(radiance.r), static_cast<float>(radiance.g), static_cast<float>(radiance.b)};
+  if (std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b)) return color;
+  ++counts.not_finite;
+  return {};
+}
+
+}  // namespace
+
+PathCounts& PathCounts::operator+=(const PathCounts& other) {
+  paths += other.paths;
+  primary += other.primary;
+  diffuse += other.diffuse;
+  reflection += other.reflection;
+  transmission += other.transmission;
+  shadow += other.shadow;
+  invalid += other.invalid;
+  too_long += other.too_long;
+  not_finite += other.not_finite;
+  return *this;
+}
+
+struct PathTracer::State {
+  PathScene shared;
+  std::vector<std::unique_ptr<PathWave>> idle;  ///< kept from tile to tile: fresh pages cost time
+  std::mutex mutex;
+  PathCounts counts;
+
+  std::unique_ptr<PathWave> take_wave();
+  void trace_tile(PathWave& wave, const View& view, const TilePlace& place, const SampleNumber& number,
+                  std::span<Rgb> pixels) const;
+};
+
+std::unique_ptr<PathWave> PathTracer::State::take_wave() {
+  {
+    const std::lock_guard lock(mutex);
+    if (!idle.empty()) {
+      std::unique_ptr<PathWave> wave = std::move(idle.back());
+      idle.pop_back();
+      return wave;
+    }
+  }
+  return std::make_unique<PathWave>(shared);
+}
+
+void PathTracer::State::trace_tile(PathWave& wave, const View& view, const TilePlace& place, const SampleNumber& number,
+                                   std::span<Rgb> pixels) const {
+  const DenormalsAsZero mode;
+  std::ranges::fill(pixels, Rgb{});
+  const Rect& rect = place.pixels;
+  for (int top = rect.y0; top < rect.y1; top += kRowsAtOnce) {
+    const int bottom = std::min(top + kRowsAtOnce, rect.y1);
+    wave.start(view, static_cast<std::size_t>(bottom - top) * kTileSide);
+    for (int y = top; y < bottom; ++y) {
+      for (int x = rect.x0; x < rect.x1; ++x) {
+        Path path = path_from_eye(view, shared.settings, x, y, number);
+        path.pixel = static_cast<std::uint32_t>((y - top) * kTileSide + x - rect.x0);
+        wave.add(path);
+      }
+    }
+    wave.run();
+    for (int y = top; y < bottom; ++y) {
+      for (int x = 0; x < rect.width(); ++x) {
+        const auto from = static_cast<std::size_t>((y - top) * kTileSide + x);
+        const auto to = static_cast<std::size_t>((y - rect.y0) * kTileSide + x);
+        pixels[to] = to_pixel(wave.radiance(from), wave.counts());
+      }
+    }
+  }
+}
+
+PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSet& lights, PathSettings settings)
+    : state_(std::make_unique<State>(PathScene{.scene = scene,
+                                               .rays = rays,
+                                               .lights = lights,
+                                               .space = RaySpace(scene.bounds),
+                                               .surfaces = Surfaces(scene, RaySpace(scene.bounds)),
+                                               .settings = settings,
+                                               .has_coverage = has_coverage(scene)})) {}
+PathTracer::~PathTracer() = default;
+PathTracer::PathTracer(PathTracer&&) noexcept = default;
+PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
+
+const PathCounts& PathTracer::counts() const {
+  return state_->counts;
+}
+
+void PathTracer::trace(std::span<const View> views, std::span<const std::size_t> tiles, const SampleNumber& number,
+                       TileLayer<Rgb>& radiance) {
+  const FrameLayout& layout = radiance.layout();
+  HPR_CHECK(views.size() == layout.screens());
+  for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
+
+  State& state = *state_;
+  parallel_for(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
+    const std::size_t tile = tiles[i];
+    const TilePlace place = layout.place(tile);
+    radiance.set_active(tile);
+    std::unique_ptr<PathWave> wave = state.take_wave();
+    state.trace_tile(*wave, views[place.screen], place, number, radiance.tile(tile));
+    const std::lock_guard lock(state.mutex);
+    state.idle.push_back(std::move(wave));
+  });
+  state.counts = {};
+  for (const auto& wave : state.idle) {
+    state.counts += wave->counts();
+    wave->counts() = {};
+  }
+}
+
+}  // namespace hpr

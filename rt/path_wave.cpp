@@ -1,0 +1,309 @@
+#include "rt/path_wave.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+namespace hpr {
+namespace {
+
+/// A path that passes more surfaces in a row than this is caught between coincident ones.
+constexpr int kMostPassed = 1000;
+
+/// The power heuristic with exponent 2: the weight of a direction found with density `own` where another technique has
+/// `other`. As a ratio, so that large densities do not overflow.
+double power_heuristic(double own, double other) {
+  const double ratio = other / own;
+  return 1.0 / (1.0 + ratio * ratio);
+}
+
+double largest(const glm::dvec3& v) {
+  return std::max({v.x, v.y, v.z});
+}
+
+/// A ray's origin beside the point, on the side of `direction`.
+glm::dvec3 leave(const SurfacePoint& point, const glm::dvec3& direction) {
+  const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  return point.position + side * point.offset * point.geometric_normal;
+}
+
+glm::dvec3 absorbed(const glm::dvec3& absorption, double metres) {
+  return glm::exp(-absorption * metres);
+}
+
+/// By how much radiance is squeezed (or, on its way out, stretched) where it is refracted.
+double squeeze_of(const MaterialPoint& material, const SurfacePoint& point) {
+  if (!material.solid || !(material.ior > 0.0)) return 1.0;
+  const double squared = material.ior * material.ior;
+  return point.inside ? squared : 1.0 / squared;
+}
+
+/// How likely each lobe is chosen: as much of the path's light as it scatters, by energy: so that clear glass changes
+/// the weight of a path by nothing but the squeeze. False when no lobe is there.
+bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double squeeze,
+                    std::array<double, kLobes.size()>& chances) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    const glm::dvec3 part = throughput * bsdf.weight(kLobes[i]);
+    chances[i] = part.x + part.y + part.z;
+    if (kLobes[i] == Lobe::Transmission && bsdf.is_delta(kLobes[i])) chances[i] /= squeeze;
+    sum += chances[i];
+  }
+  if (!(sum > 0.0) || !std::isfinite(sum)) return false;
+  for (double& chance : chances) chance /= sum;
+  return true;
+}
+
+struct Scattered {
+  glm::dvec3 value{0.0};  ///< f, of all lobes with more than one direction
+  double pdf = 0.0;       ///< of choosing such a lobe, and in it this direction
+};
+
+Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
+  Scattered scattered;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    if (!(chances[i] > 0.0) || bsdf.is_delta(kLobes[i])) continue;
+    scattered.value += bsdf.value(kLobes[i], direction);
+    scattered.pdf += chances[i] * bsdf.pdf(kLobes[i], direction);
+  }
+  return scattered;
+}
+
+std::size_t pick(const std::array<double, kLobes.size()>& chances, double u) {
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < chances.size(); ++i) {
+    if (!(chances[i] > 0.0)) continue;
+    last = i;
+    if (u < chances[i]) break;
+    u -= chances[i];
+  }
+  return last;
+}
+
+}  // namespace
+
+void PathWave::start(const View& view, std::size_t pixels) {
+  view_ = &view;
+  radiance_.assign(pixels, glm::dvec3(0.0));
+  for (auto& paths : paths_) paths.clear();
+}
+
+void PathWave::add(const Path& path) {
+  paths_[0].push_back(path);
+  ++counts_.paths;
+}
+
+void PathWave::run() {
+  const auto some_left = [&] { return std::ranges::any_of(paths_, [](const auto& paths) { return !paths.empty(); }); };
+  while (some_left()) {
+    for (auto& paths : next_) paths.clear();
+    shadows_.clear();
+    trace_paths();
+    trace_shadows();
+    std::swap(paths_, next_);
+  }
+}
+
+void PathWave::trace_paths() {
+  batch_.clear();
+  for (const auto& paths : paths_) {
+    for (const Path& path : paths) {
+      batch_.push(shared_.space.from_world(path.origin), path.direction, path.reach * shared_.space.scale);
+    }
+  }
+  hits_.resize(batch_.size());
+  counts_.invalid += shared_.rays.closest(batch_, hits_);
+  counts_.primary += paths_[0].size();
+  counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
+  counts_.reflection += paths_[kind_of(Lobe::Reflection)].size();
+  counts_.transmission += paths_[kind_of(Lobe::Transmission)].size();
+  std::size_t ray = 0;
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    for (Path& path : paths_[kind]) {
+      const std::uint32_t surface = hits_[ray++];
+      if (surface == kNoSurface) {
+        miss(path, kind);
+      } else {
+        arrive(path, kind, surface);
+      }
+    }
+  }
+}
+
+void PathWave::miss(const Path& path, std::size_t kind) {
+  // A background is a backdrop: seen, mirrored and seen through glass, but no light.
+  if (kind == kind_of(Lobe::Diffuse) && !shared_.scene.environment) return;
+  const glm::dvec3 light = shared_.lights.environment(path.direction);
+  double weight = 1.0;
+  if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
+    const double by_light = shared_.lights.environment_pdf_any(path.from, path.from_normal, path.direction);
+    if (by_light > 0.0) {
+      weight = shared_.settings.technique == Technique::Lights ? 0.0 : power_heuristic(path.pdf, by_light);
+    }
+  }
+  radiance_[path.pixel] += path.throughput * light * weight;
+}
+
+void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
+  shared_.surfaces.load(surface, triangle_);
+  const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
+  path.travelled += glm::distance(path.origin, point.position);
+  const Material& look = shared_.scene.materials[point.material];
+  if (look.alpha_mode != AlphaMode::Opaque) {
+    const double alpha = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    const bool passes = alpha <= 0.0 || (alpha < 1.0 && path.sampler.one() >= alpha);
+    if (passes) {
+      if (++path.passed > kMostPassed) return;
+      path.origin = leave(point, path.direction);
+      next_[kind].push_back(path);
+      return;
+    }
+  }
+  const MaterialPoint material = evaluate_material(shared_.scene, point);
+  if (point.inside && material.solid) path.throughput *= absorbed(material.absorption, path.travelled);
+  if (material.emission != glm::dvec3(0.0)) add_emission(path, point, surface, material.emission);
+  if (material.unlit) return;
+  if (path.segments >= shared_.settings.max_depth) {
+    ++counts_.too_long;
+    return;
+  }
+  scatter(path, point, material);
+}
+
+void PathWave::add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface,
+                            const glm::dvec3& emission) {
+  double weight = 1.0;
+  if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
+    const double by_light = shared_.lights.surface_pdf_any(path.from, path.from_normal, surface, point);
+    if (by_light > 0.0) {
+      weight = shared_.settings.technique == Technique::Lights ? 0.0 : power_heuristic(path.pdf, by_light);
+    }
+  }
+  radiance_[path.pixel] += path.throughput * emission * weight;
+}
+
+void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material) {
+  const Bsdf bsdf(material, point);
+  std::array<double, kLobes.size()> chances{};
+  const double squeeze = squeeze_of(material, point);
+  if (!choose_chances(bsdf, path.throughput, squeeze, chances)) return;
+  ask_light(path, point, material, bsdf, chances);
+
+  const std::size_t chosen = pick(chances, path.sampler.one());
+  const Lobe lobe = kLobes[chosen];
+  const auto sample = bsdf.sample(lobe, path.sampler.two());
+  if (!sample) return;
+  if (bsdf.is_delta(lobe)) {
+    path.throughput *= sample->weight / chances[chosen];
+    path.pdf = 0.0;
+  } else {
+    const Scattered scattered = evaluate(bsdf, chances, sample->direction);
+    if (!(scattered.pdf > 0.0)) return;
+    const double cosine = std::abs(glm::dot(material.normal, sample->direction));
+    path.throughput *= scattered.value * (cosine / scattered.pdf);
+    path.pdf = scattered.pdf;
+  }
+  if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
+  if (!survives(path)) return;
+  path.origin = leave(point, sample->direction);
+  path.direction = sample->direction;
+  path.reach = std::numeric_limits<double>::infinity();
+  path.from = point.position;
+  path.from_normal = material.normal;
+  path.travelled = 0.0;
+  path.passed = 0;
+  ++path.segments;
+  next_[kind_of(lobe)].push_back(path);
+}
+
+void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
+                         const std::array<double, kLobes.size()>& chances) {
+  const double u_choice = path.sampler.one();
+  const glm::dvec2 u = path.sampler.two();
+  const auto light = shared_.lights.sample_any(point.position, material.normal, *view_, u_choice, u);
+  if (!light || light->weight == glm::dvec3(0.0)) return;
+  const Technique technique = shared_.settings.technique;
+  if (technique == Technique::Surfaces && light->pdf > 0.0) return;
+  const Scattered scattered = evaluate(bsdf, chances, light->to_light);
+  if (scattered.value == glm::dvec3(0.0)) return;
+  double weight = std::abs(glm::dot(material.normal, light->to_light));
+  if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);
+  const glm::dvec3 radiance = path.throughput * scattered.value * light->weight * weight;
+  if (!light->casts_shadows) {
+    radiance_[path.pixel] += radiance;
+    return;
+  }
+
+  ShadowRay& ray = shadows_.emplace_back();
+  ray.pixel = path.pixel;
+  ray.radiance = radiance;
+  ray.origin = leave(point, light->to_light);
+  if (shared_.settings.terminator_fix) ray.origin += point.lift;
+  ray.direction = light->to_light;
+  ray.reach = light->distance;
+  if (!std::isfinite(light->distance)) return;
+  // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies on
+  // a surface is not hidden by it.
+  const glm::dvec3 goal = shared_.space.from_world(light->goal);
+  const glm::dvec3 way = light->goal - ray.origin;
+  const double distance = glm::length(way);
+  if (distance > 0.0) ray.direction = way / distance;
+  const double size = std::max(largest(glm::abs(goal)), 1.0) / shared_.space.scale;
+  ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
+}
+
+bool PathWave::survives(Path& path) {
+  if (!(largest(path.throughput) > 0.0)) return false;
+  if (path.segments < shared_.settings.roulette_from) return true;
+  const double chance = largest(path.throughput) / path.squeeze;
+  if (chance >= 1.0) return true;
+  if (path.sampler.one() >= chance) return false;
+  path.throughput /= chance;
+  return true;
+}
+
+void PathWave::trace_shadows() {
+  while (!shadows_.empty()) {
+    batch_.clear();
+    for (const ShadowRay& ray : shadows_) {
+      batch_.push(shared_.space.from_world(ray.origin), ray.direction, ray.reach * shared_.space.scale);
+    }
+    counts_.shadow += shadows_.size();
+    if (shared_.has_coverage) {
+      pass_covers();
+      continue;
+    }
+    blocked_.resize(batch_.size());
+    counts_.invalid += shared_.rays.occluded(batch_, blocked_);
+    for (std::size_t i = 0; i < shadows_.size(); ++i) {
+      if (blocked_[i] == 0) radiance_[shadows_[i].pixel] += shadows_[i].radiance;
+    }
+    shadows_.clear();
+  }
+}
+
+void PathWave::pass_covers() {
+  hits_.resize(batch_.size());
+  counts_.invalid += shared_.rays.closest(batch_, hits_);
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < shadows_.size(); ++i) {
+    ShadowRay ray = shadows_[i];
+    if (hits_[i] == kNoSurface) {
+      radiance_[ray.pixel] += ray.radiance;
+      continue;
+    }
+    shared_.surfaces.load(hits_[i], triangle_);
+    const SurfacePoint point = shared_.surfaces.meet(triangle_, ray.origin, ray.direction);
+    const Material& look = shared_.scene.materials[point.material];
+    ray.radiance *= 1.0 - evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    if (!(largest(ray.radiance) > 0.0) || ++ray.passed > kMostPassed) continue;
+    const glm::dvec3 origin = leave(point, ray.direction);
+    ray.reach = std::max(ray.reach - glm::dot(origin - ray.origin, ray.direction), 0.0);
+    ray.origin = origin;
+    shadows_[left++] = ray;
+  }
+  shadows_.resize(left);
+}
+
+}  // namespace hpr

@@ -1,0 +1,183 @@
+#include "rt/photon_map.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+/// Neighbours of cells on the verge stay neighbours although cell numbers are rounded.
+constexpr double kCellPerRadius = 1.0 + 1.0 / 1048576.0;
+
+/// In ray space, where the scene's radius is in [1, 2): below it photons' own positions are too coarse.
+constexpr double kLeastRadius = 0x1p-24;
+
+/// 1 / p and 1 / p^2 of the plastic number p, in 2^-32: multiples of such a pair keep furthest from whole numbers.
+constexpr std::uint64_t kRowShare = 0xC13FA9A9U;
+constexpr std::uint64_t kLayerShare = 0x91E10DA6U;
+constexpr int kFewestSlotBits = 8;
+
+std::int16_t to_int16(double x) {
+  return static_cast<std::int16_t>(std::lround(std::clamp(x, -1.0, 1.0) * 32767.0));
+}
+
+bool finite(const std::array<float, 3>& v) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
+}  // namespace
+
+std::uint32_t pack_direction(const glm::dvec3& direction) {
+  const double size = std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z);
+  if (!(size > 0.0) || !std::isfinite(size)) return 0;
+  double x = direction.x / size;
+  double y = direction.y / size;
+  if (direction.z < 0.0) {
+    const double folded_x = std::copysign(1.0 - std::abs(y), x);
+    y = std::copysign(1.0 - std::abs(x), y);
+    x = folded_x;
+  }
+  return std::uint32_t{static_cast<std::uint16_t>(to_int16(x))} |
+         (std::uint32_t{static_cast<std::uint16_t>(to_int16(y))} << 16U);
+}
+
+PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius) : space_(space) {
+  if (!(radius > 0.0) || !std::isfinite(radius) || photons.empty()) return;
+  if (photons.size() > (std::size_t{1} << 31U)) {
+    throw Error(ExitCode::Limit, "more than 2^31 photons in one map", "send fewer photons in a pass: --photons");
+  }
+  const double scaled = std::max(radius * space.scale, kLeastRadius);
+  radius_ = scaled / space.scale;
+  density_ = 2.0 / (std::numbers::pi * radius_ * radius_);
+  radius2_ = scaled * scaled;
+  inverse_radius2_ = 1.0 / radius2_;
+  flatness_ = kFlatness * scaled + 2.0 * kFloatStep;  // what float positions may stray from their plane
+  cells_per_unit_ = 1.0 / (scaled * kCellPerRadius);
+  const int bits = std::max(static_cast<int>(std::bit_width(photons.size() - 1)), kFewestSlotBits);
+  slots_ = std::uint32_t{1} << static_cast<unsigned>(bits);
+  row_step_ = static_cast<std::uint32_t>((kRowShare << static_cast<unsigned>(bits)) >> 32U);
+  layer_step_ = static_cast<std::uint32_t>((kLayerShare << static_cast<unsigned>(bits)) >> 32U);
+  sort(photons);
+}
+
+void PhotonMap::sort(std::span<const Photon> photons) {
+  // A counting sort. Slot `slots_` takes photons that have no place.
+  const auto slots = std::make_unique_for_overwrite<std::uint32_t[]>(photons.size());
+  starts_ = std::make_unique<std::uint32_t[]>(slots_ + std::size_t{3});
+  for (std::size_t i = 0; i < photons.size(); ++i) {
+    const Photon& photon = photons[i];
+    const glm::dvec3 cell = in_cells({photon.position[0], photon.position[1], photon.position[2]});
+    const double flux = double{photon.flux[0]} + photon.flux[1] + photon.flux[2];
+    slots[i] = inside(cell) && std::isfinite(flux)
+                   ? slot_of(static_cast<std::uint32_t>(cell.x), static_cast<std::uint32_t>(cell.y),
+                             static_cast<std::uint32_t>(cell.z))
+                   : slots_;
+    ++starts_[slots[i]];
+  }
+  size_ = photons.size() - starts_[slots_];
+  const std::uint32_t again = starts_[0] + starts_[1];
+  std::uint32_t before = 0;
+  for (std::uint32_t slot = 0; slot < slots_; ++slot) before += std::exchange(starts_[slot], before);
+  photons_ = std::make_unique_for_overwrite<Photon[]>(size_ + again);
+  constexpr std::size_t kAhead = 16;  // every photon goes to another cache line, whose way is long
+  for (std::size_t i = 0; i < photons.size(); ++i) {
+    if (i + kAhead < photons.size()) __builtin_prefetch(photons_.get() + starts_[slots[i + kAhead]], 1);
+    if (slots[i] != slots_) photons_[starts_[slots[i]]++] = photons[i];
+  }
+  // Each start now stands where the next slot begins.
+  std::copy_backward(starts_.get(), starts_.get() + slots_, starts_.get() + slots_ + 1);
+  starts_[0] = 0;
+  starts_[slots_ + 1] = starts_[slots_] + starts_[1];
+  starts_[slots_ + 2] = starts_[slots_] + starts_[2];
+  std::copy_n(photons_.get(), again, photons_.get() + size_);
+}
+
+std::size_t PhotonMap::find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<Row, 9>& rows) const {
+  // Lengths are in cells from here on, and a little too long, so that no rounding loses a photon.
+  constexpr double kSlack = 4e-6;
+  const glm::dvec3 place = in_cells(at);
+  if (!inside(place)) return 0;
+  const auto cell_x = static_cast<std::uint32_t>(place.x);
+  const auto cell_y = static_cast<std::uint32_t>(place.y);
+  const auto cell_z = static_cast<std::uint32_t>(place.z);
+  const glm::dvec3 fraction = place - glm::dvec3(cell_x, cell_y, cell_z);
+  const double slope = std::abs(normal.x) < kSlack ? kSlack : normal.x;
+  const double per_slope = 1.0 / slope;
+  const double flat = flatness_ * cells_per_unit_ + 0.5 * (std::abs(normal.y) + std::abs(normal.z)) + 4.0 * kSlack;
+  const auto gap = [](int step, double inside_cell) {  // to the nearest point of that cell
+    return step == 0 ? 0.0 : step < 0 ? inside_cell : 1.0 - inside_cell;
+  };
+  std::size_t count = 0;
+  for (int z = -1; z <= 1; ++z) {
+    const double gap_z = gap(z, fraction.z);
+    for (int y = -1; y <= 1; ++y) {
+      const double gap_y = gap(y, fraction.y);
+      const double width2 = 1.0 - gap_y * gap_y - gap_z * gap_z;
+      if (!(width2 > 0.0)) continue;
+      const double width = std::sqrt(width2);
+      // How far along x the row's box may touch the slab about the plane.
+      const double middle = normal.y * (y + 0.5 - fraction.y) + normal.z * (z + 0.5 - fraction.z);
+      const double one = (-flat - middle) * per_slope;
+      const double other = (flat - middle) * per_slope;
+      const double low = std::max(-width, std::min(one, other));
+      const double high = std::min(width, std::max(one, other));
+      if (!(low <= high)) continue;
+      // 0, 1 or 2 of the three cells about the place: truncation rounds down what is positive.
+      const auto first = static_cast<std::uint32_t>(fraction.x + low + 1.0);
+      const auto last = static_cast<std::uint32_t>(fraction.x + high + 1.0);
+      const std::uint32_t slot =
+          slot_of(cell_x - 1 + first, cell_y + static_cast<std::uint32_t>(y), cell_z + static_cast<std::uint32_t>(z));
+      const Row row{photons_.get() + starts_[slot], photons_.get() + starts_[slot + (last - first) + 1]};
+      __builtin_prefetch(row.first);
+      __builtin_prefetch(row.first + 2);
+      rows[count++] = row;
+    }
+  }
+  return count;
+}
+
+double progressive_radius(double first, std::uint64_t pass) {
+  constexpr double kAlpha = 2.0 / 3.0;
+  double area = 1.0;
+  for (std::uint64_t k = 1; k <= pass; ++k) area *= (static_cast<double>(k) + kAlpha) / (static_cast<double>(k) + 1.0);
+  return first * std::sqrt(area);
+}
+
+double first_radius(std::span<const Photon> photons, const RaySpace& space, double wanted) {
+  constexpr double kMost = 0.1;  // of a scene whose radius is at least 1 in ray space
+  constexpr std::size_t kMostThinned = 32768;
+  constexpr std::size_t kProbes = 127;
+  const std::size_t stride = photons.size() / kMostThinned + 1;
+  std::vector<glm::vec3> places;
+  for (std::size_t i = 0; i < photons.size(); i += stride) {
+    const auto& p = photons[i].position;
+    if (finite(p)) places.emplace_back(p[0], p[1], p[2]);
+  }
+  const double share = static_cast<double>(stride);
+  const auto k = static_cast<std::size_t>(std::clamp(wanted / share, 1.0, static_cast<double>(places.size())));
+  if (places.size() < 2 || k >= places.size()) return kMost / space.scale;
+  const std::size_t step = std::max<std::size_t>(places.size() / kProbes, 1);
+  std::vector<double> areas;  // of the circles about some of them that take in k others, over pi
+  std::vector<float> distances2(places.size());
+  for (std::size_t probe = 0; probe < places.size(); probe += step) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const glm::vec3 way = places[i] - places[probe];
+      distances2[i] = glm::dot(way, way);
+    }
+    const auto kth = distances2.begin() + static_cast<std::ptrdiff_t>(k);  // the nearest is the probe itself
+    std::ranges::nth_element(distances2, kth);
+    areas.push_back(*kth);
+  }
+  const auto middle = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
+  std::ranges::nth_element(areas, middle);
+  // The circle that takes in k of evenly scattered points follows a gamma distribution, whose median is k - 1/3.
+  const double area_of_one = *middle / (static_cast<double>(k) - 1.0 / 3.0) / share;
+  const double radius = std::sqrt(wanted * area_of_one);
+  return (radius > 0.0 ? std::min(radius, kMost) : kMost) / space.scale;
+}
+
+}  // namespace hpr

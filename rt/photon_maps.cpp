@@ -1,0 +1,70 @@
+#include "rt/photon_maps.h"
+
+#include <utility>
+
+#include "core/parallel.h"
+
+namespace hpr {
+namespace {
+
+PhotonSettings tracer_settings(const RaySettings& settings) {
+  PhotonSettings own;
+  own.glossy_cutoff = settings.glossy_cutoff;
+  own.caustics_only = !settings.global_photons;
+  own.threads = settings.threads;
+  return own;
+}
+
+}  // namespace
+
+PhotonSender::PhotonSender(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& rays,
+                           const LightSet& lights, const RaySettings& settings)
+    : space_(space),
+      settings_(settings),
+      tracer_(
+          scene, surfaces, space, rays,
+          [&lights](double choice, const glm::dvec2& place, const glm::dvec2& direction) {
+            return lights.emit(choice, place, direction);
+          },
+          tracer_settings(settings)) {}
+
+TracedPhotons PhotonSender::trace(const SampleNumber& number, Communicator* comm) {
+  const std::uint64_t each = settings_.photons;
+  PhotonRange range{each * number.sample, each};
+  if (comm != nullptr) range = share_of_rank(range, comm->rank(), comm->size());
+  TracedPhotons traced = tracer_.trace({settings_.seed, number.frame}, range, each);
+  counts_ += traced.counts;
+  if (comm != nullptr) share_photons(*comm, traced);
+  return traced;
+}
+
+void PhotonSender::choose_radii(const TracedPhotons& first) {
+  caustic_radius_ = settings_.photon_radius;
+  global_radius_ = settings_.photon_radius;
+  if (settings_.photon_radius > 0.0) return;
+  caustic_radius_ = first_radius(first.caustic, space_);
+  global_radius_ = first_radius(first.global, space_);
+}
+
+const PhotonMaps& PhotonSender::send(const SampleNumber& number, Communicator* comm) {
+  if (sent_ == number) return maps_;
+  // Whatever sample comes first, radii are those of the very first one: a run that is resumed gives the same bits.
+  const bool chooses = caustic_radius_ == 0.0;
+  TracedPhotons traced;
+  if (chooses && number != SampleNumber{}) choose_radii(trace({}, comm));
+  traced = trace(number, comm);
+  if (chooses && number == SampleNumber{}) choose_radii(traced);
+  parallel_for(settings_.threads, 2, [&](std::size_t which) {
+    const std::vector<Photon>& photons = which == 0 ? traced.caustic : traced.global;
+    PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;
+    map = PhotonMap(photons, space_, progressive_radius(which == 0 ? caustic_radius_ : global_radius_, number.sample));
+  });
+  sent_ = number;
+  return maps_;
+}
+
+PhotonCounts PhotonSender::take_counts() {
+  return std::exchange(counts_, {});
+}
+
+}  // namespace hpr

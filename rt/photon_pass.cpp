@@ -1,0 +1,39 @@
+#include "rt/pass.h"
+#include "rt/photon_gather.h"
+#include "rt/photon_maps.h"
+
+namespace hpr {
+namespace {
+
+/// Indirect light: what photons that lights sent out bring to lobes that are not followed by rays. Caustics always,
+/// all of it where settings ask for global photons.
+class PhotonPass final : public Pass {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "photon"; }
+  [[nodiscard]] const Requirement& requirement(const Requirements& scene, const RaySettings& settings) const override {
+    return settings.global_photons && !scene.photon.needed ? scene.indirect : scene.photon;
+  }
+  [[nodiscard]] bool runs_by_default(const RaySettings& settings) const override { return settings.photons > 0; }
+  [[nodiscard]] bool gathers_photons() const override { return true; }
+
+  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
+    if (tile.photons == nullptr) return;
+    for (const PathPoint& point : wave.points) {
+      glm::dvec3 light(0.0);
+      for (const PhotonMap* map : {&tile.photons->caustic, &tile.photons->global}) {
+        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff);
+      }
+      if (light != glm::dvec3(0.0)) {
+        tile.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
+      }
+    }
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Pass> make_photon_pass() {
+  return std::make_unique<PhotonPass>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,78 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "cluster/local_communicator.h"
+#include "rt/lighter.h"
+#include "rt/test_scene.h"
+
+namespace hpr {
+namespace {
+
+using test::add_material;
+using test::add_mesh;
+using test::place;
+using test::quad;
+
+/// A closed box of one grey that emits: light is the same everywhere inside.
+Scene furnace(float albedo, float emission) {
+  Scene scene;
+  Material wall = test::matte(glm::vec3(albedo));
+  wall.emissive = glm::vec3(emission);
+  add_material(scene, wall);
+  const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b) {
+    place(scene, add_mesh(scene, quad(corner, a, b, 0)));
+  };
+  side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0});
+  side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0});
+  side({-1, -1, -1}, {0, 2, 0}, {0, 0, 2});
+  side({1, -1, -1}, {0, 0, 2}, {0, 2, 0});
+  side({-1, -1, -1}, {0, 0, 2}, {2, 0, 0});
+  side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(PhotonPass, AClosedFurnaceIsAsBrightAsItsSeriesSums) {
+  for (const double albedo : {0.5, 0.9}) {
+    const Scene scene = furnace(static_cast<float>(albedo), 1.0F);
+    const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {8, 8}, scene, 0.5);
+    const RaySettings settings{.photons = 100'000, .global_photons = true};
+    const glm::dvec3 mean = test::mean_pixel(scene, view, 4, 4, 32, settings);
+    EXPECT_NEAR(mean.g * (1.0 - albedo), 1.0, 0.02) << albedo;
+  }
+}
+
+TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {16, 16}, scene, 0.5);
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  const RaySettings settings{.photons = 5'000, .global_photons = true};
+  const SampleNumber number{.frame = 2, .sample = 3};
+  TileLayer<Rgb> alone(keys.layout());
+  Lighter one(scene, settings);
+  one.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &alone}, number);
+  EXPECT_GT(one.counts().photon, 5'000U);
+  for (const int ranks : {2, 3, 7}) {
+    run_local_ranks(ranks, [&](Communicator& comm) {
+      Lighter lighter(scene, settings);
+      TileLayer<Rgb> lit(keys.layout());
+      lighter.send_photons(comm, number);
+      lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit}, number);
+      EXPECT_LT(lighter.counts().photon, one.counts().photon);
+      EXPECT_TRUE(std::ranges::equal(lit.tile(0), alone.tile(0)));
+    });
+  }
+}
+
+TEST(PhotonPass, SendsNothingWhereNobodyAsksAndNoCausticsWhereNothingBundlesLight) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {4, 4}, scene, 0.5);
+  EXPECT_EQ(test::light(scene, view).counts.photon, 0U);
+  EXPECT_EQ(test::light(scene, view, {.photons = 1'000}).counts.photon, 0U);
+  EXPECT_GT(test::light(scene, view, {.photons = 1'000, .global_photons = true}).counts.photon, 1'000U);
+  EXPECT_EQ(test::light(scene, view, {.passes = {"photon"}}).counts.photon, 0U) << "no caustics in a matte box";
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,255 @@
+#include "rt/photon_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <glm/exponential.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "cluster/collectives.h"
+#include "core/parallel.h"
+#include "rt/denormals.h"
+#include "rt/photon_gather.h"
+
+namespace hpr {
+namespace {
+
+/// Photons traced together, generation by generation: enough to fill packets after most have been absorbed, few enough
+/// for the cache.
+constexpr std::uint64_t kBlockPhotons = 4096;
+
+/// Bounces before roulette begins: short paths carry most of the light, and all arrive.
+constexpr int kFirstBounces = 3;
+
+double sum_of(const glm::dvec3& v) {
+  return v.r + v.g + v.b;
+}
+
+/// False for no light at all and for what is not a number.
+bool carries_light(const glm::dvec3& flux) {
+  return sum_of(flux) > 0.0 && std::isfinite(sum_of(flux));
+}
+
+/// What a shading normal changes for light that travels away from lights, beside f: Veach, "Robust Monte Carlo Methods
+/// for Light Transport Simulation", 1997, section 5.3.2.
+double adjoint(const SurfacePoint& surface, const glm::dvec3& shading_normal, const glm::dvec3& direction) {
+  const glm::dvec3& geometric = surface.geometric_normal;
+  if (shading_normal == geometric) return 1.0;
+  const glm::dvec3& from = surface.to_viewer;
+  return std::abs(glm::dot(direction, geometric) * glm::dot(from, shading_normal) /
+                  (glm::dot(direction, shading_normal) * glm::dot(from, geometric)));
+}
+
+template <typename Value>
+void append(std::vector<Value>& to, const std::vector<Value>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+void share(Communicator& comm, std::vector<Photon>& photons) {
+  const auto parts = all_gather(comm, std::as_bytes(std::span(photons)));
+  std::size_t bytes = 0;
+  for (const auto& part : parts) bytes += part.size();
+  photons.resize(bytes / sizeof(Photon));
+  auto* to = reinterpret_cast<std::byte*>(photons.data());
+  for (const auto& part : parts) to = std::copy(part.begin(), part.end(), to);
+}
+
+}  // namespace
+
+PhotonCounts& PhotonCounts::operator+=(const PhotonCounts& other) {
+  sent += other.sent;
+  caustic += other.caustic;
+  global += other.global;
+  rays += other.rays;
+  invalid += other.invalid;
+  lost += other.lost;
+  return *this;
+}
+
+PhotonRange share_of_rank(const PhotonRange& all, int rank, int ranks) {
+  const auto size = static_cast<std::uint64_t>(ranks);
+  const auto from = [&](std::uint64_t r) { return all.count / size * r + all.count % size * r / size; };
+  const auto r = static_cast<std::uint64_t>(rank);
+  return {all.first + from(r), from(r + 1) - from(r)};
+}
+
+struct PhotonTracer::Flight {
+  Sampler sampler;
+  glm::dvec3 place{0.0};   ///< world: where it was scattered last, or passed a surface
+  glm::dvec3 origin{0.0};  ///< ray space: off that surface
+  glm::dvec3 direction{0.0};
+  glm::dvec3 flux{0.0};
+  double travelled = 0.0;    ///< metres from where it was scattered last to `place`
+  std::uint32_t photon = 0;  ///< of the block
+  int bounces = 0;
+  int passed = 0;        ///< surfaces passed that do not cover all
+  bool followed = true;  ///< has met followed lobes only
+};
+
+/// Photons under way together and what they left.
+struct PhotonTracer::Block {
+  struct Kept {
+    std::uint32_t photon;
+    bool caustic;
+    Photon stored;
+  };
+  std::vector<Flight> flights;
+  std::vector<Flight> next;
+  std::vector<Kept> kept;
+  RayBatch batch;
+  std::vector<std::uint32_t> hits;
+  WorldTriangle triangle;
+  TracedPhotons traced;
+
+  /// From the order of generations into that of photons; each one's bounces keep their order.
+  void sort() {
+    std::ranges::stable_sort(kept, {}, &Kept::photon);
+    for (const Kept& one : kept) (one.caustic ? traced.caustic : traced.global).push_back(one.stored);
+    traced.counts.caustic = traced.caustic.size();
+    traced.counts.global = traced.global.size();
+  }
+};
+
+TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const {
+  const std::uint64_t stream = photon_stream(key);
+  const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
+  std::vector<TracedPhotons> traced(count);
+  parallel_for(settings_.threads, count, [&](std::size_t i) {
+    const DenormalsAsZero mode;
+    Block block;
+    const std::uint64_t before = i * kBlockPhotons;
+    start(stream, {range.first + before, std::min(kBlockPhotons, range.count - before)},
+          1.0 / static_cast<double>(pass_photons), block);
+    while (!block.flights.empty()) move(block);
+    block.sort();
+    traced[i] = std::move(block.traced);
+  });
+  TracedPhotons all;
+  for (const TracedPhotons& part : traced) {
+    append(all.caustic, part.caustic);
+    append(all.global, part.global);
+    all.counts += part.counts;
+  }
+  return all;
+}
+
+void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const {
+  for (std::uint64_t i = 0; i < range.count; ++i) {
+    const std::uint64_t index = range.first + i;
+    Flight flight;
+    // The sampler counts to 2^32; a stream of its own follows.
+    flight.sampler = Sampler(stream + (index >> 32U), static_cast<std::uint32_t>(index));
+    const double u_choice = flight.sampler.one();
+    const glm::dvec2 u_place = flight.sampler.two();
+    const std::optional<PhotonStart> begin = source_(u_choice, u_place, flight.sampler.two());
+    if (!begin) continue;
+    ++block.traced.counts.sent;
+    flight.flux = begin->flux * share;
+    if (!carries_light(flight.flux)) continue;
+    flight.place = begin->origin;
+    flight.direction = begin->direction;
+    glm::dvec3 origin = begin->origin;
+    if (begin->surface != kNoSurface) {
+      surfaces_.load(begin->surface, block.triangle);
+      const double side = glm::dot(block.triangle.normal, begin->direction) < 0.0 ? -1.0 : 1.0;
+      origin += side * begin->offset * block.triangle.normal;
+    }
+    flight.origin = space_.from_world(origin);
+    flight.photon = static_cast<std::uint32_t>(i);
+    block.flights.push_back(flight);
+  }
+}
+
+/// One generation: all flights to the next surface, and on.
+void PhotonTracer::move(Block& block) const {
+  block.batch.clear();
+  for (const Flight& flight : block.flights) {
+    block.batch.push(flight.origin, flight.direction, std::numeric_limits<double>::infinity());
+  }
+  block.hits.resize(block.flights.size());
+  block.traced.counts.rays += block.flights.size();
+  block.traced.counts.invalid += rays_.closest(block.batch, block.hits);
+  block.next.clear();
+  for (std::size_t i = 0; i < block.flights.size(); ++i) {
+    if (block.hits[i] == kNoSurface) continue;
+    Flight& flight = block.flights[i];
+    surfaces_.load(block.hits[i], block.triangle);
+    const SurfacePoint surface = surfaces_.meet(block.triangle, flight.place, flight.direction);
+    if (arrive(flight, surface, block)) block.next.push_back(flight);
+  }
+  std::swap(block.flights, block.next);
+}
+
+/// Keeps the photon if it is wanted here and sends it on; false when it ends.
+bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& block) const {
+  const MaterialPoint material = evaluate_material(scene_, surface);
+  flight.travelled += glm::distance(surface.position, flight.place);
+  if (material.alpha < 1.0 && flight.sampler.one() >= material.alpha) {
+    flight.place = surface.position;
+    flight.origin = space_.from_world(surface.position - surface.offset * surface.geometric_normal);
+    if (++flight.passed <= settings_.max_bounces) return true;
+    ++block.traced.counts.lost;
+    return false;
+  }
+  if (surface.inside && material.solid) flight.flux *= glm::exp(-material.absorption * flight.travelled);
+  if (!carries_light(flight.flux)) return false;
+
+  const Bsdf bsdf(material, surface, Carried::Flux);
+  if (flight.bounces > 0 && takes_photons(bsdf, settings_.glossy_cutoff)) {
+    const glm::dvec3 at = space_.from_world(surface.position);
+    Photon photon;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      photon.position[axis] = static_cast<float>(at[static_cast<int>(axis)]);
+      photon.flux[axis] = static_cast<float>(flight.flux[static_cast<int>(axis)]);
+    }
+    photon.normal = pack_direction(surface.geometric_normal);
+    photon.direction = pack_direction(surface.to_viewer);
+    block.kept.push_back({flight.photon, flight.followed, photon});
+  }
+  if (flight.bounces < settings_.max_bounces) return scatter(flight, surface, material, bsdf);
+  ++block.traced.counts.lost;
+  return false;
+}
+
+/// Chooses a lobe by what it makes of the photon's flux, then a direction. After the first bounces the photon ends with
+/// the chance that its light is absorbed.
+bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const MaterialPoint& material,
+                           const Bsdf& bsdf) const {
+  std::array<double, kLobes.size()> chances{};
+  double total = 0.0;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    chances[i] = sum_of(flight.flux * bsdf.weight(kLobes[i])) / sum_of(flight.flux);
+    total += chances[i];
+  }
+  if (!(total > 0.0) || !std::isfinite(total)) return false;
+  const double whole = flight.bounces < kFirstBounces ? total : std::max(total, 1.0);
+  double left = flight.sampler.one() * whole;
+  std::size_t chosen = 0;
+  while (chosen < kLobes.size() && left >= chances[chosen]) left -= chances[chosen++];
+  if (chosen == kLobes.size()) return false;
+  const bool follows = is_followed(bsdf, kLobes[chosen], settings_.glossy_cutoff);
+  if (settings_.caustics_only && !follows) return false;
+  const std::optional<BsdfSample> sample = bsdf.sample(kLobes[chosen], flight.sampler.two());
+  if (!sample) return false;
+
+  flight.flux *= sample->weight * (whole / chances[chosen] * adjoint(surface, material.normal, sample->direction));
+  if (!carries_light(flight.flux)) return false;
+  flight.followed = flight.followed && follows;
+  flight.direction = sample->direction;
+  flight.place = surface.position;
+  flight.travelled = 0.0;
+  const double side = glm::dot(sample->direction, surface.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  flight.origin = space_.from_world(surface.position + side * surface.offset * surface.geometric_normal);
+  ++flight.bounces;
+  return true;
+}
+
+void share_photons(Communicator& comm, TracedPhotons& photons) {
+  share(comm, photons.caustic);
+  share(comm, photons.global);
+}
+
+}  // namespace hpr

@@ -1,0 +1,366 @@
+#include "rt/primary_rays.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <limits>
+#include <mutex>
+#include <vector>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "rt/denormals.h"
+#include "rt/embree_compat.h"
+#include "rt/occupied_tiles.h"
+
+namespace hpr {
+namespace {
+
+using embree::kWidth;
+// Pixels of a packet.
+constexpr int kPacketWidth = 4;
+constexpr int kPacketHeight = static_cast<int>(kWidth) / kPacketWidth;
+
+/// Candidates whose distances, in ray space, differ by less are compared by their exact depths. Twice what the distance
+/// of a hit may be wrong by; then the hit with the largest key is never passed over: any other one that Embree finds at
+/// distance t, with the larger exact one, lies less than this before it.
+constexpr float kSlack = 1.0F / 1024.0F;
+
+/// Rays need not start farther than this from the middle of ray space, of which the scene fills [-2, 2]^3 at most.
+constexpr double kAround = 4.0;
+
+/// The pixels of one packet, and the surfaces found so far. The Embree context comes first: the filter is handed its
+/// address.
+struct Search {
+  embree::Context context;
+  const Scene* scene;
+  std::span<const RayGeometry> geometries;
+  const View* view;
+  bool through = false;  ///< look at every surface along the rays: none hides another
+  std::uint64_t weighed = 0;
+
+  std::array<Ray, kWidth> ray;         ///< world
+  std::array<double, kWidth> scale{};  ///< from the ray's own parameter to distances in ray space
+  std::array<double, kWidth> start{};  ///< distance in ray space at which the traced ray begins
+  std::array<float, kWidth> reach{};
+  std::array<float, kWidth> weigh_below{};  ///< nearer candidates may lie before the near plane
+
+  std::array<bool, kWidth> found{};
+  std::array<bool, kWidth> misled{};  ///< something that proved no hit may have hidden a hit
+  std::array<float, kWidth> distance{};
+  std::array<RayGeometry, kWidth> geometry{};
+  std::array<std::uint32_t, kWidth> primitive{};
+  std::array<Key, kWidth> key{};  ///< kNoKey: not reckoned yet
+};
+
+/// Barycentric coordinates moved onto the triangle; its middle where they are undefined.
+glm::dvec2 onto_triangle(double u, double v) {
+  if (!std::isfinite(u) || !std::isfinite(v)) return glm::dvec2(1.0 / 3.0);
+  u = std::max(u, 0.0);
+  v = std::max(v, 0.0);
+  const double sum = std::max(u + v, 1.0);
+  return {u / sum, v / sum};
+}
+
+const glm::uvec3& corners_of(const Search& search, std::size_t lane) {
+  const RayGeometry& geometry = search.geometry[lane];
+  const Mesh& mesh = search.scene->mesh_of(search.scene->instances[geometry.instance]);
+  return mesh.triangles[geometry.first_triangle + search.primitive[lane]];
+}
+
+/// The key of a triangle at a lane's pixel; kNoKey where it lies before the near plane, past the far one, or not at
+/// about `distance`.
+Key exact_key(const Search& search, std::size_t lane, const RayGeometry& geometry, std::uint32_t primitive,
+              float distance) {
+  const Instance& instance = search.scene->instances[geometry.instance];
+  const Mesh& mesh = search.scene->mesh_of(instance);
+  const glm::uvec3& corners = mesh.triangles[geometry.first_triangle + primitive];
+  const Ray& ray = search.ray[lane];
+  // Edges as differences of the mesh's own coordinates, and all of it relative to the eye: far places cost no digits.
+  const glm::dmat3 linear(instance.to_world);
+  const glm::dvec3 p0(mesh.positions[corners.x]);
+  const glm::dvec3 e1 = linear * (glm::dvec3(mesh.positions[corners.y]) - p0);
+  const glm::dvec3 e2 = linear * (glm::dvec3(mesh.positions[corners.z]) - p0);
+  const glm::dvec3 v0 = linear * p0 + (glm::dvec3(instance.to_world[3]) - search.view->eye);
+
+  // Moeller and Trumbore 1997, from the ray's origin.
+  const glm::dvec3 from_v0 = (ray.origin - search.view->eye) - v0;
+  const glm::dvec3 p = glm::cross(ray.direction, e2);
+  const glm::dvec3 q = glm::cross(from_v0, e1);
+  const double determinant = glm::dot(e1, p);
+  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(ray.direction, q) / determinant);
+  const double along_axis = -glm::dot(v0 + at.x * e1 + at.y * e2, search.view->axes[2]);
+
+  const auto depth = static_cast<float>(reversed_depth(*search.view, along_axis));
+  if (!(depth > 0.0F) || !(depth <= 1.0F)) return kNoKey;
+  const double expected = along_axis * search.scale[lane] - search.start[lane];
+  if (!(std::abs(static_cast<double>(distance) - expected) <= 0.5 * static_cast<double>(kSlack))) return kNoKey;
+  return make_key(depth, geometry.first_surface + primitive);
+}
+
+/// Decides between two candidates whose distances say too little. Returns whether the new one stays.
+bool weigh(Search& search, std::size_t lane, const RayGeometry& geometry, std::uint32_t primitive, float distance) {
+  ++search.weighed;
+  const Key key = exact_key(search, lane, geometry, primitive, distance);
+  if (key == kNoKey) return false;
+  if (search.found[lane] && search.key[lane] == kNoKey) {
+    search.key[lane] = exact_key(search, lane, search.geometry[lane], search.primitive[lane], search.distance[lane]);
+    if (search.key[lane] == kNoKey) search.misled[lane] = true;
+  }
+  const float before = search.found[lane] ? search.distance[lane] : std::numeric_limits<float>::infinity();
+  if (!search.found[lane] || key > search.key[lane]) {
+    search.geometry[lane] = geometry;
+    search.primitive[lane] = primitive;
+    search.key[lane] = key;
+    search.distance[lane] = distance;
+    search.found[lane] = true;
+  }
+  return distance < before;
+}
+
+/// Embree offers candidates in any order; those at most kSlack behind the nearest are still of interest.
+void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
+  auto& search = *reinterpret_cast<Search*>(arguments->context);
+  for (unsigned int i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    const std::size_t lane = RTCRayN_id(arguments->ray, arguments->N, i);
+    const unsigned int outer = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
+    const RayGeometry& geometry =
+        search.geometries[outer != RTC_INVALID_GEOMETRY_ID ? outer : RTCHitN_geomID(arguments->hit, arguments->N, i)];
+    const std::uint32_t primitive = RTCHitN_primID(arguments->hit, arguments->N, i);
+    float& limit = RTCRayN_tfar(arguments->ray, arguments->N, i);
+    const float distance = limit;
+    const float gap = search.found[lane] ? distance - search.distance[lane] : -std::numeric_limits<float>::infinity();
+    bool nearest = gap < -kSlack;
+    if (search.through || distance < search.weigh_below[lane] || std::abs(gap) <= kSlack) {
+      nearest = weigh(search, lane, geometry, primitive, distance);
+    } else if (nearest) {
+      search.found[lane] = true;
+      search.distance[lane] = distance;
+      search.geometry[lane] = geometry;
+      search.primitive[lane] = primitive;
+      search.key[lane] = kNoKey;
+      __builtin_prefetch(&corners_of(search, lane));
+    }
+    if (nearest && !search.through) {
+      limit = std::min(distance + kSlack, search.reach[lane]);
+    } else {
+      arguments->valid[i] = 0;
+    }
+  }
+}
+
+/// Where a packet's pixels go: lane i to keys[pixel[i]] of a tile.
+struct Packet {
+  std::size_t count = 0;
+  std::array<std::uint32_t, kWidth> pixel{};
+  std::array<double, kWidth> x{};  ///< of the view
+  std::array<double, kWidth> y{};
+};
+
+/// One thread's work on a tile.
+class TileTracer {
+ public:
+  TileTracer(const Scene& scene, const RayScene& rays, const View& view) : rays_(rays) {
+    embree::start(search_.context, embree::Rays::Coherent);
+    search_.scene = &scene;
+    search_.geometries = rays.geometries();
+    search_.view = &view;
+    stand_at(rays.space().from_world(view.eye));
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      embree_.ray.tnear[i] = 0.0F;
+      embree_.ray.time[i] = 0.0F;
+      embree_.ray.mask[i] = 0xFFFFFFFFU;
+      embree_.ray.id[i] = static_cast<unsigned int>(i);
+      embree_.ray.flags[i] = 0;
+    }
+  }
+
+  /// Merges the keys of `pixels`, which lie in the tile at (x0, y0). Returns whether any surface is seen.
+  bool trace(const Rect& pixels, int x0, int y0, std::span<Key> keys) {
+    bool any = false;
+    for (int y = pixels.y0; y < pixels.y1; y = (y / kPacketHeight + 1) * kPacketHeight) {
+      for (int x = pixels.x0; x < pixels.x1; x = (x / kPacketWidth + 1) * kPacketWidth) {
+        const Rect square{x, y, std::min(pixels.x1, (x / kPacketWidth + 1) * kPacketWidth),
+                          std::min(pixels.y1, (y / kPacketHeight + 1) * kPacketHeight)};
+        Packet packet;
+        for (int row = square.y0; row < square.y1; ++row) {
+          for (int column = square.x0; column < square.x1; ++column) {
+            packet.pixel[packet.count] = static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0);
+            packet.x[packet.count] = column + 0.5;
+            packet.y[packet.count++] = row + 0.5;
+          }
+        }
+        any = trace(packet, keys) || any;
+      }
+    }
+    return any;
+  }
+
+  [[nodiscard]] PrimaryRayStats stats() const {
+    PrimaryRayStats stats = stats_;
+    stats.weighed = search_.weighed;
+    return stats;
+  }
+
+ private:
+  bool trace(const Packet& packet, std::span<Key> keys) {
+    stats_.rays += packet.count;
+    for (std::size_t i = 0; i < packet.count; ++i) aim(i, view_ray(*search_.view, packet.x[i], packet.y[i]));
+    for (std::size_t i = packet.count; i < kWidth; ++i) leave_out(i);
+    search_.through = false;
+    intersect();
+    const std::size_t again = settle();
+    if (again > 0) {
+      stats_.retraced += again;
+      search_.through = true;
+      intersect();
+    }
+    bool any = false;
+    for (std::size_t i = 0; i < packet.count; ++i) {
+      if (!search_.found[i]) continue;
+      Key& key = keys[packet.pixel[i]];
+      key = std::max(key, search_.key[i]);
+      any = true;
+    }
+    return any;
+  }
+
+  /// Where rays come from, in ray space.
+  void stand_at(const glm::dvec3& eye) {
+    eye_ = eye;
+    outside_ = glm::length(eye) - kAround;
+  }
+
+  /// Ray space's origin and unit direction, moved along the ray as far as nothing can be missed: a start near the scene
+  /// keeps digits that a far eye's coordinates would lose.
+  void aim(std::size_t lane, const Ray& ray) {
+    const RaySpace& space = rays_.space();
+    const View& view = *search_.view;
+    const double length = glm::length(ray.direction);
+    const glm::dvec3 direction = ray.direction * (1.0 / length);
+    if (view.orthographic) stand_at(space.from_world(ray.origin));
+    const double scale = length * space.scale;
+    const double near = view.near_distance * scale;
+    const double start = std::max({0.0, near - static_cast<double>(kSlack), outside_});
+    const glm::dvec3 origin = eye_ + start * direction;
+    const double reach = view.orthographic ? view.far_distance * scale - start + static_cast<double>(kSlack)
+                                           : std::numeric_limits<double>::infinity();
+    search_.ray[lane] = ray;
+    search_.scale[lane] = scale;
+    search_.start[lane] = start;
+    search_.reach[lane] = static_cast<float>(reach);
+    search_.weigh_below[lane] = static_cast<float>(near - start) + kSlack;
+
+    embree::RayPacket& rays = embree_.ray;
+    rays.org_x[lane] = static_cast<float>(origin.x);
+    rays.org_y[lane] = static_cast<float>(origin.y);
+    rays.org_z[lane] = static_cast<float>(origin.z);
+    rays.dir_x[lane] = static_cast<float>(direction.x);
+    rays.dir_y[lane] = static_cast<float>(direction.y);
+    rays.dir_z[lane] = static_cast<float>(direction.z);
+    const glm::dvec3 size = glm::abs(origin);
+    // Comparisons with NaN are false, so NaN fails here too. A direction of unit length needs no more than that.
+    const bool usable = size.x < kFarthestRay && size.y < kFarthestRay && size.z < kFarthestRay && length > 0.0 &&
+                        length < kFarthestRay && reach >= 0.0;
+    valid_[lane] = usable ? -1 : 0;
+    if (!usable) {
+      leave_out(lane);
+      ++stats_.invalid;
+    }
+  }
+
+  /// The mask alone does not do: where Embree has no native packet of this width it goes by tnear <= tfar instead, and
+  /// its assertions look at every lane.
+  void leave_out(std::size_t lane) {
+    embree::RayPacket& rays = embree_.ray;
+    rays.org_x[lane] = rays.org_y[lane] = rays.org_z[lane] = 0.0F;
+    rays.dir_x[lane] = rays.dir_y[lane] = rays.dir_z[lane] = 1.0F;
+    search_.reach[lane] = -1.0F;
+    valid_[lane] = 0;
+  }
+
+  void intersect() {
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      embree_.ray.tfar[i] = search_.reach[i];
+      embree_.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      embree_.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+      if (valid_[i] == 0) continue;
+      search_.found[i] = false;
+      search_.misled[i] = false;
+      search_.key[i] = kNoKey;
+    }
+    embree::intersect(valid_.data(), rays_.embree(), search_.context, &keep_largest_key, embree_);
+  }
+
+  /// Reckons the keys still missing; leaves valid, and returns the number of, the lanes to trace once more.
+  std::size_t settle() {
+    // Triangles of neighbouring pixels lie far apart in memory: all are asked for before the first is used.
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      if (valid_[i] == 0 || !search_.found[i]) continue;
+      const Mesh& mesh = search_.scene->mesh_of(search_.scene->instances[search_.geometry[i].instance]);
+      const glm::uvec3& corners = corners_of(search_, i);
+      for (int corner = 0; corner < 3; ++corner) __builtin_prefetch(&mesh.positions[corners[corner]]);
+    }
+    std::size_t again = 0;
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      if (valid_[i] == 0) continue;
+      if (search_.found[i] && search_.key[i] == kNoKey) {
+        search_.key[i] = exact_key(search_, i, search_.geometry[i], search_.primitive[i], search_.distance[i]);
+        search_.misled[i] = search_.misled[i] || search_.key[i] == kNoKey;
+      }
+      if (search_.misled[i]) {
+        ++again;
+      } else {
+        valid_[i] = 0;
+      }
+    }
+    for (std::size_t i = 0; again > 0 && i < kWidth; ++i) {
+      if (valid_[i] == 0) leave_out(i);
+    }
+    return again;
+  }
+
+  const RayScene& rays_;
+  glm::dvec3 eye_{0.0};
+  double outside_ = 0.0;  ///< how far the eye lies outside of what the scene can fill
+  Search search_{};
+  embree::HitPacket embree_{};
+  alignas(64) std::array<int, kWidth> valid_{};
+  PrimaryRayStats stats_;
+};
+
+}  // namespace
+
+PrimaryRays::PrimaryRays(const Scene& scene, const RayScene& rays, int threads)
+    : scene_(scene), rays_(rays), threads_(threads), boxes_(mesh_boxes(scene)) {}
+
+void PrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
+  const FrameLayout& layout = layer.layout();
+  HPR_CHECK(screen < layout.screens() && layout.size(screen) == view.size());
+  HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
+  stats_ = {};
+  if (rays_.geometries().empty()) return;
+  const TileRun run = layout.tiles_of(screen);
+  const std::vector<std::uint8_t> occupied = occupied_tiles(scene_, rays_, boxes_, view, layout, screen);
+  std::mutex mutex;
+  parallel_for(threads_, run.count, [&](std::size_t i) {
+    if (occupied[i] == 0) return;
+    const std::size_t tile = run.first + i;
+    const Rect place = layout.place(tile).pixels;
+    const DenormalsAsZero mode;
+    TileTracer tracer(scene_, rays_, view);
+    bool any = false;
+    for (const Rect& part : parts) {
+      const Rect pixels = intersection(part, place);
+      if (!pixels.empty()) any = tracer.trace(pixels, place.x0, place.y0, layer.tile(tile)) || any;
+    }
+    if (any) layer.set_active(tile);
+    const std::lock_guard lock(mutex);
+    stats_ += tracer.stats();
+  });
+}
+
+}  // namespace hpr

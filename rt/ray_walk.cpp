@@ -1,0 +1,107 @@
+#include "rt/ray_walk.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "core/check.h"
+#include "rt/bsdf.h"
+
+namespace hpr {
+
+void RayWalk::push(const RayRequest& ray, RayBatch& batch) const {
+  // Space is scaled by a power of two, so an infinite reach stays one.
+  batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale);
+}
+
+double RayWalk::size_of(const glm::dvec3& place) const {
+  const glm::dvec3 seen = space_.from_world(place);
+  return std::max({std::abs(seen.x), std::abs(seen.y), std::abs(seen.z), 1.0}) / space_.scale;
+}
+
+double RayWalk::coverage_of(const SurfacePoint& point) const {
+  return evaluate_alpha(scene_, scene_.materials[point.material], point.uv, point.color.a);
+}
+
+void RayWalk::go_beyond(RayRequest& ray, const SurfacePoint& point) {
+  const glm::dvec3 origin = point.position - point.offset * point.geometric_normal;
+  if (std::isfinite(ray.reach)) {
+    ray.reach = std::max(0.0, ray.reach - glm::dot(origin - ray.origin, ray.direction));
+  }
+  ray.origin = origin;
+}
+
+void RayWalk::visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, const Visit& visit) const {
+  if (holed_ == nullptr) return;
+  scratch.waiting.resize(rays.size());
+  std::iota(scratch.waiting.begin(), scratch.waiting.end(), 0U);
+  WorldTriangle triangle;
+  for (int layer = 0; layer < kMostLayers && !scratch.waiting.empty(); ++layer) {
+    scratch.batch.clear();
+    for (const std::uint32_t ray : scratch.waiting) push(rays[ray], scratch.batch);
+    scratch.surfaces.resize(scratch.waiting.size());
+    (void)holed_->closest(scratch.batch, scratch.surfaces);
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < scratch.waiting.size(); ++i) {
+      if (scratch.surfaces[i] == kNoSurface) continue;
+      const std::uint32_t ray = scratch.waiting[i];
+      surfaces_.load(scratch.surfaces[i], triangle);
+      const SurfacePoint point = surfaces_.meet(triangle, rays[ray].origin, rays[ray].direction);
+      if (!visit(ray, point, coverage_of(point))) continue;
+      go_beyond(rays[ray], point);
+      scratch.waiting[left++] = ray;
+    }
+    scratch.waiting.resize(left);
+  }
+}
+
+std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::optional<SurfacePoint>> hits,
+                               WalkScratch& scratch) const {
+  HPR_CHECK(hits.size() == rays.size());
+  scratch.batch.clear();
+  for (const RayRequest& ray : rays) push(ray, scratch.batch);
+  scratch.surfaces.resize(rays.size());
+  const std::uint64_t invalid = opaque_.closest(scratch.batch, scratch.surfaces);
+  WorldTriangle triangle;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    hits[i].reset();
+    if (scratch.surfaces[i] == kNoSurface) continue;
+    surfaces_.load(scratch.surfaces[i], triangle);
+    hits[i] = surfaces_.meet(triangle, rays[i].origin, rays[i].direction);
+  }
+  if (holed_ == nullptr) return invalid;
+  scratch.rest.assign(rays.begin(), rays.end());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!hits[i]) continue;
+    RayRequest& ray = scratch.rest[i];
+    ray.reach = std::min(ray.reach, glm::dot(hits[i]->position - ray.origin, ray.direction));
+  }
+  visit_holed(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint& point, double coverage) {
+    if (coverage < 1.0 && !(rays[i].sampler->one() < coverage)) return true;
+    hits[i] = point;
+    return false;
+  });
+  return invalid;
+}
+
+std::uint64_t RayWalk::passed(std::span<const RayRequest> rays, std::span<float> passed, WalkScratch& scratch) const {
+  HPR_CHECK(passed.size() == rays.size());
+  scratch.batch.clear();
+  for (const RayRequest& ray : rays) push(ray, scratch.batch);
+  scratch.blocked.resize(rays.size());
+  const std::uint64_t invalid = opaque_.occluded(scratch.batch, scratch.blocked);
+  for (std::size_t i = 0; i < rays.size(); ++i) passed[i] = scratch.blocked[i] != 0 ? 0.0F : 1.0F;
+  if (holed_ == nullptr) return invalid;
+  scratch.rest.assign(rays.begin(), rays.end());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (passed[i] == 0.0F) scratch.rest[i].reach = 0.0;
+  }
+  visit_holed(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint&, double coverage) {
+    passed[i] *= static_cast<float>(1.0 - coverage);
+    return passed[i] > 0.0F;
+  });
+  return invalid;
+}
+
+}  // namespace hpr

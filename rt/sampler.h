@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+
+namespace hpr {
+
+/// One sample's random numbers: an Owen-scrambled Sobol' sequence in two dimensions, padded with freshly scrambled and
+/// shuffled copies for every further pair (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020). A number depends
+/// on the stream, the sample's index and how many numbers were drawn before; on nothing else.
+class Sampler {
+ public:
+  Sampler() = default;
+  /// `stream` says whose numbers these are (see pixel_stream); `index` is the sample: those of one stream are spread
+  /// evenly together.
+  Sampler(std::uint64_t stream, std::uint32_t index) : stream_(stream), index_(index) {}
+
+  /// In [0, 1), on a grid of 2^-32.
+  [[nodiscard]] double one();
+  [[nodiscard]] glm::dvec2 two();
+
+  /// A sampler for one of the ways a path goes on from here, whose numbers have nothing to do with those drawn here.
+  [[nodiscard]] Sampler branch(std::uint32_t which) const;
+
+ private:
+  std::uint64_t stream_ = 0;
+  std::uint32_t index_ = 0;
+  std::uint32_t drawn_ = 0;
+};
+
+/// What all randomness of a frame starts from.
+struct RandomKey {
+  std::uint64_t seed = 1;
+  std::uint64_t frame = 0;
+
+  bool operator==(const RandomKey&) const = default;
+};
+
+/// Which of a frame's samples is taken: each draws random numbers of its own, and those of one frame are spread evenly.
+struct SampleNumber {
+  std::uint64_t frame = 0;
+  std::uint32_t sample = 0;
+
+  bool operator==(const SampleNumber&) const = default;
+};
+
+/// The stream of a pixel: x and y count from the upper left corner of its whole screen, so that neither tiles, nor
+/// blocks, nor ranks change it.
+[[nodiscard]] std::uint64_t pixel_stream(const RandomKey& key, std::uint32_t screen, int x, int y);
+
+/// The stream of a photon, which is one sample of it.
+[[nodiscard]] std::uint64_t photon_stream(const RandomKey& key);
+
+}  // namespace hpr

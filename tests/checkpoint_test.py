@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Runs that are interrupted: SIGUSR1 writes a checkpoint and stops with 75, SIGUSR2 writes one and goes on, and a run
+that is resumed, by any number of ranks, ends with the bits of one that was not interrupted.
+
+usage: checkpoint_test.py HPR
+
+Signals go to hpr itself, which passes them to its mpiexec, and to a single rank of a job of several. Prints what is
+wrong and leaves with 1.
+"""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+
+HPR = os.path.abspath(sys.argv[1])
+SAMPLES = 400
+COMMON = ["--progress", "line", "--threads", "1", "--photons", "1000"]
+ARGUMENTS = ["render", "gen:gallery", "--size", "96x64", *COMMON]
+failures = []
+
+
+def check(holds, message):
+    if not holds:
+        failures.append(message)
+        print(message)
+
+
+def run(folder, *arguments):
+    return subprocess.run([HPR, *ARGUMENTS, *arguments], cwd=folder, capture_output=True, text=True, timeout=300,
+                          check=False)
+
+
+def children_of(pid):
+    found = []
+    for status in pathlib.Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = status.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid:
+            found.append(int(status.parent.name))
+    return found
+
+
+def last_rank_of(pid):
+    """A rank of the job that `pid` started: the youngest child of its mpiexec."""
+    return max(rank for mpiexec in children_of(pid) for rank in children_of(mpiexec))
+
+
+def interrupt(folder, wanted, target, *arguments):
+    """Starts hpr and sends it `wanted` once some samples are done. Returns its code, its stderr, and the samples that
+    were done when the signal went out."""
+    process = subprocess.Popen([HPR, *ARGUMENTS, *arguments], cwd=folder, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True)
+    lines = []
+    done = None
+    for line in process.stderr:
+        lines.append(line)
+        if done is None and line.startswith("hpr: sample ") and int(line.split()[2].split("/")[0]) >= 12:
+            done = int(line.split()[2].split("/")[0])
+            os.kill(target(process.pid), wanted)
+    return process.wait(timeout=300), "".join(lines), done
+
+
+def samples_in(message):
+    for line in message.splitlines():
+        if " samples are in " in line:
+            return int(line.split(" samples are in ")[0].split()[-1])
+    return None
+
+
+def itself(pid):
+    return pid
+
+
+def stop_and_resume(folder, whole, case, target, before, after):
+    code, message, sent_at = interrupt(folder, signal.SIGUSR1, target, "-o", "a.exr", "--spp", str(SAMPLES), *before)
+    check(code == 75, f"{case}: left with {code} instead of 75: {message[-800:]}")
+    check(not (folder / "a.exr").exists(), f"{case}: stopped, but wrote a picture")
+    stopped_at = samples_in(message)
+    check(stopped_at is not None and sent_at <= stopped_at < SAMPLES, f"{case}: sent at {sent_at}, stopped at {stopped_at}")
+    if not (folder / "a.exr.checkpoint").exists():
+        check(False, f"{case}: no checkpoint")
+        return
+    result = run(folder, "-o", "a.exr", "--spp", str(SAMPLES), "--resume", *after)
+    check(result.returncode == 0, f"{case}: resuming left with {result.returncode}: {result.stderr[-800:]}")
+    check(f"after {stopped_at} samples" in result.stderr, f"{case}: does not say where it goes on")
+    check(f"hpr: sample {stopped_at} " not in result.stderr, f"{case}: drew samples again")
+    same = (folder / "a.exr").exists() and (folder / "a.exr").read_bytes() == whole
+    check(same, f"{case}: other bits than a run without a break")
+    for name in ("a.exr", "a.exr.checkpoint"):
+        (folder / name).unlink(missing_ok=True)
+
+
+def write_and_go_on(folder, whole):
+    code, message, _ = interrupt(folder, signal.SIGUSR2, itself, "-o", "b.exr", "--spp", str(SAMPLES),
+                                 "--checkpoint", "b.state")
+    check(code == 0, f"USR2: left with {code}: {message[-800:]}")
+    check((folder / "b.exr").read_bytes() == whole, "USR2: other bits than a run without a break")
+    written_at = samples_in(message)
+    state = folder / "b.state"
+    check(written_at is not None and state.exists(), "USR2: no checkpoint")
+    return state
+
+
+def refusals(folder, state):
+    resume = ["--resume", "--checkpoint", state.name, "-o", "c.exr"]
+    scene, size = ["gen:gallery"], ["--size", "96x64"]
+    foreign = {"scene": ["gen:cornell", *size], "seed": [*scene, *size, "--seed", "2"], "view": [*scene, "--size", "95x64"],
+               "filter": [*scene, *size, "--filter", "gaussian"], "view 0": [*scene, *size, "--fov", "30"],
+               "passes": [*scene, *size, "--passes", "none"], "depth": [*scene, *size, "--max-depth", "3"],
+               "AOVs": [*scene, *size, "--aov", "id"]}
+    for field, arguments in foreign.items():
+        result = subprocess.run([HPR, "render", *arguments, *COMMON, "--spp", "20", *resume], cwd=folder,
+                                capture_output=True, text=True, timeout=300, check=False)
+        check(result.returncode == 3 and "another run" in result.stderr and field in result.stderr,
+              f"another {field}: left with {result.returncode}: {result.stderr}")
+    whole = bytearray(state.read_bytes())
+    whole[len(whole) // 2] ^= 1
+    (folder / "damaged").write_bytes(whole)
+    for ranks in ("1", "2"):
+        result = run(folder, "--spp", str(SAMPLES), "--resume", "--checkpoint", "damaged", "-o", "c.exr", "--ranks", ranks)
+        check(result.returncode == 3 and "damaged" in result.stderr, f"damaged, {ranks} ranks: {result.returncode}")
+    result = run(folder, "--spp", "20", "--resume", "--checkpoint", "none", "-o", "c.exr")
+    check(result.returncode == 4, f"no checkpoint: left with {result.returncode}")
+    result = run(folder, "--spp", "20", "-o", "c.exr", "--checkpoint", state.name)
+    check(result.returncode == 4 and "--force" in result.stderr, f"checkpoint in the way: left with {result.returncode}")
+    check(not (folder / "c.exr").exists(), "a refused run wrote a picture")
+
+
+def enough_samples(folder):
+    """A checkpoint that has all that is asked for."""
+    code, message, _ = interrupt(folder, signal.SIGUSR1, itself, "-o", "e.exr", "--spp", "1000000")
+    check(code == 75, f"a million samples: left with {code}")
+    stopped_at = samples_in(message)
+    result = run(folder, "-o", "e.exr", "--spp", str(stopped_at), "--resume")
+    check(result.returncode == 0, f"resuming at the goal: left with {result.returncode}: {result.stderr[-800:]}")
+    result = run(folder, "-o", "f.exr", "--spp", str(stopped_at), "--ranks", "2")
+    check((folder / "e.exr").read_bytes() == (folder / "f.exr").read_bytes(), "a checkpoint at its goal gives other bits")
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="hpr-checkpoint-") as scratch:
+        folder = pathlib.Path(scratch)
+        result = run(folder, "-o", "whole.exr", "--spp", str(SAMPLES))
+        if result.returncode != 0:
+            sys.exit(f"an unbroken run left with {result.returncode}: {result.stderr}")
+        whole = (folder / "whole.exr").read_bytes()
+        sort_last = ["--ranks", "3", "--distribute", "sort-last", "--strategy", "binary-swap"]
+        stop_and_resume(folder, whole, "one rank, then three", itself, [], sort_last)
+        stop_and_resume(folder, whole, "three ranks, then two", itself, sort_last, ["--ranks", "2"])
+        stop_and_resume(folder, whole, "a signal to one rank of two", last_rank_of, ["--ranks", "2"], [])
+        state = write_and_go_on(folder, whole)
+        if state.exists():
+            refusals(folder, state)
+        enough_samples(folder)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
