@@ -14,8 +14,7 @@ constexpr double kReach = 0.25;
 class AmbientOcclusionPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "ambient-occlusion"; }
-  [[nodiscard]] const Requirement& requirement(const Requirements& scene,
-                                               const RaySettings& /*settings*/) const override {
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
     return scene.ambient_occlusion;
   }
   [[nodiscard]] bool runs_by_default(const RaySettings& /*settings*/) const override { return false; }

@@ -45,9 +45,6 @@ struct RaySettings {
 /// Photons sent per sample where the pass is named and nothing says how many.
 inline constexpr std::uint32_t kPhotons = 200'000;
 
-/// Below this roughness specular lobes are followed by rays, unless settings say otherwise.
-inline constexpr double kGlossyCutoff = 0.3;
-
 /// Whether a pass runs for a scene, for --explain and --stats.
 struct PassPlan {
   std::string name;

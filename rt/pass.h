@@ -91,8 +91,7 @@ class Pass {
   [[nodiscard]] virtual std::string_view name() const = 0;
 
   /// Whether the scene can show what this pass adds.
-  [[nodiscard]] virtual const Requirement& requirement(const Requirements& scene,
-                                                       const RaySettings& settings) const = 0;
+  [[nodiscard]] virtual Requirement requirement(const Requirements& scene, const RaySettings& settings) const = 0;
 
   /// Whether it runs where the scene requires it and nobody names it.
   [[nodiscard]] virtual bool runs_by_default(const RaySettings& /*settings*/) const { return true; }

@@ -34,7 +34,7 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
   std::vector<PassPlan> plan;
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());
-    const Requirement& requirement = pass->requirement(scene, settings);
+    const Requirement requirement = pass->requirement(scene, settings);
     const bool named = std::ranges::find(settings.passes, name) != settings.passes.end();
     const bool wanted = named || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(settings));
     if (settings.reference) {

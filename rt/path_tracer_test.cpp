@@ -169,11 +169,7 @@ TEST(PathTracer, RouletteChangesNoMean) {
 
 TEST(PathTracer, GlassInAWhiteSkyIsNotSeen) {
   Scene scene;
-  Material glass = test::matte();
-  glass.roughness = 0.0F;
-  glass.transmission = 1.0F;
-  glass.ior = 1.5F;
-  glass.thickness = 1.0F;
+  Material glass = test::clear_glass(1.5F, 1.0F);
   Mesh smooth = test::sphere(1.0, 8, add_material(scene, glass));
   Mesh faceted;  // with interpolated normals, light is lost where they disagree with the faces
   faceted.material = smooth.material;
@@ -284,11 +280,7 @@ TEST(PathTracer, SheetsThatCoverAQuarterReflectAQuarterAsMuch) {
 
 TEST(PathTracer, AbsorbingGlassDimsByBeersLaw) {
   Scene scene;
-  Material glass = test::matte();
-  glass.roughness = 0.0F;
-  glass.transmission = 1.0F;
-  glass.ior = 1.0F;
-  glass.thickness = 1.0F;
+  Material glass = test::clear_glass(1.0F, 1.0F);
   glass.attenuation_color = glm::vec3(0.5F);
   glass.attenuation_distance = 0.25F;
   const std::uint32_t look = add_material(scene, glass);

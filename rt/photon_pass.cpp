@@ -10,7 +10,7 @@ namespace {
 class PhotonPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "photon"; }
-  [[nodiscard]] const Requirement& requirement(const Requirements& scene, const RaySettings& settings) const override {
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     return settings.global_photons && !scene.photon.needed ? scene.indirect : scene.photon;
   }
   [[nodiscard]] bool runs_by_default(const RaySettings& settings) const override { return settings.photons > 0; }

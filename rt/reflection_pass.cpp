@@ -7,9 +7,10 @@ namespace {
 class ReflectionPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "reflection"; }
-  [[nodiscard]] const Requirement& requirement(const Requirements& scene,
-                                               const RaySettings& /*settings*/) const override {
-    return scene.reflection;
+  /// Settings may follow rougher surfaces than those that mirror to the eye; what is followed takes no photons.
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    if (scene.reflection.needed || !(scene.least_roughness < settings.glossy_cutoff)) return scene.reflection;
+    return {true, "materials are smoother than the glossy cutoff"};
   }
   [[nodiscard]] const Lobe* follows() const override { return &kLobe; }
 

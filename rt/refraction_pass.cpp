@@ -7,8 +7,7 @@ namespace {
 class RefractionPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "refraction"; }
-  [[nodiscard]] const Requirement& requirement(const Requirements& scene,
-                                               const RaySettings& /*settings*/) const override {
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
     return scene.refraction;
   }
   [[nodiscard]] const Lobe* follows() const override { return &kLobe; }

@@ -12,8 +12,7 @@ namespace {
 class ShadowPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "shadow"; }
-  [[nodiscard]] const Requirement& requirement(const Requirements& scene,
-                                               const RaySettings& /*settings*/) const override {
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
     return scene.shadow;
   }
 

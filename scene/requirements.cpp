@@ -86,7 +86,7 @@ Requirements requirements_of(const Scene& scene) {
   Requirements needs;
   if (materials.empty()) {
     const Requirement nothing{false, "the scene has no triangles"};
-    return {nothing, nothing, nothing, nothing, nothing, nothing};
+    return {nothing, nothing, nothing, nothing, nothing, nothing, 1.0F};
   }
   needs.shadow = lights > 0 ? Requirement{true, counted(lights, "light casts shadows", "lights cast shadows")}
                             : Requirement{false, "no light casts shadows"};
@@ -99,6 +99,9 @@ Requirements requirements_of(const Scene& scene) {
                      ? Requirement{true, "lights reach smooth or clear materials, which bundle it into caustics"}
                      : Requirement{false, "no light can be bundled into caustics"};
   const auto rough = static_cast<std::size_t>(std::ranges::count_if(materials, scatters));
+  for (const Material* material : materials) {
+    needs.least_roughness = std::min(needs.least_roughness, least_roughness(scene, *material));
+  }
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};
