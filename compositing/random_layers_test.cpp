@@ -70,8 +70,12 @@ struct Case {
   std::vector<TileLayer<Key>> layers;
 };
 
+/// `auto` measures the machine for every new set of ranks, which under sanitizers takes longer than all else together:
+/// it takes part in one set of so many.
+constexpr std::uint64_t kSetsPerAuto = 16;
+
 /// Composites the case by every strategy and brings each frame to its screens; returns what is wrong.
-std::string faults(const Case& one) {
+std::string faults(const Case& one, bool with_auto) {
   const std::vector<Key> expected = one.expected();
   std::string wrong;
   std::mutex mutex;
@@ -79,6 +83,7 @@ std::string faults(const Case& one) {
     const auto memory = comm.share(TileLayer<Key>::bytes_for(one.layout));
     Assembler assembler;
     for (const auto& compositor : all_compositors()) {
+      if (compositor->name() == "auto" && !with_auto) continue;
       TileLayer<Key> layer(one.layout, memory);
       copy_tiles(one.layers[static_cast<std::size_t>(comm.rank())], layer, all_tiles(one.layout));
       const Composited mine = compositor->composite(comm, layer, one.tiles, one.shown_by);
@@ -102,7 +107,7 @@ TEST(RandomLayers, EveryStrategyGivesTheNearestKeysOfEverySet) {
   const std::uint64_t count = sets != nullptr ? std::stoull(sets) : 150;
   for (std::uint64_t seed = 0; seed < count; ++seed) {
     const Case one(seed);
-    ASSERT_EQ(faults(one), "") << "seed " << seed << ", " << one.ranks.size << " ranks";
+    ASSERT_EQ(faults(one, seed % kSetsPerAuto == 0), "") << "seed " << seed << ", " << one.ranks.size << " ranks";
   }
 }
 
