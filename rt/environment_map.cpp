@@ -38,25 +38,35 @@ EnvironmentMap::EnvironmentMap(const Environment& environment) : environment_(&e
   HPR_CHECK(size.area() > 0);
   texel_sums_.reserve(size.area());
   double sum = 0.0;
+  double squares = 0.0;
   for (int y = 0; y <= size.height; ++y) row_cosines_.push_back(std::cos(kPi * y / size.height));
   row_cosines_.back() = -1.0;
   for (int y = 0; y < size.height; ++y) {
     glm::dvec3 row(0.0);
     double row_sum = 0.0;
+    double row_squares = 0.0;
     for (int x = 0; x < size.width; ++x) {
       const glm::dvec3 radiance = texel_mean(x, y);
       row += radiance;
       texel_sums_.push_back(row_sum += brightness(radiance));
+      row_squares += brightness(radiance) * brightness(radiance);
     }
     const auto at = static_cast<std::size_t>(y);
     const double share = 0.5 * (row_cosines_[at] - row_cosines_[at + 1]) / size.width;  // of the sphere, per texel
     mean_ += share * row;
     row_sums_.push_back(sum += share * row_sum);
+    squares += share * row_squares;
   }
+  // Relative variances of one sample of a matte surface under open sky: by the cosine, that of the brightness; by
+  // brightness, for a constant one, 5/3. Each has its share by how little the other is good for.
+  constexpr double kByBrightness = 5.0 / 3.0;
+  const double by_cosine = sum > 0.0 ? std::max(0.0, squares / (sum * sum) - 1.0) : 0.0;
+  cosine_share_ = size.area() == 1 ? 1.0 : kByBrightness / (kByBrightness + by_cosine);
 }
 
 EnvironmentMap::Seen EnvironmentMap::look(const glm::dvec3& direction) const {
   const Size size = environment_->image.size();
+  if (size.area() == 1) return {mean_, row_sums_.back() > 0.0 ? 0.25 / kPi : 0.0};
   const double turn = 0.5 + (std::atan2(direction.x, -direction.z) + environment_->rotation_radians) / (2.0 * kPi);
   const double s = (turn - std::floor(turn)) * size.width;
   const double t = std::acos(std::clamp(direction.y, -1.0, 1.0)) / kPi * size.height;

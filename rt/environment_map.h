@@ -28,6 +28,10 @@ class EnvironmentMap {
   /// Radiance, averaged over all directions.
   [[nodiscard]] const glm::dvec3& mean() const { return mean_; }
 
+  /// How much of a matte surface's samples are better spread by the cosine than by brightness: 1 for a constant
+  /// picture, near 0 for one with a sun in it.
+  [[nodiscard]] double cosine_share() const { return cosine_share_; }
+
  private:
   [[nodiscard]] glm::dvec3 texel(int x, int y) const;
   [[nodiscard]] glm::dvec3 texel_mean(int x, int y) const;
@@ -37,6 +41,7 @@ class EnvironmentMap {
   std::vector<double> row_sums_;     ///< of brightness times solid angle
   std::vector<double> texel_sums_;   ///< of brightness, starting anew in every row
   glm::dvec3 mean_{0.0};
+  double cosine_share_ = 1.0;
 };
 
 }  // namespace hpr

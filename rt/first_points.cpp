@@ -24,13 +24,13 @@ PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, co
 /// See find_first_points.
 class FirstPoints {
  public:
-  FirstPoints(TileWork& tile, const TileJob& job, std::vector<PathPoint>& points)
-      : tile_(tile), job_(job), points_(points) {}
+  FirstPoints(TileWork& tile, const TileJob& job, const RowRange& rows, std::vector<PathPoint>& points)
+      : tile_(tile), job_(job), rows_(rows), points_(points) {}
 
   void find() {
     if (tile_.rays != nullptr && tile_.rays->has_holes()) look_through_holes();
     WorldTriangle triangle;
-    for (int y = 0; y < job_.place.height(); ++y) {
+    for (int y = rows_.first; y < rows_.end; ++y) {
       for (int x = 0; x < job_.place.width(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         const double share = left_.empty() ? 1.0 : left_[pixel];
@@ -58,7 +58,7 @@ class FirstPoints {
     left_.assign(kTilePixels, 1.0);
     tile_.requests.clear();
     WorldTriangle triangle;
-    for (int y = 0; y < job_.place.height(); ++y) {
+    for (int y = rows_.first; y < rows_.end; ++y) {
       for (int x = 0; x < job_.place.width(); ++x) {
         const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
         const Ray ray = ray_of(x, y);
@@ -93,14 +93,15 @@ class FirstPoints {
 
   TileWork& tile_;
   const TileJob& job_;
+  RowRange rows_;
   std::vector<PathPoint>& points_;
   std::vector<double> left_;  ///< per pixel: the share not yet covered; empty where nothing covers in part
 };
 
 }  // namespace
 
-void find_first_points(TileWork& tile, const TileJob& job, std::vector<PathPoint>& points) {
-  FirstPoints(tile, job, points).find();
+void find_first_points(TileWork& tile, const TileJob& job, const RowRange& rows, std::vector<PathPoint>& points) {
+  FirstPoints(tile, job, rows, points).find();
 }
 
 }  // namespace hpr

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "rt/pick.h"
+#include "rt/warp.h"
 #include "scene/requirements.h"
 
 namespace hpr {
@@ -142,7 +143,7 @@ std::optional<LightSet::Chosen> LightSet::choose(const Choices& choices, const g
   const double share = outside_share(choices, place, normal);
   if (u < share) {
     const Picked picked = pick(choices.outside_sums, u / share);
-    return Chosen{choices.outside[picked.index], share * picked.probability};
+    return Chosen{choices.outside[picked.index], share * picked.probability, picked.rest};
   }
   if (!(share < 1.0)) return std::nullopt;
   const auto choice = choices.tree.choose(place, normal, (u - share) / (1.0 - share));
@@ -160,17 +161,31 @@ std::optional<LightSample> LightSet::sample(const Choices& choices, const glm::d
   } else if (chosen->light < environment_number()) {
     sample = triangles_.sample(chosen->light - punctual_.size(), place, u);
   } else {
-    sample.to_light = environment_->sample(u);
-    sample.distance = std::numeric_limits<double>::infinity();
-    const EnvironmentMap::Seen seen = environment_->look(sample.to_light);
-    sample.pdf = seen.pdf;
-    if (seen.pdf > 0.0) sample.weight = seen.radiance / seen.pdf;
+    sample_environment(normal, chosen->rest, u, sample);
   }
   sample.weight /= chosen->probability;
   sample.pdf *= chosen->probability;
   const double weight = mean_of(sample.weight);
   if (!(weight > 0.0) || !std::isfinite(weight)) return std::nullopt;
   return sample;
+}
+
+/// By brightness or by the cosine, as suits the environment; the density is that of both together.
+void LightSet::sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u,
+                                  LightSample& sample) const {
+  const bool by_cosine = normal != glm::dvec3(0.0) && rest < environment_->cosine_share();
+  sample.to_light = by_cosine ? warp::cosine_lobe(normal, u) : environment_->sample(u);
+  sample.distance = std::numeric_limits<double>::infinity();
+  const EnvironmentMap::Seen seen = environment_->look(sample.to_light);
+  sample.pdf = environment_density(seen.pdf, normal, sample.to_light);
+  if (sample.pdf > 0.0) sample.weight = seen.radiance / sample.pdf;
+}
+
+double LightSet::environment_density(double by_brightness, const glm::dvec3& normal,
+                                     const glm::dvec3& direction) const {
+  if (normal == glm::dvec3(0.0)) return by_brightness;
+  const double share = environment_->cosine_share();
+  return (1.0 - share) * by_brightness + share * std::max(0.0, glm::dot(normal, direction)) / kPi;
 }
 
 double LightSet::surface_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
@@ -189,7 +204,7 @@ double LightSet::environment_pdf(const Choices& choices, const glm::dvec3& place
   const double before = choices.outside.size() > 1 ? choices.outside_sums[choices.outside.size() - 2] : 0.0;
   const double sum = choices.outside_sums.back();
   const double probability = outside_share(choices, place, normal) * ((sum - before) / sum);
-  return environment_->look(direction).pdf * probability;
+  return environment_density(environment_->look(direction).pdf, normal, direction) * probability;
 }
 
 std::optional<LightSample> LightSet::sample_one(const glm::dvec3& place, const glm::dvec3& normal, const View& view,

@@ -20,8 +20,9 @@ namespace hpr {
 /// All that gives light in a scene: punctual lights (KHR_lights_punctual), spheres (lights with a radius), triangles
 /// that emit (from both sides, as they are shown), and the environment. Knows nothing of visibility.
 ///
-/// A `normal` stands for the side a surface takes light on: lights wholly below its plane are never chosen. Where light
-/// may also come through the surface, pass a zero normal. All numbers `u` lie in [0, 1).
+/// A `normal` stands for the side a surface takes light on: lights wholly below its plane are never chosen, and an even
+/// sky is sampled by the cosine. Where light may also come through the surface, pass a zero normal. All numbers `u` lie
+/// in [0, 1).
 class LightSet {
  public:
   /// The scene must outlive this. A scene that gives no light (gives_light) gets a headlight. Lights without any
@@ -86,6 +87,7 @@ class LightSet {
   struct Chosen {
     std::size_t light = 0;
     double probability = 0.0;
+    double rest = 0.0;  ///< of the random number, for lights outside the tree
   };
 
   // Lights are numbered: punctual ones, triangles, the environment.
@@ -99,6 +101,9 @@ class LightSet {
   [[nodiscard]] std::optional<LightSample> sample(const Choices& choices, const glm::dvec3& place,
                                                   const glm::dvec3& normal, const View& view, double u_choice,
                                                   const glm::dvec2& u) const;
+  void sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u, LightSample& sample) const;
+  [[nodiscard]] double environment_density(double by_brightness, const glm::dvec3& normal,
+                                           const glm::dvec3& direction) const;
   [[nodiscard]] double surface_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
                                    std::uint32_t surface, const SurfacePoint& hit) const;
   [[nodiscard]] double environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,

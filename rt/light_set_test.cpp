@@ -183,10 +183,42 @@ TEST(LightSet, TheEnvironmentsDensitiesSumToOneOverItsTexels) {
     for (int x = 0; x < 16; ++x) {
       const double angle = 2.0 * kPi * ((x + 0.5) / 16.0 - 0.5);
       const glm::dvec3 w(std::sin(middle) * std::sin(angle), std::cos(middle), -std::sin(middle) * std::cos(angle));
-      sum += lights.environment_pdf_one(glm::dvec3(0.0), kUp, w) * solid_angle;
+      sum += lights.environment_pdf_one(glm::dvec3(0.0), glm::dvec3(0.0), w) * solid_angle;
     }
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
+}
+
+/// The relative standard deviation, over samples, of what an open sky sends to a matte surface.
+double spread_of_sky(const Environment& environment, const glm::dvec3& normal) {
+  Scene scene = hall(0);
+  scene.environment = environment;
+  const LightSet lights(scene);
+  double sum = 0.0;
+  double squares = 0.0;
+  constexpr std::uint32_t kSamples = 16384;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    Sampler sampler(5, i);
+    const double u = sampler.one();
+    const auto sample = lights.sample_one({0, 0, 1}, normal, View{}, u, sampler.two());
+    const double irradiance = sample ? sample->weight.g * std::max(0.0, glm::dot(normal, sample->to_light)) : 0.0;
+    sum += irradiance;
+    squares += irradiance * irradiance;
+  }
+  return std::sqrt(std::max(0.0, squares / kSamples / (sum * sum / kSamples / kSamples) - 1.0));
+}
+
+TEST(LightSet, MatteSurfacesUnderAnEvenSkySeeNoNoise) {
+  const glm::dvec3 normal = glm::normalize(glm::dvec3(0.3, -0.2, 0.8));
+  EXPECT_LT(spread_of_sky(Environment{Image<Rgb>({1, 1}, {2, 2, 2})}, normal), 1e-7);
+  EXPECT_LT(spread_of_sky(Environment{Image<Rgb>({8, 4}, {2, 2, 2})}, normal), 1e-7);
+  Environment clouds{Image<Rgb>({8, 4}, {2, 2, 2})};
+  for (int x = 0; x < 8; x += 2) clouds.image.at(x, 1) = {1, 1, 1};
+  EXPECT_LT(spread_of_sky(clouds, normal), 0.4) << "by brightness alone it is 1.3";
+  Environment sun{Image<Rgb>({64, 32}, {0.01F, 0.01F, 0.01F})};
+  sun.image.at(20, 9) = {1e4F, 1e4F, 1e4F};
+  const glm::dvec3 to_sun = EnvironmentMap(sun).sample({0.5, 0.5});
+  EXPECT_LT(spread_of_sky(sun, to_sun), 1.5) << "by the cosine alone it is above 10";
 }
 
 TEST(LightSet, TheBackgroundIsSeenButLightsNothing) {

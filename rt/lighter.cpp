@@ -22,6 +22,10 @@
 namespace hpr {
 namespace {
 
+/// Points that are worked on together: enough to fill packets, few enough for the second-level cache.
+constexpr std::size_t kWavePoints = 512;
+constexpr int kRowsAtOnce = static_cast<int>(kWavePoints) / kTileSide;
+
 /// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
 struct Scratch {
   Scratch(TileWork tile_work, std::size_t times) : work(std::move(tile_work)), ms(times, 0.0) {}
@@ -80,12 +84,11 @@ void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOut
   }
 }
 
-/// Normal and base colour of what each pixel sees, of several surfaces each by its share.
-void store_first_surfaces(const std::vector<PathPoint>& points, std::size_t index, const LightOutput& output) {
+/// Adds normal and base colour of what each pixel sees, of several surfaces each by its share.
+void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t index, const LightOutput& output) {
   for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
     if (layer == nullptr) continue;
     const auto pixels = layer->tile(index);
-    std::ranges::fill(pixels, Rgb{});
     for (const PathPoint& point : points) {
       const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
       const Rgb part = to_rgb(point.throughput * value);
@@ -152,6 +155,7 @@ struct Lighter::State {
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   std::unique_ptr<Scratch> take_scratch();
   void light_tile(Scratch& scratch, const TileJob& job, std::size_t index, const LightOutput& output) const;
+  void light_waiting(Scratch& scratch) const;
   void light_wave(Scratch& scratch) const;
 };
 
@@ -271,6 +275,24 @@ void Lighter::State::light_wave(Scratch& scratch) const {
   }
 }
 
+/// Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
+void Lighter::State::light_waiting(Scratch& scratch) const {
+  while (true) {
+    const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
+                                              [](const auto& points) { return !points.empty(); });
+    if (deepest == scratch.waiting.rend()) return;
+    if (deepest->size() <= kWavePoints) {
+      scratch.wave.points.clear();
+      std::swap(scratch.wave.points, *deepest);
+    } else {
+      const auto first = deepest->end() - static_cast<std::ptrdiff_t>(kWavePoints);
+      scratch.wave.points.assign(first, deepest->end());
+      deepest->erase(first, deepest->end());
+    }
+    light_wave(scratch);
+  }
+}
+
 void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_t index,
                                 const LightOutput& output) const {
   const DenormalsAsZero mode;
@@ -284,20 +306,16 @@ void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_
   if (tile.wants_cost) tile.cost.assign(kTilePixels, 0.0F);
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
 
-  const Stopwatch watch;
-  find_first_points(tile, job, scratch.waiting[0]);
-  store_first_surfaces(scratch.waiting[0], index, output);
-  scratch.ms[kSurfaceStep] += watch.ms();
-
-  // Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
-  while (true) {
-    const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
-                                              [](const auto& points) { return !points.empty(); });
-    if (deepest == scratch.waiting.rend()) break;
-    const auto first = deepest->size() > kTilePixels ? deepest->end() - kTilePixels : deepest->begin();
-    scratch.wave.points.assign(first, deepest->end());
-    deepest->erase(first, deepest->end());
-    light_wave(scratch);
+  for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
+    if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
+  }
+  const int height = job.place.height();
+  for (int row = 0; row < height; row += kRowsAtOnce) {
+    const Stopwatch watch;
+    find_first_points(tile, job, {row, std::min(row + kRowsAtOnce, height)}, scratch.waiting[0]);
+    add_first_surfaces(scratch.waiting[0], index, output);
+    scratch.ms[kSurfaceStep] += watch.ms();
+    light_waiting(scratch);
   }
   store(tile, job, index, output);
 }

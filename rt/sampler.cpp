@@ -29,34 +29,44 @@ std::uint32_t scrambled_reversed(std::uint32_t x, std::uint32_t seed) {
   return x;
 }
 
-std::uint32_t scrambled(std::uint32_t x, std::uint32_t seed) {
-  return reversed_bits(scrambled_reversed(reversed_bits(x), seed));
-}
-
-/// Sobol's second dimension: its generator matrix is Pascal's triangle modulo 2. The first is the reversal of bits.
-std::uint32_t sobol_second(std::uint32_t index) {
-  std::uint32_t value = 0;
-  for (std::uint32_t column = 0x80000000U; index != 0; index >>= 1U, column ^= column >> 1U) {
-    if ((index & 1U) != 0) value ^= column;
-  }
-  return value;
+/// Sobol's second dimension with its bits reversed: its generator matrix is Pascal's triangle modulo 2, and i choose j
+/// is odd where the bits of j are among those of i (Lucas), so bit j is the sum of all bits whose number holds j's.
+std::uint32_t sobol_second_reversed(std::uint32_t index) {
+  index ^= (index >> 1U) & 0x55555555U;
+  index ^= (index >> 2U) & 0x33333333U;
+  index ^= (index >> 4U) & 0x0F0F0F0FU;
+  index ^= (index >> 8U) & 0x00FF00FFU;
+  return index ^ (index >> 16U);
 }
 
 constexpr double kStep = 1.0 / 4294967296.0;
 
+/// Where the index goes in the order of points of this draw.
+std::uint32_t shuffled(std::uint32_t index, std::uint64_t key) {
+  return reversed_bits(scrambled_reversed(reversed_bits(index), static_cast<std::uint32_t>(key)));
+}
+
+/// Sobol's first dimension is the index with its bits reversed.
+double first_of(std::uint32_t place, std::uint64_t key) {
+  return reversed_bits(scrambled_reversed(place, static_cast<std::uint32_t>(key >> 32U))) * kStep;
+}
+
 }  // namespace
 
 double Sampler::one() {
-  return two().x;
+  const std::uint64_t key = next_key();
+  return first_of(shuffled(index_, key), key);
 }
 
 glm::dvec2 Sampler::two() {
-  const std::uint64_t key = mixed(stream_ + 0x632BE59BD9B4E019U * ++drawn_);
-  const std::uint64_t more = mixed(key);
-  const std::uint32_t place = scrambled(index_, static_cast<std::uint32_t>(key));
-  const std::uint32_t x = scrambled(reversed_bits(place), static_cast<std::uint32_t>(key >> 32U));
-  const std::uint32_t y = scrambled(sobol_second(place), static_cast<std::uint32_t>(more));
-  return {x * kStep, y * kStep};
+  const std::uint64_t key = next_key();
+  const std::uint32_t place = shuffled(index_, key);
+  const auto seed = static_cast<std::uint32_t>(mixed(key));
+  return {first_of(place, key), reversed_bits(scrambled_reversed(sobol_second_reversed(place), seed)) * kStep};
+}
+
+std::uint64_t Sampler::next_key() {
+  return mixed(stream_ + 0x632BE59BD9B4E019U * ++drawn_);
 }
 
 Sampler Sampler::branch(std::uint32_t which) const {

@@ -23,6 +23,8 @@ class Sampler {
   [[nodiscard]] Sampler branch(std::uint32_t which) const;
 
  private:
+  [[nodiscard]] std::uint64_t next_key();
+
   std::uint64_t stream_ = 0;
   std::uint32_t index_ = 0;
   std::uint32_t drawn_ = 0;

@@ -19,15 +19,26 @@ bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// `v` at unit length; `otherwise` where it has none. Scaled first, so that tiny and huge vectors keep their direction.
+/// Whether a vector of this squared length can be divided by its length as it is.
+bool plain(double length2) {
+  return length2 > 1e-200 && length2 < 1e200;
+}
+
+/// `v` at unit length; `otherwise` where it has none. Tiny and huge vectors are scaled first, so that they keep their
+/// direction.
 glm::dvec3 unit(const glm::dvec3& v, const glm::dvec3& otherwise) {
+  const double length2 = glm::dot(v, v);
+  if (plain(length2)) return v * (1.0 / std::sqrt(length2));
   const double size = largest(v);
   if (!(size > 0.0) || !finite(v)) return otherwise;
   return glm::normalize(v / size);
 }
 
-/// The cross product of two vectors scaled to size one, so that it neither over- nor underflows.
+/// The direction of the cross product, of tiny and huge vectors too; 0 where it has none.
 glm::dvec3 direction_of_cross(const glm::dvec3& a, const glm::dvec3& b) {
+  const glm::dvec3 cross = glm::cross(a, b);
+  const double length2 = glm::dot(cross, cross);
+  if (plain(length2)) return cross * (1.0 / std::sqrt(length2));
   const double sa = largest(a);
   const double sb = largest(b);
   if (!(sa > 0.0) || !(sb > 0.0)) return glm::dvec3(0.0);

@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+"""The hybrid's and Mitsuba 3's time for pictures of equal error: a curve of relMSE over time for each, and their ratio.
+
+usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--cache FOLDER] [--json FILE]
+
+Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). The truth is
+Mitsuba's, of many samples; relMSE is trimmed by the worst 0.1 % of pixels, which in Mitsuba's pictures are fireflies. Needs
+what tests/mitsuba_test.py needs, and says so when something is missing.
+"""
+import argparse
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "tests"))
+import mitsuba_test as peer  # noqa: E402
+
+SAMPLES_AT_ONCE = 64  # of Mitsuba: more of them need more memory, not less time
+WAYS = {
+    # name: (options, samples of a pixel)
+    "draft": (["--quality", "draft"], (1, 2, 4, 8, 16, 32)),
+    "good": (["--quality", "good"], (1, 4, 16, 64)),
+    "best": (["--quality", "best"], (1, 4, 16, 64, 256)),
+    # What suits small pictures of many triangles: rays find the first surfaces too, fewer photons go out per sample.
+    "tuned": (["--quality", "best", "--primary", "rays", "--photons", "16384"], (1, 4, 16, 64, 256)),
+    "reference": (["--reference"], (1, 4, 16, 64, 256)),
+}
+
+
+def relmse(numpy, picture, truth):
+    weight = 1.0 / (truth.mean(-1) ** 2 + 1e-2)
+    squares = numpy.sort((((picture - truth) ** 2).mean(-1) * weight).ravel())
+    return float(squares[: len(squares) - len(squares) // 1000].mean())
+
+
+def render_mitsuba(numpy, mitsuba, scene, spp, seed):
+    """A picture, and the seconds it took."""
+    done, total, start = 0, 0.0, time.perf_counter()
+    while done < spp:
+        part = min(SAMPLES_AT_ONCE, spp - done)
+        total = total + part * numpy.array(mitsuba.render(scene, spp=part, seed=seed * 100_000 + done)).astype(numpy.float64)
+        done += part
+    return total / spp, time.perf_counter() - start
+
+
+def mitsuba_curve(numpy, mitsuba, scene, truth):
+    points = []
+    for spp in (1, 4, 16, 64, 256, 1024):
+        render_mitsuba(numpy, mitsuba, scene, min(spp, SAMPLES_AT_ONCE), 1)
+        runs = [render_mitsuba(numpy, mitsuba, scene, spp, seed) for seed in ((2, 3, 4) if spp < 256 else (2,))]
+        points.append({"spp": spp, "seconds": sorted(seconds for _, seconds in runs)[len(runs) // 2],
+                       "relmse": sum(relmse(numpy, picture, truth) for picture, _ in runs) / len(runs)})
+    return points
+
+
+def render_hpr(numpy, mitsuba, hpr, path, options, size, spp, seed, folder):
+    picture, stats = folder / "picture.exr", folder / "stats.json"
+    subprocess.run([hpr, "render", str(path), "-o", str(picture), "--force", "--stats", str(stats), "--size", f"{size}x{size}",
+                    "--spp", str(spp), "--seed", str(seed), "--max-depth", str(peer.DEPTH), "--filter", "box",
+                    "--no-terminator-fix", *options], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    pixels = numpy.array(mitsuba.Bitmap(str(picture)))[..., :3].astype(numpy.float64)
+    return pixels, json.loads(stats.read_text())["ms"] / 1000.0
+
+
+def seconds_at(curve, error):
+    """When a curve of Mitsuba's reaches the error: between its points and beyond them as noise falls, 1 / time."""
+    points = sorted(curve, key=lambda point: -point["relmse"])
+    if error >= points[0]["relmse"]:
+        return points[0]["seconds"]
+    for before, after in zip(points, points[1:]):
+        if error >= after["relmse"]:
+            part = math.log(before["relmse"] / error) / math.log(before["relmse"] / after["relmse"])
+            return before["seconds"] * (after["seconds"] / before["seconds"]) ** part
+    return points[-1]["seconds"] * points[-1]["relmse"] / error
+
+
+def truth_of(numpy, mitsuba, scene, name, options):
+    """The mean of many samples, and what chance leaves of its relMSE."""
+    stored = options.cache and pathlib.Path(options.cache) / f"{name}-{options.size}-{options.truth_spp}.npz"
+    if stored and stored.exists():
+        loaded = numpy.load(stored)
+        return loaded["truth"], float(loaded["noise"])
+    halves = [render_mitsuba(numpy, mitsuba, scene, options.truth_spp // 2, seed)[0] for seed in (101, 102)]
+    truth = (halves[0] + halves[1]) / 2.0
+    noise = relmse(numpy, halves[0], halves[1]) / 4.0
+    if stored:
+        stored.parent.mkdir(parents=True, exist_ok=True)
+        numpy.savez(stored, truth=truth, noise=noise)
+    return truth, noise
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("hpr")
+    parser.add_argument("--scenes", default="pbr-spheres,two-monkeys")
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--truth-spp", type=int, default=8192)
+    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--cache", help="a folder for the truths, which take minutes")
+    parser.add_argument("--json", help="a file for all figures")
+    options = parser.parse_args()
+    scenes = pathlib.Path(os.environ.get("HPR_SCENES", "scenes")).resolve()
+    mitsuba, numpy, gltf2mi = peer.load_mitsuba(scenes.parent / "tools")
+    report = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = pathlib.Path(scratch)
+        for name in options.scenes.split(","):
+            file, ambient = peer.SCENES[name]
+            description, notes = peer.to_mitsuba(gltf2mi, mitsuba, numpy, name, scenes / file, folder, options.size)
+            scene = mitsuba.load_dict(description)
+            truth, noise = truth_of(numpy, mitsuba, scene, name, options)
+            curve = mitsuba_curve(numpy, mitsuba, scene, truth)
+            report[name] = {"truth_noise": noise, "mitsuba": curve}
+            print(f"{name}: the truth's own relMSE is about {noise:.2g}")
+            for point in curve:
+                print(f"  mitsuba    {point['spp']:5d} spp {point['seconds']:8.3f} s  relMSE {point['relmse']:.3g}", flush=True)
+            light = ["--environment", f"{ambient},{ambient},{ambient}"] if ambient else []
+            for way in options.ways.split(","):
+                settings, samples = WAYS[way]
+                report[name][way] = []
+                for spp in samples:
+                    runs = [render_hpr(numpy, mitsuba, options.hpr, scenes / file, [*settings, *light, *peer.camera_options(notes)],
+                                       options.size, spp, seed, folder) for seed in ((1, 2, 3) if spp < 64 else (1,))]
+                    point = {"spp": spp, "seconds": sorted(seconds for _, seconds in runs)[len(runs) // 2],
+                             "relmse": sum(relmse(numpy, picture, truth) for picture, _ in runs) / len(runs)}
+                    point["times_faster"] = seconds_at(curve, point["relmse"]) / point["seconds"]
+                    report[name][way].append(point)
+                    print(f"  {way:10} {spp:5d} spp {point['seconds']:8.3f} s  relMSE {point['relmse']:.3g}  "
+                          f"{point['times_faster']:.2f} x faster", flush=True)
+    if options.json:
+        pathlib.Path(options.json).write_text(json.dumps(report, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
