@@ -124,12 +124,6 @@ class Pass {
 /// step, 1 / (2 * 255 * 12.92).
 inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 
-/// Where rays leave a surface towards `direction`: off it, on that side.
-[[nodiscard]] inline glm::dvec3 ray_origin(const SurfacePoint& point, const glm::dvec3& direction) {
-  const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
-  return point.position + side * point.offset * point.geometric_normal;
-}
-
 /// The normal that lights are chosen by: none where they may shine through.
 [[nodiscard]] glm::dvec3 light_normal(const PathPoint& point);
 

@@ -22,12 +22,6 @@ double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
 }
 
-/// A ray's origin beside the point, on the side of `direction`.
-glm::dvec3 leave(const SurfacePoint& point, const glm::dvec3& direction) {
-  const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
-  return point.position + side * point.offset * point.geometric_normal;
-}
-
 glm::dvec3 absorbed(const glm::dvec3& absorption, double metres) {
   return glm::exp(-absorption * metres);
 }
@@ -151,11 +145,9 @@ void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
   path.travelled += glm::distance(path.origin, point.position);
   const Material& look = shared_.scene.materials[point.material];
   if (look.alpha_mode != AlphaMode::Opaque) {
-    const double alpha = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
-    const bool passes = alpha <= 0.0 || (alpha < 1.0 && path.sampler.one() >= alpha);
-    if (passes) {
+    if (passes_by_chance(evaluate_alpha(shared_.scene, look, point.uv, point.color.a), path.sampler)) {
       if (++path.passed > kMostPassed) return;
-      path.origin = leave(point, path.direction);
+      path.origin = ray_origin(point, path.direction);
       next_[kind].push_back(path);
       return;
     }
@@ -206,7 +198,7 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
   }
   if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
   if (!survives(path)) return;
-  path.origin = leave(point, sample->direction);
+  path.origin = ray_origin(point, sample->direction);
   path.direction = sample->direction;
   path.reach = std::numeric_limits<double>::infinity();
   path.from = point.position;
@@ -238,7 +230,7 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   ShadowRay& ray = shadows_.emplace_back();
   ray.pixel = path.pixel;
   ray.radiance = radiance;
-  ray.origin = leave(point, light->to_light);
+  ray.origin = ray_origin(point, light->to_light);
   if (shared_.settings.terminator_fix) ray.origin += point.lift;
   ray.direction = light->to_light;
   ray.reach = light->distance;
@@ -298,7 +290,7 @@ void PathWave::pass_covers() {
     const Material& look = shared_.scene.materials[point.material];
     ray.radiance *= 1.0 - evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
     if (!(largest(ray.radiance) > 0.0) || ++ray.passed > kMostPassed) continue;
-    const glm::dvec3 origin = leave(point, ray.direction);
+    const glm::dvec3 origin = ray_origin(point, ray.direction);
     ray.reach = std::max(ray.reach - glm::dot(origin - ray.origin, ray.direction), 0.0);
     ray.origin = origin;
     shadows_[left++] = ray;

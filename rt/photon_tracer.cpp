@@ -187,9 +187,9 @@ void PhotonTracer::move(Block& block) const {
 bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& block) const {
   const MaterialPoint material = evaluate_material(scene_, surface);
   flight.travelled += glm::distance(surface.position, flight.place);
-  if (material.alpha < 1.0 && flight.sampler.one() >= material.alpha) {
+  if (passes_by_chance(material.alpha, flight.sampler)) {
     flight.place = surface.position;
-    flight.origin = space_.from_world(surface.position - surface.offset * surface.geometric_normal);
+    flight.origin = space_.from_world(ray_origin(surface, flight.direction));
     if (++flight.passed <= settings_.max_bounces) return true;
     ++block.traced.counts.lost;
     return false;
@@ -241,8 +241,7 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   flight.direction = sample->direction;
   flight.place = surface.position;
   flight.travelled = 0.0;
-  const double side = glm::dot(sample->direction, surface.geometric_normal) < 0.0 ? -1.0 : 1.0;
-  flight.origin = space_.from_world(surface.position + side * surface.offset * surface.geometric_normal);
+  flight.origin = space_.from_world(ray_origin(surface, flight.direction));
   ++flight.bounces;
   return true;
 }

@@ -25,7 +25,7 @@ double RayWalk::coverage_of(const SurfacePoint& point) const {
 }
 
 void RayWalk::go_beyond(RayRequest& ray, const SurfacePoint& point) {
-  const glm::dvec3 origin = point.position - point.offset * point.geometric_normal;
+  const glm::dvec3 origin = ray_origin(point, ray.direction);
   if (std::isfinite(ray.reach)) {
     ray.reach = std::max(0.0, ray.reach - glm::dot(origin - ray.origin, ray.direction));
   }
@@ -78,7 +78,7 @@ std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::
     ray.reach = std::min(ray.reach, glm::dot(hits[i]->position - ray.origin, ray.direction));
   }
   visit_holed(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint& point, double coverage) {
-    if (coverage < 1.0 && !(rays[i].sampler->one() < coverage)) return true;
+    if (passes_by_chance(coverage, *rays[i].sampler)) return true;
     hits[i] = point;
     return false;
   });

@@ -30,6 +30,11 @@ class Sampler {
   std::uint32_t drawn_ = 0;
 };
 
+/// Whether a path passes a surface of partial coverage: drawn only where it is partial.
+[[nodiscard]] inline bool passes_by_chance(double coverage, Sampler& sampler) {
+  return coverage < 1.0 && !(sampler.one() < coverage);
+}
+
 /// What all randomness of a frame starts from.
 struct RandomKey {
   std::uint64_t seed = 1;

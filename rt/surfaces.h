@@ -54,6 +54,12 @@ struct SurfacePoint {
   }
 };
 
+/// Where rays leave a surface towards `direction`: off it, on that side.
+[[nodiscard]] inline glm::dvec3 ray_origin(const SurfacePoint& point, const glm::dvec3& direction) {
+  const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  return point.position + side * point.offset * point.geometric_normal;
+}
+
 /// Surface ids -> triangles -> points. Keeps per instance what every one of its triangles needs.
 class Surfaces {
  public:
