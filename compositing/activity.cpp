@@ -40,8 +40,8 @@ std::vector<TileRun> Activity::cut(TileRun run, int parts) const {
   for (int part = 1; part <= parts; ++part) {
     const std::size_t first = next;
     const std::uint64_t goal = all * static_cast<std::uint64_t>(part) / static_cast<std::uint64_t>(parts);
-    // A tile goes to the part in which most of it lies.
-    while (next < run.end() && (part == parts || before + costs_[next] / 2 < goal)) before += costs_[next++];
+    // A tile goes to the part in which most of it lies; no cost is 0, so the last part takes all that is left.
+    while (next < run.end() && before + costs_[next] / 2 < goal) before += costs_[next++];
     runs.push_back({first, next - first});
   }
   return runs;
