@@ -206,6 +206,30 @@ double Bsdf::pdf(Lobe lobe, const glm::dvec3& to_light) const {
   return facet_pdf(lobe, *at);
 }
 
+Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
+  constexpr auto kDiffuse = static_cast<std::size_t>(Lobe::Diffuse);
+  constexpr auto kReflection = static_cast<std::size_t>(Lobe::Reflection);
+  constexpr auto kTransmission = static_cast<std::size_t>(Lobe::Transmission);
+  Scattering all;
+  if (!scatters_) return all;
+  if (!same_side(to_light)) {
+    all.value[kTransmission] = value(Lobe::Transmission, to_light);
+    all.pdf[kTransmission] = pdf(Lobe::Transmission, to_light);
+    return all;
+  }
+  const glm::dvec3 sum = view_ + to_light;
+  const double length = glm::length(sum);
+  const double dielectric = dielectric_fresnel(0.5 * length);
+  all.value[kDiffuse] = (diffuse_ / std::numbers::pi * (1.0 - dielectric)) * base_color_;
+  if (present(Lobe::Diffuse)) all.pdf[kDiffuse] = glm::dot(normal_, to_light) / std::numbers::pi;
+  if (roughness_ < kDeltaRoughness) return all;
+  const double facets = distribution(sum / length);
+  const double common = facets * shadowing(glm::dot(normal_, to_light));
+  all.value[kReflection] = common * fresnel(0.5 * length, dielectric);
+  if (present(Lobe::Reflection)) all.pdf[kReflection] = facets / (2.0 * (normal_view_ + view_smith_));
+  return all;
+}
+
 bool Bsdf::present(Lobe lobe) const {
   if (!scatters_) return false;
   if (lobe == Lobe::Reflection) return reflects_ || metallic_ > 0.0;

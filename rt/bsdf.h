@@ -23,6 +23,12 @@ inline constexpr std::array<Lobe, 3> kLobes{Lobe::Diffuse, Lobe::Reflection, Lob
 /// the square of the relative index (Veach 1997, section 5.2).
 enum class Carried : std::uint8_t { Radiance, Flux };
 
+/// What all lobes do with light from one direction.
+struct Scattering {
+  std::array<glm::dvec3, kLobes.size()> value{glm::dvec3(0.0), glm::dvec3(0.0), glm::dvec3(0.0)};  ///< f, 1/sr
+  std::array<double, kLobes.size()> pdf{};  ///< of sampling that direction, per solid angle
+};
+
 struct BsdfSample {
   glm::dvec3 direction{0.0};  ///< unit length, away from the surface
   glm::dvec3 weight{0.0};     ///< f |cos| / pdf
@@ -56,10 +62,14 @@ class Bsdf {
   [[nodiscard]] glm::dvec3 reflected(const glm::dvec3& to_light) const { return above(to_light, true, true); }
   /// The density of sample(lobe), per solid angle; 0 where value is 0 by direction, and for lobes of one direction.
   [[nodiscard]] double pdf(Lobe lobe, const glm::dvec3& to_light) const;
+  /// value and pdf of every lobe, bit for bit, in one go.
+  [[nodiscard]] Scattering scattering(const glm::dvec3& to_light) const;
   /// None when the lobe is absent or the sample fails (below the surface). Lobes of one direction ignore `u` and do not
   /// fail for being below the surface: there a smooth normal's mirror image or refracted direction is put back on its
   /// side. GGX by visible normals (Heitz, "Sampling the GGX Distribution of Visible Normals", 2018).
   [[nodiscard]] std::optional<BsdfSample> sample(Lobe lobe, const glm::dvec2& u) const;
+  /// Whether the surface has the lobe at all.
+  [[nodiscard]] bool present(Lobe lobe) const;
   /// About the share of light that the lobe scatters towards the viewer: for choosing among lobes. Exact for lobes of
   /// one direction. Zero exactly where the lobe is absent.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
@@ -81,7 +91,6 @@ class Bsdf {
   };
 
   [[nodiscard]] glm::dvec3 above(const glm::dvec3& to_light, bool diffuse, bool specular) const;
-  [[nodiscard]] bool present(Lobe lobe) const;
   [[nodiscard]] bool same_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool other_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }

@@ -80,6 +80,24 @@ TEST(Bsdf, IsNeverNegativeInfiniteOrNaN) {
   EXPECT_GT(sampled, 20'000);
 }
 
+TEST(Bsdf, ScattersAsItsLobesDoOneByOne) {
+  Odd odd;
+  std::array<int, kLobes.size()> seen{};
+  for (int i = 0; i < 20'000; ++i) {
+    SurfacePoint surface = test::seen_from(odd.unit(), odd.coin());
+    if (odd.coin()) surface.geometric_normal = odd.unit();
+    const Bsdf bsdf(odd.material(), surface, odd.coin() ? Carried::Radiance : Carried::Flux);
+    const glm::dvec3 to_light = odd.unit();
+    const Scattering all = bsdf.scattering(to_light);
+    for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
+      ASSERT_EQ(all.value[lobe], bsdf.value(kLobes[lobe], to_light)) << i << ' ' << lobe;
+      ASSERT_EQ(all.pdf[lobe], bsdf.pdf(kLobes[lobe], to_light)) << i << ' ' << lobe;
+      seen[lobe] += all.pdf[lobe] > 0.0;
+    }
+  }
+  for (const int count : seen) EXPECT_GT(count, 500);
+}
+
 TEST(Bsdf, SurvivesDirectionsThatAreNone) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();

@@ -80,13 +80,10 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
 
 glm::dvec3 DirectLight::shared_scattering(const PathPoint& point, const LightSample& light) const {
   glm::dvec3 scattered(0.0);
-  for (const Lobe lobe : kLobes) {
-    const glm::dvec3 value = point.bsdf.value(lobe, light.to_light);
-    if (value == glm::dvec3(0.0)) continue;
-    const double share = point.may_follow[static_cast<std::size_t>(lobe)]
-                             ? 1.0 - share_of_ray(tile_, point.bsdf.pdf(lobe, light.to_light), light.pdf)
-                             : 1.0;
-    scattered += share * value;
+  const Scattering all = point.bsdf.scattering(light.to_light);
+  for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
+    const double share = point.may_follow[lobe] ? 1.0 - share_of_ray(tile_, all.pdf[lobe], light.pdf) : 1.0;
+    scattered += share * all.value[lobe];
   }
   return scattered;
 }

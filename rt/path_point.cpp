@@ -39,7 +39,7 @@ glm::dvec3 medium_towards(const PathPoint& point, const glm::dvec3& direction) {
 }  // namespace
 
 glm::dvec3 light_normal(const PathPoint& point) {
-  return point.bsdf.weight(Lobe::Transmission) == glm::dvec3(0.0) ? point.material.normal : glm::dvec3(0.0);
+  return point.bsdf.present(Lobe::Transmission) ? glm::dvec3(0.0) : point.material.normal;
 }
 
 Component component_after(const PathPoint& point, Component first) {

@@ -56,10 +56,11 @@ struct Scattered {
 
 Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
   Scattered scattered;
+  const Scattering all = bsdf.scattering(direction);
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
-    if (!(chances[i] > 0.0) || bsdf.is_delta(kLobes[i])) continue;
-    scattered.value += bsdf.value(kLobes[i], direction);
-    scattered.pdf += chances[i] * bsdf.pdf(kLobes[i], direction);
+    if (!(chances[i] > 0.0)) continue;
+    scattered.value += all.value[i];
+    scattered.pdf += chances[i] * all.pdf[i];
   }
   return scattered;
 }

@@ -6,14 +6,6 @@
 #include <glm/geometric.hpp>
 
 namespace hpr {
-namespace {
-
-bool present(const Bsdf& bsdf, Lobe lobe) {
-  const glm::dvec3 weight = bsdf.weight(lobe);
-  return std::max({weight.r, weight.g, weight.b}) > 0.0;
-}
-
-}  // namespace
 
 bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
   if (lobe == Lobe::Transmission) return true;
@@ -22,7 +14,7 @@ bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
 
 bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {
   return std::ranges::any_of(kLobes,
-                             [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && present(bsdf, lobe); });
+                             [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); });
 }
 
 glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, const Bsdf& bsdf,
@@ -32,7 +24,7 @@ glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, con
   std::size_t count = 0;
   PhotonSide side = PhotonSide::Front;
   for (const Lobe lobe : kLobes) {
-    if (is_followed(bsdf, lobe, glossy_cutoff) || !present(bsdf, lobe)) continue;
+    if (is_followed(bsdf, lobe, glossy_cutoff) || !bsdf.present(lobe)) continue;
     lobes[count++] = lobe;
     if (lobe == Lobe::Transmission) side = PhotonSide::Both;
   }
