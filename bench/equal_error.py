@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """The hybrid's and Mitsuba 3's time for pictures of equal error: a curve of relMSE over time for each, and their ratio.
 
-usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--cache FOLDER] [--json FILE]
+usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--trim PERCENT] [--cache FOLDER] [--json FILE]
 
 Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). The truth is
-Mitsuba's, of many samples; relMSE is trimmed by the worst 0.1 % of pixels, which in Mitsuba's pictures are fireflies. Needs
-what tests/mitsuba_test.py needs, and says so when something is missing.
+Mitsuba's, of many samples; relMSE is trimmed by the worst 0.1 % of pixels (--trim), which in
+Mitsuba's pictures are fireflies. What chance leaves in the truth is taken off every error. Needs what tests/mitsuba_test.py
+needs, and says so when something is missing.
 """
 import argparse
 import json
@@ -32,10 +33,10 @@ WAYS = {
 }
 
 
-def relmse(numpy, picture, truth):
+def relmse(numpy, picture, truth, trim):
     weight = 1.0 / (truth.mean(-1) ** 2 + 1e-2)
     squares = numpy.sort((((picture - truth) ** 2).mean(-1) * weight).ravel())
-    return float(squares[: len(squares) - len(squares) // 1000].mean())
+    return float(squares[: len(squares) - int(len(squares) * trim / 100.0)].mean())
 
 
 def render_mitsuba(numpy, mitsuba, scene, spp, seed):
@@ -48,13 +49,13 @@ def render_mitsuba(numpy, mitsuba, scene, spp, seed):
     return total / spp, time.perf_counter() - start
 
 
-def mitsuba_curve(numpy, mitsuba, scene, truth):
+def mitsuba_curve(numpy, mitsuba, scene, error):
     points = []
     for spp in (1, 4, 16, 64, 256, 1024):
         render_mitsuba(numpy, mitsuba, scene, min(spp, SAMPLES_AT_ONCE), 1)
         runs = [render_mitsuba(numpy, mitsuba, scene, spp, seed) for seed in ((2, 3, 4) if spp < 256 else (2,))]
         points.append({"spp": spp, "seconds": sorted(seconds for _, seconds in runs)[len(runs) // 2],
-                       "relmse": sum(relmse(numpy, picture, truth) for picture, _ in runs) / len(runs)})
+                       "relmse": sum(error(picture) for picture, _ in runs) / len(runs)})
     return points
 
 
@@ -81,13 +82,13 @@ def seconds_at(curve, error):
 
 def truth_of(numpy, mitsuba, scene, name, options):
     """The mean of many samples, and what chance leaves of its relMSE."""
-    stored = options.cache and pathlib.Path(options.cache) / f"{name}-{options.size}-{options.truth_spp}.npz"
+    stored = options.cache and pathlib.Path(options.cache) / f"{name}-{options.size}-{options.truth_spp}-{options.trim}.npz"
     if stored and stored.exists():
         loaded = numpy.load(stored)
         return loaded["truth"], float(loaded["noise"])
     halves = [render_mitsuba(numpy, mitsuba, scene, options.truth_spp // 2, seed)[0] for seed in (101, 102)]
     truth = (halves[0] + halves[1]) / 2.0
-    noise = relmse(numpy, halves[0], halves[1]) / 4.0
+    noise = relmse(numpy, halves[0], halves[1], options.trim) / 4.0
     if stored:
         stored.parent.mkdir(parents=True, exist_ok=True)
         numpy.savez(stored, truth=truth, noise=noise)
@@ -100,6 +101,7 @@ def main():
     parser.add_argument("--scenes", default="pbr-spheres,two-monkeys")
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--truth-spp", type=int, default=8192)
+    parser.add_argument("--trim", type=float, default=0.1, help="percent of the pixels, the worst, that do not count")
     parser.add_argument("--ways", default=",".join(WAYS))
     parser.add_argument("--cache", help="a folder for the truths, which take minutes")
     parser.add_argument("--json", help="a file for all figures")
@@ -114,7 +116,11 @@ def main():
             description, notes = peer.to_mitsuba(gltf2mi, mitsuba, numpy, name, scenes / file, folder, options.size)
             scene = mitsuba.load_dict(description)
             truth, noise = truth_of(numpy, mitsuba, scene, name, options)
-            curve = mitsuba_curve(numpy, mitsuba, scene, truth)
+
+            def error(picture, truth=truth, noise=noise):
+                return max(relmse(numpy, picture, truth, options.trim) - noise, 0.1 * noise)
+
+            curve = mitsuba_curve(numpy, mitsuba, scene, error)
             report[name] = {"truth_noise": noise, "mitsuba": curve}
             print(f"{name}: the truth's own relMSE is about {noise:.2g}")
             for point in curve:
@@ -127,7 +133,7 @@ def main():
                     runs = [render_hpr(numpy, mitsuba, options.hpr, scenes / file, [*settings, *light, *peer.camera_options(notes)],
                                        options.size, spp, seed, folder) for seed in ((1, 2, 3) if spp < 64 else (1,))]
                     point = {"spp": spp, "seconds": sorted(seconds for _, seconds in runs)[len(runs) // 2],
-                             "relmse": sum(relmse(numpy, picture, truth) for picture, _ in runs) / len(runs)}
+                             "relmse": sum(error(picture) for picture, _ in runs) / len(runs)}
                     point["times_faster"] = seconds_at(curve, point["relmse"]) / point["seconds"]
                     report[name][way].append(point)
                     print(f"  {way:10} {spp:5d} spp {point['seconds']:8.3f} s  relMSE {point['relmse']:.3g}  "

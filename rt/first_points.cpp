@@ -1,8 +1,10 @@
 #include "rt/first_points.h"
 
 #include <algorithm>
+#include <array>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <span>
 
 namespace hpr {
 namespace {
@@ -31,6 +33,7 @@ class FirstPoints {
     if (tile_.rays != nullptr && tile_.rays->has_holes()) look_through_holes();
     WorldTriangle triangle;
     for (int y = rows_.first; y < rows_.end; ++y) {
+      prefetch(y);
       for (int x = 0; x < job_.place.width(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         const double share = left_.empty() ? 1.0 : left_[pixel];
@@ -49,6 +52,13 @@ class FirstPoints {
   }
 
  private:
+  void prefetch(int y) const {
+    std::array<std::uint32_t, kTileSide> ids;
+    const std::span<const Key> row = job_.keys.subspan(static_cast<std::size_t>(y) * kTileSide, kTileSide);
+    std::ranges::transform(row, ids.begin(), [](Key key) { return key == kNoKey ? kNoSurface : key_surface(key); });
+    tile_.surfaces.prefetch(ids);
+  }
+
   [[nodiscard]] Ray ray_of(int x, int y) const {
     return view_ray(*tile_.view, job_.place.x0 + x + 0.5, job_.place.y0 + y + 0.5);
   }

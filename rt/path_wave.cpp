@@ -109,6 +109,7 @@ void PathWave::trace_paths() {
   }
   hits_.resize(batch_.size());
   counts_.invalid += shared_.rays.closest(batch_, hits_);
+  shared_.surfaces.prefetch(hits_);
   counts_.primary += paths_[0].size();
   counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
   counts_.reflection += paths_[kind_of(Lobe::Reflection)].size();

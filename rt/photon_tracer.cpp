@@ -19,7 +19,7 @@ namespace {
 
 /// Photons traced together, generation by generation: enough to fill packets after most have been absorbed, few enough
 /// for the cache.
-constexpr std::uint64_t kBlockPhotons = 4096;
+constexpr std::uint64_t kBlockPhotons = 2048;
 
 /// Bounces before roulette begins: short paths carry most of the light, and all arrive.
 constexpr int kFirstBounces = 3;
@@ -172,6 +172,7 @@ void PhotonTracer::move(Block& block) const {
   block.hits.resize(block.flights.size());
   block.traced.counts.rays += block.flights.size();
   block.traced.counts.invalid += rays_.closest(block.batch, block.hits);
+  surfaces_.prefetch(block.hits);
   block.next.clear();
   for (std::size_t i = 0; i < block.flights.size(); ++i) {
     if (block.hits[i] == kNoSurface) continue;

@@ -63,6 +63,7 @@ std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::
   for (const RayRequest& ray : rays) push(ray, scratch.batch);
   scratch.surfaces.resize(rays.size());
   const std::uint64_t invalid = opaque_.closest(scratch.batch, scratch.surfaces);
+  surfaces_.prefetch(scratch.surfaces);
   WorldTriangle triangle;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     hits[i].reset();

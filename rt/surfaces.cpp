@@ -1,6 +1,7 @@
 #include "rt/surfaces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -123,6 +124,33 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
   const double extent = std::max(largest(triangle.e1), largest(triangle.e2));
   const double world = place + extent;
   triangle.offset = kOriginSteps * kFloatStep * std::max(world, placed.distortion * world + placed.reach);
+}
+
+void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
+  constexpr std::size_t kAhead = 64;
+  std::array<const Mesh*, kAhead> meshes;
+  std::array<const glm::uvec3*, kAhead> corners;
+  std::uint32_t instance = 0;
+  for (std::size_t first = 0; first < ids.size(); first += kAhead) {
+    std::size_t count = 0;
+    for (const std::uint32_t id : ids.subspan(first, std::min(kAhead, ids.size() - first))) {
+      if (id >= scene_.triangles) continue;
+      const Instance* at = &scene_.instances[instance];
+      if (id < at->first_surface || id - at->first_surface >= scene_.mesh_of(*at).triangles.size()) {
+        instance = locate_surface(scene_, id).instance;
+        at = &scene_.instances[instance];
+      }
+      meshes[count] = &scene_.mesh_of(*at);
+      corners[count] = &meshes[count]->triangles[id - at->first_surface];
+      __builtin_prefetch(corners[count++]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      for (int corner = 0; corner < 3; ++corner) {
+        __builtin_prefetch(&meshes[i]->positions[(*corners[i])[corner]]);
+        __builtin_prefetch(&meshes[i]->normals[(*corners[i])[corner]]);
+      }
+    }
+  }
 }
 
 SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,

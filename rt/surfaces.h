@@ -7,6 +7,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <span>
 #include <vector>
 
 #include "rt/ray_space.h"
@@ -68,6 +69,9 @@ class Surfaces {
 
   /// Sets `triangle` to surface `id` unless it already is; neighbouring pixels mostly share theirs, or the instance.
   void load(std::uint32_t id, WorldTriangle& triangle) const;
+
+  /// Asks the memory for the triangles of `ids`, kNoSurface left out, which will be loaded next: they lie far apart.
+  void prefetch(std::span<const std::uint32_t> ids) const;
 
   /// The point where the ray meets the triangle's plane, moved onto the triangle when it lies outside (a pixel's centre
   /// may miss a triangle it was given by a hair). Exact to double rounding: nothing is read from depths.
