@@ -70,6 +70,8 @@ class Bsdf {
   [[nodiscard]] std::optional<BsdfSample> sample(Lobe lobe, const glm::dvec2& u) const;
   /// Whether the surface has the lobe at all.
   [[nodiscard]] bool present(Lobe lobe) const;
+  /// The normal that lights are chosen by: zero where they may shine through.
+  [[nodiscard]] glm::dvec3 light_normal() const { return present(Lobe::Transmission) ? glm::dvec3(0.0) : normal_; }
   /// About the share of light that the lobe scatters towards the viewer: for choosing among lobes. Exact for lobes of
   /// one direction. Zero exactly where the lobe is absent.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;

@@ -55,7 +55,7 @@ void DirectLight::sample_others() {
     PathPoint& point = wave_.points[i];
     const double choice = point.sampler.one();
     const glm::dvec2 u = point.sampler.two();
-    auto light = tile_.lights.sample_one(point.surface.position, light_normal(point), *tile_.view, choice, u);
+    auto light = tile_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *tile_.view, choice, u);
     if (!light) continue;
     light->weight /= tile_.settings.light_samples;
     add(i, *light);

@@ -114,6 +114,18 @@ TEST(Hybrid, AFrostedSheet) {
   expect_the_same_light(room(sheet, true));
 }
 
+TEST(Hybrid, AFrostedSheetBeforeAPointOfLight) {
+  Material sheet = test::clear_glass(1.5F, 0.0F);
+  sheet.roughness = 0.6F;
+  Scene scene = room(sheet, true);
+  for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
+  Light& light = scene.lights.emplace_back();
+  light.type = LightType::Point;
+  light.position = {0.1, -0.3, -0.5};
+  light.intensity = glm::vec3(1.0F);
+  expect_the_same_light(scene);
+}
+
 TEST(Hybrid, AVeil) {
   Material veil = test::matte({0.8F, 0.8F, 0.2F});
   veil.alpha_mode = AlphaMode::Mask;  // cast_keys has no coverage: a mask that covers all, but by way of coverage

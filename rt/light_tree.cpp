@@ -177,7 +177,7 @@ struct LightTree::Builder {
   }
 
   /// Puts those that go first to the front and returns how many.
-  std::size_t divide(std::span<std::uint32_t> part, int depth) const {
+  [[nodiscard]] std::size_t divide(std::span<std::uint32_t> part, int depth) const {
     glm::dvec3 low(std::numeric_limits<double>::infinity());
     glm::dvec3 high(-std::numeric_limits<double>::infinity());
     for (const std::uint32_t light : part) {
@@ -194,9 +194,9 @@ struct LightTree::Builder {
         const Split split = best_split(part, axis, low[axis], high[axis], extent[longest]);
         if (split.cost < best.cost) best = split;
       }
-      const auto rest =
-          std::ranges::partition(part, [&](std::uint32_t light) { return center(light, best.axis) < best.at; });
-      const std::size_t first = part.size() - rest.size();
+      const auto rest = std::partition(part.begin(), part.end(),
+                                       [&](std::uint32_t light) { return center(light, best.axis) < best.at; });
+      const auto first = static_cast<std::size_t>(rest - part.begin());
       if (first > 0 && first < part.size() && std::isfinite(best.cost)) return first;
     }
     const std::size_t half = part.size() / 2;

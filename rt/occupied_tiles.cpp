@@ -59,8 +59,9 @@ std::vector<Bounds> mesh_boxes(const Scene& scene) {
 std::vector<std::uint8_t> occupied_tiles(const Scene& scene, const RayScene& rays, std::span<const Bounds> boxes,
                                          const View& view, const FrameLayout& layout, std::size_t screen) {
   const TileRun run = layout.tiles_of(screen);
-  if (rays.geometries().size() > kMostBoxes) return std::vector<std::uint8_t>(run.count, 1);
-  std::vector<std::uint8_t> occupied(run.count, 0);
+  const bool many = rays.geometries().size() > kMostBoxes;
+  std::vector<std::uint8_t> occupied(run.count, many ? 1 : 0);
+  if (many) return occupied;
   const glm::dmat4 clip = clip_from_world(view, view.eye);
   const glm::dvec3 margin(kRounding / rays.space().scale);
   for (const RayGeometry& geometry : rays.geometries()) {

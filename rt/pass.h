@@ -124,9 +124,6 @@ class Pass {
 /// step, 1 / (2 * 255 * 12.92).
 inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 
-/// The normal that lights are chosen by: none where they may shine through.
-[[nodiscard]] glm::dvec3 light_normal(const PathPoint& point);
-
 /// The component that light from a followed lobe of `point` counts in.
 [[nodiscard]] Component component_after(const PathPoint& point, Component first);
 

@@ -38,10 +38,6 @@ glm::dvec3 medium_towards(const PathPoint& point, const glm::dvec3& direction) {
 
 }  // namespace
 
-glm::dvec3 light_normal(const PathPoint& point) {
-  return point.bsdf.present(Lobe::Transmission) ? glm::dvec3(0.0) : point.material.normal;
-}
-
 Component component_after(const PathPoint& point, Component first) {
   return point.depth == 0 ? first : point.component;
 }
@@ -99,7 +95,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     const Component part = component_after(*ray.from, component);
     if (!hits[i]) {
       const double light_pdf =
-          ray.pdf > 0.0 ? tile.lights.environment_pdf_one(place, light_normal(*ray.from), ray.direction) : 0.0;
+          ray.pdf > 0.0 ? tile.lights.environment_pdf_one(place, ray.from->bsdf.light_normal(), ray.direction) : 0.0;
       tile.add(ray.from->pixel, part,
                share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(ray.direction));
       continue;
@@ -112,7 +108,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     }
     reached.medium = ray.medium;
     reached.seen_from = place;
-    reached.seen_normal = light_normal(*ray.from);
+    reached.seen_normal = ray.from->bsdf.light_normal();
     reached.seen_pdf = ray.pdf;
     reached.sampler = ray.sampler;
     reached.pixel = ray.from->pixel;

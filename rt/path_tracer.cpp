@@ -60,6 +60,8 @@ PathCounts& PathCounts::operator+=(const PathCounts& other) {
 }
 
 struct PathTracer::State {
+  explicit State(PathScene scene) : shared(std::move(scene)) {}
+
   PathScene shared;
   std::vector<std::unique_ptr<PathWave>> idle;  ///< kept from tile to tile: fresh pages cost time
   std::mutex mutex;
@@ -100,8 +102,8 @@ void PathTracer::State::trace_tile(PathWave& wave, const View& view, const TileP
     wave.run();
     for (int y = top; y < bottom; ++y) {
       for (int x = 0; x < rect.width(); ++x) {
-        const auto from = static_cast<std::size_t>((y - top) * kTileSide + x);
-        const auto to = static_cast<std::size_t>((y - rect.y0) * kTileSide + x);
+        const auto from = static_cast<std::size_t>(y - top) * kTileSide + static_cast<std::size_t>(x);
+        const auto to = static_cast<std::size_t>(y - rect.y0) * kTileSide + static_cast<std::size_t>(x);
         pixels[to] = to_pixel(wave.radiance(from), wave.counts());
       }
     }

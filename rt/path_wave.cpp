@@ -204,7 +204,7 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
   path.direction = sample->direction;
   path.reach = std::numeric_limits<double>::infinity();
   path.from = point.position;
-  path.from_normal = material.normal;
+  path.from_normal = bsdf.light_normal();
   path.travelled = 0.0;
   path.passed = 0;
   ++path.segments;
@@ -215,7 +215,7 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
                          const std::array<double, kLobes.size()>& chances) {
   const double u_choice = path.sampler.one();
   const glm::dvec2 u = path.sampler.two();
-  const auto light = shared_.lights.sample_any(point.position, material.normal, *view_, u_choice, u);
+  const auto light = shared_.lights.sample_any(point.position, bsdf.light_normal(), *view_, u_choice, u);
   if (!light || light->weight == glm::dvec3(0.0)) return;
   const Technique technique = shared_.settings.technique;
   if (technique == Technique::Surfaces && light->pdf > 0.0) return;

@@ -157,7 +157,7 @@ double first_radius(std::span<const Photon> photons, const RaySpace& space, doub
     const auto& p = photons[i].position;
     if (finite(p)) places.emplace_back(p[0], p[1], p[2]);
   }
-  const double share = static_cast<double>(stride);
+  const auto share = static_cast<double>(stride);
   const auto k = static_cast<std::size_t>(std::clamp(wanted / share, 1.0, static_cast<double>(places.size())));
   if (places.size() < 2 || k >= places.size()) return kMost / space.scale;
   const std::size_t step = std::max<std::size_t>(places.size() / kProbes, 1);

@@ -44,7 +44,7 @@ glm::dvec4 read(const Scene& scene, const TextureRef& reference, Encoding encodi
 double coverage(const Scene& scene, const Material& material, const Mesh& mesh, const glm::uvec3& corners,
                 const glm::dvec2& at) {
   if (material.alpha_mode == AlphaMode::Opaque) return 1.0;
-  double alpha = static_cast<double>(material.base_color.a);
+  auto alpha = static_cast<double>(material.base_color.a);
   if (const TextureRef& texture = material.base_color_texture; texture.present()) {
     alpha *= read(scene, texture, Encoding::Srgb, uv_at(mesh, texture.uv_set, corners, at)).a;
   }
@@ -152,7 +152,8 @@ void TriangleLights::estimate_brightness(TriangleLight& triangle) const {
   for (int row = 0; row < parts; ++row) {
     for (int column = 0; column < 2 * (parts - row) - 1; ++column) {
       const double third = column % 2 == 0 ? 1.0 / 3.0 : 2.0 / 3.0;
-      sum += radiance(triangle, glm::dvec2(column / 2 + third, row + third) / static_cast<double>(parts));
+      const int pair = column / 2;
+      sum += radiance(triangle, glm::dvec2(pair + third, row + third) / static_cast<double>(parts));
     }
   }
   triangle.mean = sum / static_cast<double>(parts * parts);
