@@ -126,6 +126,52 @@ TEST(Hybrid, AFrostedSheetBeforeAPointOfLight) {
   expect_the_same_light(scene);
 }
 
+/// A ball on a floor under a sky of clouds, one far brighter than the others.
+Scene under_the_sky(const Material& thing) {
+  Scene scene;
+  const std::uint32_t ground = add_material(scene, test::matte({0.6F, 0.5F, 0.4F}));
+  place(scene, add_mesh(scene, quad({-2, -1, -2}, {0, 0, 4}, {4, 0, 0}, ground)));
+  place(scene, add_mesh(scene, test::sphere(0.45, 64, add_material(scene, thing))),
+        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
+  scene.environment = Environment{Image<Rgb>({8, 4}, {0.5F, 0.6F, 0.9F})};
+  scene.environment->image.at(2, 1) = {6.0F, 5.0F, 4.0F};
+  for (int x = 0; x < 8; x += 3) scene.environment->image.at(x, 0) = {1.0F, 0.8F, 0.7F};
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Hybrid, AMatteBallUnderTheSky) {
+  expect_the_same_light(under_the_sky(test::matte({0.3F, 0.4F, 0.6F})));
+}
+
+TEST(Hybrid, APolishedMetalBallUnderTheSky) {
+  Material metal = test::mirror(0.9F);
+  metal.roughness = 0.25F;
+  expect_the_same_light(under_the_sky(metal));
+}
+
+TEST(Hybrid, AFrostedGlassBallUnderTheSky) {
+  Material glass = test::clear_glass(1.5F, 1.0F);
+  glass.roughness = 0.4F;
+  expect_the_same_light(under_the_sky(glass));
+}
+
+TEST(Hybrid, ABallBeforeASphereOfLightASpotAndASun) {
+  Scene scene = under_the_sky(test::matte({0.3F, 0.4F, 0.6F}));
+  scene.environment.reset();
+  for (const LightType type : {LightType::Point, LightType::Spot, LightType::Directional}) {
+    Light& light = scene.lights.emplace_back();
+    light.type = type;
+    light.position = type == LightType::Point ? glm::dvec3(0.9, 0.4, 0.5) : glm::dvec3(-0.8, 1.0, 0.3);
+    light.radius = type == LightType::Point ? 0.2 : 0.0;
+    light.direction = glm::normalize(glm::vec3(0.5F, -1.0F, -0.2F));
+    light.angular_radius_radians = 0.05F;
+    light.inner_cone_radians = 0.3F;
+    light.outer_cone_radians = 0.6F;
+  }
+  expect_the_same_light(scene);
+}
+
 TEST(Hybrid, AVeil) {
   Material veil = test::matte({0.8F, 0.8F, 0.2F});
   veil.alpha_mode = AlphaMode::Mask;  // cast_keys has no coverage: a mask that covers all, but by way of coverage
