@@ -26,10 +26,10 @@ WAYS = {
     # name: (options, samples of a pixel)
     "draft": (["--quality", "draft"], (1, 2, 4, 8, 16, 32)),
     "good": (["--quality", "good"], (1, 4, 16, 64)),
-    "best": (["--quality", "best"], (1, 4, 16, 64, 256)),
+    "best": (["--quality", "best"], (1, 4, 16, 64)),
     # What suits small pictures of many triangles: rays find the first surfaces too, fewer photons go out per sample.
-    "tuned": (["--quality", "best", "--primary", "rays", "--photons", "16384"], (1, 4, 16, 64, 256)),
-    "reference": (["--reference"], (1, 4, 16, 64, 256)),
+    "tuned": (["--quality", "best", "--primary", "rays", "--photons", "16384"], (1, 4, 16, 64)),
+    "reference": (["--reference"], (1, 4, 16, 64)),
 }
 
 

@@ -160,8 +160,7 @@ std::optional<Bsdf::Facet> Bsdf::facet(Lobe lobe, const glm::dvec3& to_light) co
   return facet;
 }
 
-/// What leaves on the viewer's side.
-glm::dvec3 Bsdf::above(const glm::dvec3& to_light, bool diffuse, bool specular) const {
+glm::dvec3 Bsdf::reflected(const glm::dvec3& to_light, bool diffuse, bool specular) const {
   glm::dvec3 result(0.0);
   if (!scatters_ || !same_side(to_light)) return result;
   // Both directions lie on the normal's side, so their sum cannot vanish.
@@ -175,7 +174,7 @@ glm::dvec3 Bsdf::above(const glm::dvec3& to_light, bool diffuse, bool specular) 
 }
 
 glm::dvec3 Bsdf::value(Lobe lobe, const glm::dvec3& to_light) const {
-  if (lobe != Lobe::Transmission) return above(to_light, lobe == Lobe::Diffuse, lobe == Lobe::Reflection);
+  if (lobe != Lobe::Transmission) return reflected(to_light, lobe == Lobe::Diffuse, lobe == Lobe::Reflection);
   if (is_delta(lobe)) return glm::dvec3(0.0);
   const auto at = facet(lobe, to_light);
   if (!at) return glm::dvec3(0.0);

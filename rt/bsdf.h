@@ -58,8 +58,8 @@ class Bsdf {
   /// f of one lobe in 1/sr. Never negative, never NaN; 0 for lobes of one direction, and where the geometric and the
   /// shading normal do not agree on the side.
   [[nodiscard]] glm::dvec3 value(Lobe lobe, const glm::dvec3& to_light) const;
-  /// The sum over Diffuse and Reflection, cheaper than one by one.
-  [[nodiscard]] glm::dvec3 reflected(const glm::dvec3& to_light) const { return above(to_light, true, true); }
+  /// The sum over Diffuse and Reflection, or one of them: cheaper than one by one.
+  [[nodiscard]] glm::dvec3 reflected(const glm::dvec3& to_light, bool diffuse = true, bool specular = true) const;
   /// The density of sample(lobe), per solid angle; 0 where value is 0 by direction, and for lobes of one direction.
   [[nodiscard]] double pdf(Lobe lobe, const glm::dvec3& to_light) const;
   /// value and pdf of every lobe, bit for bit, in one go.
@@ -92,7 +92,6 @@ class Bsdf {
     double stretch = 1.0;       ///< |v + eta l|^2 for refraction
   };
 
-  [[nodiscard]] glm::dvec3 above(const glm::dvec3& to_light, bool diffuse, bool specular) const;
   [[nodiscard]] bool same_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool other_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }

@@ -1,7 +1,6 @@
 #include "rt/photon_gather.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -20,25 +19,21 @@ bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {
 glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, const Bsdf& bsdf,
                           const glm::dvec3& shading_normal, double glossy_cutoff) {
   if (map.size() == 0) return glm::dvec3(0.0);
-  std::array<Lobe, kLobes.size()> lobes{};
-  std::size_t count = 0;
-  PhotonSide side = PhotonSide::Front;
-  for (const Lobe lobe : kLobes) {
-    if (is_followed(bsdf, lobe, glossy_cutoff) || !bsdf.present(lobe)) continue;
-    lobes[count++] = lobe;
-    if (lobe == Lobe::Transmission) side = PhotonSide::Both;
-  }
-  if (count == 0) return glm::dvec3(0.0);
+  // Transmission is always followed, so photons are wanted on the viewer's side alone.
+  const auto gathers = [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); };
+  const bool diffuse = gathers(Lobe::Diffuse);
+  const bool specular = gathers(Lobe::Reflection);
+  if (!diffuse && !specular) return glm::dvec3(0.0);
   const bool flat = shading_normal == surface.geometric_normal;
-  const glm::dvec3 light = map.gather(surface.position, surface.geometric_normal, side, [&](const glm::dvec3& from) {
-    glm::dvec3 value(0.0);
-    for (std::size_t i = 0; i < count; ++i) value += bsdf.value(lobes[i], from);
-    if (flat) return value;
-    // Photons fall on the true surface, light is to fall on the one the shading normal pretends.
-    constexpr double kGrazing = 1e-3;
-    const double falls = std::abs(glm::dot(from, surface.geometric_normal));
-    return value * (std::abs(glm::dot(from, shading_normal)) / std::max(falls, kGrazing));
-  });
+  const glm::dvec3 light =
+      map.gather(surface.position, surface.geometric_normal, PhotonSide::Front, [&](const glm::dvec3& from) {
+        const glm::dvec3 value = bsdf.reflected(from, diffuse, specular);
+        if (flat) return value;
+        // Photons fall on the true surface, light is to fall on the one the shading normal pretends.
+        constexpr double kGrazing = 1e-3;
+        const double falls = std::abs(glm::dot(from, surface.geometric_normal));
+        return value * (std::abs(glm::dot(from, shading_normal)) / std::max(falls, kGrazing));
+      });
   const double sum = light.r + light.g + light.b;
   return std::isfinite(sum) ? light : glm::dvec3(0.0);
 }
