@@ -72,19 +72,86 @@ Rgba8 ramp(double t) {
   return {level(0), level(1), level(2), 255};
 }
 
+[[noreturn]] void throw_other_kind(const std::string& a, const std::string& b) {
+  throw Error(ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a, b),
+              "compare keys with keys, linear EXR with EXR, and sRGB PNG or JPEG with one another");
+}
+
 std::string describe(const FloatImage& picture) {
   return fmt::format("{}x{} {}", picture.size.width, picture.size.height, fmt::join(picture.channels, ","));
+}
+
+std::size_t worst_x(const DiffReport& report) {
+  return report.difference.worst % static_cast<std::size_t>(report.size.width);
+}
+std::size_t worst_y(const DiffReport& report) {
+  return report.difference.worst / static_cast<std::size_t>(report.size.width);
+}
+
+/// Null for equal pictures.
+nlohmann::ordered_json worst_pixel(const DiffReport& report) {
+  if (report.difference.differing == 0) return nullptr;
+  return {{"x", worst_x(report)}, {"y", worst_y(report)}, {"value", report.difference.max}};
+}
+
+bool asked(std::span<const std::string> metrics, std::string_view metric) {
+  return std::ranges::find(metrics, metric) != metrics.end();
+}
+
+/// What only pictures have. JSON has no infinity and no NaN: null.
+void add_picture(nlohmann::ordered_json& json, const DiffReport& report, std::span<const std::string> metrics) {
+  const Difference& d = report.difference;
+  json["width"] = report.size.width;
+  json["height"] = report.size.height;
+  json["channels"] = report.channels;
+  if (asked(metrics, "rmse")) json["rmse"] = d.rmse;
+  if (asked(metrics, "psnr")) json["psnr"] = d.psnr;
+  if (asked(metrics, "mean")) json["mean"] = d.mean;
+  if (asked(metrics, "mean")) json["mean_error"] = d.mean_error;
+  const ColorErrors colors = report.colors.value_or(ColorErrors{});
+  if (asked(metrics, "relmse")) json["relmse"] = colors.relative.trimmed;
+  if (asked(metrics, "relmse")) json["relmse_untrimmed"] = colors.relative.all;
+  if (asked(metrics, "ssim")) json["ssim"] = colors.ssim;
+  if (asked(metrics, "flip")) json["flip"] = colors.flip;
+  if (asks_for_colors(metrics)) json["not_finite"] = colors.not_finite;
+}
+
+std::string color_value(const std::optional<ColorErrors>& colors, const std::string& metric) {
+  if (!colors) return "none: the pictures have no channels R, G and B";
+  if (colors->not_finite > 0) return fmt::format("none: {} pixels are not finite", colors->not_finite);
+  if (metric == "ssim") return fmt::format("{:.6g}", colors->ssim);
+  if (metric == "flip") return fmt::format("{:.6g}", colors->flip);
+  return fmt::format("{:.6g} ({:.6g} with the worst 0.1 %)", colors->relative.trimmed, colors->relative.all);
+}
+
+/// What stands behind the name of a metric in the table of pictures.
+std::string picture_value(const DiffReport& report, const std::string& metric) {
+  const Difference& d = report.difference;
+  if (metric == "rmse") return fmt::format("{:.6g}", d.rmse);
+  if (metric == "psnr") return fmt::format("{:.4g} dB", d.psnr);
+  if (metric == "max") {
+    const std::string largest = fmt::format("{:.6g}", d.max);
+    return d.differing == 0 ? largest : fmt::format("{} at {},{}", largest, worst_x(report), worst_y(report));
+  }
+  if (metric == "differing") {
+    return fmt::format("{} of {} pixels ({:.4g} %)", d.differing, d.pixels, share(d.differing, d.pixels));
+  }
+  if (metric == "mean") {
+    const std::string mean = fmt::format("{:+.6g}", d.mean);
+    return std::isfinite(d.mean_error) ? fmt::format("{} +- {:.2g}", mean, d.mean_error) : mean;
+  }
+  return color_value(report.colors, metric);
 }
 
 }  // namespace
 
 const std::vector<std::string>& diff_metrics() {
-  static const std::vector<std::string> names{"rmse", "psnr", "max", "differing", "mean"};
+  static const std::vector<std::string> names{"rmse", "psnr", "max", "differing", "mean", "relmse", "ssim", "flip"};
   return names;
 }
 
 DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b, const std::string& name_b,
-                         const DiffTolerance& tolerance) {
+                         const DiffTolerance& tolerance, std::span<const std::string> metrics, int threads) {
   std::vector<std::string> sorted_a = a.channels;
   std::vector<std::string> sorted_b = b.channels;
   std::ranges::sort(sorted_a);
@@ -93,10 +160,12 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
     throw Error(ExitCode::BadInput, fmt::format("{} is {}, {} is {}", name_a, describe(a), name_b, describe(b)),
                 "only pictures of the same size and channels can be compared");
   }
+  if (a.linear != b.linear) throw_other_kind(name_a, name_b);
   DiffReport report;
   report.size = a.size;
   report.channels = a.channels;
   const std::size_t channels = a.channels.size();
+  if (asks_for_colors(metrics)) report.colors = compare_colors(a, b, metrics, threads);
   const std::vector<float> other = in_order(b, a.channels);
   report.difference = compare_values(other, a.values, channels);
   report.largest.reserve(report.difference.pixels);
@@ -130,14 +199,14 @@ DiffReport diff_keys(std::span<const Key> a, std::span<const Key> b, double perc
 }
 
 DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::path& b, const DiffTolerance& tolerance,
-                      const ImageLimits& limits) {
+                      const ImageLimits& limits, std::span<const std::string> metrics, int threads) {
   const bool keys = a.extension() == ".keys";
   if (keys != (b.extension() == ".keys") || (a.extension() == ".exr") != (b.extension() == ".exr")) {
-    throw Error(ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a.string(), b.string()),
-                "compare keys with keys, linear EXR with EXR, and sRGB PNG or JPEG with one another");
+    throw_other_kind(a.string(), b.string());
   }
   if (!keys) {
-    return diff_pictures(read_image(a, limits), a.string(), read_image(b, limits), b.string(), tolerance);
+    return diff_pictures(read_image(a, limits), a.string(), read_image(b, limits), b.string(), tolerance, metrics,
+                         threads);
   }
   if (tolerance.value != 0.0) {
     throw Error(ExitCode::Usage, "--fail is for values of pictures; keys are equal or not",
@@ -173,24 +242,19 @@ Image<Rgba8> heat_map(const DiffReport& report) {
 
 std::string diff_table(const DiffReport& report, std::span<const std::string> metrics) {
   const Difference& d = report.difference;
-  const auto asked = [&](const char* metric) { return std::ranges::find(metrics, metric) != metrics.end(); };
   std::string text;
   const auto row = [&](const char* name, const std::string& value) { text += fmt::format("{:<10} {}\n", name, value); };
   if (report.keys) {
-    if (asked("max")) row("max", fmt::format("{:.6g} of depth", d.max));
-    if (asked("differing")) {
+    if (asked(metrics, "max")) row("max", fmt::format("{:.6g} of depth", d.max));
+    if (asked(metrics, "differing")) {
       row("differing", fmt::format("{} of {} keys ({:.4g} %), {} of them another surface", d.differing, d.pixels,
                                    share(d.differing, d.pixels), report.other_surface));
     }
   } else {
     row("size", fmt::format("{}x{} {}", report.size.width, report.size.height, fmt::join(report.channels, ",")));
-    if (asked("rmse")) row("rmse", fmt::format("{:.6g}", d.rmse));
-    if (asked("psnr")) row("psnr", fmt::format("{:.4g} dB", d.psnr));
-    if (asked("max")) row("max", fmt::format("{:.6g}", d.max));
-    if (asked("differing")) {
-      row("differing", fmt::format("{} of {} pixels ({:.4g} %)", d.differing, d.pixels, share(d.differing, d.pixels)));
+    for (const std::string& metric : diff_metrics()) {
+      if (asked(metrics, metric)) row(metric.c_str(), picture_value(report, metric));
     }
-    if (asked("mean")) row("mean", fmt::format("{:+.6g}", d.mean));
   }
   if (report.beyond != d.differing) row("beyond", fmt::format("{} pixels exceed --fail", report.beyond));
   row("verdict", d.differing == 0 ? "equal" : report.passed ? "within tolerance" : "different");
@@ -200,22 +264,17 @@ std::string diff_table(const DiffReport& report, std::span<const std::string> me
 std::string diff_json(const DiffReport& report, std::span<const std::string> metrics, const std::string& name_a,
                       const std::string& name_b, const DiffTolerance& tolerance) {
   const Difference& d = report.difference;
-  const auto asked = [&](const char* metric) { return std::ranges::find(metrics, metric) != metrics.end(); };
   nlohmann::ordered_json json{{"schema", "hpr.diff/1"}, {"a", name_a}, {"b", name_b}};
   json["kind"] = report.keys ? "keys" : "picture";
   json["pixels"] = d.pixels;
   if (report.keys) {
     json["other_surface"] = report.other_surface;
   } else {
-    json["width"] = report.size.width;
-    json["height"] = report.size.height;
-    json["channels"] = report.channels;
-    if (asked("rmse")) json["rmse"] = d.rmse;  // JSON has no infinity: null
-    if (asked("psnr")) json["psnr"] = d.psnr;
-    if (asked("mean")) json["mean"] = d.mean;
+    add_picture(json, report, metrics);
   }
-  if (asked("max")) json["max"] = d.max;
-  if (asked("differing")) json["differing"] = d.differing;
+  if (asked(metrics, "max")) json["max"] = d.max;
+  if (asked(metrics, "max") && !report.keys) json["worst"] = worst_pixel(report);
+  if (asked(metrics, "differing")) json["differing"] = d.differing;
   json["fail"] = tolerance.value;
   json["fail_percent"] = tolerance.percent;
   json["beyond"] = report.beyond;

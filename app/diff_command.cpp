@@ -9,6 +9,7 @@
 #include "app/output.h"
 #include "core/file.h"
 #include "core/names.h"
+#include "core/parallel.h"
 
 namespace hpr {
 namespace {
@@ -23,7 +24,8 @@ class DiffCommand final : public Command {
   void declare(CLI::App& app) override {
     app.add_option("A", a_, "the reference: a picture, or a .keys file of hpr render --raw")->required();
     app.add_option("B", b_, "what is compared with it")->required();
-    app.add_option("--metric", metrics_, "rmse, psnr, max, differing, mean: which to print (default all)")
+    app.add_option("--metric", metrics_,
+                   "rmse, psnr, max, differing, mean, relmse, ssim, flip: which to print (default all)")
         ->delimiter(',');
     app.add_option("--fail", tolerance_.value, "largest allowed absolute difference of a value, 1 = white (default 0)");
     app.add_option("--fail-percent", tolerance_.percent, "share of pixels that may exceed it (default 0)");
@@ -33,7 +35,8 @@ class DiffCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     check_options(globals);
-    const DiffReport report = diff_files(a_, b_, tolerance_, picture_limits(globals));
+    const int threads = globals.threads > 0 ? globals.threads : usable_cores();
+    const DiffReport report = diff_files(a_, b_, tolerance_, picture_limits(globals), metrics_, threads);
     if (!heat_.empty()) write_png(heat_, heat_map(report));
     const std::string text = json_ ? diff_json(report, metrics_, a_, b_, tolerance_) : diff_table(report, metrics_);
     std::fputs(text.c_str(), stdout);

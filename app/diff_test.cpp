@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -125,7 +126,7 @@ TEST(Diff, TheTableAndTheJsonHoldWhatWasAskedFor) {
   const DiffReport report = diff(picture({0, 0, 0}), picture({0.5F, 0, 0}));
   const std::vector<std::string> some{"max", "differing"};
   const std::string table = diff_table(report, some);
-  EXPECT_NE(table.find("max        0.5\n"), std::string::npos) << table;
+  EXPECT_NE(table.find("max        0.5 at 0,0\n"), std::string::npos) << table;
   EXPECT_NE(table.find("1 of 1 pixels (100 %)"), std::string::npos) << table;
   EXPECT_EQ(table.find("rmse"), std::string::npos) << table;
   EXPECT_NE(table.find("different"), std::string::npos) << table;
@@ -139,6 +140,107 @@ TEST(Diff, TheTableAndTheJsonHoldWhatWasAskedFor) {
       diff_json(diff(picture({1, 1, 1}), picture({1, 1, 1})), diff_metrics(), "a.png", "b.png", {}));
   EXPECT_TRUE(equal["psnr"].is_null()) << "infinite";
   EXPECT_EQ(equal["passed"], true);
+}
+
+TEST(Diff, TheWorstPixelAndTheErrorOfTheMeanAreReported) {
+  FloatImage a{{2, 2}, {"R", "G", "B"}, std::vector<float>(12, 0.0F)};
+  FloatImage b = a;
+  b.values[7] = -0.5F;
+  const DiffReport report = diff(a, b);
+  const auto json = nlohmann::json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
+  EXPECT_EQ(json["worst"], nlohmann::json::parse(R"({"x": 0, "y": 1, "value": 0.5})"));
+  EXPECT_NEAR(json["mean_error"].get<double>(), 0.5 / 3.0 / 4.0, 1e-12);
+  const std::string table = diff_table(report, diff_metrics());
+  EXPECT_NE(table.find("max        0.5 at 0,1\n"), std::string::npos) << table;
+  EXPECT_NE(table.find("mean       -0.0416667 +- 0.042\n"), std::string::npos) << table;
+  EXPECT_TRUE(nlohmann::json::parse(diff_json(diff(a, a), diff_metrics(), "a", "a", {}))["worst"].is_null());
+}
+
+TEST(Diff, ColorsAreComparedAsFarAsAskedFor) {
+  const FloatImage a{{20, 20}, {"R", "G", "B"}, std::vector<float>(1200, 0.5F)};
+  FloatImage b = a;
+  std::ranges::fill(b.values, 0.75F);
+  const std::vector<std::string> some{"ssim", "rmse"};
+  const DiffReport part = diff_pictures(a, "a", b, "b", {}, some);
+  EXPECT_NEAR(part.colors->ssim, (2 * 0.375 + 1e-4) / (0.25 + 0.5625 + 1e-4), 1e-6);
+  EXPECT_TRUE(std::isnan(part.colors->flip));
+  const std::vector<std::string> plain{"rmse"};
+  EXPECT_FALSE(diff_pictures(a, "a", b, "b", {}, plain).colors.has_value());
+
+  const DiffReport report = diff(a, b);
+  EXPECT_NEAR(report.colors->relative.trimmed, 0.0625 / 0.26, 1e-6);
+  EXPECT_GT(report.colors->flip, 0.1);
+  const auto json = nlohmann::json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
+  EXPECT_EQ(json["relmse"], report.colors->relative.trimmed);
+  EXPECT_EQ(json["relmse_untrimmed"], report.colors->relative.all);
+  EXPECT_EQ(json["ssim"], report.colors->ssim);
+  EXPECT_EQ(json["flip"], report.colors->flip);
+  const std::string table = diff_table(report, diff_metrics());
+  for (const char* name : {"\nrelmse     0.24038", "\nssim       0.923", "\nflip       0."}) {
+    EXPECT_NE(table.find(name), std::string::npos) << table;
+  }
+  // One firefly of a thousand pixels.
+  const FloatImage black = picture(std::vector<float>(3000, 0.0F));
+  FloatImage firefly = black;
+  firefly.values[99] = 1000.0F;
+  const auto trimmed = nlohmann::json::parse(diff_json(diff(black, firefly), diff_metrics(), "a", "b", {}));
+  EXPECT_EQ(trimmed["relmse"], 0.0);
+  EXPECT_NEAR(trimmed["relmse_untrimmed"].get<double>(), 1e6 / 0.01 / 3000.0, 1e-3);
+
+  const auto equal = diff(a, a).colors;
+  EXPECT_EQ(equal->relative.trimmed, 0.0);
+  EXPECT_EQ(equal->ssim, 1.0);
+  EXPECT_EQ(equal->flip, 0.0);
+}
+
+TEST(Diff, LinearColorsAreSeenAsDisplaysShowThem) {
+  // On a display 0.5 is 0.735357, and 1 and 4 are the same white.
+  FloatImage a{{1, 1}, {"R", "G", "B"}, {0.5F, 0.5F, 0.5F}, true};
+  FloatImage b{{1, 1}, {"R", "G", "B"}, {4, 4, 4}, true};
+  const double level = 0.735357;
+  const DiffReport report = diff(a, b);
+  EXPECT_NEAR(report.colors->ssim, (2 * level + 1e-4) / (level * level + 1.0 + 1e-4), 1e-6);
+  EXPECT_NEAR(report.colors->relative.all, 3.5 * 3.5 / 0.26, 1e-4) << "of radiance";
+  a.values = {1, 1, 1};
+  EXPECT_EQ(diff(a, b).colors->flip, 0.0);
+  EXPECT_EQ(diff(a, b).colors->ssim, 1.0);
+  a.linear = false;
+  EXPECT_THROW((void)diff(a, b), Error);
+}
+
+TEST(Diff, WhereColorsAreNotFiniteThereIsNoNumber) {
+  FloatImage a = picture({0, 0, 0, 1, 1, 1});
+  a.values[4] = std::numeric_limits<float>::quiet_NaN();
+  const DiffReport report = diff(a, a);
+  const auto json = nlohmann::json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
+  for (const char* metric : {"relmse", "relmse_untrimmed", "ssim", "flip"})
+    EXPECT_TRUE(json[metric].is_null()) << metric;
+  EXPECT_EQ(json["not_finite"], 1);
+  const std::string table = diff_table(report, diff_metrics());
+  EXPECT_NE(table.find("flip       none: 1 pixels are not finite\n"), std::string::npos) << table;
+  EXPECT_TRUE(report.passed) << "equal all the same";
+  // Clamped for a display, an infinity would be white.
+  a.values[4] = std::numeric_limits<float>::infinity();
+  a.linear = true;
+  EXPECT_TRUE(std::isnan(diff(a, a).colors->ssim));
+  EXPECT_EQ(diff(a, a).colors->not_finite, 1U);
+}
+
+TEST(Diff, ColorsAreThoseOfRgbOrGreyAndNothingElse) {
+  const FloatImage depth{{1, 1}, {"Z"}, {0.5F}};
+  const DiffReport none = diff(depth, depth);
+  EXPECT_FALSE(none.colors.has_value());
+  EXPECT_NE(diff_table(none, diff_metrics()).find("ssim       none: the pictures have no channels"), std::string::npos);
+  EXPECT_TRUE(nlohmann::json::parse(diff_json(none, diff_metrics(), "a", "b", {}))["ssim"].is_null());
+  const FloatImage grey{{1, 1}, {"Y"}, {0.5F}};
+  const FloatImage light{{1, 1}, {"Y"}, {0.6F}};
+  const DiffReport of_grey = diff(grey, light);
+  EXPECT_EQ(of_grey.colors->flip, diff(picture({0.5F, 0.5F, 0.5F}), picture({0.6F, 0.6F, 0.6F})).colors->flip);
+  // Neither alpha nor depth counts, wherever they stand.
+  const FloatImage a{{1, 1}, {"Z", "B", "G", "R", "A"}, {0, 0.1F, 0.2F, 0.3F, 1}};
+  const FloatImage b{{1, 1}, {"R", "G", "B", "A", "Z"}, {0.3F, 0.2F, 0.1F, 0, 9}};
+  EXPECT_EQ(diff(a, b).colors->relative.all, 0.0);
+  EXPECT_EQ(diff(a, b).colors->flip, 0.0);
 }
 
 TEST_F(DiffFiles, KeysAreComparedOneByOne) {

@@ -47,4 +47,14 @@ float srgb_to_linear(std::uint8_t level) {
   return table[level];
 }
 
+float encode_srgb(float linear) {
+  const float value = std::clamp(linear, 0.0F, 1.0F);
+  return value <= 0.0031308F ? 12.92F * value : 1.055F * std::pow(value, 1.0F / 2.4F) - 0.055F;
+}
+
+float decode_srgb(float display) {
+  const float value = std::clamp(display, 0.0F, 1.0F);
+  return value <= 0.04045F ? value / 12.92F : std::pow((value + 0.055F) / 1.055F, 2.4F);
+}
+
 }  // namespace hpr

@@ -38,4 +38,8 @@ struct Rgba8 {
 /// The linear value of an 8-bit sRGB level.
 [[nodiscard]] float srgb_to_linear(std::uint8_t level);
 
+/// IEC 61966-2-1 without rounding, and back; clamped to [0, 1] before. NaN stays.
+[[nodiscard]] float encode_srgb(float linear);
+[[nodiscard]] float decode_srgb(float display);
+
 }  // namespace hpr

@@ -23,6 +23,20 @@ TEST(Color, EveryLevelSurvivesTheWayToLinearAndBack) {
   }
 }
 
+TEST(Color, EncodesWithoutRoundingAndBack) {
+  for (int level = 0; level < 256; ++level) {
+    const float display = static_cast<float>(level) / 255.0F;
+    EXPECT_NEAR(decode_srgb(display), linear_of(static_cast<double>(level) / 255.0), 1e-6) << level;
+    EXPECT_NEAR(encode_srgb(decode_srgb(display)), display, 1e-6F) << level;
+  }
+  EXPECT_NEAR(encode_srgb(0.5F), 0.735357F, 1e-6F);
+  EXPECT_EQ(encode_srgb(-1.0F), 0.0F);
+  EXPECT_EQ(encode_srgb(7.0F), encode_srgb(1.0F));
+  EXPECT_EQ(decode_srgb(-1.0F), 0.0F);
+  EXPECT_EQ(decode_srgb(2.0F), 1.0F);
+  EXPECT_TRUE(std::isnan(encode_srgb(std::numeric_limits<float>::quiet_NaN())));
+}
+
 TEST(Color, DecodesKnownLevels) {
   EXPECT_EQ(srgb_to_linear(0), 0.0F);
   EXPECT_EQ(srgb_to_linear(255), 1.0F);

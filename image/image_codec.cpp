@@ -65,8 +65,8 @@ class Input {
   Input(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits, bool floats_allowed)
       : name_(name), memory_(const_cast<std::byte*>(bytes.data()), bytes.size()) {
     const char* const format = sniff(bytes);
-    const bool floats = format != nullptr && (std::strcmp(format, "openexr") == 0 || std::strcmp(format, "hdr") == 0);
-    if (format == nullptr || (floats && !floats_allowed)) {
+    linear_ = format != nullptr && (std::strcmp(format, "openexr") == 0 || std::strcmp(format, "hdr") == 0);
+    if (format == nullptr || (linear_ && !floats_allowed)) {
       throw Error(ExitCode::BadInput,
                   fmt::format("{}: not a PNG{} or JPEG picture", name, floats_allowed ? ", EXR, Radiance" : ""),
                   "convert the picture");
@@ -84,6 +84,7 @@ class Input {
   }
 
   [[nodiscard]] const OIIO::ImageSpec& spec() const { return input_->spec(); }
+  [[nodiscard]] bool linear() const { return linear_; }
 
   template <typename Value>
   [[nodiscard]] std::vector<Value> values(OIIO::TypeDesc type) {
@@ -109,6 +110,7 @@ class Input {
   std::string name_;
   OIIO::Filesystem::IOMemReader memory_;
   std::unique_ptr<OIIO::ImageInput> input_;
+  bool linear_ = false;
 };
 
 class OiioCodec final : public ImageCodec {
@@ -182,7 +184,8 @@ class OiioCodec final : public ImageCodec {
     Input input(bytes, name, limits, true);
     return {{input.spec().width, input.spec().height},
             input.spec().channelnames,
-            input.values<float>(OIIO::TypeDesc::FLOAT)};
+            input.values<float>(OIIO::TypeDesc::FLOAT),
+            input.linear()};
   }
 
   [[nodiscard]] std::vector<std::uint32_t> decode_integers(std::span<const std::byte> bytes, const std::string& name,

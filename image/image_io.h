@@ -25,6 +25,7 @@ struct FloatImage {
   Size size;
   std::vector<std::string> channels;
   std::vector<float> values;
+  bool linear = false;  ///< radiance, not display values
 };
 
 /// One more channel set of an EXR file, e.g. depth or surface ids; floats survive bit by bit.

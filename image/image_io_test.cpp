@@ -148,6 +148,12 @@ TEST(ImageIo, PngFilesReadAsLevelsOver255) {
   EXPECT_FLOAT_EQ(read.values[3], 128.0F / 255.0F);
 }
 
+TEST(ImageIo, PicturesSayWhetherTheyAreLinear) {
+  EXPECT_FALSE(through_file(encode_png(Image<Rgba8>({1, 1})), ".png").linear);
+  EXPECT_TRUE(through_file(encode_exr(Image<Rgb>({1, 1}), {}), ".exr").linear);
+  EXPECT_TRUE(through_file(encode_exr(Image<Rgb>({1, 1}), {}), ".png").linear) << "whatever its name says";
+}
+
 TEST(ImageIo, GreyPngBecomesEqualChannels) {
   const auto grey = make_png(2, 2, 8, 0, {bytes_of({0, 0, 255}), bytes_of({0, 7, 128})});
   const Image<Rgba8> image = decode_image(grey, "grey.png", {});

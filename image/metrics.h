@@ -12,6 +12,8 @@ struct Difference {
   double psnr = 0.0;          ///< dB against a peak of 1; infinity when equal
   double max = 0.0;           ///< largest absolute difference
   double mean = 0.0;          ///< signed: mean of image - reference (bias)
+  double mean_error = 0.0;    ///< standard error of `mean`, pixels taken as independent; NaN for fewer than two
+  std::size_t worst = 0;      ///< the first pixel with a difference of `max`
   std::size_t pixels = 0;     ///< compared
   std::size_t differing = 0;  ///< pixels with any value whose bits differ by more than -0 against 0
 };
@@ -19,5 +21,20 @@ struct Difference {
 /// `channels` values per pixel.
 [[nodiscard]] Difference compare_values(std::span<const float> image, std::span<const float> reference,
                                         std::size_t channels);
+
+/// relMSE: squared differences against the squared brightness of the reference, the mean over all pixels and channels
+/// of (image - reference)^2 / (m^2 + 0.01), where m is the mean of the reference's channels in that pixel. Of noise it
+/// falls as 1 / samples.
+struct RelativeError {
+  double trimmed = 0.0;  ///< without the worst pixels, one in 1000 (rounded down): fireflies say little of the rest
+  double all = 0.0;
+};
+
+/// `channels` values per pixel. NaN where a value is not finite, 0 without pixels.
+[[nodiscard]] RelativeError relative_error(std::span<const float> image, std::span<const float> reference,
+                                           std::size_t channels);
+
+/// Whether no value is infinite or NaN.
+[[nodiscard]] bool all_finite(std::span<const float> values);
 
 }  // namespace hpr

@@ -56,6 +56,60 @@ TEST(Metrics, NanInOneImageIsAnInfiniteDifference) {
   }
 }
 
+TEST(Metrics, TheMeanHasTheStandardErrorOfThePixels) {
+  // Means per pixel are 1, 2, 6: their mean is 3, their variance 7.
+  const Difference result = compare_values(Values{0, 2, 2, 2, 7, 5}, Values{0, 0, 0, 0, 0, 0}, 2);
+  EXPECT_DOUBLE_EQ(result.mean, 3.0);
+  EXPECT_DOUBLE_EQ(result.mean_error, std::sqrt(7.0 / 3.0));
+  EXPECT_TRUE(std::isnan(compare_values(Values{1, 2}, Values{0, 0}, 2).mean_error)) << "one pixel tells no spread";
+  const Difference shift = compare_values(Values(1000, 1e6F), Values(1000, 0.0F), 1);
+  EXPECT_EQ(shift.mean_error, 0.0) << "nor does a large mean make one";
+}
+
+TEST(Metrics, TheWorstPixelIsTheFirstWithTheLargestDifference) {
+  EXPECT_EQ(compare_values(Values{0, 0, 1, 0, 0, -3, 3, 0}, Values(8, 0.0F), 2).worst, 2U);
+  EXPECT_EQ(compare_values(Values{0, 5, kNan, kNan}, Values{0, 0, kNan, 0}, 1).worst, 3U);
+}
+
+TEST(Metrics, RelativeErrorsAreHeldAgainstTheBrightnessOfTheReference) {
+  // Pixels of two channels: squares 1 and 0 against 2^2, 0 and 4 against 0, 0 against 1.
+  const Values reference{2, 2, 0, 0, 1, 1};
+  const Values image{3, 2, 0, -2, 1, 1};
+  const double expected = (0.5 / 4.01 + 2.0 / 0.01 + 0.0) / 3.0;
+  EXPECT_NEAR(relative_error(image, reference, 2).all, expected, 1e-9);
+  EXPECT_EQ(relative_error(image, reference, 2).trimmed, relative_error(image, reference, 2).all) << "too few to trim";
+  EXPECT_NE(relative_error(reference, image, 2).all, relative_error(image, reference, 2).all) << "not symmetric";
+  // Channels that cancel are as good as black.
+  EXPECT_NEAR(relative_error(Values{2, -1}, Values{1, -1}, 2).all, 0.5 / 0.01, 1e-9);
+}
+
+TEST(Metrics, TheTrimmedErrorLeavesOutOnePixelOfAThousand) {
+  for (const std::size_t pixels : {999U, 1000U, 2999U, 3000U}) {
+    const Values reference(pixels, 1.0F);
+    Values image(pixels, 1.5F);
+    image[17] = image[500] = image[998] = 1e6F;
+    const std::size_t left = 3 - pixels / 1000;  // of the three fireflies
+    const double usual = 0.25 / 1.01;
+    const double firefly = (1e6 - 1.0) * (1e6 - 1.0) / 1.01;
+    const double kept = static_cast<double>(pixels - pixels / 1000);
+    const RelativeError error = relative_error(image, reference, 1);
+    const double trimmed = (static_cast<double>(left) * firefly + (kept - static_cast<double>(left)) * usual) / kept;
+    EXPECT_NEAR(error.trimmed, trimmed, 1e-9 * trimmed) << pixels;
+    EXPECT_GT(error.all, error.trimmed * (pixels < 1000 ? 0.99 : 1.1)) << pixels;
+  }
+}
+
+TEST(Metrics, RelativeErrorsOfEqualPicturesVanishAndOfNanAreNoNumber) {
+  EXPECT_EQ(relative_error(Values{1, 2, 3}, Values{1, 2, 3}, 3).all, 0.0);
+  EXPECT_EQ(relative_error(Values{1, 2, 3}, Values{1, 2, 3}, 3).trimmed, 0.0);
+  EXPECT_EQ(relative_error({}, {}, 3).trimmed, 0.0);
+  for (const float bad : {kNan, kInfinity, -kInfinity}) {
+    EXPECT_TRUE(std::isnan(relative_error(Values{1, bad}, Values{1, 2}, 1).trimmed));
+    EXPECT_TRUE(std::isnan(relative_error(Values{1, 2}, Values{1, bad}, 1).all));
+    EXPECT_TRUE(std::isnan(relative_error(Values{1, bad}, Values{1, bad}, 1).all)) << "in both";
+  }
+}
+
 TEST(Metrics, NothingComparedIsEqual) {
   const Difference result = compare_values({}, {}, 3);
   EXPECT_EQ(result.pixels, 0U);

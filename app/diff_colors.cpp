@@ -1,0 +1,68 @@
+#include "app/diff_colors.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "image/color.h"
+#include "image/flip.h"
+#include "image/ssim.h"
+
+namespace hpr {
+namespace {
+
+bool asks_for(std::span<const std::string> metrics, const char* metric) {
+  return std::ranges::find(metrics, metric) != metrics.end();
+}
+
+/// [height][width][3]; grey pictures have the same value three times. Empty for pictures without colours.
+std::vector<float> colors_of(const FloatImage& picture) {
+  const auto place = [&](const char* channel) {
+    return static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin());
+  };
+  const std::size_t channels = picture.channels.size();
+  std::array<std::size_t, 3> from{place("R"), place("G"), place("B")};
+  if (std::ranges::count(from, channels) != 0) from.fill(place("Y"));
+  if (from[0] == channels) return {};
+  std::vector<float> colors;
+  colors.reserve(picture.size.area() * 3);
+  for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
+    for (const std::size_t channel : from) colors.push_back(picture.values[pixel * channels + channel]);
+  }
+  return colors;
+}
+
+std::size_t not_finite_pixels(std::span<const float> a, std::span<const float> b) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size(); i += 3) {
+    if (!all_finite(a.subspan(i, 3)) || !all_finite(b.subspan(i, 3))) ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
+bool asks_for_colors(std::span<const std::string> metrics) {
+  return asks_for(metrics, "relmse") || asks_for(metrics, "ssim") || asks_for(metrics, "flip");
+}
+
+std::optional<ColorErrors> compare_colors(const FloatImage& a, const FloatImage& b,
+                                          std::span<const std::string> metrics, int threads) {
+  std::vector<float> reference = colors_of(a);
+  std::vector<float> image = colors_of(b);
+  if (reference.empty() && a.size.area() > 0) return std::nullopt;
+  ColorErrors errors;
+  errors.not_finite = not_finite_pixels(reference, image);
+  if (errors.not_finite > 0) return errors;
+  if (asks_for(metrics, "relmse")) errors.relative = relative_error(image, reference, 3);
+  if (a.linear) {
+    for (std::vector<float>* const values : {&reference, &image})
+      std::ranges::transform(*values, values->begin(), encode_srgb);
+  }
+  if (asks_for(metrics, "ssim")) errors.ssim = ssim(image, reference, a.size, threads);
+  if (asks_for(metrics, "flip")) errors.flip = flip_error(image, reference, a.size, threads).mean;
+  return errors;
+}
+
+}  // namespace hpr

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "image/image_io.h"
+#include "image/metrics.h"
+
+namespace hpr {
+
+/// How the colours of two pictures differ, for those metrics that were asked for; the others stay NaN.
+struct ColorErrors {
+  std::size_t not_finite = 0;  ///< pixels where either colour is not; unless there are none, all below is NaN
+  RelativeError relative{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+  double ssim = std::numeric_limits<double>::quiet_NaN();
+  double flip = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Whether any of `metrics` is about colours: relmse, ssim or flip.
+[[nodiscard]] bool asks_for_colors(std::span<const std::string> metrics);
+
+/// Compares `b` with `a`, of the same size and channels: relmse of the values as they are; ssim and flip of display
+/// values, which linear pictures are clamped and encoded to. None for pictures without channels R, G and B, or Y.
+[[nodiscard]] std::optional<ColorErrors> compare_colors(const FloatImage& a, const FloatImage& b,
+                                                        std::span<const std::string> metrics, int threads);
+
+}  // namespace hpr
