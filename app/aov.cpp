@@ -50,8 +50,7 @@ std::vector<Aov> parse_aovs(const std::string& list) {
     aovs.push_back(static_cast<Aov>(found - kNames.begin()));
   }
   std::ranges::sort(aovs);
-  const auto repeated = std::ranges::unique(aovs);
-  aovs.erase(repeated.begin(), repeated.end());
+  aovs.erase(std::unique(aovs.begin(), aovs.end()), aovs.end());
   return aovs;
 }
 

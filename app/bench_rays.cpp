@@ -1,12 +1,12 @@
 #include "app/bench_rays.h"
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <ctime>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>

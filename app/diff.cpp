@@ -150,6 +150,12 @@ const std::vector<std::string>& diff_metrics() {
   return names;
 }
 
+std::vector<std::string> quick_diff_metrics() {
+  std::vector<std::string> names = diff_metrics();
+  std::erase_if(names, [](const std::string& name) { return name == "ssim" || name == "flip"; });
+  return names;
+}
+
 DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b, const std::string& name_b,
                          const DiffTolerance& tolerance, std::span<const std::string> metrics, int threads) {
   std::vector<std::string> sorted_a = a.channels;

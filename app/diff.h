@@ -35,6 +35,8 @@ struct DiffReport {
 
 /// The metrics by name: rmse, psnr, max, differing, mean, relmse, ssim, flip.
 [[nodiscard]] const std::vector<std::string>& diff_metrics();
+/// Those that take no longer than reading the pictures.
+[[nodiscard]] std::vector<std::string> quick_diff_metrics();
 
 /// Compares `b` with `a` value by value, channels by name, and colours as far as `metrics` asks for them. Throws Error
 /// (BadInput), naming both, when sizes or channels differ, or one is linear and the other is not.

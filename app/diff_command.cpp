@@ -24,8 +24,10 @@ class DiffCommand final : public Command {
   void declare(CLI::App& app) override {
     app.add_option("A", a_, "the reference: a picture, or a .keys file of hpr render --raw")->required();
     app.add_option("B", b_, "what is compared with it")->required();
-    app.add_option("--metric", metrics_,
-                   "rmse, psnr, max, differing, mean, relmse, ssim, flip: which to print (default all)")
+    app.add_option(
+           "--metric", metrics_,
+           "rmse, psnr, max, differing, mean, relmse, ssim, flip: which to print (default: all but the last two, "
+           "which take longer)")
         ->delimiter(',');
     app.add_option("--fail", tolerance_.value, "largest allowed absolute difference of a value, 1 = white (default 0)");
     app.add_option("--fail-percent", tolerance_.percent, "share of pixels that may exceed it (default 0)");
@@ -51,7 +53,7 @@ class DiffCommand final : public Command {
                     unknown_name_hint(metric, diff_metrics()));
       }
     }
-    if (metrics_.empty()) metrics_ = diff_metrics();
+    if (metrics_.empty()) metrics_ = quick_diff_metrics();
     if (!(tolerance_.value >= 0.0)) {
       throw Error(ExitCode::Usage, "--fail is not a difference", "give a number from 0 on, like --fail 0.004");
     }

@@ -71,8 +71,7 @@ std::string choose_primary(Session& session, FramePlan& plan, std::span<const Vi
     worst.rays_ms = std::max(worst.rays_ms, times.rays_ms);
   }
   plan.primary = worst.rays_ms < worst.raster_ms ? Primary::Rays : Primary::Raster;
-  const std::string why =
-      fmt::format("measured: {:.1f} ms by rays, {:.1f} ms by OpenGL", worst.rays_ms, worst.raster_ms);
+  std::string why = fmt::format("measured: {:.1f} ms by rays, {:.1f} ms by OpenGL", worst.rays_ms, worst.raster_ms);
   if (session.comm().rank() == 0) log::info("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", why);
   return why;
 }

@@ -32,6 +32,7 @@ const Quality& find_quality(const std::string& name) {
   const auto found = std::ranges::find(kQualities, name, &Quality::name);
   if (found != kQualities.end()) return *found;
   std::vector<std::string> choices;
+  choices.reserve(kQualities.size());
   for (const Quality& quality : kQualities) choices.emplace_back(quality.name);
   throw Error(ExitCode::Usage, "unknown quality '" + printable(name) + "'", unknown_name_hint(name, choices));
 }

@@ -16,7 +16,7 @@ std::string describe(const View& view) {
   std::array<double, 17> numbers{view.eye.x, view.eye.y, view.eye.z};
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row)
-      numbers.at(static_cast<std::size_t>(3 + 3 * column + row)) = view.axes[column][row];
+      numbers.at(3 + 3 * static_cast<std::size_t>(column) + static_cast<std::size_t>(row)) = view.axes[column][row];
   }
   numbers[12] = view.left;
   numbers[13] = view.right;
