@@ -94,25 +94,21 @@ nlohmann::ordered_json worst_pixel(const DiffReport& report) {
   return {{"x", worst_x(report)}, {"y", worst_y(report)}, {"value", report.difference.max}};
 }
 
-bool asked(std::span<const std::string> metrics, std::string_view metric) {
-  return std::ranges::find(metrics, metric) != metrics.end();
-}
-
 /// What only pictures have. JSON has no infinity and no NaN: null.
 void add_picture(nlohmann::ordered_json& json, const DiffReport& report, std::span<const std::string> metrics) {
   const Difference& d = report.difference;
   json["width"] = report.size.width;
   json["height"] = report.size.height;
   json["channels"] = report.channels;
-  if (asked(metrics, "rmse")) json["rmse"] = d.rmse;
-  if (asked(metrics, "psnr")) json["psnr"] = d.psnr;
-  if (asked(metrics, "mean")) json["mean"] = d.mean;
-  if (asked(metrics, "mean")) json["mean_error"] = d.mean_error;
+  if (asks_for(metrics, "rmse")) json["rmse"] = d.rmse;
+  if (asks_for(metrics, "psnr")) json["psnr"] = d.psnr;
+  if (asks_for(metrics, "mean")) json["mean"] = d.mean;
+  if (asks_for(metrics, "mean")) json["mean_error"] = d.mean_error;
   const ColorErrors colors = report.colors.value_or(ColorErrors{});
-  if (asked(metrics, "relmse")) json["relmse"] = colors.relative.trimmed;
-  if (asked(metrics, "relmse")) json["relmse_untrimmed"] = colors.relative.all;
-  if (asked(metrics, "ssim")) json["ssim"] = colors.ssim;
-  if (asked(metrics, "flip")) json["flip"] = colors.flip;
+  if (asks_for(metrics, "relmse")) json["relmse"] = colors.relative.trimmed;
+  if (asks_for(metrics, "relmse")) json["relmse_untrimmed"] = colors.relative.all;
+  if (asks_for(metrics, "ssim")) json["ssim"] = colors.ssim;
+  if (asks_for(metrics, "flip")) json["flip"] = colors.flip;
   if (asks_for_colors(metrics)) json["not_finite"] = colors.not_finite;
 }
 
@@ -251,15 +247,15 @@ std::string diff_table(const DiffReport& report, std::span<const std::string> me
   std::string text;
   const auto row = [&](const char* name, const std::string& value) { text += fmt::format("{:<10} {}\n", name, value); };
   if (report.keys) {
-    if (asked(metrics, "max")) row("max", fmt::format("{:.6g} of depth", d.max));
-    if (asked(metrics, "differing")) {
+    if (asks_for(metrics, "max")) row("max", fmt::format("{:.6g} of depth", d.max));
+    if (asks_for(metrics, "differing")) {
       row("differing", fmt::format("{} of {} keys ({:.4g} %), {} of them another surface", d.differing, d.pixels,
                                    share(d.differing, d.pixels), report.other_surface));
     }
   } else {
     row("size", fmt::format("{}x{} {}", report.size.width, report.size.height, fmt::join(report.channels, ",")));
     for (const std::string& metric : diff_metrics()) {
-      if (asked(metrics, metric)) row(metric.c_str(), picture_value(report, metric));
+      if (asks_for(metrics, metric)) row(metric.c_str(), picture_value(report, metric));
     }
   }
   if (report.beyond != d.differing) row("beyond", fmt::format("{} pixels exceed --fail", report.beyond));
@@ -278,9 +274,9 @@ std::string diff_json(const DiffReport& report, std::span<const std::string> met
   } else {
     add_picture(json, report, metrics);
   }
-  if (asked(metrics, "max")) json["max"] = d.max;
-  if (asked(metrics, "max") && !report.keys) json["worst"] = worst_pixel(report);
-  if (asked(metrics, "differing")) json["differing"] = d.differing;
+  if (asks_for(metrics, "max")) json["max"] = d.max;
+  if (asks_for(metrics, "max") && !report.keys) json["worst"] = worst_pixel(report);
+  if (asks_for(metrics, "differing")) json["differing"] = d.differing;
   json["fail"] = tolerance.value;
   json["fail_percent"] = tolerance.percent;
   json["beyond"] = report.beyond;

@@ -12,10 +12,6 @@
 namespace hpr {
 namespace {
 
-bool asks_for(std::span<const std::string> metrics, const char* metric) {
-  return std::ranges::find(metrics, metric) != metrics.end();
-}
-
 /// [height][width][3]; grey pictures have the same value three times. Empty for pictures without colours.
 std::vector<float> colors_of(const FloatImage& picture) {
   const auto place = [&](const char* channel) {
@@ -42,6 +38,10 @@ std::size_t not_finite_pixels(std::span<const float> a, std::span<const float> b
 }
 
 }  // namespace
+
+bool asks_for(std::span<const std::string> metrics, std::string_view metric) {
+  return std::ranges::find(metrics, metric) != metrics.end();
+}
 
 bool asks_for_colors(std::span<const std::string> metrics) {
   return asks_for(metrics, "relmse") || asks_for(metrics, "ssim") || asks_for(metrics, "flip");

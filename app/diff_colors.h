@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "image/image_io.h"
 #include "image/metrics.h"
@@ -18,6 +19,9 @@ struct ColorErrors {
   double ssim = std::numeric_limits<double>::quiet_NaN();
   double flip = std::numeric_limits<double>::quiet_NaN();
 };
+
+/// Whether `metric` is one of `metrics`.
+[[nodiscard]] bool asks_for(std::span<const std::string> metrics, std::string_view metric);
 
 /// Whether any of `metrics` is about colours: relmse, ssim or flip.
 [[nodiscard]] bool asks_for_colors(std::span<const std::string> metrics);

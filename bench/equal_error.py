@@ -4,9 +4,9 @@
 usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--trim PERCENT] [--cache FOLDER] [--json FILE]
 
 Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). The truth is
-Mitsuba's, of many samples; relMSE is trimmed by the worst 0.1 % of pixels (--trim), which in
-Mitsuba's pictures are fireflies. What chance leaves in the truth is taken off every error. Needs what tests/mitsuba_test.py
-needs, and says so when something is missing.
+Mitsuba's, of many samples; relMSE is trimmed by the worst 0.1 % of pixels (--trim), which in Mitsuba's pictures are fireflies.
+What chance leaves in the truth is taken off every error. Needs what tests/mitsuba_test.py needs, and says so when something is
+missing.
 """
 import argparse
 import json
@@ -34,9 +34,7 @@ WAYS = {
 
 
 def relmse(numpy, picture, truth, trim):
-    weight = 1.0 / (truth.mean(-1) ** 2 + 1e-2)
-    squares = numpy.sort((((picture - truth) ** 2).mean(-1) * weight).ravel())
-    return float(squares[: len(squares) - int(len(squares) * trim / 100.0)].mean())
+    return peer.trimmed_mean(numpy, ((picture - truth) ** 2).mean(-1) * peer.relative_weight(truth), trim)
 
 
 def render_mitsuba(numpy, mitsuba, scene, spp, seed):

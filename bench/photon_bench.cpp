@@ -89,13 +89,13 @@ void photon_gather(benchmark::State& state) {
     }
   }
   std::size_t gathered = 0;
-  for (const Place& place : places) gathered += map.count(place.position, place.normal, hpr::PhotonSide::Front);
+  for (const Place& place : places) gathered += map.count(place.position, place.normal);
   std::size_t i = 0;
   for (auto _ : state) {
     const Place& place = places[i++ % places.size()];
-    benchmark::DoNotOptimize(
-        map.gather(place.position, place.normal, hpr::PhotonSide::Front,
-                   [&](const glm::dvec3& from) { return glm::dvec3(glm::dot(from, place.normal)); }));
+    benchmark::DoNotOptimize(map.gather(place.position, place.normal, [&](const glm::dvec3& from) {
+      return glm::dvec3(glm::dot(from, place.normal));
+    }));
   }
   state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(places.size());
 }

@@ -7,8 +7,10 @@
 namespace hpr {
 namespace {
 
-double decode(double level) {
-  return level <= 0.04045 ? level / 12.92 : std::pow((level + 0.055) / 1.055, 2.4);
+/// IEC 61966-2-1.
+template <typename Real>
+Real decode(Real level) {
+  return level <= Real(0.04045) ? level / Real(12.92) : std::pow((level + Real(0.055)) / Real(1.055), Real(2.4));
 }
 
 /// The smallest float from which level i + 1 is nearer than level i.
@@ -53,8 +55,7 @@ float encode_srgb(float linear) {
 }
 
 float decode_srgb(float display) {
-  const float value = std::clamp(display, 0.0F, 1.0F);
-  return value <= 0.04045F ? value / 12.92F : std::pow((value + 0.055F) / 1.055F, 2.4F);
+  return decode(std::clamp(display, 0.0F, 1.0F));
 }
 
 }  // namespace hpr

@@ -8,6 +8,8 @@
 #include <glm/mat3x3.hpp>
 #include <numbers>
 
+#include "rt/warp.h"
+
 namespace hpr {
 namespace {
 
@@ -24,20 +26,11 @@ double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
 }
 
-/// Two axes at right angles to a unit vector: Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an
-/// Orthonormal Basis, Revisited", JCGT 6(1), 2017.
-glm::dmat3 frame_around(const glm::dvec3& n) {
-  const double sign = std::copysign(1.0, n.z);
-  const double a = -1.0 / (sign + n.z);
-  const double b = n.x * n.y * a;
-  return {{1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
-}
-
 /// A normal of GGX facets of roughness `alpha` that `view` sees, both around z: Heitz 2018, section 3. The facets are
 /// stretched into a hemisphere, whose visible half is a disc of which a part is squeezed.
 glm::dvec3 visible_normal(const glm::dvec3& view, double alpha, const glm::dvec2& u) {
   const glm::dvec3 stretched = glm::normalize(glm::dvec3(alpha * view.x, alpha * view.y, view.z));
-  const glm::dmat3 frame = frame_around(stretched);
+  const glm::dmat3 frame = warp::basis_about(stretched);
   // The disc's second axis is to lie in the plane of incidence, where the squeeze happens.
   const double across = std::sqrt(square(stretched.x) + square(stretched.y));
   const glm::dvec3 first = across > 0.0 ? glm::dvec3(-stretched.y, stretched.x, 0.0) / across : frame[0];
@@ -266,12 +259,8 @@ std::optional<glm::dvec3> Bsdf::refracted(const glm::dvec3& normal) const {
 }
 
 std::optional<BsdfSample> Bsdf::sample_diffuse(const glm::dvec2& u) const {
-  // Malley's method: a disc lifted onto the hemisphere.
-  const double radius = std::sqrt(u.x);
-  const double angle = 2.0 * std::numbers::pi * u.y;
-  const glm::dvec3 local(radius * std::cos(angle), radius * std::sin(angle), std::sqrt(std::max(0.0, 1.0 - u.x)));
   BsdfSample sample;
-  sample.direction = glm::normalize(frame_around(normal_) * local);
+  sample.direction = warp::cosine_lobe(normal_, u);
   if (!same_side(sample.direction)) return std::nullopt;
   sample.pdf = glm::dot(normal_, sample.direction) / std::numbers::pi;
   sample.weight = std::numbers::pi * value(Lobe::Diffuse, sample.direction);
@@ -279,7 +268,7 @@ std::optional<BsdfSample> Bsdf::sample_diffuse(const glm::dvec2& u) const {
 }
 
 std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) const {
-  const glm::dmat3 frame = frame_around(normal_);
+  const glm::dmat3 frame = warp::basis_about(normal_);
   const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), u);
   const double view_half = glm::dot(view_, half);
   const glm::dvec3 mirrored = 2.0 * view_half * half - view_;

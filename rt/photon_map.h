@@ -41,12 +41,6 @@ struct Photon {
 };
 static_assert(sizeof(Photon) == 32);
 
-/// From which side of a surface photons count.
-enum class PhotonSide : std::uint8_t {
-  Front,  ///< that of the normal
-  Both,   ///< for surfaces that let light through
-};
-
 /// Photons in a hash grid whose cells are as wide as the gather radius: with one radius for a whole map, as progressive
 /// photon mapping has it (Knaus and Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", 2011), a gather
 /// looks at 3 x 3 rows of cells.
@@ -76,10 +70,9 @@ class PhotonMap {
   /// mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at the rim, so that what lies
   /// there matters little and pictures are continuous.
   template <typename Value>
-  [[nodiscard]] glm::dvec3 gather(const glm::dvec3& place, const glm::dvec3& normal, PhotonSide side,
-                                  Value&& value) const {
+  [[nodiscard]] glm::dvec3 gather(const glm::dvec3& place, const glm::dvec3& normal, Value&& value) const {
     glm::dvec3 sum(0.0);
-    visit(place, normal, side, [&](const Photon& photon, double weight) {
+    visit(place, normal, [&](const Photon& photon, double weight) {
       const glm::dvec3 flux(photon.flux[0], photon.flux[1], photon.flux[2]);
       sum += weight * flux * value(unpack_direction(photon.direction));
     });
@@ -87,9 +80,9 @@ class PhotonMap {
   }
 
   /// How many photons such a gather counts.
-  [[nodiscard]] std::size_t count(const glm::dvec3& place, const glm::dvec3& normal, PhotonSide side) const {
+  [[nodiscard]] std::size_t count(const glm::dvec3& place, const glm::dvec3& normal) const {
     std::size_t found = 0;
-    visit(place, normal, side, [&](const Photon& /*photon*/, double /*weight*/) { ++found; });
+    visit(place, normal, [&](const Photon& /*photon*/, double /*weight*/) { ++found; });
     return found;
   }
 
@@ -121,7 +114,7 @@ class PhotonMap {
   std::size_t find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<Row, 9>& rows) const;
 
   template <typename Visit>
-  void visit(const glm::dvec3& place, const glm::dvec3& normal, PhotonSide side, Visit&& found) const {
+  void visit(const glm::dvec3& place, const glm::dvec3& normal, Visit&& found) const {
     if (size_ == 0) return;
     const glm::dvec3 at = space_.from_world(place);
     std::array<Row, 9> rows;
@@ -133,8 +126,7 @@ class PhotonMap {
         if (!(distance2 < radius2_)) continue;
         if (!(std::abs(glm::dot(way, normal)) <= flatness_)) continue;
         const glm::dvec3 facing = unpack_unscaled(photon->normal);
-        double cosine = glm::dot(facing, normal);
-        if (side == PhotonSide::Both) cosine = std::abs(cosine);
+        const double cosine = glm::dot(facing, normal);
         if (!(cosine > 0.0) || cosine * cosine < kLeastCosine2 * glm::dot(facing, facing)) continue;
         found(*photon, 1.0 - distance2 * inverse_radius2_);
       }

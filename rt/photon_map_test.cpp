@@ -53,8 +53,7 @@ struct Gathered {
 };
 
 /// What the map promises, photon by photon.
-Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& place, const glm::dvec3& normal, double radius,
-                    PhotonSide side) {
+Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& place, const glm::dvec3& normal, double radius) {
   Gathered result;
   for (const Photon& photon : photons) {
     const glm::dvec3 way = glm::dvec3(photon.position[0], photon.position[1], photon.position[2]) - place;
@@ -62,7 +61,7 @@ Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& place, co
     if (!(distance < radius)) continue;
     if (std::abs(glm::dot(way, normal)) > PhotonMap::kFlatness * radius + 2.0 * kFloatStep) continue;
     const double cosine = glm::dot(unpack_direction(photon.normal), normal);
-    if ((side == PhotonSide::Both ? std::abs(cosine) : cosine) < 0.5) continue;
+    if (cosine < 0.5) continue;
     ++result.count;
     const double kernel = 2.0 / (std::numbers::pi * radius * radius) * (1.0 - distance * distance / (radius * radius));
     result.sum += kernel * glm::dvec3(photon.flux[0], photon.flux[1], photon.flux[2]) *
@@ -89,11 +88,10 @@ TEST(PhotonMapTest, AGatherEqualsTheSumOverAllPhotons) {
           normal = glm::dvec3(0.0);
           normal[axis] = -place[axis];
         }
-        const PhotonSide from = i % 2 == 0 ? PhotonSide::Front : PhotonSide::Both;
-        const Gathered expected = gather_all(all, place, normal, radius, from);
-        ASSERT_EQ(map.count(place, normal, from), expected.count) << photons << " photons, radius " << radius;
+        const Gathered expected = gather_all(all, place, normal, radius);
+        ASSERT_EQ(map.count(place, normal), expected.count) << photons << " photons, radius " << radius;
         const glm::dvec3 sum =
-            map.gather(place, normal, from, [&](const glm::dvec3& d) { return glm::dvec3(glm::dot(d, kUp + normal)); });
+            map.gather(place, normal, [&](const glm::dvec3& d) { return glm::dvec3(glm::dot(d, kUp + normal)); });
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c], expected.sum[c], 1e-9 * glm::length(expected.sum) + 1e-300);
         found += expected.count;
       }
@@ -112,7 +110,7 @@ TEST(PhotonMapTest, AnEvenlyLitPlaneHasItsFluxOverItsArea) {
   const PhotonMap map(photons, kRoom, 0.08);
   const double expected = static_cast<double>(photons.size()) / 4.0;
   for (const glm::dvec3& place : {glm::dvec3(0.0, 0.25, 0.0), glm::dvec3(0.513, 0.25, -0.377)})
-    EXPECT_NEAR(map.gather(place, kUp, PhotonSide::Front, one).g, expected, 2e-3 * expected);
+    EXPECT_NEAR(map.gather(place, kUp, one).g, expected, 2e-3 * expected);
 }
 
 TEST(PhotonMapTest, ACornersOtherWallAndAThinWallsOtherSideDoNotCount) {
@@ -123,9 +121,8 @@ TEST(PhotonMapTest, ACornersOtherWallAndAThinWallsOtherSideDoNotCount) {
     RaySpace space = kRoom;
     space.scale = 1.0 / scale;
     const PhotonMap map(photons, space, 0.1 * scale);
-    EXPECT_EQ(map.count(glm::dvec3(0.0), kUp, PhotonSide::Front), 2U);
-    EXPECT_EQ(map.count(glm::dvec3(0.0), kUp, PhotonSide::Both), 3U);
-    EXPECT_EQ(map.count({0.0, 0.03 * scale, 0.0}, kUp, PhotonSide::Front), 1U);
+    EXPECT_EQ(map.count(glm::dvec3(0.0), kUp), 2U);
+    EXPECT_EQ(map.count({0.0, 0.03 * scale, 0.0}, kUp), 1U);
   }
 }
 
@@ -139,8 +136,8 @@ TEST(PhotonMapTest, ScalingBySomePowerOfTwoChangesNoBit) {
   std::uniform_real_distribution<double> side(-1.0, 1.0);
   for (int i = 0; i < 100; ++i) {
     const glm::dvec3 place(side(random), -1.0, side(random));
-    const glm::dvec3 sum = map.gather(place, kUp, PhotonSide::Front, one);
-    EXPECT_EQ(scaled.gather(place * 0x1p20, kUp, PhotonSide::Front, one), sum * 0x1p-40);
+    const glm::dvec3 sum = map.gather(place, kUp, one);
+    EXPECT_EQ(scaled.gather(place * 0x1p20, kUp, one), sum * 0x1p-40);
   }
 }
 
@@ -160,9 +157,9 @@ TEST(PhotonMapTest, SumsKeepThePhotonsOrderWithinACell) {
   int differing = 0;
   for (int i = 0; i < 50; ++i) {
     const glm::dvec3 place(-0.5 + 0.02 * i, -1.0, 0.5);
-    const glm::dvec3 sum = map.gather(place, kUp, PhotonSide::Front, one);
-    EXPECT_EQ(same.gather(place, kUp, PhotonSide::Front, one), sum);
-    differing += other.gather(place, kUp, PhotonSide::Front, one) == sum ? 0 : 1;
+    const glm::dvec3 sum = map.gather(place, kUp, one);
+    EXPECT_EQ(same.gather(place, kUp, one), sum);
+    differing += other.gather(place, kUp, one) == sum ? 0 : 1;
   }
   EXPECT_GT(differing, 0) << "the order given would not matter at all";
 }
@@ -171,7 +168,7 @@ TEST(PhotonMapTest, EmptyMapsFarPlacesAndWhatIsNotANumberGiveNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   const std::vector<Photon> photons = random_photons(1000, 8);
-  EXPECT_EQ(PhotonMap().gather(glm::dvec3(0.0), kUp, PhotonSide::Front, one), glm::dvec3(0.0));
+  EXPECT_EQ(PhotonMap().gather(glm::dvec3(0.0), kUp, one), glm::dvec3(0.0));
   for (const double radius : {0.0, -1.0, nan, infinity}) EXPECT_EQ(PhotonMap(photons, kRoom, radius).size(), 0U);
 
   const PhotonMap map(photons, kRoom, 0.5);
@@ -179,11 +176,11 @@ TEST(PhotonMapTest, EmptyMapsFarPlacesAndWhatIsNotANumberGiveNothing) {
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 place(0.0);
       place[axis] = far;
-      EXPECT_EQ(map.gather(place, kUp, PhotonSide::Both, one), glm::dvec3(0.0));
+      EXPECT_EQ(map.gather(place, kUp, one), glm::dvec3(0.0));
     }
   }
-  EXPECT_EQ(map.gather(glm::dvec3(0.0), glm::dvec3(nan), PhotonSide::Both, one), glm::dvec3(0.0));
-  EXPECT_EQ(map.gather(glm::dvec3(0.0), glm::dvec3(0.0), PhotonSide::Both, one), glm::dvec3(0.0));
+  EXPECT_EQ(map.gather(glm::dvec3(0.0), glm::dvec3(nan), one), glm::dvec3(0.0));
+  EXPECT_EQ(map.gather(glm::dvec3(0.0), glm::dvec3(0.0), one), glm::dvec3(0.0));
 
   std::vector<Photon> bad = photons;
   bad[10].position[1] = std::numeric_limits<float>::quiet_NaN();
@@ -197,7 +194,7 @@ TEST(PhotonMapTest, AllPhotonsInOnePlaceAreFoundOnce) {
     const std::vector<Photon> photons(3000, photon_at({x, x, x}));
     for (const double radius : {1e-30, 1e-6, 0.1, 5.0}) {
       const PhotonMap map(photons, kRoom, radius);
-      EXPECT_EQ(map.count(glm::dvec3(static_cast<float>(x)), kUp, PhotonSide::Front), photons.size());
+      EXPECT_EQ(map.count(glm::dvec3(static_cast<float>(x)), kUp), photons.size());
     }
   }
 }

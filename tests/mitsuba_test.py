@@ -99,6 +99,17 @@ def camera_options(notes):
     return ["--eye", numbers[0], "--at", numbers[1], "--fov", repr(camera["yfov_deg"])]
 
 
+def relative_weight(truth):
+    """Squared errors times this are relative: relMSE's denominator, per pixel [height][width]."""
+    return 1.0 / (truth.mean(-1) ** 2 + 1e-2)
+
+
+def trimmed_mean(numpy, values, percent):
+    """Without the largest: a few fireflies say nothing of the rest."""
+    ordered = numpy.sort(values.ravel())
+    return float(ordered[: len(ordered) - int(len(ordered) * percent / 100.0)].mean())
+
+
 def compare(numpy, ours, theirs):
     """Lists of pictures, independent of each other -> the figures of the report."""
     ours = numpy.stack(ours).astype(numpy.float64)
@@ -118,14 +129,12 @@ def compare(numpy, ours, theirs):
 
     # The variance of each mean picture, pixel by pixel, is what relMSE would be if only chance differed.
     variance = ours.var(0, ddof=1) / len(ours) + theirs.var(0, ddof=1) / len(theirs)
-    weight = 1.0 / (truth.mean(-1, keepdims=True) ** 2 + 1e-2)
-    squares = numpy.sort(((mean - truth) ** 2 * weight).mean(-1).ravel())
-    noises = numpy.sort((variance * weight).mean(-1).ravel())
-    kept = len(squares) - len(squares) // 1000  # a few fireflies say nothing of the rest
+    weight = relative_weight(truth)
     return {
         "mean": float(mean.mean()), "mitsuba": float(scale),
         "bias": bias(numpy.inf), "usual bias": bias(most),
-        "relmse": float(squares[:kept].mean()), "noise": float(noises[:kept].mean()),
+        "relmse": trimmed_mean(numpy, ((mean - truth) ** 2).mean(-1) * weight, 0.1),
+        "noise": trimmed_mean(numpy, variance.mean(-1) * weight, 0.1),
         "finite": bool(numpy.isfinite(ours).all()),
     }
 
