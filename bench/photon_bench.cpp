@@ -83,9 +83,9 @@ void photon_gather(benchmark::State& state) {
   if (state.range(0) != 0) {
     // As neighbouring pixels come: a walk over one wall.
     for (std::size_t i = 0; i < places.size(); ++i) {
-      const auto row = static_cast<double>(i / 256);
-      const auto column = static_cast<double>(i % 256);
-      places[i] = {{column / 128.0 - 1.0, -1.0, row / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
+      const std::size_t row = i / 256;
+      const double across = static_cast<double>(i % 256) / 128.0 - 1.0;
+      places[i] = {{across, -1.0, static_cast<double>(row) / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
     }
   }
   std::size_t gathered = 0;
