@@ -1,0 +1,13 @@
+#pragma once
+
+#include <vector>
+
+#include "app/stability/stability.h"
+
+/// What each file of app/stability/ measures.
+namespace hpr::stability {
+
+// depth.cpp
+[[nodiscard]] std::vector<StabilityFinding> depth_order(const Globals& globals);
+
+}  // namespace hpr::stability
