@@ -8,6 +8,7 @@
 #include "app/graphics_checks.h"
 #include "app/render_command.h"
 #include "app/scene_command.h"
+#include "app/stability_command.h"
 #include "app/wall_command.h"
 
 namespace hpr {
@@ -21,6 +22,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   all.push_back(make_diff_command());
   all.push_back(make_scene_command());
   all.push_back(make_bench_command());
+  all.push_back(make_stability_command());
   all.push_back(make_doctor_command(graphics_checks()));
   return all;
 }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "app/markup.h"
+#include "app/plot_axes.h"
 
 namespace hpr {
 namespace {
@@ -62,43 +63,6 @@ std::vector<CompareRun> runs_of(const std::vector<CompareRun>& runs, const std::
   return some;
 }
 
-/// A logarithmic scale from `from` to `to` pixels.
-class Scale {
- public:
-  Scale(double least, double most, double from, double to)
-      : least_(std::log10(least)), span_(std::log10(most) - least_), from_(from), to_(to) {}
-
-  /// Wide enough for positive `values`, with some room at both ends.
-  static Scale of(std::vector<double> values, double from, double to) {
-    std::ranges::sort(values);
-    const double least = values.front();
-    const double most = values.back();
-    const double room = std::max(1.12, std::pow(most / least, 0.04));
-    return {least / room, most * room, from, to};
-  }
-
-  [[nodiscard]] double at(double value) const { return from_ + (to_ - from_) * (std::log10(value) - least_) / span_; }
-
-  /// Round values inside: 1, 2 and 5 of each power of ten, or powers alone where those are many.
-  [[nodiscard]] std::vector<double> ticks() const {
-    std::vector<double> found;
-    for (int power = static_cast<int>(std::floor(least_)); power <= static_cast<int>(least_ + span_) + 1; ++power) {
-      for (const double digit : {1.0, 2.0, 5.0}) {
-        if (span_ > 4.0 && digit > 1.0) continue;
-        const double log = power + std::log10(digit);
-        if (log >= least_ - 1e-9 && log <= least_ + span_ + 1e-9) found.push_back(digit * std::pow(10.0, power));
-      }
-    }
-    return found;
-  }
-
- private:
-  double least_;
-  double span_;
-  double from_;
-  double to_;
-};
-
 std::string corners(std::initializer_list<Point> points) {
   std::string text;
   for (const Point& point : points) text += fmt::format("{:.1f},{:.1f} ", point.x, point.y);
@@ -140,7 +104,7 @@ std::vector<double> times_of(const std::vector<CompareRun>& runs) {
   return times;
 }
 
-void draw_time_axis(SvgDrawing& drawing, const Scale& times) {
+void draw_time_axis(SvgDrawing& drawing, const LogScale& times) {
   for (const double ms : times.ticks()) {
     drawing.line({kLeft, times.at(ms)}, {kRight, times.at(ms)}, kGrid);
     drawing.text({kLeft - 8, times.at(ms) + 4}, fmt::format("{:g}", ms), Anchor::End);
@@ -188,8 +152,8 @@ void draw_labels(SvgDrawing& drawing, std::vector<Label> labels, bool lead_to_ma
 }
 
 /// Whiskers, medians, predictions and the line through them of one strategy. Returns where it ends.
-Point draw_strategy(SvgDrawing& drawing, const std::vector<CompareRun>& runs, const Look& style, const Scale& ranks,
-                    const Scale& times, double aside) {
+Point draw_strategy(SvgDrawing& drawing, const std::vector<CompareRun>& runs, const Look& style, const LogScale& ranks,
+                    const LogScale& times, double aside) {
   std::string points;
   for (const CompareRun& run : runs) {
     if (run.ms.median <= 0.0) continue;
@@ -211,7 +175,7 @@ Point draw_strategy(SvgDrawing& drawing, const std::vector<CompareRun>& runs, co
   return last;
 }
 
-void draw_bytes_axis(SvgDrawing& drawing, const Scale& bytes, bool some_send_nothing) {
+void draw_bytes_axis(SvgDrawing& drawing, const LogScale& bytes, bool some_send_nothing) {
   for (const double tick : bytes.ticks()) draw_tick_below(drawing, bytes.at(tick), fmt::format("{:g}", tick));
   if (some_send_nothing) {
     draw_tick_below(drawing, kNothingSent, "0");
@@ -221,8 +185,8 @@ void draw_bytes_axis(SvgDrawing& drawing, const Scale& bytes, bool some_send_not
 }
 
 /// The runs of strategy number `index`, each with its number of ranks. Returns where the last one stands.
-Point draw_marks(SvgDrawing& drawing, const std::vector<CompareRun>& runs, std::size_t index, const Scale& bytes,
-                 const Scale& times) {
+Point draw_marks(SvgDrawing& drawing, const std::vector<CompareRun>& runs, std::size_t index, const LogScale& bytes,
+                 const LogScale& times) {
   Point last{kLeft, kBottom};
   for (const CompareRun& run : runs) {
     if (run.ms.median <= 0.0) continue;
@@ -250,8 +214,8 @@ std::string plot_time_over_ranks(const std::vector<CompareRun>& runs) {
                      fastest_text(runs));
   std::set<int> counts;
   for (const CompareRun& run : runs) counts.insert(run.ranks);
-  const Scale ranks = Scale::of({counts.begin(), counts.end()}, kLeft + 30, kRight - 30);
-  const Scale times = Scale::of(times_of(runs), kBottom, kTop);
+  const LogScale ranks = LogScale::of({counts.begin(), counts.end()}, kLeft + 30, kRight - 30);
+  const LogScale times = LogScale::of(times_of(runs), kBottom, kTop);
   draw_time_axis(drawing, times);
   double free = 0.0;
   for (const int count : counts) {
@@ -285,8 +249,9 @@ std::string plot_time_against_bytes(const std::vector<CompareRun>& all_runs) {
   }
   const bool some_send_nothing = megabytes.size() < runs.size();
   if (megabytes.empty()) megabytes.push_back(1.0);
-  const Scale bytes = Scale::of(std::move(megabytes), some_send_nothing ? kNothingSent + 60 : kLeft + 20, kRight - 20);
-  const Scale times = Scale::of(times_of(runs), kBottom, kTop);
+  const LogScale bytes =
+      LogScale::of(std::move(megabytes), some_send_nothing ? kNothingSent + 60 : kLeft + 20, kRight - 20);
+  const LogScale times = LogScale::of(times_of(runs), kBottom, kTop);
   draw_time_axis(drawing, times);
   draw_bytes_axis(drawing, bytes, some_send_nothing);
 

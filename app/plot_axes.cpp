@@ -1,0 +1,30 @@
+#include "app/plot_axes.h"
+
+#include <algorithm>
+
+namespace hpr {
+
+LogScale LogScale::of(std::vector<double> values, double from, double to) {
+  std::ranges::sort(values);
+  const double least = values.front();
+  const double most = values.back();
+  const double room = std::max(1.12, std::pow(most / least, 0.04));
+  return {least / room, most * room, from, to};
+}
+
+std::vector<double> LogScale::ticks() const {
+  constexpr double kMostPowers = 12.0;
+  const int stride = std::max(1, static_cast<int>(std::ceil(span_ / kMostPowers)));
+  std::vector<double> found;
+  for (int power = static_cast<int>(std::floor(least_)); power <= static_cast<int>(least_ + span_) + 1; ++power) {
+    if (power % stride != 0) continue;
+    for (const double digit : {1.0, 2.0, 5.0}) {
+      if (span_ > 4.0 && digit > 1.0) continue;
+      const double log = power + std::log10(digit);
+      if (log >= least_ - 1e-9 && log <= least_ + span_ + 1e-9) found.push_back(digit * std::pow(10.0, power));
+    }
+  }
+  return found;
+}
+
+}  // namespace hpr

@@ -1,0 +1,87 @@
+#include "app/stability_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <iterator>
+
+#include "app/progress.h"
+#include "app/stability/stability.h"
+#include "core/file.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+class StabilityCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "stability"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "drive everything to its extremes: each case's limit, what was measured, where it breaks";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("--case", names_, "only these cases")->delimiter(',')->type_name("NAME,...");
+    app.add_flag("--list", list_, "print the cases and measure nothing");
+    app.add_option("--html", html_, "write the report as one page with plots")->type_name("FILE");
+    app.add_flag("--json", json_, "print the findings as JSON");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    const std::vector<StabilityCase> cases = chosen_cases();
+    if (list_) {
+      for (const StabilityCase& one : cases) fmt::print("{:<20} {}\n", one.name, one.about);
+      return ExitCode::Done;
+    }
+    if (!html_.empty()) check_writable(html_, globals.force);
+    const std::vector<StabilityFinding> findings = measure(cases, globals);
+    if (!html_.empty()) write_file_atomically(html_, stability_html(findings));
+    const std::string text = json_ ? stability_json(findings) : stability_table(findings);
+    std::fputs(text.c_str(), stdout);
+    const bool all_hold = std::ranges::all_of(findings, &StabilityFinding::holds);
+    return all_hold ? ExitCode::Done : ExitCode::CheckFailed;
+  }
+
+ private:
+  /// In the order of the report, whatever the order they were named in.
+  [[nodiscard]] std::vector<StabilityCase> chosen_cases() const {
+    const std::span<const StabilityCase> all = all_stability_cases();
+    std::vector<std::string> choices;
+    for (const StabilityCase& one : all) choices.emplace_back(one.name);
+    for (const std::string& name : names_) {
+      if (std::ranges::find(choices, name) != choices.end()) continue;
+      throw Error(ExitCode::Usage, fmt::format("--case: no case is named '{}'", printable(name)),
+                  unknown_name_hint(name, choices));
+    }
+    std::vector<StabilityCase> some;
+    std::ranges::copy_if(all, std::back_inserter(some), [&](const StabilityCase& one) {
+      return names_.empty() || std::ranges::find(names_, one.name) != names_.end();
+    });
+    return some;
+  }
+
+  static std::vector<StabilityFinding> measure(const std::vector<StabilityCase>& cases, const Globals& globals) {
+    Progress progress(globals.progress, "case", cases.size());
+    std::vector<StabilityFinding> findings;
+    for (const StabilityCase& one : cases) {
+      const std::vector<StabilityFinding> found = one.measure(globals);
+      findings.insert(findings.end(), found.begin(), found.end());
+      progress.step(std::string(one.name));
+    }
+    return findings;
+  }
+
+  std::vector<std::string> names_;
+  std::string html_;
+  bool list_ = false;
+  bool json_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_stability_command() {
+  return std::make_unique<StabilityCommand>();
+}
+
+}  // namespace hpr
