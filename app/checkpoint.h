@@ -21,6 +21,7 @@ struct CheckpointSettings {
   std::filesystem::path path;  ///< empty: none is written
   bool resume = false;         ///< begin with what stands there
   RunIdentity identity;
+  bool at_end = false;  ///< also when the goal is reached, for a later run that wants more
 };
 
 /// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the

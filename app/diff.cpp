@@ -59,19 +59,6 @@ std::vector<Key> read_keys(const std::filesystem::path& path) {
   return keys;
 }
 
-/// Black to pale yellow in equal steps of lightness.
-Rgba8 ramp(double t) {
-  constexpr std::array<std::array<double, 3>, 6> kStops{
-      {{0, 0, 0}, {52, 18, 108}, {133, 26, 110}, {208, 65, 62}, {247, 148, 34}, {252, 250, 192}}};
-  const double place = std::clamp(t, 0.0, 1.0) * (kStops.size() - 1);
-  const std::size_t stop = std::min(static_cast<std::size_t>(place), kStops.size() - 2);
-  const double f = place - static_cast<double>(stop);
-  const auto level = [&](std::size_t channel) {
-    return static_cast<std::uint8_t>(std::lround((1.0 - f) * kStops[stop][channel] + f * kStops[stop + 1][channel]));
-  };
-  return {level(0), level(1), level(2), 255};
-}
-
 [[noreturn]] void throw_other_kind(const std::string& a, const std::string& b) {
   throw Error(ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a, b),
               "compare keys with keys, linear EXR with EXR, and sRGB PNG or JPEG with one another");
@@ -140,6 +127,18 @@ std::string picture_value(const DiffReport& report, const std::string& metric) {
 }
 
 }  // namespace
+
+Rgba8 heat_color(double share) {
+  constexpr std::array<std::array<double, 3>, 6> kStops{
+      {{0, 0, 0}, {52, 18, 108}, {133, 26, 110}, {208, 65, 62}, {247, 148, 34}, {252, 250, 192}}};
+  const double place = std::clamp(share, 0.0, 1.0) * (kStops.size() - 1);
+  const std::size_t stop = std::min(static_cast<std::size_t>(place), kStops.size() - 2);
+  const double f = place - static_cast<double>(stop);
+  const auto level = [&](std::size_t channel) {
+    return static_cast<std::uint8_t>(std::lround((1.0 - f) * kStops[stop][channel] + f * kStops[stop + 1][channel]));
+  };
+  return {level(0), level(1), level(2), 255};
+}
 
 const std::vector<std::string>& diff_metrics() {
   static const std::vector<std::string> names{"rmse", "psnr", "max", "differing", "mean", "relmse", "ssim", "flip"};
@@ -235,9 +234,10 @@ Image<Rgba8> heat_map(const DiffReport& report) {
     const float value = report.largest[i];
     // Even the least difference is seen: colours start a fifth up the ramp.
     constexpr double kLeast = 0.2;
-    image.pixels()[i] = value == 0.0F           ? Rgba8{0, 0, 0, 255}
-                        : !std::isfinite(value) ? Rgba8{0, 255, 255, 255}
-                                                : ramp(kLeast + (1.0 - kLeast) * static_cast<double>(value / top));
+    image.pixels()[i] = value == 0.0F ? Rgba8{0, 0, 0, 255}
+                        : !std::isfinite(value)
+                            ? Rgba8{0, 255, 255, 255}
+                            : heat_color(kLeast + (1.0 - kLeast) * static_cast<double>(value / top));
   }
   return image;
 }

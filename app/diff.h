@@ -38,6 +38,9 @@ struct DiffReport {
 /// Those that take no longer than reading the pictures.
 [[nodiscard]] std::vector<std::string> quick_diff_metrics();
 
+/// From black for 0 to pale yellow for 1, in equal steps of lightness.
+[[nodiscard]] Rgba8 heat_color(double share);
+
 /// Compares `b` with `a` value by value, channels by name, and colours as far as `metrics` asks for them. Throws Error
 /// (BadInput), naming both, when sizes or channels differ, or one is linear and the other is not.
 [[nodiscard]] DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b,

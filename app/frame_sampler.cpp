@@ -102,17 +102,20 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   const Stopwatch watch;
   while (!reached(sampling_, so_far_)) {
     add_sample(views);
-    const Word word = agree(session_.comm(), {take_request(), before + 1e-3 * watch.ms()});
+    // Without a checkpoint a request is for whoever draws frame after frame.
+    const Request request = checkpoint.path.empty() ? Request::None : take_request();
+    const Word word = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
     so_far_.samples = film_.samples();
     so_far_.seconds = word.seconds;
     if (is_milestone(so_far_.samples) && so_far_.samples > 1) {
       so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
     }
     progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
-    if (word.request == Request::None || checkpoint.path.empty() || reached(sampling_, so_far_)) continue;
+    if (word.request == Request::None || reached(sampling_, so_far_)) continue;
     write(checkpoint);
     if (word.request == Request::Stop) return false;
   }
+  if (checkpoint.at_end && homes_) write(checkpoint);
   finish();
   return true;
 }

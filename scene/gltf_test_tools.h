@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base64.h"
 #include "core/error.h"
 #include "scene/gltf_loader.h"
 
@@ -39,19 +40,6 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
-
-inline std::string base64(std::span<const std::byte> bytes) {
-  constexpr const char* kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      bits = bits << 8U | (i + k < bytes.size() ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k) text += k <= bytes.size() - i ? kAlphabet[(bits >> (18 - 6 * k)) & 63U] : '=';
-  }
-  return text;
-}
 
 /// A glTF document that grows: every call adds a buffer, view and accessor of its own.
 class Document {
