@@ -9,6 +9,7 @@
 #include "app/render_command.h"
 #include "app/scene_command.h"
 #include "app/stability_command.h"
+#include "app/tradeoff_command.h"
 #include "app/wall_command.h"
 
 namespace hpr {
@@ -19,6 +20,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   all.push_back(make_render_command());
   all.push_back(make_wall_command());
   all.push_back(make_compare_command(scene_layers));
+  all.push_back(make_tradeoff_command());
   all.push_back(make_diff_command());
   all.push_back(make_scene_command());
   all.push_back(make_bench_command());

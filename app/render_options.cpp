@@ -70,6 +70,17 @@ const Camera& find_camera(const Scene& scene, const std::string& wanted) {
 }  // namespace
 
 void RenderOptions::declare(CLI::App& app) {
+  declare_frame(app);
+  app.add_flag("--reference", reference, "path tracing in place of the passes: slow, and the ground truth");
+  app.add_option("--aov", aov,
+                 "layers of the .exr, or of FILE.aov.exr beside a .png: a list of depth, id, normal, albedo, direct, "
+                 "shadow, reflection, refraction, ambient-occlusion, photon, rank, cost")
+      ->type_name("LIST");
+  app.add_flag("--explain", explain, "print the plan of the frame and why");
+  app.add_option("--stats", stats, "write what the frame took as JSON")->type_name("FILE.json");
+}
+
+void RenderOptions::declare_frame(CLI::App& app) {
   const auto point = [&](const char* name, std::vector<double>& value, const char* text) {
     return app.add_option(name, value, text)->delimiter(',')->expected(3)->type_name("X,Y,Z");
   };
@@ -93,8 +104,6 @@ void RenderOptions::declare(CLI::App& app) {
                  "brightens (or darkens) display colours by so many stops; EXR files stay as lit")
       ->check(CLI::Range(-30.0, 30.0))
       ->capture_default_str();
-  app.add_flag("--explain", explain, "print the plan of the frame and why");
-  app.add_option("--stats", stats, "write what the frame took as JSON")->type_name("FILE.json");
 }
 
 void RenderOptions::declare_light(CLI::App& app) {
@@ -115,13 +124,8 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--photons", photons, "sent per sample, where the scene requires any")
       ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
-  app.add_flag("--reference", reference, "path tracing in place of the passes: slow, and the ground truth");
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");
-  app.add_option("--aov", aov,
-                 "layers of the .exr, or of FILE.aov.exr beside a .png: a list of depth, id, normal, albedo, direct, "
-                 "shadow, reflection, refraction, ambient-occlusion, photon, rank, cost")
-      ->type_name("LIST");
 }
 
 Camera RenderOptions::choose_camera(const Scene& scene) const {

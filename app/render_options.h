@@ -41,6 +41,8 @@ struct RenderOptions {
   double exposure = 0.0;  ///< stops, of display colours only
 
   void declare(CLI::App& app);
+  /// All but what a command that draws many frames says in its own way: --reference, --aov, --explain and --stats.
+  void declare_frame(CLI::App& app);
 
   /// The scene with the light these options give it.
   [[nodiscard]] Scene load(const std::string& source, const Globals& globals) const;

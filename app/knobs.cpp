@@ -1,0 +1,87 @@
+#include "app/knobs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::array kKnobs{
+    Knob{"quality", "draft, good, best", "all of the below that are not given", "all of the below that are not given"},
+    Knob{"spp", "1, 2, 3 ...; until:60s; until:relmse=1e-3", "time in proportion",
+         "noise: its squared error falls as 1 / spp, faster where it is only edges"},
+    Knob{"passes", "auto, none, or a list of shadow, reflection, refraction, photon, ambient-occlusion",
+         "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},
+    Knob{"photons", "0 to 1000000000 a sample", "time in proportion, past the frame's pixels without use",
+         "fewer photons gather from further away: caustics and indirect light blur; 0 leaves them out"},
+    Knob{"max-depth", "1 to 64", "rays between mirrors and through glass", "what is seen by more bounces is black"},
+    Knob{"glossy-cutoff", "0 to 1: a roughness", "a ray for every smoother surface in view, and what it meets",
+         "rougher surfaces reflect lights only, not the scene"},
+    Knob{"light-samples", "1 to 4096 a point", "shadow rays in proportion", "noise in soft shadows"},
+    Knob{"filter", "box, triangle, gaussian, b-spline, mitchell", "nothing",
+         "sharpness for smoothness, and the noise of wide filters"},
+    Knob{"primary", "raster, rays, auto", "rasterising many triangles, or rays through many pixels",
+         "at edges, 0.0025 to 0.045 % of pixels see another surface"},
+    Knob{"shading", "deferred, local", "rays for what later turns out to be hidden",
+         "local: colours of 8 bits are composited, and coplanar surfaces of different ranks show the brighter one"},
+    Knob{"no-terminator-fix", "false, true", "nothing",
+         "true: smooth surfaces of few triangles show their triangles where light grazes them"},
+    Knob{"reference", "false, true", "path tracing in place of the passes: many more samples for the same noise",
+         "false: what the passes leave out, caught by photons of some width"},
+};
+
+}  // namespace
+
+std::span<const Knob> all_knobs() {
+  return kKnobs;
+}
+
+const Knob& find_knob(const std::string& name) {
+  const auto found = std::ranges::find(kKnobs, name, &Knob::name);
+  if (found != kKnobs.end()) return *found;
+  std::vector<std::string> choices;
+  choices.reserve(kKnobs.size());
+  for (const Knob& knob : kKnobs) choices.emplace_back(knob.name);
+  throw Error(ExitCode::Usage, fmt::format("there is no knob '{}'", printable(name)), unknown_name_hint(name, choices));
+}
+
+void set_knob(RenderOptions& options, const std::string& knob, const std::string& value) {
+  std::string written = value;
+  std::ranges::replace(written, '+', ',');
+  CLI::App app;
+  options.declare(app);
+  try {
+    std::vector<std::string> words{fmt::format("--{}={}", find_knob(knob).name, written)};
+    app.parse(words);
+  } catch (const CLI::ParseError& error) {
+    throw Error(ExitCode::Usage, fmt::format("--vary {}={}: {}", knob, printable(value), error.what()),
+                fmt::format("it takes {}", find_knob(knob).range));
+  }
+}
+
+std::string knobs_text() {
+  std::string text =
+      "Settings that trade speed for accuracy, options of `hpr render` and `hpr wall run` alike.\n"
+      "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene.\n";
+  for (const Knob& knob : kKnobs) {
+    text +=
+        fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", knob.name, knob.range, knob.costs, knob.loses);
+  }
+  return text;
+}
+
+std::string knobs_markdown() {
+  std::string text = "| Option | takes | costs | loses |\n|---|---|---|---|\n";
+  for (const Knob& knob : kKnobs) {
+    text += fmt::format("| `--{}` | {} | {} | {} |\n", knob.name, knob.range, knob.costs, knob.loses);
+  }
+  return text;
+}
+
+}  // namespace hpr

@@ -1,0 +1,240 @@
+#include "app/tradeoff_command.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <hpr/version.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <set>
+
+#include "app/cache_folder.h"
+#include "app/compare_options.h"
+#include "app/launcher.h"
+#include "app/output.h"
+#include "app/progress.h"
+#include "app/signals.h"
+#include "app/tradeoff_html.h"
+#include "app/tradeoff_measure.h"
+#include "app/tradeoff_report.h"
+#include "cluster/collectives.h"
+#include "cluster/scene_distribution.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "core/stopwatch.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kLargestSide = 16384;
+constexpr int kCropSide = 128;
+constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
+
+/// The words of the command line that a frame of `hpr render` would take as well.
+std::string base_options(const std::vector<std::string>& args) {
+  static const std::set<std::string> kOwn{"--vary",   "--metric", "--reference", "--reference-spp", "--budget",
+                                          "--frames", "--html",   "--csv",       "--size"};
+  static const std::set<std::string> kFlags{"--json", "--resume", "--force", "-q", "-v", "-vv"};
+  std::string line;
+  bool scene_seen = false;
+  for (std::size_t i = 1; i < args.size(); ++i) {
+    const std::string name = args[i].substr(0, args[i].find('='));
+    if (kFlags.contains(name)) continue;
+    if (kOwn.contains(name)) {
+      if (name == args[i]) ++i;
+      continue;
+    }
+    if (!args[i].starts_with('-') && !scene_seen && !(i > 1 && args[i - 1].starts_with("--"))) {
+      scene_seen = true;
+      continue;
+    }
+    line += (line.empty() ? "" : " ") + args[i];
+  }
+  return line;
+}
+
+class TradeoffCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "tradeoff"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "what the knobs of a scene cost and lose: time against error, and the settings a budget allows";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("scene", scene_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+    app.add_option("--vary", vary_, "a knob and its values, spp=1,4,16; again for another knob (see hpr help knobs)")
+        ->type_name("K=V,V,...")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->allow_extra_args(false)
+        ->required();
+    app.add_option("--metric", metrics_,
+                   "relmse, rmse, psnr, ssim, flip: which errors to measure; the first one decides the front")
+        ->delimiter(',');
+    app.add_option("--reference", how_.reference,
+                   "the truth: an .exr or .png, path (path tracing), passes (--quality best, many samples), or auto: "
+                   "passes where light of points is seen through mirrors and glass, which paths cannot find, else path")
+        ->type_name("FILE|auto")
+        ->capture_default_str();
+    app.add_option("--reference-spp", how_.reference_spp, "samples of a rendered truth")
+        ->check(CLI::Range(std::uint32_t{16}, std::uint32_t{1'000'000'000}))
+        ->capture_default_str();
+    app.add_option("--budget", budget_, "a time (33ms) or an error (flip=0.05) to find the best settings within");
+    app.add_option("--frames", how_.frames, "of each point; fewer where they take seconds")
+        ->check(CLI::Range(1, 1'000'000))
+        ->capture_default_str();
+    app.add_option("--size", size_, "pixels of the pictures")->capture_default_str()->type_name("WxH");
+    app.add_flag("--json", json_, "print the result as JSON (schema hpr.tradeoff/1) instead of a table");
+    app.add_option("--csv", csv_, "write one line per point to this file")->type_name("FILE");
+    app.add_option("--html", html_, "write the result as one page with plots and crops")->type_name("FILE");
+    app.add_flag("--resume", resume_, "go on with the points of this sweep that an earlier run measured");
+    options_.declare_frame(app);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    check_options(globals);
+    watch_requests();
+    return run_ranks(globals, [&](Communicator& comm) {
+      Session session(comm, globals, [&] { return options_.load(scene_, globals); });
+      return sweep(session, globals);
+    });
+  }
+
+ private:
+  void check_options(const Globals& globals) {
+    how_.size = parse_size(size_, "--size", kLargestSide);
+    check_size(how_.size, globals);
+    std::vector<KnobSweep> sweeps;
+    for (const std::string& text : vary_) sweeps.push_back(parse_knob_sweep(text));
+    for (const KnobSweep& sweep : sweeps) report_.knobs.push_back(sweep.knob);
+    all_ = combinations(sweeps);
+    for (const KnobValues& values : all_) {  // bad ones are found before any scene is loaded
+      const RenderOptions options = with_knobs(options_, values);
+      (void)options.settings(globals.seed);
+      (void)options.sampling();
+    }
+    if (metrics_.empty()) metrics_ = tradeoff_metrics();
+    for (const std::string& metric : metrics_) (void)PictureError{}.of(metric);
+    if (!budget_.empty()) report_.budget = parse_budget(budget_);
+    if (report_.budget && !report_.budget->ms && !asks_for(metrics_, report_.budget->metric)) {
+      metrics_.push_back(report_.budget->metric);
+    }
+    how_.metrics = metrics_;
+    for (const std::string& path : {csv_, html_}) {
+      if (!path.empty()) check_writable(path, globals.force);
+    }
+  }
+
+  ExitCode sweep(Session& session, const Globals& globals) {
+    const bool speaks = session.rank() == 0;
+    std::filesystem::path cache;
+    agree_on_failure(session.comm(), [&] {
+      if (speaks) cache = cache_folder();
+    });
+    const auto reference = find_reference(session, options_, how_, globals, cache);
+    if (!reference) {
+      if (speaks) log::info("stopped: the reference's samples are kept; the same command goes on with them");
+      return ExitCode::Stopped;
+    }
+    const Rect crop = speaks ? most_detail(reference->radiance, kCropSide) : Rect{};
+    const std::string identity = sweep_identity(session, *reference, globals);
+    const std::filesystem::path state =
+        cache / fmt::format("tradeoff-{}.json", hex16(xxh64(std::as_bytes(std::span(identity)))));
+    std::vector<TradeoffPoint> done;
+    check_on_root(session.comm(), [&] {
+      if (resume_ && std::filesystem::exists(state)) {
+        const auto bytes = read_file(state, kLargestState);
+        done = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
+      }
+    });
+
+    Progress progress(speaks ? globals.progress : "none", "point", all_.size());
+    const Stopwatch watch;
+    std::size_t measured = 0;
+    for (const KnobValues& values : all_) {
+      const auto known = std::ranges::find(done, values, &TradeoffPoint::knobs);
+      const bool skips = all_gather_value(session.comm(), known != done.end() ? 1 : 0).front() == 1;
+      if (!skips) {
+        done.push_back(measure_point(session, options_, values, how_, globals, *reference, crop));
+        ++measured;
+        agree_on_failure(session.comm(), [&] {
+          if (speaks) write_file_atomically(state, encode_points(identity, done));
+        });
+      }
+      report_.points.push_back(skips && speaks ? *known : skips ? TradeoffPoint{} : done.back());
+      const auto left = static_cast<double>(all_.size() - report_.points.size());
+      const double pace = measured > 0 ? 1e-3 * watch.ms() / static_cast<double>(measured) : 0.0;
+      progress.step(fmt::format("{}, about {:.0f} s left", describe(values), left * pace));
+      const Request mine = take_request();
+      const std::vector<Request> requests = all_gather_value(session.comm(), mine);
+      if (std::ranges::max(requests) == Request::Stop && report_.points.size() < all_.size()) {
+        if (speaks) log::info("stopped after {} of {} points: --resume goes on", report_.points.size(), all_.size());
+        return ExitCode::Stopped;
+      }
+    }
+    agree_on_failure(session.comm(), [&] {
+      if (speaks) finish(session, *reference, crop, globals, state);
+    });
+    return ExitCode::Done;
+  }
+
+  [[nodiscard]] std::string sweep_identity(Session& session, const ReferencePicture& reference,
+                                           const Globals& globals) const {
+    return fmt::format("{} {} {} {}x{} seed {} ranks {} threads {} truth {} metrics {} frames {} options {}", kVersion,
+                       kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height, globals.seed,
+                       session.comm().size(), session.threads(),
+                       hex16(xxh64(std::as_bytes(reference.radiance.pixels()))), fmt::join(metrics_, ","), how_.frames,
+                       base_options(globals.args));
+  }
+
+  void finish(Session& session, const ReferencePicture& reference, const Rect& crop, const Globals& globals,
+              const std::filesystem::path& state) {
+    report_.scene = scene_;
+    report_.command = "hpr";
+    for (const std::string& word : globals.args) report_.command += " " + word;
+    report_.machine = this_machine();
+    report_.ranks = session.comm().size();
+    report_.threads = session.threads();
+    report_.size = how_.size;
+    report_.seed = globals.seed;
+    report_.reference = reference.about;
+    report_.metrics = metrics_;
+    report_.base_options = base_options(globals.args);
+    report_.reference_crop_png = crop_as_png(reference.radiance, crop, reference.linear);
+    mark_pareto(report_.points, metrics_.front());
+    if (report_.budget) report_.best = best_within(report_.points, *report_.budget, metrics_.front());
+    if (!csv_.empty()) write_file_atomically(csv_, tradeoff_csv(report_));
+    if (!html_.empty()) write_file_atomically(html_, tradeoff_html(report_));
+    std::fputs((json_ ? tradeoff_json(report_) : tradeoff_table(report_)).c_str(), stdout);
+    if (json_ && report_.budget) log::info("{}", answer(report_));
+    std::error_code ignored;
+    std::filesystem::remove(state, ignored);  // what is done needs no going on
+  }
+
+  std::string scene_;
+  std::vector<std::string> vary_;
+  std::vector<std::string> metrics_;
+  std::string budget_;
+  std::string size_ = "640x360";
+  std::string csv_;
+  std::string html_;
+  bool json_ = false;
+  bool resume_ = false;
+  TradeoffMeasurement how_;
+  RenderOptions options_;
+  std::vector<KnobValues> all_;
+  TradeoffReport report_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_tradeoff_command() {
+  return std::make_unique<TradeoffCommand>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""What `hpr tradeoff` says of a scene is true: errors against hpr diff's, the front, budgets, going on after a stop.
+
+usage: tradeoff_test.py HPR SOURCE
+
+Prints what is wrong and leaves with 1.
+"""
+
+import csv
+import json
+import math
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import xml.dom.minidom
+
+HPR = os.path.abspath(sys.argv[1])
+SOURCE = pathlib.Path(sys.argv[2])
+SIZE = "96x64"
+failures = []
+
+
+def check(holds, message):
+    if not holds:
+        failures.append(message)
+        print(message)
+
+
+def hpr(folder, *arguments, code=0):
+    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+                            env={**os.environ, "HPR_CACHE": str(folder / "cache")})
+    check(result.returncode == code,
+          f"hpr {' '.join(arguments)} left with {result.returncode}, not {code}: {result.stderr[-1000:]}")
+    return result
+
+
+def sweep(folder, *arguments):
+    return json.loads(hpr(folder, "tradeoff", "gen:cornell", "--size", SIZE, "--reference-spp", "512", "--frames", "1", "--json",
+                          *arguments).stdout)
+
+
+def knobs(folder):
+    text = hpr(folder, "help", "knobs").stdout
+    help_text = hpr(folder, "render", "--help").stdout
+    names = [line for line in text.splitlines() if line.startswith("--")]
+    check(len(names) > 10, f"no more than {len(names)} knobs")
+    for name in names:
+        check(name in help_text, f"render has no option {name}")
+    table = hpr(folder, "help", "knobs", "--markdown").stdout
+    check(table in (SOURCE / "docs" / "knobs.md").read_text(), "docs/knobs.md is not what hpr help knobs --markdown prints")
+
+
+def errors_are_those_of_diff(folder):
+    """A truth from a file; the point's errors must be what hpr diff finds between the same pictures."""
+    hpr(folder, "render", "gen:cornell", "--size", SIZE, "--reference", "--spp", "64", "-o", "truth.exr")
+    report = sweep(folder, "--vary", "spp=4", "--vary", "quality=draft,good", "--reference", "truth.exr")
+    check(report["schema"] == "hpr.tradeoff/1" and report["size"] == SIZE, "the report's head is wrong")
+    check(report["knobs"] == ["spp", "quality"], f"knobs: {report['knobs']}")
+    check(report["best_under_budget"] is None, "a best point without a budget")
+    for point in report["points"]:
+        quality = point["knobs"]["quality"]
+        check(point["knobs"]["spp"] == 4, "a number is no number in JSON")
+        hpr(folder, "render", "gen:cornell", "--size", SIZE, "--spp", "4", "--quality", quality, "-o", "point.exr", "--force")
+        diff = json.loads(hpr(folder, "diff", "truth.exr", "point.exr", "--json", "--metric", "rmse,relmse,ssim,flip,mean,max", code=1).stdout)
+        error = point["error"]
+        for ours, theirs in (("rmse", diff["rmse"]), ("relmse", diff["relmse"]), ("relmse_untrimmed", diff["relmse_untrimmed"]),
+                             ("ssim", diff["ssim"]), ("flip", diff["flip"]), ("mean", diff["mean"])):
+            check(math.isclose(error[ours], theirs, rel_tol=1e-12), f"{quality}: {ours} is {error[ours]}, hpr diff says {theirs}")
+        check((error["worst"]["x"], error["worst"]["y"]) == (diff["worst"]["x"], diff["worst"]["y"]), "another worst pixel")
+
+
+def front_and_budgets(folder):
+    report = sweep(folder, "--vary", "reference=true", "--vary", "spp=1,4,16,64", "--budget", "relmse=0.02", "--html", "report.html",
+                   "--csv", "report.csv", "--reference", "path")
+    points = report["points"]
+    for point in points:
+        beaten = any(other["ms"]["median"] <= point["ms"]["median"] and other["error"]["relmse"] <= point["error"]["relmse"]
+                     and other is not point for other in points)
+        check(point["pareto"] == (not beaten), f"the front is wrong at {point['knobs']}")
+    slope = next(s for s in report["slopes"] if s["knob"] == "spp" and s["metric"] == "relmse")
+    check(-1.5 < slope["slope"] < -0.7, f"noise falls with power {slope['slope']} of the samples")
+    best = report["best_under_budget"]
+    within = [point for point in points if point["error"]["relmse"] <= 0.02]
+    check(best is not None and best["ms"] == min(within, key=lambda point: point["ms"]["median"])["ms"], "not the fastest within the budget")
+    check("--spp=" in best["command"] and best["command"].startswith("hpr render gen:cornell"), f"command: {best['command']}")
+    xml.dom.minidom.parse(str(folder / "report.html"))
+    with open(folder / "report.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    check([float(row["relmse"]) for row in rows] == [point["error"]["relmse"] for point in points], "the CSV's errors differ")
+    again = sweep(folder, "--vary", "reference=true", "--vary", "spp=1,4,16,64", "--reference", "path")
+    check(again["reference"]["cached"], "the truth is rendered twice")
+    check([p["error"] for p in again["points"]] == [p["error"] for p in points], "errors are not the same twice")
+    nothing = sweep(folder, "--vary", "spp=1", "--reference", "path", "--budget", "1us")
+    check(nothing["best_under_budget"] is None, "something is drawn within a microsecond")
+
+
+def ranks_agree(folder):
+    alone = sweep(folder, "--vary", "spp=1,2", "--reference", "path")
+    three = sweep(folder, "--vary", "spp=1,2", "--reference", "path", "--ranks", "3")
+    check(three["reference"]["cached"], "ranks do not share a truth")
+    check([p["error"] for p in alone["points"]] == [p["error"] for p in three["points"]], "other errors on three ranks")
+
+
+def going_on(folder):
+    arguments = ["tradeoff", "gen:cornell", "--size", SIZE, "--reference-spp", "16", "--vary", "spp=" + ",".join(map(str, range(60, 90))),
+                 "--json", "--frames", "1", "--progress", "line"]
+    process = subprocess.Popen([HPR, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                               env={**os.environ, "HPR_CACHE": str(folder / "cache")})
+    states = []
+    end = time.monotonic() + 120
+    while not states and time.monotonic() < end and process.poll() is None:
+        time.sleep(0.05)
+        states = list((folder / "cache").glob("tradeoff-*.json"))
+    process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=120)
+    check(process.returncode == 75, f"USR1 made it leave with {process.returncode}")
+    kept = json.loads(states[0].read_text())["points"]
+    check(0 < len(kept) < 30, f"{len(kept)} points are kept")
+    report = json.loads(hpr(folder, *arguments, "--resume").stdout)
+    check(len(report["points"]) == 30, "points are missing")
+    check([p["ms"]["median"] for p in report["points"][:len(kept)]] == [p["all_ms"][0] for p in kept], "kept points were measured again")
+    check(not states[0].exists(), "a finished sweep leaves its points behind")
+
+
+def refusals(folder):
+    hpr(folder, "tradeoff", "gen:cornell", code=2)
+    for wrong in ("ssp=1", "spp", "spp=0", "spp=1,1", "photons=many", "passes=shaddow"):
+        hpr(folder, "tradeoff", "gen:cornell", "--vary", wrong, code=2)
+    hpr(folder, "tradeoff", "gen:cornell", "--vary", "spp=1", "--budget", "flap=1", code=2)
+    hpr(folder, "tradeoff", "gen:cornell", "--vary", "spp=1", "--metric", "flap", code=2)
+    hpr(folder, "tradeoff", "gen:cornell", "--vary", "spp=1", "--reference", "nothing.exr", code=4)
+    hpr(folder, "tradeoff", "gen:cornell", "--vary", "spp=1", "--reference", "truth.exr", "--size", "32x32", code=3)
+
+
+with tempfile.TemporaryDirectory() as scratch:
+    for part in (knobs, errors_are_those_of_diff, front_and_budgets, ranks_agree, going_on, refusals):
+        part(pathlib.Path(scratch))
+sys.exit(1 if failures else 0)
