@@ -23,17 +23,22 @@ struct PictureFiles {
 /// A frame of one screen on its way to its files.
 class CollectedPicture {
  public:
-  /// Collective. Brings what the files need of `frame` to rank 0. `blocks` are the screen's; both must outlive this.
-  CollectedPicture(Session& session, Frame& frame, const Blocks& blocks, PictureFiles files);
+  /// Collective. Brings what the files need of `frame` to rank 0. `blocks` are the screen's; both must outlive this. A
+  /// frame made of other than `size` pixels is enlarged by a filter; it has neither keys nor AOVs for files.
+  CollectedPicture(Session& session, Frame& frame, const Blocks& blocks, Size size, PictureFiles files);
 
   /// On rank 0. Throws Error (Io).
   void write(const std::string& scene_name) const;
 
  private:
   [[nodiscard]] std::vector<ExrLayer> exr_layers() const;
+  [[nodiscard]] Image<Rgb> radiance() const;
+  [[nodiscard]] bool enlarged() const { return blocks_.views.front().screen != size_; }
 
   const Frame& frame_;
   const Blocks& blocks_;
+  Size size_;
+  int threads_;
   PictureFiles files_;
   TileLayer<Rgba8> display_;  ///< where a .png is wanted
 };

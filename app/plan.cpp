@@ -90,12 +90,19 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));
+  if (settings.resolution_scale != 1.0) {
+    lines.push_back(
+        fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
+  }
   if (!gives_light(session.scene())) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
     if (pass.runs && pass.name == "photon") {
       lines.push_back(fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
                                   settings.photons_fit_frame ? "of the quality, but no more than pixels" : "as asked"));
+      if (plan.rays.photon_radius > 0.0) {
+        lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
+      }
     }
   }
   return plan;

@@ -11,6 +11,7 @@
 #include "app/output.h"
 #include "app/picture_files.h"
 #include "app/render_options.h"
+#include "app/resolution.h"
 #include "app/run_identity.h"
 #include "app/signals.h"
 #include "cluster/scene_distribution.h"
@@ -75,6 +76,10 @@ class RenderCommand final : public Command {
       throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
                   "use --shading deferred");
     }
+    if (!files_.raw.empty() && options_.resolution_scale != 1.0) {
+      throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
+                  "draw a smaller picture with --size");
+    }
     if (files_.picture.ends_with(".exr") && options_.shading == "local") {
       log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those",
                    files_.picture);
@@ -99,7 +104,7 @@ class RenderCommand final : public Command {
   ExitCode draw(Session& session, const Globals& globals, const FrameSettings& settings, const Sampling& sampling,
                 Size size) {
     const View view = make_view(options_.choose_camera(session.scene()), size, session.scene().bounds);
-    const Blocks blocks = cut_blocks(std::span(&view, 1));
+    const Blocks blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.resolution_scale));
     FramePlan plan = plan_frame(session, settings, blocks.views);
     plan.lit = !files_.picture.empty() || !options_.stats.empty();
     const bool speaks = session.comm().rank() == 0;
@@ -123,7 +128,7 @@ class RenderCommand final : public Command {
     } else {
       whole = make_frame(session, plan, blocks.views, &times);
     }
-    const CollectedPicture picture(session, sampler ? sampler->frame() : whole, blocks, files_);
+    const CollectedPicture picture(session, sampler ? sampler->frame() : whole, blocks, size, files_);
     RunStats stats = gather_stats(session, plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
     if (sampler) stats.relmse = sampler->reached_so_far().relmse;
     agree_on_failure(session.comm(), [&] {

@@ -94,6 +94,7 @@ void RenderOptions::declare_frame(CLI::App& app) {
   app.add_option("--primary", primary, "what finds the visible surfaces: raster, rays, or auto, which measures both")
       ->capture_default_str();
   declare_light(app);
+  declare_economies(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -126,6 +127,30 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");
+}
+
+void RenderOptions::declare_economies(CLI::App& app) {
+  app.add_option(
+         "--photon-radius", photon_radius,
+         "metres about a point in which photons count, in a frame's first sample (default 0: from their density)")
+      ->check(CLI::Range(0.0, 1e30));
+  app.add_option("--resolution-scale", resolution_scale,
+                 "the frame is made of so many of the pixels a side, and shown at full size by a filter")
+      ->check(CLI::Range(0.1, 1.0))
+      ->capture_default_str();
+}
+
+void RenderOptions::settle_economies(FrameSettings& settings) const {
+  if (!std::isfinite(photon_radius) || !std::isfinite(resolution_scale)) {
+    throw Error(ExitCode::Usage, "--photon-radius and --resolution-scale take finite numbers",
+                "write e.g. --resolution-scale 0.5");
+  }
+  if (resolution_scale != 1.0 && !settings.aovs.empty()) {
+    throw Error(ExitCode::Usage, "--aov has a value for every pixel, of which --resolution-scale makes fewer",
+                "draw a smaller picture with --size");
+  }
+  settings.rays.photon_radius = photon_radius;
+  settings.resolution_scale = resolution_scale;
 }
 
 Camera RenderOptions::choose_camera(const Scene& scene) const {
@@ -192,6 +217,7 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
     throw Error(ExitCode::Usage, "--aov needs surfaces, which --shading local replaces by colours",
                 "use --shading deferred");
   }
+  settle_economies(settings);
   (void)plan_passes({}, settings.rays);  // unknown pass names are found before the scene is loaded
   return settings;
 }

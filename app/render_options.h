@@ -27,6 +27,8 @@ struct RenderOptions {
   std::optional<int> light_samples;
   std::optional<double> glossy_cutoff;
   std::optional<std::uint32_t> photons;
+  double photon_radius = 0.0;     ///< metres
+  double resolution_scale = 1.0;  ///< of the pixels a side
   std::string filter;
   std::string aov;
   std::string environment;
@@ -57,6 +59,8 @@ struct RenderOptions {
 
  private:
   void declare_light(CLI::App& app);
+  void declare_economies(CLI::App& app);
+  void settle_economies(FrameSettings& settings) const;
 };
 
 }  // namespace hpr

@@ -9,6 +9,7 @@
 #include "app/diff.h"
 #include "app/frame_sampler.h"
 #include "app/output.h"
+#include "app/resolution.h"
 #include "app/run_identity.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
@@ -17,6 +18,7 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "image/enlarge.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/ssim.h"
@@ -40,17 +42,20 @@ struct Setup {
 Setup set_up(Session& session, const RenderOptions& options, Size size, std::uint64_t seed) {
   Setup setup;
   const View view = make_view(options.choose_camera(session.scene()), size, session.scene().bounds);
-  setup.blocks = cut_blocks(std::span(&view, 1));
-  setup.plan = plan_frame(session, options.settings(seed), setup.blocks.views);
+  const FrameSettings settings = options.settings(seed);
+  setup.blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.resolution_scale));
+  setup.plan = plan_frame(session, settings, setup.blocks.views);
   setup.sampling = options.sampling();
   return setup;
 }
 
-/// Collective. The radiance of a frame of one screen, on rank 0.
-Image<Rgb> collect(Session& session, Frame& frame, const Blocks& blocks) {
+/// Collective. The radiance of a frame of one screen of `size` pixels, on rank 0.
+Image<Rgb> collect(Session& session, Frame& frame, const Blocks& blocks, Size size) {
   const std::vector<int> to_root(blocks.views.size(), 0);
   session.assembler().assemble(session.comm(), frame.radiance, frame.owned, to_root);
-  return session.rank() == 0 ? join_blocks(frame.radiance, blocks, 0) : Image<Rgb>();
+  if (session.rank() != 0) return {};
+  Image<Rgb> made = join_blocks(frame.radiance, blocks, 0);
+  return made.size() == size ? made : enlarge(made, size, session.threads());
 }
 
 bool caught_by_photons_alone(const Session& session) {
@@ -165,6 +170,8 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   best.light_samples.reset();
   best.glossy_cutoff.reset();
   best.photons.reset();
+  best.photon_radius = 0.0;
+  best.resolution_scale = 1.0;
   best.reference = !passes;
   const Setup setup = set_up(session, best, how.size, globals.seed ^ kOtherSeed);
 
@@ -196,7 +203,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   reference.about = {passes ? "passes at best" : "path tracing", reached.samples,
                      reached.relmse.value_or(std::numeric_limits<double>::quiet_NaN()),
                      kept.resume && sampler->times().samples == 0};
-  reference.radiance = collect(session, sampler->frame(), setup.blocks);
+  reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size);
   return reference;
 }
 
@@ -259,7 +266,7 @@ TradeoffPoint measure_point(Session& session, const RenderOptions& options, cons
     } else {
       whole = make_frame(session, setup.plan, setup.blocks.views, &times);
     }
-    picture = collect(session, sampler ? sampler->frame() : whole, setup.blocks);
+    picture = collect(session, sampler ? sampler->frame() : whole, setup.blocks, how.size);
     const RunStats stats =
         gather_stats(session, setup.plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
     spent += stats.ms;

@@ -12,6 +12,8 @@
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
+#include "app/resolution.h"
+#include "app/screens.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/assembly.h"
@@ -70,6 +72,12 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
   return owners;
 }
 
+std::vector<Size> sizes_of(const Wall& wall) {
+  std::vector<Size> sizes;
+  for (const WallScreen& screen : wall.screens) sizes.push_back(screen.pixels);
+  return sizes;
+}
+
 std::vector<std::string> hosts_of(Communicator& comm, const std::string& mine) {
   std::vector<std::string> hosts;
   for (const auto& name : all_gather(comm, std::as_bytes(std::span(mine)))) {
@@ -87,9 +95,9 @@ class WallDriver {
         wall_(wall),
         session_(session),
         screens_(wall_views(wall, run.options.choose_camera(session.scene()), session.scene().bounds)),
-        blocks_(cut_blocks(screens_)),
+        blocks_(cut_blocks(at_resolution(screens_, settings.resolution_scale))),
         plan_(plan_frame(session, settings, blocks_.views)),
-        shown_by_(owners_of(wall, hosts_of(session.comm(), session.host()))),
+        showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host())), run.options.exposure},
         sampling_(run.options.sampling()) {
     agree_on_failure(session_.comm(), [&] {
       if (shows_any()) display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
@@ -121,14 +129,7 @@ class WallDriver {
     } else {
       whole = make_frame(session_, plan_, blocks_.views, &times_, {{number, 0}, nullptr});
     }
-    const Frame& frame = sampler ? sampler->frame() : whole;
-    TileLayer<Rgba8> display = to_display(frame, session_.threads(), run_.options.exposure);
-    session_.assembler().assemble(session_.comm(), display, frame.owned, block_owners(blocks_, shown_by_));
-    pictures_.clear();
-    for (std::size_t screen = 0; screen < shown_by_.size(); ++screen) {
-      pictures_.push_back(shown_by_[screen] == session_.comm().rank() ? join_blocks(display, blocks_, screen)
-                                                                      : Image<Rgba8>());
-    }
+    pictures_ = bring_to_screens(session_, sampler ? sampler->frame() : whole, blocks_, showing_);
     last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
     agree_on_failure(session_.comm(), [&] { show(number); });
     record(number);
@@ -137,8 +138,8 @@ class WallDriver {
   /// Collective. All screens' pictures of the last frame, on rank 0.
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures() {
     Communicator& comm = session_.comm();
-    for (std::size_t screen = 0; screen < shown_by_.size(); ++screen) {
-      const int from = shown_by_[screen];
+    for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
+      const int from = showing_.shown_by[screen];
       if (from == 0) continue;
       if (comm.rank() == from) comm.send(std::as_bytes(pictures_[screen].pixels()), 0);
       if (comm.rank() == 0) {
@@ -151,23 +152,23 @@ class WallDriver {
 
  private:
   [[nodiscard]] bool shows_any() const {
-    return std::ranges::find(shown_by_, session_.comm().rank()) != shown_by_.end();
+    return std::ranges::find(showing_.shown_by, session_.comm().rank()) != showing_.shown_by.end();
   }
 
   void show(std::uint64_t number) {
     if (!display_) return;
     std::vector<ScreenPicture> mine;
-    for (std::size_t screen = 0; screen < shown_by_.size(); ++screen) {
-      if (shown_by_[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
+    for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
+      if (showing_.shown_by[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
     }
     display_->show({number, mine});
   }
 
   /// Every rank hashes what it showed; rank 0 writes it down.
   void record(std::uint64_t number) {
-    std::vector<std::uint64_t> hashes(shown_by_.size(), 0);
-    for (std::size_t screen = 0; screen < shown_by_.size(); ++screen) {
-      if (shown_by_[screen] == session_.comm().rank()) {
+    std::vector<std::uint64_t> hashes(showing_.shown_by.size(), 0);
+    for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
+      if (showing_.shown_by[screen] == session_.comm().rank()) {
         hashes[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
       }
     }
@@ -192,7 +193,7 @@ class WallDriver {
   std::vector<View> screens_;
   Blocks blocks_;
   FramePlan plan_;
-  std::vector<int> shown_by_;
+  Showing showing_;
   std::unique_ptr<Display> display_;
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
   RunManifest manifest_;

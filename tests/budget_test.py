@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+"""What is given up for speed: the same bits however the work is spread, and clear words where it makes no sense.
+
+usage: budget_test.py HPR
+
+Prints what differs and leaves with 1.
+"""
+
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+
+import exr
+
+HPR = os.path.abspath(sys.argv[1])
+failures = []
+
+
+def check(holds, message):
+    if not holds:
+        failures.append(message)
+        print(message)
+
+
+def hpr(folder, *arguments, code=0):
+    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    check(result.returncode == code,
+          f"hpr {' '.join(arguments)} left with {result.returncode} instead of {code}: {result.stderr[-1000:]}")
+    return result
+
+
+def render(folder, *arguments, scene="gen:gallery", picture="a.png"):
+    hpr(folder, "render", scene, "--size", "171x105", "-o", picture, "--stats", "a.json", "--force", *arguments)
+    return (folder / picture).read_bytes()
+
+
+def rmse(folder, a, b):
+    return json.loads(hpr(folder, "diff", a, b, "--metric", "rmse", "--json", code=1).stdout)["rmse"]
+
+
+SPREADS = [("--ranks", "2"), ("--ranks", "3"), ("--threads", "2"), ("--ranks", "3", "--distribute", "hybrid"),
+           ("--ranks", "2", "--distribute", "sort-last", "--strategy", "direct-send"),
+           ("--ranks", "3", "--distribute", "sort-last", "--strategy", "shared-memory")]
+
+
+def same_bits(folder, name, *arguments, picture="a.png"):
+    expected = render(folder, *arguments, picture=picture)
+    for spread in SPREADS:
+        check(render(folder, *arguments, *spread, picture=picture) == expected, f"{name}: other bits with {' '.join(spread)}")
+    return expected
+
+
+def usage(folder, name, *arguments, says):
+    result = hpr(folder, *arguments, code=2)
+    check(says in result.stderr, f"{name}: does not say {says!r}: {result.stderr[-400:]}")
+    check(not list(folder.glob("refused*")), f"{name}: left a file")
+
+
+def resolution(folder):
+    whole = render(folder, "--spp", "2", picture="a.exr")
+    render(folder, "--spp", "32", scene="gen:cornell", picture="whole.png")
+    check(render(folder, "--resolution-scale", "1") == render(folder), "a scale of 1 changes the picture")
+    errors = []
+    for scale in ("0.75", "0.5", "0.25"):
+        made = same_bits(folder, f"scale {scale}", "--resolution-scale", scale, "--spp", "2", picture="a.exr")
+        check(made != whole, f"scale {scale} changes nothing")
+        size = exr.read(folder / "a.exr")[:2]
+        check(size == (171, 105), f"scale {scale}: the picture has {size} pixels")
+        render(folder, "--spp", "32", "--resolution-scale", scale, scene="gen:cornell")
+        errors.append(rmse(folder, "a.png", "whole.png"))
+    check(errors == sorted(errors), f"errors do not grow as the resolution falls: {errors}")
+    same_bits(folder, "scale 0.5, as .png", "--resolution-scale", "0.5")
+    same_bits(folder, "scale 0.3, local", "--resolution-scale", "0.3", "--shading", "local")
+    hpr(folder, "render", "gen:cornell", "-o", "dot.png", "--size", "4x1", "--resolution-scale", "0.1")
+    check(struct.unpack(">II", (folder / "dot.png").read_bytes()[16:24]) == (4, 1), "one pixel does not show as 4x1")
+    render(folder, "--resolution-scale", "0.5")
+    few = json.loads((folder / "a.json").read_text())["rays"]["shadow"]
+    render(folder)
+    many = json.loads((folder / "a.json").read_text())["rays"]["shadow"]
+    check(0.2 < few / many < 0.3, f"half the pixels a side take {few} of {many} shadow rays")
+    for scale in ("0", "0.05", "1.5", "-1", "nan", "inf", "much"):
+        usage(folder, f"scale {scale}", "render", "gen:cornell", "-o", "refused.png", f"--resolution-scale={scale}",
+              says="--resolution-scale")
+    usage(folder, "raw", "render", "gen:cornell", "--raw", "refused.raw", "--resolution-scale", "0.5", says="--raw")
+    usage(folder, "aov", "render", "gen:cornell", "-o", "refused.exr", "--aov", "depth", "--resolution-scale", "0.5",
+          says="--aov")
+
+
+def wall(folder, name, *arguments):
+    expected = None
+    for ranks in ("1", "2", "3"):
+        hpr(folder, "wall", "run", "3x2@61x47", "gen:gallery", "-o", "wall", "--force", "--ranks", ranks, *arguments)
+        frames = json.loads((folder / "wall" / "manifest.json").read_text())["frames"]
+        screens = [(s["id"], s["width"], s["height"], s["xxh64"]) for f in frames for s in f["screens"]]
+        png = (folder / "wall" / f"{screens[0][0]}.png").read_bytes()
+        check(struct.unpack(">II", png[16:24]) == (61, 47), f"{name}: a screen of another size")
+        expected = expected or screens
+        check(screens == expected, f"{name}: another wall with {ranks} ranks")
+    return expected
+
+
+def photon_radius(folder):
+    caustic = ("--passes", "photon", "--photons", "20000")
+    chosen = same_bits(folder, "photons", *caustic)
+    check(render(folder, *caustic, "--photon-radius", "0") == chosen, "a radius of 0 is not the one chosen")
+    wide = same_bits(folder, "radius 0.3", *caustic, "--photon-radius", "0.3")
+    narrow = render(folder, *caustic, "--photon-radius", "0.03")
+    check(len({chosen, wide, narrow}) == 3, "the radius changes nothing")
+    for radius in ("-1", "nan", "inf", "wide"):
+        usage(folder, f"radius {radius}", "render", "gen:cornell", "-o", "refused.png", f"--photon-radius={radius}",
+              says="--photon-radius")
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="hpr-budget-") as scratch:
+        folder = pathlib.Path(scratch)
+        resolution(folder)
+        photon_radius(folder)
+        plain = wall(folder, "wall")
+        check(wall(folder, "wall at half", "--resolution-scale", "0.5") != plain, "a wall's scale changes nothing")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
