@@ -75,7 +75,6 @@ void FrameSampler::write(const CheckpointSettings& checkpoint) {
   agree_on_failure(session_.comm(), [&] {
     if (session_.rank() != 0) return;
     write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity, film_, so_far_));
-    log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
   });
 }
 
@@ -113,6 +112,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
     if (word.request == Request::None || reached(sampling_, so_far_)) continue;
     write(checkpoint);
+    if (session_.rank() == 0) log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
     if (word.request == Request::Stop) return false;
   }
   if (checkpoint.at_end && homes_) write(checkpoint);

@@ -20,7 +20,7 @@ constexpr std::array kKnobs{
          "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},
     Knob{"photons", "0 to 1000000000 a sample", "time in proportion, past the frame's pixels without use",
          "fewer photons gather from further away: caustics and indirect light blur; 0 leaves them out"},
-    Knob{"photon-radius", "metres; 0: from the photons' density", "nothing, but for gathers that meet more photons",
+    Knob{"photon-radius", "0 (from the photons' density) or metres", "nothing, but for gathers that meet more photons",
          "wide: caustics blur, corners darken; narrow: noise. It shrinks from sample to sample"},
     Knob{"resolution-scale", "0.1 to 1", "time in proportion to its square, but for what triangles take",
          "detail smaller than the pixels that are left, edges first"},
