@@ -83,6 +83,7 @@ void RenderOptions::declare(CLI::App& app) {
   app.add_option("--primary", primary, "what finds the visible surfaces: raster, rays, or auto, which measures both")
       ->capture_default_str();
   declare_light(app);
+  ray_build.declare(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -176,6 +177,7 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   settings.rays.global_photons =
       defaults.global_photons || std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
   settings.rays.reference = reference;
+  settings.rays.build = ray_build.build();
   settings.rays.terminator_fix = !no_terminator_fix;
   settings.aovs = parse_aovs(aov);
   const bool splits = std::ranges::any_of(
