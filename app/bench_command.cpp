@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/accuracy_options.h"
 #include "app/bench_net.h"
 #include "app/bench_raster.h"
 #include "app/bench_rays.h"
@@ -39,6 +40,7 @@ class BenchCommand final : public Command {
     rays_->add_option("--side", side_, "pixels of the square picture, a multiple of 64")
         ->check(CLI::Range(64, 8192))
         ->capture_default_str();
+    ray_build_.declare(*rays_);
     for (CLI::App* const bench : {raster, net_, rays_}) {
       bench->add_flag("--json", json_, "one JSON document");
       bench->fallthrough();
@@ -62,8 +64,9 @@ class BenchCommand final : public Command {
   }
 
   [[nodiscard]] ExitCode run_rays(const Globals& globals) const {
+    const RayBuild build = ray_build_.build();
     const Scene scene = scene_.empty() ? ray_bench_scene(triangles_) : load_scene(scene_, globals.scene_limits());
-    print(bench_rays(scene, side_ / kTileSide * kTileSide), this_machine().cpu);
+    print(bench_rays(scene, side_ / kTileSide * kTileSide, build), this_machine().cpu);
     return ExitCode::Done;
   }
 
@@ -102,6 +105,7 @@ class BenchCommand final : public Command {
   std::string scene_;
   std::uint64_t triangles_ = 1'000'000;
   int side_ = 1024;
+  RayBuildOptions ray_build_;
   bool json_ = false;
 };
 

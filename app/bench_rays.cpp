@@ -224,8 +224,8 @@ std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const Vi
 
 }  // namespace
 
-std::vector<BenchRow> bench_rays(const Scene& scene, int side) {
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+std::vector<BenchRow> bench_rays(const Scene& scene, int side, const RayBuild& build) {
+  const RayScene rays(scene, RaySpace(scene.bounds), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
   const Camera camera = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
   const View view = make_view(camera, {side, side}, scene.bounds);
   const DenormalsAsZero mode;

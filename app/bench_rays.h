@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "app/bench_raster.h"
+#include "rt/ray_build.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -11,6 +12,6 @@ namespace hpr {
 /// the rule for ties) against a bare loop of rtcIntersect16 or rtcOccluded16 over packets that lie ready, in the same
 /// Embree scene with the same flags. Primary rays of a picture of `side` x `side` pixels, and from what they meet rays
 /// to the first light, mirrored and diffuse ones. Both sides in turn, stretch by stretch, CPU time, best of five.
-[[nodiscard]] std::vector<BenchRow> bench_rays(const Scene& scene, int side);
+[[nodiscard]] std::vector<BenchRow> bench_rays(const Scene& scene, int side, const RayBuild& build);
 
 }  // namespace hpr

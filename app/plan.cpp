@@ -41,6 +41,13 @@ std::vector<std::size_t> tiles_in(const FrameLayout& layout, const std::vector<S
   return tiles;
 }
 
+std::string explain(const RayBuild& build) {
+  return fmt::format("embree: {} build quality, {}", kBuildQualityNames.at(static_cast<std::size_t>(build.quality)),
+                     build.same_instructions
+                         ? "AVX2 on every rank"
+                         : "each rank's widest instructions (last bits may differ between machines)");
+}
+
 /// A map finer than the pixels that look at it is wasted work: progressive samples add up to the same.
 std::uint32_t photons_for(std::uint32_t most, std::span<const View> views) {
   constexpr std::size_t kFewest = 1000;
@@ -87,6 +94,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   const char* const asked = plan.primary == Primary::Raster ? "unless asked for rays or a choice" : "as asked";
   const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
   lines.push_back(fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
+  if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));

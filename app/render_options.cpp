@@ -95,6 +95,7 @@ void RenderOptions::declare_frame(CLI::App& app) {
       ->capture_default_str();
   declare_light(app);
   declare_economies(app);
+  ray_build.declare(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -205,6 +206,7 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   settings.rays.global_photons =
       defaults.global_photons || std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
   settings.rays.reference = reference;
+  settings.rays.build = ray_build.build();
   settings.rays.terminator_fix = !no_terminator_fix;
   settings.aovs = parse_aovs(aov);
   const bool splits = std::ranges::any_of(

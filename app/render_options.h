@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/accuracy_options.h"
 #include "app/frame.h"
 #include "app/samples.h"
 #include "scene/view.h"
@@ -38,6 +39,7 @@ struct RenderOptions {
   int groups = 0;
   std::string strategy = "auto";
   std::string shading = "deferred";
+  RayBuildOptions ray_build;
   bool explain = false;
   std::string stats;
   double exposure = 0.0;  ///< stops, of display colours only

@@ -51,6 +51,7 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   identity.emplace_back("list of passes", fmt::format("'{}'", fmt::join(passes, ",")));
   identity.emplace_back("keys", plan.primary == Primary::Rays ? "by rays" : "by raster");
   identity.emplace_back("light", rays.reference ? "the reference" : "passes");
+  identity.emplace_back("instructions of rays", rays.build.same_instructions ? "the same everywhere" : "the widest");
   identity.emplace_back("depth", fmt::format("{}", rays.max_depth));
   identity.emplace_back("samples of lights", fmt::format("{}", rays.light_samples));
   identity.emplace_back("glossy cutoff", fmt::format("{}", rays.glossy_cutoff));

@@ -54,34 +54,49 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
   return *rasterizer_;
 }
 
-PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects) {
+void Session::build_rays_by(const RayBuild& build) {
+  if (build == ray_build_) return;
+  lighter_.reset();
+  ray_settings_.reset();
+  primary_rays_.reset();
+  traced_share_.reset();
+  ray_scene_.reset();
+  ray_build_ = build;
+}
+
+PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RayBuild& build) {
+  build_rays_by(build);
   if (!primary_rays_ || !std::ranges::equal(objects, traced_objects_)) {
     primary_rays_.reset();
     traced_share_.reset();  // frees its memory before the next one takes some
     traced_objects_.assign(objects.begin(), objects.end());
     const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_surfaces(scene_, false);
     if (!everything) {
-      traced_share_ = std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, traced_objects_);
+      traced_share_ =
+          std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, traced_objects_, build);
     }
-    primary_rays_ = std::make_unique<PrimaryRays>(scene_, everything ? ray_scene() : *traced_share_, share_.threads);
+    primary_rays_ =
+        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(build) : *traced_share_, share_.threads);
   }
   return *primary_rays_;
 }
 
-const RayScene& Session::ray_scene() {
+const RayScene& Session::ray_scene(const RayBuild& build) {
+  build_rays_by(build);
   if (!ray_scene_) {
-    ray_scene_ =
-        std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, covering_surfaces(scene_, false));
+    ray_scene_ = std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads,
+                                            covering_surfaces(scene_, false), build);
   }
   return *ray_scene_;
 }
 
 Lighter& Session::lighter(const RaySettings& settings) {
+  build_rays_by(settings.build);
   if (!lighter_ || ray_settings_ != settings) {
     RaySettings own = settings;
     own.threads = share_.threads;
-    lighter_ =
-        std::make_unique<Lighter>(scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(); });
+    lighter_ = std::make_unique<Lighter>(scene_, own, requirements_,
+                                         [this]() -> const RayScene& { return ray_scene(ray_build_); });
     ray_settings_ = settings;
   }
   return *lighter_;

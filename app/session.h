@@ -38,11 +38,11 @@ class Session {
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for.
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
-  /// The primary rays through `objects`; kept until other objects are asked for.
-  [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects);
+  /// The primary rays through `objects`; kept until other objects, or another way of building, are asked for.
+  [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RayBuild& build);
   /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
-  /// asked for.
-  [[nodiscard]] const RayScene& ray_scene();
+  /// asked for. Asking for one built in another way ends it, and the lighter and primary rays that use it.
+  [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
   /// The lighter of these settings; kept until others are asked for.
   [[nodiscard]] Lighter& lighter(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
@@ -57,6 +57,8 @@ class Session {
 
  private:
   void compare_rasterizers();
+  /// Ends what rays meet where it was built in another way.
+  void build_rays_by(const RayBuild& build);
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
                                             std::span<const int> members);
 
@@ -72,6 +74,7 @@ class Session {
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
+  RayBuild ray_build_;  ///< of all that follows
   std::unique_ptr<RayScene> ray_scene_;
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_share_;  ///< of primary_rays_; none where ray_scene_ is

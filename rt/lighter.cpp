@@ -176,11 +176,13 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
 }
 
 void Lighter::State::build_rays(const RaySource& source) {
-  opaque = source ? &source() : &own_opaque.emplace(scene, space, settings.threads, covering_surfaces(scene, false));
+  const auto build = [&](std::optional<RayScene>& made, const std::vector<SurfaceRange>& objects) {
+    return &made.emplace(scene, space, settings.threads, objects, settings.build);
+  };
+  opaque = source ? &source() : build(own_opaque, covering_surfaces(scene, false));
   std::uint64_t skipped = opaque->skipped_triangles();
-  if (const std::vector<SurfaceRange> surfaces_with_holes = covering_surfaces(scene, true);
-      !surfaces_with_holes.empty()) {
-    holed.emplace(scene, space, settings.threads, surfaces_with_holes);
+  if (const auto with_holes = covering_surfaces(scene, true); !with_holes.empty()) {
+    (void)build(holed, with_holes);
     skipped += holed->skipped_triangles();
   }
   rays.emplace(scene, surfaces, space, *opaque, holed ? &*holed : nullptr);
@@ -203,7 +205,8 @@ void Lighter::State::build_reference() {
 
 const RayScene& Lighter::State::whole_scene() {
   if (!holed) return *opaque;
-  if (!whole) whole.emplace(scene, space, settings.threads);
+  const std::array all{SurfaceRange{0, scene.triangles}};
+  if (!whole) whole.emplace(scene, space, settings.threads, all, settings.build);
   return *whole;
 }
 

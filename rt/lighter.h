@@ -13,6 +13,7 @@
 #include "image/color.h"
 #include "image/key.h"
 #include "image/tiles.h"
+#include "rt/ray_build.h"
 #include "rt/sampler.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
@@ -35,6 +36,7 @@ struct RaySettings {
   int occlusion_rays = 4;                ///< of the ambient-occlusion pass, per point and sample
   double ambient = 0.2;                  ///< radiance that pass lets in where nothing is near
   bool terminator_fix = true;            ///< lifts the origins of shadow rays onto the smooth surface normals pretend
+  RayBuild build = {};                   ///< of Embree's scenes
   bool reference = false;                ///< path tracing in place of all passes, paths of max_depth segments
   std::uint64_t seed = 1;                ///< of all randomness
   int threads = 1;

@@ -140,6 +140,11 @@ RTCSceneFlags scene_flags() {
   return static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | embree::kFilterFlag);
 }
 
+RTCBuildQuality quality_of(const RayBuild& build) {
+  if (build.quality == BuildQuality::Low) return RTC_BUILD_QUALITY_LOW;
+  return build.quality == BuildQuality::High ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM;
+}
+
 }  // namespace
 
 /// A mesh's triangles as several instances may show them.
@@ -152,16 +157,18 @@ struct RayScene::Embree {
   OwnedScene top;
   std::vector<RayGeometry> geometries;
   std::uint64_t skipped = 0;
+  RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
 
-  void start(int threads);
+  void start(int threads, const RayBuild& build);
+  [[nodiscard]] OwnedScene new_scene() const;
   RTCScene shared_part(const Scene& scene, const InstanceRange& part);
   void add_instance(const Instance& instance, unsigned int id, RTCScene shared_mesh, const RaySpace& space);
   void add_triangles(const Scene& scene, const InstanceRange& part, unsigned int id, const RaySpace& space);
 };
 
-void RayScene::Embree::start(int threads) {
-  // One instruction set on all ranks: distances differ between AVX2 and AVX-512 in the last bit.
-  const char* const isa = __builtin_cpu_supports("avx2") ? ",isa=avx2" : "";
+void RayScene::Embree::start(int threads, const RayBuild& build) {
+  quality = quality_of(build);
+  const char* const isa = build.same_instructions && __builtin_cpu_supports("avx2") ? ",isa=avx2" : "";
   device = OwnedDevice(rtcNewDevice(fmt::format("threads={},set_affinity=0{}", std::max(threads, 1), isa).c_str()));
   if (device.get() == nullptr) {
     const RTCError error = rtcGetDeviceError(nullptr);
@@ -173,14 +180,20 @@ void RayScene::Embree::start(int threads) {
   rtcSetDeviceErrorFunction(device.get(), &Failure::note, &failure);
 }
 
+OwnedScene RayScene::Embree::new_scene() const {
+  OwnedScene scene(rtcNewScene(device.get()));
+  rtcSetSceneFlags(scene.get(), scene_flags());
+  rtcSetSceneBuildQuality(scene.get(), quality);
+  return scene;
+}
+
 RTCScene RayScene::Embree::shared_part(const Scene& scene, const InstanceRange& part) {
   const std::uint32_t mesh = scene.instances[part.instance].mesh;
   OwnedScene& made = shared[{mesh, part.range.first, part.range.last}];
   if (made.get() != nullptr) return made.get();
   const OwnedGeometry geometry = make_triangles(device.get(), failure, MeshPart(scene.meshes[mesh], part.range),
                                                 skipped, [](const glm::vec3& p) { return glm::dvec3(p); });
-  made = OwnedScene(rtcNewScene(device.get()));
-  rtcSetSceneFlags(made.get(), scene_flags());
+  made = new_scene();
   rtcAttachGeometryByID(made.get(), geometry.get(), 0);
   rtcCommitScene(made.get());
   failure.check();
@@ -216,11 +229,11 @@ void RayScene::Embree::add_triangles(const Scene& scene, const InstanceRange& pa
 RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads)
     : RayScene(scene, space, threads, std::array{SurfaceRange{0, scene.triangles}}) {}
 
-RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects)
+RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects,
+                   const RayBuild& build)
     : space_(space), embree_(std::make_unique<Embree>()) {
-  embree_->start(threads);
-  embree_->top = OwnedScene(rtcNewScene(embree_->device.get()));
-  rtcSetSceneFlags(embree_->top.get(), scene_flags());
+  embree_->start(threads, build);
+  embree_->top = embree_->new_scene();
   // By the whole scene, whatever the share: an instance is traced by the same numbers on every rank.
   const std::vector<std::uint8_t> is_shared = shared_instances(scene);
   for (const InstanceRange& part :

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "rt/ray_build.h"
 #include "rt/ray_space.h"
 #include "scene/scene.h"
 
@@ -59,7 +60,8 @@ class RayScene {
   /// Builds with `threads` threads. The scene may go afterwards. Throws Error (NoDevice) when Embree fails.
   RayScene(const Scene& scene, const RaySpace& space, int threads);
   /// Only the surfaces of `objects`, ranges in any order. Each is met at the same distance as in the whole scene.
-  RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects);
+  RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects,
+           const RayBuild& build = {});
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
@@ -54,6 +55,52 @@ TEST(RayScene, FindsWhatABruteForceSearchFinds) {
     EXPECT_EQ(blocked[i] != 0, surfaces[i] != kNoSurface);
   }
   EXPECT_LE(differing, 2U);  // rays within a rounding of an edge
+}
+
+/// Surfaces met by rays from random places, many of them into the edges of triangles.
+std::vector<std::uint32_t> met_with(const RayBuild& build) {
+  Scene scene;
+  test::place(scene, test::add_mesh(scene, test::sphere(1.0, 40, 0)), glm::translate(glm::dmat4(1.0), {0.3, 0.1, 0.0}));
+  const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.5, 12, 0));
+  for (int i = 0; i < 20; ++i) {
+    test::place(scene, shared, glm::translate(glm::dmat4(1.0), {std::cos(i), 0.1 * i - 1.0, std::sin(i)}));
+  }
+  const Mesh quad = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
+  for (int copy = 0; copy < 3; ++copy) test::place(scene, test::add_mesh(scene, quad));
+  finish_scene(scene);
+  const RaySpace space(scene.bounds);
+  const RayScene rays(scene, space, 1, std::array{SurfaceRange{0, scene.triangles}}, build);
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> uniform(-2.0, 2.0);
+  const Mesh& mesh = scene.meshes.front();
+  RayBatch batch;
+  for (int i = 0; i < 20000; ++i) {
+    const glm::dvec3 origin(uniform(random), uniform(random), uniform(random));
+    const glm::dvec3 anywhere(uniform(random), uniform(random), uniform(random));
+    const auto vertex = glm::dvec3(mesh.positions[static_cast<std::size_t>(i) % mesh.positions.size()]);
+    const glm::dvec3 aim = i % 2 == 0 ? anywhere : vertex + glm::dvec3(0.3, 0.1, 0.0);
+    batch.push(space.from_world(origin), glm::normalize(aim - origin), kInfinity);
+  }
+  std::vector<std::uint32_t> surfaces(batch.size());
+  EXPECT_EQ(rays.closest(batch, surfaces), 0U);
+  std::vector<std::uint8_t> blocked(batch.size());
+  (void)rays.occluded(batch, blocked);
+  for (std::size_t i = 0; i < surfaces.size(); ++i) EXPECT_EQ(blocked[i] != 0, surfaces[i] != kNoSurface) << i;
+  return surfaces;
+}
+
+TEST(RayScene, MeetsTheSameSurfacesWhateverTheQualityOfItsTrees) {
+  const auto expected = met_with({});
+  EXPECT_TRUE(met_with({BuildQuality::Low, true}) == expected);
+  EXPECT_TRUE(met_with({BuildQuality::High, true}) == expected);
+}
+
+TEST(RayScene, TheWidestInstructionsMayDisagreeAtEdgesAlone) {
+  const auto expected = met_with({});
+  const auto widest = met_with({BuildQuality::Medium, false});
+  std::size_t differing = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) differing += expected[i] != widest[i] ? 1U : 0U;
+  EXPECT_LT(differing, expected.size() / 20);  // every other ray is aimed at a vertex, where six triangles meet
 }
 
 TEST(RayScene, GivesTheLowestIdAmongSurfacesInOnePlane) {
