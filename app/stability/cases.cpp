@@ -5,13 +5,26 @@
 namespace hpr {
 
 std::span<const StabilityCase> all_stability_cases() {
+  using namespace stability;
   static const std::array kCases{
+      // Geometry, rasterisation and frames.
       StabilityCase{"depth-order", "pairs of close surfaces from 1 mm to 10 000 km: the nearer one is seen",
-                    stability::depth_order},
+                    depth_order},
+      StabilityCase{"crossing", "two planes that cross at a small angle: the line lies where it should",
+                    crossing_planes},
+      StabilityCase{"coplanar", "64 surfaces in one plane: the picture is the same on any ranks, by any strategy",
+                    coplanar},
+      StabilityCase{"slivers", "fans, strips and T-junctions: every pixel is covered exactly once", slivers},
+      StabilityCase{"slanted", "ground to the horizon: what its depth resolves", slanted_planes},
+      StabilityCase{"offset", "scene and eye far from the origin: the picture stays", offset},
+      StabilityCase{"scale", "scenes of micrometres and of thousands of kilometres: the picture stays", scale},
+      StabilityCase{"nodes", "chains of nodes that cancel out: the placement stays", nodes},
+      StabilityCase{"frusta", "the eye nears the plane of a screen: its corners stay", frusta},
+      // Light.
       StabilityCase{"watertight", "rays aimed at shared edges and vertices of a closed mesh: none gets through",
-                    stability::watertight},
-      StabilityCase{"acne", "light at 89.9 degrees and covers close above floors: no false shadow, no leak",
-                    stability::acne},
+                    watertight},
+      StabilityCase{"acne", "light at 89.9 degrees and covers close above floors: no false shadow, no leak", acne},
+      StabilityCase{"accumulator", "a million samples of a pixel: what the film's sums lose", accumulator},
   };
   return kCases;
 }

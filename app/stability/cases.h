@@ -7,13 +7,24 @@
 /// What each file of app/stability/ measures.
 namespace hpr::stability {
 
-// depth.cpp
-[[nodiscard]] std::vector<StabilityFinding> depth_order(const Globals& globals);
+// Geometry, rasterisation and frames.
+[[nodiscard]] std::vector<StabilityFinding> depth_order(const Globals& globals);      // depth.cpp
+[[nodiscard]] std::vector<StabilityFinding> crossing_planes(const Globals& globals);  // crossing.cpp
+[[nodiscard]] std::vector<StabilityFinding> coplanar(const Globals& globals);         // coplanar.cpp
+[[nodiscard]] std::vector<StabilityFinding> slivers(const Globals& globals);          // slivers.cpp
+[[nodiscard]] std::vector<StabilityFinding> slanted_planes(const Globals& globals);   // slanted.cpp
+[[nodiscard]] std::vector<StabilityFinding> offset(const Globals& globals);           // offset.cpp
+[[nodiscard]] std::vector<StabilityFinding> scale(const Globals& globals);            // scale.cpp
+[[nodiscard]] std::vector<StabilityFinding> nodes(const Globals& globals);            // nodes.cpp
+[[nodiscard]] std::vector<StabilityFinding> frusta(const Globals& globals);           // frusta.cpp
 
 // watertight.cpp
 [[nodiscard]] std::vector<StabilityFinding> watertight(const Globals& globals);
 
 // acne.cpp
 [[nodiscard]] std::vector<StabilityFinding> acne(const Globals& globals);
+
+// accumulator.cpp
+[[nodiscard]] std::vector<StabilityFinding> accumulator(const Globals& globals);
 
 }  // namespace hpr::stability
