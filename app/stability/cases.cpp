@@ -20,6 +20,11 @@ std::span<const StabilityCase> all_stability_cases() {
       StabilityCase{"scale", "scenes of micrometres and of thousands of kilometres: the picture stays", scale},
       StabilityCase{"nodes", "chains of nodes that cancel out: the placement stays", nodes},
       StabilityCase{"frusta", "the eye nears the plane of a screen: its corners stay", frusta},
+      // Light.
+      StabilityCase{"watertight", "rays aimed at shared edges and vertices of a closed mesh: none gets through",
+                    watertight},
+      StabilityCase{"acne", "light at 89.9 degrees and covers close above floors: no false shadow, no leak", acne},
+      StabilityCase{"accumulator", "a million samples of a pixel: what the film's sums lose", accumulator},
   };
   return kCases;
 }

@@ -18,4 +18,13 @@ namespace hpr::stability {
 [[nodiscard]] std::vector<StabilityFinding> nodes(const Globals& globals);            // nodes.cpp
 [[nodiscard]] std::vector<StabilityFinding> frusta(const Globals& globals);           // frusta.cpp
 
+// watertight.cpp
+[[nodiscard]] std::vector<StabilityFinding> watertight(const Globals& globals);
+
+// acne.cpp
+[[nodiscard]] std::vector<StabilityFinding> acne(const Globals& globals);
+
+// accumulator.cpp
+[[nodiscard]] std::vector<StabilityFinding> accumulator(const Globals& globals);
+
 }  // namespace hpr::stability

@@ -1,0 +1,173 @@
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <vector>
+
+#include "app/stability/cases.h"
+#include "app/stability/light_tools.h"
+#include "rt/ray_space.h"
+#include "rt/surfaces.h"
+#include "scene/shapes.h"
+
+// Surfaces that shadow themselves, and light that gets through a cover: both sides of how far a shadow ray's origin is
+// moved off its surface.
+namespace hpr::stability {
+namespace {
+
+constexpr Size kPicture{192, 192};
+constexpr double kGrazing = 89.9 * std::numbers::pi / 180.0;
+
+/// Where things stand: a ball of `size` metres and what belongs to it, about `center`.
+struct Placement {
+  double size = 1.0;
+  glm::dvec3 center{0.0};
+};
+
+Light sun(double angle_from_z) {
+  Light light;
+  light.type = LightType::Directional;
+  light.direction = glm::vec3(-std::sin(angle_from_z), 0.0, -std::cos(angle_from_z));
+  return light;
+}
+
+/// A wall in the plane z = 0 and a smooth sphere before it under light that grazes the wall. Nothing stands in any
+/// light's way: the sphere's shadow falls on the wall's plane at 286 of its radii, past the wall's end.
+Scene grazed(const Placement& at) {
+  Scene scene;
+  const glm::dmat4 to_world = shapes::placed(at.center, at.size);
+  add_placed(scene, parallelogram({-2, -1.5, 0}, {4, 0, 0}, {0, 3, 0}), matte(), to_world);
+  Mesh ball = shapes::icosphere(4);
+  for (glm::vec3& p : ball.positions) p += glm::vec3(0.0F, 0.0F, 1.5F);
+  add_placed(scene, std::move(ball), matte(), to_world);
+  scene.lights = {sun(kGrazing)};
+  return scene;
+}
+
+/// Two slips of paper that make the scene of radius 1 about the origin.
+void widen(Scene& scene) {
+  for (const double corner : {-1.0, 1.0}) {
+    add_placed(scene, parallelogram(glm::dvec3(corner), {-corner * 1e-3, 0, 0}, {0, -corner * 1e-3, 0}), matte(),
+               glm::dmat4(1.0));
+  }
+}
+
+View view_of(const Scene& scene, const Placement& at, const glm::dvec3& eye) {
+  Camera camera = look_at(at.center + at.size * eye, at.center + at.size * glm::dvec3(0, 0, 0.7), {0, 1, 0}, 0.8);
+  std::get<PerspectiveLens>(camera.lens).near_distance = 0.1 * at.size;
+  return make_view(camera, kPicture, scene.bounds);
+}
+
+/// Pixels of surfaces seen from their front that differ where shadow rays are traced although nothing is in their way.
+/// (Past a silhouette that rounding has moved, a pixel may show the inside of the far side.)
+std::size_t shadowed_pixels(Scene scene, const Placement& at, int threads) {
+  finish_scene(scene);
+  const View view = view_of(scene, at, {1.5, 1.0, 6.0});
+  RaySettings settings;
+  settings.threads = threads;
+  settings.passes = {"shadow"};
+  const LitPicture shadowed = lit_picture(scene, view, settings);
+  settings.passes = {};
+  settings.auto_passes = false;
+  const LitPicture open = lit_picture(scene, view, settings);
+  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  WorldTriangle triangle;
+  std::size_t differing = 0;
+  std::size_t lit = 0;
+  for (int y = 0; y < kPicture.height; ++y) {
+    for (int x = 0; x < kPicture.width; ++x) {
+      const Key key = open.keys.at(0, x, y);
+      if (key == kNoKey) continue;
+      const Ray ray = view_ray(view, x + 0.5, y + 0.5);
+      surfaces.load(key_surface(key), triangle);
+      if (surfaces.meet(triangle, ray.origin, ray.direction).inside) continue;
+      lit += open.image.at(x, y).r > 0.0F ? 1U : 0U;
+      differing += open.image.at(x, y) == shadowed.image.at(x, y) ? 0U : 1U;
+    }
+  }
+  return lit * 4 > kPicture.area() ? differing : kPicture.area();  // a picture of nothing proves nothing
+}
+
+std::size_t shadowed_in_a_wide_scene(double size, int threads) {
+  const Placement at{size, {0.7, -0.6, 0.5}};
+  Scene scene = grazed(at);
+  widen(scene);
+  return shadowed_pixels(std::move(scene), at, threads);
+}
+
+/// Pixels of a floor that see light although a cover lies `gap` scene radii above it; both are squares of 2 by 2 radii.
+std::size_t lit_under_cover(double gap, double size, int threads) {
+  const Placement at{size, {}};
+  const glm::dmat4 to_world = shapes::placed({}, size);
+  Scene floor;
+  add_placed(floor, parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), matte(), to_world);
+  floor.lights = {sun(0.7)};
+  Scene covered = floor;
+  add_placed(covered, parallelogram({-1.5, -1.5, gap}, {3, 0, 0}, {0, 3, 0}), matte(), to_world);
+  finish_scene(floor);
+  finish_scene(covered);
+  // What the floor's pixels show is named by keys, so that the cover does not hide it from the eye.
+  const View view = view_of(floor, at, {0.2, 0.1, 2.5});
+  RaySettings settings;
+  settings.threads = threads;
+  const TileLayer<Key> keys = lit_picture(floor, view, settings).keys;
+  settings.passes = {"shadow"};
+  TileLayer<Rgb> radiance(keys.layout());
+  Lighter(covered, settings).light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
+  const Image<Rgb> image = to_image(radiance, 0);
+  std::size_t lit = 0;
+  for (int y = 0; y < kPicture.height; ++y) {
+    for (int x = 0; x < kPicture.width; ++x) lit += image.at(x, y).r > 0.0F ? 1U : 0U;
+  }
+  return lit;
+}
+
+}  // namespace
+
+std::vector<StabilityFinding> acne(const Globals& globals) {
+  const int threads = threads_of(globals);
+  StabilityFinding terminator =
+      finding("acne/terminator", "wall and smooth sphere lit at 89.9 degrees, scales 1e-3 .. 1e3", 0.0,
+              "shadowed pixels", "nothing stands in the light's way");
+  StabilityFinding scales = finding("acne/offset-rule", "the same at scales 1e-9 .. 1e9", 0.0, "shadowed pixels",
+                                    "origins move by 4 steps of the coordinates' own size, which scale along");
+  scales.curve.x = "scale";
+  for (const double scale : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
+    const auto count = static_cast<double>(shadowed_pixels(grazed({scale, {}}), {scale, {}}, threads));
+    if (scale >= 1e-3 && scale <= 1e3) terminator.measured = worse(terminator.measured, count);
+    scales.measured = worse(scales.measured, count);
+    scales.curve.points.emplace_back(scale, count);
+  }
+
+  StabilityFinding small = finding("acne/small-in-large", "the same, 1 .. 1e-4 scene radii large, away from the middle",
+                                   0.0, "shadowed pixels", "origins move by more than Embree's test errs");
+  small.curve.x = "size, in radii of the scene";
+  for (const double size : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
+    const auto count = static_cast<double>(shadowed_in_a_wide_scene(size, threads));
+    if (size >= 1e-4) small.measured = worse(small.measured, count);
+    small.curve.points.emplace_back(size, count);
+  }
+  const auto holds_small = [&](double size) { return shadowed_in_a_wide_scene(size, threads) == 0; };
+  if (!holds_small(1e-8)) small.breaks_at = breaking_point(1e-4, 1e-8, 0.2, holds_small);
+
+  // The floor's corners lie 1 radius off the middle, its edges are 2 long.
+  constexpr double kOffset = kOriginSteps * kFloatStep * 3.0;
+  StabilityFinding thin =
+      finding("acne/thin-wall", "floor under a cover 2.9e-6 (two offsets) .. 1e-2 radii above it, scales 1e-3 .. 1e3",
+              0.0, "lit pixels", "an origin is moved by 4 steps, and Embree errs by 3");
+  thin.curve.x = "gap, in radii of the scene";
+  const auto worst_lit = [&](double gap) {
+    std::size_t lit = 0;
+    for (const double scale : {1e-3, 1.0, 1e3}) lit = std::max(lit, lit_under_cover(gap, scale, threads));
+    return static_cast<double>(lit);
+  };
+  for (const double gap : {0.5 * kOffset, kOffset, 2.0 * kOffset, 1e-4, 1e-2}) {
+    const double lit = worst_lit(gap);
+    if (gap >= 2.0 * kOffset) thin.measured = worse(thin.measured, lit);
+    thin.curve.points.emplace_back(gap, lit);
+  }
+  thin.breaks_at = breaking_point(2.0 * kOffset, 1e-9, 0.05, [&](double gap) { return worst_lit(gap) == 0.0; });
+  return {terminator, scales, small, thin};
+}
+
+}  // namespace hpr::stability
