@@ -18,7 +18,7 @@ struct Quality {
   int max_depth = 8;            ///< --max-depth
   double glossy_cutoff = 0.0;   ///< --glossy-cutoff
   std::uint32_t photons = 0;    ///< --photons
-  bool global_photons = false;  ///< all indirect light, not caustics alone; also where --passes names photon
+  bool global_photons = false;  ///< --indirect
 };
 
 /// From the fastest to the best.

@@ -126,6 +126,9 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--photons", photons, "sent per sample, where the scene requires any")
       ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
+  app.add_flag("--indirect,!--no-indirect", indirect,
+               "photons carry all indirect light, not caustics alone (default: with --quality best, or where --passes "
+               "names photon)");
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");
 }
@@ -203,8 +206,12 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   settings.rays.glossy_cutoff = glossy_cutoff.value_or(defaults.glossy_cutoff);
   settings.rays.photons = photons.value_or(defaults.photons);
   settings.photons_fit_frame = !photons;
-  settings.rays.global_photons =
-      defaults.global_photons || std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
+  const bool names_photons = std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
+  settings.rays.global_photons = indirect.value_or(defaults.global_photons || names_photons);
+  if (photons == std::uint32_t{0} && names_photons) {
+    throw Error(ExitCode::Usage, "--passes names photon, and --photons 0 sends none",
+                "leave one of them out, or send some");
+  }
   settings.rays.reference = reference;
   settings.rays.build = ray_build.build();
   settings.rays.terminator_fix = !no_terminator_fix;

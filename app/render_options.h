@@ -28,6 +28,7 @@ struct RenderOptions {
   std::optional<int> light_samples;
   std::optional<double> glossy_cutoff;
   std::optional<std::uint32_t> photons;
+  std::optional<bool> indirect;
   double photon_radius = 0.0;     ///< metres
   double resolution_scale = 1.0;  ///< of the pixels a side
   std::string filter;

@@ -57,8 +57,9 @@ std::string table(const TradeoffReport& report) {
   for (const std::string& knob : report.knobs) head(knob);
   head("ms");
   for (const std::string& metric : report.metrics) head(metric);
-  for (const char* name : {"signed mean", "its standard error", "largest difference", "at"}) head(name);
+  for (const char* name : {"signed mean, %", "its standard error", "largest difference", "at"}) head(name);
   text += "</tr></thead>\n<tbody>\n";
+  const double percent = report.reference.mean > 0.0 ? 100.0 / report.reference.mean : std::nan("");
   for (std::size_t i = 0; i < report.points.size(); ++i) {
     const TradeoffPoint& point = report.points[i];
     text += fmt::format("<tr{}><th scope=\"row\">{}</th>", point.pareto ? " class=\"fastest\"" : "", i + 1);
@@ -66,8 +67,8 @@ std::string table(const TradeoffReport& report) {
     text += fmt::format("<td>{:.1f}</td>", point.median_ms());
     for (const std::string& metric : report.metrics) text += cell(metric, point.error.of(metric));
     const auto width = static_cast<std::size_t>(report.size.width);
-    text += fmt::format("<td>{:+.3g}</td><td>{:.2g}</td><td>{:.3g}</td><td>{},{}</td></tr>\n", point.error.mean,
-                        point.error.mean_error, point.error.worst, point.error.worst_pixel % width,
+    text += fmt::format("<td>{:+.3g}</td><td>{:.2g}</td><td>{:.3g}</td><td>{},{}</td></tr>\n",
+                        percent * point.error.mean, percent * point.error.mean_error, point.error.worst, point.error.worst_pixel % width,
                         point.error.worst_pixel / width);
   }
   return text + "</tbody></table></div>\n";

@@ -77,6 +77,13 @@ std::vector<float> display_values(std::vector<float> values, double exposure_sto
   return values;
 }
 
+/// 0 without pixels.
+double mean_of(const Image<Rgb>& picture) {
+  double sum = 0.0;
+  for (const Rgb& pixel : picture.pixels()) sum += pixel.r + pixel.g + pixel.b;
+  return picture.pixels().empty() ? 0.0 : sum / (3.0 * static_cast<double>(picture.pixels().size()));
+}
+
 ReferencePicture read_reference(const std::string& path, Size size, const Globals& globals) {
   const FloatImage file = read_image(path, picture_limits(globals));
   if (file.size != size) {
@@ -86,7 +93,8 @@ ReferencePicture read_reference(const std::string& path, Size size, const Global
                 fmt::format("add --size {}x{}", file.size.width, file.size.height));
   }
   ReferencePicture reference;
-  reference.about = {path, 0, std::numeric_limits<double>::quiet_NaN(), false};
+  reference.about.how = path;
+  reference.about.relmse = std::numeric_limits<double>::quiet_NaN();
   reference.linear = file.linear;
   reference.radiance = Image<Rgb>(size);
   const auto place = [&](const char* channel) {
@@ -106,6 +114,7 @@ ReferencePicture read_reference(const std::string& path, Size size, const Global
     const float* const pixel = file.values.data() + i * channels;
     reference.radiance.pixels()[i] = {pixel[r], pixel[g], pixel[b]};
   }
+  reference.about.mean = mean_of(reference.radiance);
   return reference;
 }
 
@@ -200,10 +209,12 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
     if (!draw(kept, *sampler)) return std::nullopt;
   }
   const SampleProgress reached = sampler->reached_so_far();
-  reference.about = {passes ? "passes at best" : "path tracing", reached.samples,
-                     reached.relmse.value_or(std::numeric_limits<double>::quiet_NaN()),
-                     kept.resume && sampler->times().samples == 0};
   reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size);
+  reference.about = {.how = passes ? "passes at best" : "path tracing",
+                     .spp = reached.samples,
+                     .relmse = reached.relmse.value_or(std::numeric_limits<double>::quiet_NaN()),
+                     .mean = mean_of(reference.radiance),
+                     .cached = kept.resume && sampler->times().samples == 0};
   return reference;
 }
 

@@ -135,13 +135,16 @@ std::string tradeoff_table(const TradeoffReport& report) {
   for (const std::string& knob : report.knobs) rows.front().push_back(knob);
   rows.front().emplace_back("ms");
   for (const std::string& metric : report.metrics) rows.front().push_back(metric);
-  rows.front().emplace_back("mean +- error");
+  rows.front().emplace_back("mean in %");
   for (const TradeoffPoint& point : report.points) {
     auto& row = rows.emplace_back();
     for (const auto& [knob, value] : point.knobs) row.push_back(value);
     row.push_back(fmt::format("{:.1f}", point.median_ms()));
     for (const std::string& metric : report.metrics) row.push_back(metric_text(metric, point.error));
-    row.push_back(fmt::format("{:+.2g} +- {:.1g}", point.error.mean, point.error.mean_error));
+    const double percent = 100.0 / report.reference.mean;
+    row.push_back(report.reference.mean > 0.0 ? fmt::format("{:+.2f} +- {:.2f}", percent * point.error.mean,
+                                                            percent * point.error.mean_error)
+                                              : "-");
   }
   std::string text = fmt::format("{} at {}x{} against {}{}\n", report.scene, report.size.width, report.size.height,
                                  report.reference.how,
