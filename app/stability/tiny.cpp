@@ -21,7 +21,7 @@ Mesh fine_grid() {
   Mesh mesh;
   for (std::uint32_t row = 0; row <= kCells; ++row) {
     for (std::uint32_t column = 0; column <= kCells; ++column) {
-      mesh.positions.emplace_back(glm::dvec3(double{column}, double{row}, 0.0) / double{kCells});
+      mesh.positions.emplace_back(glm::dvec3(column, row, 0.0) / static_cast<double>(kCells));
       mesh.normals.emplace_back(0.0F, 0.0F, 1.0F);
     }
   }
