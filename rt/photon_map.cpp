@@ -148,7 +148,7 @@ double progressive_radius(double first, std::uint64_t pass) {
 }
 
 double first_radius(std::span<const Photon> photons, const RaySpace& space, double wanted) {
-  constexpr double kMost = 0.1;  // of a scene whose radius is at least 1 in ray space
+  const double most = 0.1 * space.radius;
   constexpr std::size_t kMostThinned = 32768;
   constexpr std::size_t kProbes = 127;
   const std::size_t stride = photons.size() / kMostThinned + 1;
@@ -159,7 +159,7 @@ double first_radius(std::span<const Photon> photons, const RaySpace& space, doub
   }
   const auto share = static_cast<double>(stride);
   const auto k = static_cast<std::size_t>(std::clamp(wanted / share, 1.0, static_cast<double>(places.size())));
-  if (places.size() < 2 || k >= places.size()) return kMost / space.scale;
+  if (places.size() < 2 || k >= places.size()) return most / space.scale;
   const std::size_t step = std::max<std::size_t>(places.size() / kProbes, 1);
   std::vector<double> areas;  // of the circles about some of them that take in k others, over pi
   std::vector<float> distances2(places.size());
@@ -177,7 +177,7 @@ double first_radius(std::span<const Photon> photons, const RaySpace& space, doub
   // The circle that takes in k of evenly scattered points follows a gamma distribution, whose median is k - 1/3.
   const double area_of_one = *middle / (static_cast<double>(k) - 1.0 / 3.0) / share;
   const double radius = std::sqrt(wanted * area_of_one);
-  return (radius > 0.0 ? std::min(radius, kMost) : kMost) / space.scale;
+  return (radius > 0.0 ? std::min(radius, most) : most) / space.scale;
 }
 
 }  // namespace hpr

@@ -254,5 +254,11 @@ TEST(PhotonRadiusTest, FewPhotonsOrAllInOnePlaceGetATenthOfTheScene) {
     EXPECT_DOUBLE_EQ(first_radius(std::vector<Photon>(count, photon_at({0.5, 0.5, 0.5})), kRoom), 0.1);
 }
 
+TEST(PhotonRadiusTest, TheTenthIsOfTheSceneWhateverPowerOfTwoIsNearItsSize) {
+  for (const double radius : {1.0, 1.3, 1.9, 3.0, 1e-6, 7e5}) {
+    EXPECT_DOUBLE_EQ(first_radius({}, RaySpace({glm::dvec3(-radius), glm::dvec3(radius)})), 0.1 * radius);
+  }
+}
+
 }  // namespace
 }  // namespace hpr

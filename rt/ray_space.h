@@ -15,14 +15,17 @@ namespace hpr {
 struct RaySpace {
   glm::dvec3 origin{0.0};
   double scale = 1.0;
+  double radius = 1.0;  ///< the scene's, in ray space: [1, 2)
 
   RaySpace() = default;
   explicit RaySpace(const Bounds& bounds) {
     const glm::dvec3 half = 0.5 * bounds.high - 0.5 * bounds.low;
-    const double radius = std::max({half.x, half.y, half.z});
-    if (!std::isfinite(radius)) return;
+    const double extent = std::max({half.x, half.y, half.z});
+    if (!std::isfinite(extent)) return;
     origin = 0.5 * bounds.high + 0.5 * bounds.low;
-    if (radius > 0.0) scale = std::ldexp(1.0, std::clamp(-std::ilogb(radius), -1000, 1000));
+    if (!(extent > 0.0)) return;
+    scale = std::ldexp(1.0, std::clamp(-std::ilogb(extent), -1000, 1000));
+    radius = extent * scale;
   }
 
   [[nodiscard]] glm::dvec3 from_world(const glm::dvec3& world) const { return (world - origin) * scale; }

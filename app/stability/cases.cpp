@@ -20,6 +20,11 @@ std::span<const StabilityCase> all_stability_cases() {
       StabilityCase{"scale", "scenes of micrometres and of thousands of kilometres: the picture stays", scale},
       StabilityCase{"nodes", "chains of nodes that cancel out: the placement stays", nodes},
       StabilityCase{"frusta", "the eye nears the plane of a screen: its corners stay", frusta},
+      StabilityCase{"giant", "triangles of 1e9 m, ground to the horizon, an eye almost on a wall", giant},
+      StabilityCase{"tiny", "a million triangles in one tile: what is seen, and how they are shared out", tiny},
+      StabilityCase{"degenerate", "points, doubles, segments and needles in a mesh: it looks as without", degenerate},
+      StabilityCase{"layers", "64 translucent layers in any order: the exact mixture", layers},
+      StabilityCase{"frames", "frames and messages past 2^31 bytes", frames},
       // Light.
       StabilityCase{"watertight", "rays aimed at shared edges and vertices of a closed mesh: none gets through",
                     watertight},

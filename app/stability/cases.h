@@ -17,6 +17,11 @@ namespace hpr::stability {
 [[nodiscard]] std::vector<StabilityFinding> scale(const Globals& globals);            // scale.cpp
 [[nodiscard]] std::vector<StabilityFinding> nodes(const Globals& globals);            // nodes.cpp
 [[nodiscard]] std::vector<StabilityFinding> frusta(const Globals& globals);           // frusta.cpp
+[[nodiscard]] std::vector<StabilityFinding> giant(const Globals& globals);            // giant.cpp
+[[nodiscard]] std::vector<StabilityFinding> tiny(const Globals& globals);             // tiny.cpp
+[[nodiscard]] std::vector<StabilityFinding> degenerate(const Globals& globals);       // degenerate.cpp
+[[nodiscard]] std::vector<StabilityFinding> layers(const Globals& globals);           // layers.cpp
+[[nodiscard]] std::vector<StabilityFinding> frames(const Globals& globals);           // frames.cpp
 
 // watertight.cpp
 [[nodiscard]] std::vector<StabilityFinding> watertight(const Globals& globals);

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+"""`hpr stability`: every number has a limit and a verdict that follows from it, the page is well-formed, and what is
+promised holds. With --full all cases are measured.
+
+usage: stability_test.py HPR [--full]
+"""
+
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ElementTree
+
+HPR = str(pathlib.Path(sys.argv[1]).resolve())
+FULL = "--full" in sys.argv[2:]
+QUICK = "depth-order,slanted,crossing,nodes,degenerate,offset"
+SVG = "{http://www.w3.org/2000/svg}"
+LARGEST = sys.float_info.max
+failures = []
+
+
+def expect(condition, message):
+    if not condition:
+        failures.append(message)
+        print(f"failed: {message}")
+
+
+def run(folder, *arguments, timeout=60):
+    return subprocess.run([HPR, "stability", *arguments], cwd=folder, capture_output=True, text=True, timeout=timeout,
+                          check=False)
+
+
+def check_json(text, code):
+    document = json.loads(text)
+    expect(document["schema"] == "hpr.stability/1", document["schema"])
+    cases = document["cases"]
+    expect(cases, "no case")
+    for case in cases:
+        name = case["name"]
+        for key in ("name", "parameter", "unit", "why"):
+            expect(isinstance(case[key], str) and case[key], f"{name}: {key} is {case[key]!r}")
+        for key in ("limit", "measured"):
+            value = case[key]
+            expect(isinstance(value, (int, float)) and math.isfinite(value) and abs(value) < LARGEST,
+                   f"{name}: {key} is {value!r}")
+        at_most = case["bound"] == "at-most"
+        holds = case["measured"] <= case["limit"] if at_most else case["measured"] >= case["limit"]
+        expect(case["verdict"] == ("holds" if holds else "breaks"), f"{name}: {case}")
+        expect(case["verdict"] == "holds", f"{name} breaks: {case['measured']} against {case['limit']} {case['unit']}")
+        breaks_at = case["breaks_at"]
+        expect(breaks_at is None or isinstance(breaks_at, (int, float)), f"{name}: breaks at {breaks_at!r}")
+    expect(len({case["name"] for case in cases}) == len(cases), "a name stands twice")
+    broken = any(case["verdict"] == "breaks" for case in cases)
+    expect(code == (1 if broken else 0), f"exit code {code}")
+    return cases
+
+
+def check_page(text, cases):
+    root = ElementTree.fromstring(text.split("\n", 1)[1])  # without the DOCTYPE
+    rows = root.findall(".//tbody/tr")
+    expect(len(rows) == len(cases), f"{len(rows)} rows for {len(cases)} numbers")
+    expect([row.find("th").text for row in rows] == [case["name"] for case in cases], "other names in the page")
+    expect(root.findall(f".//{SVG}svg"), "no plot")
+    expect(not root.findall(".//script"), "a script")
+
+
+def check_errors(folder):
+    unknown = run(folder, "--case", "depth-ordr")
+    expect(unknown.returncode == 2, f"unknown case: exit code {unknown.returncode}")
+    expect("depth-order" in unknown.stderr and not unknown.stdout, "the nearest name is not told")
+    (folder / "there.html").write_text("mine")
+    there = run(folder, "--case", "nodes", "--html", "there.html")
+    expect(there.returncode == 4, f"file that exists: exit code {there.returncode}")
+    expect((folder / "there.html").read_text() == "mine", "a file was overwritten")
+    listed = run(folder, "--list")
+    expect(listed.returncode == 0, f"--list: exit code {listed.returncode}")
+    for name in QUICK.split(","):
+        expect(any(line.split()[0] == name for line in listed.stdout.splitlines()), f"--list lacks {name}")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        chosen = [] if FULL else ["--case", QUICK]
+        done = run(folder, *chosen, "--json", "--html", "page.html", timeout=900 if FULL else 60)
+        if done.returncode == 5:
+            print(f"no graphics here: {done.stderr}")
+            return 77
+        expect(done.returncode in (0, 1), f"exit code {done.returncode}: {done.stderr}")
+        if done.stdout:
+            cases = check_json(done.stdout, done.returncode)
+            check_page((folder / "page.html").read_text(), cases)
+        check_errors(folder)
+    return 1 if failures else 0
+
+
+sys.exit(main())
