@@ -26,6 +26,8 @@ constexpr std::array kKnobs{
          "wide: caustics blur, corners darken; narrow: noise. It shrinks from sample to sample"},
     Knob{"resolution-scale", "0.1 to 1", "time in proportion to its square, but for what triangles take",
          "detail smaller than the pixels that are left, edges first"},
+    Knob{"half-resolution", "none, or a list of photon, ambient-occlusion, reflection, refraction, shadow",
+         "four times the points of those passes", "detail of that light where neighbours see the like"},
     Knob{"max-depth", "1 to 64", "rays between mirrors and through glass", "what is seen by more bounces is black"},
     Knob{"glossy-cutoff", "0 to 1: a roughness", "a ray for every smoother surface in view, and what it meets",
          "rougher surfaces reflect lights only, not the scene"},

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -103,6 +104,9 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
         fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
   }
   if (!gives_light(session.scene())) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
+  if (!plan.rays.half_resolution.empty()) {
+    lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
+  }
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
     if (pass.runs && pass.name == "photon") {

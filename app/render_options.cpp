@@ -12,6 +12,7 @@
 #include "app/quality.h"
 #include "compositing/compositor.h"
 #include "core/names.h"
+#include "rt/half_resolution.h"
 #include "scene/environment.h"
 #include "scene/load_scene.h"
 
@@ -142,6 +143,9 @@ void RenderOptions::declare_economies(CLI::App& app) {
                  "the frame is made of so many of the pixels a side, and shown at full size by a filter")
       ->check(CLI::Range(0.1, 1.0))
       ->capture_default_str();
+  app.add_option("--half-resolution", half_resolution,
+                 "a list of passes whose light is worked out for one pixel in four where neighbours see the like")
+      ->type_name("LIST");
 }
 
 void RenderOptions::settle_economies(FrameSettings& settings) const {
@@ -155,6 +159,12 @@ void RenderOptions::settle_economies(FrameSettings& settings) const {
   }
   settings.rays.photon_radius = photon_radius;
   settings.resolution_scale = resolution_scale;
+  if (half_resolution != "none") settings.rays.half_resolution = split_list(half_resolution);
+  (void)shared_components(settings.rays);  // as for unknown passes
+  if (!settings.rays.half_resolution.empty() && (reference || settings.shading == Shading::Local)) {
+    throw Error(ExitCode::Usage, "--half-resolution is about passes over what is seen in the end",
+                "use it without --reference and with --shading deferred");
+  }
 }
 
 Camera RenderOptions::choose_camera(const Scene& scene) const {

@@ -31,6 +31,7 @@ struct RenderOptions {
   std::optional<bool> indirect;
   double photon_radius = 0.0;     ///< metres
   double resolution_scale = 1.0;  ///< of the pixels a side
+  std::string half_resolution;    ///< passes
   std::string filter;
   std::string aov;
   std::string environment;

@@ -181,6 +181,8 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   best.photons.reset();
   best.photon_radius = 0.0;
   best.resolution_scale = 1.0;
+  best.half_resolution.clear();
+  best.indirect.reset();
   best.reference = !passes;
   const Setup setup = set_up(session, best, how.size, globals.seed ^ kOtherSeed);
 

@@ -26,6 +26,7 @@ class AmbientOcclusionPass final : public Pass {
     const double reach = kReach * glm::length(tile.scene.bounds.high - tile.scene.bounds.low) / 2.0;
     for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
       const PathPoint& point = wave.points[i];
+      if (point.borrows_light(Component::AmbientOcclusion)) continue;
       if (point.bsdf.weight(Lobe::Diffuse) == glm::dvec3(0.0)) continue;
       Sampler sampler = point.sampler.branch(kBranch);
       for (int ray = 0; ray < count; ++ray) {

@@ -44,6 +44,7 @@ void DirectLight::sample_listed() {
     const bool fixed = tile_.lights.listed_is_fixed(light_);
     for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
       PathPoint& point = wave_.points[i];
+      if (point.borrows_light(Component::Direct)) continue;
       const glm::dvec2 u = fixed ? glm::dvec2(0.0) : point.sampler.two();
       add(i, tile_.lights.sample_listed(light_, point.surface.position, *tile_.view, u));
     }
@@ -53,6 +54,7 @@ void DirectLight::sample_listed() {
 void DirectLight::sample_others() {
   for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
     PathPoint& point = wave_.points[i];
+    if (point.borrows_light(Component::Direct)) continue;
     const double choice = point.sampler.one();
     const glm::dvec2 u = point.sampler.two();
     auto light = tile_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *tile_.view, choice, u);

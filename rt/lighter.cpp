@@ -15,6 +15,7 @@
 #include "rt/denormals.h"
 #include "rt/direct_light.h"
 #include "rt/first_points.h"
+#include "rt/half_resolution.h"
 #include "rt/pass.h"
 #include "rt/path_tracer.h"
 #include "rt/photon_maps.h"
@@ -30,6 +31,7 @@ constexpr int kRowsAtOnce = static_cast<int>(kWavePoints) / kTileSide;
 struct Scratch {
   Scratch(TileWork tile_work, std::size_t times) : work(std::move(tile_work)), ms(times, 0.0) {}
   TileWork work;
+  SharedLight shared;
   std::vector<std::vector<PathPoint>> waiting;  ///< by depth
   Wave wave;
   std::vector<double> ms;
@@ -130,6 +132,7 @@ struct Lighter::State {
   Surfaces surfaces;
   LightSet lights;
   std::vector<std::unique_ptr<Pass>> passes;  ///< those that run
+  std::uint8_t shared = 0;                    ///< components, see SharedLight
   std::array<bool, kLobes.size()> followed_lobes{};
   std::optional<RayScene> own_opaque;
   const RayScene* opaque = nullptr;
@@ -161,6 +164,7 @@ struct Lighter::State {
 
 Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source)
     : scene(lit), settings(std::move(chosen)), space(lit.bounds), surfaces(lit, space), lights(lit) {
+  shared = shared_components(settings);
   const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
   bool needs_rays = settings.reference || !covering_surfaces(lit, true).empty();
@@ -300,7 +304,8 @@ void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_
                                 const LightOutput& output) const {
   const DenormalsAsZero mode;
   TileWork& tile = scratch.work;
-  tile.wants_components = std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
+  tile.wants_components =
+      shared != 0 || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
   tile.wants_cost = output.cost != nullptr;
   tile.radiance.assign(kTilePixels, glm::dvec3(0.0));
   if (tile.wants_components) {
@@ -312,14 +317,17 @@ void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_
   for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
     if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
   }
+  if (shared != 0) scratch.shared.start(shared, tile, job);
   const int height = job.place.height();
   for (int row = 0; row < height; row += kRowsAtOnce) {
     const Stopwatch watch;
     find_first_points(tile, job, {row, std::min(row + kRowsAtOnce, height)}, scratch.waiting[0]);
     add_first_surfaces(scratch.waiting[0], index, output);
+    if (shared != 0) scratch.shared.choose(scratch.waiting[0], row);
     scratch.ms[kSurfaceStep] += watch.ms();
     light_waiting(scratch);
   }
+  if (shared != 0) scratch.shared.spread(tile);
   store(tile, job, index, output);
 }
 
@@ -382,19 +390,6 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
 
 void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
   (void)state_->send_photons(number, &comm);
-}
-
-void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
-                 std::span<const std::size_t> tiles, const SampleNumber& number) {
-  TileLayer<Rgb> radiance(keys.layout());
-  lighter.light(views, keys, tiles, {.radiance = &radiance}, number);
-  for (const std::size_t tile : tiles) {
-    const std::span<const Rgb> colors = radiance.tile(tile);
-    const std::span<Key> words = keys.tile(tile);
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      if (words[i] != kNoKey) words[i] = make_color_key(key_depth(words[i]), to_word(to_srgb(colors[i])));
-    }
-  }
 }
 
 }  // namespace hpr

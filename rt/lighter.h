@@ -37,8 +37,11 @@ struct RaySettings {
   double ambient = 0.2;                  ///< radiance that pass lets in where nothing is near
   bool terminator_fix = true;            ///< lifts the origins of shadow rays onto the smooth surface normals pretend
   RayBuild build = {};                   ///< of Embree's scenes
-  bool reference = false;                ///< path tracing in place of all passes, paths of max_depth segments
-  std::uint64_t seed = 1;                ///< of all randomness
+  /// Passes, by name, whose light of the first surface is worked out for one pixel in four and spread to its
+  /// neighbours where they see the like; "shadow" stands for the light of lights.
+  std::vector<std::string> half_resolution = {};
+  bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
+  std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;
 
   bool operator==(const RaySettings&) const = default;

@@ -34,6 +34,11 @@ struct PathPoint {
   std::uint32_t pixel = 0;                  ///< of the tile
   std::uint16_t depth = 0;                  ///< bounces from the eye
   Component component = Component::Direct;  ///< where its light counts
+  std::uint8_t borrows = 0;                 ///< a bit per component that comes from neighbours, see SharedLight
+
+  [[nodiscard]] bool borrows_light(Component which) const {
+    return ((borrows >> static_cast<unsigned>(which)) & 1U) != 0;
+  }
 };
 
 /// Light that would fall on a point if nothing stood between.

@@ -19,6 +19,7 @@ class PhotonPass final : public Pass {
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
     if (tile.photons == nullptr) return;
     for (const PathPoint& point : wave.points) {
+      if (point.borrows_light(Component::Photon)) continue;
       glm::dvec3 light(0.0);
       for (const PhotonMap* map : {&tile.photons->caustic, &tile.photons->global}) {
         light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff);

@@ -90,6 +90,18 @@ def resolution(folder):
           says="--aov")
 
 
+def half_resolution(folder):
+    passes = ("--passes", "shadow,reflection,refraction,ambient-occlusion,photon", "--photons", "5000")
+    whole = render(folder, *passes)
+    half = same_bits(folder, "half resolution", *passes, "--half-resolution",
+                     "shadow,reflection,refraction,ambient-occlusion,photon")
+    check(half != whole, "half resolution changes nothing")
+    usage(folder, "no pass", "render", "gen:cornell", "-o", "refused.png", "--half-resolution", "photons", says="photon")
+    for other in (("--reference",), ("--shading", "local")):
+        usage(folder, other[0], "render", "gen:cornell", "-o", "refused.png", "--half-resolution", "photon", *other,
+              says="--half-resolution")
+
+
 def wall(folder, name, *arguments):
     expected = None
     for ranks in ("1", "2", "3"):
@@ -120,6 +132,7 @@ def main():
         folder = pathlib.Path(scratch)
         resolution(folder)
         photon_radius(folder)
+        half_resolution(folder)
         plain = wall(folder, "wall")
         check(wall(folder, "wall at half", "--resolution-scale", "0.5") != plain, "a wall's scale changes nothing")
     return 1 if failures else 0
