@@ -120,6 +120,20 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   return true;
 }
 
+void FrameSampler::refine(std::span<const View> views) {
+  if (!reached(sampling_, so_far_)) {
+    const Stopwatch watch;
+    add_sample(views);
+    const double seconds = so_far_.seconds + 1e-3 * watch.ms();
+    so_far_.seconds = agree(session_.comm(), {Request::None, seconds}).seconds;
+    so_far_.samples = film_.samples();
+    if (is_milestone(so_far_.samples) && so_far_.samples > 1) {
+      so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
+    }
+  }
+  finish();
+}
+
 void FrameSampler::finish() {
   if (!homes_) {  // a checkpoint that had reached the goal: rank 0 has it all
     const std::vector<std::size_t> all = session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};

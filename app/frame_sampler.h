@@ -24,6 +24,9 @@ class FrameSampler {
   /// does, and Io.
   [[nodiscard]] bool draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress);
 
+  /// Collective. Draws one more sample unless the goal is reached; frame() is the means of those so far. Signals wait.
+  void refine(std::span<const View> views);
+
   /// After draw() returned true: the means. Valid as long as this.
   [[nodiscard]] Frame& frame() { return frame_; }
   /// Summed over the samples this run drew.

@@ -102,7 +102,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
     passes.push_back(
         {{"name", time.name}, {"ms", time.ms}, {"why", plan == stats.passes.end() ? "every frame" : plan->why}});
   }
-  const nlohmann::ordered_json json{
+  nlohmann::ordered_json json{
       {"schema", "hpr.stats/1"},
       {"ms", stats.ms},
       {"samples", stats.samples},
@@ -120,6 +120,12 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
       {"bytes_sent", stats.bytes_sent},
       {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
       {"ranks", stats.ranks}};
+  if (stats.budget) {
+    json["budget"] = {{"target_ms", stats.budget->target_ms},
+                      {"resolution_scale", stats.budget->resolution_scale},
+                      {"samples", stats.budget->samples},
+                      {"given_up", stats.budget->given_up}};
+  }
   write_file_atomically(path, json.dump(2) + "\n");
 }
 

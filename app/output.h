@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app/frame.h"
+#include "walls/manifest.h"
 
 namespace hpr {
 
@@ -51,9 +52,10 @@ void check_size(Size size, const Globals& globals);
 
 /// What a run of frames took, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {
-  double ms = 0.0;               ///< one frame, all its samples, slowest rank
-  int samples = 1;               ///< drawn by this run
-  std::optional<double> relmse;  ///< of a frame of several samples, as their halves tell it
+  double ms = 0.0;                     ///< one frame, all its samples, slowest rank
+  int samples = 1;                     ///< drawn by this run
+  std::optional<double> relmse;        ///< of a frame of several samples, as their halves tell it
+  std::optional<BudgetRecord> budget;  ///< of a frame with a target time
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank

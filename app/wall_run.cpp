@@ -1,18 +1,21 @@
 #include "app/wall_run.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <hpr/version.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <optional>
 
-#include "app/frame_sampler.h"
+#include "app/camera_path.h"
+#include "app/frame_maker.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
-#include "app/resolution.h"
 #include "app/screens.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
@@ -86,6 +89,15 @@ std::vector<std::string> hosts_of(Communicator& comm, const std::string& mine) {
   return hosts;
 }
 
+/// As the options say, until the target error where there is one.
+Sampling sampling_of(const WallRun& run) {
+  Sampling sampling = run.options.sampling();
+  if (!run.target_error) return sampling;
+  sampling.goal.relmse = run.target_error;
+  if (!run.options.spp) sampling.goal.samples.reset();
+  return sampling;
+}
+
 /// Drives one wall: what stays the same from frame to frame.
 class WallDriver {
  public:
@@ -94,11 +106,9 @@ class WallDriver {
       : run_(run),
         wall_(wall),
         session_(session),
-        screens_(wall_views(wall, run.options.choose_camera(session.scene()), session.scene().bounds)),
-        blocks_(cut_blocks(at_resolution(screens_, settings.resolution_scale))),
-        plan_(plan_frame(session, settings, blocks_.views)),
-        showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host())), run.options.exposure},
-        sampling_(run.options.sampling()) {
+        path_(run.path.empty() ? std::optional<CameraPath>() : load_camera_path(run.path)),
+        frames_(session, settings, sampling_of(run), screens_in(0), run.target_ms),
+        showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host())), run.options.exposure} {
     agree_on_failure(session_.comm(), [&] {
       if (shows_any()) display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
     });
@@ -109,27 +119,18 @@ class WallDriver {
         {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
   }
 
-  [[nodiscard]] const FramePlan& plan() const { return plan_; }
+  [[nodiscard]] const FramePlan& plan() const { return frames_.plan(); }
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
-  [[nodiscard]] const FrameTimes& times() const { return times_; }
+  [[nodiscard]] const FrameTimes& times() const { return frames_.times(); }
   [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
-  [[nodiscard]] std::optional<double> relmse() const { return relmse_; }
+  [[nodiscard]] std::optional<double> relmse() const { return frames_.relmse(); }
 
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
   void draw(std::uint64_t number, Progress& progress) {
     const Stopwatch watch;
     const std::size_t sent_before = session_.comm().bytes_sent();
-    std::optional<FrameSampler> sampler;
-    Frame whole;
-    if (sampling_.sums()) {
-      sampler.emplace(session_, plan_, sampling_, number, false);
-      (void)sampler->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
-      times_ = sampler->times();
-      relmse_ = sampler->reached_so_far().relmse;
-    } else {
-      whole = make_frame(session_, plan_, blocks_.views, &times_, {{number, 0}, nullptr});
-    }
-    pictures_ = bring_to_screens(session_, sampler ? sampler->frame() : whole, blocks_, showing_);
+    Frame& frame = frames_.make(screens_in(number), number, progress);
+    pictures_ = bring_to_screens(session_, frame, frames_.blocks(), showing_);
     last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
     agree_on_failure(session_.comm(), [&] { show(number); });
     record(number);
@@ -151,6 +152,12 @@ class WallDriver {
   }
 
  private:
+  [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame) const {
+    const Camera camera = path_ ? camera_of(path_->at_frame(frame, static_cast<std::size_t>(run_.frames)))
+                                : run_.options.choose_camera(session_.scene());
+    return wall_views(wall_, camera, session_.scene().bounds);
+  }
+
   [[nodiscard]] bool shows_any() const {
     return std::ranges::find(showing_.shown_by, session_.comm().rank()) != showing_.shown_by.end();
   }
@@ -174,7 +181,8 @@ class WallDriver {
     }
     const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
     session_.comm().reduce_max(hashes, 0);  // all but the owner's are 0
-    FrameRecord frame{number, slowest, strategy(), {}};
+    frames_.took(slowest);
+    FrameRecord frame{number, slowest, strategy(), {}, frames_.report()};
     for (std::size_t screen = 0; screen < hashes.size(); ++screen) {
       frame.screens.push_back(
           {wall_.screens[screen].id, wall_.screens[screen].pixels, hashes[screen], ScreenState::Fresh});
@@ -183,25 +191,38 @@ class WallDriver {
   }
 
   [[nodiscard]] std::string strategy() const {
-    if (plan_.mine.group.size() == 1) return std::string(name_of(plan_.distribution));
-    return std::string(session_.compositor(plan_.strategy, plan_.mine.group).chosen());
+    const FramePlan& made = plan();
+    if (made.mine.group.size() == 1) return std::string(name_of(made.distribution));
+    return std::string(session_.compositor(made.strategy, made.mine.group).chosen());
   }
 
   const WallRun& run_;
   const Wall& wall_;
   Session& session_;
-  std::vector<View> screens_;
-  Blocks blocks_;
-  FramePlan plan_;
+  std::optional<CameraPath> path_;
+  FrameMaker frames_;
   Showing showing_;
   std::unique_ptr<Display> display_;
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
   RunManifest manifest_;
-  Sampling sampling_;
-  FrameTimes times_;
-  std::optional<double> relmse_;
   FrameCost last_cost_;
 };
+
+/// How well the target time was kept.
+void report_budget(const RunManifest& manifest) {
+  std::vector<double> ms;
+  std::map<std::string, std::size_t> given_up;
+  for (const FrameRecord& frame : manifest.frames) {
+    ms.push_back(frame.ms);
+    for (const std::string& what : frame.budget->given_up) ++given_up[what];
+  }
+  std::ranges::sort(ms);
+  std::vector<std::string> words;
+  for (const auto& [what, frames] : given_up) words.push_back(fmt::format("{} in {}", what, frames));
+  log::info("{} frames: half took up to {:.1f} ms, 95 % up to {:.1f} ms, target {:.1f} ms; given up: {}", ms.size(),
+            ms[(ms.size() - 1) / 2], ms[(ms.size() - 1) * 95 / 100], manifest.frames.back().budget->target_ms,
+            words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, ", ")));
+}
 
 void print_summary(const RunStats& stats, const Wall& wall, const Scene& scene) {
   fmt::print("scene      {}: {} triangles, {} instances, {} lights\n", printable(scene.name), scene.triangles,
@@ -249,7 +270,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   prepare(session, driver.plan());
   {
     const std::string mode = speaks ? globals.progress : "none";
-    const Sampling sampling = run.options.sampling();
+    const Sampling sampling = sampling_of(run);
     Progress progress(sampling.sums() ? "none" : mode, "frame", static_cast<std::size_t>(run.frames));
     for (int frame = 0; frame < run.frames; ++frame) {
       Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}/{}: sample", frame + 1, run.frames),
@@ -260,6 +281,8 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   }
   RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
   stats.relmse = driver.relmse();
+  stats.budget = driver.manifest().frames.back().budget;
+  if (speaks && stats.budget) report_budget(driver.manifest());
   std::vector<Image<Rgba8>> pictures;
   if (run.display == "file" || !run.picture.empty()) pictures = driver.collect_pictures();
   agree_on_failure(session.comm(), [&] {
@@ -296,6 +319,14 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   }
 }
 
+/// A wrong path is found before any scene is loaded.
+void check_path(const WallRun& run) {
+  if (!run.options.camera.empty() || !run.options.eye.empty()) {
+    throw Error(ExitCode::Usage, "--path says where the camera is, as do --camera and --eye", "use one of them");
+  }
+  (void)load_camera_path(run.path);
+}
+
 }  // namespace
 
 ExitCode run_wall(const WallRun& run, const Globals& globals) {
@@ -304,6 +335,12 @@ ExitCode run_wall(const WallRun& run, const Globals& globals) {
   const FrameSettings settings = run.options.settings(globals.seed);
   if (!settings.aovs.empty()) {
     throw Error(ExitCode::Usage, "a wall has no AOVs", "use --aov with render");
+  }
+  if (!run.path.empty()) check_path(run);
+  for (const auto& target : {run.target_ms, run.target_error}) {
+    if (target && !std::isfinite(*target)) {
+      throw Error(ExitCode::Usage, "--target-ms and --target-error take finite numbers", "write e.g. --target-ms 33");
+    }
   }
   (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
@@ -334,6 +371,11 @@ class WallRunCommand final : public Command {
         ->check(CLI::Range(1e-6, 1e6))
         ->capture_default_str();
     app.add_option("--frames", run_.frames, "how many frames")->check(CLI::Range(1, 1'000'000))->capture_default_str();
+    app.add_option("--path", run_.path, "where the camera goes in these frames, see docs/cli.md")->type_name("FILE");
+    app.add_option("--target-ms", run_.target_ms, "what a frame may take; what is given up for it is in the manifest")
+        ->check(CLI::Range(1e-3, 1e9));
+    app.add_option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples")
+        ->check(CLI::Range(1e-12, 1e12));
     run_.options.declare(app);
   }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "app/command.h"
@@ -19,7 +20,10 @@ struct WallRun {
   std::string picture;  ///< the assembled wall goes here too; empty: only into the folder
   double scale = 1.0;   ///< of the screens' pixels
   int frames = 1;
-  bool summary = false;  ///< say on stdout what each pass did
+  std::string path;                    ///< of the camera; empty: it stands
+  std::optional<double> target_ms;     ///< of a frame
+  std::optional<double> target_error;  ///< estimated relMSE at which a frame has enough samples
+  bool summary = false;                ///< say on stdout what each pass did
   RenderOptions options;
 };
 

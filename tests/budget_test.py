@@ -127,12 +127,69 @@ def photon_radius(folder):
               says="--photon-radius")
 
 
+def frames_of(folder, *arguments):
+    hpr(folder, "wall", "run", "2x1@61x47", "gen:gallery", "-o", "walk", "--force", *arguments)
+    return json.loads((folder / "walk" / "manifest.json").read_text())["frames"]
+
+
+def hashes(frame):
+    return [screen["xxh64"] for screen in frame["screens"]]
+
+
+def path(folder):
+    (folder / "walk.txt").write_text("# two keys\neye -4,1.7,4 at 0,1.6,-2\n\neye 4,1.7,3 at 2,1.5,-2 fov 60\n")
+    walk = ("--path", "walk.txt", "--frames", "3")
+    expected = [hashes(frame) for frame in frames_of(folder, *walk)]
+    check(len({tuple(each) for each in expected}) == 3, "the path does not move the camera")
+    for ranks in ("2", "3"):
+        check([hashes(frame) for frame in frames_of(folder, *walk, "--ranks", ranks)] == expected,
+              f"another walk with {ranks} ranks")
+    first = frames_of(folder, "--eye", "-4,1.7,4", "--at", "0,1.6,-2")[0]
+    check(hashes(first) == expected[0], "the path does not begin at its first key")
+    refused = ("wall", "run", "1x1@16x16", "gen:cornell", "-o", "refused", "--path")
+    usage(folder, "path and camera", *refused, "walk.txt", "--camera", "0", says="--path")
+    (folder / "bad.txt").write_text("eye 0,0,1 at 0,0,0\neye 0,0 at 0,0,0\n")
+    result = hpr(folder, *refused, "bad.txt", code=3)
+    check("bad.txt:2" in result.stderr, f"the wrong key is not named: {result.stderr}")
+    hpr(folder, *refused, "missing.txt", code=4)
+
+
+def target(folder):
+    walk = ("--path", "walk.txt", "--frames", "12")
+    for ranks in ("1", "3"):
+        frames = frames_of(folder, *walk, "--ranks", ranks, "--target-ms", "0.5", "--stats", "b.json")
+        last = frames[-1]["budget"]
+        check(all(set(f["budget"]) == {"target_ms", "resolution_scale", "samples", "given_up"} for f in frames),
+              f"a frame's budget has other keys: {last}")
+        check(last["given_up"][:1] == ["half-resolution"] and last["given_up"][-1] == "resolution"
+              and last["resolution_scale"] < 1 and last["target_ms"] == 0.5, f"0.5 ms give up no more than {last}")
+        check(json.loads((folder / "b.json").read_text())["budget"] == last, "--stats tell another budget")
+    frames = frames_of(folder, *walk, "--target-ms", "1e6")
+    check(frames[-1]["budget"]["given_up"] == [], f"with all the time: {frames[-1]['budget']}")
+    check("budget" not in frames_of(folder, *walk)[0], "a budget nobody asked for")
+
+    still = frames_of(folder, "--frames", "6", "--target-ms", "0.5", "--spp", "4")
+    check([f["budget"]["samples"] for f in still[1:]] == [1, 2, 3, 4, 4], f"at rest: {[f['budget'] for f in still]}")
+    check(all(f["budget"]["given_up"] == [] and f["budget"]["resolution_scale"] == 1 for f in still[1:]),
+          "something is given up at rest")
+    check(hashes(still[4]) == hashes(still[5]) == hashes(frames_of(folder, "--frames", "2", "--spp", "4")[1]),
+          "a refined picture is another one than without a target")
+    exact = frames_of(folder, "--target-error", "0.5", "--stats", "e.json")
+    check(len(exact) == 1 and json.loads((folder / "e.json").read_text())["samples"] >= 16, "no samples for the error")
+    for option in ("--target-ms", "--target-error"):
+        for value in ("0", "-3", "nan", "inf", "soon"):
+            usage(folder, f"{option} {value}", "wall", "run", "1x1@16x16", "gen:cornell", "-o", "refused", f"{option}={value}",
+                  says=option)
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-budget-") as scratch:
         folder = pathlib.Path(scratch)
         resolution(folder)
         photon_radius(folder)
         half_resolution(folder)
+        path(folder)
+        target(folder)
         plain = wall(folder, "wall")
         check(wall(folder, "wall at half", "--resolution-scale", "0.5") != plain, "a wall's scale changes nothing")
     return 1 if failures else 0

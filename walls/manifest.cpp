@@ -36,8 +36,15 @@ std::string to_json(const RunManifest& manifest) {
                              {"xxh64", hex16(screen.xxh64)},
                              {"state", to_string(screen.state)}});
     }
-    frames.push_back(
-        Json{{"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}});
+    Json record{
+        {"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
+    if (frame.budget) {
+      record["budget"] = Json{{"target_ms", frame.budget->target_ms},
+                              {"resolution_scale", frame.budget->resolution_scale},
+                              {"samples", frame.budget->samples},
+                              {"given_up", frame.budget->given_up}};
+    }
+    frames.push_back(std::move(record));
   }
   const Json document{{"schema", "hpr.wall-run/1"},
                       {"scene_hash", hex16(manifest.scene_hash)},

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,11 +24,20 @@ struct ScreenRecord {
   ScreenState state = ScreenState::Fresh;
 };
 
+/// What a frame with a target time was made with.
+struct BudgetRecord {
+  double target_ms = 0.0;
+  double resolution_scale = 1.0;      ///< of the screens' pixels a side
+  std::uint32_t samples = 1;          ///< of the picture shown
+  std::vector<std::string> given_up;  ///< in the order in which it is
+};
+
 struct FrameRecord {
   std::uint64_t frame = 0;
   double ms = 0.0;
   std::string strategy;
   std::vector<ScreenRecord> screens;
+  std::optional<BudgetRecord> budget;
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
