@@ -39,4 +39,13 @@ RayBuild RayBuildOptions::build() const {
   return build;
 }
 
+void WireOptions::declare(CLI::App& app) {
+  app.add_option("--depth-format", depth_format, "bits of a depth where layers are composited: 32f, 24 or 16")
+      ->capture_default_str();
+}
+
+DepthFormat WireOptions::depths() const {
+  return static_cast<DepthFormat>(choose("--depth-format", depth_format, kDepthFormatNames));
+}
+
 }  // namespace hpr

@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <string>
 
+#include "image/depth_format.h"
 #include "rt/ray_build.h"
 
 namespace hpr {
@@ -15,6 +16,15 @@ struct RayBuildOptions {
   void declare(CLI::App& app);
   /// Throws Error (Usage) with the choices.
   [[nodiscard]] RayBuild build() const;
+};
+
+/// What is sent between ranks, as the command line says it.
+struct WireOptions {
+  std::string depth_format = "32f";
+
+  void declare(CLI::App& app);
+  /// Throws Error (Usage) with the choices.
+  [[nodiscard]] DepthFormat depths() const;
 };
 
 }  // namespace hpr

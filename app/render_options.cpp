@@ -84,6 +84,7 @@ void RenderOptions::declare(CLI::App& app) {
       ->capture_default_str();
   declare_light(app);
   ray_build.declare(app);
+  wire.declare(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -105,7 +106,8 @@ void RenderOptions::declare_light(CLI::App& app) {
   app.add_option("--filter", filter,
                  "how samples make up a pixel: box, triangle, gaussian, b-spline or mitchell (default: the centre for "
                  "one sample, box for more)");
-  app.add_option("--passes", passes, "auto, none, or a list of ray passes")->capture_default_str();
+  app.add_option("--passes", passes, "auto, none, or a list of ray passes")
+      ->capture_default_str();
   app.add_option("--max-depth", max_depth, "reflections and refractions in a row")->check(CLI::Range(1, 64));
   app.add_option("--environment", environment,
                  "light from all around: a latitude-longitude picture, or one radiance R,G,B; replaces the scene's own")
@@ -178,8 +180,13 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
       defaults.global_photons || std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
   settings.rays.reference = reference;
   settings.rays.build = ray_build.build();
+  settings.depth_format = wire.depths();
   settings.rays.terminator_fix = !no_terminator_fix;
   settings.aovs = parse_aovs(aov);
+  if (settings.depth_format != DepthFormat::Float32 && settings.primary != Primary::Raster) {
+    throw Error(ExitCode::Usage, "--depth-format rounds depths before OpenGL compares them; rays compare their own",
+                "use it with --primary raster");
+  }
   const bool splits = std::ranges::any_of(
       settings.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
   if (reference && (splits || settings.shading == Shading::Local)) {
