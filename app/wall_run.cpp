@@ -304,6 +304,7 @@ ExitCode run_wall(const WallRun& run, const Globals& globals) {
   if (!settings.aovs.empty()) {
     throw Error(ExitCode::Usage, "a wall has no AOVs", "use --aov with render");
   }
+  (void)run.options.wire.colors();
   (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   const EmptyFolders tidy(run.folder);

@@ -13,6 +13,8 @@ import subprocess
 import sys
 import tempfile
 
+import exr
+
 HPR = os.path.abspath(sys.argv[1])
 SCENE = "gen:gallery"
 failures = []
@@ -37,7 +39,7 @@ def render(folder, *arguments, scene=SCENE):
 
 def refusals(folder):
     for option, nearest in (("--embree-quality=hihg", "did you mean 'high'?"), ("--deterministic=yes", "choices: off, on"),
-                            ("--depth-format=25", "choices: 32f, 24, 16")):
+                            ("--depth-format=25", "choices: 32f, 24, 16"), ("--color-format=16", "choices: 32f, 16f, 8")):
         result = hpr(folder, "render", SCENE, "--explain", option)
         check(result.returncode == 2 and nearest in result.stderr, f"{option}: {result.returncode} {result.stderr}")
 
@@ -79,12 +81,34 @@ def depths(folder):
     check(result.returncode == 2 and "--primary raster" in result.stderr, f"depths of rays: {result.stderr}")
 
 
+def colors(folder):
+    sent = []
+    for name in ("32f", "16f", "8"):
+        expected, plan = render(folder, "--color-format", name)
+        check((f"colors: {name}" in plan) == (name != "32f"), f"--color-format {name}: {plan}")
+        picture, _ = render(folder, "--color-format", name, "--ranks", "3")
+        check(picture == expected, f"--color-format {name}: three ranks have other bits")
+        sent.append(json.loads((folder / "a.json").read_text())["bytes_sent"])
+        image = exr.read(folder / "a.exr")[2]
+        if name == "32f":
+            exact = image
+            continue
+        worst = 0.0
+        for channel in "RGB":
+            for value, true in zip(image[channel], exact[channel]):
+                shown = min(max(true, 0.0), 1.0) if name == "8" else true
+                worst = max(worst, abs(value - shown) / (max(abs(shown), 2 ** -14) if name == "16f" else 1.0))
+        check(0.0 < worst <= (2 ** -11 if name == "16f" else 0.005), f"--color-format {name}: off by {worst}")
+    check(sent[0] > sent[1] > sent[2], f"bytes of colours do not shrink: {sent}")
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-accuracy-") as scratch:
         folder = pathlib.Path(scratch)
         refusals(folder)
         rays(folder)
         depths(folder)
+        colors(folder)
     return 1 if failures else 0
 
 
