@@ -106,7 +106,7 @@ void RenderOptions::declare_light(CLI::App& app) {
   app.add_option("--filter", filter,
                  "how samples make up a pixel: box, triangle, gaussian, b-spline or mitchell (default: the centre for "
                  "one sample, box for more)");
-  app.add_option("--passes", passes, "auto, none, or a list of ray passes")
+  app.add_option("--passes", passes, "auto: what the scene requires; all: those it does not too; none; or a list")
       ->capture_default_str();
   app.add_option("--max-depth", max_depth, "reflections and refractions in a row")->check(CLI::Range(1, 64));
   app.add_option("--environment", environment,
@@ -168,7 +168,8 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   settings.primary = parse_primary(primary);
   settings.shading = parse_shading(shading);
   settings.rays.auto_passes = passes == "auto";
-  if (passes != "auto" && passes != "none") settings.rays.passes = split_list(passes);
+  settings.rays.all_passes = passes == "all";
+  if (passes != "auto" && passes != "none" && passes != "all") settings.rays.passes = split_list(passes);
   const Quality& defaults = find_quality(quality);
   settings.rays.seed = seed;
   settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);
