@@ -39,4 +39,19 @@ RayBuild RayBuildOptions::build() const {
   return build;
 }
 
+void WireOptions::declare(CLI::App& app) {
+  app.add_option("--depth-format", depth_format, "bits of a depth where layers are composited: 32f, 24 or 16")
+      ->capture_default_str();
+  app.add_option("--color-format", color_format, "how the colours of an .exr are sent to rank 0: 32f, 16f or 8")
+      ->capture_default_str();
+}
+
+ColorFormat WireOptions::colors() const {
+  return static_cast<ColorFormat>(choose("--color-format", color_format, kColorFormatNames));
+}
+
+DepthFormat WireOptions::depths() const {
+  return static_cast<DepthFormat>(choose("--depth-format", depth_format, kDepthFormatNames));
+}
+
 }  // namespace hpr

@@ -3,6 +3,8 @@
 #include <CLI/App.hpp>
 #include <string>
 
+#include "image/color_format.h"
+#include "image/depth_format.h"
 #include "rt/ray_build.h"
 
 namespace hpr {
@@ -15,6 +17,18 @@ struct RayBuildOptions {
   void declare(CLI::App& app);
   /// Throws Error (Usage) with the choices.
   [[nodiscard]] RayBuild build() const;
+};
+
+/// What is sent between ranks, as the command line says it.
+struct WireOptions {
+  std::string depth_format = "32f";
+  std::string color_format = "32f";
+
+  void declare(CLI::App& app);
+  /// Throws Error (Usage) with the choices.
+  [[nodiscard]] DepthFormat depths() const;
+  /// The same.
+  [[nodiscard]] ColorFormat colors() const;
 };
 
 }  // namespace hpr

@@ -118,6 +118,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   FrameTimes taken;
   Stopwatch watch;
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
+  keys.set_depth_format(plan.depth_format);
   if (plan.primary == Primary::Rays) {
     taken.primary = trace_primary(session, plan, views, keys);
   } else {

@@ -34,6 +34,7 @@ struct FrameSettings {
   int groups = 0;                            ///< of Hybrid; 0: default_groups
   std::string strategy;                      ///< empty: chosen by plan_frame
   Primary primary = Primary::Raster;
+  DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Primary::Raster only
   Shading shading = Shading::Deferred;
   RaySettings rays;
   bool photons_fit_frame = false;  ///< no more photons a sample than the frame has pixels
@@ -47,6 +48,7 @@ struct FramePlan {
   int groups = 1;
   std::string strategy;
   Primary primary = Primary::Raster;  ///< never Auto
+  DepthFormat depth_format = DepthFormat::Float32;
   Shading shading = Shading::Deferred;
   RaySettings rays;
   std::vector<Aov> aovs;

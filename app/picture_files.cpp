@@ -7,6 +7,7 @@
 #include "app/screens.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "core/parallel.h"
 #include "image/enlarge.h"
 
 namespace hpr {
@@ -14,6 +15,13 @@ namespace hpr {
 std::string PictureFiles::aov_file() const {
   if (aovs.empty()) return {};
   return is_png() ? std::filesystem::path(picture).replace_extension(".aov.exr").string() : picture;
+}
+
+std::string PictureFiles::explain_colors() const {
+  const bool half = colors == ColorFormat::Float16;
+  if (is_png() && aovs.empty()) return "colors: sent as the 8 bits a .png holds, whatever --color-format says";
+  return half ? "colors: 16f (6 bytes a pixel instead of 12 on their way to rank 0, rounded to 11 bits)"
+              : "colors: 8 (4 bytes a pixel instead of 12 on their way to rank 0, clamped to display colours)";
 }
 
 CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks& blocks, Size size, PictureFiles files)
@@ -27,7 +35,12 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
     display_ = to_display(frame, session.threads(), files_.exposure);
     collect(display_);
   }
-  if (!files_.picture.empty() && (!display_colors || !files_.aovs.empty())) collect(frame.radiance);
+  // What is shown at another size than it was made in is enlarged on rank 0 before it is rounded to display colours.
+  if (enlarged() && files_.is_png()) {
+    collect(frame.radiance);
+  } else if (!files_.picture.empty() && (!files_.is_png() || !files_.aovs.empty())) {
+    collect_radiance(session, frame);
+  }
   if (!files_.raw.empty() || std::ranges::any_of(files_.aovs, needs_keys)) collect(*frame.keys);
   for (auto& [aov, layer] : frame.aovs.rgb) collect(layer);
   for (auto& [aov, layer] : frame.aovs.single) collect(layer);
@@ -36,6 +49,45 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
 Image<Rgb> CollectedPicture::radiance() const {
   Image<Rgb> made = join_blocks(frame_.radiance, blocks_, 0);
   return enlarged() ? enlarge(made, size_, threads_) : made;
+}
+
+namespace {
+
+/// Brings `radiance` to rank 0 by way of another kind of pixel; every rank's tiles go through it, rank 0's too.
+template <typename Sent, typename Encode, typename Decode>
+void collect_as(Session& session, TileLayer<Rgb>& radiance, std::span<const std::size_t> owned,
+                std::span<const int> shown_by, const Encode& encode, const Decode& decode) {
+  TileLayer<Sent> sent(radiance.layout());
+  parallel_for(session.threads(), owned.size(), [&](std::size_t i) {
+    std::ranges::transform(std::as_const(radiance).tile(owned[i]), sent.tile(owned[i]).begin(), encode);
+    sent.set_active(owned[i]);
+  });
+  session.assembler().assemble(session.comm(), sent, owned, shown_by);
+  if (session.rank() != 0) return;
+  parallel_for(session.threads(), sent.tiles(), [&](std::size_t tile) {
+    if (!sent.active(tile)) return;
+    std::ranges::transform(std::as_const(sent).tile(tile), radiance.tile(tile).begin(), decode);
+    radiance.set_active(tile);
+  });
+}
+
+}  // namespace
+
+void CollectedPicture::collect_radiance(Session& session, Frame& frame) const {
+  const std::vector<int> to_root(blocks_.views.size(), 0);
+  const auto half = [](Rgb color) { return to_half(color); };
+  const auto whole = [](RgbHalf color) { return from_half(color); };
+  switch (files_.colors) {
+    case ColorFormat::Float32:
+      session.assembler().assemble(session.comm(), frame.radiance, frame.owned, to_root);
+      break;
+    case ColorFormat::Float16:
+      collect_as<RgbHalf>(session, frame.radiance, frame.owned, to_root, half, whole);
+      break;
+    case ColorFormat::Srgb8:
+      collect_as<Rgba8>(session, frame.radiance, frame.owned, to_root, to_srgb, from_srgb);
+      break;
+  }
 }
 
 std::vector<ExrLayer> CollectedPicture::exr_layers() const {

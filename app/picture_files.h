@@ -5,6 +5,7 @@
 
 #include "app/frame.h"
 #include "app/output.h"
+#include "image/color_format.h"
 
 namespace hpr {
 
@@ -14,10 +15,13 @@ struct PictureFiles {
   std::string raw;        ///< keys
   double exposure = 0.0;  ///< stops, of a .png
   std::vector<Aov> aovs;
+  ColorFormat colors = ColorFormat::Float32;  ///< on their way to an .exr
 
   [[nodiscard]] bool is_png() const { return picture.ends_with(".png"); }
   /// Where AOVs go: into the .exr, or FILE.aov.exr beside a .png. Empty when there are none.
   [[nodiscard]] std::string aov_file() const;
+  /// For --explain.
+  [[nodiscard]] std::string explain_colors() const;
 };
 
 /// A frame of one screen on its way to its files.
@@ -29,10 +33,12 @@ class CollectedPicture {
 
   /// On rank 0. Throws Error (Io).
   void write(const std::string& scene_name) const;
+  /// On rank 0, for an .exr: what it will hold.
+  [[nodiscard]] Image<Rgb> radiance() const;
 
  private:
   [[nodiscard]] std::vector<ExrLayer> exr_layers() const;
-  [[nodiscard]] Image<Rgb> radiance() const;
+  void collect_radiance(Session& session, Frame& frame) const;
   [[nodiscard]] bool enlarged() const { return blocks_.views.front().screen != size_; }
 
   const Frame& frame_;

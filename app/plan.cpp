@@ -42,6 +42,19 @@ std::vector<std::size_t> tiles_in(const FrameLayout& layout, const std::vector<S
   return tiles;
 }
 
+std::string explain_depth(const FramePlan& plan) {
+  const char* why = "keys of {} bytes instead of 8 where they are sent, drawn so by OpenGL";
+  if (plan.mine.group.size() == 1) {
+    why = "as asked; gains nothing, as nothing is composited";
+  } else if (plan.strategy == "mpi-reduce") {
+    why = "as asked; gains nothing, as MPI's reduction moves whole keys";
+  } else if (plan.strategy == "shared-memory" || plan.strategy == "auto") {
+    why = "keys of {} bytes instead of 8 between hosts; gains nothing inside one, where they are merged in place";
+  }
+  return fmt::format("depth: {} bits ({})", kDepthFormatNames.at(static_cast<std::size_t>(plan.depth_format)),
+                     fmt::format(fmt::runtime(why), sent_bytes(plan.depth_format)));
+}
+
 std::string explain(const RayBuild& build) {
   return fmt::format("embree: {} build quality, {}", kBuildQualityNames.at(static_cast<std::size_t>(build.quality)),
                      build.same_instructions
@@ -71,6 +84,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.groups = std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
   plan.primary = settings.primary;
+  plan.depth_format = settings.depth_format;
   plan.shading = settings.shading;
   plan.rays = settings.rays;
   if (settings.photons_fit_frame) plan.rays.photons = photons_for(plan.rays.photons, views);
@@ -92,6 +106,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   lines.push_back(plan.mine.group.size() > 1
                       ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
                       : fmt::format("composite: off (one rank covers each tile)"));
+  if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
   const char* const asked = plan.primary == Primary::Raster ? "unless asked for rays or a choice" : "as asked";
   const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
   lines.push_back(fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));

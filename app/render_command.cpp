@@ -52,6 +52,7 @@ class RenderCommand final : public Command {
     const Sampling sampling = options_.sampling();
     files_.aovs = settings.aovs;
     files_.exposure = options_.exposure;
+    files_.colors = options_.wire.colors();
     if (checkpoint_.empty() && !files_.picture.empty()) checkpoint_ = files_.picture + ".checkpoint";
     if (!sampling.sums()) checkpoint_.clear();
     if (!inside_mpi_job()) check_outputs(globals);
@@ -110,6 +111,7 @@ class RenderCommand final : public Command {
     const bool speaks = session.comm().rank() == 0;
     if (options_.explain && speaks) {
       for (const std::string& line : plan.explained) fmt::print("{}\n", line);
+      if (files_.colors != ColorFormat::Float32) fmt::print("{}\n", files_.explain_colors());
     }
     if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty()) return ExitCode::Done;
 

@@ -97,6 +97,7 @@ void RenderOptions::declare_frame(CLI::App& app) {
   declare_light(app);
   declare_economies(app);
   ray_build.declare(app);
+  wire.declare(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::PositiveNumber);
@@ -116,7 +117,8 @@ void RenderOptions::declare_light(CLI::App& app) {
   app.add_option("--filter", filter,
                  "how samples make up a pixel: box, triangle, gaussian, b-spline or mitchell (default: the centre for "
                  "one sample, box for more)");
-  app.add_option("--passes", passes, "auto, none, or a list of ray passes")->capture_default_str();
+  app.add_option("--passes", passes, "auto: what the scene requires; all: those it does not too; none; or a list")
+      ->capture_default_str();
   app.add_option("--max-depth", max_depth, "reflections and refractions in a row")->check(CLI::Range(1, 64));
   app.add_option("--environment", environment,
                  "light from all around: a latitude-longitude picture, or one radiance R,G,B; replaces the scene's own")
@@ -208,7 +210,8 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   settings.primary = parse_primary(primary);
   settings.shading = parse_shading(shading);
   settings.rays.auto_passes = passes == "auto";
-  if (passes != "auto" && passes != "none") settings.rays.passes = split_list(passes);
+  settings.rays.all_passes = passes == "all";
+  if (passes != "auto" && passes != "none" && passes != "all") settings.rays.passes = split_list(passes);
   const Quality& defaults = find_quality(quality);
   settings.rays.seed = seed;
   settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);
@@ -224,8 +227,13 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   }
   settings.rays.reference = reference;
   settings.rays.build = ray_build.build();
+  settings.depth_format = wire.depths();
   settings.rays.terminator_fix = !no_terminator_fix;
   settings.aovs = parse_aovs(aov);
+  if (settings.depth_format != DepthFormat::Float32 && settings.primary != Primary::Raster) {
+    throw Error(ExitCode::Usage, "--depth-format rounds depths before OpenGL compares them; rays compare their own",
+                "use it with --primary raster");
+  }
   const bool splits = std::ranges::any_of(
       settings.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
   if (reference && (splits || settings.shading == Shading::Local)) {

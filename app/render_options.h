@@ -42,6 +42,7 @@ struct RenderOptions {
   std::string strategy = "auto";
   std::string shading = "deferred";
   RayBuildOptions ray_build;
+  WireOptions wire;
   bool explain = false;
   std::string stats;
   double exposure = 0.0;  ///< stops, of display colours only

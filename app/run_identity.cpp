@@ -50,6 +50,7 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   }
   identity.emplace_back("list of passes", fmt::format("'{}'", fmt::join(passes, ",")));
   identity.emplace_back("keys", plan.primary == Primary::Rays ? "by rays" : "by raster");
+  identity.emplace_back("depth format", std::string(kDepthFormatNames.at(static_cast<std::size_t>(plan.depth_format))));
   identity.emplace_back("light", rays.reference ? "the reference" : "passes");
   identity.emplace_back("instructions of rays", rays.build.same_instructions ? "the same everywhere" : "the widest");
   identity.emplace_back("depth", fmt::format("{}", rays.max_depth));

@@ -9,6 +9,7 @@
 #include "app/diff.h"
 #include "app/frame_sampler.h"
 #include "app/output.h"
+#include "app/picture_files.h"
 #include "app/resolution.h"
 #include "app/run_identity.h"
 #include "cluster/collectives.h"
@@ -18,7 +19,6 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
-#include "image/enlarge.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/ssim.h"
@@ -37,6 +37,7 @@ struct Setup {
   Blocks blocks;
   FramePlan plan;
   Sampling sampling;
+  ColorFormat colors = ColorFormat::Float32;
 };
 
 Setup set_up(Session& session, const RenderOptions& options, Size size, std::uint64_t seed) {
@@ -46,16 +47,17 @@ Setup set_up(Session& session, const RenderOptions& options, Size size, std::uin
   setup.blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.resolution_scale));
   setup.plan = plan_frame(session, settings, setup.blocks.views);
   setup.sampling = options.sampling();
+  setup.colors = options.wire.colors();
   return setup;
 }
 
-/// Collective. The radiance of a frame of one screen of `size` pixels, on rank 0.
-Image<Rgb> collect(Session& session, Frame& frame, const Blocks& blocks, Size size) {
-  const std::vector<int> to_root(blocks.views.size(), 0);
-  session.assembler().assemble(session.comm(), frame.radiance, frame.owned, to_root);
-  if (session.rank() != 0) return {};
-  Image<Rgb> made = join_blocks(frame.radiance, blocks, 0);
-  return made.size() == size ? made : enlarge(made, size, session.threads());
+/// Collective. The radiance of a frame of one screen as an .exr would hold it, on rank 0.
+Image<Rgb> collect(Session& session, Frame& frame, const Blocks& blocks, Size size, ColorFormat colors) {
+  PictureFiles files;
+  files.picture = "radiance.exr";
+  files.colors = colors;
+  const CollectedPicture picture(session, frame, blocks, size, files);
+  return session.rank() == 0 ? picture.radiance() : Image<Rgb>();
 }
 
 bool caught_by_photons_alone(const Session& session) {
@@ -182,6 +184,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   best.photon_radius = 0.0;
   best.resolution_scale = 1.0;
   best.half_resolution.clear();
+  best.wire = {};
   best.indirect.reset();
   best.reference = !passes;
   const Setup setup = set_up(session, best, how.size, globals.seed ^ kOtherSeed);
@@ -211,7 +214,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
     if (!draw(kept, *sampler)) return std::nullopt;
   }
   const SampleProgress reached = sampler->reached_so_far();
-  reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size);
+  reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size, ColorFormat::Float32);
   reference.about = {.how = passes ? "passes at best" : "path tracing",
                      .spp = reached.samples,
                      .relmse = reached.relmse.value_or(std::numeric_limits<double>::quiet_NaN()),
@@ -279,7 +282,7 @@ TradeoffPoint measure_point(Session& session, const RenderOptions& options, cons
     } else {
       whole = make_frame(session, setup.plan, setup.blocks.views, &times);
     }
-    picture = collect(session, sampler ? sampler->frame() : whole, setup.blocks, how.size);
+    picture = collect(session, sampler ? sampler->frame() : whole, setup.blocks, how.size, setup.colors);
     const RunStats stats =
         gather_stats(session, setup.plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
     spent += stats.ms;

@@ -342,6 +342,7 @@ ExitCode run_wall(const WallRun& run, const Globals& globals) {
       throw Error(ExitCode::Usage, "--target-ms and --target-error take finite numbers", "write e.g. --target-ms 33");
     }
   }
+  (void)run.options.wire.colors();
   (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   const EmptyFolders tidy(run.folder);

@@ -224,6 +224,7 @@ Composited SharedMemorySchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>
     if (copy_.peers() == nullptr || copy_.layout() != layer.layout()) {
       copy_ = TileLayer<Pixel>(layer.layout(), comm.share(TileLayer<Pixel>::bytes_for(layer.layout())));
     }
+    copy_.set_depth_format(layer.depth_format());
     copy_tiles(layer, copy_, tiles);
   }
   TileLayer<Pixel>& shared = in_place ? layer : copy_;

@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "compositing/merge.h"
+#include "compositing/narrow_keys.h"
 #include "compositing/sparse.h"
 #include "core/check.h"
 #include "core/error.h"
@@ -39,7 +40,7 @@ bool looks_full(std::span<const Pixel, kTilePixels> tile) {
 /// Masks and pixels of packed tiles, one after the other, merged where they lie.
 class PackedTiles {
  public:
-  explicit PackedTiles(std::span<const std::byte> bytes) : next_(bytes.data()) {
+  PackedTiles(std::span<const std::byte> bytes, DepthFormat depths) : next_(bytes.data()), depths_(depths) {
     HPR_CHECK(reinterpret_cast<std::uintptr_t>(next_) % alignof(Key) == 0);
   }
 
@@ -47,12 +48,21 @@ class PackedTiles {
     if (drawn == 0) return;
     TileMask mask;
     std::memcpy(mask.data(), next_, sizeof mask);
-    merge_packed(tile.first<kTilePixels>(), mask, {reinterpret_cast<const Key*>(next_ + sizeof mask), drawn});
-    next_ += packed_bytes(drawn, sizeof(Key));
+    const std::byte* const packed = next_ + sizeof mask;
+    if (depths_ == DepthFormat::Float32) {
+      merge_packed(tile.first<kTilePixels>(), mask, {reinterpret_cast<const Key*>(packed), drawn});
+    } else {
+      wide_.resize(drawn);
+      widen_keys(packed, depths_, wide_);
+      merge_packed(tile.first<kTilePixels>(), mask, wide_);
+    }
+    next_ += packed_bytes(drawn, sent_bytes(depths_));
   }
 
  private:
   const std::byte* next_;
+  DepthFormat depths_;
+  std::vector<Key> wide_;
 };
 
 /// Every mask marks as many pixels as its tile announced.
@@ -93,9 +103,9 @@ void TileMessage::start(std::span<const std::byte> prefix) {
   head_.append(prefix);
 }
 
-void TileMessage::add_head(std::span<const std::uint16_t> drawn) {
+void TileMessage::add_head(std::span<const std::uint16_t> drawn, DepthFormat depths) {
   std::vector<Word> head(1 + words_for(drawn.size()));
-  head[0] = kTileFormat;
+  head[0] = kTileFormat | Word{static_cast<std::uint8_t>(depths)} << 32U;
   std::vector<std::uint16_t> counts;
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     if (drawn[i] == TileHead::kInactive) continue;
@@ -122,12 +132,15 @@ void TileMessage::add_packed(const TileLayer<Pixel>& layer, std::span<const std:
     drawn[i] = static_cast<std::uint16_t>(pixels);
     if (pixels > 0) masks.push_back(mask);
   }
-  add_head(drawn);
-  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMostPackedPixels * sizeof(Pixel)) +
+  constexpr bool kHasDepth = std::is_same_v<Pixel, Key>;
+  const DepthFormat depths = kHasDepth ? layer.depth_format() : DepthFormat::Float32;
+  const std::size_t pixel_bytes = depths == DepthFormat::Float32 ? sizeof(Pixel) : sent_bytes(depths);
+  add_head(drawn, depths);
+  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMostPackedPixels * pixel_bytes) +
                 kTilePixels * sizeof(Pixel));
   auto mask = masks.begin();
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const std::size_t bytes = packed_bytes(drawn[i], sizeof(Pixel));
+    const std::size_t bytes = packed_bytes(drawn[i], pixel_bytes);
     if (bytes == 0) continue;
     const std::size_t at = head_.size();
     std::byte* const room = head_.extend(sizeof *mask + kTilePixels * sizeof(Pixel)).data();
@@ -135,10 +148,30 @@ void TileMessage::add_packed(const TileLayer<Pixel>& layer, std::span<const std:
     auto* const packed = reinterpret_cast<Pixel*>(room + sizeof *mask);
     const std::size_t pixels = pack_drawn(layer.tile(tiles[i]).template first<kTilePixels>(), *mask, packed);
     HPR_CHECK(pixels == drawn[i]);
+    if constexpr (kHasDepth) {
+      // In place: a key is read before what is written reaches it.
+      if (depths != DepthFormat::Float32) narrow_keys({packed, pixels}, depths, room + sizeof *mask);
+    }
     head_.shrink(at + bytes);
     ++mask;
   }
+  if constexpr (kHasDepth) {
+    if (depths != DepthFormat::Float32) return add_narrow_bodies(layer, tiles, drawn);
+  }
   add_bodies(layer, tiles, drawn);
+}
+
+void TileMessage::add_narrow_bodies(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                    std::span<const std::uint16_t> drawn) {
+  const std::size_t tile_bytes = kTilePixels * sent_bytes(layer.depth_format());
+  narrow_.clear();
+  narrow_.reserve(static_cast<std::size_t>(std::ranges::count(drawn, kWholeTile)) * tile_bytes);  // so it stays put
+  for (const Body body : bodies_of(drawn, tiles)) {
+    const std::size_t count = body.end - body.first;
+    const std::span<std::byte> room = narrow_.extend(count * tile_bytes);
+    narrow_keys(layer.run({tiles[body.first], count}), layer.depth_format(), room.data());
+    bodies_.push_back(room);
+  }
 }
 
 template void TileMessage::add_packed(const TileLayer<Key>&, std::span<const std::size_t>);
@@ -153,12 +186,17 @@ TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool 
         fmt::format("{} bytes cannot hold the head of {} tiles, which takes {}", message.size(), tiles, head_bytes));
   }
   std::memcpy(head.data(), message.data(), head_bytes);
-  if (head[0] != kTileFormat) malformed(fmt::format("unknown format {}", head[0]));
+  const Word depths = head[0] >> 32U;
+  if ((head[0] & 0xFFFFFFFFU) != kTileFormat) malformed(fmt::format("unknown format {}", head[0]));
+  if (depths >= kDepthFormatNames.size() || (depths > 0 && !(packs && pixel_bytes == sizeof(Key)))) {
+    malformed(fmt::format("pixels of these do not have depths of format {}", depths));
+  }
   if (tiles % kWordBits != 0 && head.back() >> (tiles % kWordBits) != 0) {
     malformed(fmt::format("a tile past the {} of the list is said to be active", tiles));
   }
 
-  TileHead parsed{std::vector<std::uint16_t>(tiles, TileHead::kInactive), {}};
+  TileHead parsed{std::vector<std::uint16_t>(tiles, TileHead::kInactive), {}, static_cast<DepthFormat>(depths)};
+  if (depths > 0) pixel_bytes = sent_bytes(parsed.depths);
   std::size_t active = 0;
   for (std::size_t i = 0; i < words_for(tiles); ++i) active += static_cast<std::size_t>(std::popcount(head[1 + i]));
   if (message.size() < head_bytes + count_bytes(active)) malformed("no counts of pixels");
@@ -184,8 +222,12 @@ TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool 
 
 void TileReader::merge(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
                        std::span<const std::size_t> tiles) {
-  const TileHead head = parse_head(message, tiles.size(), true);
-  PackedTiles packed(head.packed);
+  comm.worked(merge_tiles(comm, from, parse_head(message, tiles.size(), true), layer, tiles));
+}
+
+std::size_t TileReader::merge_tiles(Communicator& comm, int from, const TileHead& head, TileLayer<Key>& layer,
+                                    std::span<const std::size_t> tiles) {
+  PackedTiles packed(head.packed, head.depths);
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (head.drawn[i] == TileHead::kInactive || head.whole(i)) continue;
@@ -193,28 +235,43 @@ void TileReader::merge(Communicator& comm, int from, std::span<const std::byte> 
     layer.set_active(tiles[i]);
     bytes += kTilePixels * sizeof(Key);  // it goes through all of the tile
   }
+  const bool narrow = head.depths != DepthFormat::Float32;
   for (const Body body : bodies_of(head.drawn, tiles)) {
     const auto part = tiles.subspan(body.first, body.end - body.first);
     const std::span<Key> into = layer.run({part.front(), part.size()});
-    if (std::ranges::none_of(part, [&](std::size_t tile) { return layer.active(tile); })) {
+    const bool fresh = std::ranges::none_of(part, [&](std::size_t tile) { return layer.active(tile); });
+    if (fresh && !narrow) {
       comm.receive(std::as_writable_bytes(into), from);
     } else {
       body_.clear();
-      const std::span<std::byte> arrived = body_.extend(into.size_bytes());
+      const std::span<std::byte> arrived = body_.extend(into.size() * sent_bytes(head.depths));
       comm.receive(arrived, from);
-      merge_keys(into, {reinterpret_cast<const Key*>(arrived.data()), into.size()});
+      if (fresh) {
+        widen_keys(arrived.data(), head.depths, into);
+      } else if (narrow) {
+        wide_.resize(into.size());
+        widen_keys(arrived.data(), head.depths, wide_);
+        merge_keys(into, wide_);
+      } else {
+        merge_keys(into, {reinterpret_cast<const Key*>(arrived.data()), into.size()});
+      }
     }
     for (const std::size_t tile : part) layer.set_active(tile);
     bytes += into.size_bytes();
   }
-  comm.worked(bytes);
+  return bytes;
 }
 
 void TileReader::replace(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
                          std::span<const std::size_t> tiles) {
   const TileHead head = parse_head(message, tiles.size(), true);
+  if (head.depths != DepthFormat::Float32) {
+    for (const std::size_t tile : tiles) layer.clear(tile);
+    (void)merge_tiles(comm, from, head, layer, tiles);
+    return;
+  }
   receive_whole(comm, from, head, layer, tiles);
-  PackedTiles packed(head.packed);
+  PackedTiles packed(head.packed, head.depths);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (head.drawn[i] == TileHead::kInactive || head.whole(i)) continue;
     packed.merge_next(layer.tile(tiles[i]), head.drawn[i]);

@@ -17,7 +17,7 @@
 /// what follows and carries the tiles that are only partly drawn; whole tiles follow it as bodies, which leave from the
 /// layer they lie in and arrive, where they can, in the one they go to.
 ///
-///   8 bytes            kTileFormat
+///   8 bytes            kTileFormat, and above 32 bits the format of depths
 ///   8 ceil(n / 64)     one bit per tile of the list, the lowest first: is it active? The bits past the last are 0
 ///   2 bytes each       per active tile how many of its pixels follow, or kWholeTile; zeros up to a multiple of 8
 ///   then per active tile that is not whole, in order of the list, unless it has no pixels:
@@ -25,7 +25,8 @@
 ///     8 bytes each     the drawn pixels, one after the other (keys; others take their size), up to a multiple of 8
 ///     bytes
 ///
-///   bodies             the whole tiles, in order of the list; tiles that are neighbours in the frame share one body,
+///   bodies             the whole tiles, keys of fewer than 32 bits of depth as narrow_keys.h has them, in order of the
+///   list; tiles that are neighbours in the frame share one body,
 ///                      up to kTilesOfABody of them
 ///
 /// The list of tiles itself does not travel: sender and receiver both know it. Scattered pixels cost 8 bytes and a bit
@@ -33,7 +34,7 @@
 /// faster.
 namespace hpr {
 
-inline constexpr std::uint64_t kTileFormat = 3;
+inline constexpr std::uint64_t kTileFormat = 4;
 inline constexpr std::uint16_t kWholeTile = 0xFFFF;
 /// Of 4096 pixels. At 3/4 the packed tile takes 77 % of the whole one's bytes.
 inline constexpr std::size_t kMostPackedPixels = kTilePixels * 3 / 4;
@@ -61,6 +62,7 @@ struct TileHead {
 
   std::vector<std::uint16_t> drawn;   ///< per tile of the list: kInactive, kWholeTile or how many pixels are packed
   std::span<const std::byte> packed;  ///< masks and pixels of packed tiles, one after the other
+  DepthFormat depths = DepthFormat::Float32;
 
   [[nodiscard]] bool whole(std::size_t position) const { return drawn[position] == kWholeTile; }
 };
@@ -90,7 +92,7 @@ class TileMessage {
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (layer.active(tiles[i])) drawn[i] = kWholeTile;
     }
-    add_head(drawn);
+    add_head(drawn, DepthFormat::Float32);
     add_bodies(layer, tiles, drawn);
   }
 
@@ -109,7 +111,9 @@ class TileMessage {
  private:
   template <typename Pixel>
   void add_packed(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles);
-  void add_head(std::span<const std::uint16_t> drawn);
+  void add_head(std::span<const std::uint16_t> drawn, DepthFormat depths);
+  void add_narrow_bodies(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                         std::span<const std::uint16_t> drawn);
   template <typename Pixel>
   void add_bodies(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
                   std::span<const std::uint16_t> drawn) {
@@ -119,6 +123,7 @@ class TileMessage {
 
   ByteBuffer head_;
   std::vector<std::span<const std::byte>> bodies_;
+  ByteBuffer narrow_;  ///< the bodies where they do not leave from the layer
 };
 
 /// Checks the format, the bits, the counts and the length of a message for a list of `tiles` tiles. `packs`: whether
@@ -168,7 +173,12 @@ class TileReader {
     }
   }
 
+  /// Merges packed tiles and bodies of keys into a layer; returns the bytes it went through.
+  std::size_t merge_tiles(Communicator& comm, int from, const TileHead& head, TileLayer<Key>& layer,
+                          std::span<const std::size_t> tiles);
+
   ByteBuffer body_;
+  std::vector<Key> wide_;
 };
 
 }  // namespace hpr

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/check.h"
+#include "image/depth_format.h"
 #include "image/image.h"
 
 namespace hpr {
@@ -109,6 +110,7 @@ class TileLayer {
     TileLayer peer;
     peer.layout_ = layout_;
     peer.peers_ = peers_;
+    peer.depth_format_ = depth_format_;
     peer.place(peers_->of(rank).data());
     return peer;
   }
@@ -120,6 +122,10 @@ class TileLayer {
   [[nodiscard]] const FrameLayout& layout() const { return layout_; }
   /// Whose memory it lives in; null where that is its own.
   [[nodiscard]] PeerMemory* peers() const { return peers_.get(); }
+  /// What depths of its keys look like: whoever draws into it quantizes them so, and messages leave out what that makes
+  /// 0. The same on all ranks. Other pixels have no depth.
+  [[nodiscard]] DepthFormat depth_format() const { return depth_format_; }
+  void set_depth_format(DepthFormat format) { depth_format_ = format; }
   [[nodiscard]] std::size_t tiles() const { return layout_.tiles(); }
   [[nodiscard]] bool active(std::size_t tile) const { return active_[tile] != 0; }
   void set_active(std::size_t tile) { active_[tile] = 1; }
@@ -187,6 +193,7 @@ class TileLayer {
   std::shared_ptr<PeerMemory> peers_;  ///< shared
   std::uint8_t* active_ = nullptr;
   Pixel* pixels_ = nullptr;
+  DepthFormat depth_format_ = DepthFormat::Float32;
 };
 
 /// Every tile of a frame.

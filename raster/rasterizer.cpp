@@ -1,5 +1,7 @@
 #include "raster/rasterizer.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstddef>
 #include <string_view>
@@ -35,6 +37,25 @@ layout(location = 0) out uint word;
 void main() { word = ~surface; }
 )";
 
+// The same with depths rounded as quantized_depth does: LOST_BITS is set before it.
+constexpr std::string_view kQuantizingFragmentShader = R"(
+flat in uint surface;
+layout(location = 0) out uint word;
+void main() {
+  word = ~surface;
+  const uint half_step = (1u << LOST_BITS) >> 1;
+  gl_FragDepth = uintBitsToFloat((floatBitsToUint(gl_FragCoord.z) + half_step) >> LOST_BITS << LOST_BITS);
+}
+)";
+
+/// Which shader draws depths of a format.
+GlObject make_program_for(GlContext& context, DepthFormat format) {
+  if (format == DepthFormat::Float32) return make_program(context, kVertexShader, kFragmentShader);
+  return make_program(
+      context, kVertexShader,
+      fmt::format("#version 450 core\n#define LOST_BITS {}{}", lost_bits(format), kQuantizingFragmentShader));
+}
+
 constexpr GLuint kVertices = 0;  // vertex buffer bindings
 constexpr GLuint kRecords = 1;
 
@@ -54,7 +75,7 @@ class Rasterizer::Implementation {
         threads_(threads),
         culling_(culling),
         geometry_(collect_geometry(scene, objects)),
-        program_(make_program(context, kVertexShader, kFragmentShader)),
+        program_(make_program_for(context, format_)),
         vertices_(make_buffer(context)),
         indices_(make_buffer(context)),
         records_(make_buffer(context)),
@@ -78,6 +99,10 @@ class Rasterizer::Implementation {
     HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
     stats_ = {};
     context_.make_current();
+    if (layer.depth_format() != format_) {
+      format_ = layer.depth_format();
+      program_ = make_program_for(context_, format_);
+    }
     for (const Rect& wanted : parts) {
       const Rect part = intersection(wanted, {0, 0, size.width, size.height});
       if (!part.empty()) draw_part(view, screen, part, layer);
@@ -165,6 +190,7 @@ class Rasterizer::Implementation {
   int threads_;
   Culling culling_;
   Geometry geometry_;
+  DepthFormat format_ = DepthFormat::Float32;
   GlObject program_;
   GlObject vertices_;
   GlObject indices_;

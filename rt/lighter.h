@@ -27,6 +27,7 @@ class RayScene;
 struct RaySettings {
   std::vector<std::string> passes = {};  ///< by name; empty: as `auto_passes` says
   bool auto_passes = true;               ///< with no names: what the scene requires; false: none
+  bool all_passes = false;               ///< all that run by default, also where the scene does not require them
   int max_depth = 8;                     ///< reflections and refractions in a row
   int light_samples = 1;                 ///< rays per point and sample towards emitting surfaces and the environment
   double glossy_cutoff = 0.3;            ///< specular lobes of at least this roughness are not followed by rays

@@ -41,6 +41,10 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
       plan.push_back({name, false, "the reference traces whole paths instead"});
       continue;
     }
+    if (settings.all_passes && pass->runs_by_default(settings)) {
+      plan.push_back({name, true, requirement.needed ? requirement.why : "as asked, although " + requirement.why});
+      continue;
+    }
     plan.push_back(
         {name, wanted && requirement.needed, wanted ? requirement.why : "not asked for: " + requirement.why});
   }

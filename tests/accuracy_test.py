@@ -6,11 +6,14 @@ usage: accuracy_test.py HPR
 Prints what differs and leaves with 1.
 """
 
+import json
 import os
 import pathlib
 import subprocess
 import sys
 import tempfile
+
+import exr
 
 HPR = os.path.abspath(sys.argv[1])
 SCENE = "gen:gallery"
@@ -35,7 +38,8 @@ def render(folder, *arguments, scene=SCENE):
 
 
 def refusals(folder):
-    for option, nearest in (("--embree-quality=hihg", "did you mean 'high'?"), ("--deterministic=yes", "choices: off, on")):
+    for option, nearest in (("--embree-quality=hihg", "did you mean 'high'?"), ("--deterministic=yes", "choices: off, on"),
+                            ("--depth-format=25", "choices: 32f, 24, 16"), ("--color-format=16", "choices: 32f, 16f, 8")):
         result = hpr(folder, "render", SCENE, "--explain", option)
         check(result.returncode == 2 and nearest in result.stderr, f"{option}: {result.returncode} {result.stderr}")
 
@@ -53,11 +57,58 @@ def rays(folder):
     check(free == again, "ranks of one host differ with --deterministic off")
 
 
+def depths(folder):
+    """Each format has bits of its own, and every way to spread the work has those."""
+    ways = (("--ranks", "4", "--distribute", "sort-last", "--strategy", "radix-k"),
+            ("--ranks", "4", "--distribute", "sort-last", "--strategy", "shared-memory"),
+            ("--ranks", "3", "--distribute", "hybrid", "--strategy", "tree"),
+            ("--ranks", "2", "--distribute", "sort-last", "--strategy", "mpi-reduce"))
+    seen, sent = set(), []
+    for bits in ("32f", "24", "16"):
+        expected, plan = render(folder, "--depth-format", bits, "--raw", "a.keys")
+        keys = (folder / "a.keys").read_bytes()
+        check(("gains nothing" in plan) == (bits != "32f"), f"{bits} on one rank: {plan}")
+        for way in ways:
+            picture, plan = render(folder, "--depth-format", bits, "--raw", "a.keys", *way)
+            check((folder / "a.keys").read_bytes() == keys, f"--depth-format {bits} {' '.join(way)}: other keys")
+            check(picture == expected, f"--depth-format {bits} {' '.join(way)}: another picture")
+            if "radix-k" in way:
+                sent.append(json.loads((folder / "a.json").read_text())["bytes_sent"])
+        seen.add(keys)
+    check(len(seen) == 3, "formats have the same keys")
+    check(sent[0] > sent[1] > sent[2], f"bytes sent do not shrink: {sent}")
+    result = hpr(folder, "render", SCENE, "--explain", "--depth-format", "24", "--primary", "rays")
+    check(result.returncode == 2 and "--primary raster" in result.stderr, f"depths of rays: {result.stderr}")
+
+
+def colors(folder):
+    sent = []
+    for name in ("32f", "16f", "8"):
+        expected, plan = render(folder, "--color-format", name)
+        check((f"colors: {name}" in plan) == (name != "32f"), f"--color-format {name}: {plan}")
+        picture, _ = render(folder, "--color-format", name, "--ranks", "3")
+        check(picture == expected, f"--color-format {name}: three ranks have other bits")
+        sent.append(json.loads((folder / "a.json").read_text())["bytes_sent"])
+        image = exr.read(folder / "a.exr")[2]
+        if name == "32f":
+            exact = image
+            continue
+        worst = 0.0
+        for channel in "RGB":
+            for value, true in zip(image[channel], exact[channel]):
+                shown = min(max(true, 0.0), 1.0) if name == "8" else true
+                worst = max(worst, abs(value - shown) / (max(abs(shown), 2 ** -14) if name == "16f" else 1.0))
+        check(0.0 < worst <= (2 ** -11 if name == "16f" else 0.005), f"--color-format {name}: off by {worst}")
+    check(sent[0] > sent[1] > sent[2], f"bytes of colours do not shrink: {sent}")
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-accuracy-") as scratch:
         folder = pathlib.Path(scratch)
         refusals(folder)
         rays(folder)
+        depths(folder)
+        colors(folder)
     return 1 if failures else 0
 
 
