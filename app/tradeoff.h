@@ -110,7 +110,7 @@ struct TradeoffReference {
   std::string how;        ///< "path tracing", "passes at best", or a file's name
   std::uint64_t spp = 0;  ///< 0: unknown
   double relmse = 0.0;    ///< what is left of its own noise, estimated; NaN: unknown
-  double mean = 0.0;    ///< of its values: what signed means of errors are shares of
+  double mean = 0.0;      ///< of its values: what signed means of errors are shares of
   bool cached = false;
 };
 

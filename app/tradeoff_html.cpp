@@ -68,8 +68,8 @@ std::string table(const TradeoffReport& report) {
     for (const std::string& metric : report.metrics) text += cell(metric, point.error.of(metric));
     const auto width = static_cast<std::size_t>(report.size.width);
     text += fmt::format("<td>{:+.3g}</td><td>{:.2g}</td><td>{:.3g}</td><td>{},{}</td></tr>\n",
-                        percent * point.error.mean, percent * point.error.mean_error, point.error.worst, point.error.worst_pixel % width,
-                        point.error.worst_pixel / width);
+                        percent * point.error.mean, percent * point.error.mean_error, point.error.worst,
+                        point.error.worst_pixel % width, point.error.worst_pixel / width);
   }
   return text + "</tbody></table></div>\n";
 }

@@ -142,9 +142,9 @@ std::string tradeoff_table(const TradeoffReport& report) {
     row.push_back(fmt::format("{:.1f}", point.median_ms()));
     for (const std::string& metric : report.metrics) row.push_back(metric_text(metric, point.error));
     const double percent = 100.0 / report.reference.mean;
-    row.push_back(report.reference.mean > 0.0 ? fmt::format("{:+.2f} +- {:.2f}", percent * point.error.mean,
-                                                            percent * point.error.mean_error)
-                                              : "-");
+    row.push_back(report.reference.mean > 0.0
+                      ? fmt::format("{:+.2f} +- {:.2f}", percent * point.error.mean, percent * point.error.mean_error)
+                      : "-");
   }
   std::string text = fmt::format("{} at {}x{} against {}{}\n", report.scene, report.size.width, report.size.height,
                                  report.reference.how,
