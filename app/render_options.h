@@ -38,6 +38,7 @@ struct RenderOptions {
   std::string shading = "deferred";
   bool explain = false;
   std::string stats;
+  bool strict = false;    ///< values that are no finite numbers are errors
   double exposure = 0.0;  ///< stops, of display colours only
 
   void declare(CLI::App& app);
