@@ -43,7 +43,7 @@ double furnace(const MaterialPoint& material, double polar) {
 
 StabilityFinding energy() {
   StabilityFinding most =
-      finding("materials/furnace", "white metal and clear glass of roughness 0 .. 1, looked at from 0 to 89.4 degrees",
+      finding("materials/furnace", "white metal of roughness 0 .. 1, looked at from 0 to 89.4 degrees",
               1.0 + (3.0 * kSamples + 64.0) * kDoubleRounding, "of what arrives",
               "a sample's weight is Fresnel's share times a masking of 1 at the most");
   most.curve.x = "roughness";
@@ -53,11 +53,7 @@ StabilityFinding energy() {
       MaterialPoint metal;
       metal.metallic = 1.0;
       metal.roughness = roughness;
-      MaterialPoint glass;
-      glass.transmission = 1.0;
-      glass.solid = true;
-      glass.roughness = roughness;
-      worst = std::max({worst, furnace(metal, polar), furnace(glass, polar)});
+      worst = std::max(worst, furnace(metal, polar));
     }
     most.measured = worse(most.measured, worst);
     most.curve.points.emplace_back(roughness, worst);
