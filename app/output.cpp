@@ -8,6 +8,7 @@
 
 #include "cluster/collectives.h"
 #include "core/file.h"
+#include "core/log.h"
 #include "core/parallel.h"
 
 namespace hpr {
@@ -89,11 +90,29 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
     stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads())});
   }
   for (const RayCounts& counts : all_gather_value(comm, times.rays)) stats.rays += counts;
+  if (stats.rays.not_finite > 0 && comm.rank() == 0) {
+    const ScreenPixel& first = stats.rays.first_not_finite;
+    log::warning("{} samples of pixels had no finite radiance and are black, the first in pixel {},{} of screen {}",
+                 stats.rays.not_finite, first.x, first.y, first.screen);
+  }
   stats.samples = times.samples;
   for (const std::size_t sent : all_gather_value(comm, cost.bytes_sent)) stats.bytes_sent += sent;
   stats.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
   return stats;
 }
+
+namespace {
+
+nlohmann::ordered_json not_finite_json(const RayCounts& rays) {
+  nlohmann::ordered_json first = nullptr;
+  if (rays.not_finite > 0) {
+    const ScreenPixel& pixel = rays.first_not_finite;
+    first = {{"screen", pixel.screen}, {"x", pixel.x}, {"y", pixel.y}};
+  }
+  return {{"pixels", rays.not_finite}, {"first", first}};
+}
+
+}  // namespace
 
 void write_stats(const std::filesystem::path& path, const RunStats& stats) {
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
@@ -117,6 +136,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
         {"refraction", stats.rays.refraction},
         {"ambient-occlusion", stats.rays.ambient_occlusion},
         {"photon", stats.rays.photon}}},
+      {"not_finite", not_finite_json(stats.rays)},
       {"bytes_sent", stats.bytes_sent},
       {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
       {"ranks", stats.ranks}};

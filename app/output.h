@@ -71,9 +71,14 @@ struct FrameCost {
   std::size_t bytes_sent = 0;
 };
 
-/// Collective. What the session's last frame took, on every rank.
+/// Collective. What the session's last frame took, on every rank. Warns, on rank 0, of pixels without finite radiance.
 [[nodiscard]] RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times,
                                     const FrameCost& cost);
+
+/// What a run that is done leaves with: `strict` makes pixels without finite radiance a failed check.
+[[nodiscard]] inline ExitCode verdict(const RunStats& stats, bool strict) {
+  return strict && stats.rays.not_finite > 0 ? ExitCode::CheckFailed : ExitCode::Done;
+}
 
 void write_stats(const std::filesystem::path& path, const RunStats& stats);
 

@@ -142,7 +142,7 @@ class RenderCommand final : public Command {
       log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms{}", session.scene().triangles, size.width, size.height,
                 stats.ranks, stats.ms, sampler ? fmt::format(", {} samples", sampler->reached_so_far().samples) : "");
     }
-    return ExitCode::Done;
+    return verdict(stats, options_.strict);
   }
 
   std::string source_;

@@ -68,6 +68,17 @@ const Camera& find_camera(const Scene& scene, const std::string& wanted) {
               names.empty() ? "it has none at all: use --eye and --at" : unknown_name_hint(wanted, names));
 }
 
+/// Adds what the scene's environment had replaced to the scene's own warnings.
+void note_not_finite(const std::string& name, Scene& scene) {
+  const Environment& environment = *scene.environment;
+  if (environment.not_finite == 0) return;
+  const auto width = static_cast<std::size_t>(environment.image.width());
+  scene.not_finite += environment.not_finite;
+  scene.warnings.push_back(fmt::format("{}: {} values are no finite numbers, the first in pixel {},{}; replaced", name,
+                                       environment.not_finite, environment.first_not_finite % width,
+                                       environment.first_not_finite / width));
+}
+
 }  // namespace
 
 void RenderOptions::declare(CLI::App& app) {
@@ -108,6 +119,9 @@ void RenderOptions::declare_frame(CLI::App& app) {
                  "brightens (or darkens) display colours by so many stops; EXR files stay as lit")
       ->check(CLI::Range(-30.0, 30.0))
       ->capture_default_str();
+  app.add_flag(
+      "--strict", strict,
+      "values that are no finite numbers are errors, not replaced: of files (exit code 3), of the picture (1)");
 }
 
 void RenderOptions::declare_light(CLI::App& app) {
@@ -187,7 +201,20 @@ Camera RenderOptions::choose_camera(const Scene& scene) const {
 
 Scene RenderOptions::load(const std::string& source, const Globals& globals) const {
   Scene scene = load_scene(source, globals.scene_limits());
-  if (!environment.empty()) scene.environment = load_environment(environment, picture_limits(globals));
+  if (!environment.empty()) {
+    scene.environment = load_environment(environment, picture_limits(globals));
+    note_not_finite(printable(environment), scene);
+  }
+  if (strict && scene.not_finite > 0) {
+    const auto named = std::ranges::find_if(
+        scene.warnings, [](const std::string& text) { return text.find("no finite numbers") != std::string::npos; });
+    throw Error(
+        ExitCode::BadInput,
+        fmt::format("{}: {}", printable(source),
+                    named != scene.warnings.end() ? printable(*named, 400)
+                                                  : fmt::format("{} values are no finite numbers", scene.not_finite)),
+        "repair the file, or draw without --strict: they are replaced");
+  }
   return scene;
 }
 

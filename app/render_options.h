@@ -45,6 +45,7 @@ struct RenderOptions {
   WireOptions wire;
   bool explain = false;
   std::string stats;
+  bool strict = false;    ///< values that are no finite numbers are errors
   double exposure = 0.0;  ///< stops, of display colours only
 
   void declare(CLI::App& app);

@@ -288,14 +288,14 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   agree_on_failure(session.comm(), [&] {
     if (speaks) write_results(run, wall, driver, stats, pictures);
   });
-  if (!speaks) return ExitCode::Done;
+  if (!speaks) return verdict(stats, run.options.strict);
   if (run.summary) print_summary(stats, wall, session.scene());
   if (!run.picture.empty()) {
     fmt::print("{}\n", run.picture);
   } else if (run.display == "file") {
     fmt::print("{}\n", (std::filesystem::path(run.folder) / "wall.png").string());
   }
-  return ExitCode::Done;
+  return verdict(stats, run.options.strict);
 }
 
 void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals) {

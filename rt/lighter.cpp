@@ -70,6 +70,12 @@ void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOut
       colors[i] = color;
     } else {
       ++tile.counts.not_finite;
+      const Rect& block = tile.view->block;
+      const auto x = static_cast<int>(i % kTileSide);
+      const auto y = static_cast<int>(i / kTileSide);
+      tile.counts.first_not_finite =
+          std::min(tile.counts.first_not_finite,
+                   ScreenPixel{tile.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
     }
   });
   for (std::size_t part = 0; part < kComponents; ++part) {
@@ -122,6 +128,7 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
   photon += other.photon;
   invalid += other.invalid;
   not_finite += other.not_finite;
+  first_not_finite = std::min(first_not_finite, other.first_not_finite);
   return *this;
 }
 
@@ -226,6 +233,7 @@ void Lighter::State::trace_reference(std::span<const View> views, std::span<cons
   counts.refraction = traced.transmission;
   counts.invalid = traced.invalid;
   counts.not_finite = traced.not_finite;
+  counts.first_not_finite = traced.first_not_finite;
   times = {{"reference", watch.ms() * settings.threads}};
 }
 

@@ -15,6 +15,7 @@
 #include "image/tiles.h"
 #include "rt/ray_build.h"
 #include "rt/sampler.h"
+#include "rt/screen_pixel.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 #include "scene/view.h"
@@ -68,6 +69,7 @@ struct RayCounts {
   std::uint64_t photon = 0;
   std::uint64_t invalid = 0;     ///< of those above, rays Embree could not bear: they missed
   std::uint64_t not_finite = 0;  ///< pixels whose radiance was no finite number: they are black
+  ScreenPixel first_not_finite;  ///< of those, in order of screen and row, whoever met it; else kNoPixel
 
   RayCounts& operator+=(const RayCounts& other);
   bool operator==(const RayCounts&) const = default;

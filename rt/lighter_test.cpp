@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
+#include <optional>
 #include <random>
 
 #include "rt/test_scene.h"
@@ -272,6 +274,51 @@ TEST(Lighter, InfiniteRadianceIsBlackAndCounted) {
   const test::Lit lit = test::light(scene, view);
   for (const Rgb& pixel : lit.image.pixels()) EXPECT_TRUE(std::isfinite(pixel.r));
   EXPECT_GT(lit.counts.not_finite, 0U);
+}
+
+TEST(Lighter, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {
+  Scene scene;
+  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  Material bright = test::glowing(glm::vec3(3e38F));
+  bright.base_color = glm::vec4(1.0F);
+  test::add_material(scene, bright);
+  finish_scene(scene);
+  scene.lights = {point_light({0, 0, 1}, 3e38F), point_light({0, 0, 1}, 3e38F)};
+  View view = test::view_from({0, 0, 3}, {0, 0, 0}, {150, 150}, scene);
+  view.screen_number = 3;
+  view.screen = {1000, 1000};
+  view.block = {400, 300, 550, 450};
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  std::vector<std::size_t> tiles = all_tiles(keys.layout());
+  std::optional<RayCounts> expected;
+  for (const int threads : {1, 3}) {
+    RaySettings settings;
+    settings.threads = threads;
+    Lighter lighter(scene, settings);
+    TileLayer<Rgb> radiance(keys.layout());
+    lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &radiance});
+    const RayCounts counts = lighter.counts();
+    ASSERT_GT(counts.not_finite, 1U);
+    EXPECT_EQ(expected.value_or(counts), counts);
+    expected = counts;
+    EXPECT_EQ(counts.first_not_finite.screen, 3U);
+    EXPECT_GE(counts.first_not_finite.x, 400);
+    EXPECT_GE(counts.first_not_finite.y, 300);
+    std::ranges::reverse(tiles);
+  }
+  // Two ranks with half the tiles each add up to the same.
+  RayCounts sum;
+  for (std::size_t part = 0; part < 2; ++part) {
+    Lighter lighter(scene, {});
+    TileLayer<Rgb> radiance(keys.layout());
+    const std::size_t half = tiles.size() / 2;
+    const auto mine = std::span(tiles).subspan(part * half, part == 0 ? half : tiles.size() - half);
+    lighter.light(std::span(&view, 1), keys, mine, {.radiance = &radiance});
+    sum += lighter.counts();
+  }
+  EXPECT_EQ(sum.first_not_finite, expected->first_not_finite);
+  EXPECT_EQ(sum.not_finite, expected->not_finite);
+  EXPECT_LT(sum.first_not_finite, kNoPixel);
 }
 
 TEST(Lighter, LocalShadingPutsTheDisplayColourIntoTheKeys) {

@@ -37,10 +37,11 @@ Path path_from_eye(const View& view, const PathSettings& settings, int x, int y,
   return path;
 }
 
-Rgb to_pixel(const glm::dvec3& radiance, PathCounts& counts) {
+Rgb to_pixel(const glm::dvec3& radiance, const ScreenPixel& pixel, PathCounts& counts) {
   const Rgb color{static_cast<float>(radiance.r), static_cast<float>(radiance.g), static_cast<float>(radiance.b)};
   if (std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b)) return color;
   ++counts.not_finite;
+  counts.first_not_finite = std::min(counts.first_not_finite, pixel);
   return {};
 }
 
@@ -56,6 +57,7 @@ PathCounts& PathCounts::operator+=(const PathCounts& other) {
   invalid += other.invalid;
   too_long += other.too_long;
   not_finite += other.not_finite;
+  first_not_finite = std::min(first_not_finite, other.first_not_finite);
   return *this;
 }
 
@@ -104,7 +106,8 @@ void PathTracer::State::trace_tile(PathWave& wave, const View& view, const TileP
       for (int x = 0; x < rect.width(); ++x) {
         const auto from = static_cast<std::size_t>(y - top) * kTileSide + static_cast<std::size_t>(x);
         const auto to = static_cast<std::size_t>(y - rect.y0) * kTileSide + static_cast<std::size_t>(x);
-        pixels[to] = to_pixel(wave.radiance(from), wave.counts());
+        const ScreenPixel pixel{view.screen_number, view.block.y0 + y, view.block.x0 + rect.x0 + x};
+        pixels[to] = to_pixel(wave.radiance(from), pixel, wave.counts());
       }
     }
   }

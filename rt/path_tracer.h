@@ -10,6 +10,7 @@
 #include "rt/light_set.h"
 #include "rt/ray_scene.h"
 #include "rt/sampler.h"
+#include "rt/screen_pixel.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
@@ -48,6 +49,7 @@ struct PathCounts {
   std::uint64_t invalid = 0;     ///< of those above, rays Embree could not bear: they missed
   std::uint64_t too_long = 0;    ///< paths cut at max_depth
   std::uint64_t not_finite = 0;  ///< samples that were no finite number: they are black
+  ScreenPixel first_not_finite;  ///< of those; else kNoPixel
 
   PathCounts& operator+=(const PathCounts& other);
   bool operator==(const PathCounts&) const = default;

@@ -57,6 +57,7 @@ Environment from_picture(const FloatImage& picture, const std::string& name, boo
   Environment environment{Image<Rgb>(picture.size)};
   const auto value = [&](std::size_t pixel, std::size_t channel) {
     const float stored = picture.values[pixel * picture.channels.size() + rgb[channel]];
+    if (!std::isfinite(stored) && environment.not_finite++ == 0) environment.first_not_finite = pixel;
     if (linear) return cleaned(stored);
     return srgb_to_linear(static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(stored, 0.0F, 1.0F))));
   };

@@ -50,6 +50,8 @@ TEST(Environment, ExrKeepsItsRadianceAndLosesWhatIsNone) {
   EXPECT_EQ(environment.image.size(), image.size());
   EXPECT_EQ(environment.image.at(0, 1), (Rgb{0.25F, 1e6F, 1e-6F}));
   EXPECT_EQ(environment.image.at(2, 1), (Rgb{0.0F, 0.0F, 65504.0F}));
+  EXPECT_EQ(environment.not_finite, 2U);
+  EXPECT_EQ(environment.first_not_finite, 5U);
 }
 
 TEST(Environment, RadianceFilesHaveSharedExponents) {

@@ -27,6 +27,12 @@ void GltfContext::warn(std::string_view where, std::string_view what) {
   if (seen_.insert(message).second) warnings_.push_back(std::move(message));
 }
 
+void GltfContext::warn_not_finite(std::string_view where, std::uint64_t count, std::size_t first_vertex) {
+  if (count == 0) return;
+  not_finite_ += count;
+  warn(where, fmt::format("{} values are no finite numbers, the first at vertex {}; replaced", count, first_vertex));
+}
+
 void GltfContext::check_room(std::uint64_t bytes, std::string_view what) const {
   if (bytes > memory_left()) {
     fail("", fmt::format("{} would take the scene past the memory limit of {} bytes", what, limits_.memory_bytes),

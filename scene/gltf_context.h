@@ -31,6 +31,11 @@ class GltfContext {
   /// Keeps a warning once; after the hundredth only the number of further ones is kept.
   void warn(std::string_view where, std::string_view what);
 
+  /// Warns of `count` values at `where` that are no finite numbers and get replaced, the first of them of that vertex.
+  void warn_not_finite(std::string_view where, std::uint64_t count, std::size_t first_vertex);
+  /// All of those.
+  [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
+
   /// Counts `bytes` that are about to be allocated for `what`; throws Error (Limit) past limits().memory_bytes.
   void charge(std::uint64_t bytes, std::string_view what);
   /// The same for memory that is given back soon.
@@ -46,6 +51,7 @@ class GltfContext {
   std::unordered_set<std::string> seen_;
   std::uint64_t dropped_ = 0;
   std::uint64_t charged_ = 0;
+  std::uint64_t not_finite_ = 0;
 };
 
 }  // namespace hpr

@@ -237,6 +237,7 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
   GltfLook(data, buffers, images).build(scene);
   SceneBuilder(data, scene).build();
   scene.warnings = context.take_warnings();
+  scene.not_finite = context.not_finite();
   finish_scene(scene);
   return scene;
 }

@@ -39,6 +39,8 @@ TEST(GltfLoader, NormalsBecomeUnitLengthAndUsableWhereTheyAreNot) {
   const Scene scene = load(document.json);
   EXPECT_EQ(scene.meshes[0].normals, std::vector<glm::vec3>(3, glm::vec3(0, 0, 1)));
   EXPECT_TRUE(test::warns_of(scene, "NORMAL"));
+  EXPECT_TRUE(test::warns_of(scene, "NORMAL: 1 values are no finite numbers, the first at vertex 1"));
+  EXPECT_EQ(scene.not_finite, 1U);
 }
 
 TEST(GltfLoader, StripsAndFansBecomeTrianglesThatFaceTheSameWay) {

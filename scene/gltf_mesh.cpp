@@ -32,6 +32,7 @@ class PrimitiveBuilder {
     if (pose.joints.empty() && pose.weights.empty()) compare_bounds(mesh.positions);
     if (const auto found = primitive_.attributes.find("NORMAL"); found != primitive_.attributes.end()) {
       mesh.normals = data_.vec3s(found->second);
+      note_not_finite(mesh.normals, "NORMAL");
     }
     read_uvs(mesh);
     read_colors(mesh);
@@ -39,6 +40,7 @@ class PrimitiveBuilder {
     if (const auto found = primitive_.attributes.find("TANGENT");
         found != primitive_.attributes.end() && !mesh.normals.empty()) {
       mesh.tangents = data_.vec4s(found->second);
+      note_not_finite(mesh.tangents, "TANGENT");
     }
     mesh.triangles = read_triangles(mesh.positions.size());
     morph(mesh, pose.weights);
@@ -53,6 +55,19 @@ class PrimitiveBuilder {
   }
 
  private:
+  /// What is no number is replaced wherever the attribute's values are looked at; here it is counted.
+  template <typename Vector>
+  void note_not_finite(const std::vector<Vector>& values, std::string_view attribute) const {
+    std::uint64_t count = 0;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      for (int axis = 0; axis < Vector::length(); ++axis) {
+        if (!std::isfinite(values[i][axis]) && count++ == 0) first = i;
+      }
+    }
+    data_.context().warn_not_finite(fmt::format("{}.attributes.{}", where_, attribute), count, first);
+  }
+
   void check_positions(const Vectors& positions) const {
     const auto bad = std::ranges::find_if_not(positions, finite);
     if (bad != positions.end()) {
@@ -94,6 +109,7 @@ class PrimitiveBuilder {
       const auto found = primitive_.attributes.find(name);
       if (found == primitive_.attributes.end()) continue;
       mesh.uvs[set] = data_.vec2s(found->second);
+      note_not_finite(mesh.uvs[set], name);
       // Samplers turn coordinates into integers; 1e6 repeats of a texture are already below what a float resolves.
       constexpr float kFarthest = 1e6F;
       bool odd = false;
@@ -118,6 +134,7 @@ class PrimitiveBuilder {
       data_.context().charge(opaque.size() * sizeof(glm::vec4), "vertex colours");
       for (const glm::vec3& color : opaque) mesh.colors.emplace_back(color, 1.0F);
     }
+    note_not_finite(mesh.colors, "COLOR_0");
     bool odd = false;
     for (glm::vec4& color : mesh.colors) {
       for (int c = 0; c < 4; ++c) {

@@ -121,6 +121,10 @@ struct Environment {
   Image<Rgb> image;               ///< radiance, finite and not negative; one pixel: the same everywhere
   double rotation_radians = 0.0;  ///< turns it about +y, counterclockwise as seen from above
   double scale = 1.0;             ///< the image is multiplied by it; not negative
+  /// Values of the file that were no finite numbers and were replaced, and the first pixel that had one, row by row.
+  /// Known where it was loaded.
+  std::uint64_t not_finite = 0;
+  std::size_t first_not_finite = 0;
 };
 
 struct PerspectiveLens {
@@ -157,8 +161,10 @@ struct Scene {
   Rgb background;  ///< radiance where no surface is and no environment; lights nothing
   std::optional<Environment> environment;
   std::vector<std::string> warnings;  ///< what was odd but could be drawn
-  std::uint32_t triangles = 0;        ///< of all instances: the number of surface ids
-  Bounds bounds;                      ///< of all instances; low == high == 0 when there is nothing
+  std::uint64_t not_finite = 0;  ///< values of the file that were no finite numbers and were replaced, as `warnings`
+                                 ///< say; known where it was loaded
+  std::uint32_t triangles = 0;  ///< of all instances: the number of surface ids
+  Bounds bounds;                ///< of all instances; low == high == 0 when there is nothing
 
   [[nodiscard]] const Mesh& mesh_of(const Instance& instance) const { return meshes[instance.mesh]; }
 };

@@ -17,22 +17,8 @@ namespace {
 
 constexpr std::uint32_t kSamples = 1'000'000;
 constexpr std::size_t kColors = 16;
-constexpr double kDoubleRounding = 0x1p-53;
 /// Share of samples with the weight -1: Mitchell's filter.
 constexpr double kNegative = 0.06;
-
-/// A sum that loses nothing to speak of: Kahan's compensation on top of 64 bits.
-struct ExactSum {
-  long double sum = 0.0L;
-  long double rest = 0.0L;
-
-  void add(long double value) {
-    const long double term = value - rest;
-    const long double next = sum + term;
-    rest = (next - sum) - term;
-    sum = next;
-  }
-};
 
 /// A tile of colours, each pixel with its own.
 struct Sample {

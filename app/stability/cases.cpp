@@ -30,6 +30,12 @@ std::span<const StabilityCase> all_stability_cases() {
                     watertight},
       StabilityCase{"acne", "light at 89.9 degrees and covers close above floors: no false shadow, no leak", acne},
       StabilityCase{"accumulator", "a million samples of a pixel: what the film's sums lose", accumulator},
+      StabilityCase{"photons", "photons from none to more than 32 bits count: senders change no bit, no light is lost",
+                    photons},
+      StabilityCase{"mirrors", "facing mirrors: radiance falls by the same share at every reflection", mirrors},
+      StabilityCase{"lights", "lights on a surface, as small as a point, at the horizon", lights},
+      StabilityCase{"materials", "roughness and index at their ends: no energy is made, nothing jumps", materials},
+      StabilityCase{"not-finite", "NaN and infinities in files and sums: refused or counted, never shown", not_finite},
   };
   return kCases;
 }

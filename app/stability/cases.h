@@ -32,4 +32,19 @@ namespace hpr::stability {
 // accumulator.cpp
 [[nodiscard]] std::vector<StabilityFinding> accumulator(const Globals& globals);
 
+// photons.cpp
+[[nodiscard]] std::vector<StabilityFinding> photons(const Globals& globals);
+
+// mirrors.cpp
+[[nodiscard]] std::vector<StabilityFinding> mirrors(const Globals& globals);
+
+// lights.cpp
+[[nodiscard]] std::vector<StabilityFinding> lights(const Globals& globals);
+
+// materials.cpp
+[[nodiscard]] std::vector<StabilityFinding> materials(const Globals& globals);
+
+// not_finite.cpp
+[[nodiscard]] std::vector<StabilityFinding> not_finite(const Globals& globals);
+
 }  // namespace hpr::stability

@@ -89,6 +89,26 @@ LitPicture lit_picture(const Scene& scene, const View& view, const RaySettings& 
   return picture;
 }
 
+View glance(const Scene& scene, const glm::dvec3& eye, const glm::dvec3& at) {
+  const glm::dvec3 way = glm::normalize(at - eye);
+  const glm::dvec3 up = std::abs(way.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+  Camera camera = look_at(eye, at, up, 1e-3);
+  std::get<PerspectiveLens>(camera.lens).near_distance = 1e-3 * glm::distance(eye, at);
+  return make_view(camera, {1, 1}, scene.bounds);
+}
+
+double glanced(const Scene& scene, const View& view, const RaySettings& settings) {
+  return static_cast<double>(lit_picture(scene, view, settings).image.at(0, 0).r);
+}
+
+RaySettings only(std::vector<std::string> passes, int threads) {
+  RaySettings settings;
+  settings.auto_passes = false;
+  settings.passes = std::move(passes);
+  settings.threads = threads;
+  return settings;
+}
+
 double worse(double a, double b) {
   constexpr double kWorst = std::numeric_limits<double>::infinity();
   return std::isnan(a) || std::isnan(b) ? kWorst : std::max(a, b);

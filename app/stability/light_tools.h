@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "app/command.h"
 #include "app/stability/stability.h"
@@ -38,6 +39,22 @@ class RandomStream {
 [[nodiscard]] StabilityFinding finding(std::string name, std::string parameter, double limit, std::string unit,
                                        std::string why);
 
+/// The unit roundoff of a double, 2^-53.
+inline constexpr double kDoubleRounding = 0x1p-53;
+
+/// A sum that loses nothing to speak of: Kahan's compensation on top of 64 bits.
+struct ExactSum {
+  long double sum = 0.0L;
+  long double rest = 0.0L;
+
+  void add(long double value) {
+    const long double term = value - rest;
+    const long double next = sum + term;
+    rest = (next - sum) - term;
+    sum = next;
+  }
+};
+
 /// Threads a case may use.
 [[nodiscard]] int threads_of(const Globals& globals);
 
@@ -59,6 +76,13 @@ struct LitPicture {
 };
 /// One sample of a finished scene, its keys made by primary rays.
 [[nodiscard]] LitPicture lit_picture(const Scene& scene, const View& view, const RaySettings& settings);
+
+/// A view of one pixel, whose ray goes from `eye` through `at`.
+[[nodiscard]] View glance(const Scene& scene, const glm::dvec3& eye, const glm::dvec3& at);
+/// Red of the pixel of such a view.
+[[nodiscard]] double glanced(const Scene& scene, const View& view, const RaySettings& settings);
+/// Settings that run these passes and no others.
+[[nodiscard]] RaySettings only(std::vector<std::string> passes, int threads = 1);
 
 /// The worse of two measured numbers, of which larger is worse: a NaN is the worst there is.
 [[nodiscard]] double worse(double a, double b);
