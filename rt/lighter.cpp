@@ -19,6 +19,7 @@
 #include "rt/pass.h"
 #include "rt/path_tracer.h"
 #include "rt/photon_maps.h"
+#include "rt/tile_output.h"
 
 namespace hpr {
 namespace {
@@ -41,81 +42,6 @@ struct Scratch {
 constexpr std::size_t kSurfaceStep = 0;
 constexpr std::size_t kDirectStep = 1;
 constexpr std::size_t kFirstPassStep = 2;
-
-Rgb to_rgb(const glm::dvec3& sum) {
-  return {static_cast<float>(sum.r), static_cast<float>(sum.g), static_cast<float>(sum.b)};
-}
-
-bool is_finite(const Rgb& color) {
-  return std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b);
-}
-
-/// The tile's sums as pixels. Light that is no finite number is black, in all layers.
-void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output) {
-  const auto each = [&](auto&& body) {
-    for (int y = 0; y < job.place.height(); ++y) {
-      for (int x = 0; x < job.place.width(); ++x)
-        body(static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x));
-    }
-  };
-  const auto start = [&](auto* layer) {
-    const auto pixels = layer->tile(index);
-    std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
-    return pixels;
-  };
-  const auto colors = start(output.radiance);
-  each([&](std::size_t i) {
-    const Rgb color = to_rgb(tile.radiance[i]);
-    if (is_finite(color)) {
-      colors[i] = color;
-    } else {
-      ++tile.counts.not_finite;
-      const Rect& block = tile.view->block;
-      const auto x = static_cast<int>(i % kTileSide);
-      const auto y = static_cast<int>(i / kTileSide);
-      tile.counts.first_not_finite =
-          std::min(tile.counts.first_not_finite,
-                   ScreenPixel{tile.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
-    }
-  });
-  for (std::size_t part = 0; part < kComponents; ++part) {
-    if (output.components.at(part) == nullptr) continue;
-    const auto pixels = start(output.components.at(part));
-    each([&](std::size_t i) {
-      const Rgb color = to_rgb(tile.components[part][i]);
-      if (is_finite(color) && is_finite(to_rgb(tile.radiance[i]))) pixels[i] = color;
-    });
-  }
-  if (output.cost != nullptr) {
-    const auto pixels = start(output.cost);
-    each([&](std::size_t i) { pixels[i] = tile.cost[i]; });
-  }
-}
-
-/// Adds normal and base colour of what each pixel sees, of several surfaces each by its share.
-void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t index, const LightOutput& output) {
-  for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
-    if (layer == nullptr) continue;
-    const auto pixels = layer->tile(index);
-    for (const PathPoint& point : points) {
-      const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
-      const Rgb part = to_rgb(point.throughput * value);
-      Rgb& sum = pixels[point.pixel];
-      sum = {sum.r + part.r, sum.g + part.g, sum.b + part.b};
-    }
-  }
-}
-
-void set_active(const LightOutput& output, std::size_t tile) {
-  const auto activate = [&](auto* layer) {
-    if (layer != nullptr) layer->set_active(tile);
-  };
-  activate(output.radiance);
-  for (TileLayer<Rgb>* layer : output.components) activate(layer);
-  activate(output.normal);
-  activate(output.albedo);
-  activate(output.cost);
-}
 
 }  // namespace
 

@@ -163,8 +163,8 @@ struct Scene {
   std::vector<std::string> warnings;  ///< what was odd but could be drawn
   std::uint64_t not_finite = 0;  ///< values of the file that were no finite numbers and were replaced, as `warnings`
                                  ///< say; known where it was loaded
-  std::uint32_t triangles = 0;  ///< of all instances: the number of surface ids
-  Bounds bounds;                ///< of all instances; low == high == 0 when there is nothing
+  std::uint32_t triangles = 0;   ///< of all instances: the number of surface ids
+  Bounds bounds;                 ///< of all instances; low == high == 0 when there is nothing
 
   [[nodiscard]] const Mesh& mesh_of(const Instance& instance) const { return meshes[instance.mesh]; }
 };

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "rt/first_points.h"
+#include "rt/lighter.h"
+#include "rt/pass.h"
+
+namespace hpr {
+
+/// The tile's sums as pixels of tile `index`. Light that is no finite number is black, in all layers, and counted.
+void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output);
+
+/// Adds normal and base colour of what each pixel sees, of several surfaces each by its share.
+void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t index, const LightOutput& output);
+
+/// Makes the tile active in all layers there are.
+void set_active(const LightOutput& output, std::size_t tile);
+
+}  // namespace hpr
