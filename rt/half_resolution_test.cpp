@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/error.h"
 #include "rt/test_scene.h"
 
@@ -95,6 +97,21 @@ TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
     ASSERT_NEAR(half.image.pixels()[i].r, full.image.pixels()[i].r, 1e-5) << i;
     ASSERT_NEAR(half.image.pixels()[i].g, full.image.pixels()[i].g, 1e-5) << i;
   }
+}
+
+TEST(HalfResolution, AnotherMaterialIsNotTheLike) {
+  // Two materials of one look meet in a plane, on a line between the pixels of one column of blocks.
+  Scene scene;
+  add_material(scene, test::matte());
+  add_material(scene, test::matte());
+  const float border = static_cast<float>(-2.0 * 3.0 * std::tan(0.4) / 64.0);
+  place(scene, add_mesh(scene, quad({-4, -4, 0}, {4 + border, 0, 0}, {0, 8, 0}, 0)));
+  place(scene, add_mesh(scene, quad({border, -4, 0}, {4 - border, 0, 0}, {0, 8, 0}, 1)));
+  finish_scene(scene);
+  const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
+  const RaySettings settings{.passes = {"ambient-occlusion"}, .occlusion_rays = 1};
+  const test::Lit half = test::light(scene, view, halved(settings, {"ambient-occlusion"}));
+  EXPECT_EQ(half.counts.ambient_occlusion, 32U * 32U + 64U);
 }
 
 TEST(HalfResolution, NoLightCrossesAnEdge) {
