@@ -37,7 +37,7 @@ struct FrameRecord {
   double ms = 0.0;
   std::string strategy;
   std::vector<ScreenRecord> screens;
-  std::optional<BudgetRecord> budget;
+  std::optional<BudgetRecord> budget = {};
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
