@@ -143,9 +143,10 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--photons", photons, "sent per sample, where the scene requires any")
       ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
-  app.add_flag("--indirect,!--no-indirect", indirect,
-               "photons carry all indirect light, not caustics alone (default: with --quality best, or where --passes "
-               "names photon)");
+  app.add_flag_function(
+      "--indirect,!--no-indirect", [this](std::int64_t count) { indirect = count > 0; },
+      "photons carry all indirect light, not caustics alone (default: with --quality best, or where --passes "
+      "names photon)");
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");
 }

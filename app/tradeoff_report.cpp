@@ -203,6 +203,7 @@ std::string tradeoff_json(const TradeoffReport& report) {
        {{"how", report.reference.how},
         {"spp", report.reference.spp > 0 ? Json(report.reference.spp) : Json(nullptr)},
         {"estimated_relmse", number(report.reference.relmse)},
+        {"mean", number(report.reference.mean)},
         {"cached", report.reference.cached}}},
       {"knobs", report.knobs},
       {"metrics", report.metrics},

@@ -45,6 +45,18 @@ TEST(Knobs, AValueSetsItsOptionAlone) {
   EXPECT_FALSE(options.reference);
 }
 
+TEST(Knobs, IndirectLightIsTheQualitysUnlessSet) {
+  RenderOptions options;
+  EXPECT_FALSE(options.settings(1).rays.global_photons);
+  set_knob(options, "quality", "best");
+  EXPECT_TRUE(options.settings(1).rays.global_photons);
+  set_knob(options, "indirect", "false");
+  EXPECT_FALSE(options.settings(1).rays.global_photons);
+  set_knob(options, "indirect", "true");
+  set_knob(options, "quality", "good");
+  EXPECT_TRUE(options.settings(1).rays.global_photons);
+}
+
 TEST(Knobs, UnknownOnesAndBadValuesAreRefused) {
   RenderOptions options;
   EXPECT_THROW(set_knob(options, "ssp", "1"), Error);
