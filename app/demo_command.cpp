@@ -8,7 +8,6 @@ namespace hpr {
 namespace {
 
 constexpr const char* kPicture = "hpr-demo.png";
-constexpr std::uint32_t kPhotonsEnough = 30'000;
 
 class DemoCommand final : public Command {
  public:
@@ -39,7 +38,6 @@ class DemoCommand final : public Command {
     // The quickest proof that a machine works: light that hardly varies from pixel to pixel is worked out for one in
     // four.
     run.options.half_resolution = "shadow,photon";
-    run.options.photons = kPhotonsEnough;
     // The demo's own picture may be made again and again; a name the user chose is guarded as everywhere.
     Globals own = globals;
     own.force = globals.force || output_ == kPicture;
