@@ -17,26 +17,22 @@ namespace {
 
 constexpr int kMostRanksDrawn = 16;
 
-std::string entry(std::string_view name, std::string_view value) {
-  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", name, escape_markup(value));
-}
-
 std::string header(const CompareReport& report) {
   const CompareRun& first = report.runs.front();
   std::string text = "<h1>Compositing strategies compared</h1>\n<dl>\n";
-  text += entry("Input", fmt::format("{}, seed {}", report.input, report.seed));
+  text += html_entry("Input", fmt::format("{}, seed {}", report.input, report.seed));
   const std::string screens = report.grid.area() == 1
                                   ? std::string("one screen")
                                   : fmt::format("{}x{} screens", report.grid.width, report.grid.height);
-  text += entry("Wall", fmt::format("{} of {}x{} pixels", screens, report.screen.width, report.screen.height));
-  text += entry("Operator", report.operation);
-  text += entry("Machine", report.machine.cpu);
-  text += entry("Cores", fmt::format("{}{}", report.machine.cores,
-                                     report.oversubscribed() ? ", oversubscribed" : ", not oversubscribed"));
-  text += entry("MPI", report.machine.mpi);
-  text += entry("Transport", first.transport);
-  text += entry("Frames", fmt::format("{} per run", first.frames));
-  text += entry("Commit", kCommit);
+  text += html_entry("Wall", fmt::format("{} of {}x{} pixels", screens, report.screen.width, report.screen.height));
+  text += html_entry("Operator", report.operation);
+  text += html_entry("Machine", report.machine.cpu);
+  text += html_entry("Cores", fmt::format("{}{}", report.machine.cores,
+                                          report.oversubscribed() ? ", oversubscribed" : ", not oversubscribed"));
+  text += html_entry("MPI", report.machine.mpi);
+  text += html_entry("Transport", first.transport);
+  text += html_entry("Frames", fmt::format("{} per run", first.frames));
+  text += html_entry("Commit", kCommit);
   text += fmt::format("<dt>Command</dt><dd><code>{}</code></dd>\n</dl>\n", escape_markup(report.command));
   if (report.oversubscribed()) {
     text +=

@@ -22,30 +22,20 @@ constexpr double kTop = 18.0;
 constexpr double kBottom = 410.0;
 constexpr double kNothingSent = 120.0;  ///< where runs without bytes stand
 constexpr double kLabelPitch = 16.0;    ///< where there is room
-constexpr Stroke kGrid{"#dddddd", 1.0};
-constexpr Stroke kAxis{"#444444", 1.0};
 
 enum class Mark { Circle, Square, Triangle, Diamond, Wedge };
 
-/// How a strategy looks. Colours: Tol's "muted" scheme, without those too light on white.
+/// How a strategy looks.
 struct Look {
   std::string_view color;
   Mark mark;
   std::string_view dashes;
 };
-constexpr std::array<Look, 10> kLooks{{{"#332288", Mark::Circle, ""},
-                                       {"#117733", Mark::Square, "7 3"},
-                                       {"#CC6677", Mark::Triangle, ""},
-                                       {"#2F9C8E", Mark::Diamond, "2 3"},
-                                       {"#882255", Mark::Wedge, "7 3"},
-                                       {"#8A8A20", Mark::Circle, "9 3 2 3"},
-                                       {"#AA4499", Mark::Square, ""},
-                                       {"#3E8FC0", Mark::Triangle, "7 3"},
-                                       {"#555555", Mark::Diamond, "9 3 2 3"},
-                                       {"#B5651D", Mark::Wedge, "2 3"}}};
 
-const Look& look(std::size_t index) {
-  return kLooks.at(index % kLooks.size());
+Look look(std::size_t index) {
+  constexpr std::array<Mark, 5> kMarks{Mark::Circle, Mark::Square, Mark::Triangle, Mark::Diamond, Mark::Wedge};
+  const SeriesLook& series = series_look(index);
+  return {series.color, kMarks.at(index % kMarks.size()), series.dashes};
 }
 
 std::vector<std::string> strategies_of(const std::vector<CompareRun>& runs) {
@@ -106,16 +96,16 @@ std::vector<double> times_of(const std::vector<CompareRun>& runs) {
 
 void draw_time_axis(SvgDrawing& drawing, const LogScale& times) {
   for (const double ms : times.ticks()) {
-    drawing.line({kLeft, times.at(ms)}, {kRight, times.at(ms)}, kGrid);
+    drawing.line({kLeft, times.at(ms)}, {kRight, times.at(ms)}, kGridStroke);
     drawing.text({kLeft - 8, times.at(ms) + 4}, fmt::format("{:g}", ms), Anchor::End);
   }
   drawing.upright_text({22, (kTop + kBottom) / 2}, "ms of a frame, slowest rank", 13);
-  drawing.line({kLeft, kTop}, {kLeft, kBottom}, kAxis);
-  drawing.line({kLeft, kBottom}, {kRight, kBottom}, kAxis);
+  drawing.line({kLeft, kTop}, {kLeft, kBottom}, kAxisStroke);
+  drawing.line({kLeft, kBottom}, {kRight, kBottom}, kAxisStroke);
 }
 
 void draw_tick_below(SvgDrawing& drawing, double x, const std::string& text) {
-  drawing.line({x, kTop}, {x, kBottom}, kGrid);
+  drawing.line({x, kTop}, {x, kBottom}, kGridStroke);
   drawing.text({x, kBottom + 18}, text, Anchor::Middle);
 }
 
@@ -142,7 +132,7 @@ void draw_labels(SvgDrawing& drawing, std::vector<Label> labels, bool lead_to_ma
     room = heights[i];
   }
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    const Look& style = look(labels[i].look);
+    const Look style = look(labels[i].look);
     if (lead_to_marks) {
       drawing.line({labels[i].of.x + 6, labels[i].of.y}, {kRight + 8, heights[i]}, {style.color, 0.6, "1 2"});
     }
@@ -219,7 +209,7 @@ std::string plot_time_over_ranks(const std::vector<CompareRun>& runs) {
   draw_time_axis(drawing, times);
   double free = 0.0;
   for (const int count : counts) {
-    drawing.line({ranks.at(count), kTop}, {ranks.at(count), kBottom}, kGrid);
+    drawing.line({ranks.at(count), kTop}, {ranks.at(count), kBottom}, kGridStroke);
     if (ranks.at(count) < free) continue;
     drawing.text({ranks.at(count), kBottom + 18}, fmt::format("{}", count), Anchor::Middle);
     free = ranks.at(count) + 22;

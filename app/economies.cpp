@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/check.h"
+#include "rt/half_resolution.h"
 
 namespace hpr {
 namespace {
@@ -33,7 +34,7 @@ FrameSettings economize(FrameSettings settings, std::span<const std::string> eco
   RaySettings& rays = settings.rays;
   for (const std::string& name : economies) {
     if (name == kHalfResolution) {
-      rays.half_resolution = {"shadow", "reflection", "refraction", "ambient-occlusion", "photon"};
+      rays.half_resolution = half_resolution_passes();
     } else if (name == kNoPhotons) {
       rays.photons = 0;
       rays.global_photons = false;

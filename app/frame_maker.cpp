@@ -85,7 +85,7 @@ Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Pro
     write_report(effort, effort.samples);
   }
   last_screens_.assign(screens.begin(), screens.end());
-  return sampler_ ? sampler_->frame() : whole_;
+  return sampler_->frame();
 }
 
 void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress) {
@@ -94,12 +94,6 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
     sampling.goal = {.samples = samples, .seconds = {}, .relmse = {}};
     const auto least = static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
     if (samples < least) sampling.filter.reset();
-  }
-  sampler_.reset();
-  relmse_.reset();
-  if (!sampling.sums()) {
-    whole_ = make_frame(session_, plan_, blocks_.views, &times_, {{number, 0}, nullptr});
-    return;
   }
   sampler_.emplace(session_, plan_, sampling, number, false);
   (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only

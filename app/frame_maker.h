@@ -55,7 +55,6 @@ class FrameMaker {
   std::vector<View> last_screens_;
   std::optional<FrameSampler> sampler_;  ///< of the frame at hand, or the picture that is refined
   bool refining_ = false;
-  Frame whole_;
   FrameTimes times_;
   std::optional<double> relmse_;
   std::optional<BudgetRecord> report_;

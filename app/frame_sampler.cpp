@@ -44,7 +44,7 @@ FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampli
       plan_(plan),
       sampling_(sampling),
       number_(frame),
-      film_(plan.layout, {plan.aovs, keeps_keys}),
+      film_(sampling.sums() ? plan.layout : FrameLayout(), {plan.aovs, keeps_keys}),
       keeps_keys_(keeps_keys) {}
 
 void FrameSampler::load(const CheckpointSettings& checkpoint) {
@@ -96,6 +96,11 @@ void FrameSampler::add_sample(std::span<const View> views) {
 }
 
 bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
+  if (!sampling_.sums()) {
+    frame_ = make_frame(session_, plan_, views, &times_, {{number_, 0}, nullptr});
+    so_far_.samples = 1;
+    return true;
+  }
   if (checkpoint.resume) load(checkpoint);
   const double before = so_far_.seconds;
   const Stopwatch watch;

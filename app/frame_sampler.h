@@ -11,8 +11,8 @@
 
 namespace hpr {
 
-/// Makes one frame of many: draws samples, each a frame seen through its own place of the pixels, until the goal is
-/// reached, and takes their mean.
+/// Makes a frame: draws samples, each a frame seen through its own place of the pixels, until the goal is reached, and
+/// takes their mean. A single look through the pixels' centres is that frame itself, and nothing is summed.
 class FrameSampler {
  public:
   /// `frame`: its number, by which its noise differs from other frames'. `keeps_keys`: frame().keys are those of the

@@ -36,6 +36,10 @@ svg { max-width: 100%; height: auto; }
 
 }  // namespace
 
+std::string html_entry(std::string_view name, std::string_view value) {
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", name, escape_markup(value));
+}
+
 std::string html_page(std::string_view title, std::string_view body) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"

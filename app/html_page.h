@@ -9,4 +9,7 @@ namespace hpr {
 /// network. `title` is plain text, `body` markup.
 [[nodiscard]] std::string html_page(std::string_view title, std::string_view body);
 
+/// A line of the list of facts (dl) a report begins with: `name` is markup, `value` plain text.
+[[nodiscard]] std::string html_entry(std::string_view name, std::string_view value);
+
 }  // namespace hpr

@@ -16,7 +16,7 @@ constexpr std::array kKnobs{
     Knob{"quality", "draft, good, best", "all of the below that are not given", "all of the below that are not given"},
     Knob{"spp", "1, 2, 3 ...; until:60s; until:relmse=1e-3", "time in proportion",
          "noise: its squared error falls as 1 / spp, faster where it is only edges"},
-    Knob{"passes", "auto, none, or a list of shadow, reflection, refraction, photon, ambient-occlusion",
+    Knob{"passes", "auto, all, none, or a list of shadow, reflection, refraction, photon, ambient-occlusion",
          "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},
     Knob{"indirect", "false, true", "photons wherever light meets rough surfaces, and a gather at every point",
          "false: light that rough surfaces scatter on to others: a quarter of what a closed room shows"},

@@ -59,15 +59,31 @@ void check_size(Size size, const Globals& globals) {
   }
 }
 
-TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops) {
+namespace {
+
+void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, double exposure_stops) {
   const auto gain = static_cast<float>(std::exp2(exposure_stops));
+  std::ranges::transform(radiance, display.begin(), [gain](const Rgb& color) {
+    return to_srgb({color.r * gain, color.g * gain, color.b * gain});
+  });
+}
+
+}  // namespace
+
+Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops) {
+  Image<Rgba8> display(radiance.size());
+  parallel_for(threads, static_cast<std::size_t>(radiance.height()), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    to_display(radiance.row(y), display.row(y), exposure_stops);
+  });
+  return display;
+}
+
+TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops) {
   TileLayer<Rgba8> display(frame.radiance.layout());
   for (const std::size_t tile : frame.owned) display.set_active(tile);
   parallel_for(threads, frame.owned.size(), [&](std::size_t i) {
-    const auto from = frame.radiance.tile(frame.owned[i]);
-    std::ranges::transform(from, display.tile(frame.owned[i]).begin(), [gain](Rgb color) {
-      return to_srgb({color.r * gain, color.g * gain, color.b * gain});
-    });
+    to_display(frame.radiance.tile(frame.owned[i]), display.tile(frame.owned[i]), exposure_stops);
   });
   return display;
 }

@@ -49,6 +49,8 @@ void check_size(Size size, const Globals& globals);
 /// A frame's tiles as display colours,
 /// `exposure_stops` brighter.
 [[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops);
+/// The same of a picture.
+[[nodiscard]] Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops);
 
 /// What a run of frames took, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {

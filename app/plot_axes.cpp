@@ -1,8 +1,23 @@
 #include "app/plot_axes.h"
 
 #include <algorithm>
+#include <array>
 
 namespace hpr {
+
+const SeriesLook& series_look(std::size_t index) {
+  static constexpr std::array<SeriesLook, 10> kLooks{{{"#332288", ""},
+                                                      {"#117733", "7 3"},
+                                                      {"#CC6677", ""},
+                                                      {"#2F9C8E", "2 3"},
+                                                      {"#882255", "7 3"},
+                                                      {"#8A8A20", "9 3 2 3"},
+                                                      {"#AA4499", ""},
+                                                      {"#3E8FC0", "7 3"},
+                                                      {"#555555", "9 3 2 3"},
+                                                      {"#B5651D", "2 3"}}};
+  return kLooks.at(index % kLooks.size());
+}
 
 LogScale LogScale::of(std::vector<double> values, double from, double to) {
   std::ranges::sort(values);

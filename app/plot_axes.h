@@ -1,9 +1,24 @@
 #pragma once
 
 #include <cmath>
+#include <string_view>
 #include <vector>
 
+#include "app/markup.h"
+
 namespace hpr {
+
+/// What all plots of reports have in common.
+inline constexpr Stroke kGridStroke{"#dddddd", 1.0};
+inline constexpr Stroke kAxisStroke{"#444444", 1.0};
+
+/// How series `index` of a plot looks: colors of Tol's "muted" scheme, without those too light on white, each with
+/// dashes, so that nothing hangs on color alone. After ten they begin again.
+struct SeriesLook {
+  std::string_view color;
+  std::string_view dashes;
+};
+[[nodiscard]] const SeriesLook& series_look(std::size_t index);
 
 /// A logarithmic scale from `from` to `to` pixels of a plot.
 class LogScale {

@@ -118,21 +118,15 @@ class RenderCommand final : public Command {
     prepare(session, plan);
     const Stopwatch watch;
     const std::size_t sent_before = session.comm().bytes_sent();
-    FrameTimes times;
-    Frame whole;
-    std::optional<FrameSampler> sampler;
-    if (sampling.sums()) {
-      sampler.emplace(session, plan, sampling, 0, !files_.raw.empty());
-      Progress progress(speaks ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
-      const CheckpointSettings checkpoint{checkpoint_, resume_, identity_of(session, plan, blocks.views, sampling)};
-      if (!sampler->draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
-      times = sampler->times();
-    } else {
-      whole = make_frame(session, plan, blocks.views, &times);
-    }
-    const CollectedPicture picture(session, sampler ? sampler->frame() : whole, blocks, size, files_);
-    RunStats stats = gather_stats(session, plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
-    if (sampler) stats.relmse = sampler->reached_so_far().relmse;
+    FrameSampler sampler(session, plan, sampling, 0, !files_.raw.empty());
+    Progress progress(speaks ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
+    CheckpointSettings checkpoint{checkpoint_, resume_, {}};
+    if (!checkpoint_.empty()) checkpoint.identity = identity_of(session, plan, blocks.views, sampling);
+    if (!sampler.draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
+    const CollectedPicture picture(session, sampler.frame(), blocks, size, files_);
+    const FrameCost cost{watch.ms(), session.comm().bytes_sent() - sent_before};
+    RunStats stats = gather_stats(session, plan, sampler.times(), cost);
+    stats.relmse = sampler.reached_so_far().relmse;
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;
       picture.write(session.scene().name);
@@ -140,7 +134,8 @@ class RenderCommand final : public Command {
     });
     if (speaks) {
       log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms{}", session.scene().triangles, size.width, size.height,
-                stats.ranks, stats.ms, sampler ? fmt::format(", {} samples", sampler->reached_so_far().samples) : "");
+                stats.ranks, stats.ms,
+                sampling.sums() ? fmt::format(", {} samples", sampler.reached_so_far().samples) : "");
     }
     return verdict(stats, options_.strict);
   }

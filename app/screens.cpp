@@ -1,8 +1,5 @@
 #include "app/screens.h"
 
-#include <cmath>
-
-#include "core/parallel.h"
 #include "image/enlarge.h"
 
 namespace hpr {
@@ -15,18 +12,6 @@ Size made_size(const Blocks& blocks, std::size_t screen) {
 }
 
 }  // namespace
-
-Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops) {
-  const auto gain = static_cast<float>(std::exp2(exposure_stops));
-  Image<Rgba8> display(radiance.size());
-  parallel_for(threads, static_cast<std::size_t>(radiance.height()), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    std::ranges::transform(radiance.row(y), display.row(y).begin(), [gain](const Rgb& color) {
-      return to_srgb({color.r * gain, color.g * gain, color.b * gain});
-    });
-  });
-  return display;
-}
 
 std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const Blocks& blocks,
                                            const Showing& showing) {

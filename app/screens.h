@@ -8,9 +8,6 @@
 
 namespace hpr {
 
-/// Display colours of `radiance`, `exposure_stops` brighter.
-[[nodiscard]] Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops);
-
 /// Where a frame is shown.
 struct Showing {
   std::vector<Size> sizes;    ///< per screen, pixels; a frame made of fewer or more is enlarged by a filter

@@ -15,22 +15,19 @@
 namespace hpr {
 namespace {
 
-std::string entry(std::string_view name, std::string_view value) {
-  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", name, escape_markup(value));
-}
-
 std::string header(const TradeoffReport& report) {
   std::string text = "<h1>Speed against accuracy</h1>\n<dl>\n";
-  text += entry("Scene", fmt::format("{}, {}x{} pixels, seed {}", report.scene, report.size.width, report.size.height,
-                                     report.seed));
+  text += html_entry("Scene", fmt::format("{}, {}x{} pixels, seed {}", report.scene, report.size.width,
+                                          report.size.height, report.seed));
   const TradeoffReference& reference = report.reference;
   std::string truth = reference.how;
   if (reference.spp > 0) truth += fmt::format(", {} samples", reference.spp);
   if (std::isfinite(reference.relmse)) truth += fmt::format(", its own relMSE about {:.2g}", reference.relmse);
-  text += entry("Truth", truth);
-  text += entry("Machine", fmt::format("{}, {} rank{} of {} thread{}", report.machine.cpu, report.ranks,
-                                       report.ranks == 1 ? "" : "s", report.threads, report.threads == 1 ? "" : "s"));
-  text += entry("Commit", kCommit);
+  text += html_entry("Truth", truth);
+  text +=
+      html_entry("Machine", fmt::format("{}, {} rank{} of {} thread{}", report.machine.cpu, report.ranks,
+                                        report.ranks == 1 ? "" : "s", report.threads, report.threads == 1 ? "" : "s"));
+  text += html_entry("Commit", kCommit);
   text += fmt::format("<dt>Command</dt><dd><code>{}</code></dd>\n</dl>\n", escape_markup(report.command));
   if (report.budget) {
     text += fmt::format("<p><strong>{}.</strong></p>\n", escape_markup(answer(report)));

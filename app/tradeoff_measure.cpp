@@ -272,19 +272,11 @@ TradeoffPoint measure_point(Session& session, const RenderOptions& options, cons
     const std::size_t sent_before = session.comm().bytes_sent();
     const Stopwatch watch;
     Progress silent("none", "sample", 0);
-    FrameTimes times;
-    std::optional<FrameSampler> sampler;
-    Frame whole;
-    if (setup.sampling.sums()) {
-      sampler.emplace(session, setup.plan, setup.sampling, 0, false);
-      (void)sampler->draw(setup.blocks.views, {}, silent);  // without a checkpoint it does not stop early
-      times = sampler->times();
-    } else {
-      whole = make_frame(session, setup.plan, setup.blocks.views, &times);
-    }
-    picture = collect(session, sampler ? sampler->frame() : whole, setup.blocks, how.size, setup.colors);
+    FrameSampler sampler(session, setup.plan, setup.sampling, 0, false);
+    (void)sampler.draw(setup.blocks.views, {}, silent);  // without a checkpoint it does not stop early
+    picture = collect(session, sampler.frame(), setup.blocks, how.size, setup.colors);
     const RunStats stats =
-        gather_stats(session, setup.plan, times, {watch.ms(), session.comm().bytes_sent() - sent_before});
+        gather_stats(session, setup.plan, sampler.times(), {watch.ms(), session.comm().bytes_sent() - sent_before});
     spent += stats.ms;
     if (frame == 0 && spent < 0.5 * kLongEnoughMs) continue;
     point.ms.push_back(stats.ms);

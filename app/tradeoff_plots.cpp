@@ -21,27 +21,7 @@ constexpr double kLeft = 86.0;
 constexpr double kRight = 680.0;  ///< of the field; names stand to the right of it
 constexpr double kTop = 18.0;
 constexpr double kBottom = 370.0;
-constexpr Stroke kGrid{"#dddddd", 1.0};
-constexpr Stroke kAxis{"#444444", 1.0};
 constexpr Stroke kFront{"#d8c070", 6.0};
-
-/// Tol's "muted" scheme, without those too light on white; dashes tell apart what colours do not.
-struct Look {
-  std::string_view color;
-  std::string_view dashes;
-};
-constexpr std::array<Look, 8> kLooks{{{"#332288", ""},
-                                      {"#117733", "7 3"},
-                                      {"#CC6677", ""},
-                                      {"#3E8FC0", "7 3"},
-                                      {"#882255", "2 3"},
-                                      {"#8A8A20", ""},
-                                      {"#AA4499", "7 3"},
-                                      {"#555555", "2 3"}}};
-
-const Look& look(std::size_t index) {
-  return kLooks.at(index % kLooks.size());
-}
 
 /// A point with a place in the plot.
 struct Dot {
@@ -66,15 +46,15 @@ std::string axis_name(const std::string& metric) {
 
 void draw_axes(SvgDrawing& drawing, const LogScale& x, const LogScale& y, const std::string& metric) {
   for (const double value : y.ticks()) {
-    drawing.line({kLeft, y.at(value)}, {kRight, y.at(value)}, kGrid);
+    drawing.line({kLeft, y.at(value)}, {kRight, y.at(value)}, kGridStroke);
     drawing.text({kLeft - 8, y.at(value) + 4}, fmt::format("{:g}", value), Anchor::End);
   }
   for (const double value : x.ticks()) {
-    drawing.line({x.at(value), kTop}, {x.at(value), kBottom}, kGrid);
+    drawing.line({x.at(value), kTop}, {x.at(value), kBottom}, kGridStroke);
     drawing.text({x.at(value), kBottom + 18}, fmt::format("{:g}", value), Anchor::Middle);
   }
-  drawing.line({kLeft, kTop}, {kLeft, kBottom}, kAxis);
-  drawing.line({kLeft, kBottom}, {kRight, kBottom}, kAxis);
+  drawing.line({kLeft, kTop}, {kLeft, kBottom}, kAxisStroke);
+  drawing.line({kLeft, kBottom}, {kRight, kBottom}, kAxisStroke);
   drawing.text({(kLeft + kRight) / 2, kBottom + 42}, "ms of a frame, slowest rank", Anchor::Middle, 13);
   drawing.upright_text({18, (kTop + kBottom) / 2}, axis_name(metric), 13);
 }
@@ -122,14 +102,15 @@ std::string plot_error_over_time(const TradeoffReport& report, const std::string
   if (metric == report.metrics.front()) draw_line(drawing, front, kFront);
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::vector<Dot>& dots = lines.at(order[i]);
-    draw_line(drawing, dots, {look(i).color, 1.6, look(i).dashes});
+    draw_line(drawing, dots, {series_look(i).color, 1.6, series_look(i).dashes});
     for (const Dot& dot : dots) {
-      drawing.circle(dot.at, 4.4, dot.pareto ? look(i).color : "#ffffff", {look(i).color, 1.5});
+      drawing.circle(dot.at, 4.4, dot.pareto ? series_look(i).color : "#ffffff", {series_look(i).color, 1.5});
       drawing.text({dot.at.x + 6, dot.at.y - 5}, fmt::format("{}", dot.number), Anchor::Start, 10);
     }
     const double height = kTop + 12 + 18.0 * static_cast<double>(i);
     if (order[i].empty() || height > kBottom) continue;
-    drawing.line({kRight + 14, height - 4}, {kRight + 40, height - 4}, {look(i).color, 1.6, look(i).dashes});
+    drawing.line({kRight + 14, height - 4}, {kRight + 40, height - 4},
+                 {series_look(i).color, 1.6, series_look(i).dashes});
     drawing.text({kRight + 46, height}, describe(order[i]));
   }
   return drawing.str();
@@ -157,13 +138,13 @@ std::string plot_shares_of_passes(const TradeoffReport& report) {
       const auto found = std::ranges::find(point.times, names[name], &PassTime::name);
       if (found == point.times.end()) continue;
       const double width = (kRight - kLeft) * found->ms / sum;
-      drawing.rectangle({left, top}, width, kPitch - 5, look(name).color, {"#ffffff", 0.5});
+      drawing.rectangle({left, top}, width, kPitch - 5, series_look(name).color, {"#ffffff", 0.5});
       left += width;
     }
   }
   for (std::size_t name = 0; name < names.size(); ++name) {
     const double top = kTop + kPitch * static_cast<double>(name);
-    drawing.rectangle({kRight + 14, top}, 14, kPitch - 7, look(name).color, {"#ffffff", 0.5});
+    drawing.rectangle({kRight + 14, top}, 14, kPitch - 7, series_look(name).color, {"#ffffff", 0.5});
     drawing.text({kRight + 34, top + 11}, names[name]);
   }
   return drawing.str();

@@ -43,13 +43,13 @@ void widen(const std::byte* bytes, std::span<Key> keys) {
 void narrow_keys(std::span<const Key> keys, DepthFormat format, std::byte* bytes) {
   if (format == DepthFormat::Bits16) return narrow<DepthFormat::Bits16>(keys, bytes);
   if (format == DepthFormat::Bits24) return narrow<DepthFormat::Bits24>(keys, bytes);
-  std::memcpy(bytes, keys.data(), keys.size_bytes());
+  if (!keys.empty()) std::memcpy(bytes, keys.data(), keys.size_bytes());
 }
 
 void widen_keys(const std::byte* bytes, DepthFormat format, std::span<Key> keys) {
   if (format == DepthFormat::Bits16) return widen<DepthFormat::Bits16>(bytes, keys);
   if (format == DepthFormat::Bits24) return widen<DepthFormat::Bits24>(bytes, keys);
-  std::memcpy(keys.data(), bytes, keys.size_bytes());
+  if (!keys.empty()) std::memcpy(keys.data(), bytes, keys.size_bytes());
 }
 
 }  // namespace hpr

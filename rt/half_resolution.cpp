@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <string_view>
 
 #include "core/check.h"
 #include "core/error.h"
@@ -45,28 +46,33 @@ glm::dvec3 made_up_for(const glm::vec3& borrower, const glm::vec3& lender) {
   return {ratio(borrower.r, lender.r), ratio(borrower.g, lender.g), ratio(borrower.b, lender.b)};
 }
 
+struct Shareable {
+  std::string_view name;
+  std::uint8_t bits;
+};
+constexpr std::array<Shareable, 5> kShareable{{
+    {"shadow", static_cast<std::uint8_t>(bit(Component::Direct) | bit(Component::Shadow))},
+    {"reflection", bit(Component::Reflection)},
+    {"refraction", bit(Component::Refraction)},
+    {"ambient-occlusion", bit(Component::AmbientOcclusion)},
+    {"photon", bit(Component::Photon)},
+}};
+
 }  // namespace
 
+std::vector<std::string> half_resolution_passes() {
+  std::vector<std::string> names;
+  for (const Shareable& each : kShareable) names.emplace_back(each.name);
+  return names;
+}
+
 std::uint8_t shared_components(const RaySettings& settings) {
-  struct Shareable {
-    std::string name;
-    std::uint8_t bits;
-  };
-  const std::array<Shareable, 5> all{{
-      {"shadow", static_cast<std::uint8_t>(bit(Component::Direct) | bit(Component::Shadow))},
-      {"reflection", bit(Component::Reflection)},
-      {"refraction", bit(Component::Refraction)},
-      {"ambient-occlusion", bit(Component::AmbientOcclusion)},
-      {"photon", bit(Component::Photon)},
-  }};
   std::uint8_t bits = 0;
   for (const std::string& name : settings.half_resolution) {
-    const auto found = std::ranges::find(all, name, &Shareable::name);
-    if (found == all.end()) {
-      std::vector<std::string> names;
-      for (const Shareable& each : all) names.push_back(each.name);
+    const auto found = std::ranges::find(kShareable, name, &Shareable::name);
+    if (found == kShareable.end()) {
       throw Error(ExitCode::Usage, "no pass called '" + printable(name) + "' runs at half resolution",
-                  unknown_name_hint(name, names));
+                  unknown_name_hint(name, half_resolution_passes()));
     }
     bits |= found->bits;
   }

@@ -4,12 +4,16 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "rt/first_points.h"
 #include "rt/pass.h"
 
 namespace hpr {
+
+/// The names RaySettings::half_resolution may hold: passes, "shadow" standing for the light of lights.
+[[nodiscard]] std::vector<std::string> half_resolution_passes();
 
 /// The components of passes that RaySettings::half_resolution names, one bit each. Throws Error (Usage) for a name that
 /// is no pass, or one whose light cannot be shared among pixels.

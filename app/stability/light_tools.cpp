@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "app/stability/tools.h"
 #include "core/parallel.h"
 #include "rt/primary_rays.h"
 #include "rt/ray_scene.h"
@@ -60,11 +61,8 @@ Material mirror(float reflectance) {
 std::uint32_t add_placed(Scene& scene, Mesh mesh, const Material& material, const glm::dmat4& to_world) {
   mesh.material = static_cast<std::uint32_t>(scene.materials.size());
   scene.materials.push_back(material);
-  if (mesh.normals.empty()) mesh.normals = smooth_normals(mesh.positions, mesh.triangles);
-  const auto index = static_cast<std::uint32_t>(scene.meshes.size());
-  scene.meshes.push_back(std::move(mesh));
-  scene.instances.push_back({index, to_world, 0});
-  return index;
+  add(scene, std::move(mesh), to_world);
+  return static_cast<std::uint32_t>(scene.meshes.size() - 1);
 }
 
 Mesh parallelogram(const glm::dvec3& corner, const glm::dvec3& a, const glm::dvec3& b) {

@@ -19,8 +19,6 @@ constexpr double kLeft = 86.0;
 constexpr double kRight = 700.0;
 constexpr double kTop = 18.0;
 constexpr double kBottom = 270.0;
-constexpr Stroke kGrid{"#dddddd", 1.0};
-constexpr Stroke kAxis{"#444444", 1.0};
 constexpr Stroke kMeasured{"#332288", 1.8};
 constexpr Stroke kExpected{"#117733", 1.6, "7 4"};
 constexpr Stroke kLimit{"#8a3c00", 1.4};
@@ -97,15 +95,15 @@ std::string plot(const StabilityFinding& finding) {
   SvgDrawing drawing(kWidth, kHeight, fmt::format("{}: measured against its limit", finding.name),
                      fmt::format("Measured {:.4g}, limit {:.4g} {}.", finding.measured, finding.limit, finding.unit));
   for (const auto& [place, name] : y.ticks()) {
-    drawing.line({kLeft, place}, {kRight, place}, kGrid);
+    drawing.line({kLeft, place}, {kRight, place}, kGridStroke);
     drawing.text({kLeft - 8, place + 4}, name, Anchor::End);
   }
   for (const auto& [place, name] : x.ticks()) {
-    drawing.line({place, kTop}, {place, kBottom}, kGrid);
+    drawing.line({place, kTop}, {place, kBottom}, kGridStroke);
     drawing.text({place, kBottom + 18}, name, Anchor::Middle);
   }
-  drawing.line({kLeft, kTop}, {kLeft, kBottom}, kAxis);
-  drawing.line({kLeft, kBottom}, {kRight, kBottom}, kAxis);
+  drawing.line({kLeft, kTop}, {kLeft, kBottom}, kAxisStroke);
+  drawing.line({kLeft, kBottom}, {kRight, kBottom}, kAxisStroke);
   drawing.text({(kLeft + kRight) / 2, kBottom + 40}, curve.x, Anchor::Middle, 13);
   drawing.upright_text({18, (kTop + kBottom) / 2}, finding.unit, 13);
 
@@ -148,10 +146,9 @@ std::string section(const StabilityFinding& finding) {
 std::string stability_html(std::span<const StabilityFinding> findings) {
   const auto held = std::ranges::count_if(findings, [](const StabilityFinding& f) { return f.holds(); });
   const Machine machine = this_machine();
-  std::string body = fmt::format(
-      "<h1>Numerical stability at the extremes</h1>\n<dl>\n<dt>Result</dt><dd>{} of {} hold</dd>\n"
-      "<dt>Machine</dt><dd>{}</dd>\n<dt>Commit</dt><dd>{}</dd>\n</dl>\n",
-      held, findings.size(), escape_markup(machine.cpu), escape_markup(kCommit));
+  std::string body = "<h1>Numerical stability at the extremes</h1>\n<dl>\n";
+  body += html_entry("Result", fmt::format("{} of {} hold", held, findings.size()));
+  body += html_entry("Machine", machine.cpu) + html_entry("Commit", kCommit) + "</dl>\n";
   body += "<div class=\"wide\"><table>\n<caption>The worst number within what is promised, and where along the ";
   body += "parameter the promise ends. docs/numerics.md derives the limits.</caption>\n<thead><tr>";
   for (const char* name : {"case", "measured", "limit", "unit", "verdict", "breaks at", "parameter"}) {
