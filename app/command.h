@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/launcher.h"
 #include "cluster/communicator.h"
 #include "core/error.h"
 #include "scene/load_scene.h"
@@ -57,7 +58,8 @@ class Command {
 /// Runs `body` on `globals.ranks` ranks. Inside an MPI job (mpirun, srun, or our own mpiexec) the job's ranks run it;
 /// with one rank it runs here; otherwise mpiexec is started with this very command line and the body never runs here.
 /// Returns what all ranks agreed on. Check whatever can be checked without the other ranks before calling it.
-[[nodiscard]] ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body);
+[[nodiscard]] ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body,
+                                 StandardInput input = StandardInput::None);
 
 /// What this rank may use of the machine it runs on.
 struct HostShare {

@@ -71,11 +71,9 @@ const Knob& find_knob(const std::string& name) {
 void set_knob(RenderOptions& options, const std::string& knob, const std::string& value) {
   std::string written = value;
   std::ranges::replace(written, '+', ',');
-  CLI::App app;
-  options.declare(app);
+  (void)find_knob(knob);
   try {
-    std::vector<std::string> words{fmt::format("--{}={}", find_knob(knob).name, written)};
-    app.parse(words);
+    set_option(options, knob, written);
   } catch (const CLI::ParseError& error) {
     throw Error(ExitCode::Usage, fmt::format("--vary {}={}: {}", knob, printable(value), error.what()),
                 fmt::format("it takes {}", find_knob(knob).range));

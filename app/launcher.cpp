@@ -34,16 +34,23 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
     {"OMPI_MCA_opal_signal", ""},  // no stack dumps
 }};
 
+/// Tells rank 0, which reads from a pipe, that its launcher reads from a terminal.
+constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
+
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const std::map<std::string, std::string>& extra_env,
-                         int stdout_pipe, pid_t parent) {
+                         int stdout_pipe, StandardInput input, pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
-  const int null = ::open("/dev/null", O_RDONLY);
-  if (null >= 0) ::dup2(null, STDIN_FILENO);
+  if (input == StandardInput::None) {
+    const int null = ::open("/dev/null", O_RDONLY);
+    if (null >= 0) ::dup2(null, STDIN_FILENO);
+  }
+  const bool typed = input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
   if (stdout_pipe >= 0) ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
+  if (typed) ::setenv(kTypedInput, "1", 1);
   for (const auto& [name, value] : extra_env) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
   ::execvp(arguments.front(), arguments.data());
@@ -138,8 +145,13 @@ std::string program_path() {
   return std::filesystem::read_symlink("/proc/self/exe").string();
 }
 
+bool input_is_typed() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
+  return ::isatty(STDIN_FILENO) == 1 || std::getenv(kTypedInput) != nullptr;
+}
+
 int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
-                const std::map<std::string, std::string>& extra_env) {
+                const std::map<std::string, std::string>& extra_env, StandardInput input) {
   if (!find_on_path("mpiexec")) {
     throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
                 "install openmpi-bin, or run with --ranks 1");
@@ -160,7 +172,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
-  if (child == 0) become(arguments, extra_env, pipe[1], parent);
+  if (child == 0) become(arguments, extra_env, pipe[1], input, parent);
   PassedSignals::to(child);
 
   if (captured_stdout != nullptr) {

@@ -277,4 +277,11 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   return settings;
 }
 
+void set_option(RenderOptions& options, const std::string& name, const std::string& value) {
+  CLI::App app;
+  options.declare(app);
+  std::vector<std::string> words{fmt::format("--{}={}", name, value)};
+  app.parse(words);
+}
+
 }  // namespace hpr

@@ -69,4 +69,8 @@ struct RenderOptions {
   void settle_economies(FrameSettings& settings) const;
 };
 
+/// Sets one option, named without its dashes, as the command line would. Throws CLI::ParseError when there is none of
+/// this name or it does not take the value.
+void set_option(RenderOptions& options, const std::string& name, const std::string& value);
+
 }  // namespace hpr

@@ -18,10 +18,7 @@ Session::Session(Communicator& comm, const Globals& globals, const std::function
       share_(host_share(comm, globals)),
       scene_(distribute_scene(comm_, load)),
       requirements_(requirements_of(scene_)) {
-  if (comm_.rank() == 0) {
-    for (const std::string& warning : scene_.warnings)
-      log::warning("{}: {}", printable(scene_.name), printable(warning, 400));
-  }
+  warn_of_scene();
   agree_on_failure(comm_, [&] {
     gl_ = make_gl_context({.backend = globals.backend,
                            .device = globals.device,
@@ -30,6 +27,37 @@ Session::Session(Communicator& comm, const Globals& globals, const std::function
   });
   log::debug("OpenGL: {}", gl_->description());
   compare_rasterizers();
+}
+
+void Session::load(const std::function<Scene()>& load) {
+  Scene scene = distribute_scene(comm_, load);
+  forget_scene();
+  scene_ = std::move(scene);
+  requirements_ = requirements_of(scene_);
+  warn_of_scene();
+}
+
+void Session::change_scene(const std::function<void(Scene&)>& change) {
+  forget_scene();
+  change(scene_);
+  requirements_ = requirements_of(scene_);
+}
+
+void Session::warn_of_scene() const {
+  if (comm_.rank() != 0) return;
+  for (const std::string& warning : scene_.warnings)
+    log::warning("{}: {}", printable(scene_.name), printable(warning, 400));
+}
+
+void Session::forget_scene() {
+  lighter_.reset();
+  ray_settings_.reset();
+  primary_rays_.reset();
+  traced_share_.reset();
+  traced_objects_.clear();
+  ray_scene_.reset();
+  rasterizer_.reset();
+  objects_.clear();
 }
 
 void Session::compare_rasterizers() {

@@ -27,6 +27,11 @@ class Session {
   /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
   Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load);
 
+  /// Collective. Another scene in this one's place; when it cannot be loaded, this one stays.
+  void load(const std::function<Scene()>& load);
+  /// Changes the scene; called alike on every rank. What was made of the old one is made anew when asked for.
+  void change_scene(const std::function<void(Scene&)>& change);
+
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
   [[nodiscard]] int rank() const { return comm_.rank(); }
   [[nodiscard]] const Scene& scene() const { return scene_; }
@@ -57,6 +62,9 @@ class Session {
 
  private:
   void compare_rasterizers();
+  void warn_of_scene() const;
+  /// Ends what was made of the scene.
+  void forget_scene();
   /// Ends what rays meet where it was built in another way.
   void build_rays_by(const RayBuild& build);
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "app/output.h"
+#include "app/wall_remote.h"
 #include "app/wall_run.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -44,6 +45,12 @@ class WallCommand final : public Command {
       runs_ = true;
       action_ = [this](const Globals& globals) { return run_->run(globals); };
     });
+    for (const auto& command : remote_) {
+      CLI::App& sub = *app.add_subcommand(std::string(command->name()), std::string(command->summary()));
+      command->declare(sub);
+      sub.callback(
+          [this, &command] { action_ = [&command](const Globals& globals) { return command->run(globals); }; });
+    }
   }
 
   /// Only `run` draws; the rest reads a file and answers.
@@ -109,6 +116,7 @@ class WallCommand final : public Command {
   std::string output_;
   bool json_ = false;
   std::unique_ptr<Command> run_ = make_wall_run_command();
+  std::vector<std::unique_ptr<Command>> remote_ = make_wall_remote_commands();
   bool runs_ = false;
   std::function<ExitCode(const Globals&)> action_;
 };

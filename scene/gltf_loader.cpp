@@ -133,8 +133,14 @@ class SceneBuilder {
         }
         if (glm::determinant(glm::dmat3(instance.to_world)) == 0.0) ++singular_;
         scene_.instances.push_back(instance);
+        scene_.node_names.push_back(node_name(node));
       }
     }
+  }
+
+  [[nodiscard]] std::string node_name(int node) const {
+    const std::string& name = data_.model().nodes[GltfData::to_size(node)].name;
+    return name.empty() ? fmt::format("node{}", node) : name;
   }
 
   const std::vector<std::uint32_t>& meshes_of(const tinygltf::Node& node) {

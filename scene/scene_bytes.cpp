@@ -12,7 +12,7 @@
 #include "scene/scene.h"
 
 // Every struct of scene.h, field by field: what stands here is what reaches the other ranks and what the content hash
-// sees.
+// sees; node names reach the ranks alone.
 namespace glm {
 
 template <typename Archive, length_t N, typename T, qualifier Q>
@@ -151,17 +151,19 @@ class SpanSource final : public std::streambuf {
   }
 };
 
-void save(const Scene& scene, std::streambuf& sink) {
+/// One serialize() both reads and writes; an output archive only reads.
+void save(const Scene& scene, std::streambuf& sink, bool with_names) {
   std::ostream stream(&sink);
   cereal::BinaryOutputArchive archive(stream);
-  archive(const_cast<Scene&>(scene));  // one serialize() both reads and writes; an output archive only reads
+  archive(const_cast<Scene&>(scene));
+  if (with_names) archive(scene.node_names);
 }
 
 }  // namespace
 
 std::vector<std::byte> to_bytes(const Scene& scene) {
   VectorSink sink;
-  save(scene, sink);
+  save(scene, sink, true);
   return std::move(sink.bytes);
 }
 
@@ -170,13 +172,13 @@ Scene scene_from_bytes(std::span<const std::byte> bytes) {
   std::istream stream(&source);
   cereal::BinaryInputArchive archive(stream);
   Scene scene;
-  archive(scene);
+  archive(scene, scene.node_names);
   return scene;
 }
 
 std::uint64_t content_hash(const Scene& scene) {
   HashSink sink;
-  save(scene, sink);
+  save(scene, sink, false);
   return sink.hash.value();
 }
 

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <functional>
+#include <glm/vec3.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hpr {
+
+using Words = std::span<const std::string>;
+
+/// One command of a session.
+struct SessionCommand {
+  std::string name;
+  std::string usage;  ///< what follows the name
+  std::string summary;
+  /// Collective; `words` without the name. What it has to tell, lines without a final newline. Throws Error.
+  std::function<std::string(Words words)> run;
+};
+
+/// The commands a session knows, `help` among them.
+class CommandTable {
+ public:
+  CommandTable();
+  CommandTable(const CommandTable&) = delete;
+  CommandTable& operator=(const CommandTable&) = delete;
+
+  void add(SessionCommand command) { commands_.push_back(std::move(command)); }
+  [[nodiscard]] const std::vector<SessionCommand>& commands() const { return commands_; }
+  /// Runs one line: words apart by blanks, "quoted" where they hold some; what follows # is a remark. Throws Error
+  /// (Usage) for unknown commands, and what the command throws.
+  [[nodiscard]] std::string run(const std::string& line) const;
+
+ private:
+  [[nodiscard]] std::string help(Words words) const;
+
+  std::vector<SessionCommand> commands_;
+};
+
+/// Throws Error (Usage) that shows how the command is written.
+[[noreturn]] void refuse(const std::string& problem, const std::string& example);
+
+/// A finite number; three of them, "X,Y,Z". Throw Error (Usage).
+[[nodiscard]] double number_of(const std::string& word);
+[[nodiscard]] glm::dvec3 point_of(const std::string& word);
+
+}  // namespace hpr

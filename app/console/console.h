@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "app/console/controls.h"
+#include "app/frame_sampler.h"
+#include "app/output.h"
+
+namespace hpr {
+
+/// A resident session: a scene, how it is drawn, and the last picture of it. Every rank has one and is told the same
+/// lines.
+class Console {
+ public:
+  /// All outlive this.
+  Console(Session& session, const Globals& globals, const RenderOptions& options, Size size);
+
+  /// Collective. What the line has to tell. Throws Error where nothing was done: the session stays as it was.
+  [[nodiscard]] std::string run(const std::string& line) { return table_.run(line); }
+  [[nodiscard]] bool quits() const { return quits_; }
+
+ private:
+  /// A picture as it was drawn, whatever changed since.
+  struct Picture {
+    FramePlan plan;
+    Blocks blocks;
+    Size size;
+    double exposure = 0.0;
+    ColorFormat colors = ColorFormat::Float32;
+    std::unique_ptr<FrameSampler> sampler;
+    RunStats stats;
+    std::string scene_name;
+  };
+
+  std::string set_size(Words words);
+  std::string render();
+  std::string save(Words words);
+  std::string write_stats_of(Words words) const;
+  std::string explain();
+  [[nodiscard]] const Picture& picture() const;
+  [[nodiscard]] View view() const;
+
+  Session& session_;
+  const Globals& globals_;
+  RenderOptions options_;
+  Size size_;
+  CommandTable table_;
+  Controls controls_;
+  std::unique_ptr<Picture> picture_;
+  bool quits_ = false;
+};
+
+}  // namespace hpr

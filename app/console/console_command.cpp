@@ -1,0 +1,140 @@
+#include "app/console/console_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <optional>
+
+#include "app/console/console.h"
+#include "app/console/forgivable.h"
+#include "app/console/line_source.h"
+#include "app/launcher.h"
+#include "app/render_options.h"
+#include "app/report_error.h"
+#include "cluster/collectives.h"
+#include "cluster/scene_distribution.h"
+#include "core/log.h"
+#include "core/units.h"
+
+namespace hpr {
+namespace {
+
+/// The other ranks hear from rank 0 at least so often: to them silence is a hang.
+constexpr std::chrono::milliseconds kHeartbeat{250};
+
+class ConsoleCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "console"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "a resident scene, told what to do line by line; 'help' lists the commands";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+    app.add_option("--listen", listen_, "also take lines from a Unix socket (a path) or from TCP (ADDRESS:PORT)")
+        ->type_name("ADDRESS");
+    app.add_flag("--keep-going", keeps_going_, "a command that fails in a script does not end it");
+    app.add_option("--size", size_, "pixels of the picture")->capture_default_str()->type_name("WxH");
+    options_.declare(app);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    const auto extent = parse_extent(size_);
+    if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
+    check_size({extent->first, extent->second}, globals);
+    if (!options_.stats.empty() || options_.explain) {
+      throw Error(ExitCode::Usage, "--stats and --explain are commands here", "say stats FILE.json, or explain");
+    }
+    (void)options_.settings(globals.seed);
+    (void)options_.sampling();
+    return run_ranks(
+        globals,
+        [&](Communicator& comm) {
+          Session session(comm, globals, [&] { return options_.load(source_, globals); });
+          Console console(session, globals, options_, {extent->first, extent->second});
+          return converse(session.comm(), console);
+        },
+        StandardInput::OfRank0);
+  }
+
+ private:
+  /// The next line, the same on all ranks; none when there will be none.
+  [[nodiscard]] static std::optional<std::string> hear(Communicator& comm, LineSource* source,
+                                                       std::optional<InputLine>& line) {
+    while (true) {
+      std::string said = "-";
+      if (source != nullptr) {
+        line = source->next(kHeartbeat);
+        said = line ? "+" + line->text : source->ended() ? "." : "-";
+      }
+      std::vector<std::byte> bytes(std::as_bytes(std::span(said)).begin(), std::as_bytes(std::span(said)).end());
+      broadcast(comm, bytes);
+      said.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+      if (said == ".") return std::nullopt;
+      if (said.starts_with('+')) return said.substr(1);
+    }
+  }
+
+  ExitCode converse(Communicator& comm, Console& console) {
+    const bool speaks = comm.rank() == 0;
+    std::optional<LineSource> source;
+    agree_on_failure(comm, [&] {
+      if (speaks) source.emplace(LineSource::Options{true, listen_});
+    });
+    const bool typed = speaks && input_is_typed();
+    if (speaks && !source->address().empty()) {
+      log::info("listening on {}{}", source->address(),
+                source->token().empty() ? "" : fmt::format(", first line: token {}", source->token()));
+    }
+    ExitCode worst = ExitCode::Done;
+    while (!console.quits()) {
+      if (typed) fmt::print("> ");
+      if (speaks) std::fflush(stdout);
+      std::optional<InputLine> line;
+      const auto heard = hear(comm, source ? &*source : nullptr, line);
+      if (!heard) break;
+      const bool scripted = all_gather_value(comm, speaks && !typed && line->from == STDIN_FILENO ? 1 : 0)[0] == 1;
+      try {
+        const std::string told = console.run(*heard);
+        if (speaks) source->answer(*line, answer_of(told, *line));
+      } catch (const Error& error) {
+        if (!is_forgivable(error)) throw;
+        if (scripted && !keeps_going_) throw;
+        worst = std::max(worst, scripted ? error.code() : ExitCode::Done);
+        if (speaks) refuse_line(*source, *line, error);
+      }
+    }
+    return worst;
+  }
+
+  /// Clients of a socket see by a last line that an answer is whole.
+  [[nodiscard]] static std::string answer_of(const std::string& told, const InputLine& line) {
+    std::string answer = told.empty() ? "" : told + "\n";
+    if (line.from != STDIN_FILENO) answer += "ok\n";
+    return answer;
+  }
+
+  static void refuse_line(LineSource& source, const InputLine& line, const Error& error) {
+    if (line.from == STDIN_FILENO) {
+      print_error(error);
+    } else {
+      source.answer(line, fmt::format("error: {} ({})\n", error.what(), error.hint()));
+    }
+  }
+
+  std::string source_;
+  std::string listen_;
+  std::string size_ = "1280x720";
+  bool keeps_going_ = false;
+  RenderOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_console_command() {
+  return std::make_unique<ConsoleCommand>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "app/console/command_table.h"
+#include "app/console/scene_edits.h"
+#include "app/render_options.h"
+#include "app/session.h"
+
+namespace hpr {
+
+/// What can be changed about a resident scene and how it is drawn, by the same commands wherever they come from. Every
+/// rank has one and is told the same lines: a change travels as its command, not as the scene.
+class Controls {
+ public:
+  /// All outlive this. Adds its commands to `table`.
+  Controls(Session& session, const Globals& globals, RenderOptions& options, CommandTable& table);
+
+  /// Raised by every change: whoever keeps a plan or a picture sees by it that it is of an earlier state.
+  [[nodiscard]] std::uint64_t changes() const { return changes_; }
+
+ private:
+  void add_scene_commands(CommandTable& table);
+  void add_light_commands(CommandTable& table);
+  void add_drawing_commands(CommandTable& table);
+  std::string load(Words words);
+  std::string move(Words words);
+  std::string change_light(Words words);
+  std::string set_camera(Words words);
+  std::string set(const std::string& option, Words words);
+  [[nodiscard]] std::string list_nodes() const;
+  [[nodiscard]] std::string list_lights() const;
+  [[nodiscard]] std::string list_cameras() const;
+  std::string scene_changed();
+
+  Session& session_;
+  const Globals& globals_;
+  RenderOptions& options_;
+  SceneEdits edits_;
+  std::uint64_t changes_ = 0;
+};
+
+}  // namespace hpr

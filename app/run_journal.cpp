@@ -1,0 +1,113 @@
+#include "app/run_journal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "app/launcher.h"
+#include "core/error.h"
+#include "core/log.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::string_view kFrame = "frame ";
+constexpr std::string_view kRestart = "restart ";
+
+}  // namespace
+
+RunJournal::RunJournal() : owns_(true) {
+  std::string name = (std::filesystem::temp_directory_path() / "hpr-run-XXXXXX").string();
+  const int file = ::mkstemp(name.data());
+  if (file < 0) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", name, std::strerror(errno)),
+                "name a folder for temporary files in TMPDIR");
+  }
+  ::close(file);
+  path_ = name;
+}
+
+std::optional<RunJournal> RunJournal::of_supervisor() {
+  const char* const path = std::getenv(kVariable);  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
+  if (path == nullptr) return std::nullopt;
+  return RunJournal(std::filesystem::path(path));
+}
+
+RunJournal::~RunJournal() {
+  std::error_code ignored;
+  if (owns_) std::filesystem::remove(path_, ignored);
+}
+
+RunJournal::RunJournal(RunJournal&& other) noexcept
+    : path_(std::move(other.path_)), owns_(std::exchange(other.owns_, false)) {}
+
+void RunJournal::append(const std::string& line) const {
+  // One write: a job that is killed leaves whole lines and at most one part of one.
+  const int file = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  const bool written = file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
+  if (file >= 0) ::close(file);
+  if (!written) log::warning("cannot write '{}': a restart would begin anew", path_.string());
+}
+
+void RunJournal::add_frame(const std::string& record) {
+  append(fmt::format("{}{}\n", kFrame, record));
+}
+
+void RunJournal::add_restart(const std::string& why) {
+  const nlohmann::ordered_json record{{"frame", read().frames.size()}, {"why", why}};
+  append(fmt::format("\n{}{}\n", kRestart, record.dump()));
+}
+
+RunJournal::Entries RunJournal::read() const {
+  Entries entries;
+  std::ifstream file(path_);
+  std::string line;
+  while (std::getline(file, line)) {
+    const bool whole = !file.eof();
+    const std::size_t space = line.find(' ');
+    if (!whole || space == std::string::npos) continue;
+    const std::string record = line.substr(space + 1);
+    if (!nlohmann::json::accept(record)) continue;
+    if (line.starts_with(kFrame)) entries.frames.push_back(record);
+    if (line.starts_with(kRestart)) entries.restarts.push_back(record);
+  }
+  return entries;
+}
+
+ExitCode run_supervised(const Globals& globals, int restarts, const std::function<ExitCode(Communicator&)>& body) {
+  if (inside_mpi_job() || globals.ranks <= 1 || restarts <= 0) return run_ranks(globals, body);
+  RunJournal journal;
+  // The launcher's own words, which name the rank and its host, are wanted here.
+  const std::map<std::string, std::string> environment{{RunJournal::kVariable, journal.path().string()},
+                                                       {"OMPI_MCA_orte_execute_quiet", "0"}};
+  std::optional<std::size_t> ended_at;
+  for (int restart = 0;; ++restart) {
+    std::optional<Error> lost;
+    try {
+      const auto code = static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, nullptr, environment));
+      if (code != ExitCode::Hang && code != ExitCode::Lost) return code;
+      lost.emplace(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::Lost) throw;
+      lost.emplace(error);
+    }
+    const std::size_t done = journal.read().frames.size();
+    if (restart == restarts || ended_at == done) {
+      throw Error(lost->code(), fmt::format("{}; {} of its frames are done", lost->what(), done),
+                  ended_at == done ? "frame " + std::to_string(done) + " ended two jobs; draw it alone to see why"
+                                   : fmt::format("it was started again {} times; see --restarts", restart));
+    }
+    ended_at = done;
+    log::warning("{}; starting it again from frame {} (restart {} of {})", lost->what(), done, restart + 1, restarts);
+    journal.add_restart(lost->what());
+  }
+}
+
+}  // namespace hpr

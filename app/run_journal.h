@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/command.h"
+
+namespace hpr {
+
+/// What survives the jobs of one run: the records of its frames, one JSON object a line, and why jobs were started
+/// again. Written by rank 0 and the supervisor, in turn.
+class RunJournal {
+ public:
+  /// The supervisor's: a new file only this user may read; removed with this object.
+  RunJournal();
+  /// A job's: the file the supervisor named in the environment; none where nobody supervises.
+  [[nodiscard]] static std::optional<RunJournal> of_supervisor();
+  ~RunJournal();
+  RunJournal(RunJournal&& other) noexcept;
+  RunJournal& operator=(RunJournal&&) = delete;
+
+  /// A frame is drawn and shown.
+  void add_frame(const std::string& record);
+  void add_restart(const std::string& why);
+
+  struct Entries {
+    std::vector<std::string> frames;    ///< records, in order
+    std::vector<std::string> restarts;  ///< JSON objects: the frame that was to come, and why
+  };
+  /// A last line that was cut short is none.
+  [[nodiscard]] Entries read() const;
+
+  /// For the environment of a job.
+  static constexpr const char* kVariable = "HPR_RUN_JOURNAL";
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  explicit RunJournal(std::filesystem::path path) : path_(std::move(path)) {}
+  void append(const std::string& line) const;
+
+  std::filesystem::path path_;
+  bool owns_ = false;
+};
+
+/// As run_ranks; where that starts a job of several ranks, one that loses a rank or stands still is started again, up
+/// to `restarts` times, with the journal of what was done. It is not where the frame after which it ended is the one an
+/// earlier job ended at: that frame would end the next one too. Throws Error (Lost) then.
+[[nodiscard]] ExitCode run_supervised(const Globals& globals, int restarts,
+                                      const std::function<ExitCode(Communicator&)>& body);
+
+}  // namespace hpr

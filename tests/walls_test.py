@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""The example walls at an eighth of their size: whatever strategy and ranks, each screen shows what one rank draws of it.
+
+usage: walls_test.py HPR SOURCE [--full]
+
+Prints what differs or is missing and leaves with 1. With --full every strategy drives every wall on 4 and 7 ranks.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+HPR = os.path.abspath(sys.argv[1])
+EXAMPLES = sorted((pathlib.Path(sys.argv[2]) / "walls" / "examples").glob("*.toml"))
+FULL = "--full" in sys.argv[3:]
+SCENE = "gen:gallery"
+SORT_LAST = ["serial", "tree", "binary-swap", "radix-k", "direct-send", "ring", "shared-memory", "mpi-reduce"]
+
+
+def screens_of(wall, folder, *options):
+    command = [HPR, "-q", "wall", "run", str(wall), SCENE, "--scale", "0.125", "--quality", "draft", "-o", str(folder), *options]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    if result.returncode != 0:
+        print(f"{' '.join(command)} left with {result.returncode}:\n{result.stderr[-1500:]}")
+        return {}
+    manifest = json.loads((folder / "manifest.json").read_text())
+    return {screen["id"]: (screen["width"], screen["height"], screen["xxh64"]) for screen in manifest["frames"][0]["screens"]}
+
+
+def ways():
+    """Options of the runs that must all show the same."""
+    every = [["--distribute", "sort-last", "--strategy", name] for name in SORT_LAST]
+    every += [["--distribute", "sort-first"], ["--distribute", "hybrid", "--groups", "2"], ["--distribute", "auto"]]
+    return every
+
+
+def main():
+    bad = 0
+    if len(EXAMPLES) < 3:
+        print(f"only {len(EXAMPLES)} example walls in {sys.argv[2]}")
+        return 1
+    with tempfile.TemporaryDirectory(prefix="hpr-walls-") as scratch:
+        for number, wall in enumerate(EXAMPLES):
+            folder = pathlib.Path(scratch) / wall.stem
+            expected = screens_of(wall, folder / "one")
+            if len({screen[2] for screen in expected.values()}) < 2:
+                print(f"{wall.name}: its screens show the same, or nothing: {expected}")
+                bad += 1
+            for i, way in enumerate(ways()):
+                if not FULL and (i + number) % len(EXAMPLES) != 0:
+                    continue  # every way drives one of the walls
+                for ranks in ("4", "7") if FULL else ("4",):
+                    shown = screens_of(wall, folder / f"{i}-{ranks}", *way, "--ranks", ranks)
+                    differ = sorted(name for name in expected if shown.get(name) != expected[name])
+                    if differ or len(shown) != len(expected):
+                        print(f"{wall.name}: {' '.join(way)} on {ranks} ranks: {differ} differ from one rank's")
+                        bad += 1
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
