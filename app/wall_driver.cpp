@@ -1,8 +1,10 @@
 #include "app/wall_driver.h"
 
 #include <hpr/version.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
@@ -82,8 +84,11 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
       wall_(wall),
       session_(session),
       path_(run.path.empty() ? std::optional<CameraPath>() : load_camera_path(run.path)),
-      frames_(session, settings, sampling_of(run), screens_in(0), run.target_ms),
+      globals_(globals),
+      options_(run.options),
+      control_(session, globals, options_, [this] { return status(); }),
       showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host())), run.options.exposure} {
+  frames_.emplace(session, settings, sampling_of(run), screens_in(0), run.target_ms);
   agree_on_failure(session_.comm(), [&] {
     if (shows_any()) display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
   });
@@ -92,13 +97,65 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
   manifest_.seed = globals.seed;
   manifest_.versions = {
       {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
+  take_over();
+}
+
+/// What an earlier job of this run did before it was lost.
+void WallDriver::take_over() {
+  std::uint64_t done = 0;
+  auto journal = session_.comm().rank() == 0 ? RunJournal::of_supervisor() : std::nullopt;
+  if (journal) {
+    journal_.emplace(std::move(*journal));
+    RunJournal::Entries entries = journal_->read();
+    // The last picture is needed for what is written at the end.
+    entries.frames.resize(std::min(entries.frames.size(), static_cast<std::size_t>(run_.frames - 1)));
+    done = entries.frames.size();
+    manifest_.earlier = std::move(entries.frames);
+    manifest_.restarts = std::move(entries.restarts);
+  }
+  first_frame_ = all_gather_value(session_.comm(), done)[0];
+}
+
+bool WallDriver::obey() {
+  if (control_.attend(std::chrono::milliseconds(0))) plan_frames();
+  return !control_.stops();
+}
+
+void WallDriver::plan_frames() {
+  WallRun changed = run_;
+  changed.options = options_;
+  showing_.exposure_stops = options_.exposure;
+  frames_.emplace(session_, options_.settings(globals_.seed), sampling_of(changed), screens_in(0), run_.target_ms);
+}
+
+std::string WallDriver::status() const {
+  using Json = nlohmann::ordered_json;
+  Json screens = Json::array();
+  Json restarts = Json::array();
+  const bool drawn = !manifest_.frames.empty();
+  if (drawn) {
+    for (const ScreenRecord& screen : manifest_.frames.back().screens) {
+      screens.push_back(Json{{"id", screen.id}, {"state", to_string(screen.state)}});
+    }
+  }
+  for (const std::string& restart : manifest_.restarts) restarts.push_back(Json::parse(restart));
+  const Json document{{"schema", "hpr.wall-status/1"},
+                      {"run", ::getpid()},
+                      {"wall", wall_.name},
+                      {"scene", session_.scene().name},
+                      {"ranks", session_.comm().size()},
+                      {"frame", drawn ? manifest_.frames.back().frame : 0},
+                      {"ms", drawn ? manifest_.frames.back().ms : 0.0},
+                      {"screens", std::move(screens)},
+                      {"restarts", std::move(restarts)}};
+  return document.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
-  Frame& frame = frames_.make(screens_in(number), number, progress);
-  pictures_ = bring_to_screens(session_, frame, frames_.blocks(), showing_);
+  Frame& frame = frames_->make(screens_in(number), number, progress);
+  pictures_ = bring_to_screens(session_, frame, frames_->blocks(), showing_);
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   agree_on_failure(session_.comm(), [&] { show(number); });
   record(number);
@@ -120,7 +177,7 @@ std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
 
 std::vector<View> WallDriver::screens_in(std::uint64_t frame) const {
   const Camera camera = path_ ? camera_of(path_->at_frame(frame, static_cast<std::size_t>(run_.frames)))
-                              : run_.options.choose_camera(session_.scene());
+                              : options_.choose_camera(session_.scene());
   return wall_views(wall_, camera, session_.scene().bounds);
 }
 
@@ -147,12 +204,13 @@ void WallDriver::record(std::uint64_t number) {
   }
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
   session_.comm().reduce_max(hashes, 0);  // all but the owner's are 0
-  frames_.took(slowest);
-  FrameRecord frame{number, slowest, strategy(), {}, frames_.report()};
+  frames_->took(slowest);
+  FrameRecord frame{number, slowest, strategy(), {}, frames_->report()};
   for (std::size_t screen = 0; screen < hashes.size(); ++screen) {
     frame.screens.push_back(
         {wall_.screens[screen].id, wall_.screens[screen].pixels, hashes[screen], ScreenState::Fresh});
   }
+  if (journal_) journal_->add_frame(to_json(frame));
   manifest_.frames.push_back(std::move(frame));
 }
 

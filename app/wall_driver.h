@@ -9,6 +9,8 @@
 #include "app/frame_maker.h"
 #include "app/output.h"
 #include "app/progress.h"
+#include "app/run_control.h"
+#include "app/run_journal.h"
 #include "app/screens.h"
 #include "app/session.h"
 #include "app/wall_run.h"
@@ -28,11 +30,16 @@ class WallDriver {
   WallDriver(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
              Session& session);
 
-  [[nodiscard]] const FramePlan& plan() const { return frames_.plan(); }
+  [[nodiscard]] const FramePlan& plan() const { return frames_->plan(); }
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
-  [[nodiscard]] const FrameTimes& times() const { return frames_.times(); }
+  [[nodiscard]] const FrameTimes& times() const { return frames_->times(); }
   [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
-  [[nodiscard]] std::optional<double> relmse() const { return frames_.relmse(); }
+  [[nodiscard]] std::optional<double> relmse() const { return frames_->relmse(); }
+
+  /// The frame to begin with: past 0 where an earlier job of this run was lost.
+  [[nodiscard]] std::uint64_t first_frame() const { return first_frame_; }
+  /// Collective. Does what others told the run since the last frame; false when they ended it.
+  [[nodiscard]] bool obey();
 
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
   void draw(std::uint64_t number, Progress& progress);
@@ -43,6 +50,9 @@ class WallDriver {
  private:
   [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame) const;
   [[nodiscard]] bool shows_any() const;
+  void plan_frames();
+  void take_over();
+  [[nodiscard]] std::string status() const;
   void show(std::uint64_t number);
   void record(std::uint64_t number);
   [[nodiscard]] std::string strategy() const;
@@ -51,12 +61,17 @@ class WallDriver {
   const Wall& wall_;
   Session& session_;
   std::optional<CameraPath> path_;
-  FrameMaker frames_;
+  const Globals& globals_;
+  RenderOptions options_;  ///< as changed while it runs
+  RunControl control_;
+  std::optional<FrameMaker> frames_;
   Showing showing_;
   std::unique_ptr<Display> display_;
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
   RunManifest manifest_;
   FrameCost last_cost_;
+  std::optional<RunJournal> journal_;  ///< on rank 0, where a supervisor looks on
+  std::uint64_t first_frame_ = 0;
 };
 
 }  // namespace hpr

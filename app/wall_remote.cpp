@@ -99,6 +99,7 @@ class WallCtlCommand final : public WallRemoteCommand {
   void declare(CLI::App& app) override {
     WallRemoteCommand::declare(app);
     app.prefix_command();  // what is told may look like an option: -1,0,0
+    app.fallthrough(false);
     app_ = &app;
   }
   [[nodiscard]] ExitCode run(const Globals&) override {

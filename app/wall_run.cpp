@@ -13,6 +13,7 @@
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
+#include "app/run_journal.h"
 #include "app/wall_driver.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
@@ -95,7 +96,8 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
     const std::string mode = speaks ? globals.progress : "none";
     const Sampling sampling = sampling_of(run);
     Progress progress(sampling.sums() ? "none" : mode, "frame", static_cast<std::size_t>(run.frames));
-    for (int frame = 0; frame < run.frames; ++frame) {
+    for (int frame = static_cast<int>(driver.first_frame()); frame < run.frames; ++frame) {
+      if (frame > static_cast<int>(driver.first_frame()) && !driver.obey()) break;
       Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}/{}: sample", frame + 1, run.frames),
                        sampling.goal.samples.value_or(0));
       driver.draw(static_cast<std::uint64_t>(frame), samples);
@@ -152,7 +154,10 @@ void check_path(const WallRun& run) {
 
 }  // namespace
 
-ExitCode run_wall(const WallRun& run, const Globals& globals) {
+ExitCode run_wall(const WallRun& run, const Globals& given) {
+  Globals globals = given;
+  // What stands there is what the job that was lost had written.
+  if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
   Wall wall = load_wall(run.wall);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
   const FrameSettings settings = run.options.settings(globals.seed);
@@ -170,7 +175,7 @@ ExitCode run_wall(const WallRun& run, const Globals& globals) {
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   const EmptyFolders tidy(run.folder);
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
-  return run_ranks(globals, [&](Communicator& comm) {
+  return run_supervised(globals, run.restarts, [&](Communicator& comm) {
     const EmptyFolders tidy_in_job(run.folder);  // a rank that fails leaves run_ranks only to end the job
     if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(run, wall, globals); });
     Session session(comm, globals, [&] { return run.options.load(run.scene, globals); });
@@ -200,6 +205,9 @@ class WallRunCommand final : public Command {
         ->check(CLI::Range(1e-3, 1e9));
     app.add_option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples")
         ->check(CLI::Range(1e-12, 1e12));
+    app.add_option("--restarts", run_.restarts, "how often a job of several ranks that is lost is started again")
+        ->check(CLI::Range(0, 1000))
+        ->capture_default_str();
     run_.options.declare(app);
   }
 

@@ -23,6 +23,7 @@ struct WallRun {
   std::string path;                    ///< of the camera; empty: it stands
   std::optional<double> target_ms;     ///< of a frame
   std::optional<double> target_error;  ///< estimated relMSE at which a frame has enough samples
+  int restarts = 3;                    ///< of a job of several ranks that was lost
   bool summary = false;                ///< say on stdout what each pass did
   RenderOptions options;
 };

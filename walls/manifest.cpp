@@ -6,6 +6,31 @@
 #include "core/hash.h"
 
 namespace hpr {
+namespace {
+
+// ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
+using Json = nlohmann::ordered_json;
+
+Json json_of(const FrameRecord& frame) {
+  Json screens = Json::array();
+  for (const ScreenRecord& screen : frame.screens) {
+    screens.push_back(Json{{"id", screen.id},
+                           {"width", screen.size.width},
+                           {"height", screen.size.height},
+                           {"xxh64", hex16(screen.xxh64)},
+                           {"state", to_string(screen.state)}});
+  }
+  Json record{{"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
+  if (frame.budget) {
+    record["budget"] = Json{{"target_ms", frame.budget->target_ms},
+                            {"resolution_scale", frame.budget->resolution_scale},
+                            {"samples", frame.budget->samples},
+                            {"given_up", frame.budget->given_up}};
+  }
+  return record;
+}
+
+}  // namespace
 
 std::string_view to_string(ScreenState state) {
   switch (state) {
@@ -23,35 +48,24 @@ ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, S
   return {id, picture.size(), xxh64(std::as_bytes(picture.pixels())), state};
 }
 
+std::string to_json(const FrameRecord& frame) {
+  return json_of(frame).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 std::string to_json(const RunManifest& manifest) {
-  // ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
-  using Json = nlohmann::ordered_json;
   Json frames = Json::array();
-  for (const FrameRecord& frame : manifest.frames) {
-    Json screens = Json::array();
-    for (const ScreenRecord& screen : frame.screens) {
-      screens.push_back(Json{{"id", screen.id},
-                             {"width", screen.size.width},
-                             {"height", screen.size.height},
-                             {"xxh64", hex16(screen.xxh64)},
-                             {"state", to_string(screen.state)}});
-    }
-    Json record{
-        {"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
-    if (frame.budget) {
-      record["budget"] = Json{{"target_ms", frame.budget->target_ms},
-                              {"resolution_scale", frame.budget->resolution_scale},
-                              {"samples", frame.budget->samples},
-                              {"given_up", frame.budget->given_up}};
-    }
-    frames.push_back(std::move(record));
+  for (const std::string& frame : manifest.earlier) frames.push_back(Json::parse(frame));
+  for (const FrameRecord& frame : manifest.frames) frames.push_back(json_of(frame));
+  Json document{{"schema", "hpr.wall-run/1"},
+                {"scene_hash", hex16(manifest.scene_hash)},
+                {"wall_hash", hex16(manifest.wall_hash)},
+                {"seed", manifest.seed},
+                {"versions", manifest.versions},
+                {"frames", std::move(frames)}};
+  if (!manifest.restarts.empty()) {
+    document["restarts"] = Json::array();
+    for (const std::string& restart : manifest.restarts) document["restarts"].push_back(Json::parse(restart));
   }
-  const Json document{{"schema", "hpr.wall-run/1"},
-                      {"scene_hash", hex16(manifest.scene_hash)},
-                      {"wall_hash", hex16(manifest.wall_hash)},
-                      {"seed", manifest.seed},
-                      {"versions", manifest.versions},
-                      {"frames", std::move(frames)}};
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -46,10 +46,15 @@ struct RunManifest {
   std::uint64_t wall_hash = 0;
   std::uint64_t seed = 0;
   std::map<std::string, std::string> versions;  ///< "hpr", "embree", "gl", ...
-  std::vector<FrameRecord> frames;
+  std::vector<std::string> earlier;   ///< records of the frames a job drew that was lost since, as JSON objects
+  std::vector<std::string> restarts;  ///< JSON objects: before which frame a job was started again, and why
+  std::vector<FrameRecord> frames;    ///< of this job
 };
 
 [[nodiscard]] ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state);
+
+/// One frame's record, as the manifest has it, on one line.
+[[nodiscard]] std::string to_json(const FrameRecord& frame);
 
 /// One JSON document, schema hpr.wall-run/1; hashes are 16 hex digits, a NaN becomes null.
 [[nodiscard]] std::string to_json(const RunManifest& manifest);

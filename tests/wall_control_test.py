@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""A wall that runs: it is told what to do, tells how it fares, stops when asked, and survives the loss of a rank.
+
+usage: wall_control_test.py HPR
+
+Prints what differs or is missing and leaves with 1.
+"""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+HPR = os.path.abspath(sys.argv[1])
+FAILED = []
+
+
+def check(holds, what):
+    if not holds:
+        print(what)
+        FAILED.append(what)
+
+
+class Wall:
+    """A run in the background, alone in its folder of sockets."""
+
+    def __init__(self, folder, name, ranks, frames, *options):
+        self.out = folder / name
+        self.runtime = folder / f"{name}-runtime"
+        self.runtime.mkdir(mode=0o700)
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.runtime)}
+        self.log = open(folder / f"{name}.log", "w+", encoding="utf-8")
+        self.job = subprocess.Popen([HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(self.out), "--ranks",
+                                     str(ranks), "--frames", str(frames), "--quality", "draft", *options],
+                                    cwd=folder, env=self.environment, stderr=self.log, stdout=self.log)
+
+    def say(self, *words, code=0):
+        result = subprocess.run([HPR, "wall", *words], env=self.environment, capture_output=True, text=True, timeout=60,
+                                check=False)
+        check(result.returncode == code, f"hpr wall {' '.join(words)} left with {result.returncode}: {result.stderr}")
+        return result.stdout
+
+    def wait_for_frame(self, number):
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline and self.job.poll() is None:
+            result = subprocess.run([HPR, "wall", "status", "--json"], env=self.environment, capture_output=True, text=True,
+                                    timeout=60, check=False)
+            if result.returncode == 0 and json.loads(result.stdout)["frame"] >= number:
+                return json.loads(result.stdout)
+            time.sleep(0.05)
+        check(False, f"no frame {number}:\n{self.told()}")
+        return {}
+
+    def ranks(self):
+        """The processes of the job's ranks: children of mpiexec, which is the run's."""
+        found = []
+        for children in pathlib.Path(f"/proc/{self.job.pid}/task").glob("*/children"):
+            for launcher in children.read_text().split():
+                for ranks in pathlib.Path(f"/proc/{launcher}/task").glob("*/children"):
+                    found += [int(pid) for pid in ranks.read_text().split()]
+        return sorted(found)
+
+    def leave(self, code=0):
+        left = self.job.wait(timeout=120)
+        check(left == code, f"the run left with {left}, not {code}:\n{self.told()}")
+
+    def told(self):
+        self.log.flush()
+        self.log.seek(0)
+        return self.log.read()[-3000:]
+
+    def manifest(self):
+        return json.loads((self.out / "manifest.json").read_text())
+
+
+def hashes(frame):
+    return {screen["id"]: screen["xxh64"] for screen in frame["screens"]}
+
+
+def told_and_stopped(folder):
+    for ranks in (1, 2):
+        wall = Wall(folder, f"told-{ranks}", ranks, 100000)
+        status = wall.wait_for_frame(2)
+        check(status.get("schema") == "hpr.wall-status/1" and status.get("ranks") == ranks, f"status: {status}")
+        check({screen["id"] for screen in status.get("screens", [])} == {"0-0", "1-0"} or len(status["screens"]) == 2,
+              f"status has other screens: {status}")
+        check("screen" in wall.say("status"), "status in words names the screens")
+        check("move NODE" in wall.say("ctl", "help"), "ctl help lists the commands")
+        wall.say("ctl", "hide", "nothing", code=2)
+        before = wall.wait_for_frame(3)["frame"]
+        wall.say("ctl", "camera", "-8,1.7,3", "at", "-10,1.5,-2")
+        wall.say("ctl", "passes", "none")
+        wall.wait_for_frame(before + 4)
+        wall.say("stop")
+        wall.leave()
+        frames = wall.manifest()["frames"]
+        check(hashes(frames[0]) != hashes(frames[-1]), "the camera moved, the picture did not")
+        out = folder / f"direct-{ranks}"
+        direct = subprocess.run([HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(out), "--quality", "draft", "--passes",
+                                 "none", "--frames", str(frames[-1]["frame"] + 1), "--eye=-8,1.7,3", "--at=-10,1.5,-2"], capture_output=True, text=True, timeout=60, check=False)
+        check(direct.returncode == 0, direct.stderr)
+        shown = json.loads((out / "manifest.json").read_text())["frames"][-1]  # of one number, and so of one noise
+        check(hashes(frames[-1]) == hashes(shown), "a wall told to look elsewhere shows another picture than one that does")
+        check(not list(wall.runtime.glob("hpr/*.sock")), "a run that ended leaves its socket")
+        wall.say("status", code=7)
+
+
+def survives_a_lost_rank(folder):
+    whole = Wall(folder, "whole", 2, 150)
+    whole.leave()
+    expected = [hashes(frame) for frame in whole.manifest()["frames"]]
+    for how in (signal.SIGKILL, signal.SIGSTOP):
+        wall = Wall(folder, f"lost-{how.name}", 2, 150, "--hang-timeout", "2")
+        wall.wait_for_frame(3)
+        ranks = wall.ranks()
+        check(len(ranks) == 2, f"the job has ranks {ranks}")
+        if ranks:
+            os.kill(ranks[-1], how)
+        wall.leave()
+        manifest = wall.manifest()
+        numbers = [frame["frame"] for frame in manifest["frames"]]
+        check(numbers == list(range(150)), f"{how.name}: frames {numbers[:5]} ... {numbers[-5:]}, {len(numbers)} of 150")
+        restarts = manifest.get("restarts", [])
+        check(len(restarts) == 1 and 3 <= restarts[0]["frame"] < 150, f"{how.name}: restarts {restarts}")
+        check([hashes(frame) for frame in manifest["frames"]] == expected, f"{how.name}: other frames than those of a whole run")
+        check("starting it again from frame" in wall.told(), "the log does not tell of the restart")
+    wall = Wall(folder, "given-up", 2, 100000, "--restarts", "0")
+    wall.wait_for_frame(3)
+    os.kill(wall.ranks()[0], signal.SIGKILL)
+    wall.leave(7)
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="hpr-ctl-") as scratch:
+        told_and_stopped(pathlib.Path(scratch))
+        survives_a_lost_rank(pathlib.Path(scratch))
+    return 1 if FAILED else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
