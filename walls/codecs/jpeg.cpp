@@ -2,6 +2,7 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <new>
 
@@ -24,9 +25,23 @@ Turbo made(tjhandle handle) {
   return Turbo(handle);
 }
 
-int rounded_steps(int difference, int step) {
-  return difference >= 0 ? (difference + step / 2) / step : -((-difference + step / 2) / step);
-}
+/// The number of steps nearest to each difference from -255 to 255.
+class StepTable {
+ public:
+  explicit StepTable(int error) {
+    for (int difference = 0; difference < 256; ++difference) {
+      const int steps = (difference + error) / (2 * error + 1);
+      steps_[static_cast<std::size_t>(255 + difference)] = static_cast<std::uint8_t>(steps);
+      steps_[static_cast<std::size_t>(255 - difference)] = static_cast<std::uint8_t>(-steps);
+    }
+  }
+  [[nodiscard]] std::uint8_t operator()(int difference) const {
+    return steps_[static_cast<std::size_t>(255 + difference)];
+  }
+
+ private:
+  std::array<std::uint8_t, 511> steps_{};
+};
 
 std::uint8_t corrected(std::uint8_t level, std::uint8_t steps, int step) {
   return static_cast<std::uint8_t>(std::clamp(level + static_cast<std::int8_t>(steps) * step, 0, 255));
@@ -58,16 +73,7 @@ class JpegCoder final : public Coder {
     Image<Rgba8> decoded(picture.size());
     read_jpeg(std::span(into).subspan(first), decoded);
     corrections_.resize(picture.pixels().size_bytes());
-    const int step = 2 * error_ + 1;
-    const std::size_t count = picture.pixels().size();
-    for (std::size_t i = 0; i < count; ++i) {
-      const Rgba8 wanted = picture.pixels()[i];
-      const Rgba8 got = decoded.pixels()[i];
-      corrections_[i] = static_cast<std::uint8_t>(rounded_steps(wanted.r - got.r, step));
-      corrections_[count + i] = static_cast<std::uint8_t>(rounded_steps(wanted.g - got.g, step));
-      corrections_[2 * count + i] = static_cast<std::uint8_t>(rounded_steps(wanted.b - got.b, step));
-      corrections_[3 * count + i] = static_cast<std::uint8_t>(255 - wanted.a);
-    }
+    fill_corrections(picture, decoded);
     zstd_.compress(corrections_, into);
     if (seen == nullptr) return;
     correct(decoded, error_);
@@ -89,6 +95,18 @@ class JpegCoder final : public Coder {
 
  private:
   using Length = std::uint64_t;
+
+  void fill_corrections(const Image<Rgba8>& wanted, const Image<Rgba8>& decoded) {
+    const std::size_t count = wanted.pixels().size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Rgba8 w = wanted.pixels()[i];
+      const Rgba8 d = decoded.pixels()[i];
+      corrections_[i] = steps_(w.r - d.r);
+      corrections_[count + i] = steps_(w.g - d.g);
+      corrections_[2 * count + i] = steps_(w.b - d.b);
+      corrections_[3 * count + i] = static_cast<std::uint8_t>(255 - w.a);
+    }
+  }
 
   void append_jpeg(const Image<Rgba8>& picture, std::vector<std::byte>& into) {
     if (std::max(picture.width(), picture.height()) > kLargestSide) {
@@ -140,6 +158,7 @@ class JpegCoder final : public Coder {
 
   int quality_;
   int error_;
+  StepTable steps_{error_};
   Turbo compressor_ = made(tjInitCompress());
   Turbo decompressor_ = made(tjInitDecompress());
   ZstdStream zstd_;

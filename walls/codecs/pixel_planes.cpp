@@ -33,6 +33,11 @@ std::size_t within(const std::uint8_t* /*a*/, const std::uint8_t* /*b*/, std::si
   return 0;
 }
 
+std::size_t scale_up(const std::uint8_t* /*steps*/, std::size_t /*bytes*/, std::uint16_t /*step*/,
+                     std::uint8_t* /*levels*/) {
+  return 0;
+}
+
 #else
 
 // Sixteen bytes at a time whatever the machine: sums run on from lane to lane.
@@ -100,6 +105,24 @@ std::size_t within(const std::uint8_t* a, const std::uint8_t* b, std::size_t byt
   return i;
 }
 
+/// Bytes of whole pixels times `step`, at most 255; every fourth one stays.
+std::size_t scale_up(const std::uint8_t* steps, std::size_t bytes, std::uint16_t step, std::uint8_t* levels) {
+  using Words = hn::FixedTag<std::uint16_t, 8>;
+  using Half = hn::FixedTag<std::uint8_t, 8>;
+  HWY_ALIGN constexpr std::uint8_t kAlpha[8] = {0, 0, 0, 255, 0, 0, 0, 255};
+  const auto alpha = hn::Load(Half(), kAlpha);
+  const auto factor = hn::Set(Words(), step);
+  const auto most = hn::Set(Words(), 255);
+  std::size_t i = 0;
+  for (; i + 8 <= bytes; i += 8) {
+    const auto v = hn::LoadU(Half(), steps + i);
+    const auto scaled = hn::Min(hn::Mul(hn::PromoteTo(Words(), v), factor), most);
+    const auto levels8 = hn::DemoteTo(Half(), hn::BitCast(hn::FixedTag<std::int16_t, 8>(), scaled));
+    hn::StoreU(hn::Or(hn::And(alpha, v), hn::AndNot(alpha, levels8)), Half(), levels + i);
+  }
+  return i;
+}
+
 #endif
 
 }  // namespace HWY_NAMESPACE
@@ -112,6 +135,7 @@ namespace hpr {
 HWY_EXPORT(split);
 HWY_EXPORT(join);
 HWY_EXPORT(within);
+HWY_EXPORT(scale_up);
 
 namespace {
 
@@ -125,14 +149,6 @@ std::uint8_t modulo(int value) {
 
 Rgba8 decorrelated(Rgba8 p) {
   return {modulo(p.r - p.g), p.g, modulo(p.b - p.g), p.a};
-}
-
-void look_up(std::span<const Rgba8> from, const std::array<std::uint8_t, 256>& table, std::span<Rgba8> into) {
-  HPR_CHECK(from.size() == into.size());
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    const Rgba8 p = from[i];
-    into[i] = {table[p.r], table[p.g], table[p.b], p.a};
-  }
 }
 
 }  // namespace
@@ -170,19 +186,27 @@ void join_planes(std::span<const std::uint8_t> planes, std::span<Rgba8> pixels) 
 }
 
 void quantize(std::span<const Rgba8> pixels, int error, std::span<Rgba8> steps) {
+  HPR_CHECK(pixels.size() == steps.size());
   std::array<std::uint8_t, 256> table{};
   for (int level = 0; level < 256; ++level) {
     table[static_cast<std::size_t>(level)] = static_cast<std::uint8_t>((level + error) / (2 * error + 1));
   }
-  look_up(pixels, table, steps);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const Rgba8 p = pixels[i];
+    steps[i] = {table[p.r], table[p.g], table[p.b], p.a};
+  }
 }
 
 void dequantize(std::span<const Rgba8> steps, int error, std::span<Rgba8> pixels) {
-  std::array<std::uint8_t, 256> table{};
-  for (int step = 0; step < 256; ++step) {
-    table[static_cast<std::size_t>(step)] = static_cast<std::uint8_t>(std::min(255, step * (2 * error + 1)));
+  HPR_CHECK(pixels.size() == steps.size());
+  const auto step = static_cast<std::uint16_t>(2 * error + 1);
+  const std::size_t bytes = HWY_DYNAMIC_DISPATCH(scale_up)(bytes_of(steps), steps.size_bytes(), step,
+                                                           reinterpret_cast<std::uint8_t*>(pixels.data()));
+  const auto level = [step](std::uint8_t number) { return static_cast<std::uint8_t>(std::min(255, number * step)); };
+  for (std::size_t i = bytes / sizeof(Rgba8); i < steps.size(); ++i) {
+    const Rgba8 p = steps[i];
+    pixels[i] = {level(p.r), level(p.g), level(p.b), p.a};
   }
-  look_up(steps, table, pixels);
 }
 
 bool all_within(std::span<const Rgba8> a, std::span<const Rgba8> b, int error) {

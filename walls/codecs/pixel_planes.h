@@ -16,7 +16,7 @@ void split_planes(std::span<const Rgba8> pixels, std::span<std::uint8_t> planes)
 void join_planes(std::span<const std::uint8_t> planes, std::span<Rgba8> pixels);
 
 /// Every r, g and b as the number of the step of 2 error + 1 it is nearest to, and back: within `error` of what it was.
-/// Alpha stays.
+/// Alpha stays. `steps` and `pixels` may be the same.
 void quantize(std::span<const Rgba8> pixels, int error, std::span<Rgba8> steps);
 void dequantize(std::span<const Rgba8> steps, int error, std::span<Rgba8> pixels);
 
