@@ -3,16 +3,21 @@
 #include <fmt/format.h>
 #include <hpr/version.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "app/accuracy_options.h"
+#include "app/bench_codec.h"
+#include "app/bench_codec_frames.h"
 #include "app/bench_net.h"
 #include "app/bench_raster.h"
 #include "app/bench_rays.h"
 #include "app/bench_scene.h"
 #include "app/launcher.h"
 #include "app/machine.h"
+#include "app/output.h"
 #include "core/parallel.h"
+#include "core/units.h"
 #include "raster/gl_context.h"
 
 namespace hpr {
@@ -41,7 +46,13 @@ class BenchCommand final : public Command {
         ->check(CLI::Range(64, 8192))
         ->capture_default_str();
     ray_build_.declare(*rays_);
-    for (CLI::App* const bench : {raster, net_, rays_}) {
+    codec_ = app.add_subcommand("codec", "picture codecs of one core on rendered frames, against the bare libraries");
+    codec_->add_option("scene", codec_scenes_, "other scenes to draw (default: gen:gallery gen:cornell)");
+    codec_->add_option("--size", codec_size_, "pixels of the frames")->capture_default_str()->type_name("WxH");
+    codec_->add_option("--frames", codec_frames_, "of each sequence that deltas are measured on")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    for (CLI::App* const bench : {raster, net_, rays_, codec_}) {
       bench->add_flag("--json", json_, "one JSON document");
       bench->fallthrough();
     }
@@ -51,6 +62,7 @@ class BenchCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     if (rays_->parsed()) return run_rays(globals);
+    if (codec_->parsed()) return run_codec(globals);
     return net_->parsed() ? run_net(globals) : run_raster(globals);
   }
 
@@ -70,6 +82,22 @@ class BenchCommand final : public Command {
     return ExitCode::Done;
   }
 
+  [[nodiscard]] ExitCode run_codec(const Globals& globals) const {
+    const auto extent = parse_extent(codec_size_);
+    if (!extent) {
+      throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", codec_size_), "write e.g. 1280x720");
+    }
+    const Size size{extent->first, extent->second};
+    check_size(size, globals);
+    std::vector<BenchRow> rows;
+    for (const std::string& scene : codec_scenes_) {
+      const std::vector<BenchRow> more = bench_codec(draw_codec_frames(scene, size, codec_frames_, globals));
+      rows.insert(rows.end(), more.begin(), more.end());
+    }
+    print(rows, this_machine().cpu);
+    return ExitCode::Done;
+  }
+
   [[nodiscard]] ExitCode run_net(const Globals& globals) const {
     Globals pair = globals;
     if (pair.ranks == 0 && !inside_mpi_job()) pair.ranks = 2;
@@ -85,9 +113,12 @@ class BenchCommand final : public Command {
 
   void print(const std::vector<BenchRow>& rows, const std::string& machine) const {
     if (!json_) {
-      fmt::print("{:<44} {:>10} {:>10} {:<6} {:>6}\n", "", "ours", "floor", "", "ratio");
+      std::size_t width = 44;
+      for (const BenchRow& row : rows) width = std::max(width, row.name.size());
+      fmt::print("{:<{}} {:>10} {:>10} {:<6} {:>6}\n", "", width, "ours", "floor", "", "ratio");
       for (const BenchRow& row : rows) {
-        fmt::print("{:<44} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, row.ours, row.floor, row.unit, row.ratio);
+        fmt::print("{:<{}} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, width, row.ours, row.floor, row.unit,
+                   row.ratio);
       }
       return;
     }
@@ -102,6 +133,10 @@ class BenchCommand final : public Command {
 
   CLI::App* net_ = nullptr;
   CLI::App* rays_ = nullptr;
+  CLI::App* codec_ = nullptr;
+  std::vector<std::string> codec_scenes_{"gen:gallery", "gen:cornell"};
+  std::string codec_size_ = "1280x720";
+  int codec_frames_ = 4;
   std::string scene_;
   std::uint64_t triangles_ = 1'000'000;
   int side_ = 1024;
