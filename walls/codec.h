@@ -16,6 +16,8 @@ struct CodecSettings {
   int quality = 90;     ///< of jpeg, 1..100
   int error = 0;        ///< largest difference of r, g or b the receiver may see, 0..255; 0 with jpeg: no bound
   bool deltas = false;  ///< send only the tiles that changed since the stream's last picture
+  double link_bytes_per_second = 125e6;  ///< what auto chooses for; the default is a gigabit network
+  int cores = 1;                         ///< for auto: streams that are encoded, and decoded, at a time
 };
 
 /// Turns the pictures of one stream into bytes, or such bytes into pictures; one object per stream and direction, as
@@ -23,7 +25,8 @@ struct CodecSettings {
 ///
 /// raw, lz4 and zstd return every bit, or with an error of e > 0 every r, g and b within e and alpha as it was. jpeg
 /// drops alpha (the receiver sees 255) and is as good as its quality; with an error of e > 0 it keeps that bound too,
-/// by corrections, and alpha.
+/// by corrections, and alpha. auto tries the others on the stream's first pictures and goes on with what brings
+/// pictures over the link soonest (choose_codec); jpeg is among them where there is a bound to keep.
 class Codec {
  public:
   virtual ~Codec() = default;

@@ -28,6 +28,9 @@ class Coder {
 };
 
 [[nodiscard]] std::unique_ptr<Coder> make_raw_coder();
+[[nodiscard]] std::unique_ptr<Coder> make_lz4_coder(const CodecSettings& settings);
+[[nodiscard]] std::unique_ptr<Coder> make_zstd_coder(const CodecSettings& settings);
+[[nodiscard]] std::unique_ptr<Coder> make_jpeg_coder(const CodecSettings& settings);
 
 /// One place per coder; its index is its number on the wire.
 struct CoderKind {

@@ -15,6 +15,8 @@ namespace {
 constexpr double kPingEvery = 0.25;
 constexpr double kFirstPingsEvery = 0.01;
 constexpr std::uint64_t kFirstPings = 4;
+/// A Unix socket moves about as much as memory.
+constexpr double kSocketBytesPerSecond = 3e9;
 constexpr double kLongestPoll = 0.25;
 /// An order to show a frame reaches everybody before its time comes: round trips differ. Not more than this.
 constexpr double kMostLead = 0.02;
@@ -45,11 +47,13 @@ WallSender::WallSender(const Wall& wall, std::span<const int> owners, const Send
   for (const WallHost& host : wall_hosts(wall)) {
     if (settings.rank == 0) swaps_.push_back({make_link(host, LinkRole::Swap), host, {}});
     FrameLink frames{make_link(host, LinkRole::Frames), {}, {}, {}};
+    CodecSettings codec = settings.codec_settings;
+    if (!frames.link.address().tcp) codec.link_bytes_per_second = kSocketBytesPerSecond;
     for (std::size_t i = 0; i < host.screens.size(); ++i) {
       if (owners[host.screens[i]] != settings.rank) continue;
       frames.screens.push_back(host.screens[i]);
       frames.numbers.push_back(static_cast<std::uint32_t>(i));
-      codecs_[host.screens[i]] = make_codec(settings.codec, settings.codec_settings);
+      codecs_[host.screens[i]] = make_codec(settings.codec, codec);
     }
     frames.sent_anew.resize(frames.screens.size());
     if (!frames.screens.empty()) frames_.push_back(std::move(frames));

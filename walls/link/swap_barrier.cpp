@@ -1,6 +1,7 @@
 #include "walls/link/swap_barrier.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/check.h"
 

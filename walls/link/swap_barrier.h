@@ -69,8 +69,8 @@ class SwapBarrier {
  private:
   struct Display {
     bool up = false;
-    bool late = false;                 ///< missed a frame and has not caught up
-    std::optional<double> late_since;  ///< cleared when caught up
+    bool late = false;                   ///< missed a frame and has not caught up
+    std::optional<double> late_since{};  ///< cleared when caught up
     bool told_lost = false;
     bool told_stale = false;
   };
