@@ -4,6 +4,7 @@
 #include "app/compare_scene.h"
 #include "app/demo_command.h"
 #include "app/diff_command.h"
+#include "app/display_command.h"
 #include "app/doctor_command.h"
 #include "app/graphics_checks.h"
 #include "app/render_command.h"
@@ -19,6 +20,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   all.push_back(make_demo_command());
   all.push_back(make_render_command());
   all.push_back(make_wall_command());
+  all.push_back(make_display_command());
   all.push_back(make_compare_command(scene_layers));
   all.push_back(make_tradeoff_command());
   all.push_back(make_diff_command());

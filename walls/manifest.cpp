@@ -44,14 +44,18 @@ std::string to_json(const RunManifest& manifest) {
                               {"samples", frame.budget->samples},
                               {"given_up", frame.budget->given_up}};
     }
+    if (frame.swap) {
+      record["swap"] = Json{{"skew_ms", frame.swap->skew_ms ? Json(*frame.swap->skew_ms) : Json(nullptr)}};
+    }
     frames.push_back(std::move(record));
   }
-  const Json document{{"schema", "hpr.wall-run/1"},
-                      {"scene_hash", hex16(manifest.scene_hash)},
-                      {"wall_hash", hex16(manifest.wall_hash)},
-                      {"seed", manifest.seed},
-                      {"versions", manifest.versions},
-                      {"frames", std::move(frames)}};
+  Json document{{"schema", "hpr.wall-run/1"},
+                {"scene_hash", hex16(manifest.scene_hash)},
+                {"wall_hash", hex16(manifest.wall_hash)},
+                {"seed", manifest.seed},
+                {"versions", manifest.versions},
+                {"frames", std::move(frames)}};
+  if (manifest.degraded_seconds) document["degraded_seconds"] = *manifest.degraded_seconds;
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -32,12 +32,18 @@ struct BudgetRecord {
   std::vector<std::string> given_up;  ///< in the order in which it is
 };
 
+/// How the displays outside the job showed a frame.
+struct SwapRecord {
+  std::optional<double> skew_ms = {};  ///< between the first and the last display; none: fewer than two showed it
+};
+
 struct FrameRecord {
   std::uint64_t frame = 0;
   double ms = 0.0;
   std::string strategy;
   std::vector<ScreenRecord> screens;
   std::optional<BudgetRecord> budget = {};
+  std::optional<SwapRecord> swap = {};  ///< only with such displays
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
@@ -47,6 +53,8 @@ struct RunManifest {
   std::uint64_t seed = 0;
   std::map<std::string, std::string> versions;  ///< "hpr", "embree", "gl", ...
   std::vector<FrameRecord> frames;
+  /// How long displays outside the job were missing or behind; none where there are no such displays.
+  std::optional<double> degraded_seconds = {};
 };
 
 [[nodiscard]] ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state);

@@ -89,7 +89,7 @@ void DisplayProcess::run(const std::function<bool()>& stop) {
     if (auto presentation = receiver_.next(kTick)) present(*presentation);
     const ReceiverReport report = receiver_.report();
     update(report);
-    if (settings_.once && report.runs > 0) return;
+    if (settings_.once && report.runs > 0 && report.idle) return;
   }
 }
 
@@ -97,7 +97,7 @@ void DisplayProcess::present(Presentation& presentation) {
   std::vector<ScreenPicture> pictures;
   for (const auto& [screen, picture] : presentation.pictures) pictures.push_back({screen, picture});
   if (!pictures.empty()) display_.show({presentation.frame, pictures});
-  receiver_.shown(presentation, link_seconds());
+  receiver_.shown(presentation);
   for (auto& [screen, picture] : presentation.pictures) {
     screens_[screen].picture = std::move(picture);
     screens_[screen].frame = presentation.frame;
@@ -105,7 +105,7 @@ void DisplayProcess::present(Presentation& presentation) {
 }
 
 void DisplayProcess::update(const ReceiverReport& report) {
-  const double now = link_seconds();
+  const double now = receiver_.now();
   for (std::size_t i = 0; i < screens_.size(); ++i) {
     const ScreenReport& of = report.screens[i];
     ShownState state = ShownState::Fresh;

@@ -155,6 +155,13 @@ Reply decode_reply(std::span<const std::byte> block) {
   return reply;
 }
 
+std::size_t longest_picture(Size size) {
+  // Bytes nothing can compress, a codec's own frame around them, and room.
+  constexpr std::size_t kRoom = 65536;
+  const std::size_t raw = size.area() * 4;
+  return raw + raw / 8 + kRoom;
+}
+
 std::vector<std::byte> encode_packet(PacketHeader header, std::span<const std::byte> payload) {
   ByteWriter packet;
   packet.u32(kPacketMagic);

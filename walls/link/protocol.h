@@ -91,6 +91,9 @@ struct PacketHeader {
   std::uint64_t payload_hash = 0;
 };
 
+/// The longest payload a screen's picture may have, bytes; longer ones are not even received.
+[[nodiscard]] std::size_t longest_picture(Size size);
+
 /// A header and its payload, ready to be sent; fills in length and hash.
 [[nodiscard]] std::vector<std::byte> encode_packet(PacketHeader header, std::span<const std::byte> payload = {});
 

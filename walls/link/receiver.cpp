@@ -29,11 +29,6 @@ constexpr int kPollMs = 250;
 
 }  // namespace
 
-std::size_t longest_picture(Size size) {
-  // Bytes nothing can compress, a codec's own frame around them, and room.
-  return size.area() * sizeof(Rgba8) + size.area() / 2 + 65536;
-}
-
 FrameReceiver::FrameReceiver(ReceiverSettings settings) : settings_(std::move(settings)), alarm_(make_alarm()) {
   for (const LinkAddress& address : settings_.listen) {
     if (address.tcp && settings_.token.empty()) {
@@ -82,7 +77,8 @@ std::optional<Presentation> FrameReceiver::next(double limit) {
   return presentation;
 }
 
-void FrameReceiver::shown(const Presentation& presentation, double at) {
+void FrameReceiver::shown(const Presentation& presentation) {
+  const double at = now();
   const std::lock_guard lock(mutex_);
   showing_ = false;
   for (const auto& [screen, image] : presentation.pictures) {
@@ -98,7 +94,8 @@ void FrameReceiver::shown(const Presentation& presentation, double at) {
 
 ReceiverReport FrameReceiver::report() const {
   const std::lock_guard lock(mutex_);
-  ReceiverReport report{{}, ended_, runs_, std::ranges::any_of(peers_, [](const auto& peer) { return peer->open; })};
+  const bool connected = std::ranges::any_of(peers_, [](const auto& peer) { return peer->open; });
+  ReceiverReport report{{}, ended_, runs_, connected, !showing_ && orders_.empty()};
   for (const Screen& screen : screens_) report.screens.push_back(screen.report);
   return report;
 }
@@ -273,9 +270,19 @@ void FrameReceiver::take(Peer& peer, const Packet& packet) {
     if (!swap) return;
     ended_ = true;
     ++runs_;
+    show_rest();
   } else {
     throw LinkError("a packet that is not for this end");
   }
+}
+
+/// Nobody will ask for what has not been shown yet, and the last frame is what stays.
+void FrameReceiver::show_rest() {
+  std::optional<std::uint64_t> newest;
+  for (const Screen& screen : screens_) {
+    if (!screen.pending.empty()) newest = std::max(newest.value_or(0), screen.pending.rbegin()->first);
+  }
+  if (newest) orders_.emplace_back(*newest, now());
 }
 
 void FrameReceiver::take_picture(Peer& peer, const Packet& packet) {

@@ -22,9 +22,6 @@
 
 namespace hpr {
 
-/// The longest payload a screen's picture may have, bytes; longer ones are not even received.
-[[nodiscard]] std::size_t longest_picture(Size size);
-
 struct ReceiverSettings {
   std::string build;  ///< of this program; runs of another one are refused
   std::string host;
@@ -56,6 +53,7 @@ struct ReceiverReport {
   bool ended = false;      ///< the last run said that it is over
   std::uint64_t runs = 0;  ///< that said so
   bool connected = false;  ///< a run is connected
+  bool idle = true;        ///< nothing waits to be shown
 };
 
 /// A display process's end of its links: listens, accepts one run at a time, keeps of each screen the whole pictures
@@ -71,7 +69,9 @@ class FrameReceiver {
   /// Waits for a frame's moment, for `limit` seconds at the most.
   [[nodiscard]] std::optional<Presentation> next(double limit);
   /// The frame next() returned is on the screens.
-  void shown(const Presentation& presentation, double at);
+  void shown(const Presentation& presentation);
+  /// Seconds of the clock all its times are of.
+  [[nodiscard]] double now() const { return settings_.clock(); }
   [[nodiscard]] ReceiverReport report() const;
 
  private:
@@ -105,6 +105,7 @@ class FrameReceiver {
   [[nodiscard]] std::string objection(const Peer& peer, const Hello& hello);
   void begin_session(const Hello& hello);
   void take(Peer& peer, const Packet& packet);
+  void show_rest();
   void take_picture(Peer& peer, const Packet& packet);
   void announce();
   [[nodiscard]] Peer* swap_peer();

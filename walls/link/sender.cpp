@@ -15,6 +15,8 @@ namespace {
 constexpr double kPingEvery = 0.25;
 constexpr double kFirstPingsEvery = 0.01;
 constexpr std::uint64_t kFirstPings = 4;
+/// No frame follows the last one: it may take a little longer.
+constexpr std::chrono::duration<double> kLeastEnd{2.0};
 /// A Unix socket moves about as much as memory.
 constexpr double kSocketBytesPerSecond = 3e9;
 constexpr double kLongestPoll = 0.25;
@@ -101,7 +103,9 @@ void WallSender::show(const WallFrame& frame) {
     const auto place =
         static_cast<std::size_t>(std::ranges::find(link->screens, picture.screen) - link->screens.begin());
     PacketHeader header{PacketType::Frame, link->numbers[place], frame.number, now_since_1970(), 0, 0};
-    const std::vector<std::byte> encoded = codecs_[picture.screen]->encode(picture.image);
+    std::vector<std::byte> encoded = codecs_[picture.screen]->encode(picture.image);
+    // What a codec cannot make smaller goes as it is.
+    if (encoded.size() > longest_picture(picture.image.size())) encoded = make_codec("raw", {})->encode(picture.image);
     packets.emplace_back(picture.screen,
                          std::make_shared<const std::vector<std::byte>>(encode_packet(header, encoded)));
   }
@@ -132,7 +136,7 @@ void WallSender::show(const WallFrame& frame) {
 void WallSender::finish() {
   std::unique_lock lock(mutex_);
   const std::uint64_t newest = barrier_.newest().value_or(0);
-  const auto limit = settings_.send_budget + settings_.swap_timeout;
+  const auto limit = std::max(settings_.send_budget + settings_.swap_timeout, kLeastEnd);
   const auto done = [&] { return all_sent() && (swaps_.empty() || barrier_.all_shown(newest)); };
   (void)news_.wait_for(lock, limit, done);
   degraded_s_ = barrier_.degraded_seconds(link_seconds());
@@ -236,7 +240,7 @@ void WallSender::step_swap(std::size_t display, double now) {
     barrier_.connected(display, now);
     log::debug("display of host '{}' on {} answers", swap.host.host, swap.link.address().text);
   } else if (change == ClientLink::Change::Down) {
-    barrier_.gone(display, now);
+    if (!finishing_) barrier_.gone(display, now);
     log::debug("display of host '{}' on {}: {}", swap.host.host, swap.link.address().text, swap.link.failure());
   }
   if (swap.ever_up && swap.link.refusal() != swap.told_refusal) {

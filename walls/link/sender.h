@@ -50,7 +50,8 @@ class WallSender {
   /// Hands over a frame: on this rank's screens; numbers ascend. Rank 0 then waits, within the budget, until the
   /// displays are ready for the frame `in_flight` before this one.
   void show(const WallFrame& frame);
-  /// After the last frame: returns when it is sent, on rank 0 shown, or after the budget and the swap's time-out.
+  /// After the last frame: returns when it is sent, on rank 0 shown, or after two seconds, or
+  /// what budget and swap time-out ask for.
   void finish();
 
   /// Rank 0, after finish().
