@@ -5,6 +5,7 @@
 #include "app/console/console_command.h"
 #include "app/demo_command.h"
 #include "app/diff_command.h"
+#include "app/display_command.h"
 #include "app/doctor_command.h"
 #include "app/graphics_checks.h"
 #include "app/render_command.h"
@@ -21,6 +22,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   all.push_back(make_render_command());
   all.push_back(make_wall_command());
   all.push_back(make_console_command());
+  all.push_back(make_display_command());
   all.push_back(make_compare_command(scene_layers));
   all.push_back(make_tradeoff_command());
   all.push_back(make_diff_command());

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "app/remote_wall.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/hash.h"
@@ -20,8 +21,8 @@ namespace {
 constexpr std::size_t kPixelsWorthAWriter = 4'000'000;
 
 /// Per screen the rank that shows it: the one the wall file names, else one on the screen's host, else any: no more
-/// ranks than the pixels keep busy, each with neighbouring screens.
-std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hosts) {
+/// ranks than the pixels keep busy, each with neighbouring screens. `remote`: displays outside the job show them.
+std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hosts, bool remote) {
   const int ranks = static_cast<int>(hosts.size());
   std::size_t pixels = 0;
   for (const WallScreen& screen : wall.screens) pixels += screen.pixels.area();
@@ -43,7 +44,7 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
       owners.push_back(static_cast<int>(i * writers / wall.screens.size()));
     }
     const bool any_host = node == wall.nodes.end() || node->host == "localhost" || node->host == "*";
-    if (screen.rank < 0 && on_its_host.empty() && !any_host) {
+    if (screen.rank < 0 && on_its_host.empty() && !any_host && !remote) {
       log::warning("no rank runs on host '{}' of screen '{}': rank {} shows it", node->host, screen.id, owners.back());
     }
     if (screen.rank >= ranks) {
@@ -87,10 +88,15 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
       globals_(globals),
       options_(run.options),
       control_(session, globals, options_, [this] { return status(); }),
-      showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host())), run.options.exposure} {
+      showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host()), run.display == kRemoteDisplay),
+               run.options.exposure} {
   frames_.emplace(session, settings, sampling_of(run), screens_in(0), run.target_ms);
+  if (run.display == kRemoteDisplay) {
+    remote_ = connect_displays(session_.comm(), wall, showing_.shown_by, run.remote);
+  }
   agree_on_failure(session_.comm(), [&] {
-    if (shows_any()) display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
+    if (shows_any() && !remote_)
+      display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
   });
   manifest_.scene_hash = content_hash(session.scene());
   manifest_.wall_hash = wall.hash;
@@ -161,6 +167,10 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   record(number);
 }
 
+bool WallDriver::finish() {
+  return !remote_ || end_displays(session_.comm(), *remote_, manifest_);
+}
+
 std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
   Communicator& comm = session_.comm();
   for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
@@ -186,12 +196,16 @@ bool WallDriver::shows_any() const {
 }
 
 void WallDriver::show(std::uint64_t number) {
-  if (!display_) return;
+  if (!display_ && !remote_) return;
   std::vector<ScreenPicture> mine;
   for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
     if (showing_.shown_by[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
   }
-  display_->show({number, mine});
+  if (remote_) {
+    remote_->show({number, mine});
+  } else {
+    display_->show({number, mine});
+  }
 }
 
 /// Every rank hashes what it showed; rank 0 writes it down.

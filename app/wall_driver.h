@@ -15,6 +15,7 @@
 #include "app/session.h"
 #include "app/wall_run.h"
 #include "walls/display.h"
+#include "walls/link/sender.h"
 #include "walls/manifest.h"
 #include "walls/wall.h"
 
@@ -44,6 +45,9 @@ class WallDriver {
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
   void draw(std::uint64_t number, Progress& progress);
 
+  /// Collective. After the last frame. False: displays outside the job were meant to show it, and none ever did.
+  [[nodiscard]] bool finish();
+
   /// Collective. All screens' pictures of the last frame, on rank 0.
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
 
@@ -67,6 +71,7 @@ class WallDriver {
   std::optional<FrameMaker> frames_;
   Showing showing_;
   std::unique_ptr<Display> display_;
+  std::unique_ptr<WallSender> remote_;  ///< in place of a display, to those outside the job
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
   RunManifest manifest_;
   FrameCost last_cost_;

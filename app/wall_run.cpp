@@ -74,6 +74,9 @@ void write_results(const WallRun& run, const Wall& wall, const WallDriver& drive
     }
     if (!run.picture.empty()) write_file_atomically(run.picture, picture);
   }
+  if (run.display == kRemoteDisplay && !run.folder.empty()) {
+    write_file_atomically(std::filesystem::path(run.folder) / "manifest.json", to_json(driver.manifest()));
+  }
   if (!run.options.stats.empty()) write_stats(run.options.stats, stats);
 }
 
@@ -104,6 +107,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
       progress.step(fmt::format("{:.1f} ms", driver.last_cost().ms));
     }
   }
+  const bool seen = driver.finish();
   RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
   stats.relmse = driver.relmse();
   stats.budget = driver.manifest().frames.back().budget;
@@ -113,14 +117,35 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   agree_on_failure(session.comm(), [&] {
     if (speaks) write_results(run, wall, driver, stats, pictures);
   });
+  if (!seen) return ExitCode::Lost;
   if (!speaks) return verdict(stats, run.options.strict);
   if (run.summary) print_summary(stats, wall, session.scene());
   if (!run.picture.empty()) {
     fmt::print("{}\n", run.picture);
   } else if (run.display == "file") {
     fmt::print("{}\n", (std::filesystem::path(run.folder) / "wall.png").string());
+  } else if (run.display == kRemoteDisplay && !run.folder.empty()) {
+    fmt::print("{}\n", (std::filesystem::path(run.folder) / "manifest.json").string());
   }
   return verdict(stats, run.options.strict);
+}
+
+void check_remote(const WallRun& run, const Wall& wall, const Globals& globals) {
+  (void)run.remote.settings(wall);
+  if (run.folder.empty()) return;
+  std::error_code error;
+  std::filesystem::create_directories(run.folder, error);
+  check_writable(std::filesystem::path(run.folder) / "manifest.json", globals.force);
+}
+
+void check_display(const WallRun& run, const Wall& wall, const Globals& globals) {
+  std::vector<std::string> names = all_displays();
+  names.emplace_back(kRemoteDisplay);
+  if (std::ranges::find(names, run.display) == names.end()) {
+    throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(run.display)),
+                unknown_name_hint(run.display, names));
+  }
+  (void)make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
 }
 
 void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals) {
@@ -137,7 +162,11 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   if (!run.options.stats.empty()) check_writable(run.options.stats, globals.force);
   // Made to be checked, and last, as it may make its folder: an unknown display or a folder that may not be written is
   // found before any rank starts.
-  (void)make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
+  if (run.display == kRemoteDisplay) {
+    check_remote(run, wall, globals);
+  } else {
+    check_display(run, wall, globals);
+  }
   if (run.display == "file") {
     check_writable(std::filesystem::path(run.folder) / "wall.png", globals.force);
     check_writable(std::filesystem::path(run.folder) / "manifest.json", globals.force);
@@ -194,8 +223,10 @@ class WallRunCommand final : public Command {
   void declare(CLI::App& app) override {
     app.add_option("wall", run_.wall, "a wall file, or CxR, or CxR@WxH")->required();
     app.add_option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("--display", run_.display, "file or none")->capture_default_str();
-    app.add_option("-o,--output", run_.folder, "folder for the pictures of the file display")->type_name("DIR");
+    app.add_option("--display", run_.display, "file, none, or remote: display processes, see hpr display")
+        ->capture_default_str();
+    app.add_option("-o,--output", run_.folder, "folder for the pictures of the file display, and the manifest")
+        ->type_name("DIR");
     app.add_option("--scale", run_.scale, "of the screens' pixels, e.g. 0.25")
         ->check(CLI::Range(1e-6, 1e6))
         ->capture_default_str();
@@ -208,6 +239,7 @@ class WallRunCommand final : public Command {
     app.add_option("--restarts", run_.restarts, "how often a job of several ranks that is lost is started again")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
+    run_.remote.declare(app);
     run_.options.declare(app);
   }
 

@@ -3,20 +3,25 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "app/command.h"
+#include "app/remote_wall.h"
 #include "app/render_options.h"
 #include "walls/display.h"
 #include "walls/wall.h"
 
 namespace hpr {
 
+/// The display of screens that processes outside the job show.
+inline constexpr std::string_view kRemoteDisplay = "remote";
+
 /// Driving a wall from a scene, as `wall run` and `demo --wall` do it.
 struct WallRun {
   std::string scene;
   std::string wall;
   std::string display = "file";
-  std::string folder;   ///< where the file display writes
+  std::string folder;   ///< where the file display writes, and for remote ones the manifest goes
   std::string picture;  ///< the assembled wall goes here too; empty: only into the folder
   double scale = 1.0;   ///< of the screens' pixels
   int frames = 1;
@@ -25,6 +30,7 @@ struct WallRun {
   std::optional<double> target_error;  ///< estimated relMSE at which a frame has enough samples
   int restarts = 3;                    ///< of a job of several ranks that was lost
   bool summary = false;                ///< say on stdout what each pass did
+  RemoteOptions remote;
   RenderOptions options;
 };
 

@@ -27,6 +27,9 @@ Json json_of(const FrameRecord& frame) {
                             {"samples", frame.budget->samples},
                             {"given_up", frame.budget->given_up}};
   }
+  if (frame.swap) {
+    record["swap"] = Json{{"skew_ms", frame.swap->skew_ms ? Json(*frame.swap->skew_ms) : Json(nullptr)}};
+  }
   return record;
 }
 
@@ -66,6 +69,7 @@ std::string to_json(const RunManifest& manifest) {
     document["restarts"] = Json::array();
     for (const std::string& restart : manifest.restarts) document["restarts"].push_back(Json::parse(restart));
   }
+  if (manifest.degraded_seconds) document["degraded_seconds"] = *manifest.degraded_seconds;
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -32,12 +32,18 @@ struct BudgetRecord {
   std::vector<std::string> given_up;  ///< in the order in which it is
 };
 
+/// How the displays outside the job showed a frame.
+struct SwapRecord {
+  std::optional<double> skew_ms = {};  ///< between the first and the last display; none: fewer than two showed it
+};
+
 struct FrameRecord {
   std::uint64_t frame = 0;
   double ms = 0.0;
   std::string strategy;
   std::vector<ScreenRecord> screens;
   std::optional<BudgetRecord> budget = {};
+  std::optional<SwapRecord> swap = {};  ///< only with such displays
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
@@ -49,6 +55,9 @@ struct RunManifest {
   std::vector<std::string> earlier;   ///< records of the frames a job drew that was lost since, as JSON objects
   std::vector<std::string> restarts;  ///< JSON objects: before which frame a job was started again, and why
   std::vector<FrameRecord> frames;    ///< of this job
+  std::vector<FrameRecord> frames;
+  /// How long displays outside the job were missing or behind; none where there are no such displays.
+  std::optional<double> degraded_seconds = {};
 };
 
 [[nodiscard]] ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state);

@@ -1,0 +1,484 @@
+#!/usr/bin/env python3
+"""Display processes outside the job: what they show, and what the run does when they die, freeze or lie behind a bad line.
+
+usage: display_test.py HPR
+
+Prints what is wrong and leaves with 1.
+"""
+
+import json
+import os
+import pathlib
+import random
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import zlib
+
+HPR = os.path.abspath(sys.argv[1])
+SCENE = "gen:gallery"
+LIGHT = ["--passes", "none"]
+WALL = "2x1@64x48"
+TWO_HOSTS = """
+hpr_wall = 1
+nodes = [ { id = "a", host = "left" }, { id = "b", host = "right" } ]
+windows = [ { id = "w0", node = "a" }, { id = "w1", node = "b" } ]
+[[surfaces]]
+id = "wall"
+[surfaces.grid]
+columns = 2
+rows = 1
+tile_pixels = [64, 48]
+tile_size_m = [0.64, 0.48]
+windows = ["w0", "w1"]
+"""
+failures = []
+
+
+def complain(case, message):
+    failures.append(case)
+    print(f"{case}: {message}")
+
+
+def environment(folder):
+    return {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
+
+
+def wait_until(happens, seconds):
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        if happens():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def xxh64(data):
+    """XXH64 with seed 0, as manifests have it."""
+    p1, p2, p3, p4, p5 = 0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x85EBCA77C2B2AE63, 0x27D4EB2F165667C5
+    mask = (1 << 64) - 1
+    turn = lambda x, n: ((x << n) | (x >> (64 - n))) & mask
+    mix = lambda acc, lane: turn((acc + lane * p2) & mask, 31) * p1 & mask
+    words = struct.unpack(f"<{len(data) // 8}Q", data[:len(data) // 8 * 8])
+    at = 0
+    if len(words) >= 4:
+        lanes = [(p1 + p2) & mask, p2, 0, -p1 & mask]
+        while at + 4 <= len(words):
+            lanes = [mix(lane, word) for lane, word in zip(lanes, words[at:at + 4])]
+            at += 4
+        value = sum(turn(lane, n) for lane, n in zip(lanes, (1, 7, 12, 18))) & mask
+        for lane in lanes:
+            value = ((value ^ mix(0, lane)) * p1 + p4) & mask
+    else:
+        value = p5
+    value = (value + len(data)) & mask
+    for word in words[at:]:
+        value = (turn(value ^ mix(0, word), 27) * p1 + p4) & mask
+    assert len(data) % 8 == 0
+    value = (value ^ (value >> 33)) * p2 & mask
+    value = (value ^ (value >> 29)) * p3 & mask
+    return f"{value ^ (value >> 32):016x}"
+
+
+def pixels_of(png):
+    """The RGBA8 pixels of a PNG of 8 bits a channel."""
+    at, packed = 8, b""
+    while at < len(png):
+        length, kind = struct.unpack(">I4s", png[at:at + 8])
+        body = png[at + 8:at + 8 + length]
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", body[:10])
+        packed += body if kind == b"IDAT" else b""
+        at += 12 + length
+    assert depth == 8 and color in (2, 6)
+    channels = 4 if color == 6 else 3
+    data, stride = zlib.decompress(packed), width * channels
+    above, pixels = bytes(stride), bytearray()
+    for y in range(height):
+        how, *line = data[y * (stride + 1):(y + 1) * (stride + 1)]
+        for i in range(stride):
+            left, up, corner = (line[i - channels] if i >= channels else 0), above[i], (above[i - channels] if i >= channels else 0)
+            guess = left + up - corner
+            paeth = min((left, up, corner), key=lambda v: abs(guess - v))
+            line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[how]) & 255
+        above = line
+        for x in range(0, stride, channels):
+            pixels += bytes(line[x:x + 3]) + (bytes(line[x + 3:x + 4]) if channels == 4 else b"\xff")
+    return bytes(pixels)
+
+
+def hash_of(png):
+    return xxh64(pixels_of(png))
+
+
+class Display:
+    """A display process that is up once this is made, and gone afterwards."""
+
+    def __init__(self, folder, wall, host, *options):
+        self.folder = folder / f"shown-{host}"
+        self.log = open(folder / f"display-{host}.log", "a+", encoding="utf-8")
+        begin = self.log.tell()
+        self.process = subprocess.Popen([HPR, "display", "--wall", wall, "--host", host, "-o", str(self.folder), "--force", *options],
+                                        cwd=folder, env=environment(folder), stderr=self.log)
+        up = lambda: "listening on" in pathlib.Path(self.log.name).read_text(encoding="utf-8")[begin:]
+        if not wait_until(lambda: up() or self.process.poll() is not None, 20) or self.process.poll() is not None:
+            complain("display", f"did not start: {self.said()}")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGCONT)
+            self.process.terminate()
+        self.process.wait(timeout=20)
+        self.log.close()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait(timeout=20)
+
+    def said(self):
+        return pathlib.Path(self.log.name).read_text(encoding="utf-8")
+
+    def status(self):
+        return json.loads((self.folder / "display.json").read_text())
+
+    def frame(self):
+        """Of its first screen; -1 before the first."""
+        if not (self.folder / "display.json").exists():
+            return -1
+        frame = self.status()["screens"][0]["frame"]
+        return -1 if frame is None else frame
+
+    def picture(self, screen):
+        return (self.folder / f"{screen}.png").read_bytes()
+
+
+def run(folder, wall, *options, frames=3, env=None, timeout=60):
+    return subprocess.run([HPR, "wall", "run", wall, SCENE, *LIGHT, "--frames", str(frames), *options], cwd=folder,
+                          env={**environment(folder), **(env or {})}, capture_output=True, text=True, timeout=timeout, check=False)
+
+
+def start(folder, wall, frames, *options):
+    return subprocess.Popen([HPR, "wall", "run", wall, SCENE, *LIGHT, "--frames", str(frames), "--display", "remote", "-o", "out", "--force",
+                             "--path", "path", *options],
+                            cwd=folder, env=environment(folder), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def manifest(folder, name="out"):
+    return json.loads((folder / name / "manifest.json").read_text())
+
+
+def states(frames, screen):
+    return [s["state"] for f in frames for s in f["screens"] if s["id"] == screen]
+
+
+def write_path(folder):
+    (folder / "path").write_text("eye -4,1.7,4 at 0,1.6,-2\neye 4,1.7,3 at 2,1.5,-2\n")
+
+
+def same_pictures(folder):
+    """What remote displays show is what the file display writes, bit by bit; 2 ranks, 2 hosts, a lossless codec."""
+    case = "same pictures"
+    (folder / "wall.toml").write_text(TWO_HOSTS)
+    write_path(folder)
+    path = ["--path", "path"]
+    run(folder, "wall.toml", "--display", "file", "-o", "expected", *path, "--ranks", "2")
+    expected = {f: s["xxh64"] for f, s in enumerate(manifest(folder, "expected")["frames"][-1]["screens"])}
+    with Display(folder, "wall.toml", "left") as left, Display(folder, "wall.toml", "b") as right:
+        result = run(folder, "wall.toml", "--display", "remote", "-o", "out", "--codec", "zstd", *path, "--ranks", "2",
+                     "--send-budget", "5s", "--swap-timeout", "5s")
+        if result.returncode != 0:
+            return complain(case, f"left with {result.returncode}: {result.stderr[-800:]}")
+        got = manifest(folder)
+        if {f: s["xxh64"] for f, s in enumerate(got["frames"][-1]["screens"])} != expected:
+            complain(case, "the run itself drew another picture")
+        for frame in got["frames"]:
+            if {s["state"] for s in frame["screens"]} != {"fresh"}:
+                complain(case, f"frame {frame['frame']} was not shown whole: {frame['screens']}")
+            if not isinstance(frame["swap"]["skew_ms"], float):
+                complain(case, f"no skew was measured: {frame['swap']}")
+        for display, screen in ((left, "wall-r0c0"), (right, "wall-r0c1")):
+            if display.picture(screen) != (folder / "expected" / f"{screen}.png").read_bytes():
+                complain(case, f"{screen} shows something else")
+            if not wait_until(lambda d=display: d.status()["screens"][0]["state"] == "ended", 5):
+                complain(case, f"the end of the run is not in display.json: {display.status()}")
+            if [s["frame"] for s in display.status()["screens"]] != [2]:
+                complain(case, f"another last frame: {display.status()}")
+    return None
+
+
+def killed_display(folder):
+    """kill -9 and a restart while the run goes on: the other display goes on, this one is back at once, each said once."""
+    case = "killed display"
+    (folder / "wall.toml").write_text(TWO_HOSTS)
+    write_path(folder)
+    with Display(folder, "wall.toml", "left", "--show", "none") as left:
+        right = Display(folder, "wall.toml", "right", "--show", "none")
+        process = start(folder, "wall.toml", 100000, "--ranks", "2")
+        try:
+            if not wait_until(lambda: right.frame() > 0, 30):
+                return complain(case, "nothing was ever shown")
+            right.kill()
+            (right.folder / "display.json").unlink()
+            before = left.frame()
+            if not wait_until(lambda: left.frame() > before + 5, 20):
+                complain(case, "the other display stands still")
+            right = Display(folder, "wall.toml", "right", "--show", "none")
+            # A second is the promise, and display.json is behind by up to a fifth; machines that test are busy.
+            if not wait_until(lambda: right.frame() > before, 2.0):
+                complain(case, "it shows nothing after the restart")
+        finally:
+            process.send_signal(signal.SIGTERM)
+            said = process.communicate(timeout=30)[1]
+            with right:
+                pass
+        lost, back = (f"screen wall-r0c1 (right) {words}, frame " for words in ("lost", "back"))
+        if said.count(lost) != 1 or "; retrying" not in said or back not in said.split(lost)[-1]:
+            complain(case, f"does not say once that the screen was lost and came back: {said[-800:]}")
+        if "wall-r0c0 (left) lost" in said:
+            complain(case, f"the other screen is called lost: {said[-800:]}")
+    return None
+
+
+def killed_display_in_manifest(folder):
+    """The same in a run that ends: exit code 0, the loss in the manifest and in degraded_seconds."""
+    case = "killed display, manifest"
+    (folder / "wall.toml").write_text(TWO_HOSTS)
+    write_path(folder)
+    with Display(folder, "wall.toml", "left") as left:
+        right = Display(folder, "wall.toml", "right")
+        process = start(folder, "wall.toml", 400, "--ranks", "2")
+        wait_until(lambda: right.frame() > 0, 30)
+        right.kill()
+        with Display(folder, "wall.toml", "right") as right:
+            said = process.communicate(timeout=60)[1]
+            if process.returncode != 0:
+                return complain(case, f"left with {process.returncode}: {said[-800:]}")
+            got = manifest(folder)
+            last = states(got["frames"], "wall-r0c1")
+            if "lost" not in last or last[0] == "lost":
+                complain(case, f"lost is not in the manifest: {sorted(set(last))}, first {last[0]}")
+            if last[-1] != "fresh":
+                complain(case, f"the last frame is {last[-1]}")
+            if not 0.2 < got["degraded_seconds"] < 30:
+                complain(case, f"degraded_seconds is {got['degraded_seconds']}")
+            for display, screen, number in ((left, "wall-r0c0", 0), (right, "wall-r0c1", 1)):
+                if hash_of(display.picture(screen)) != got["frames"][-1]["screens"][number]["xxh64"]:
+                    complain(case, f"{screen} does not end on the last frame")
+    return None
+
+
+def frozen_display(folder):
+    """SIGSTOP of one display: the other goes on at its pace, as the run waits for the frozen one once; then it is back."""
+    case = "frozen display"
+    (folder / "wall.toml").write_text(TWO_HOSTS)
+    write_path(folder)
+    with Display(folder, "wall.toml", "left", "--show", "none") as left, Display(folder, "wall.toml", "right", "--show", "none") as right:
+        process = start(folder, "wall.toml", 100000, "--ranks", "2", "--send-budget", "250ms")
+
+        def thirty_frames():
+            begin = time.monotonic()
+            before = left.frame()
+            if not wait_until(lambda: left.frame() > before + 30, 30):
+                complain(case, "the other display stands still")
+            return time.monotonic() - begin
+
+        try:
+            if not wait_until(lambda: right.frame() > 0, 30):
+                return complain(case, "nothing was ever shown")
+            at_ease = thirty_frames()
+            right.process.send_signal(signal.SIGSTOP)
+            time.sleep(1.2)
+            meanwhile = thirty_frames()
+            # Waiting for it in each of thirty frames would take 7.5 s.
+            if meanwhile > 2 * at_ease + 2:
+                complain(case, f"thirty frames took {meanwhile:.1f} s with a frozen display beside, {at_ease:.1f} s without")
+            stopped_at = right.frame()
+            right.process.send_signal(signal.SIGCONT)
+            if not wait_until(lambda: right.frame() > stopped_at + 5, 5):
+                complain(case, f"it does not come back: {right.status()}")
+        finally:
+            process.send_signal(signal.SIGTERM)
+            said = process.communicate(timeout=30)[1]
+        for words in ("screen wall-r0c1 (right) is behind, frame ", "screen wall-r0c1 (right) back, frame "):
+            if words not in said:
+                complain(case, f"does not say {words!r}: {said[-800:]}")
+    return None
+
+
+def no_display(folder):
+    """No display anywhere: every frame is drawn without waiting, the exit code and the manifest say that nobody saw them."""
+    case = "no display"
+    begin = time.monotonic()
+    result = run(folder, WALL, "--display", "remote", "-o", "out", "--ranks", "2")
+    if result.returncode != 7:
+        complain(case, f"left with {result.returncode} instead of 7: {result.stderr[-800:]}")
+    if "no display was there" not in result.stderr:
+        complain(case, f"does not say so: {result.stderr[-800:]}")
+    if time.monotonic() - begin > 30:
+        complain(case, "took far too long")
+    if set(states(manifest(folder)["frames"], "wall-r0c0")) != {"lost"}:
+        complain(case, "the manifest does not call the screens lost")
+
+
+class BadLine(threading.Thread):
+    """A proxy between the run and a display's socket that flips bits on the way to the display."""
+
+    def __init__(self, listen, target, every):
+        super().__init__(daemon=True)
+        self.server = socket.socket(socket.AF_UNIX)
+        self.server.bind(listen)
+        self.server.listen(16)
+        self.target = target
+        self.every = every
+        self.flipped = 0
+        self.random = random.Random(7)
+        self.done = False
+
+    def carry(self, run_side, display_side):
+        # Handshakes pass whole, so that what is tried are the packets.
+        passed = 0
+        due = self.random.randrange(self.every)
+        ends = [run_side, display_side]
+        while not self.done:
+            for end in select.select(ends, [], [], 0.1)[0]:
+                try:
+                    data = bytearray(end.recv(65536))
+                    if data and end is run_side:
+                        if passed > 2000 and due < len(data):
+                            data[due] ^= 1 << self.random.randrange(8)
+                            self.flipped += 1
+                            due += self.every
+                        due = max(0, due - len(data)) if passed > 2000 else due
+                        passed += len(data)
+                    other = display_side if end is run_side else run_side
+                    if data:
+                        other.sendall(data)
+                except OSError:
+                    data = b""
+                if not data:
+                    run_side.close()
+                    display_side.close()
+                    return
+
+    def run(self):
+        while not self.done:
+            if not select.select([self.server], [], [], 0.1)[0]:
+                continue
+            run_side, _ = self.server.accept()
+            display_side = socket.socket(socket.AF_UNIX)
+            try:
+                display_side.connect(self.target)
+            except OSError:
+                run_side.close()
+                continue
+            threading.Thread(target=self.carry, args=(run_side, display_side), daemon=True).start()
+
+
+def bad_line(folder):
+    """Flipped bits on the way: damaged pictures are dropped and counted, and what is shown was sent exactly so."""
+    case = "bad line"
+    with Display(folder, WALL, "localhost", "--listen", str(folder / "display.sock"), "--stale-after", "60s") as display:
+        line = BadLine(str(folder / "line.sock"), str(folder / "display.sock"), 60_000)
+        line.start()
+        process = subprocess.Popen([HPR, "wall", "run", WALL, SCENE, *LIGHT, "--frames", "150", "--display", "remote", "-o", "out", "--ranks",
+                                    "2", "--codec", "raw", "--displays", f"localhost={folder / 'line.sock'}"],
+                                   cwd=folder, env=environment(folder), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        seen = {"wall-r0c0": set(), "wall-r0c1": set()}
+        while process.poll() is None:
+            for screen, pictures in seen.items():
+                if (display.folder / f"{screen}.png").exists():
+                    pictures.add(display.picture(screen))
+            time.sleep(0.02)
+        said = process.communicate(timeout=60)[1]
+        line.done = True
+        if process.returncode != 0:
+            return complain(case, f"left with {process.returncode}: {said[-800:]}")
+        time.sleep(0.3)
+        dropped = sum(s["dropped"] for s in display.status()["screens"])
+        frames = manifest(folder)["frames"]
+        for number, (screen, pictures) in enumerate(seen.items()):
+            sent = {frame["screens"][number]["xxh64"] for frame in frames}
+            wrong = {hash_of(picture) for picture in pictures} - sent
+            if wrong:
+                complain(case, f"{screen} showed {len(wrong)} pictures that were never sent")
+            if line.flipped == 0 or len(pictures) < 3:
+                complain(case, f"{line.flipped} bits were flipped and {len(pictures)} pictures seen: nothing was tried")
+        if dropped == 0 or dropped > line.flipped:
+            complain(case, f"{line.flipped} bits were flipped, {dropped} pictures dropped")
+        if "fresh" not in states(frames, "wall-r0c0"):
+            complain(case, "no frame was ever shown")
+    return None
+
+
+def refusals(folder):
+    """Version skew, another wall's size, a second display of a host and a token that is missing: refused in words."""
+    case = "refusals"
+    # A display of another build: what it greets with is enough to be refused.
+    greeting = struct.pack("<8sIII", b"HPRLINK\n", 0x01020304, 99, 0) + bytes(8)
+    server = socket.socket(socket.AF_UNIX)
+    server.bind(str(folder / "other.sock"))
+    server.listen(16)
+    stop = threading.Event()
+
+    def greet():
+        server.settimeout(0.1)
+        while not stop.is_set():
+            try:
+                end, _ = server.accept()
+                end.sendall(greeting)
+                end.recv(1)
+                end.close()
+            except OSError:
+                pass
+
+    thread = threading.Thread(target=greet, daemon=True)
+    thread.start()
+    result = run(folder, WALL, "--display", "remote", "--displays", f"localhost={folder / 'other.sock'}")
+    stop.set()
+    thread.join()
+    if result.returncode != 7 or "protocol 99" not in result.stderr:
+        complain(case, f"another protocol: left with {result.returncode}: {result.stderr[-500:]}")
+    with Display(folder, WALL, "localhost") as display:
+        result = run(folder, WALL, "--display", "remote", "--scale", "0.5")
+        if result.returncode != 7 or "--scale" not in result.stderr:
+            complain(case, f"another size: left with {result.returncode}: {result.stderr[-500:]}")
+        if "refused rank" not in display.said():
+            complain(case, f"the display says nothing: {display.said()}")
+        second = subprocess.run([HPR, "display", "--wall", WALL, "--show", "none"], cwd=folder, env=environment(folder),
+                                capture_output=True, text=True, timeout=20, check=False)
+        if second.returncode != 2 or "another process listens" not in second.stderr:
+            complain(case, f"a second display: left with {second.returncode}: {second.stderr[-500:]}")
+    for arguments in (["display", "--wall", WALL, "--show", "none", "--listen", "127.0.0.1:5005"],
+                      ["wall", "run", WALL, SCENE, "--display", "remote", "--displays", "localhost=127.0.0.1:5005"]):
+        result = subprocess.run([HPR, *arguments], cwd=folder, env={k: v for k, v in environment(folder).items() if k != "HPR_TOKEN"},
+                                capture_output=True, text=True, timeout=20, check=False)
+        if result.returncode != 2 or "HPR_TOKEN" not in result.stderr:
+            complain(case, f"{arguments[0]} without a token: left with {result.returncode}: {result.stderr[-500:]}")
+    left_over = [p.name for p in folder.rglob("*.sock") if p.name != "other.sock"]
+    if left_over:
+        complain(case, f"sockets are left: {left_over}")
+
+
+def main():
+    names = sys.argv[2:]
+    for case in (same_pictures, killed_display, killed_display_in_manifest, frozen_display, no_display, bad_line, refusals):
+        if names and case.__name__ not in names:
+            continue
+        with tempfile.TemporaryDirectory(prefix="hpr-display-") as scratch:
+            begin = time.monotonic()
+            case(pathlib.Path(scratch))
+            print(f"{case.__name__}: {time.monotonic() - begin:.1f} s")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

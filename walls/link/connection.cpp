@@ -1,0 +1,95 @@
+#include "walls/link/connection.h"
+
+#include <sys/socket.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+#include "core/hash.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::size_t kChunk = 256 * 1024;
+/// Of one call, so that one link cannot keep the others waiting.
+constexpr std::size_t kMostReceived = 16 * kChunk;
+
+[[noreturn]] void gone(int code) {
+  throw LinkError(std::generic_category().message(code));
+}
+
+bool later(int code) {
+  return code == EAGAIN || code == EWOULDBLOCK || code == EINTR;
+}
+
+}  // namespace
+
+void Connection::send() {
+  while (!unsent_.empty()) {
+    const std::vector<std::byte>& message = *unsent_.front();
+    const ssize_t sent = ::send(socket_.descriptor(), message.data() + sent_of_first_, message.size() - sent_of_first_,
+                                MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent < 0) {
+      if (later(errno)) return;
+      gone(errno);
+    }
+    sent_of_first_ += static_cast<std::size_t>(sent);
+    if (sent_of_first_ < message.size()) continue;
+    unsent_.pop_front();
+    sent_of_first_ = 0;
+  }
+}
+
+void Connection::receive() {
+  drop_taken();
+  for (std::size_t total = 0; total < kMostReceived;) {
+    const std::size_t before = in_.size();
+    const ssize_t got = ::recv(socket_.descriptor(), in_.extend(kChunk).data(), kChunk, MSG_DONTWAIT);
+    in_.shrink(before + (got > 0 ? static_cast<std::size_t>(got) : 0));
+    if (got < 0) {
+      if (later(errno)) return;
+      gone(errno);
+    }
+    if (got == 0) {
+      // What came before the end counts; the next call finds the end again.
+      if (total > 0) return;
+      throw LinkError("the other end closed the link");
+    }
+    total += static_cast<std::size_t>(got);
+  }
+}
+
+std::optional<std::vector<std::byte>> Connection::take_block() {
+  const auto begin = arrived();
+  const auto size = block_bytes(begin);
+  if (!size || begin.size() < *size) return std::nullopt;
+  taken_ += *size;
+  return std::vector<std::byte>(begin.begin(), begin.begin() + static_cast<std::ptrdiff_t>(*size));
+}
+
+std::optional<Packet> Connection::take_packet(const std::function<std::size_t(const PacketHeader&)>& limit_of) {
+  const auto begin = arrived();
+  if (begin.size() < kPacketHeaderBytes) return std::nullopt;
+  const PacketHeader header = decode_header(begin.first(kPacketHeaderBytes));
+  if (header.length > limit_of(header)) throw LinkError("a packet is longer than it may be");
+  if (begin.size() - kPacketHeaderBytes < header.length) return std::nullopt;
+  const auto payload = begin.subspan(kPacketHeaderBytes, header.length);
+  taken_ += kPacketHeaderBytes + header.length;
+  return Packet{header, payload, xxh64(payload) == header.payload_hash};
+}
+
+std::span<const std::byte> Connection::arrived() const {
+  return in_.bytes().subspan(taken_);
+}
+
+void Connection::drop_taken() {
+  if (taken_ == 0) return;
+  const auto rest = arrived();
+  if (!rest.empty()) std::memmove(in_.bytes().data(), rest.data(), rest.size());
+  in_.shrink(rest.size());
+  taken_ = 0;
+}
+
+}  // namespace hpr

@@ -1,0 +1,169 @@
+#include "walls/link/display_process.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "walls/canvas.h"
+
+namespace hpr {
+namespace {
+
+constexpr double kTick = 0.1;
+constexpr std::chrono::milliseconds kStatusEvery{200};
+constexpr int kBadgeHeight = 24;
+constexpr Rgba8 kBadgeColor{176, 32, 32, 255};
+constexpr Rgba8 kBadgeText{255, 255, 255, 255};
+
+}  // namespace
+
+std::string_view to_string(ShownState state) {
+  switch (state) {
+    case ShownState::Waiting:
+      return "waiting";
+    case ShownState::Fresh:
+      return "fresh";
+    case ShownState::Stale:
+      return "stale";
+    case ShownState::Ended:
+      break;
+  }
+  return "ended";
+}
+
+Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& words) {
+  const int height = std::min(kBadgeHeight, std::max(1, picture.height() / 4));
+  const double text = height * 0.6;
+  const int width =
+      std::min(picture.width(), static_cast<int>(text * 0.7 * static_cast<double>(words.size())) + height);
+  PixelCanvas canvas({width, height});
+  canvas.fill({0.0, 0.0}, {width, height}, kBadgeColor);
+  canvas.text({width / 2.0, height / 2.0}, words, text, kBadgeText);
+  const Image<Rgba8> badge = canvas.image();
+  Image<Rgba8> result = picture;
+  for (int y = 0; y < height; ++y) std::ranges::copy(badge.row(y), result.row(y).begin());
+  return result;
+}
+
+DisplayProcess::DisplayProcess(const Wall& wall, const std::string& host, Display& display, FrameReceiver& receiver,
+                               const ProcessSettings& settings)
+    : wall_(wall),
+      host_(host),
+      display_(display),
+      receiver_(receiver),
+      settings_(settings),
+      screens_(wall.screens.size()) {
+  if (settings_.folder.empty()) return;
+  write_status();
+  writer_ = std::jthread([this](const std::stop_token& stop) {
+    std::mutex mutex;
+    std::condition_variable_any wake;
+    std::unique_lock lock(mutex);
+    while (!wake.wait_for(lock, stop, kStatusEvery, [&] { return stop.stop_requested(); })) {
+      try {
+        write_status();
+      } catch (const Error& error) {
+        log::debug("{}", error.what());
+      }
+    }
+  });
+}
+
+DisplayProcess::~DisplayProcess() {
+  if (!writer_.joinable()) return;
+  writer_.request_stop();
+  writer_.join();
+  try {
+    write_status();
+  } catch (const Error& error) {
+    log::warning("{}", error.what());
+  }
+}
+
+void DisplayProcess::run(const std::function<bool()>& stop) {
+  while (!stop()) {
+    if (auto presentation = receiver_.next(kTick)) present(*presentation);
+    const ReceiverReport report = receiver_.report();
+    update(report);
+    if (settings_.once && report.runs > 0 && report.idle) return;
+  }
+}
+
+void DisplayProcess::present(Presentation& presentation) {
+  std::vector<ScreenPicture> pictures;
+  for (const auto& [screen, picture] : presentation.pictures) pictures.push_back({screen, picture});
+  if (!pictures.empty()) display_.show({presentation.frame, pictures});
+  receiver_.shown(presentation);
+  for (auto& [screen, picture] : presentation.pictures) {
+    screens_[screen].picture = std::move(picture);
+    screens_[screen].frame = presentation.frame;
+  }
+}
+
+void DisplayProcess::update(const ReceiverReport& report) {
+  const double now = receiver_.now();
+  for (std::size_t i = 0; i < screens_.size(); ++i) {
+    const ScreenReport& of = report.screens[i];
+    ShownState state = ShownState::Fresh;
+    if (!of.frame || !of.arrived) {
+      state = ShownState::Waiting;
+    } else if (report.ended) {
+      state = ShownState::Ended;
+    } else if (now - *of.arrived > settings_.stale_after.count()) {
+      state = ShownState::Stale;
+    }
+    const ShownState before = screens_[i].state;
+    if (state == before) continue;
+    const std::string& id = wall_.screens[i].id;
+    if (state == ShownState::Stale) {
+      log::warning("screen {} ({}) is stale: no frame after {}", id, host_, screens_[i].frame);
+      show_again(i, with_badge(screens_[i].picture, "stale: frame " + std::to_string(screens_[i].frame)));
+    } else if (before == ShownState::Stale) {
+      log::info("screen {} ({}) {}, frame {}", id, host_, state == ShownState::Fresh ? "back" : to_string(state),
+                screens_[i].frame);
+      if (state == ShownState::Ended) show_again(i, screens_[i].picture);
+    }
+    const std::lock_guard lock(mutex_);
+    screens_[i].state = state;
+  }
+}
+
+void DisplayProcess::show_again(std::size_t screen, const Image<Rgba8>& picture) {
+  const std::vector<ScreenPicture> pictures{{screen, picture}};
+  display_.show({screens_[screen].frame, pictures});
+}
+
+std::string DisplayProcess::status() const {
+  using Json = nlohmann::ordered_json;
+  const ReceiverReport report = receiver_.report();
+  Json screens = Json::array();
+  const std::lock_guard lock(mutex_);
+  for (std::size_t i = 0; i < screens_.size(); ++i) {
+    const ScreenReport& of = report.screens[i];
+    screens.push_back(Json{{"id", wall_.screens[i].id},
+                           {"frame", of.frame ? Json(*of.frame) : Json(nullptr)},
+                           {"state", to_string(screens_[i].state)},
+                           {"dropped", of.dropped},
+                           {"late", of.late},
+                           {"skew_ms", of.frame ? Json(of.skew_s * 1000.0) : Json(nullptr)}});
+  }
+  const Json document{{"schema", "hpr.display/1"},
+                      {"host", host_},
+                      {"wall_hash", hex16(wall_.hash)},
+                      {"connected", report.connected},
+                      {"screens", std::move(screens)}};
+  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void DisplayProcess::write_status() {
+  const std::string text = status();
+  if (text == written_) return;
+  write_file_atomically(settings_.folder / "display.json", text);
+  written_ = text;
+}
+
+}  // namespace hpr

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "walls/link/protocol.h"
+#include "walls/wall.h"
+
+namespace hpr {
+
+/// The screens one display process shows.
+struct WallHost {
+  std::string host;                  ///< "localhost" for screens that belong to no host or to any
+  std::vector<std::size_t> screens;  ///< indices into Wall::screens, ascending, never empty
+};
+
+/// In the order of their first screens; hosts without screens are left out.
+[[nodiscard]] std::vector<WallHost> wall_hosts(const Wall& wall);
+
+/// The host of this name, or that of the node with this id. Throws Error (Usage) with the choices.
+[[nodiscard]] WallHost find_host(const Wall& wall, const std::string& name);
+
+/// The wall with that host's screens only; the hash stays.
+[[nodiscard]] Wall wall_of_host(const Wall& wall, const WallHost& host);
+
+/// As the ends of a link compare them.
+[[nodiscard]] std::vector<LinkScreen> link_screens(const Wall& wall, const WallHost& host);
+
+/// Where the display process of that wall and host listens unless told otherwise: in $XDG_RUNTIME_DIR/hpr, or in
+/// /tmp/hpr-UID. Only names it.
+[[nodiscard]] std::filesystem::path display_socket(const Wall& wall, const std::string& host);
+
+}  // namespace hpr

@@ -1,0 +1,199 @@
+#include "walls/link/protocol.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "core/hash.h"
+#include "walls/wall_file.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::string_view kBlockMagic = "HPRLINK\n";
+constexpr std::uint32_t kPacketMagic = 0x4B525048;  // "HPRK"
+/// Written as it lies in memory: what comes out as another number comes from a machine of another byte order.
+constexpr std::uint32_t kByteOrder = 0x01020304;
+constexpr std::size_t kPreambleBytes = 8 + 4 + 4 + 4;
+constexpr std::size_t kHashBytes = 8;
+constexpr std::size_t kLongestText = 1024;
+
+std::vector<std::byte> make_block(const ByteWriter& body) {
+  ByteWriter block;
+  block.raw(std::as_bytes(std::span(kBlockMagic)));
+  block.raw(std::as_bytes(std::span(&kByteOrder, 1)));
+  block.u32(kLinkProtocol);
+  block.u32(static_cast<std::uint32_t>(body.bytes().size()));
+  block.raw(body.bytes());
+  block.u64(xxh64(block.bytes()));
+  return block.take();
+}
+
+/// The body of a whole block whose beginning block_bytes() has judged.
+ByteReader open_block(std::span<const std::byte> block) {
+  if (block.size() < kPreambleBytes + kHashBytes) throw LinkError("a handshake is too short");
+  const auto hashed = block.first(block.size() - kHashBytes);
+  if (ByteReader(block.last(kHashBytes)).u64() != xxh64(hashed)) throw LinkError("a handshake arrived damaged");
+  return ByteReader(hashed.subspan(kPreambleBytes));
+}
+
+template <std::size_t Count>
+void read_array(ByteReader& reader, std::array<std::byte, Count>& into) {
+  std::ranges::copy(reader.raw(Count), into.begin());
+}
+
+bool read_bool(ByteReader& reader) {
+  const std::uint8_t value = reader.u8();
+  if (value > 1) throw LinkError("a handshake holds nonsense");
+  return value == 1;
+}
+
+}  // namespace
+
+std::vector<std::byte> encode(const Greeting& greeting) {
+  ByteWriter body;
+  body.text(greeting.build);
+  body.raw(greeting.nonce);
+  body.u8(greeting.wants_token ? 1 : 0);
+  return make_block(body);
+}
+
+std::vector<std::byte> encode(const Hello& hello) {
+  ByteWriter body;
+  body.text(hello.build);
+  body.u8(static_cast<std::uint8_t>(hello.role));
+  body.text(hello.host);
+  body.u64(hello.wall_hash);
+  body.u64(hello.session);
+  body.u32(hello.rank);
+  body.u32(static_cast<std::uint32_t>(hello.screens.size()));
+  for (const LinkScreen& screen : hello.screens) {
+    body.text(screen.id);
+    body.u32(static_cast<std::uint32_t>(screen.size.width));
+    body.u32(static_cast<std::uint32_t>(screen.size.height));
+  }
+  body.raw(hello.nonce);
+  body.raw(hello.proof);
+  return make_block(body);
+}
+
+std::vector<std::byte> encode(const Reply& reply) {
+  ByteWriter body;
+  body.u8(reply.accepted ? 1 : 0);
+  body.text(reply.reason);
+  body.raw(reply.proof);
+  return make_block(body);
+}
+
+std::optional<std::size_t> block_bytes(std::span<const std::byte> begin) {
+  const auto magic = std::as_bytes(std::span(kBlockMagic));
+  const std::size_t seen = std::min(begin.size(), magic.size());
+  if (!std::ranges::equal(begin.first(seen), magic.first(seen))) throw LinkError("the other end does not speak HPR's");
+  if (begin.size() < kPreambleBytes) return std::nullopt;
+  ByteReader reader(begin.subspan(magic.size()));
+  std::uint32_t order = 0;
+  std::memcpy(&order, reader.raw(sizeof order).data(), sizeof order);
+  if (order != kByteOrder) throw LinkError("the other end's machine has another byte order");
+  const std::uint32_t protocol = reader.u32();
+  if (protocol != kLinkProtocol) {
+    throw LinkError("the other end speaks protocol " + std::to_string(protocol) + " of displays, this is " +
+                    std::to_string(kLinkProtocol) + ": install the same hpr on both");
+  }
+  const std::size_t body = reader.u32();
+  if (body > kMostBlockBytes) throw LinkError("a handshake is too long");
+  return kPreambleBytes + body + kHashBytes;
+}
+
+Greeting decode_greeting(std::span<const std::byte> block) {
+  ByteReader reader = open_block(block);
+  Greeting greeting;
+  greeting.build = reader.text(kLongestText);
+  read_array(reader, greeting.nonce);
+  greeting.wants_token = read_bool(reader);
+  reader.finish();
+  return greeting;
+}
+
+Hello decode_hello(std::span<const std::byte> block) {
+  ByteReader reader = open_block(block);
+  Hello hello;
+  hello.build = reader.text(kLongestText);
+  const std::uint8_t role = reader.u8();
+  if (role > static_cast<std::uint8_t>(LinkRole::Swap)) throw LinkError("a handshake names an unknown role");
+  hello.role = static_cast<LinkRole>(role);
+  hello.host = reader.text(kLongestText);
+  hello.wall_hash = reader.u64();
+  hello.session = reader.u64();
+  hello.rank = reader.u32();
+  const std::uint32_t screens = reader.u32();
+  if (screens > static_cast<std::uint32_t>(kMostScreens)) throw LinkError("a handshake names too many screens");
+  for (std::uint32_t i = 0; i < screens; ++i) {
+    LinkScreen screen;
+    screen.id = reader.text(kLongestText);
+    const std::uint32_t width = reader.u32();
+    const std::uint32_t height = reader.u32();
+    if (std::max(width, height) > static_cast<std::uint32_t>(kMostScreenSide)) {
+      throw LinkError("a handshake names too large a screen");
+    }
+    screen.size = {static_cast<int>(width), static_cast<int>(height)};
+    hello.screens.push_back(std::move(screen));
+  }
+  read_array(reader, hello.nonce);
+  read_array(reader, hello.proof);
+  reader.finish();
+  return hello;
+}
+
+Reply decode_reply(std::span<const std::byte> block) {
+  ByteReader reader = open_block(block);
+  Reply reply;
+  reply.accepted = read_bool(reader);
+  reply.reason = reader.text(kLongestText);
+  read_array(reader, reply.proof);
+  reader.finish();
+  return reply;
+}
+
+std::size_t longest_picture(Size size) {
+  // Bytes nothing can compress, a codec's own frame around them, and room.
+  constexpr std::size_t kRoom = 65536;
+  const std::size_t raw = size.area() * 4;
+  return raw + raw / 8 + kRoom;
+}
+
+std::vector<std::byte> encode_packet(PacketHeader header, std::span<const std::byte> payload) {
+  ByteWriter packet;
+  packet.u32(kPacketMagic);
+  packet.u32(static_cast<std::uint32_t>(header.type));
+  packet.u32(header.screen);
+  packet.u64(header.frame);
+  packet.real(header.time);
+  packet.u64(payload.size());
+  packet.u64(xxh64(payload));
+  packet.u64(xxh64(packet.bytes()));
+  packet.raw(payload);
+  return packet.take();
+}
+
+PacketHeader decode_header(std::span<const std::byte> bytes) {
+  ByteReader hashed(bytes.first(kPacketHeaderBytes - kHashBytes));
+  ByteReader hash(bytes.subspan(kPacketHeaderBytes - kHashBytes));
+  if (hash.u64() != xxh64(hashed.rest())) throw LinkError("a packet's header arrived damaged");
+  if (hashed.u32() != kPacketMagic) throw LinkError("a packet of another kind of program");
+  PacketHeader header;
+  const std::uint32_t type = hashed.u32();
+  if (type < static_cast<std::uint32_t>(PacketType::Frame) || type > static_cast<std::uint32_t>(PacketType::Bye)) {
+    throw LinkError("a packet of an unknown type");
+  }
+  header.type = static_cast<PacketType>(type);
+  header.screen = hashed.u32();
+  header.frame = hashed.u64();
+  header.time = hashed.real();
+  header.length = hashed.u64();
+  header.payload_hash = hashed.u64();
+  if (!std::isfinite(header.time)) throw LinkError("a packet from no time");
+  return header;
+}
+
+}  // namespace hpr

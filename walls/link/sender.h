@@ -1,0 +1,111 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "walls/codec.h"
+#include "walls/display.h"
+#include "walls/link/client_link.h"
+#include "walls/link/clock.h"
+#include "walls/link/hosts.h"
+#include "walls/link/swap_barrier.h"
+#include "walls/wall.h"
+
+namespace hpr {
+
+struct SenderSettings {
+  std::string build;  ///< of this program; displays of another one refuse
+  std::uint64_t session = 0;
+  std::string token;                                ///< of TCP links
+  std::map<std::string, LinkAddress> addresses;     ///< per host where it is not the socket wall and host name
+  int rank = 0;                                     ///< 0 also has the displays agree on when to show
+  std::chrono::duration<double> send_budget{0.1};   ///< the longest a frame waits for displays
+  std::chrono::duration<double> swap_timeout{0.1};  ///< the longest displays that are ready wait for others
+  int in_flight = 1;                                ///< frames the job may be ahead of what displays are ready for
+  std::string codec = "raw";
+  CodecSettings codec_settings;
+};
+
+/// Sends the pictures of one rank's screens to the display processes of their hosts, and on rank 0 has all displays of
+/// the wall show each frame together. A thread of its own sends, connects and connects again; the job only hands over
+/// frames, and waits no longer than the budget.
+class WallSender {
+ public:
+  /// `owners`: per screen the rank. Throws Error (Usage) for an unknown codec or host.
+  WallSender(const Wall& wall, std::span<const int> owners, const SenderSettings& settings);
+  ~WallSender();
+  WallSender(const WallSender&) = delete;
+  WallSender& operator=(const WallSender&) = delete;
+
+  /// Rank 0: returns when all displays have answered, or after `limit`. Throws Error (Lost) with the words of a display
+  /// that refuses: waiting would not help.
+  void wait_for_displays(std::chrono::duration<double> limit);
+  /// Hands over a frame: on this rank's screens; numbers ascend. Rank 0 then waits, within the budget, until the
+  /// displays are ready for the frame `in_flight` before this one.
+  void show(const WallFrame& frame);
+  /// After the last frame: returns when it is sent, on rank 0 shown, or after two seconds, or
+  /// what budget and swap time-out ask for.
+  void finish();
+
+  /// Rank 0, after finish().
+  [[nodiscard]] SwapOutcome outcome(std::uint64_t frame) const;
+  [[nodiscard]] double degraded_seconds() const { return degraded_s_; }
+  /// Whether any display ever answered; and if none did, why the first did not.
+  [[nodiscard]] bool reached_any() const;
+  [[nodiscard]] std::string why_unreached() const;
+
+ private:
+  /// The way of this rank's pictures to a host.
+  struct FrameLink {
+    ClientLink link;
+    std::vector<std::size_t> screens;        ///< of the wall, of this rank
+    std::vector<std::uint32_t> numbers;      ///< the same among the host's
+    std::vector<LinkMessage> current;        ///< the latest frame's, one per screen
+    bool sent = true;                        ///< `current` was handed to the connection
+    std::vector<std::uint64_t> sent_anew{};  ///< per screen the frame last sent a second time, plus one
+  };
+  /// Rank 0's agreement with a display.
+  struct SwapLink {
+    ClientLink link;
+    WallHost host;
+    ClockOffset clock;
+    std::uint64_t pings = 0;
+    double ping_sent = 0.0;
+    double next_ping = 0.0;
+    bool ever_up = false;
+    std::string told_refusal{};
+  };
+
+  [[nodiscard]] ClientLink make_link(const WallHost& host, LinkRole role) const;
+  void run(const std::stop_token& stop);
+  void wait_for_news(double now);
+  void step(double now);
+  void step_frames(FrameLink& link, double now);
+  void step_swap(std::size_t display, double now);
+  void take_answer(std::size_t display, const Packet& packet, double now);
+  void present(double now);
+  void say(const SwapEvent& event) const;
+  [[nodiscard]] bool all_sent() const;
+
+  const Wall& wall_;
+  SenderSettings settings_;
+  std::vector<std::unique_ptr<Codec>> codecs_;  ///< per screen; none where another rank owns it
+  mutable std::mutex mutex_;                    ///< of all below
+  std::condition_variable news_;
+  std::vector<FrameLink> frames_;
+  std::vector<SwapLink> swaps_;  ///< one per display on rank 0
+  SwapBarrier barrier_;
+  double degraded_s_ = 0.0;
+  bool finishing_ = false;
+  Socket alarm_;
+  std::jthread thread_;
+};
+
+}  // namespace hpr

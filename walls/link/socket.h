@@ -1,0 +1,65 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "walls/link/address.h"
+
+namespace hpr {
+
+/// A file descriptor that is closed with its owner.
+class Socket {
+ public:
+  Socket() = default;
+  explicit Socket(int descriptor) : descriptor_(descriptor) {}
+  ~Socket();
+  Socket(Socket&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  Socket& operator=(Socket&& other) noexcept {
+    std::swap(descriptor_, other.descriptor_);
+    return *this;
+  }
+
+  /// -1: none.
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  explicit operator bool() const { return descriptor_ >= 0; }
+
+ private:
+  int descriptor_ = -1;
+};
+
+/// A listening socket; a Unix socket's file goes with it.
+class Listener {
+ public:
+  /// Makes a Unix socket's folder where it is missing (mode 0700; the socket has 0600) and takes the place of a socket
+  /// nobody listens on any more. Throws Error: Usage when another process listens there, Io when it cannot be had, or
+  /// when its folder belongs to somebody else or lets others write.
+  explicit Listener(const LinkAddress& address);
+  ~Listener();
+  Listener(Listener&& other) noexcept;
+  Listener& operator=(Listener&&) = delete;
+
+  [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
+  [[nodiscard]] bool tcp() const { return tcp_; }
+  /// Whoever waits, non-blocking; none when nobody does, or on a Unix socket another user.
+  [[nodiscard]] std::optional<Socket> accept() const;
+
+ private:
+  Socket socket_;
+  bool tcp_ = false;
+  std::filesystem::path path_;  ///< of the Unix socket
+};
+
+/// Starts to connect, without waiting. Throws LinkError when it fails at once.
+[[nodiscard]] Socket start_connecting(const LinkAddress& address);
+
+/// Once such a socket can be written: throws LinkError when it did not connect, or when a Unix socket's listener is
+/// another user.
+void finish_connecting(const Socket& socket, bool tcp);
+
+/// An eventfd: wakes whoever polls it.
+[[nodiscard]] Socket make_alarm();
+void raise_alarm(const Socket& alarm);
+void clear_alarm(const Socket& alarm);
+
+}  // namespace hpr
