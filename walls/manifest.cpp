@@ -23,18 +23,32 @@ ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, S
   return {id, picture.size(), xxh64(std::as_bytes(picture.pixels())), state};
 }
 
+namespace {
+
+// ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
+using Json = nlohmann::ordered_json;
+
+Json to_json(const HeadRecord& head) {
+  const auto& [position, turn] = head.pose;
+  return Json{{"viewer", head.viewer},
+              {"position_m", {position.x, position.y, position.z}},
+              {"orientation", {turn.x, turn.y, turn.z, turn.w}}};
+}
+
+Json picture_json(const ScreenRecord& screen) {
+  return Json{
+      {"id", screen.id}, {"width", screen.size.width}, {"height", screen.size.height}, {"xxh64", hex16(screen.xxh64)}};
+}
+
+}  // namespace
+
 std::string to_json(const RunManifest& manifest) {
-  // ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
-  using Json = nlohmann::ordered_json;
   Json frames = Json::array();
   for (const FrameRecord& frame : manifest.frames) {
     Json screens = Json::array();
     for (const ScreenRecord& screen : frame.screens) {
-      screens.push_back(Json{{"id", screen.id},
-                             {"width", screen.size.width},
-                             {"height", screen.size.height},
-                             {"xxh64", hex16(screen.xxh64)},
-                             {"state", to_string(screen.state)}});
+      screens.push_back(picture_json(screen));
+      screens.back()["state"] = to_string(screen.state);
     }
     Json record{
         {"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
@@ -44,6 +58,8 @@ std::string to_json(const RunManifest& manifest) {
                               {"samples", frame.budget->samples},
                               {"given_up", frame.budget->given_up}};
     }
+    for (const HeadRecord& head : frame.heads) record["heads"].push_back(to_json(head));
+    for (const ScreenRecord& monitor : frame.monitors) record["monitors"].push_back(picture_json(monitor));
     frames.push_back(std::move(record));
   }
   const Json document{{"schema", "hpr.wall-run/1"},

@@ -9,6 +9,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
+#include "walls/head.h"
 
 namespace hpr {
 
@@ -32,12 +33,20 @@ struct BudgetRecord {
   std::vector<std::string> given_up;  ///< in the order in which it is
 };
 
+/// Where a tracked viewer's head was.
+struct HeadRecord {
+  std::string viewer;  ///< id
+  HeadPose pose;
+};
+
 struct FrameRecord {
   std::uint64_t frame = 0;
   double ms = 0.0;
   std::string strategy;
   std::vector<ScreenRecord> screens;
   std::optional<BudgetRecord> budget = {};
+  std::vector<HeadRecord> heads = {};
+  std::vector<ScreenRecord> monitors = {};
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
