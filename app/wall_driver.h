@@ -11,6 +11,8 @@
 #include "app/progress.h"
 #include "app/screens.h"
 #include "app/session.h"
+#include "app/wall_heads.h"
+#include "app/wall_monitors.h"
 #include "app/wall_run.h"
 #include "walls/display.h"
 #include "walls/manifest.h"
@@ -41,7 +43,7 @@ class WallDriver {
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
 
  private:
-  [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame) const;
+  [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const;
   [[nodiscard]] bool shows_any() const;
   void show(std::uint64_t number);
   void record(std::uint64_t number);
@@ -51,10 +53,14 @@ class WallDriver {
   const Wall& wall_;
   Session& session_;
   std::optional<CameraPath> path_;
+  WallHeads heads_;
+  WallMonitors monitors_;
   FrameMaker frames_;
-  Showing showing_;
+  std::vector<int> owners_;  ///< per screen the rank that shows it
+  Showing showing_;          ///< of the pictures of screen_eyes()
   std::unique_ptr<Display> display_;
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
+  std::vector<Image<Rgba8>> copies_;    ///< per monitor, on rank 0
   RunManifest manifest_;
   FrameCost last_cost_;
 };

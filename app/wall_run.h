@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/command.h"
 #include "app/render_options.h"
@@ -15,6 +16,7 @@ namespace hpr {
 struct WallRun {
   std::string scene;
   std::string wall;
+  std::vector<std::string> overrides;  ///< of the wall file, PATH=VALUE
   std::string display = "file";
   std::string folder;   ///< where the file display writes
   std::string picture;  ///< the assembled wall goes here too; empty: only into the folder
@@ -29,6 +31,9 @@ struct WallRun {
 
 /// Checks what can be checked alone, then draws on all ranks.
 [[nodiscard]] ExitCode run_wall(const WallRun& run, const Globals& globals);
+
+/// `--set PATH=VALUE`, as often as wanted.
+void declare_overrides(CLI::App& app, std::vector<std::string>& overrides);
 
 /// `hpr wall run WALL SCENE`.
 [[nodiscard]] std::unique_ptr<Command> make_wall_run_command();
