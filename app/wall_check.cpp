@@ -3,13 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 
 #include "app/report_error.h"
 #include "app/wall_command.h"
 #include "core/hash.h"
 #include "core/log.h"
+#include "core/names.h"
+#include "image/key.h"
 #include "walls/geometry.h"
+#include "walls/plan.h"
+#include "walls/stereo.h"
 
 namespace hpr {
 namespace {
@@ -33,7 +38,8 @@ Figures figures_of(const Wall& wall) {
   double lit = 0.0;
   for (const WallScreen& screen : wall.screens) {
     figures.visible_pixels += screen.pixels.area();
-    lit += screen_width(screen) * screen_height(screen);
+    // Two eyes' screens lie in one place.
+    lit += (screen.eye == Eye::Both ? 1.0 : 0.5) * screen_width(screen) * screen_height(screen);
   }
   const WallExtent extent = wall_extent(wall);
   figures.flat = extent.flat;
@@ -44,12 +50,111 @@ Figures figures_of(const Wall& wall) {
   return figures;
 }
 
-double tenths(double value) {
-  return std::round(10.0 * value) / 10.0;
-}
-
 std::string plural(std::size_t count, std::string_view what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// What a rank's screens take of its memory; the scene comes on top.
+struct RankNeed {
+  std::string owner;  ///< "n0 (wall01), rank 0", "any rank"
+  int rank = -1;      ///< -1: whichever
+  std::string node;
+  std::size_t screens = 0;
+  std::uint64_t bytes = 0;
+};
+
+/// Of each picture that is drawn: its keys, its radiance, the display colours that travel, and the screen's picture.
+constexpr std::uint64_t kBytesPerPixel = sizeof(Key) + sizeof(Rgb) + 2 * sizeof(Rgba8);
+
+/// Per rank that is named, and per node or the whole wall for the screens that name none.
+std::vector<RankNeed> needs_of(const Wall& wall) {
+  std::vector<RankNeed> needs;
+  std::size_t last = wall.screens.size();
+  for (const ScreenEye& picture : screen_eyes(wall)) {
+    const WallScreen& screen = wall.screens[picture.screen];
+    const std::string owner = owner_of(wall, screen);
+    auto need = std::ranges::find(needs, owner, &RankNeed::owner);
+    if (need == needs.end()) need = needs.insert(needs.end(), {owner, screen.rank, screen.node, 0, 0});
+    need->bytes += kBytesPerPixel * picture.pixels.area();
+    if (picture.screen != last) ++need->screens;
+    last = picture.screen;
+  }
+  return needs;
+}
+
+std::uint64_t sum_of(const std::vector<RankNeed>& needs) {
+  return std::accumulate(needs.begin(), needs.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const RankNeed& need) { return sum + need.bytes; });
+}
+
+std::string mebibytes(std::uint64_t bytes) {
+  return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+std::string describe_memory(const Wall& wall) {
+  const std::vector<RankNeed> needs = needs_of(wall);
+  const RankNeed& most = *std::ranges::max_element(needs, {}, &RankNeed::bytes);
+  const std::string all = mebibytes(sum_of(needs));
+  if (needs.size() == 1) return fmt::format("memory: {} for the pictures of a frame, and the scene\n", all);
+  return fmt::format("memory: {} for the pictures of a frame, {} of it for {}; and the scene on every rank\n", all,
+                     mebibytes(most.bytes), most.owner);
+}
+
+std::string describe_first_viewer(const Wall& wall, bool flat) {
+  const WallViewer& viewer = wall.viewers.front();
+  const glm::dvec3 at = viewer.position;
+  if (viewer.given) {
+    return fmt::format("viewer: at {:g}, {:g}, {:g} m; the wall is a window into the scene\n", at.x, at.y, at.z);
+  }
+  if (flat) return "viewer: none given; the wall shows what the camera sees\n";
+  return fmt::format("viewer: none given; taken at {:g}, {:g}, {:g} m\n", at.x, at.y, at.z);
+}
+
+/// One line each for further viewers, trackers, stereo and monitors.
+std::string describe_more(const Wall& wall) {
+  std::string text;
+  for (std::size_t i = 1; i < wall.viewers.size(); ++i) {
+    const WallViewer& viewer = wall.viewers[i];
+    text += fmt::format("viewer \"{}\": at {:g}, {:g}, {:g} m\n", viewer.id, viewer.position.x, viewer.position.y,
+                        viewer.position.z);
+  }
+  for (const WallViewer& viewer : wall.viewers) {
+    const std::string who = viewer.id.empty() ? "the viewer" : fmt::format("viewer \"{}\"", viewer.id);
+    const WallTracker& tracker = viewer.tracker;
+    if (tracker.kind == WallTracker::Kind::File) {
+      text += fmt::format("tracker: {} moves as recorded in {}\n", who, printable(tracker.path));
+    } else if (tracker.kind == WallTracker::Kind::Udp) {
+      text += fmt::format("tracker: {} moves as told at UDP port {} of {}\n", who, tracker.port,
+                          printable(tracker.address));
+    }
+  }
+  if (wall.stereo != StereoMode::None) {
+    text += fmt::format("stereo: {}, {} pictures for {}\n", stereo_names().at(static_cast<std::size_t>(wall.stereo)),
+                        screen_eyes(wall).size(), plural(wall.screens.size(), "screen"));
+  }
+  for (const WallMonitor& monitor : wall.monitors) {
+    text += fmt::format("monitor \"{}\": {} on {}x{} px\n", monitor.id, monitor.surface, monitor.pixels.width,
+                        monitor.pixels.height);
+  }
+  return text;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json memory_json(const Wall& wall) {
+  const std::vector<RankNeed> needs = needs_of(wall);
+  Json ranks = Json::array();
+  for (const RankNeed& need : needs) {
+    ranks.push_back(Json{{"rank", need.rank >= 0 ? Json(need.rank) : Json(nullptr)},
+                         {"node", need.node.empty() ? Json(nullptr) : Json(need.node)},
+                         {"screens", need.screens},
+                         {"bytes", need.bytes}});
+  }
+  return Json{{"bytes_per_pixel", kBytesPerPixel}, {"bytes", sum_of(needs)}, {"ranks", std::move(ranks)}};
+}
+
+double tenths(double value) {
+  return std::round(10.0 * value) / 10.0;
 }
 
 }  // namespace
@@ -77,16 +182,10 @@ std::string describe_wall(const Wall& wall) {
         fmt::format("seams: {}; bezels in whole pixels would be off by {:.2f} px at one, {:.2f} px across the wall\n",
                     figures.seams.count, figures.seams.largest_error_px, figures.seams.accumulated_error_px);
   }
-  text += wall.viewer_given ? fmt::format("viewer: at {:g}, {:g}, {:g} m; the wall is a window into the scene\n",
-                                          wall.viewer.x, wall.viewer.y, wall.viewer.z)
-          : figures.flat    ? std::string("viewer: none given; the wall shows what the camera sees\n")
-                            : fmt::format("viewer: none given; taken at {:g}, {:g}, {:g} m\n", wall.viewer.x,
-                                          wall.viewer.y, wall.viewer.z);
-  return text;
+  return text + describe_first_viewer(wall, figures.flat) + describe_more(wall) + describe_memory(wall);
 }
 
 std::string check_json(const WallCheck& check) {
-  using Json = nlohmann::ordered_json;
   Json findings = Json::array();
   for (const WallFinding& finding : check.reading.findings) {
     findings.push_back(Json{{"severity", finding.error ? "error" : "warning"},
@@ -114,7 +213,11 @@ std::string check_json(const WallCheck& check) {
     document["seams"] = Json{{"count", figures.seams.count},
                              {"whole_pixel_error_px", figures.seams.largest_error_px},
                              {"accumulated_error_px", figures.seams.accumulated_error_px}};
-    document["viewer_given"] = wall.viewer_given;
+    document["viewer_given"] = wall.viewers.front().given;
+    document["viewers"] = wall.viewers.size();
+    document["stereo"] = stereo_names().at(static_cast<std::size_t>(wall.stereo));
+    document["pictures"] = screen_eyes(wall).size();
+    document["memory"] = memory_json(wall);
   }
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

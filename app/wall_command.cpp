@@ -13,6 +13,7 @@
 #include "image/image_io.h"
 #include "walls/pattern.h"
 #include "walls/plan.h"
+#include "walls/wall_schema.h"
 
 namespace hpr {
 namespace {
@@ -26,6 +27,7 @@ class WallCommand final : public Command {
     app.require_subcommand(1);
     CLI::App& check = add(app, "check", "every error and oddity in a wall file");
     check.add_flag("--json", json_, "print one JSON document (hpr.wall-check/1)");
+    declare_overrides(check, overrides_);
     check.callback([this] { action_ = [this](const Globals&) { return this->check(); }; });
 
     CLI::App& plan = add(app, "plan", "a picture of where the screens are and who drives them");
@@ -33,7 +35,16 @@ class WallCommand final : public Command {
     plan.callback([this] { action_ = [this](const Globals& globals) { return this->plan(globals); }; });
 
     CLI::App& expand = add(app, "expand", "the same wall as TOML with its grids written out");
+    declare_overrides(expand, overrides_);
     expand.callback([this] { action_ = [this](const Globals&) { return this->expand(); }; });
+
+    CLI::App& schema = *app.add_subcommand("schema", "what a wall file may hold, as a JSON Schema (draft 2020-12)");
+    schema.callback([this] {
+      action_ = [](const Globals&) {
+        fmt::print("{}", wall_schema());
+        return ExitCode::Done;
+      };
+    });
 
     CLI::App& pattern = add(app, "pattern", "calibration pictures, one per screen");
     pattern.add_option("-o,--output", output_, "where <screen id>.png go")->required()->type_name("DIR");
@@ -65,7 +76,7 @@ class WallCommand final : public Command {
   }
 
   [[nodiscard]] ExitCode check() const {
-    const WallCheck check{wall_, read_wall(wall_)};
+    const WallCheck check{wall_, read_wall(wall_, overrides_)};
     if (json_) {
       fmt::print("{}", check_json(check));
     } else {
@@ -92,7 +103,7 @@ class WallCommand final : public Command {
   }
 
   [[nodiscard]] ExitCode expand() const {
-    fmt::print("{}", expand_wall(load_wall(wall_)));
+    fmt::print("{}", expand_wall(load_wall(wall_, overrides_)));
     return ExitCode::Done;
   }
 
@@ -113,6 +124,7 @@ class WallCommand final : public Command {
   }
 
   std::string wall_;
+  std::vector<std::string> overrides_;
   std::string output_;
   bool json_ = false;
   std::unique_ptr<Command> run_ = make_wall_run_command();

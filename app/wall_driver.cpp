@@ -55,10 +55,15 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
   return owners;
 }
 
-std::vector<Size> sizes_of(const Wall& wall) {
-  std::vector<Size> sizes;
-  for (const WallScreen& screen : wall.screens) sizes.push_back(screen.pixels);
-  return sizes;
+/// Of each picture that is drawn, its screen's rank.
+Showing showing_of(const Wall& wall, const std::vector<int>& owners, double exposure_stops) {
+  Showing showing;
+  for (const ScreenEye& picture : screen_eyes(wall)) {
+    showing.sizes.push_back(picture.pixels);
+    showing.shown_by.push_back(owners[picture.screen]);
+  }
+  showing.exposure_stops = exposure_stops;
+  return showing;
 }
 
 std::vector<std::string> hosts_of(Communicator& comm, const std::string& mine) {
@@ -85,15 +90,15 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
       wall_(wall),
       session_(session),
       path_(run.path.empty() ? std::optional<CameraPath>() : load_camera_path(run.path)),
+      heads_(wall, session.comm()),
+      monitors_(wall),
       globals_(globals),
       options_(run.options),
       control_(session, globals, options_, [this] { return status(); }),
-      showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host()), run.display == kRemoteDisplay),
-               run.options.exposure} {
-  frames_.emplace(session, settings, sampling_of(run), screens_in(0), run.target_ms);
-  if (run.display == kRemoteDisplay) {
-    remote_ = connect_displays(session_.comm(), wall, showing_.shown_by, run.remote);
-  }
+      owners_(owners_of(wall, hosts_of(session.comm(), session.host()), run.display == kRemoteDisplay)),
+      showing_(showing_of(wall, owners_, run.options.exposure)) {
+  frames_.emplace(session, settings, sampling_of(run), screens_in(0, resting_heads(wall)), run.target_ms);
+  if (run.display == kRemoteDisplay) remote_ = connect_displays(session_.comm(), wall, owners_, run.remote);
   agree_on_failure(session_.comm(), [&] {
     if (shows_any() && !remote_)
       display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
@@ -131,7 +136,8 @@ void WallDriver::plan_frames() {
   WallRun changed = run_;
   changed.options = options_;
   showing_.exposure_stops = options_.exposure;
-  frames_.emplace(session_, options_.settings(globals_.seed), sampling_of(changed), screens_in(0), run_.target_ms);
+  frames_.emplace(session_, options_.settings(globals_.seed), sampling_of(changed), screens_in(0, resting_heads(wall_)),
+                  run_.target_ms);
 }
 
 std::string WallDriver::status() const {
@@ -160,8 +166,9 @@ std::string WallDriver::status() const {
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
-  Frame& frame = frames_->make(screens_in(number), number, progress);
-  pictures_ = bring_to_screens(session_, frame, frames_->blocks(), showing_);
+  Frame& frame = frames_->make(screens_in(number, heads_.at(number)), number, progress);
+  pictures_ = compose_screens(wall_, bring_to_screens(session_, frame, frames_->blocks(), showing_));
+  copies_ = monitors_.draw(session_.comm(), pictures_, owners_);
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   agree_on_failure(session_.comm(), [&] { show(number); });
   record(number);
@@ -173,8 +180,8 @@ bool WallDriver::finish() {
 
 std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
   Communicator& comm = session_.comm();
-  for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
-    const int from = showing_.shown_by[screen];
+  for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+    const int from = owners_[screen];
     if (from == 0) continue;
     if (comm.rank() == from) comm.send(std::as_bytes(pictures_[screen].pixels()), 0);
     if (comm.rank() == 0) {
@@ -185,34 +192,37 @@ std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
   return std::move(pictures_);
 }
 
-std::vector<View> WallDriver::screens_in(std::uint64_t frame) const {
+std::vector<View> WallDriver::screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const {
   const Camera camera = path_ ? camera_of(path_->at_frame(frame, static_cast<std::size_t>(run_.frames)))
                               : options_.choose_camera(session_.scene());
-  return wall_views(wall_, camera, session_.scene().bounds);
+  return wall_views(wall_, heads, camera, session_.scene().bounds);
 }
 
 bool WallDriver::shows_any() const {
-  return std::ranges::find(showing_.shown_by, session_.comm().rank()) != showing_.shown_by.end();
+  const bool shows_monitors = monitors_.any() && session_.comm().rank() == 0;
+  return shows_monitors || std::ranges::find(owners_, session_.comm().rank()) != owners_.end();
 }
 
 void WallDriver::show(std::uint64_t number) {
   if (!display_ && !remote_) return;
   std::vector<ScreenPicture> mine;
-  for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
-    if (showing_.shown_by[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
+  for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+    if (owners_[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
   }
   if (remote_) {
-    remote_->show({number, mine});
-  } else {
-    display_->show({number, mine});
+    remote_->show({number, mine, {}});
+    return;
   }
+  std::vector<MonitorPicture> monitors;
+  for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) monitors.push_back({monitor, copies_[monitor]});
+  display_->show({number, mine, monitors});
 }
 
 /// Every rank hashes what it showed; rank 0 writes it down.
 void WallDriver::record(std::uint64_t number) {
-  std::vector<std::uint64_t> hashes(showing_.shown_by.size(), 0);
-  for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
-    if (showing_.shown_by[screen] == session_.comm().rank()) {
+  std::vector<std::uint64_t> hashes(owners_.size(), 0);
+  for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+    if (owners_[screen] == session_.comm().rank()) {
       hashes[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
     }
   }
@@ -223,6 +233,10 @@ void WallDriver::record(std::uint64_t number) {
   for (std::size_t screen = 0; screen < hashes.size(); ++screen) {
     frame.screens.push_back(
         {wall_.screens[screen].id, wall_.screens[screen].pixels, hashes[screen], ScreenState::Fresh});
+  }
+  frame.heads = heads_.report();
+  for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) {
+    frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, copies_[monitor], ScreenState::Fresh));
   }
   if (journal_) journal_->add_frame(to_json(frame));
   manifest_.frames.push_back(std::move(frame));

@@ -13,6 +13,8 @@
 #include "app/run_journal.h"
 #include "app/screens.h"
 #include "app/session.h"
+#include "app/wall_heads.h"
+#include "app/wall_monitors.h"
 #include "app/wall_run.h"
 #include "walls/display.h"
 #include "walls/link/sender.h"
@@ -52,7 +54,7 @@ class WallDriver {
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
 
  private:
-  [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame) const;
+  [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const;
   [[nodiscard]] bool shows_any() const;
   void plan_frames();
   void take_over();
@@ -65,14 +67,18 @@ class WallDriver {
   const Wall& wall_;
   Session& session_;
   std::optional<CameraPath> path_;
+  WallHeads heads_;
+  WallMonitors monitors_;
   const Globals& globals_;
   RenderOptions options_;  ///< as changed while it runs
   RunControl control_;
+  std::vector<int> owners_;  ///< per screen the rank that shows it
+  Showing showing_;          ///< of the pictures of screen_eyes()
   std::optional<FrameMaker> frames_;
-  Showing showing_;
   std::unique_ptr<Display> display_;
   std::unique_ptr<WallSender> remote_;  ///< in place of a display, to those outside the job
   std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
+  std::vector<Image<Rgba8>> copies_;    ///< per monitor, on rank 0
   RunManifest manifest_;
   FrameCost last_cost_;
   std::optional<RunJournal> journal_;  ///< on rank 0, where a supervisor looks on

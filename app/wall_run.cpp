@@ -187,7 +187,7 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   Globals globals = given;
   // What stands there is what the job that was lost had written.
   if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
-  Wall wall = load_wall(run.wall);
+  Wall wall = load_wall(run.wall, run.overrides);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
   const FrameSettings settings = run.options.settings(globals.seed);
   if (!settings.aovs.empty()) {
@@ -202,6 +202,7 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   (void)run.options.wire.colors();
   (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
+  for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals);
   const EmptyFolders tidy(run.folder);
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
   return run_supervised(globals, run.restarts, [&](Communicator& comm) {
@@ -222,6 +223,7 @@ class WallRunCommand final : public Command {
 
   void declare(CLI::App& app) override {
     app.add_option("wall", run_.wall, "a wall file, or CxR, or CxR@WxH")->required();
+    declare_overrides(app, run_.overrides);
     app.add_option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value")->required();
     app.add_option("--display", run_.display, "file, none, or remote: display processes, see hpr display")
         ->capture_default_str();
@@ -250,6 +252,13 @@ class WallRunCommand final : public Command {
 };
 
 }  // namespace
+
+void declare_overrides(CLI::App& app, std::vector<std::string>& overrides) {
+  app.add_option("--set", overrides, "put a value over one of the wall file's, e.g. stereo.mode=anaglyph")
+      ->type_name("PATH=VALUE")
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->allow_extra_args(false);
+}
 
 std::unique_ptr<Command> make_wall_run_command() {
   return std::make_unique<WallRunCommand>();

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "app/command.h"
 #include "app/remote_wall.h"
@@ -20,6 +21,7 @@ inline constexpr std::string_view kRemoteDisplay = "remote";
 struct WallRun {
   std::string scene;
   std::string wall;
+  std::vector<std::string> overrides;  ///< of the wall file, PATH=VALUE
   std::string display = "file";
   std::string folder;   ///< where the file display writes, and for remote ones the manifest goes
   std::string picture;  ///< the assembled wall goes here too; empty: only into the folder
@@ -36,6 +38,9 @@ struct WallRun {
 
 /// Checks what can be checked alone, then draws on all ranks.
 [[nodiscard]] ExitCode run_wall(const WallRun& run, const Globals& globals);
+
+/// `--set PATH=VALUE`, as often as wanted.
+void declare_overrides(CLI::App& app, std::vector<std::string>& overrides);
 
 /// `hpr wall run WALL SCENE`.
 [[nodiscard]] std::unique_ptr<Command> make_wall_run_command();

@@ -11,7 +11,7 @@ namespace hpr {
 
 /// The assembled wall: each screen's picture (upright, in the wall's order) at its place, and the wall's gap colour
 /// between them. A picture whose size differs from its place is resampled by area, in linear light; an empty one
-/// leaves its place black.
+/// leaves its place black. Of two screens for different eyes in one place the left eye's is seen.
 [[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
                                      std::span<const Image<Rgba8>> screens);
 

@@ -14,9 +14,15 @@
 
 namespace hpr {
 
-/// A screen's finished picture, upright; sRGB.
+/// A screen's finished picture, upright; sRGB. A display sends its panel what ScanOut makes of it.
 struct ScreenPicture {
   std::size_t screen = 0;  ///< index into Wall::screens
+  const Image<Rgba8>& image;
+};
+
+/// What an operator's monitor shows.
+struct MonitorPicture {
+  std::size_t monitor = 0;  ///< index into Wall::monitors
   const Image<Rgba8>& image;
 };
 
@@ -24,6 +30,7 @@ struct ScreenPicture {
 struct WallFrame {
   std::uint64_t number = 0;
   std::span<const ScreenPicture> screens;
+  std::span<const MonitorPicture> monitors = {};
 };
 
 /// Shows pictures on the screens of a wall.
@@ -43,7 +50,8 @@ struct DisplayOptions {
   bool overwrite = false;        ///< replace files that were there before the run
 };
 
-/// "file" (folder/<screen id>.png, the latest frame, each file complete or untouched) and "none".
+/// "file" (folder/<screen id>.png, what its panel is sent of the latest frame, and folder/<monitor id>.png; each file
+/// complete or untouched) and "none".
 [[nodiscard]] const std::vector<std::string>& all_displays();
 
 /// Throws Error: Usage for an unknown name (with the choices), Io when the folder cannot be written or holds a picture

@@ -25,8 +25,11 @@ std::string_view line_of(std::string_view text, int line) {
 
 void Findings::add(bool error, TextPlace place, std::string_view what, std::string hint) {
   constexpr std::size_t kLineLimit = 200;
-  const std::string where =
-      place.line > 0 ? fmt::format("{}:{}:{}: ", name_, place.line, place.column) : fmt::format("{}: ", name_);
+  std::string where = fmt::format("{}: ", name_);
+  if (place.line > 0) where = fmt::format("{}:{}:{}: ", name_, place.line, place.column);
+  if (place.option > 0) {
+    where = fmt::format("--set {}: ", printable(overrides_.at(static_cast<std::size_t>(place.option - 1))));
+  }
   const std::string line = place.line > 0 ? printable(line_of(text_, place.line), kLineLimit) : std::string();
   findings_.push_back({error, place, where + std::string(what), line, std::move(hint)});
 }

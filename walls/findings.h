@@ -21,7 +21,9 @@ struct WallFinding {
 /// Collects findings about one text.
 class Findings {
  public:
-  Findings(std::string name, std::string_view text) : name_(std::move(name)), text_(text) {}
+  /// `overrides` are named where a place is in one of them.
+  Findings(std::string name, std::string_view text, std::vector<std::string> overrides = {})
+      : name_(std::move(name)), text_(text), overrides_(std::move(overrides)) {}
 
   void error(TextPlace place, std::string_view what, std::string hint) { add(true, place, what, std::move(hint)); }
   void warning(TextPlace place, std::string_view what, std::string hint) { add(false, place, what, std::move(hint)); }
@@ -37,6 +39,7 @@ class Findings {
 
   std::string name_;
   std::string_view text_;
+  std::vector<std::string> overrides_;
   std::vector<WallFinding> findings_;
   TextPlace first_ignored_;
   std::vector<std::string> ignored_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 #include <variant>
 
 namespace hpr {
@@ -23,45 +24,49 @@ std::array<glm::dvec3, 4> corners_of(const WallScreen& screen) {
           screen.lower_right + (screen.upper_left - screen.lower_left)};
 }
 
-/// Wall space as the camera sees it: a rotation, and the viewer who stands at the camera's eye.
+/// Wall space as the camera sees it: a rotation about a point that is at the camera's eye.
 struct Placement {
   glm::dmat3 world_from_wall{1.0};
-  glm::dvec3 viewer{0.0};
+  glm::dvec3 anchor{0.0};
+  /// The viewer is where the anchor is, with the head turned like this; none: where the wall file or a tracker says.
+  std::optional<glm::dquat> facing;
   double height = 0.0;  ///< metres of wall an orthographic camera's height covers
 };
 
 Placement place_viewer(const Wall& wall, const WallExtent& extent, const Camera& camera) {
-  if (wall.viewer_given || !extent.flat) return {camera.axes, wall.viewer, extent.height};
+  const WallViewer& first = wall.viewers.front();
+  if (first.given || !extent.flat) return {camera.axes, first.position, std::nullopt, extent.height};
   double distance = extent.height;
   if (const auto* const lens = std::get_if<PerspectiveLens>(&camera.lens)) {
     distance = 0.5 * extent.height / std::tan(0.5 * lens->vertical_fov_radians);
   }
-  return {camera.axes * glm::transpose(extent.axes), extent.center + extent.axes[2] * distance, extent.height};
+  return {camera.axes * glm::transpose(extent.axes), extent.center + extent.axes[2] * distance,
+          glm::quat_cast(extent.axes), extent.height};
 }
 
-/// `template_view` holds what all screens share.
-View screen_view(const View& template_view, const WallScreen& screen, const Placement& placement, double clamp) {
+/// `shared` holds what all screens share; `eye` is in wall space.
+View screen_view(const View& shared, const WallScreen& screen, const Placement& placement, const glm::dvec3& eye,
+                 double clamp) {
   const glm::dmat3 axes = screen_axes(screen);
-  const glm::dvec3 from_viewer = screen.lower_left - placement.viewer;
-  View view = template_view;
+  const glm::dvec3 from_eye = screen.lower_left - eye;
+  View view = shared;
+  view.eye += placement.world_from_wall * (eye - placement.anchor);
   view.axes = placement.world_from_wall * axes;
-  view.screen = screen.pixels;
-  view.block = {0, 0, screen.pixels.width, screen.pixels.height};
 
   double scale = 1.0;
   if (view.orthographic) {
-    scale = (template_view.top - template_view.bottom) / placement.height;
+    scale = (shared.top - shared.bottom) / placement.height;
   } else {
-    const double distance = -glm::dot(from_viewer, axes[2]);
+    const double distance = -glm::dot(from_eye, axes[2]);
     const double held = std::max(distance, clamp);
     // Moving the eye, not only dividing by another number, keeps what lies in the screen's plane where it is.
     view.eye += view.axes[2] * (held - distance);
     scale = 1.0 / held;
   }
-  view.left = glm::dot(from_viewer, axes[0]) * scale;
-  view.right = (glm::dot(from_viewer, axes[0]) + screen_width(screen)) * scale;
-  view.bottom = glm::dot(from_viewer, axes[1]) * scale;
-  view.top = (glm::dot(from_viewer, axes[1]) + screen_height(screen)) * scale;
+  view.left = glm::dot(from_eye, axes[0]) * scale;
+  view.right = (glm::dot(from_eye, axes[0]) + screen_width(screen)) * scale;
+  view.bottom = glm::dot(from_eye, axes[1]) * scale;
+  view.top = (glm::dot(from_eye, axes[1]) + screen_height(screen)) * scale;
   return view;
 }
 
@@ -123,17 +128,43 @@ WallExtent wall_extent(std::span<const WallScreen> screens) {
   return extent;
 }
 
-std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds) {
+std::vector<HeadPose> resting_heads(const Wall& wall) {
+  std::vector<HeadPose> heads;
+  for (const WallViewer& viewer : wall.viewers) heads.push_back({viewer.position});
+  return heads;
+}
+
+glm::dvec3 eye_position(const WallViewer& viewer, const HeadPose& head, Eye eye) {
+  const double side = eye == Eye::Left ? -0.5 : eye == Eye::Right ? 0.5 : 0.0;
+  const glm::dvec3 inside = viewer.eye_offset + glm::dvec3(side * viewer.ipd_m, 0.0, 0.0);
+  // A head that looks straight ahead loses no digit to the quaternion.
+  return head.position + (head.orientation == glm::dquat(1.0, 0.0, 0.0, 0.0) ? inside : head.orientation * inside);
+}
+
+std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
+                             const Bounds& bounds) {
+  HPR_CHECK(heads.size() == wall.viewers.size());
   const Placement placement = place_viewer(wall, wall_extent(wall), camera);
-  View shared = make_view(camera, {1, 1}, bounds);
-  if (wall.near_m > 0.0 && !shared.orthographic) shared.near_distance = wall.near_m;
+  const View shared = make_view(camera, {1, 1}, bounds);
   std::vector<View> views;
-  views.reserve(wall.screens.size());
-  for (const WallScreen& screen : wall.screens) {
-    views.push_back(screen_view(shared, screen, placement, wall.clamp_distance_m));
-    views.back().screen_number = static_cast<std::uint32_t>(views.size() - 1);
+  for (const ScreenEye& picture : screen_eyes(wall)) {
+    const WallScreen& screen = wall.screens[picture.screen];
+    const WallViewer& viewer = wall.viewers.at(screen.viewer);
+    HeadPose head = heads[screen.viewer];
+    if (placement.facing) head = {placement.anchor, *placement.facing};
+    const glm::dvec3 eye = shared.orthographic ? placement.anchor : eye_position(viewer, head, picture.eye);
+    View view = screen_view(shared, screen, placement, eye, viewer.clamp_distance_m);
+    if (viewer.near_m > 0.0 && !shared.orthographic) view.near_distance = viewer.near_m;
+    view.screen = picture.pixels;
+    view.block = {0, 0, picture.pixels.width, picture.pixels.height};
+    view.screen_number = static_cast<std::uint32_t>(views.size());
+    views.push_back(view);
   }
   return views;
+}
+
+std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds) {
+  return wall_views(wall, resting_heads(wall), camera, bounds);
 }
 
 }  // namespace hpr

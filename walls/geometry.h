@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "scene/view.h"
+#include "walls/head.h"
+#include "walls/stereo.h"
 #include "walls/wall.h"
 
 namespace hpr {
@@ -29,13 +31,24 @@ struct WallExtent {
 [[nodiscard]] glm::dmat3 screen_axes(const WallScreen& screen);
 [[nodiscard]] glm::dvec3 screen_center(const WallScreen& screen);
 
-/// One view per screen: off-axis frusta after Kooima, Generalized Perspective Projection, 2008, all in double.
+/// The viewers' heads at rest, one per viewer.
+[[nodiscard]] std::vector<HeadPose> resting_heads(const Wall& wall);
+
+/// Wall space. Left and Right lie half of ipd_m along the head's right axis from the middle.
+[[nodiscard]] glm::dvec3 eye_position(const WallViewer& viewer, const HeadPose& head, Eye eye);
+
+/// One view per picture of screen_eyes(): off-axis frusta after Kooima, Generalized Perspective Projection, 2008, all
+/// in double, each from its own eye of the screen's viewer.
 ///
-/// With a viewer in the file the wall is a window into the scene: the viewer stands at the camera's eye, wall axes are
-/// the camera's axes, and a metre is a unit of the scene. Without one, a flat wall shows what the camera sees: the
-/// viewer is placed so that the wall's height subtends the camera's vertical angle. An orthographic camera shows its
-/// half height on half the wall's height. `bounds` (of the scene) choose the near plane where neither wall nor camera
-/// give one. An eye nearer to a screen's plane than clamp_distance_m, or behind it, is moved back for that screen.
+/// With a viewer in the file the wall is a window into the scene: the first viewer's head at rest is at the camera's
+/// eye, wall axes are the camera's axes, a metre is a unit of the scene, and heads that move move before that window.
+/// Without one, a flat wall shows what the camera sees: the viewer is placed so that the wall's height subtends the
+/// camera's vertical angle. An orthographic camera shows its half height on half the wall's height, wherever the heads
+/// are. `bounds` (of the scene) choose the near plane where neither wall nor camera give one. An eye nearer to a
+/// screen's plane than clamp_distance_m, or behind it, is moved back for that screen.
+[[nodiscard]] std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
+                                           const Bounds& bounds);
+/// With heads at rest.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds);
 
 /// Screens (by index) that lie in one plane and face the same way; plane after plane from left to right as the viewer

@@ -31,8 +31,8 @@ Camera straight() {
 Wall wall_of(const std::vector<WallScreen>& screens, const glm::dvec3& viewer) {
   Wall wall;
   wall.screens = screens;
-  wall.viewer = viewer;
-  wall.viewer_given = true;
+  wall.viewers.front().position = viewer;
+  wall.viewers.front().given = true;
   return wall;
 }
 
@@ -186,7 +186,7 @@ TEST(WallGeometry, AWallWithoutViewerShowsWhatTheCameraSees) {
 TEST(WallGeometry, AWallThatFacesElsewhereIsTurnedTowardsTheCamera) {
   // Faces +x, 40 m away.
   Wall wall = wall_of({screen_at({40.0, 1.0, 3.0}, {40.0, 1.0, 1.0}, {40.0, 2.0, 3.0}, {200, 100})}, glm::dvec3(0.0));
-  wall.viewer_given = false;
+  wall.viewers.front().given = false;
   const Camera camera = perspective(0.9);
   const View view = wall_views(wall, camera, kBounds).at(0);
   const View plain = make_view(camera, {200, 100}, kBounds);
@@ -217,7 +217,7 @@ TEST(WallGeometry, AnEyeInTheScreensPlaneIsHeldAtTheClampDistance) {
   for (const double distance : {1e-3, 1e-9, 0.0, -1.0}) {
     const glm::dvec3 viewer(0.3, 0.2, -2.0 + distance);
     Wall wall = wall_of({screen}, viewer);
-    wall.clamp_distance_m = 0.1;
+    wall.viewers.front().clamp_distance_m = 0.1;
     const View view = wall_views(wall, straight(), kBounds).at(0);
     for (const double edge : {view.left, view.right, view.bottom, view.top}) ASSERT_TRUE(std::isfinite(edge));
     EXPECT_NEAR(view.right - view.left, 2.0 / 0.1, 1e-12);
@@ -229,7 +229,7 @@ TEST(WallGeometry, AnEyeInTheScreensPlaneIsHeldAtTheClampDistance) {
 TEST(WallGeometry, NearPlaneIsTheWallsElseTheCameras) {
   Wall wall = load_wall("1x1");
   EXPECT_EQ(wall_views(wall, perspective(0.5), kBounds).at(0).near_distance, 0.1);
-  wall.near_m = 0.25;
+  wall.viewers.front().near_m = 0.25;
   EXPECT_EQ(wall_views(wall, perspective(0.5), kBounds).at(0).near_distance, 0.25);
 }
 

@@ -11,14 +11,23 @@ namespace {
 // ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
 using Json = nlohmann::ordered_json;
 
+Json json_of(const HeadRecord& head) {
+  const auto& [position, turn] = head.pose;
+  return Json{{"viewer", head.viewer},
+              {"position_m", {position.x, position.y, position.z}},
+              {"orientation", {turn.x, turn.y, turn.z, turn.w}}};
+}
+
+Json picture_json(const ScreenRecord& screen) {
+  return Json{
+      {"id", screen.id}, {"width", screen.size.width}, {"height", screen.size.height}, {"xxh64", hex16(screen.xxh64)}};
+}
+
 Json json_of(const FrameRecord& frame) {
   Json screens = Json::array();
   for (const ScreenRecord& screen : frame.screens) {
-    screens.push_back(Json{{"id", screen.id},
-                           {"width", screen.size.width},
-                           {"height", screen.size.height},
-                           {"xxh64", hex16(screen.xxh64)},
-                           {"state", to_string(screen.state)}});
+    screens.push_back(picture_json(screen));
+    screens.back()["state"] = to_string(screen.state);
   }
   Json record{{"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
   if (frame.budget) {
@@ -27,6 +36,8 @@ Json json_of(const FrameRecord& frame) {
                             {"samples", frame.budget->samples},
                             {"given_up", frame.budget->given_up}};
   }
+  for (const HeadRecord& head : frame.heads) record["heads"].push_back(json_of(head));
+  for (const ScreenRecord& monitor : frame.monitors) record["monitors"].push_back(picture_json(monitor));
   if (frame.swap) {
     record["swap"] = Json{{"skew_ms", frame.swap->skew_ms ? Json(*frame.swap->skew_ms) : Json(nullptr)}};
   }

@@ -9,6 +9,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
+#include "walls/head.h"
 
 namespace hpr {
 
@@ -37,6 +38,12 @@ struct SwapRecord {
   std::optional<double> skew_ms = {};  ///< between the first and the last display; none: fewer than two showed it
 };
 
+/// Where a tracked viewer's head was.
+struct HeadRecord {
+  std::string viewer;  ///< id
+  HeadPose pose;
+};
+
 struct FrameRecord {
   std::uint64_t frame = 0;
   double ms = 0.0;
@@ -44,6 +51,8 @@ struct FrameRecord {
   std::vector<ScreenRecord> screens;
   std::optional<BudgetRecord> budget = {};
   std::optional<SwapRecord> swap = {};  ///< only with such displays
+  std::vector<HeadRecord> heads = {};
+  std::vector<ScreenRecord> monitors = {};
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.

@@ -131,7 +131,8 @@ std::vector<std::vector<std::size_t>> wall_planes(const Wall& wall) {
   std::vector<std::pair<double, std::vector<std::size_t>>> headed;
   headed.reserve(planes.size());
   for (auto& plane : planes) {
-    const double heading = heading_of(wall_extent(screens_of(wall, plane)).center - wall.viewer, ahead);
+    const double heading =
+        heading_of(wall_extent(screens_of(wall, plane)).center - wall.viewers.front().position, ahead);
     headed.emplace_back(heading, std::move(plane));
   }
   std::ranges::stable_sort(headed, {}, [](const auto& plane) { return plane.first; });

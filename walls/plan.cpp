@@ -101,6 +101,8 @@ void draw_screen(Canvas& canvas, const Plan& plan, std::size_t index) {
       owner_of(plan.wall, screen)};
   if (!screen.window.empty()) lines.push_back("window " + screen.window);
   if (screen.rotate != 0) lines.push_back(fmt::format("turned {} degrees", screen.rotate));
+  if (screen.mirror != Mirror::None) lines.push_back("mirrored");
+  if (screen.eye != Eye::Both) lines.push_back(screen.eye == Eye::Left ? "left eye" : "right eye");
   std::size_t longest = 0;
   for (const std::string& line : lines) longest = std::max(longest, line.size());
   // A letter is about 0.6 of the font's height wide.
@@ -119,8 +121,8 @@ void draw_screen(Canvas& canvas, const Plan& plan, std::size_t index) {
 /// Where the viewer looks straight at a flat wall.
 void draw_foot_point(Canvas& canvas, const Plan& plan) {
   const WallExtent whole = wall_extent(plan.wall);
-  if (!plan.wall.viewer_given || !whole.flat) return;
-  const glm::dvec3 inside = glm::transpose(whole.axes) * (plan.wall.viewer - whole.center);
+  if (!plan.wall.viewers.front().given || !whole.flat) return;
+  const glm::dvec3 inside = glm::transpose(whole.axes) * (plan.wall.viewers.front().position - whole.center);
   const double per_metre = plan.picture.size.width / whole.width;
   const glm::dvec2 size(plan.picture.size.width, plan.picture.size.height);
   const glm::dvec2 at = plan.origin + 0.5 * size + glm::dvec2(inside.x, -inside.y) * per_metre;
@@ -134,7 +136,7 @@ void draw_foot_point(Canvas& canvas, const Plan& plan) {
 /// The wall seen from above, with the viewer and what they see it under.
 void draw_top_view(Canvas& canvas, const Plan& plan) {
   const Wall& wall = plan.wall;
-  glm::dvec2 low(wall.viewer.x, wall.viewer.z);
+  glm::dvec2 low(wall.viewers.front().position.x, wall.viewers.front().position.z);
   glm::dvec2 high = low;
   const auto seen_from_above = [](const glm::dvec3& p) { return glm::dvec2(p.x, p.z); };
   for (const WallScreen& screen : wall.screens) {
@@ -153,7 +155,7 @@ void draw_top_view(Canvas& canvas, const Plan& plan) {
     return center + (seen_from_above(p) - 0.5 * (low + high)) * per_metre;
   };
   canvas.text({0.5 * kWidth, top + 8.0}, "seen from above", 13.0, kFaint);
-  const glm::dvec2 eye = place(wall.viewer);
+  const glm::dvec2 eye = place(wall.viewers.front().position);
   // Floors and ceilings first: the rest stands on them.
   for (const bool lying : {true, false}) {
     for (std::size_t i = 0; i < wall.screens.size(); ++i) {
@@ -174,7 +176,7 @@ void draw_top_view(Canvas& canvas, const Plan& plan) {
     }
   }
   canvas.disc(eye, 6.0, kViewer);
-  const std::string_view label = wall.viewer_given ? "viewer" : "viewer (placed by the camera)";
+  const std::string_view label = wall.viewers.front().given ? "viewer" : "viewer (placed by the camera)";
   canvas.text(eye + glm::dvec2(0.0, 18.0), label, 13.0, kViewer);
 }
 

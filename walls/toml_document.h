@@ -13,6 +13,7 @@ namespace hpr {
 struct TextPlace {
   int line = 0;
   int column = 0;
+  int option = 0;  ///< from 1: not in the text, but in this override of it
 };
 
 struct TomlEntry;

@@ -73,6 +73,15 @@ std::optional<std::string> TableReader::id(std::string_view key) {
   return std::nullopt;
 }
 
+std::optional<std::size_t> TableReader::choice(std::string_view key, const std::vector<std::string>& names) {
+  const auto name = text(key);
+  if (!name) return std::nullopt;
+  const auto found = std::ranges::find(names, *name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  error(key, fmt::format("is \"{}\"", printable(*name)), unknown_name_hint(*name, names));
+  return std::nullopt;
+}
+
 std::optional<bool> TableReader::boolean(std::string_view key) {
   const TomlValue* const value = typed(key, TomlValue::Type::Boolean);
   if (value == nullptr) return std::nullopt;

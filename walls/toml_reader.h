@@ -33,6 +33,8 @@ class TableReader {
   [[nodiscard]] std::optional<std::string> text(std::string_view key);
   /// A text that names something: letters, digits, dot, dash, underscore, at most 64.
   [[nodiscard]] std::optional<std::string> id(std::string_view key);
+  /// One of `names`: its index.
+  [[nodiscard]] std::optional<std::size_t> choice(std::string_view key, const std::vector<std::string>& names);
   [[nodiscard]] std::optional<bool> boolean(std::string_view key);
   [[nodiscard]] std::optional<int> integer(std::string_view key, int low, int high);
   /// Finite, in (low, high].

@@ -18,6 +18,8 @@ struct WallNode {
   std::string host;               ///< as MPI names the processor; "localhost" and "*" match every host
   int ranks = 0;                  ///< how many are to run there; 0: free
   std::vector<std::string> gpus;  ///< ids
+
+  bool operator==(const WallNode&) const = default;
 };
 
 /// A place on a node's display in which one screen, or several side by side, are shown.
@@ -29,6 +31,41 @@ struct WallWindow {
   int rank = -1;        ///< the rank of the job that must own it; -1: free
   Rect rect;            ///< on the display; empty: as large as its screens
   bool fullscreen = false;
+
+  bool operator==(const WallWindow&) const = default;
+};
+
+/// How a panel is mounted besides being turned: the picture is sent to it as in a mirror.
+enum class Mirror { None, Horizontal, Vertical };
+
+/// Whose picture a screen shows. Both: one picture without stereo, else both eyes' as StereoMode says.
+enum class Eye { Both, Left, Right };
+
+/// How screens for both eyes carry two pictures. Passive, and screens for one eye: an output for each eye.
+enum class StereoMode { None, Passive, SideBySide, TopBottom, Anaglyph };
+
+/// What makes panels look alike, each red, green, blue. In linear light a panel is sent black + (1 - black) * gain *
+/// light, and of its sRGB level, in [0, 1], the power 1 / gamma.
+struct PanelColor {
+  glm::dvec3 gamma{1.0};
+  glm::dvec3 gain{1.0};
+  glm::dvec3 black{0.0};
+
+  bool operator==(const PanelColor&) const = default;
+};
+
+/// Fades a screen's light towards its edges, where others overlap it. Widths in metres; automatic ones are what
+/// overlaps.
+struct EdgeBlend {
+  bool automatic = false;
+  double left = 0.0;
+  double right = 0.0;
+  double bottom = 0.0;
+  double top = 0.0;
+  double gamma = 1.0;  ///< power of the ramp, as the blend module has it; 1: straight in linear light
+
+  [[nodiscard]] bool any() const { return automatic || left > 0.0 || right > 0.0 || bottom > 0.0 || top > 0.0; }
+  bool operator==(const EdgeBlend&) const = default;
 };
 
 /// A flat rectangle of lit pixels.
@@ -46,7 +83,55 @@ struct WallScreen {
   /// Degrees (0, 90, 180, 270) by which the picture is turned clockwise when it is shown, because the panel is mounted
   /// turned. Rendering never sees it.
   int rotate = 0;
+  Mirror mirror = Mirror::None;  ///< of what is sent to the panel, after turning
+  Eye eye = Eye::Both;
+  std::size_t viewer = 0;  ///< index into Wall::viewers
+  PanelColor color;
+  EdgeBlend blend;
   Rect viewport;  ///< of the window, in the window's pixels, i.e. after turning
+
+  bool operator==(const WallScreen&) const = default;
+};
+
+/// Where a viewer's head is learned from while the wall runs.
+struct WallTracker {
+  enum class Kind { None, File, Udp };
+  enum class Lost { Freeze, Rest };  ///< stay where last seen, or go to the viewer's position in the wall file
+
+  Kind kind = Kind::None;
+  std::string path;                   ///< File: as written in the wall file
+  std::string file;                   ///< File: as found from here
+  double rate_hz = 60.0;              ///< File: frames per second of the recording's time
+  std::string address = "127.0.0.1";  ///< Udp: an address of this host; "0.0.0.0": all
+  int port = 0;                       ///< Udp
+  int lost_after_ms = 200;            ///< Udp: without a datagram
+  Lost lost_then = Lost::Freeze;
+
+  bool operator==(const WallTracker&) const = default;
+};
+
+/// Somebody who looks at screens. Eyes lie on the head's right axis, half of ipd_m to each side of eye_offset_m.
+struct WallViewer {
+  std::string id;
+  glm::dvec3 position{0.0};  ///< of the head, wall space; where it rests when it is tracked
+  /// The file places the viewer: the wall is a window into the scene. Otherwise a flat wall shows what the camera sees.
+  bool given = false;
+  double ipd_m = 0.0;              ///< between the pupils
+  glm::dvec3 eye_offset{0.0};      ///< of the eyes' middle from the head's position, in the head's axes
+  double near_m = 0.0;             ///< 0: the camera's
+  double clamp_distance_m = 0.01;  ///< an eye nearer to a screen's plane is moved back to this distance
+  WallTracker tracker;
+
+  bool operator==(const WallViewer&) const = default;
+};
+
+/// An operator's scaled copy of a surface, made from the screens' finished pictures.
+struct WallMonitor {
+  std::string id;       ///< unique among monitors and screens
+  std::string surface;  ///< id
+  Size pixels;
+
+  bool operator==(const WallMonitor&) const = default;
 };
 
 struct Wall {
@@ -54,15 +139,24 @@ struct Wall {
   std::vector<WallNode> nodes;
   std::vector<WallWindow> windows;
   std::vector<WallScreen> screens;  ///< never empty; grids row by row from the top, left to right
-  glm::dvec3 viewer{0.0};           ///< wall space
-  /// The file places the viewer: the wall is a window into the scene. Otherwise a flat wall shows what the camera sees.
-  bool viewer_given = false;
-  double near_m = 0.0;             ///< 0: the camera's
-  double clamp_distance_m = 0.01;  ///< an eye nearer to a screen's plane is moved back to this distance
+  /// Never empty. The first stands at the camera's eye when it rests, and wall axes are the camera's.
+  std::vector<WallViewer> viewers{WallViewer{}};
+  StereoMode stereo = StereoMode::None;
+  std::vector<WallMonitor> monitors;
   Rgba8 gap_color{32, 32, 36, 255};
   std::uint64_t hash =
       0;  ///< XXH64 of expand_wall() but for the name: equal walls, however written or called, have equal hashes
+
+  bool operator==(const Wall&) const = default;
 };
+
+/// "none", "passive", ...: in wall files, in the enumeration's order.
+[[nodiscard]] const std::vector<std::string>& stereo_names();
+[[nodiscard]] const std::vector<std::string>& eye_names();
+[[nodiscard]] const std::vector<std::string>& mirror_names();
+
+/// Pixels of what is sent to the screen's panel: sides swap where it is mounted turned by a right angle.
+[[nodiscard]] Size panel_pixels(const WallScreen& screen);
 
 /// Metres.
 [[nodiscard]] double screen_width(const WallScreen& screen);

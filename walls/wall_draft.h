@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,20 +27,53 @@ struct DraftWindow {
 
 struct DraftScreen {
   WallScreen screen;  ///< node, rank and viewport are settled by link_wall
-  std::string eye;    ///< empty: both
   TextPlace place;
   TextPlace window_place;
   bool has_corners = false;  ///< and they are sound
 };
 
+struct DraftSurface {
+  std::string id;
+  TextPlace place;
+  std::string viewer;  ///< id; empty: the first
+  TextPlace viewer_place;
+};
+
+struct DraftViewer {
+  WallViewer viewer;
+  TextPlace place;
+  bool placed = false;  ///< has a position_m, sound or not
+};
+
+struct DraftMonitor {
+  WallMonitor monitor;
+  TextPlace place;
+  TextPlace surface_place;
+};
+
 struct WallDraft {
   std::vector<DraftNode> nodes;
   std::vector<DraftWindow> windows;
+  std::vector<DraftSurface> surfaces;
   std::vector<DraftScreen> screens;
+  std::vector<DraftViewer> viewers;
+  std::vector<DraftMonitor> monitors;
+  StereoMode stereo = StereoMode::None;
+  TextPlace stereo_place;
 };
 
 /// Reads `surfaces`: grids are expanded, in order.
 void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings);
+
+/// Reads what a panel is sent besides the picture: mirror, eye, colour, edge_blend_m, and its turn, which is called
+/// `turn` there.
+void read_look(TableReader& reader, std::string_view turn, WallScreen& screen, Findings& findings);
+
+/// Reads `viewers` and `stereo`, and `test` as far as it is about them and the gaps. Files are looked for in `folder`.
+void read_viewers(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
+void read_test(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Rgba8& gap_color,
+               Findings& findings);
+void read_monitors(TableReader& document, WallDraft& draft, Findings& findings);
 
 /// The screens of a grid with their corners; pure, so that the shorthand uses it as well.
 struct WallGrid {
@@ -50,11 +85,24 @@ struct WallGrid {
   std::vector<double> column_gaps_m;  ///< columns - 1, lit edge to lit edge; negative: overlap
   std::vector<double> row_gaps_m;     ///< rows - 1, from the top
   glm::dvec3 center{0.0};
+  /// Columns stand as chords on an arc around a vertical axis in front of the centre, gaps are measured along the arc;
+  /// 0: all in one plane.
+  double radius_m = 0.0;
 };
+/// The radius at which the columns and their gaps take `angle` radians of the arc; none when no arc does.
+[[nodiscard]] std::optional<double> radius_of_arc(const WallGrid& grid, double angle);
+/// The columns fit on a circle of this radius.
+[[nodiscard]] bool fits_arc(const WallGrid& grid, double radius);
 [[nodiscard]] std::vector<WallScreen> expand_grid(const WallGrid& grid, const std::string& surface);
 
 /// Checks what spans tables (references, doubles, overlaps) and settles who owns which screen.
 void link_wall(WallDraft& draft, Findings& findings);
+
+/// The same for viewers, stereo and monitors.
+void link_viewers(WallDraft& draft, Findings& findings);
+
+/// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
+void warn_about_neighbours(const WallDraft& draft, Findings& findings);
 
 /// Fills in a wall whose screens are sound: the default viewer and the hash.
 void finish_wall(Wall& wall);

@@ -12,12 +12,12 @@
 #include "core/names.h"
 #include "walls/geometry.h"
 #include "walls/wall_draft.h"
+#include "walls/wall_override.h"
 
 namespace hpr {
 namespace {
 
 constexpr int kMostRanks = 1 << 20;
-constexpr double kMetresLimit = 1e6;
 
 void read_nodes(TableReader& document, WallDraft& draft, Findings& findings) {
   for (const TomlValue* const table : document.tables("nodes")) {
@@ -60,40 +60,6 @@ void read_windows(TableReader& document, WallDraft& draft, Findings& findings) {
   }
 }
 
-void read_viewers(TableReader& document, Wall& wall, Findings& findings) {
-  const std::vector<const TomlValue*> viewers = document.tables("viewers");
-  for (const TomlValue* const table : viewers) {
-    TableReader reader(*table, "viewer", findings);
-    static_cast<void>(reader.id("id"));
-    const auto position = reader.point("position_m");
-    const auto near_m = reader.real("near_m", 0.0, kMetresLimit);
-    const auto clamp_m = reader.real("clamp_distance_m", 0.0, kMetresLimit);
-    reader.ignore({"ipd_m", "eye_offset_m", "tracker"});
-    reader.finish();
-    if (table != viewers.front()) continue;
-    wall.viewer_given = position.has_value();
-    wall.viewer = position.value_or(wall.viewer);
-    wall.near_m = near_m.value_or(wall.near_m);
-    wall.clamp_distance_m = clamp_m.value_or(wall.clamp_distance_m);
-  }
-  if (viewers.size() > 1) {
-    findings.warning(viewers[1]->place, "only the first viewer is used",
-                     "remove the others, or put the one you want first");
-  }
-}
-
-void read_test(TableReader& document, Wall& wall, Findings& findings) {
-  const TomlValue* const table = document.table("test");
-  if (table == nullptr) return;
-  TableReader reader(*table, "test", findings);
-  if (const auto rgba = reader.integers("gap_rgba", 4, 0, 255)) {
-    const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>((*rgba)[i]); };
-    wall.gap_color = {byte(0), byte(1), byte(2), byte(3)};
-  }
-  reader.ignore({"headless", "scale", "dump", "viewer_path"});
-  reader.finish();
-}
-
 void read_version(TableReader& document) {
   const TomlValue* const version = document.require("hpr_wall", "1");
   if (version == nullptr || (version->type == TomlValue::Type::Integer && version->integer == 1)) return;
@@ -127,9 +93,9 @@ bool WallReading::ok() const {
 }
 
 void finish_wall(Wall& wall) {
-  if (!wall.viewer_given) {
+  if (!wall.viewers.front().given) {
     const WallExtent extent = wall_extent(wall);
-    wall.viewer = extent.middle + extent.axes[2] * extent.height;
+    wall.viewers.front().position = extent.middle + extent.axes[2] * extent.height;
   }
   Wall nameless = wall;
   nameless.name.clear();
@@ -137,10 +103,10 @@ void finish_wall(Wall& wall) {
   wall.hash = xxh64(std::as_bytes(std::span(text)));
 }
 
-WallReading parse_wall(std::string_view text, const std::string& name) {
-  Findings findings(name, text);
+WallReading parse_wall(std::string_view text, const std::string& name, const std::vector<std::string>& overrides) {
+  Findings findings(name, text, overrides);
   WallReading reading;
-  const auto parsed = parse_toml(text);
+  auto parsed = parse_toml(text);
   if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
     findings.error(failure->place, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
     reading.findings = findings.take();
@@ -148,17 +114,22 @@ WallReading parse_wall(std::string_view text, const std::string& name) {
   }
   Wall& wall = reading.wall;
   WallDraft draft;
+  const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+  apply_overrides(std::get<TomlValue>(parsed), overrides, findings);
   TableReader document(std::get<TomlValue>(parsed), "the wall", findings);
   read_version(document);
   wall.name = document.text("name").value_or(std::filesystem::path(name).stem().string());
   read_nodes(document, draft, findings);
   read_windows(document, draft, findings);
   read_surfaces(document, draft, findings);
-  read_viewers(document, wall, findings);
-  read_test(document, wall, findings);
-  document.ignore({"sync", "render", "transport", "fault", "monitors", "stereo"});
+  read_viewers(document, folder, draft, findings);
+  read_test(document, folder, draft, wall.gap_color, findings);
+  read_monitors(document, draft, findings);
+  document.ignore({"sync", "render", "transport", "fault"});
   document.finish();
   link_wall(draft, findings);
+  link_viewers(draft, findings);
+  if (!findings.any_errors()) warn_about_neighbours(draft, findings);
 
   const bool sound = !findings.any_errors();
   reading.findings = findings.take();
@@ -166,6 +137,10 @@ WallReading parse_wall(std::string_view text, const std::string& name) {
   for (DraftNode& node : draft.nodes) wall.nodes.push_back(std::move(node.node));
   for (DraftWindow& window : draft.windows) wall.windows.push_back(std::move(window.window));
   for (DraftScreen& screen : draft.screens) wall.screens.push_back(std::move(screen.screen));
+  for (DraftMonitor& monitor : draft.monitors) wall.monitors.push_back(std::move(monitor.monitor));
+  if (!draft.viewers.empty()) wall.viewers.clear();
+  for (DraftViewer& viewer : draft.viewers) wall.viewers.push_back(std::move(viewer.viewer));
+  wall.stereo = draft.stereo;
   finish_wall(wall);
   return reading;
 }
@@ -202,20 +177,23 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
   return wall;
 }
 
-WallReading read_wall(const std::string& spec) {
+WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides) {
   constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 20;
-  if (auto wall = wall_from_shorthand(spec)) return {std::move(*wall), {}};
+  if (auto wall = wall_from_shorthand(spec)) {
+    if (overrides.empty()) return {std::move(*wall), {}};
+    return parse_wall(expand_wall(*wall), spec, overrides);
+  }
   std::error_code error;
   if (!std::filesystem::exists(spec, error)) {
     throw Error(ExitCode::Io, fmt::format("there is no wall file '{}'", printable(spec)),
                 "a wall is a TOML file, or columns x rows such as 3x2 or 3x2@1920x1080");
   }
   const std::vector<std::byte> bytes = read_file(spec, kLargestFile);
-  return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec);
+  return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec, overrides);
 }
 
-Wall load_wall(const std::string& spec) {
-  WallReading reading = read_wall(spec);
+Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides) {
+  WallReading reading = read_wall(spec, overrides);
   const auto first = std::ranges::find_if(reading.findings, &WallFinding::error);
   if (first != reading.findings.end()) throw Error(ExitCode::BadInput, first->what, first->hint, first->line);
   for (const WallFinding& finding : reading.findings) log::warning("{} ({})", finding.what, finding.hint);

@@ -22,8 +22,10 @@ struct WallReading {
   [[nodiscard]] bool ok() const;
 };
 
-/// Reads the text of a wall file; `name` stands in findings.
-[[nodiscard]] WallReading parse_wall(std::string_view text, const std::string& name);
+/// Reads the text of a wall file; `name` stands in findings, and files the wall names are looked for beside it.
+/// `overrides`: see wall_override.h.
+[[nodiscard]] WallReading parse_wall(std::string_view text, const std::string& name,
+                                     const std::vector<std::string>& overrides = {});
 
 /// "6x3", or "6x3@1920x1080": a grid of equal screens (640 x 360 unless told) on whichever hosts there are, 0.36 m
 /// high, gaps of 6 mm, without a viewer. None when `spec` has another form. Throws Error (BadInput) for impossible
@@ -32,10 +34,10 @@ struct WallReading {
 
 /// A shorthand or a TOML file, with all its findings. Throws Error: Io when the file cannot be read, BadInput for
 /// an impossible shorthand.
-[[nodiscard]] WallReading read_wall(const std::string& spec);
+[[nodiscard]] WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides = {});
 
 /// The same for those who want the wall: logs warnings, throws the first error (BadInput) with file:line:column, the
 /// offending line and a hint.
-[[nodiscard]] Wall load_wall(const std::string& spec);
+[[nodiscard]] Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides = {});
 
 }  // namespace hpr

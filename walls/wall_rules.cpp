@@ -141,8 +141,7 @@ class Linker {
   void link_screens() {
     for (DraftScreen& draft : draft_.screens) {
       WallScreen& screen = draft.screen;
-      const bool turned = screen.rotate % 180 != 0;
-      const Size shown = turned ? Size{screen.pixels.height, screen.pixels.width} : screen.pixels;
+      const Size shown = panel_pixels(screen);
       const bool placed = !screen.viewport.empty();
       placed_.push_back(placed);
       if (!placed) screen.viewport = {0, 0, shown.width, shown.height};
@@ -232,7 +231,9 @@ class Linker {
       for (std::size_t j = 0; j < i; ++j) {
         const DraftScreen& a = draft_.screens[j];
         const DraftScreen& b = draft_.screens[i];
-        if (!a.has_corners || !b.has_corners || a.eye != b.eye || a.screen.id == b.screen.id) continue;
+        if (!a.has_corners || !b.has_corners || a.screen.id == b.screen.id) continue;
+        const bool an_eye_each = a.screen.eye != Eye::Both && b.screen.eye != Eye::Both && a.screen.eye != b.screen.eye;
+        if (an_eye_each) continue;
         const double near_enough = 1e-6 * screen_width(a.screen);
         const bool same = glm::distance(a.screen.lower_left, b.screen.lower_left) < near_enough &&
                           glm::distance(a.screen.lower_right, b.screen.lower_right) < near_enough &&
@@ -241,7 +242,7 @@ class Linker {
         findings_.error(
             b.place,
             fmt::format(R"(tile driven twice: screens "{}" and "{}" are the same rectangle)", a.screen.id, b.screen.id),
-            "remove one, or give them different eyes");
+            "remove one, or give one eye = \"left\" and the other eye = \"right\"");
       }
     }
   }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numeric>
+#include <numbers>
 
 #include "walls/wall_draft.h"
 #include "walls/wall_file.h"
@@ -22,13 +22,6 @@ std::optional<Size> read_pixels(TableReader& reader, std::string_view key) {
   return Size{(*numbers)[0], (*numbers)[1]};
 }
 
-int read_rotate(TableReader& reader) {
-  const int angle = reader.integer("rotate", 0, 270).value_or(0);
-  if (angle % 90 == 0) return angle;
-  reader.error("rotate", fmt::format("is {}", angle), "a panel is turned by 0, 90, 180 or 270 degrees");
-  return 0;
-}
-
 /// `count` gaps: all `common`, unless listed one by one under `key`. Empty when one overlaps a whole tile.
 std::vector<double> read_gaps(TableReader& reader, std::string_view key, int count, double common, double tile) {
   const auto listed = reader.reals(key, static_cast<std::size_t>(count), kMetresLimit);
@@ -41,6 +34,35 @@ std::vector<double> read_gaps(TableReader& reader, std::string_view key, int cou
                  "a negative gap must stay smaller than the tile");
   }
   return gaps;
+}
+
+/// How the columns stand; 0 for a plane. Asked for last: it needs all the rest of the grid.
+std::optional<double> read_curve(TableReader& reader, const WallGrid& grid, bool sound, Findings& findings) {
+  const TomlValue* const table = reader.table("curve");
+  if (table == nullptr) return 0.0;
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  TableReader curve(*table, "curve", findings);
+  const auto radius = curve.real("radius_m", 0.0, kMetresLimit);
+  const auto degrees = curve.real("angle_degrees", 0.0, 360.0);
+  curve.finish();
+  if (curve.has("radius_m") == curve.has("angle_degrees")) {
+    findings.error(table->place, "curve has either radius_m or angle_degrees",
+                   "write e.g. curve = { radius_m = 3.0 } or curve = { angle_degrees = 90 }");
+    return std::nullopt;
+  }
+  if (!sound || (!radius && !degrees)) return std::nullopt;
+  if (degrees) {
+    const auto found = radius_of_arc(grid, *degrees * kDegree);
+    if (!found) {
+      curve.error("angle_degrees", fmt::format("is {}, which no arc of these columns has", *degrees),
+                  "give the radius instead, or check the columns' widths and gaps");
+    }
+    return found;
+  }
+  if (fits_arc(grid, *radius)) return radius;
+  curve.error("radius_m", fmt::format("is {}, and the columns go more than once around", *radius),
+              "the radius must be larger, or the columns fewer");
+  return std::nullopt;
 }
 
 void read_grid(const TomlValue& table, const std::string& surface, WallDraft& draft, Findings& findings) {
@@ -59,7 +81,10 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
   }
   const std::vector<double> gap = reader.reals("gap_m", 2, kMetresLimit).value_or(std::vector<double>{0.0, 0.0});
   grid.center = reader.point("centre_m").value_or(glm::dvec3(0.0));
-  const int rotate = read_rotate(reader);
+  const bool turned_twice = reader.has("rotate") && reader.has("panel_rotate");
+  if (turned_twice) reader.error("panel_rotate", "stands beside rotate", "they mean the same: remove one");
+  WallScreen look;
+  read_look(reader, reader.has("panel_rotate") ? "panel_rotate" : "rotate", look, findings);
   const auto windows = reader.texts("windows");
   const std::int64_t asked = std::int64_t{columns.value_or(1)} * rows.value_or(1);
   const bool fits = asked + static_cast<std::int64_t>(draft.screens.size()) <= kMostScreens;
@@ -75,7 +100,14 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
     grid.row_gaps_m = read_gaps(reader, "row_gaps_m", *rows - 1, gap[1], (*size)[1]);
   }
   for (const std::string_view key : {"column_gaps_m", "row_gaps_m"}) static_cast<void>(reader.has(key));
-  reader.ignore({"curve", "panel_rotate", "mirror", "edge_blend_m"});
+  const bool spaced =
+      countable && std::ssize(grid.column_gaps_m) == *columns - 1 && std::ssize(grid.row_gaps_m) == *rows - 1;
+  if (pixels && positive) {
+    grid.tile_pixels = *pixels;
+    grid.tile_width_m = (*size)[0];
+    grid.tile_height_m = (*size)[1];
+  }
+  const auto radius = read_curve(reader, grid, pixels && positive && spaced, findings);
   reader.finish();
   if (!countable) return;
   const auto count = static_cast<std::size_t>(asked);
@@ -84,16 +116,17 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
                  fmt::format("name {}, row by row from the top left", count));
     return;
   }
-  const bool spaced = std::ssize(grid.column_gaps_m) == *columns - 1 && std::ssize(grid.row_gaps_m) == *rows - 1;
-  if (!pixels || !positive || !spaced) return;
-  grid.tile_pixels = *pixels;
-  grid.tile_width_m = (*size)[0];
-  grid.tile_height_m = (*size)[1];
+  if (!pixels || !positive || !spaced || !radius) return;
+  grid.radius_m = *radius;
   const TomlValue* const list = reader.find("windows");
   std::vector<WallScreen> screens = expand_grid(grid, surface);
   for (std::size_t i = 0; i < screens.size(); ++i) {
-    DraftScreen screen{std::move(screens[i]), {}, table.place, table.place, true};
-    screen.screen.rotate = rotate;
+    DraftScreen screen{std::move(screens[i]), table.place, table.place, true};
+    screen.screen.rotate = look.rotate;
+    screen.screen.mirror = look.mirror;
+    screen.screen.eye = look.eye;
+    screen.screen.color = look.color;
+    screen.screen.blend = look.blend;
     if (windows) {
       screen.screen.window = (*windows)[i];
       screen.window_place = list->items[i].place;
@@ -153,7 +186,7 @@ void warn_about_pixel_shape(const DraftScreen& draft, Findings& findings) {
 void read_screens(TableReader& surface, const std::string& surface_id, WallDraft& draft, Findings& findings) {
   for (const TomlValue* const table : surface.tables("screens")) {
     TableReader reader(*table, "screen", findings);
-    DraftScreen draft_screen{{}, {}, table->place, reader.place("window"), false};
+    DraftScreen draft_screen{{}, table->place, reader.place("window"), false};
     WallScreen& screen = draft_screen.screen;
     reader.require("id", "\"left\"");
     screen.id = reader.id("id").value_or("");
@@ -163,40 +196,14 @@ void read_screens(TableReader& surface, const std::string& surface_id, WallDraft
     draft_screen.has_corners = read_corners(reader, screen, findings) && pixels;
     screen.window = reader.text("window").value_or("");
     screen.viewport = reader.rect("viewport").value_or(Rect{});
-    screen.rotate = read_rotate(reader);
-    draft_screen.eye = reader.text("eye").value_or("");
-    reader.ignore({"eye", "warp", "edge_blend_m", "mirror", "colour", "overscan_px"});
+    read_look(reader, "rotate", screen, findings);
+    reader.ignore({"warp", "overscan_px"});
     reader.finish();
     draft.screens.push_back(std::move(draft_screen));
   }
 }
 
 }  // namespace
-
-std::vector<WallScreen> expand_grid(const WallGrid& grid, const std::string& surface) {
-  const double width =
-      std::accumulate(grid.column_gaps_m.begin(), grid.column_gaps_m.end(), grid.columns * grid.tile_width_m);
-  const double height = std::accumulate(grid.row_gaps_m.begin(), grid.row_gaps_m.end(), grid.rows * grid.tile_height_m);
-  std::vector<WallScreen> screens;
-  double top = grid.center.y + 0.5 * height;
-  for (int row = 0; row < grid.rows; ++row) {
-    double left = grid.center.x - 0.5 * width;
-    for (int column = 0; column < grid.columns; ++column) {
-      WallScreen screen;
-      screen.id = fmt::format("{}-r{}c{}", surface, row, column);
-      screen.surface = surface;
-      screen.pixels = grid.tile_pixels;
-      screen.lower_left = {left, top - grid.tile_height_m, grid.center.z};
-      screen.lower_right = {left + grid.tile_width_m, top - grid.tile_height_m, grid.center.z};
-      screen.upper_left = {left, top, grid.center.z};
-      screen.viewport = {0, 0, grid.tile_pixels.width, grid.tile_pixels.height};
-      screens.push_back(std::move(screen));
-      if (column + 1 < grid.columns) left += grid.tile_width_m + grid.column_gaps_m[static_cast<std::size_t>(column)];
-    }
-    if (row + 1 < grid.rows) top -= grid.tile_height_m + grid.row_gaps_m[static_cast<std::size_t>(row)];
-  }
-  return screens;
-}
 
 void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings) {
   document.require("surfaces", "[{ id = \"wall\", grid = { ... } }]");
@@ -205,6 +212,7 @@ void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings) 
     TableReader reader(*table, "surface", findings);
     if (surfaces.size() > 1) reader.require("id", "\"wall\"");
     const std::string id = reader.id("id").value_or("wall");
+    draft.surfaces.push_back({id, table->place, reader.text("viewer").value_or(""), reader.place("viewer")});
     const std::size_t before = draft.screens.size();
     const bool has_grid = reader.has("grid");
     const bool has_screens = reader.has("screens");

@@ -33,12 +33,12 @@ View view_of(const Beside& beside, double distance) {
   screen.upper_left = {0.0, kHeight, 0.0};
   Wall wall;
   wall.screens = {screen};
-  wall.viewer = {beside.x, beside.y, distance};
-  wall.viewer_given = true;
-  wall.near_m = 0.5 * distance;
-  wall.clamp_distance_m = 0.5 * distance;
+  wall.viewers.front().position = {beside.x, beside.y, distance};
+  wall.viewers.front().given = true;
+  wall.viewers.front().near_m = 0.5 * distance;
+  wall.viewers.front().clamp_distance_m = 0.5 * distance;
   Camera camera;
-  camera.eye = wall.viewer;
+  camera.eye = wall.viewers.front().position;
   return wall_views(wall, camera, {}).front();
 }
 

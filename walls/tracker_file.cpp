@@ -1,0 +1,22 @@
+#include "walls/head_path.h"
+#include "walls/tracker.h"
+
+namespace hpr {
+namespace {
+
+class FileTracker final : public Tracker {
+ public:
+  explicit FileTracker(HeadPath path) : path_(std::move(path)) {}
+  [[nodiscard]] HeadPose sample(double time) override { return path_.at(time); }
+
+ private:
+  HeadPath path_;
+};
+
+}  // namespace
+
+std::unique_ptr<Tracker> make_file_tracker(const WallTracker& tracker) {
+  return std::make_unique<FileTracker>(load_head_path(tracker.file));
+}
+
+}  // namespace hpr
