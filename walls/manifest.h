@@ -64,7 +64,6 @@ struct RunManifest {
   std::vector<std::string> earlier;   ///< records of the frames a job drew that was lost since, as JSON objects
   std::vector<std::string> restarts;  ///< JSON objects: before which frame a job was started again, and why
   std::vector<FrameRecord> frames;    ///< of this job
-  std::vector<FrameRecord> frames;
   /// How long displays outside the job were missing or behind; none where there are no such displays.
   std::optional<double> degraded_seconds = {};
 };
