@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "app/output.h"
+#include "app/wall_import.h"
 #include "app/wall_run.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -38,80 +39,90 @@ class WallCommand final : public Command {
     pattern.add_option("-o,--output", output_, "where <screen id>.png go")->required()->type_name("DIR");
     pattern.callback([this] { action_ = [this](const Globals& globals) { return this->pattern(globals); }; });
 
-    CLI::App& run = *app.add_subcommand(std::string(run_->name()), std::string(run_->summary()));
-    run_->declare(run);
-    run.callback([this] {
-      runs_ = true;
-      action_ = [this](const Globals& globals) { return run_->run(globals); };
-    });
+    CLI::App& import = *app.add_subcommand(std::string(import_->name()), std::string(import_->summary()));
+    import_->declare(import);
+    import.callback([this] { action_ = [this](const Globals& globals) { return import_->run(globals);
+  }; });
+
+CLI::App& run = *app.add_subcommand(std::string(run_->name()), std::string(run_->summary()));
+run_->declare(run);
+run.callback([this] {
+  runs_ = true;
+  action_ = [this](const Globals& globals) { return run_->run(globals); };
+});
+}  // namespace
+
+/// Only `run` draws; the rest reads a file and answers.
+[[nodiscard]] bool collective() const override {
+  return runs_;
+}
+[[nodiscard]] ExitCode run(const Globals& globals) override {
+  return action_(globals);
+}
+
+private:
+CLI::App& add(CLI::App& app, const std::string& name, const std::string& summary) {
+  CLI::App& sub = *app.add_subcommand(name, summary);
+  sub.add_option("wall", wall_, "a wall file, or CxR, or CxR@WxH")->required()->type_name("WALL");
+  return sub;
+}
+
+[[nodiscard]] ExitCode check() const {
+  const WallCheck check{wall_, read_wall(wall_)};
+  if (json_) {
+    fmt::print("{}", check_json(check));
+  } else {
+    report_findings(check);
+    if (check.reading.ok()) fmt::print("{}", describe_wall(check.reading.wall));
   }
+  return check.reading.ok() ? ExitCode::Done : ExitCode::BadInput;
+}
 
-  /// Only `run` draws; the rest reads a file and answers.
-  [[nodiscard]] bool collective() const override { return runs_; }
-  [[nodiscard]] ExitCode run(const Globals& globals) override { return action_(globals); }
-
- private:
-  CLI::App& add(CLI::App& app, const std::string& name, const std::string& summary) {
-    CLI::App& sub = *app.add_subcommand(name, summary);
-    sub.add_option("wall", wall_, "a wall file, or CxR, or CxR@WxH")->required()->type_name("WALL");
-    return sub;
+[[nodiscard]] ExitCode plan(const Globals& globals) const {
+  const std::string extension = std::filesystem::path(output_).extension().string();
+  if (extension != ".svg" && extension != ".png") {
+    throw Error(ExitCode::Usage, fmt::format("cannot write a plan as '{}'", printable(output_)),
+                "choose a name that ends in .svg or .png");
   }
-
-  [[nodiscard]] ExitCode check() const {
-    const WallCheck check{wall_, read_wall(wall_)};
-    if (json_) {
-      fmt::print("{}", check_json(check));
-    } else {
-      report_findings(check);
-      if (check.reading.ok()) fmt::print("{}", describe_wall(check.reading.wall));
-    }
-    return check.reading.ok() ? ExitCode::Done : ExitCode::BadInput;
+  check_writable(output_, globals.force);
+  const Wall wall = load_wall(wall_);
+  if (extension == ".svg") {
+    write_file_atomically(output_, wall_plan_svg(wall));
+  } else {
+    write_png(output_, wall_plan_image(wall));
   }
+  return ExitCode::Done;
+}
 
-  [[nodiscard]] ExitCode plan(const Globals& globals) const {
-    const std::string extension = std::filesystem::path(output_).extension().string();
-    if (extension != ".svg" && extension != ".png") {
-      throw Error(ExitCode::Usage, fmt::format("cannot write a plan as '{}'", printable(output_)),
-                  "choose a name that ends in .svg or .png");
-    }
-    check_writable(output_, globals.force);
-    const Wall wall = load_wall(wall_);
-    if (extension == ".svg") {
-      write_file_atomically(output_, wall_plan_svg(wall));
-    } else {
-      write_png(output_, wall_plan_image(wall));
-    }
-    return ExitCode::Done;
+[[nodiscard]] ExitCode expand() const {
+  fmt::print("{}", expand_wall(load_wall(wall_)));
+  return ExitCode::Done;
+}
+
+[[nodiscard]] ExitCode pattern(const Globals& globals) const {
+  const Wall wall = load_wall(wall_);
+  const std::filesystem::path folder(output_);
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()),
+                "name a folder that can be written with -o");
   }
+  const auto path_of = [&](const WallScreen& screen) { return folder / (screen.id + ".png"); };
+  for (const WallScreen& screen : wall.screens) check_writable(path_of(screen), globals.force);
+  for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) write_png(path_of(wall.screens[i]), wall_pattern(wall, i));
+  return ExitCode::Done;
+}
 
-  [[nodiscard]] ExitCode expand() const {
-    fmt::print("{}", expand_wall(load_wall(wall_)));
-    return ExitCode::Done;
-  }
-
-  [[nodiscard]] ExitCode pattern(const Globals& globals) const {
-    const Wall wall = load_wall(wall_);
-    const std::filesystem::path folder(output_);
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) {
-      throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()),
-                  "name a folder that can be written with -o");
-    }
-    const auto path_of = [&](const WallScreen& screen) { return folder / (screen.id + ".png"); };
-    for (const WallScreen& screen : wall.screens) check_writable(path_of(screen), globals.force);
-    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
-    for (std::size_t i = 0; i < wall.screens.size(); ++i) write_png(path_of(wall.screens[i]), wall_pattern(wall, i));
-    return ExitCode::Done;
-  }
-
-  std::string wall_;
-  std::string output_;
-  bool json_ = false;
-  std::unique_ptr<Command> run_ = make_wall_run_command();
-  bool runs_ = false;
-  std::function<ExitCode(const Globals&)> action_;
-};
+std::string wall_;
+std::string output_;
+bool json_ = false;
+std::unique_ptr<Command> import_ = make_wall_import_command();
+std::unique_ptr<Command> run_ = make_wall_run_command();
+bool runs_ = false;
+std::function<ExitCode(const Globals&)> action_;
+};  // namespace hpr
 
 }  // namespace
 
