@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "app/output.h"
+#include "app/wall_import.h"
 #include "app/wall_remote.h"
 #include "app/wall_run.h"
 #include "core/file.h"
@@ -56,7 +57,8 @@ class WallCommand final : public Command {
       runs_ = true;
       action_ = [this](const Globals& globals) { return run_->run(globals); };
     });
-    for (const auto& command : remote_) {
+    others_.push_back(make_wall_import_command());
+    for (const auto& command : others_) {
       CLI::App& sub = *app.add_subcommand(std::string(command->name()), std::string(command->summary()));
       command->declare(sub);
       sub.callback(
@@ -128,7 +130,7 @@ class WallCommand final : public Command {
   std::string output_;
   bool json_ = false;
   std::unique_ptr<Command> run_ = make_wall_run_command();
-  std::vector<std::unique_ptr<Command>> remote_ = make_wall_remote_commands();
+  std::vector<std::unique_ptr<Command>> others_ = make_wall_remote_commands();
   bool runs_ = false;
   std::function<ExitCode(const Globals&)> action_;
 };
