@@ -16,6 +16,7 @@
 #include <system_error>
 #include <utility>
 
+#include "app/interrupts.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -36,7 +37,9 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const std::map<std::string, std::string>& extra_env,
-                         int stdout_pipe, pid_t parent) {
+                         int stdout_pipe, pid_t parent, Interrupts interrupts) {
+  // Ctrl-C is then for the parent alone, which passes on what it stands for.
+  if (interrupts == Interrupts::Stop) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
   const int null = ::open("/dev/null", O_RDONLY);
@@ -54,8 +57,11 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
 std::atomic<pid_t> launched = 0;
 std::atomic<int> early = 0;  ///< a signal that came before there was anybody to pass it to
 
+std::atomic<bool> interrupted = false;
+
 extern "C" void pass_on(int signal) {
   const int error = errno;
+  if (signal == SIGINT || signal == SIGTERM) signal = interrupted.exchange(true) ? SIGTERM : SIGUSR1;
   const pid_t to = launched.load();
   if (to > 0) {
     ::kill(to, signal);
@@ -65,19 +71,21 @@ extern "C" void pass_on(int signal) {
   errno = error;
 }
 
-/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks.
+/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks; with Interrupts::Stop also what
+/// interrupts.
 class PassedSignals {
  public:
-  PassedSignals() {
+  explicit PassedSignals(Interrupts interrupts) : count_(interrupts == Interrupts::Stop ? kSignals.size() : 2) {
     launched.store(0);
     early.store(0);
+    interrupted.store(false);
     struct sigaction action {};
     action.sa_handler = pass_on;
     action.sa_flags = SA_RESTART;
-    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &action, &before_[i]);
+    for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &action, &before_.at(i));
   }
   ~PassedSignals() {
-    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
+    for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
   }
   PassedSignals(const PassedSignals&) = delete;
   PassedSignals& operator=(const PassedSignals&) = delete;
@@ -90,7 +98,8 @@ class PassedSignals {
   static void to_nobody() { launched.store(0); }
 
  private:
-  static constexpr std::array kSignals{SIGUSR1, SIGUSR2};
+  static constexpr std::array kSignals{SIGUSR1, SIGUSR2, SIGINT, SIGTERM};
+  std::size_t count_;  ///< of them, from the front
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
@@ -138,8 +147,10 @@ std::string program_path() {
   return std::filesystem::read_symlink("/proc/self/exe").string();
 }
 
-int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
-                const std::map<std::string, std::string>& extra_env) {
+namespace {
+
+int run_job(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
+            const std::map<std::string, std::string>& extra_env, Interrupts interrupts) {
   if (!find_on_path("mpiexec")) {
     throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
                 "install openmpi-bin, or run with --ranks 1");
@@ -155,12 +166,12 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   if (captured_stdout != nullptr && ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   }
-  const PassedSignals passed;
+  const PassedSignals passed(interrupts);
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
-  if (child == 0) become(arguments, extra_env, pipe[1], parent);
+  if (child == 0) become(arguments, extra_env, pipe[1], parent, interrupts);
   PassedSignals::to(child);
 
   if (captured_stdout != nullptr) {
@@ -185,6 +196,17 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
   return code;
+}
+
+}  // namespace
+
+int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
+                const std::map<std::string, std::string>& extra_env) {
+  return run_job(ranks, args, captured_stdout, extra_env, Interrupts::End);
+}
+
+int run_mpiexec_until_interrupted(int ranks, const std::vector<std::string>& args) {
+  return run_job(ranks, args, nullptr, {}, Interrupts::Stop);
 }
 
 }  // namespace hpr

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "app/command.h"
+#include "app/interrupts.h"
 #include "app/launcher.h"
 #include "app/report_error.h"
 #include "cluster/collectives.h"
@@ -113,13 +114,21 @@ HostShare host_share(Communicator& comm, const Globals& globals) {
   return share;
 }
 
-ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
+ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body, Interrupts interrupts) {
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
-  if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args));
+  if (globals.ranks > 1) {
+    return static_cast<ExitCode>(interrupts == Interrupts::Stop
+                                     ? run_mpiexec_until_interrupted(globals.ranks, globals.args)
+                                     : run_mpiexec(globals.ranks, globals.args));
+  }
   ExitCode code = ExitCode::Done;
   run_local_ranks(
       1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());
   return code;
+}
+
+ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
+  return run_ranks(globals, body, Interrupts::End);
 }
 
 }  // namespace hpr

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "app/signals.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/hash.h"
@@ -29,6 +30,13 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
   for (std::size_t i = 0; i < wall.screens.size(); ++i) {
     const WallScreen& screen = wall.screens[i];
     const auto node = std::ranges::find(wall.nodes, screen.node, &WallNode::id);
+    const auto same_window =
+        std::ranges::find(wall.screens.begin(), wall.screens.begin() + static_cast<std::ptrdiff_t>(i), screen.window,
+                          &WallScreen::window);
+    if (!screen.window.empty() && same_window != wall.screens.begin() + static_cast<std::ptrdiff_t>(i)) {
+      owners.push_back(owners[static_cast<std::size_t>(same_window - wall.screens.begin())]);
+      continue;
+    }
     std::vector<int> on_its_host;
     for (int rank = 0; rank < ranks; ++rank) {
       if (node != wall.nodes.end() && node->host == hosts[static_cast<std::size_t>(rank)]) on_its_host.push_back(rank);
@@ -66,6 +74,21 @@ std::vector<std::string> hosts_of(Communicator& comm, const std::string& mine) {
   return hosts;
 }
 
+/// A viewer who moves the camera waits no longer for a frame, unless told otherwise.
+std::optional<double> target_of(const WallRun& run) {
+  constexpr double kResponsive_ms = 50.0;
+  if (run.target_ms || !run.open_ended()) return run.target_ms;
+  return kResponsive_ms;
+}
+
+/// While nobody moves the camera, the picture of an open-ended run gets better.
+std::optional<SampleGoal> resting_of(const WallRun& run) {
+  constexpr std::uint32_t kSamplesAtRest = 64;
+  const Sampling sampling = sampling_of(run);
+  if (!run.open_ended() || !sampling.goal.one() || run.options.spp) return std::nullopt;
+  return SampleGoal{.samples = kSamplesAtRest, .seconds = {}, .relmse = {}};
+}
+
 }  // namespace
 
 Sampling sampling_of(const WallRun& run) {
@@ -82,10 +105,16 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
       wall_(wall),
       session_(session),
       path_(run.path.empty() ? std::optional<CameraPath>() : load_camera_path(run.path)),
-      frames_(session, settings, sampling_of(run), screens_in(0), run.target_ms),
+      orbit_(run.options.choose_camera(session.scene()), session.scene().bounds),
+      frames_(session, settings, sampling_of(run), screens_in(0), target_of(run), resting_of(run)),
       showing_{sizes_of(wall), owners_of(wall, hosts_of(session.comm(), session.host())), run.options.exposure} {
+  if (run.display.kind().whole_wall) std::ranges::fill(showing_.shown_by, 0);
   agree_on_failure(session_.comm(), [&] {
-    if (shows_any()) display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
+    DisplayOptions options = run.display.options(globals);
+    for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
+      if (showing_.shown_by[screen] == session_.comm().rank()) options.screens.push_back(screen);
+    }
+    if (!options.screens.empty()) display_ = run.display.kind().make(wall, options);
   });
   manifest_.scene_hash = content_hash(session.scene());
   manifest_.wall_hash = wall.hash;
@@ -104,6 +133,29 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   record(number);
 }
 
+bool WallDriver::follow_viewers() {
+  DisplayInput mine = display_ ? display_->take_input() : DisplayInput{};
+  if (run_.open_ended() && take_request() == Request::Stop) mine.stop = true;
+  OrbitInput motion;
+  bool stop = false;
+  for (const DisplayInput& input : all_gather_value(session_.comm(), mine)) {
+    motion += input.orbit;
+    stop = stop || input.stop;
+  }
+  orbit_.move(motion);
+  return !stop;
+}
+
+bool WallDriver::settled() const {
+  return !path_ && frames_.refined(screens_in(0));
+}
+
+void WallDriver::finish() {
+  agree_on_failure(session_.comm(), [&] {
+    if (display_) display_->finish();
+  });
+}
+
 std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
   Communicator& comm = session_.comm();
   for (std::size_t screen = 0; screen < showing_.shown_by.size(); ++screen) {
@@ -119,13 +171,9 @@ std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
 }
 
 std::vector<View> WallDriver::screens_in(std::uint64_t frame) const {
-  const Camera camera = path_ ? camera_of(path_->at_frame(frame, static_cast<std::size_t>(run_.frames)))
-                              : run_.options.choose_camera(session_.scene());
+  const auto frames = static_cast<std::size_t>(run_.frames.value_or(1));
+  const Camera camera = path_ ? camera_of(path_->at_frame(frame, frames)) : orbit_.camera();
   return wall_views(wall_, camera, session_.scene().bounds);
-}
-
-bool WallDriver::shows_any() const {
-  return std::ranges::find(showing_.shown_by, session_.comm().rank()) != showing_.shown_by.end();
 }
 
 void WallDriver::show(std::uint64_t number) {
@@ -152,6 +200,11 @@ void WallDriver::record(std::uint64_t number) {
   for (std::size_t screen = 0; screen < hashes.size(); ++screen) {
     frame.screens.push_back(
         {wall_.screens[screen].id, wall_.screens[screen].pixels, hashes[screen], ScreenState::Fresh});
+  }
+  // An open-ended run keeps its last frames only.
+  constexpr std::size_t kMostRecords = 10'000;
+  if (!run_.frames && manifest_.frames.size() == kMostRecords) {
+    manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMostRecords / 2);
   }
   manifest_.frames.push_back(std::move(frame));
 }

@@ -7,6 +7,7 @@
 
 #include "app/camera_path.h"
 #include "app/frame_maker.h"
+#include "app/orbit.h"
 #include "app/output.h"
 #include "app/progress.h"
 #include "app/screens.h"
@@ -37,12 +38,19 @@ class WallDriver {
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
   void draw(std::uint64_t number, Progress& progress);
 
+  /// Collective. Moves the camera as viewers on all ranks asked since the last call; a camera on a path stays on it.
+  /// False once one of them, or a signal, asked to end the run.
+  [[nodiscard]] bool follow_viewers();
+  /// Whether the next frame would be the last one again.
+  [[nodiscard]] bool settled() const;
+  /// Collective. The run ended well.
+  void finish();
+
   /// Collective. All screens' pictures of the last frame, on rank 0.
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
 
  private:
   [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame) const;
-  [[nodiscard]] bool shows_any() const;
   void show(std::uint64_t number);
   void record(std::uint64_t number);
   [[nodiscard]] std::string strategy() const;
@@ -51,6 +59,7 @@ class WallDriver {
   const Wall& wall_;
   Session& session_;
   std::optional<CameraPath> path_;
+  OrbitCamera orbit_;  ///< where there is no path
   FrameMaker frames_;
   Showing showing_;
   std::unique_ptr<Display> display_;
