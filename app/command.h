@@ -59,7 +59,7 @@ class Command {
 /// with one rank it runs here; otherwise mpiexec is started with this very command line and the body never runs here.
 /// Returns what all ranks agreed on. Check whatever can be checked without the other ranks before calling it.
 [[nodiscard]] ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body,
-                                 StandardInput input = StandardInput::None);
+                                 const JobOptions& options = {});
 
 /// What this rank may use of the machine it runs on.
 struct HostShare {

@@ -12,6 +12,7 @@
 #include "app/scene_command.h"
 #include "app/stability_command.h"
 #include "app/tradeoff_command.h"
+#include "app/view_command.h"
 #include "app/wall_command.h"
 
 namespace hpr {
@@ -23,6 +24,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   all.push_back(make_wall_command());
   all.push_back(make_console_command());
   all.push_back(make_display_command());
+  all.push_back(make_view_command());
   all.push_back(make_compare_command(scene_layers));
   all.push_back(make_tradeoff_command());
   all.push_back(make_diff_command());

@@ -246,8 +246,8 @@ class CompareCommand final : public Command {
         result.picture = std::move(here.picture);
       } else {
         std::string output;
-        const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()), &output,
-                                     {{kHandOverVariable, "1"}});
+        const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()),
+                                     {.captured_stdout = &output, .environment = {{kHandOverVariable, "1"}}});
         // Its ranks have said on stderr what went wrong.
         if (code != static_cast<int>(ExitCode::Done) && code != static_cast<int>(ExitCode::CheckFailed)) {
           return static_cast<ExitCode>(code);

@@ -33,7 +33,7 @@ class DemoCommand final : public Command {
     run.scene = "gen:gallery";
     run.wall = wall_;
     run.picture = output_;
-    run.folder = std::filesystem::path(output_).replace_extension("").string() + "-screens";
+    run.display.output = std::filesystem::path(output_).replace_extension("").string() + "-screens";
     run.summary = true;
     // The quickest proof that a machine works: light that hardly varies from pixel to pixel is worked out for one in
     // four.

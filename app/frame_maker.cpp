@@ -25,8 +25,10 @@ bool same_look(const View& a, const View& b) {
 }  // namespace
 
 FrameMaker::FrameMaker(Session& session, const FrameSettings& settings, const Sampling& sampling,
-                       std::span<const View> screens, std::optional<double> target_ms)
-    : session_(session), settings_(settings), sampling_(sampling), target_ms_(target_ms) {
+                       std::span<const View> screens, std::optional<double> target_ms,
+                       const std::optional<SampleGoal>& resting)
+    : session_(session), settings_(settings), sampling_(sampling), resting_(sampling), target_ms_(target_ms) {
+  if (resting) resting_.goal = *resting;
   plan_for({}, screens);
   if (!target_ms_) return;
   // Whatever the size of a frame, it has as many photons and takes its keys the same way: the lighter stays.
@@ -71,12 +73,16 @@ bool FrameMaker::rests(std::span<const View> screens) const {
   return std::ranges::equal(screens, last_screens_, same_look);
 }
 
+bool FrameMaker::refined(std::span<const View> screens) const {
+  return refining_ && rests(screens) && reached(resting_, sampler_->reached_so_far());
+}
+
 Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress) {
   if (!budget_) {
     plan_for({}, screens);
     make_anew(number, sampling_.goal.samples.value_or(0), progress);
   } else if (rests(screens)) {
-    refine(screens, number);
+    refine(screens, number, progress);
   } else {
     refining_ = false;
     const Effort effort = all_gather_value(session_.comm(), budget_->effort()).front();
@@ -101,14 +107,16 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
   relmse_ = sampler_->reached_so_far().relmse;
 }
 
-void FrameMaker::refine(std::span<const View> screens, std::uint64_t number) {
+void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Progress& progress) {
   if (!refining_) {
     sampler_.reset();
     plan_for({}, screens);
-    sampler_.emplace(session_, plan_, sampling_, number, false);
+    sampler_.emplace(session_, plan_, resting_, number, false);
+    // A single look with nothing given up: there is nothing to add to it.
+    if (!resting_.sums()) (void)sampler_->draw(blocks_.views, {}, progress);
   }
   refining_ = true;
-  sampler_->refine(blocks_.views);
+  if (resting_.sums()) sampler_->refine(blocks_.views);
   times_ = sampler_->times();
   relmse_ = sampler_->reached_so_far().relmse;
   write_report({most_samples(), 0, 0}, sampler_->reached_so_far().samples);

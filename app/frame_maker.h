@@ -18,13 +18,17 @@ namespace hpr {
 class FrameMaker {
  public:
   /// Collective. `screens`: as first seen; sizes stay. `target_ms` of a frame; none: all are made as the settings say.
+  /// `resting`: what a picture is refined to while the eye rests; none: as `sampling`.
   FrameMaker(Session& session, const FrameSettings& settings, const Sampling& sampling, std::span<const View> screens,
-             std::optional<double> target_ms);
+             std::optional<double> target_ms, const std::optional<SampleGoal>& resting = {});
 
   /// Collective. Valid until the next one; made in blocks(). `progress` is told of samples.
   [[nodiscard]] Frame& make(std::span<const View> screens, std::uint64_t number, Progress& progress);
   /// Collective. What the slowest rank took for the last frame, the same on all ranks.
   void took(double slowest_ms);
+
+  /// Whether the same screens once more would give the last frame again: it was refined as far as it is to be.
+  [[nodiscard]] bool refined(std::span<const View> screens) const;
 
   /// Of the last frame; before the first one, of that.
   [[nodiscard]] const FramePlan& plan() const { return plan_; }
@@ -37,7 +41,7 @@ class FrameMaker {
  private:
   void plan_for(const Effort& effort, std::span<const View> screens);
   void make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress);
-  void refine(std::span<const View> screens, std::uint64_t number);
+  void refine(std::span<const View> screens, std::uint64_t number, Progress& progress);
   void write_report(const Effort& effort, std::uint32_t samples);
   [[nodiscard]] bool rests(std::span<const View> screens) const;
   [[nodiscard]] std::uint32_t most_samples() const;
@@ -46,6 +50,7 @@ class FrameMaker {
   Session& session_;
   FrameSettings settings_;  ///< with nothing given up
   Sampling sampling_;
+  Sampling resting_;
   std::optional<double> target_ms_;
   std::vector<std::string> economies_;
   std::optional<FrameBudget> budget_;

@@ -38,20 +38,22 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
 constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
-[[noreturn]] void become(const std::vector<char*>& arguments, const std::map<std::string, std::string>& extra_env,
-                         int stdout_pipe, StandardInput input, pid_t parent) {
+[[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
+                         pid_t parent) {
+  // Ctrl-C is then for the parent alone, which passes on what it stands for.
+  if (options.interrupts == Interrupts::Stop) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
-  if (input == StandardInput::None) {
+  if (options.input == StandardInput::None) {
     const int null = ::open("/dev/null", O_RDONLY);
     if (null >= 0) ::dup2(null, STDIN_FILENO);
   }
-  const bool typed = input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
+  const bool typed = options.input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
   if (stdout_pipe >= 0) ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
   if (typed) ::setenv(kTypedInput, "1", 1);
-  for (const auto& [name, value] : extra_env) ::setenv(name.c_str(), value.c_str(), 1);
+  for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
   ::execvp(arguments.front(), arguments.data());
   ::_exit(127);
@@ -59,10 +61,12 @@ constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
 
 // The handler reaches nothing but globals.
 std::atomic<pid_t> launched = 0;
+std::atomic<bool> interrupted = false;
 std::atomic<int> early = 0;  ///< a signal that came before there was anybody to pass it to
 
 extern "C" void pass_on(int signal) {
   const int error = errno;
+  if (signal == SIGINT || signal == SIGTERM) signal = interrupted.exchange(true) ? SIGTERM : SIGUSR1;
   const pid_t to = launched.load();
   if (to > 0) {
     ::kill(to, signal);
@@ -72,19 +76,21 @@ extern "C" void pass_on(int signal) {
   errno = error;
 }
 
-/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks.
+/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks; with Interrupts::Stop also what
+/// interrupts.
 class PassedSignals {
  public:
-  PassedSignals() {
+  explicit PassedSignals(Interrupts interrupts) : count_(interrupts == Interrupts::Stop ? kSignals.size() : 2) {
     launched.store(0);
     early.store(0);
+    interrupted.store(false);
     struct sigaction action {};
     action.sa_handler = pass_on;
     action.sa_flags = SA_RESTART;
-    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &action, &before_[i]);
+    for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &action, &before_.at(i));
   }
   ~PassedSignals() {
-    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
+    for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
   }
   PassedSignals(const PassedSignals&) = delete;
   PassedSignals& operator=(const PassedSignals&) = delete;
@@ -97,7 +103,8 @@ class PassedSignals {
   static void to_nobody() { launched.store(0); }
 
  private:
-  static constexpr std::array kSignals{SIGUSR1, SIGUSR2};
+  static constexpr std::array kSignals{SIGUSR1, SIGUSR2, SIGINT, SIGTERM};
+  std::size_t count_;  ///< of them, from the front
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
@@ -150,8 +157,7 @@ bool input_is_typed() {
   return ::isatty(STDIN_FILENO) == 1 || std::getenv(kTypedInput) != nullptr;
 }
 
-int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout,
-                const std::map<std::string, std::string>& extra_env, StandardInput input) {
+int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options) {
   if (!find_on_path("mpiexec")) {
     throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
                 "install openmpi-bin, or run with --ranks 1");
@@ -164,20 +170,20 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* ca
   arguments.push_back(nullptr);
 
   std::array<int, 2> pipe{-1, -1};
-  if (captured_stdout != nullptr && ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+  if (options.captured_stdout != nullptr && ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   }
-  const PassedSignals passed;
+  const PassedSignals passed(options.interrupts);
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
-  if (child == 0) become(arguments, extra_env, pipe[1], input, parent);
+  if (child == 0) become(arguments, options, pipe[1], parent);
   PassedSignals::to(child);
 
-  if (captured_stdout != nullptr) {
+  if (options.captured_stdout != nullptr) {
     ::close(pipe[1]);
-    *captured_stdout = read_to_end(pipe[0]);
+    *options.captured_stdout = read_to_end(pipe[0]);
     ::close(pipe[0]);
   }
   int status = 0;

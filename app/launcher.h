@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -10,9 +11,23 @@
 namespace hpr {
 
 /// What a job's ranks read on standard input.
-enum class StandardInput {
+enum class StandardInput : std::uint8_t {
   None,
   OfRank0,  ///< rank 0 reads what the launcher was given
+};
+
+/// What SIGINT and SIGTERM do to a job.
+enum class Interrupts : std::uint8_t {
+  End,   ///< end it
+  Stop,  ///< the first one reaches its ranks as SIGUSR1: they come to an orderly end by themselves
+};
+
+/// How a job is started.
+struct JobOptions {
+  std::string* captured_stdout = nullptr;  ///< where its standard output is collected; null: it passes through
+  std::map<std::string, std::string> environment = {};  ///< added to this process's own
+  StandardInput input = StandardInput::None;
+  Interrupts interrupts = Interrupts::End;
 };
 
 /// Whether somebody types what this process reads on standard input, at a terminal of its own or its launcher's.
@@ -25,12 +40,10 @@ enum class StandardInput {
 [[nodiscard]] int launched_rank();
 
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
-/// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through; their stdout passes
-/// through or, when `captured_stdout` is given, is collected there. Returns mpiexec's exit code. The job ends when this
-/// process does; SIGUSR1 and SIGUSR2 are passed on to its ranks. Throws Error: Io when mpiexec cannot be started, Lost
-/// when a rank or mpiexec itself was killed.
-int run_mpiexec(int ranks, const std::vector<std::string>& args, std::string* captured_stdout = nullptr,
-                const std::map<std::string, std::string>& extra_env = {}, StandardInput input = StandardInput::None);
+/// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
+/// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks. Throws Error: Io when
+/// mpiexec cannot be started, Lost when a rank or mpiexec itself was killed.
+int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 
 /// The first executable file of this name on the PATH.
 [[nodiscard]] std::optional<std::filesystem::path> find_on_path(std::string_view program);

@@ -113,9 +113,10 @@ HostShare host_share(Communicator& comm, const Globals& globals) {
   return share;
 }
 
-ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body, StandardInput input) {
+ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body,
+                   const JobOptions& options) {
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
-  if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, nullptr, {}, input));
+  if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
   ExitCode code = ExitCode::Done;
   run_local_ranks(
       1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());

@@ -81,17 +81,20 @@ RunJournal::Entries RunJournal::read() const {
   return entries;
 }
 
-ExitCode run_supervised(const Globals& globals, int restarts, const std::function<ExitCode(Communicator&)>& body) {
-  if (inside_mpi_job() || globals.ranks <= 1 || restarts <= 0) return run_ranks(globals, body);
+ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interrupts,
+                        const std::function<ExitCode(Communicator&)>& body) {
+  if (inside_mpi_job() || globals.ranks <= 1 || restarts <= 0)
+    return run_ranks(globals, body, {.interrupts = interrupts});
   RunJournal journal;
   // The launcher's own words, which name the rank and its host, are wanted here.
-  const std::map<std::string, std::string> environment{{RunJournal::kVariable, journal.path().string()},
-                                                       {"OMPI_MCA_orte_execute_quiet", "0"}};
+  const JobOptions options{
+      .environment = {{RunJournal::kVariable, journal.path().string()}, {"OMPI_MCA_orte_execute_quiet", "0"}},
+      .interrupts = interrupts};
   std::optional<std::size_t> ended_at;
   for (int restart = 0;; ++restart) {
     std::optional<Error> lost;
     try {
-      const auto code = static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, nullptr, environment));
+      const auto code = static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
       if (code != ExitCode::Hang && code != ExitCode::Lost) return code;
       lost.emplace(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
     } catch (const Error& error) {

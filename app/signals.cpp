@@ -12,7 +12,7 @@ std::atomic<int> requested = 0;
 static_assert(std::atomic<int>::is_always_lock_free);
 
 extern "C" void remember_request(int signal) {
-  const int request = static_cast<int>(signal == SIGUSR1 ? Request::Stop : Request::Write);
+  const int request = static_cast<int>(signal == SIGUSR2 ? Request::Write : Request::Stop);
   int before = requested.load();
   while (before < request && !requested.compare_exchange_weak(before, request)) {
   }
@@ -26,6 +26,16 @@ void watch_requests() {
   action.sa_flags = SA_RESTART;
   ::sigaction(SIGUSR1, &action, nullptr);
   ::sigaction(SIGUSR2, &action, nullptr);
+}
+
+void watch_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = remember_request;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGUSR1, &action, nullptr);
+  action.sa_flags = static_cast<int>(SA_RESTART | static_cast<unsigned>(SA_RESETHAND));
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
 }
 
 Request take_request() {

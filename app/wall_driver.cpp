@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/remote_wall.h"
+#include "app/signals.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/hash.h"
@@ -32,6 +33,13 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
   for (std::size_t i = 0; i < wall.screens.size(); ++i) {
     const WallScreen& screen = wall.screens[i];
     const auto node = std::ranges::find(wall.nodes, screen.node, &WallNode::id);
+    const auto same_window =
+        std::ranges::find(wall.screens.begin(), wall.screens.begin() + static_cast<std::ptrdiff_t>(i), screen.window,
+                          &WallScreen::window);
+    if (!screen.window.empty() && same_window != wall.screens.begin() + static_cast<std::ptrdiff_t>(i)) {
+      owners.push_back(owners[static_cast<std::size_t>(same_window - wall.screens.begin())]);
+      continue;
+    }
     std::vector<int> on_its_host;
     for (int rank = 0; rank < ranks; ++rank) {
       if (node != wall.nodes.end() && node->host == hosts[static_cast<std::size_t>(rank)]) on_its_host.push_back(rank);
@@ -74,6 +82,21 @@ std::vector<std::string> hosts_of(Communicator& comm, const std::string& mine) {
   return hosts;
 }
 
+/// A viewer who moves the camera waits no longer for a frame, unless told otherwise.
+std::optional<double> target_of(const WallRun& run) {
+  constexpr double kResponsive_ms = 50.0;
+  if (run.target_ms || !run.open_ended()) return run.target_ms;
+  return kResponsive_ms;
+}
+
+/// While nobody moves the camera, the picture of an open-ended run gets better.
+std::optional<SampleGoal> resting_of(const WallRun& run) {
+  constexpr std::uint32_t kSamplesAtRest = 64;
+  const Sampling sampling = sampling_of(run);
+  if (!run.open_ended() || !sampling.goal.one() || run.options.spp) return std::nullopt;
+  return SampleGoal{.samples = kSamplesAtRest, .seconds = {}, .relmse = {}};
+}
+
 }  // namespace
 
 Sampling sampling_of(const WallRun& run) {
@@ -94,14 +117,25 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
       monitors_(wall),
       globals_(globals),
       options_(run.options),
+      start_(run.options.choose_camera(session.scene())),
+      fov_degrees_(run.options.fov_degrees),
+      orbit_(start_, session.scene().bounds),
       control_(session, globals, options_, [this] { return status(); }),
-      owners_(owners_of(wall, hosts_of(session.comm(), session.host()), run.display == kRemoteDisplay)),
+      owners_(owners_of(wall, hosts_of(session.comm(), session.host()), run.display.remote())),
       showing_(showing_of(wall, owners_, run.options.exposure)) {
-  frames_.emplace(session, settings, sampling_of(run), screens_in(0, resting_heads(wall)), run.target_ms);
-  if (run.display == kRemoteDisplay) remote_ = connect_displays(session_.comm(), wall, owners_, run.remote);
+  if (run.display.kind().whole_wall) {
+    std::ranges::fill(owners_, 0);
+    showing_ = showing_of(wall, owners_, run.options.exposure);
+  }
+  frames_.emplace(session, settings, sampling_of(run), screens_in(0, resting_heads(wall)), target_of(run),
+                  resting_of(run));
+  if (run.display.remote()) remote_ = connect_displays(session_.comm(), wall, owners_, run.remote);
   agree_on_failure(session_.comm(), [&] {
-    if (shows_any() && !remote_)
-      display_ = make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
+    DisplayOptions options = run.display.options(globals);
+    for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+      if (owners_[screen] == session_.comm().rank()) options.screens.push_back(screen);
+    }
+    if (shows_any() && !remote_) display_ = run.display.kind().make(wall, options);
   });
   manifest_.scene_hash = content_hash(session.scene());
   manifest_.wall_hash = wall.hash;
@@ -118,10 +152,13 @@ void WallDriver::take_over() {
   if (journal) {
     journal_.emplace(std::move(*journal));
     RunJournal::Entries entries = journal_->read();
-    // The last picture is needed for what is written at the end.
-    entries.frames.resize(std::min(entries.frames.size(), static_cast<std::size_t>(run_.frames - 1)));
-    done = entries.frames.size();
-    manifest_.earlier = std::move(entries.frames);
+    if (!run_.open_ended()) {
+      // The last picture is needed for what is written at the end.
+      const auto most = static_cast<std::size_t>(run_.frames.value_or(1) - 1);
+      entries.frames.resize(std::min(entries.frames.size(), most));
+      done = entries.frames.size();
+      manifest_.earlier = std::move(entries.frames);
+    }
     manifest_.restarts = std::move(entries.restarts);
   }
   first_frame_ = all_gather_value(session_.comm(), done)[0];
@@ -136,8 +173,14 @@ void WallDriver::plan_frames() {
   WallRun changed = run_;
   changed.options = options_;
   showing_.exposure_stops = options_.exposure;
+  const Camera start = options_.choose_camera(session_.scene());
+  if (start.eye != start_.eye || start.axes != start_.axes || options_.fov_degrees != fov_degrees_) {
+    orbit_ = OrbitCamera(start, session_.scene().bounds);
+    start_ = start;
+    fov_degrees_ = options_.fov_degrees;
+  }
   frames_.emplace(session_, options_.settings(globals_.seed), sampling_of(changed), screens_in(0, resting_heads(wall_)),
-                  run_.target_ms);
+                  target_of(run_), resting_of(changed));
 }
 
 std::string WallDriver::status() const {
@@ -166,7 +209,8 @@ std::string WallDriver::status() const {
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
-  Frame& frame = frames_->make(screens_in(number, heads_.at(number)), number, progress);
+  last_heads_ = heads_.at(number);
+  Frame& frame = frames_->make(screens_in(number, last_heads_), number, progress);
   pictures_ = compose_screens(wall_, bring_to_screens(session_, frame, frames_->blocks(), showing_));
   copies_ = monitors_.draw(session_.comm(), pictures_, owners_);
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
@@ -174,7 +218,27 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   record(number);
 }
 
+bool WallDriver::follow_viewers() {
+  DisplayInput mine = display_ ? display_->take_input() : DisplayInput{};
+  if (run_.open_ended() && take_request() == Request::Stop) mine.stop = true;
+  OrbitInput motion;
+  bool stop = false;
+  for (const DisplayInput& input : all_gather_value(session_.comm(), mine)) {
+    motion += input.orbit;
+    stop = stop || input.stop;
+  }
+  orbit_.move(motion);
+  return !stop;
+}
+
+bool WallDriver::settled() const {
+  return !path_ && frames_->refined(screens_in(0, last_heads_));
+}
+
 bool WallDriver::finish() {
+  agree_on_failure(session_.comm(), [&] {
+    if (display_) display_->finish();
+  });
   return !remote_ || end_displays(session_.comm(), *remote_, manifest_);
 }
 
@@ -193,8 +257,8 @@ std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
 }
 
 std::vector<View> WallDriver::screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const {
-  const Camera camera = path_ ? camera_of(path_->at_frame(frame, static_cast<std::size_t>(run_.frames)))
-                              : options_.choose_camera(session_.scene());
+  const auto frames = static_cast<std::size_t>(run_.frames.value_or(1));
+  const Camera camera = path_ ? camera_of(path_->at_frame(frame, frames)) : orbit_.camera();
   return wall_views(wall_, heads, camera, session_.scene().bounds);
 }
 
@@ -238,7 +302,14 @@ void WallDriver::record(std::uint64_t number) {
   for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) {
     frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, copies_[monitor], ScreenState::Fresh));
   }
-  if (journal_) journal_->add_frame(to_json(frame));
+  // Of an open-ended run only now and then: that it gets on is all that counts.
+  constexpr std::uint64_t kSignOfLife = 1000;
+  if (journal_ && (run_.frames || number % kSignOfLife == 0)) journal_->add_frame(to_json(frame));
+  // An open-ended run keeps its last frames only.
+  constexpr std::size_t kMostRecords = 10'000;
+  if (!run_.frames && manifest_.frames.size() == kMostRecords) {
+    manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMostRecords / 2);
+  }
   manifest_.frames.push_back(std::move(frame));
 }
 

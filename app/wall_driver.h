@@ -7,6 +7,7 @@
 
 #include "app/camera_path.h"
 #include "app/frame_maker.h"
+#include "app/orbit.h"
 #include "app/output.h"
 #include "app/progress.h"
 #include "app/run_control.h"
@@ -47,6 +48,11 @@ class WallDriver {
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
   void draw(std::uint64_t number, Progress& progress);
 
+  /// Collective. Moves the camera as viewers on all ranks asked since the last call; a camera on a path stays on it.
+  /// False once one of them, or a signal, asked to end the run.
+  [[nodiscard]] bool follow_viewers();
+  /// Whether the next frame would be the last one again.
+  [[nodiscard]] bool settled() const;
   /// Collective. After the last frame. False: displays outside the job were meant to show it, and none ever did.
   [[nodiscard]] bool finish();
 
@@ -71,6 +77,9 @@ class WallDriver {
   WallMonitors monitors_;
   const Globals& globals_;
   RenderOptions options_;  ///< as changed while it runs
+  Camera start_;           ///< of the orbit, with that angle of view
+  double fov_degrees_;
+  OrbitCamera orbit_;  ///< where there is no path
   RunControl control_;
   std::vector<int> owners_;  ///< per screen the rank that shows it
   Showing showing_;          ///< of the pictures of screen_eyes()
@@ -81,6 +90,7 @@ class WallDriver {
   std::vector<Image<Rgba8>> copies_;    ///< per monitor, on rank 0
   RunManifest manifest_;
   FrameCost last_cost_;
+  std::vector<HeadPose> last_heads_;
   std::optional<RunJournal> journal_;  ///< on rank 0, where a supervisor looks on
   std::uint64_t first_frame_ = 0;
 };

@@ -105,7 +105,8 @@ class WallCtlCommand final : public WallRemoteCommand {
   [[nodiscard]] ExitCode run(const Globals&) override {
     std::ostringstream line;
     const std::vector<std::string> words = app_->remaining();
-    if (words.empty()) throw Error(ExitCode::Usage, "there is nothing to tell", "write e.g. hpr wall ctl quality draft");
+    if (words.empty())
+      throw Error(ExitCode::Usage, "there is nothing to tell", "write e.g. hpr wall ctl quality draft");
     for (const std::string& word : words) {
       const bool plain = !word.empty() && word.find_first_of(" \t\"\\#") == std::string::npos;
       line << (line.tellp() > 0 ? " " : "");

@@ -4,16 +4,19 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <thread>
 
 #include "app/camera_path.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
 #include "app/run_journal.h"
+#include "app/signals.h"
 #include "app/wall_driver.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
@@ -66,18 +69,29 @@ void print_summary(const RunStats& stats, const Wall& wall, const Scene& scene) 
 /// Rank 0's files of a finished run: the assembled wall and what was done.
 void write_results(const WallRun& run, const Wall& wall, const WallDriver& driver, const RunStats& stats,
                    std::span<const Image<Rgba8>> pictures) {
-  if (run.display == "file" || !run.picture.empty()) {
+  if (run.writes_files() || !run.picture.empty()) {
     const std::vector<std::byte> picture = encode_png(draw_wall(wall, wall_picture(wall, kLargestPicture), pictures));
-    if (run.display == "file") {
-      write_file_atomically(std::filesystem::path(run.folder) / "wall.png", picture);
-      write_file_atomically(std::filesystem::path(run.folder) / "manifest.json", to_json(driver.manifest()));
+    if (run.writes_files()) {
+      write_file_atomically(std::filesystem::path(run.display.output) / "wall.png", picture);
+      write_file_atomically(std::filesystem::path(run.display.output) / "manifest.json", to_json(driver.manifest()));
     }
     if (!run.picture.empty()) write_file_atomically(run.picture, picture);
   }
-  if (run.display == kRemoteDisplay && !run.folder.empty()) {
-    write_file_atomically(std::filesystem::path(run.folder) / "manifest.json", to_json(driver.manifest()));
+  if (run.display.remote() && !run.display.output.empty()) {
+    write_file_atomically(std::filesystem::path(run.display.output) / "manifest.json", to_json(driver.manifest()));
   }
   if (!run.options.stats.empty()) write_stats(run.options.stats, stats);
+}
+
+/// Collective. Follows the viewers, and does what others say, until there is a frame to draw; false when they ended the
+/// run.
+bool wait_for_work(const WallRun& run, WallDriver& driver) {
+  constexpr std::chrono::milliseconds kBetweenLooks{10};
+  while (true) {
+    if (!driver.follow_viewers() || !driver.obey()) return false;
+    if (!run.open_ended() || !driver.settled()) return true;
+    std::this_thread::sleep_for(kBetweenLooks);
+  }
 }
 
 ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
@@ -98,13 +112,15 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   {
     const std::string mode = speaks ? globals.progress : "none";
     const Sampling sampling = sampling_of(run);
-    Progress progress(sampling.sums() ? "none" : mode, "frame", static_cast<std::size_t>(run.frames));
-    for (int frame = static_cast<int>(driver.first_frame()); frame < run.frames; ++frame) {
-      if (frame > static_cast<int>(driver.first_frame()) && !driver.obey()) break;
-      Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}/{}: sample", frame + 1, run.frames),
+    const int frames = run.open_ended() ? 0 : run.frames.value_or(1);
+    Progress progress(sampling.sums() ? "none" : mode, "frame", static_cast<std::size_t>(frames));
+    for (int frame = static_cast<int>(driver.first_frame()); frame < frames || run.open_ended(); ++frame) {
+      Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}: sample", frame + 1),
                        sampling.goal.samples.value_or(0));
       driver.draw(static_cast<std::uint64_t>(frame), samples);
       progress.step(fmt::format("{:.1f} ms", driver.last_cost().ms));
+      const bool last = !run.open_ended() && frame + 1 >= frames;
+      if (!last && !wait_for_work(run, driver)) break;
     }
   }
   const bool seen = driver.finish();
@@ -113,7 +129,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   stats.budget = driver.manifest().frames.back().budget;
   if (speaks && stats.budget) report_budget(driver.manifest());
   std::vector<Image<Rgba8>> pictures;
-  if (run.display == "file" || !run.picture.empty()) pictures = driver.collect_pictures();
+  if (run.writes_files() || !run.picture.empty()) pictures = driver.collect_pictures();
   agree_on_failure(session.comm(), [&] {
     if (speaks) write_results(run, wall, driver, stats, pictures);
   });
@@ -122,35 +138,27 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   if (run.summary) print_summary(stats, wall, session.scene());
   if (!run.picture.empty()) {
     fmt::print("{}\n", run.picture);
-  } else if (run.display == "file") {
-    fmt::print("{}\n", (std::filesystem::path(run.folder) / "wall.png").string());
-  } else if (run.display == kRemoteDisplay && !run.folder.empty()) {
-    fmt::print("{}\n", (std::filesystem::path(run.folder) / "manifest.json").string());
+  } else if (run.writes_files()) {
+    fmt::print("{}\n", (std::filesystem::path(run.display.output) / "wall.png").string());
+  } else if (run.display.remote() && !run.display.output.empty()) {
+    fmt::print("{}\n", (std::filesystem::path(run.display.output) / "manifest.json").string());
   }
   return verdict(stats, run.options.strict);
 }
 
 void check_remote(const WallRun& run, const Wall& wall, const Globals& globals) {
   (void)run.remote.settings(wall);
-  if (run.folder.empty()) return;
+  if (run.display.output.empty()) return;
   std::error_code error;
-  std::filesystem::create_directories(run.folder, error);
-  check_writable(std::filesystem::path(run.folder) / "manifest.json", globals.force);
-}
-
-void check_display(const WallRun& run, const Wall& wall, const Globals& globals) {
-  std::vector<std::string> names = all_displays();
-  names.emplace_back(kRemoteDisplay);
-  if (std::ranges::find(names, run.display) == names.end()) {
-    throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(run.display)),
-                unknown_name_hint(run.display, names));
-  }
-  (void)make_display(run.display, wall, {.folder = run.folder, .overwrite = globals.force});
+  std::filesystem::create_directories(run.display.output, error);
+  check_writable(std::filesystem::path(run.display.output) / "manifest.json", globals.force);
 }
 
 void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals) {
-  if (run.display == "file" && run.folder.empty()) {
-    throw Error(ExitCode::Usage, "the file display needs a folder", "name one with -o DIR, or use --display none");
+  const DisplayOptions display = run.display.options(globals);
+  if (run.display.frames_on_stdout() && run.options.explain) {
+    throw Error(ExitCode::Usage, "--explain writes to standard output, where the frames go",
+                "leave it out, or send the frames elsewhere");
   }
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
@@ -160,16 +168,12 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
     check_writable(run.picture, globals.force);
   }
   if (!run.options.stats.empty()) check_writable(run.options.stats, globals.force);
-  // Made to be checked, and last, as it may make its folder: an unknown display or a folder that may not be written is
-  // found before any rank starts.
-  if (run.display == kRemoteDisplay) {
-    check_remote(run, wall, globals);
-  } else {
-    check_display(run, wall, globals);
-  }
-  if (run.display == "file") {
-    check_writable(std::filesystem::path(run.folder) / "wall.png", globals.force);
-    check_writable(std::filesystem::path(run.folder) / "manifest.json", globals.force);
+  // Last, as it may make its folder: what cannot be shown is found before any rank starts.
+  run.display.kind().check(wall, display);
+  if (run.display.remote()) check_remote(run, wall, globals);
+  if (run.writes_files()) {
+    check_writable(std::filesystem::path(run.display.output) / "wall.png", globals.force);
+    check_writable(std::filesystem::path(run.display.output) / "manifest.json", globals.force);
   }
 }
 
@@ -177,6 +181,9 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
 void check_path(const WallRun& run) {
   if (!run.options.camera.empty() || !run.options.eye.empty()) {
     throw Error(ExitCode::Usage, "--path says where the camera is, as do --camera and --eye", "use one of them");
+  }
+  if (run.open_ended()) {
+    throw Error(ExitCode::Usage, "--path needs to know how many frames it takes", "add --frames N");
   }
   (void)load_camera_path(run.path);
 }
@@ -203,14 +210,17 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals);
-  const EmptyFolders tidy(run.folder);
+  const std::string folder = run.writes_files() ? run.display.output : "";
+  const EmptyFolders tidy(folder);
+  if (run.open_ended()) watch_interrupts();
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
-  return run_supervised(globals, run.restarts, [&](Communicator& comm) {
-    const EmptyFolders tidy_in_job(run.folder);  // a rank that fails leaves run_ranks only to end the job
+  const auto body = [&](Communicator& comm) {
+    const EmptyFolders tidy_in_job(folder);  // a rank that fails leaves run_ranks only to end the job
     if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(run, wall, globals); });
     Session session(comm, globals, [&] { return run.options.load(run.scene, globals); });
     return drive(run, wall, settings, globals, session);
-  });
+  };
+  return run_supervised(globals, run.restarts, run.open_ended() ? Interrupts::Stop : Interrupts::End, body);
 }
 
 namespace {
@@ -225,14 +235,12 @@ class WallRunCommand final : public Command {
     app.add_option("wall", run_.wall, "a wall file, or CxR, or CxR@WxH")->required();
     declare_overrides(app, run_.overrides);
     app.add_option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("--display", run_.display, "file, none, or remote: display processes, see hpr display")
-        ->capture_default_str();
-    app.add_option("-o,--output", run_.folder, "folder for the pictures of the file display, and the manifest")
-        ->type_name("DIR");
+    run_.display.declare(app);
     app.add_option("--scale", run_.scale, "of the screens' pixels, e.g. 0.25")
         ->check(CLI::Range(1e-6, 1e6))
         ->capture_default_str();
-    app.add_option("--frames", run_.frames, "how many frames")->check(CLI::Range(1, 1'000'000))->capture_default_str();
+    app.add_option("--frames", run_.frames, "how many frames (default: 1; window and web: until they are closed)")
+        ->check(CLI::Range(1, 1'000'000));
     app.add_option("--path", run_.path, "where the camera goes in these frames, see docs/cli.md")->type_name("FILE");
     app.add_option("--target-ms", run_.target_ms, "what a frame may take; what is given up for it is in the manifest")
         ->check(CLI::Range(1e-3, 1e9));

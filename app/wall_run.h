@@ -3,30 +3,25 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/command.h"
+#include "app/display_flags.h"
 #include "app/remote_wall.h"
 #include "app/render_options.h"
-#include "walls/display.h"
 #include "walls/wall.h"
 
 namespace hpr {
-
-/// The display of screens that processes outside the job show.
-inline constexpr std::string_view kRemoteDisplay = "remote";
 
 /// Driving a wall from a scene, as `wall run` and `demo --wall` do it.
 struct WallRun {
   std::string scene;
   std::string wall;
   std::vector<std::string> overrides;  ///< of the wall file, PATH=VALUE
-  std::string display = "file";
-  std::string folder;   ///< where the file display writes, and for remote ones the manifest goes
-  std::string picture;  ///< the assembled wall goes here too; empty: only into the folder
-  double scale = 1.0;   ///< of the screens' pixels
-  int frames = 1;
+  DisplayFlags display;
+  std::string picture;                 ///< the assembled wall goes here too; empty: only into the folder
+  double scale = 1.0;                  ///< of the screens' pixels
+  std::optional<int> frames;           ///< none: one, or until a viewer ends the run
   std::string path;                    ///< of the camera; empty: it stands
   std::optional<double> target_ms;     ///< of a frame
   std::optional<double> target_error;  ///< estimated relMSE at which a frame has enough samples
@@ -34,6 +29,10 @@ struct WallRun {
   bool summary = false;                ///< say on stdout what each pass did
   RemoteOptions remote;
   RenderOptions options;
+
+  /// Whether it goes on until a viewer, SIGINT or SIGTERM ends it.
+  [[nodiscard]] bool open_ended() const { return !frames && display.kind().interactive; }
+  [[nodiscard]] bool writes_files() const { return display.kind().name == "file"; }
 };
 
 /// Checks what can be checked alone, then draws on all ranks.

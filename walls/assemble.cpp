@@ -72,6 +72,13 @@ Image<Rgba8> resample(const Image<Rgba8>& image, Size size) {
 }
 
 Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<const Image<Rgba8>> screens) {
+  std::vector<const Image<Rgba8>*> pointers;
+  pointers.reserve(screens.size());
+  for (const Image<Rgba8>& screen : screens) pointers.push_back(&screen);
+  return draw_wall(wall, picture, pointers);
+}
+
+Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<const Image<Rgba8>* const> screens) {
   HPR_CHECK(screens.size() == wall.screens.size() && screens.size() == picture.screens.size());
   Image<Rgba8> result(picture.size, wall.gap_color);
   for (const bool right_eye : {true, false}) {
@@ -79,8 +86,8 @@ Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<c
       if ((wall.screens[i].eye == Eye::Right) != right_eye) continue;
       const Rect place = picture.screens[i];
       const Size size{place.width(), place.height()};
-      const Image<Rgba8> shown =
-          screens[i].size().area() > 0 ? resample(screens[i], size) : Image<Rgba8>(size, {0, 0, 0, 255});
+      const bool there = screens[i] != nullptr && screens[i]->size().area() > 0;
+      const Image<Rgba8> shown = there ? resample(*screens[i], size) : Image<Rgba8>(size, {0, 0, 0, 255});
       for (int y = 0; y < size.height; ++y) {
         std::ranges::copy(shown.row(y), result.row(place.y0 + y).begin() + place.x0);
       }

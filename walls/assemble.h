@@ -14,6 +14,9 @@ namespace hpr {
 /// leaves its place black. Of two screens for different eyes in one place the left eye's is seen.
 [[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
                                      std::span<const Image<Rgba8>> screens);
+/// The same; a null picture leaves its place black.
+[[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
+                                     std::span<const Image<Rgba8>* const> screens);
 
 /// `image` on `size` pixels: each the mean, in linear light, of the area it covers.
 [[nodiscard]] Image<Rgba8> resample(const Image<Rgba8>& image, Size size);

@@ -2,78 +2,66 @@
 
 #include <fmt/format.h>
 
-#include <map>
-#include <system_error>
+#include <algorithm>
 
-#include "core/check.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/names.h"
-#include "image/image_io.h"
-#include "walls/scan_out.h"
+#include "walls/displays/file_display.h"
+#include "walls/displays/no_display.h"
+#include "walls/displays/pipe_display.h"
+#include "walls/displays/web_display.h"
+#include "walls/displays/window_display.h"
 
 namespace hpr {
-namespace {
 
-class NoDisplay final : public Display {
- public:
-  [[nodiscard]] std::string_view name() const override { return "none"; }
-  void show(const WallFrame& /*frame*/) override {}
-};
+OrbitInput& OrbitInput::operator+=(const OrbitInput& other) {
+  turn_right += other.turn_right;
+  turn_up += other.turn_up;
+  pan_right += other.pan_right;
+  pan_up += other.pan_up;
+  dolly += other.dolly;
+  return *this;
+}
 
-class FileDisplay final : public Display {
- public:
-  FileDisplay(const Wall& wall, const DisplayOptions& options)
-      : wall_(wall), folder_(options.folder.empty() ? "." : options.folder) {
-    std::error_code error;
-    std::filesystem::create_directories(folder_, error);
-    if (error) {
-      throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder_.string(), error.message()),
-                  "name a folder that can be written with -o");
-    }
-    for (const WallScreen& screen : wall.screens) check_writable(path_of(screen.id), options.overwrite);
-    for (const WallMonitor& monitor : wall.monitors) check_writable(path_of(monitor.id), options.overwrite);
-  }
+std::vector<const Image<Rgba8>*> pictures_by_screen(const Wall& wall, const WallFrame& frame) {
+  std::vector<const Image<Rgba8>*> pictures(wall.screens.size(), nullptr);
+  for (const ScreenPicture& picture : frame.screens) pictures.at(picture.screen) = &picture.image;
+  return pictures;
+}
 
-  [[nodiscard]] std::string_view name() const override { return "file"; }
-
-  void show(const WallFrame& frame) override {
-    for (const ScreenPicture& picture : frame.screens) {
-      HPR_CHECK(picture.screen < wall_.screens.size());
-      // Made where it is needed: this process shows few of the wall's screens.
-      const auto scan_out = scan_outs_.try_emplace(picture.screen, wall_, picture.screen).first;
-      const std::filesystem::path path = path_of(wall_.screens[picture.screen].id);
-      if (scan_out->second.trivial()) {
-        write_png(path, picture.image);
-      } else {
-        write_png(path, scan_out->second.apply(picture.image));
-      }
-    }
-    for (const MonitorPicture& picture : frame.monitors) {
-      write_png(path_of(wall_.monitors.at(picture.monitor).id), picture.image);
-    }
-  }
-
- private:
-  [[nodiscard]] std::filesystem::path path_of(const std::string& id) const { return folder_ / (id + ".png"); }
-
-  const Wall& wall_;
-  std::filesystem::path folder_;
-  std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
-};
-
-}  // namespace
+const std::vector<DisplayKind>& display_kinds() {
+  static const std::vector<DisplayKind> kinds{
+      {"file", false, false, make_file_display, check_file_display},
+      {"window", false, true, make_window_display, check_window_display},
+      {"web", true, true, make_web_display, check_web_display},
+      {"pipe", true, false, make_pipe_display, check_pipe_display},
+      {"none", false, false, make_no_display, check_no_display},
+  };
+  return kinds;
+}
 
 const std::vector<std::string>& all_displays() {
-  static const std::vector<std::string> names{"file", "none"};
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const DisplayKind& kind : display_kinds()) all.emplace_back(kind.name);
+    return all;
+  }();
   return names;
 }
 
-std::unique_ptr<Display> make_display(std::string_view name, const Wall& wall, const DisplayOptions& options) {
-  if (name == "file") return std::make_unique<FileDisplay>(wall, options);
-  if (name == "none") return std::make_unique<NoDisplay>();
+const DisplayKind& find_display(std::string_view name) {
+  const auto found = std::ranges::find(display_kinds(), name, &DisplayKind::name);
+  if (found != display_kinds().end()) return *found;
   throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(name)),
               unknown_name_hint(name, all_displays()));
+}
+
+std::unique_ptr<Display> make_display(std::string_view name, const Wall& wall, const DisplayOptions& options) {
+  return find_display(name).make(wall, options);
+}
+
+void check_display(std::string_view name, const Wall& wall, const DisplayOptions& options) {
+  find_display(name).check(wall, options);
 }
 
 }  // namespace hpr

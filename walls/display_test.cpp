@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -42,8 +43,10 @@ class Folder {
 TEST(Displays, AreMadeByNameAndUnknownNamesListTheChoices) {
   const Folder folder("displays");
   const Wall wall = load_wall("1x1@4x4");
-  for (const std::string& name : all_displays())
+  for (const std::string name : {"file", "none"}) {
     EXPECT_EQ(make_display(name, wall, {folder.path(), false})->name(), name);
+    EXPECT_NE(std::ranges::find(all_displays(), name), all_displays().end());
+  }
   try {
     static_cast<void>(make_display("flie", wall, {}));
     FAIL();
@@ -68,6 +71,32 @@ TEST(FileDisplay, WritesEachScreenUnderItsIdAndReplacesItsOwnFrames) {
   EXPECT_EQ(read, image);
   // Neither the other screen nor a temporary file.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path() / "sub"), {}), 1);
+}
+
+TEST(FileDisplay, KeepsEveryFrameInAFolderOfItsOwn) {
+  const Folder folder("kept");
+  const Wall wall = load_wall("1x1@2x1");
+  const DisplayOptions options{.folder = folder.path(), .keep_frames = true};
+  check_display("file", wall, options);
+  const auto display = make_display("file", wall, options);
+  for (const std::uint64_t frame : {7U, 8U}) {
+    const Image<Rgba8> image({2, 1}, {static_cast<std::uint8_t>(frame), 0, 0, 255});
+    const std::vector<ScreenPicture> pictures{{0, image}};
+    display->show({frame, pictures});
+  }
+  const std::string file = wall.screens.front().id + ".png";
+  const auto red_of = [&](const std::filesystem::path& path) {
+    return decode_image(read_file(path, 1 << 20), "kept", {}).at(0, 0).r;
+  };
+  EXPECT_EQ(red_of(folder.path() / file), 8);
+  EXPECT_EQ(red_of(folder.path() / "frame-000007" / file), 7);
+  EXPECT_EQ(red_of(folder.path() / "frame-000008" / file), 8);
+  // Frames of another run are not mixed with this one's.
+  std::filesystem::remove(folder.path() / file);
+  EXPECT_THROW(check_display("file", wall, options), Error);
+  DisplayOptions forced = options;
+  forced.overwrite = true;
+  EXPECT_NO_THROW(check_display("file", wall, forced));
 }
 
 TEST(FileDisplay, RefusesToReplaceAnotherRunsFilesUnlessForced) {

@@ -36,6 +36,7 @@ std::string window_line(const WallWindow& window) {
   if (!window.gpu.empty()) line += ", gpu = " + toml_quote(window.gpu);
   if (window.rank >= 0) line += fmt::format(", rank = {}", window.rank);
   if (!window.display.empty()) line += ", display = " + toml_quote(window.display);
+  if (!window.monitor.empty()) line += ", monitor = " + toml_quote(window.monitor);
   if (!window.rect.empty()) line += ", rect = " + rect(window.rect);
   if (window.fullscreen) line += ", fullscreen = true";
   return line + " },\n";

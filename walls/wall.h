@@ -28,6 +28,7 @@ struct WallWindow {
   std::string node;     ///< id; empty: whichever host the rank runs on
   std::string gpu;      ///< id; empty: any
   std::string display;  ///< X display, e.g. ":0.1"; empty: any
+  std::string monitor;  ///< by name, e.g. "DP-1"; empty: the one `rect` is on
   int rank = -1;        ///< the rank of the job that must own it; -1: free
   Rect rect;            ///< on the display; empty: as large as its screens
   bool fullscreen = false;

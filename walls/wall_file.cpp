@@ -51,6 +51,7 @@ void read_windows(TableReader& document, WallDraft& draft, Findings& findings) {
     window.node = reader.text("node").value_or("");
     window.gpu = reader.text("gpu").value_or("");
     window.display = reader.text("display").value_or("");
+    window.monitor = reader.text("monitor").value_or("");
     window.rank = reader.integer("rank", 0, kMostRanks - 1).value_or(-1);
     window.rect = reader.rect("rect").value_or(Rect{});
     window.fullscreen = reader.boolean("fullscreen").value_or(false);

@@ -49,14 +49,13 @@ class ConsoleCommand final : public Command {
     }
     (void)options_.settings(globals.seed);
     (void)options_.sampling();
-    return run_ranks(
-        globals,
-        [&](Communicator& comm) {
-          Session session(comm, globals, [&] { return options_.load(source_, globals); });
-          Console console(session, globals, options_, {extent->first, extent->second});
-          return converse(session.comm(), console);
-        },
-        StandardInput::OfRank0);
+    return run_ranks(globals,
+                     [&](Communicator& comm) {
+                       Session session(comm, globals, [&] { return options_.load(source_, globals); });
+                       Console console(session, globals, options_, {extent->first, extent->second});
+                       return converse(session.comm(), console);
+                     },
+                     {.input = StandardInput::OfRank0});
   }
 
  private:

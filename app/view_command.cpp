@@ -1,0 +1,54 @@
+#include "app/view_command.h"
+
+#include "app/wall_run.h"
+#include "walls/displays/window_display.h"
+
+namespace hpr {
+namespace {
+
+class ViewCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "view"; }
+  [[nodiscard]] std::string_view summary() const override { return "look around in a scene: in windows or a browser"; }
+
+  void declare(CLI::App& app) override {
+    app.add_option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+    app.add_option("--wall", run_.wall, "a wall file, or CxR, or CxR@WxH")->capture_default_str();
+    app.add_flag("--web", address_, "=ADDR:PORT: in a browser instead of windows; by default on loopback, a free port");
+    app.add_option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
+        ->check(CLI::Range(1, 1'000'000));
+    app.add_option("--target-ms", run_.target_ms, "what a frame may take while the camera moves (default: 50)")
+        ->check(CLI::Range(1e-3, 1e9));
+    run_.options.declare(app);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    run_.display.display = display();
+    return run_wall(run_, globals);
+  }
+
+ private:
+  /// From what all ranks of this host find alike: the command line, and whether there is a desktop.
+  [[nodiscard]] std::string display() const {
+    if (address_.empty()) return has_desktop() ? "window" : "web";
+    return address_ == "true" ? "web" : "web=" + address_;  // a flag without a value is true
+  }
+
+  WallRun run_ = first_view();
+  std::string address_;
+
+  [[nodiscard]] static WallRun first_view() {
+    WallRun run;
+    run.wall = "1x1@1280x720";
+    return run;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_view_command() {
+  return std::make_unique<ViewCommand>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,100 @@
+#include "walls/displays/file_display.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <string>
+#include <system_error>
+
+#include "core/check.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/names.h"
+#include "image/image_io.h"
+#include "walls/scan_out.h"
+
+namespace hpr {
+namespace {
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error) return;
+  throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()),
+              "name a folder that can be written with -o");
+}
+
+bool is_frame_folder(const std::string& name) {
+  return name.starts_with("frame-") && name.find_first_not_of("0123456789", 6) == std::string::npos;
+}
+
+/// Frames of another run among this one's would pass for its own.
+void refuse_kept_frames(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (!is_frame_folder(entry.path().filename().string())) continue;
+    throw Error(ExitCode::Io,
+                fmt::format("'{}' holds frames of another run already", printable(entry.path().parent_path().string())),
+                "name an empty folder, or overwrite them with --force");
+  }
+}
+
+class FileDisplay final : public Display {
+ public:
+  FileDisplay(const Wall& wall, const DisplayOptions& options)
+      : wall_(wall), folder_(options.folder.empty() ? "." : options.folder), keeps_frames_(options.keep_frames) {
+    make_folder(folder_);
+    for (const WallScreen& screen : wall.screens) check_writable(folder_ / file_of(screen), options.overwrite);
+    for (const WallMonitor& monitor : wall.monitors) check_writable(folder_ / file_of(monitor), options.overwrite);
+  }
+
+  [[nodiscard]] std::string_view name() const override { return "file"; }
+
+  void show(const WallFrame& frame) override {
+    const std::filesystem::path kept = folder_ / fmt::format("frame-{:06}", frame.number);
+    if (keeps_frames_ && !(frame.screens.empty() && frame.monitors.empty())) make_folder(kept);
+    const auto write = [&](const std::string& file, const Image<Rgba8>& picture) {
+      const std::vector<std::byte> png = encode_png(picture);
+      write_file_atomically(folder_ / file, png);
+      if (keeps_frames_) write_file_atomically(kept / file, png);
+    };
+    for (const ScreenPicture& picture : frame.screens) {
+      HPR_CHECK(picture.screen < wall_.screens.size());
+      // Made where it is needed: this process shows few of the wall's screens.
+      const ScanOut& scan_out = scan_outs_.try_emplace(picture.screen, wall_, picture.screen).first->second;
+      const std::string file = file_of(wall_.screens[picture.screen]);
+      if (scan_out.trivial()) {
+        write(file, picture.image);
+      } else {
+        write(file, scan_out.apply(picture.image));
+      }
+    }
+    for (const MonitorPicture& picture : frame.monitors) {
+      write(file_of(wall_.monitors.at(picture.monitor)), picture.image);
+    }
+  }
+
+ private:
+  template <typename Shown>
+  [[nodiscard]] static std::string file_of(const Shown& shown) {
+    return shown.id + ".png";
+  }
+
+  const Wall& wall_;
+  std::filesystem::path folder_;
+  bool keeps_frames_;
+  std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
+};
+
+}  // namespace
+
+std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options) {
+  return std::make_unique<FileDisplay>(wall, options);
+}
+
+void check_file_display(const Wall& wall, const DisplayOptions& options) {
+  const FileDisplay made(wall, options);
+  if (options.keep_frames && !options.overwrite) refuse_kept_frames(options.folder.empty() ? "." : options.folder);
+}
+
+}  // namespace hpr

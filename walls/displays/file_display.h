@@ -1,0 +1,13 @@
+#pragma once
+
+#include "walls/display.h"
+
+namespace hpr {
+
+/// PNG files: folder/<screen id>.png is the latest frame. With keep_frames, folder/frame-000042/<screen id>.png is
+/// frame 42, too. Each file is complete or untouched.
+[[nodiscard]] std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options);
+/// Makes the folder.
+void check_file_display(const Wall& wall, const DisplayOptions& options);
+
+}  // namespace hpr

@@ -1,0 +1,41 @@
+#include "walls/displays/web_display.h"
+
+#include "walls/displays/web_hub.h"
+#include "walls/displays/web_request.h"
+#include "walls/displays/web_server.h"
+
+namespace hpr {
+namespace {
+
+class WebDisplay final : public Display {
+ public:
+  WebDisplay(const Wall& wall, const WebAddress& address) : hub_(wall), server_(hub_, address) {}
+
+  [[nodiscard]] std::string_view name() const override { return "web"; }
+  [[nodiscard]] std::string url() const { return server_.url(); }
+
+  void show(const WallFrame& frame) override {
+    hub_.publish(frame);
+    server_.notify();
+  }
+
+  [[nodiscard]] DisplayInput take_input() override { return hub_.take_input(); }
+
+ private:
+  WebHub hub_;
+  WebServer server_;
+};
+
+}  // namespace
+
+std::unique_ptr<Display> make_web_display(const Wall& wall, const DisplayOptions& options) {
+  auto display = std::make_unique<WebDisplay>(wall, parse_web_address(options.web_address));
+  if (options.announce) options.announce(display->url());
+  return display;
+}
+
+void check_web_display(const Wall& /*wall*/, const DisplayOptions& options) {
+  (void)parse_web_address(options.web_address);
+}
+
+}  // namespace hpr

@@ -1,0 +1,93 @@
+#include "walls/displays/window_display.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+
+#include "core/check.h"
+#include "core/error.h"
+#include "core/names.h"
+#include "walls/displays/window_gl.h"
+#include "walls/displays/window_thread.h"
+#include "walls/scan_out.h"
+
+namespace hpr {
+namespace {
+
+std::vector<std::size_t> screens_or_all(const Wall& wall, const DisplayOptions& options) {
+  if (!options.screens.empty()) return options.screens;
+  std::vector<std::size_t> all(wall.screens.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  return all;
+}
+
+/// GLFW opens the display DISPLAY names, and one only.
+void choose_x_display(const std::vector<WindowPlan>& plans) {
+  const std::string& wanted = plans.front().display;
+  for (const WindowPlan& plan : plans) {
+    if (plan.display == wanted) continue;
+    throw Error(ExitCode::BadInput,
+                fmt::format("the windows '{}' and '{}' are on the displays '{}' and '{}', but one rank opens both",
+                            plans.front().title, plan.title, printable(wanted), printable(plan.display)),
+                "give each X display a rank of its own: rank = 0, rank = 1, ...");
+  }
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): the one thread that reads it is not yet started
+  if (!wanted.empty()) setenv("DISPLAY", wanted.c_str(), 1);
+}
+
+class WindowDisplay final : public Display {
+ public:
+  WindowDisplay(const Wall& wall, const std::vector<WindowPlan>& plans) : wall_(wall), plans_(plans), windows_(plans) {}
+
+  [[nodiscard]] std::string_view name() const override { return "window"; }
+
+  void show(const WallFrame& frame) override {
+    std::vector<PanePicture> pictures;
+    for (std::size_t window = 0; window < plans_.size(); ++window) {
+      const std::vector<Pane>& panes = plans_[window].panes;
+      for (std::size_t pane = 0; pane < panes.size(); ++pane) {
+        const auto found = std::ranges::find(frame.screens, panes[pane].screen, &ScreenPicture::screen);
+        if (found == frame.screens.end()) continue;
+        const ScanOut& scan_out = scan_outs_.try_emplace(found->screen, wall_, found->screen).first->second;
+        pictures.push_back({window, pane, scan_out.apply(found->image)});
+      }
+    }
+    windows_.present(std::move(pictures));
+  }
+
+  [[nodiscard]] DisplayInput take_input() override { return windows_.take_input(); }
+
+ private:
+  const Wall& wall_;
+  std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
+  std::vector<WindowPlan> plans_;
+  WindowThread windows_;
+};
+
+}  // namespace
+
+std::unique_ptr<Display> make_window_display(const Wall& wall, const DisplayOptions& options) {
+  const std::vector<WindowPlan> plans = plan_windows(wall, screens_or_all(wall, options));
+  choose_x_display(plans);
+  return std::make_unique<WindowDisplay>(wall, plans);
+}
+
+void check_window_display(const Wall& wall, const DisplayOptions& /*options*/) {
+  const auto elsewhere = [](const WallWindow& window) { return !window.display.empty(); };
+  const auto distant = [](const WallNode& node) { return node.host != "localhost" && node.host != "*"; };
+  if (std::ranges::any_of(wall.windows, elsewhere) || std::ranges::any_of(wall.nodes, distant)) return;
+  const Desktop desktop;
+}
+
+bool has_desktop() {
+  try {
+    const Desktop desktop;
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace hpr

@@ -1,0 +1,60 @@
+#include "walls/displays/window_plan.h"
+
+#include <gtest/gtest.h>
+
+#include "walls/wall_file.h"
+
+namespace hpr {
+namespace {
+
+TEST(WindowPlan, ScreensOfAGridHaveWindowsPlacedAsTheyHang) {
+  const Wall wall = load_wall("2x2@40x30");
+  const auto plans = plan_windows(wall, {0, 1, 2, 3});
+  ASSERT_EQ(plans.size(), 4U);
+  for (std::size_t i = 0; i < plans.size(); ++i) {
+    EXPECT_EQ(plans[i].title, wall.screens[i].id);
+    EXPECT_EQ(plans[i].rect.width(), 40);
+    EXPECT_EQ(plans[i].rect.height(), 30);
+    ASSERT_EQ(plans[i].panes.size(), 1U);
+    EXPECT_EQ(plans[i].panes[0].place, (Rect{0, 0, 40, 30}));
+    EXPECT_TRUE(plans[i].decorated);
+  }
+  EXPECT_GE(plans[1].rect.x0, plans[0].rect.x1);
+  EXPECT_GE(plans[2].rect.y0, plans[0].rect.y1);
+}
+
+TEST(WindowPlan, ScreensOfOneWindowShareItAndTurnedOnesAreShownTurned) {
+  Wall wall = load_wall("2x1@40x30");
+  wall.windows = {{.id = "both", .node = {}, .gpu = {}, .display = ":7", .monitor = {}, .rect = {5, 6, 75, 46}}};
+  for (WallScreen& screen : wall.screens) screen.window = "both";
+  wall.screens[0].viewport = {0, 0, 40, 30};
+  wall.screens[1].rotate = 90;
+  wall.screens[1].viewport = {40, 0, 70, 40};
+  const auto plans = plan_windows(wall, {0, 1});
+  ASSERT_EQ(plans.size(), 1U);
+  EXPECT_EQ(plans[0].rect, (Rect{5, 6, 75, 46}));
+  EXPECT_EQ(plans[0].display, ":7");
+  EXPECT_FALSE(plans[0].decorated);
+  ASSERT_EQ(plans[0].panes.size(), 2U);
+  EXPECT_EQ(plans[0].panes[1].place, (Rect{40, 0, 70, 40}));
+  EXPECT_EQ(plans[0].panes[1].rotate, 90);
+}
+
+TEST(WindowPlan, AWindowWithoutASizeIsAsLargeAsItsScreens) {
+  Wall wall = load_wall("1x1@40x30");
+  wall.windows = {{.id = "w", .node = {}, .gpu = {}, .display = {}, .monitor = {}, .rect = {}}};
+  wall.screens[0].window = "w";
+  const auto plans = plan_windows(wall, {0});
+  ASSERT_EQ(plans.size(), 1U);
+  EXPECT_EQ(plans[0].rect, (Rect{0, 0, 40, 30}));
+}
+
+TEST(WindowPlan, OnlyTheScreensAskedForAreShown) {
+  const Wall wall = load_wall("2x1@40x30");
+  const auto plans = plan_windows(wall, {1});
+  ASSERT_EQ(plans.size(), 1U);
+  EXPECT_EQ(plans[0].panes[0].screen, 1U);
+}
+
+}  // namespace
+}  // namespace hpr
