@@ -74,7 +74,7 @@ void add_grid(const ForeignGrid& grid, const std::vector<ForeignTile>& tiles, Im
         all.y1 = std::max(all.y1, tile.y + screen.viewport.y1);
       }
     }
-    window.rect = all;
+    if (tile.placed) window.rect = all;
     into.wall.windows.push_back(std::move(window));
   }
   const std::size_t panels = grid.panels.area();

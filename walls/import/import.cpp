@@ -9,6 +9,27 @@
 #include "walls/wall_file.h"
 
 namespace hpr {
+namespace {
+
+/// Windows that lie on others of one display are no error there, but would be here: they lose their places.
+void drop_overlaps(ImportedWall& imported) {
+  std::vector<WallWindow>& windows = imported.wall.windows;
+  std::string dropped;
+  for (auto window = windows.begin(); window != windows.end(); ++window) {
+    const bool covers = std::any_of(windows.begin(), window, [&](const WallWindow& other) {
+      return other.node == window->node && other.display == window->display && !other.rect.empty() &&
+             !intersection(other.rect, window->rect).empty();
+    });
+    if (!covers) continue;
+    window->rect = {};
+    dropped += (dropped.empty() ? "" : ", ") + window->id;
+  }
+  if (dropped.empty()) return;
+  imported.remarks.push_back(
+      "These windows lie on others of their display, and their places were left out: " + dropped + ".");
+}
+
+}  // namespace
 
 std::span<const WallImporter> all_importers() {
   static constexpr std::array kImporters{
@@ -41,7 +62,8 @@ std::string import_wall(std::string_view text, const std::string& name, std::str
     throw Error(ExitCode::Usage, fmt::format("unknown kind of wall file '{}'", printable(kind)),
                 unknown_name_hint(kind, importer_names()));
   }
-  const ImportedWall imported = found->read(text, name, settings);
+  ImportedWall imported = found->read(text, name, settings);
+  drop_overlaps(imported);
   std::string toml = fmt::format("# From {} ({}).\n", printable(name, 200), found->name);
   for (const std::string& remark : imported.remarks) toml += fmt::format("# {}\n", printable(remark, 400));
   toml += expand_wall(imported.wall);

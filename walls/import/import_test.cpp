@@ -263,6 +263,24 @@ TEST(Importers, UnknownKindsListTheChoices) {
   }
 }
 
+TEST(Importers, WindowsOnOneAnotherLoseTheirPlaces) {
+  const std::string tide =
+      R"({"surfaces": [{"displayWidth": 40, "displayHeight": 30, "numScreensX": 2, "numScreensY": 1}],
+      "processes": [{"host": "a", "screens": [{"i": 0}, {"i": 1}]}]})";
+  const Wall wall = imported(tide, "tide");
+  EXPECT_EQ(wall.windows[0].rect, (Rect{0, 0, 40, 30}));
+  EXPECT_TRUE(wall.windows[1].rect.empty());
+  EXPECT_NE(import_wall(tide, "file", "tide", {}).find("their places were left out: wall-w0-1."), std::string::npos);
+}
+
+TEST(Importers, TilesWithoutGeometryHaveNoPlaces) {
+  const Wall wall = imported(R"(<pvx><Option Name="tile-dimensions-x" Value="2"/><Machine Name="localhost"/>
+      <Machine Name="localhost"/></pvx>)",
+                             "paraview");
+  EXPECT_TRUE(wall.windows[0].rect.empty());
+  EXPECT_EQ(wall.nodes[0].ranks, 2);
+}
+
 /// Prefixes, and bytes replaced by ones that mean something: told or imported, nothing else.
 TEST(Importers, DamagedFilesDoNoHarm) {
   const std::vector<std::pair<std::string, std::string>> files{
@@ -275,7 +293,7 @@ TEST(Importers, DamagedFilesDoNoHarm) {
         EXPECT_EQ(error.code(), ExitCode::BadInput) << error.what();
       }
     };
-    for (std::size_t at = 0; at < text.size(); at += 3) {
+    for (std::size_t at = 0; at < text.size(); at += 7) {
       harmless(text.substr(0, at));
       for (const char with : {'9', '-', '<', '"', '{', '\0'}) {
         std::string damaged = text;

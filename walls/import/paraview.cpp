@@ -118,7 +118,8 @@ void import_tiles(const XmlFile& file, const Element& process, const std::vector
                      .node = node_of(into.wall, machine),
                      .display = machine.display,
                      .x = machine.window.x0,
-                     .y = machine.window.y0});
+                     .y = machine.window.y0,
+                     .placed = told});
   }
   add_grid(grid, tiles, into);
 }
