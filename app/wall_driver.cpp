@@ -11,6 +11,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "walls/geometry.h"
+#include "walls/link/sender.h"
 
 namespace hpr {
 namespace {
@@ -99,6 +100,8 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
   manifest_.versions = {
       {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
 }
+
+WallDriver::~WallDriver() = default;
 
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
