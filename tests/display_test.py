@@ -198,7 +198,7 @@ def killed_display_in_manifest(folder):
     write_path(folder)
     with Display(folder, "wall.toml", "left") as left:
         right = Display(folder, "wall.toml", "right")
-        process = start(folder, "wall.toml", 300, "--ranks", "2")
+        process = start(folder, "wall.toml", 200, "--ranks", "2")
         wait_until(lambda: right.frame() > 0, 30)
         right.kill()
         with Display(folder, "wall.toml", "right") as right:
