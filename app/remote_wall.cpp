@@ -15,6 +15,7 @@
 #include "core/names.h"
 #include "core/units.h"
 #include "walls/link/hosts.h"
+#include "walls/link/sender.h"
 #include "walls/link/token.h"
 
 namespace hpr {

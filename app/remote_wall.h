@@ -6,10 +6,13 @@
 #include <vector>
 
 #include "app/command.h"
-#include "walls/link/sender.h"
 #include "walls/manifest.h"
+#include "walls/wall.h"
 
 namespace hpr {
+
+class WallSender;
+struct SenderSettings;
 
 /// What a display process and a run compare to know that they are of one build.
 [[nodiscard]] std::string link_build();

@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "walls/geometry.h"
+#include "walls/link/sender.h"
 
 namespace hpr {
 namespace {
@@ -205,6 +206,8 @@ std::string WallDriver::status() const {
                       {"restarts", std::move(restarts)}};
   return document.dump(2, ' ', false, Json::error_handler_t::replace);
 }
+
+WallDriver::~WallDriver() = default;
 
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;

@@ -18,11 +18,12 @@
 #include "app/wall_monitors.h"
 #include "app/wall_run.h"
 #include "walls/display.h"
-#include "walls/link/sender.h"
 #include "walls/manifest.h"
 #include "walls/wall.h"
 
 namespace hpr {
+
+class WallSender;
 
 /// As the run's options say, until its target error where there is one.
 [[nodiscard]] Sampling sampling_of(const WallRun& run);
@@ -33,6 +34,9 @@ class WallDriver {
   /// Collective. All outlive this.
   WallDriver(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
              Session& session);
+  ~WallDriver();
+  WallDriver(const WallDriver&) = delete;
+  WallDriver& operator=(const WallDriver&) = delete;
 
   [[nodiscard]] const FramePlan& plan() const { return frames_->plan(); }
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }

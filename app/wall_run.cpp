@@ -26,6 +26,7 @@
 #include "image/image_io.h"
 #include "walls/assemble.h"
 #include "walls/geometry.h"
+#include "walls/link/sender.h"
 #include "walls/manifest.h"
 #include "walls/wall_file.h"
 

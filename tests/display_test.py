@@ -19,7 +19,8 @@ import sys
 import tempfile
 import threading
 import time
-import zlib
+
+from png_hash import hash_of
 
 HPR = os.path.abspath(sys.argv[1])
 SCENE = "gen:gallery"
@@ -57,64 +58,6 @@ def wait_until(happens, seconds):
             return True
         time.sleep(0.01)
     return False
-
-
-def xxh64(data):
-    """XXH64 with seed 0, as manifests have it."""
-    p1, p2, p3, p4, p5 = 0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x85EBCA77C2B2AE63, 0x27D4EB2F165667C5
-    mask = (1 << 64) - 1
-    turn = lambda x, n: ((x << n) | (x >> (64 - n))) & mask
-    mix = lambda acc, lane: turn((acc + lane * p2) & mask, 31) * p1 & mask
-    words = struct.unpack(f"<{len(data) // 8}Q", data[:len(data) // 8 * 8])
-    at = 0
-    if len(words) >= 4:
-        lanes = [(p1 + p2) & mask, p2, 0, -p1 & mask]
-        while at + 4 <= len(words):
-            lanes = [mix(lane, word) for lane, word in zip(lanes, words[at:at + 4])]
-            at += 4
-        value = sum(turn(lane, n) for lane, n in zip(lanes, (1, 7, 12, 18))) & mask
-        for lane in lanes:
-            value = ((value ^ mix(0, lane)) * p1 + p4) & mask
-    else:
-        value = p5
-    value = (value + len(data)) & mask
-    for word in words[at:]:
-        value = (turn(value ^ mix(0, word), 27) * p1 + p4) & mask
-    assert len(data) % 8 == 0
-    value = (value ^ (value >> 33)) * p2 & mask
-    value = (value ^ (value >> 29)) * p3 & mask
-    return f"{value ^ (value >> 32):016x}"
-
-
-def pixels_of(png):
-    """The RGBA8 pixels of a PNG of 8 bits a channel."""
-    at, packed = 8, b""
-    while at < len(png):
-        length, kind = struct.unpack(">I4s", png[at:at + 8])
-        body = png[at + 8:at + 8 + length]
-        if kind == b"IHDR":
-            width, height, depth, color = struct.unpack(">IIBB", body[:10])
-        packed += body if kind == b"IDAT" else b""
-        at += 12 + length
-    assert depth == 8 and color in (2, 6)
-    channels = 4 if color == 6 else 3
-    data, stride = zlib.decompress(packed), width * channels
-    above, pixels = bytes(stride), bytearray()
-    for y in range(height):
-        how, *line = data[y * (stride + 1):(y + 1) * (stride + 1)]
-        for i in range(stride):
-            left, up, corner = (line[i - channels] if i >= channels else 0), above[i], (above[i - channels] if i >= channels else 0)
-            guess = left + up - corner
-            paeth = min((left, up, corner), key=lambda v: abs(guess - v))
-            line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[how]) & 255
-        above = line
-        for x in range(0, stride, channels):
-            pixels += bytes(line[x:x + 3]) + (bytes(line[x + 3:x + 4]) if channels == 4 else b"\xff")
-    return bytes(pixels)
-
-
-def hash_of(png):
-    return xxh64(pixels_of(png))
 
 
 class Display:
@@ -255,7 +198,7 @@ def killed_display_in_manifest(folder):
     write_path(folder)
     with Display(folder, "wall.toml", "left") as left:
         right = Display(folder, "wall.toml", "right")
-        process = start(folder, "wall.toml", 400, "--ranks", "2")
+        process = start(folder, "wall.toml", 200, "--ranks", "2")
         wait_until(lambda: right.frame() > 0, 30)
         right.kill()
         with Display(folder, "wall.toml", "right") as right:
@@ -387,15 +330,15 @@ def bad_line(folder):
     """Flipped bits on the way: damaged pictures are dropped and counted, and what is shown was sent exactly so."""
     case = "bad line"
     with Display(folder, WALL, "localhost", "--listen", str(folder / "display.sock"), "--stale-after", "60s") as display:
-        line = BadLine(str(folder / "line.sock"), str(folder / "display.sock"), 60_000)
+        line = BadLine(str(folder / "line.sock"), str(folder / "display.sock"), 40_000)
         line.start()
-        process = subprocess.Popen([HPR, "wall", "run", WALL, SCENE, *LIGHT, "--frames", "150", "--display", "remote", "-o", "out", "--ranks",
+        process = subprocess.Popen([HPR, "wall", "run", WALL, SCENE, *LIGHT, "--frames", "60", "--display", "remote", "-o", "out", "--ranks",
                                     "2", "--codec", "raw", "--displays", f"localhost={folder / 'line.sock'}"],
                                    cwd=folder, env=environment(folder), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         seen = {"wall-r0c0": set(), "wall-r0c1": set()}
         while process.poll() is None:
             for screen, pictures in seen.items():
-                if (display.folder / f"{screen}.png").exists():
+                if len(pictures) < 30 and (display.folder / f"{screen}.png").exists():
                     pictures.add(display.picture(screen))
             time.sleep(0.02)
         said = process.communicate(timeout=60)[1]

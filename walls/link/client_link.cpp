@@ -60,11 +60,10 @@ ClientLink::Change ClientLink::advance(double now, const std::function<void(cons
   if (state_ == State::AwaitGreeting) {
     if (const auto block = connection_->take_block()) answer(decode_greeting(*block));
   }
-  Change change = Change::None;
   if (state_ == State::AwaitReply) {
     if (const auto block = connection_->take_block()) {
       judge(decode_reply(*block));
-      change = Change::Up;
+      return Change::Up;
     }
   }
   if (state_ == State::Up) {
@@ -75,7 +74,7 @@ ClientLink::Change ClientLink::advance(double now, const std::function<void(cons
     }
   }
   connection_->send();
-  return change;
+  return Change::None;
 }
 
 void ClientLink::answer(const Greeting& greeting) {

@@ -33,7 +33,8 @@ class ClientLink {
   [[nodiscard]] std::optional<pollfd> watched() const;
   /// When step() is to be called even without news.
   [[nodiscard]] double next_due() const { return due_; }
-  /// Goes as far as it can; hands over the packets that have arrived. Throws nothing of its own.
+  /// Goes as far as it can; hands over the packets that have arrived. Throws nothing of its own. Once up it is to be
+  /// called again at once: packets may have come along with the news.
   [[nodiscard]] Change step(double now, const std::function<void(const Packet&)>& arrived);
 
   /// Only when up.

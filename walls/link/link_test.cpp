@@ -255,16 +255,18 @@ TEST_F(LinkTest, ADisplayThatComesBackShowsTheCurrentFrame) {
   display.reset();
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   show(sender, 1);
+  show(sender, 2);
   display = std::make_unique<RunningDisplay>(wall_, "localhost", receiver());
   ASSERT_TRUE(within(1.0, [&] { return display->display().shown().size() == 2; })) << "without another frame";
-  EXPECT_EQ(display->display().shown()[0].frame, 1U);
+  EXPECT_EQ(display->display().shown()[0].frame, 2U);
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  show(sender, 2);
+  show(sender, 3);
   ASSERT_TRUE(within(2.0, [&] { return display->display().shown().size() == 4; }));
   sender.finish();
   EXPECT_EQ(sender.outcome(0).screens, std::vector<ScreenState>(2, ScreenState::Fresh));
   EXPECT_EQ(sender.outcome(1).screens, std::vector<ScreenState>(2, ScreenState::Lost));
-  EXPECT_EQ(sender.outcome(2).screens, std::vector<ScreenState>(2, ScreenState::Fresh));
+  EXPECT_EQ(sender.outcome(2).screens, std::vector<ScreenState>(2, ScreenState::Fresh)) << "shown when it came back";
+  EXPECT_EQ(sender.outcome(3).screens, std::vector<ScreenState>(2, ScreenState::Fresh));
   EXPECT_GT(sender.degraded_seconds(), 0.05);
 }
 

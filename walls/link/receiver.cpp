@@ -22,8 +22,9 @@ constexpr std::size_t kMostUnknownPeers = 64;
 constexpr double kHandshakeLimit = 2.0;
 /// Rank 0 pings several times a second.
 constexpr double kSilence = 10.0;
-/// A moment further off than this is not kept to: clocks that far apart were not compared.
-constexpr double kFurthestMoment = 1.0;
+/// Rank 0 asks for moments a few milliseconds ahead. One further off comes from a round trip that told the clocks
+/// badly, and is not waited for.
+constexpr double kFurthestMoment = 0.05;
 constexpr std::size_t kMostPending = 10;  ///< pictures of one screen: more than may be in flight
 constexpr int kPollMs = 250;
 
@@ -258,7 +259,8 @@ void FrameReceiver::take(Peer& peer, const Packet& packet) {
     take_picture(peer, packet);
   } else if (header.type == PacketType::Present && swap) {
     const double now = settings_.clock();
-    orders_.emplace_back(header.frame, header.time > now + kFurthestMoment ? now : header.time);
+    const bool moment = header.time < now + kFurthestMoment && header.time > now - kSilence;
+    orders_.emplace_back(header.frame, moment ? header.time : now);
     if (orders_.size() > kMostPending) orders_.pop_front();
   } else if (header.type == PacketType::Ping && swap) {
     ByteWriter times;

@@ -118,6 +118,7 @@ void WallSender::show(const WallFrame& frame) {
       link.current.push_back(packet->second);
     }
     link.sent = false;
+    hand_over(link);
   }
   if (swaps_.empty()) {
     raise_alarm(alarm_);
@@ -220,7 +221,11 @@ void WallSender::step_frames(FrameLink& link, double now) {
     link.link.connection().queue(link.current[i]);
   };
   // A display that comes back gets the current frame.
-  if (link.link.step(now, send_again) == ClientLink::Change::Up && !link.current.empty()) link.sent = false;
+  if (link.link.step(now, send_again) == ClientLink::Change::Up) link.sent = link.current.empty();
+  hand_over(link);
+}
+
+void WallSender::hand_over(FrameLink& link) const {
   if (!link.link.up() || link.sent) return;
   Connection& connection = link.link.connection();
   // What it cannot take in time is not kept: it goes on with the latest.
@@ -231,7 +236,8 @@ void WallSender::step_frames(FrameLink& link, double now) {
 
 void WallSender::step_swap(std::size_t display, double now) {
   SwapLink& swap = swaps_[display];
-  const auto change = swap.link.step(now, [&](const Packet& packet) { take_answer(display, packet, now); });
+  const auto take = [&](const Packet& packet) { take_answer(display, packet, now); };
+  auto change = swap.link.step(now, take);
   if (change == ClientLink::Change::Up) {
     swap.ever_up = true;
     swap.clock = {};
@@ -239,7 +245,10 @@ void WallSender::step_swap(std::size_t display, double now) {
     swap.next_ping = now;
     barrier_.connected(display, now);
     log::debug("display of host '{}' on {} answers", swap.host.host, swap.link.address().text);
-  } else if (change == ClientLink::Change::Down) {
+    // What it has ready counts only from here on.
+    change = swap.link.step(now, take);
+  }
+  if (change == ClientLink::Change::Down) {
     if (!finishing_) barrier_.gone(display, now);
     log::debug("display of host '{}' on {}: {}", swap.host.host, swap.link.address().text, swap.link.failure());
   }
@@ -250,9 +259,10 @@ void WallSender::step_swap(std::size_t display, double now) {
   }
   if (!swap.link.up() || now < swap.next_ping) return;
   ++swap.pings;
-  swap.ping_sent = link_seconds();
+  const double sent = link_seconds();
+  swap.ping_sent.at(swap.pings % swap.ping_sent.size()) = sent;
   swap.next_ping = now + (swap.pings <= kFirstPings ? kFirstPingsEvery : kPingEvery);
-  swap.link.connection().queue(encode_packet({.type = PacketType::Ping, .frame = swap.pings, .time = swap.ping_sent}));
+  swap.link.connection().queue(encode_packet({.type = PacketType::Ping, .frame = swap.pings, .time = sent}));
 }
 
 void WallSender::take_answer(std::size_t display, const Packet& packet, double now) {
@@ -264,15 +274,16 @@ void WallSender::take_answer(std::size_t display, const Packet& packet, double n
       barrier_.ready(swap.host.screens[header.screen], header.frame, now);
       break;
     case PacketType::Presented:
-      barrier_.shown(display, header.frame, header.time - swap.clock.seconds());
+      // Before the first round trip nothing is known of its clock but when its words come.
+      barrier_.shown(display, header.frame, swap.clock.known() ? header.time - swap.clock.seconds() : now);
       break;
     case PacketType::Pong: {
-      if (header.frame != swap.pings) break;  // of a ping before the last one
+      if (header.frame > swap.pings || header.frame + swap.ping_sent.size() <= swap.pings) break;  // of no known ping
       ByteReader times(packet.payload);
       const double arrived = times.real();
       const double answered = times.real();
       if (!std::isfinite(arrived) || !std::isfinite(answered)) throw LinkError("a clock out of its mind");
-      swap.clock.add(swap.ping_sent, arrived, answered, link_seconds());
+      swap.clock.add(swap.ping_sent.at(header.frame % swap.ping_sent.size()), arrived, answered, link_seconds());
       break;
     }
     default:
@@ -289,9 +300,9 @@ void WallSender::present(double now) {
   for (const SwapDecision& decision : barrier_.due(now)) {
     SwapLink& swap = swaps_[decision.display];
     if (!swap.link.up()) continue;
-    const double when = decision.late ? now : at;
-    swap.link.connection().queue(
-        encode_packet({.type = PacketType::Present, .frame = decision.frame, .time = when + swap.clock.seconds()}));
+    // Zero has passed on any clock.
+    const double when = decision.late || !swap.clock.known() ? 0.0 : at + swap.clock.seconds();
+    swap.link.connection().queue(encode_packet({.type = PacketType::Present, .frame = decision.frame, .time = when}));
   }
   for (const SwapEvent& event : barrier_.take_events()) say(event);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <condition_variable>
 #include <cstdint>
 #include <map>
@@ -77,7 +78,7 @@ class WallSender {
     WallHost host;
     ClockOffset clock;
     std::uint64_t pings = 0;
-    double ping_sent = 0.0;
+    std::array<double, 16> ping_sent{};  ///< of the last few, by number
     double next_ping = 0.0;
     bool ever_up = false;
     std::string told_refusal{};
@@ -87,6 +88,8 @@ class WallSender {
   void run(const std::stop_token& stop);
   void wait_for_news(double now);
   void step(double now);
+  /// Queues the latest frame unless the connection still has its hands full.
+  void hand_over(FrameLink& link) const;
   void step_frames(FrameLink& link, double now);
   void step_swap(std::size_t display, double now);
   void take_answer(std::size_t display, const Packet& packet, double now);
