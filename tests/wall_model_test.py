@@ -23,6 +23,7 @@ ARC = """
 hpr_wall = 1
 stereo = { mode = "side-by-side" }
 monitors = [{ id = "operator", surface = "arc", pixels = [120, 60] }]
+windows = [{ id = "w0", rank = 0 }, { id = "w1", rank = 1 }]
 [[viewers]]
 id = "head"
 position_m = [0, 0, 0]
@@ -37,6 +38,7 @@ tile_pixels = [64, 48]
 tile_size_m = [0.8, 0.6]
 centre_m = [0, 0, -1]
 gap_m = [0.02, 0]
+windows = ["w0", "w1"]
 curve = { radius_m = 1.0 }
 """
 

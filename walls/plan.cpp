@@ -187,7 +187,12 @@ void draw_plan(Canvas& canvas, const Plan& plan) {
     canvas.fill(plan.origin + corner(plane), extent(plane), kGap);
     canvas.hatch(plan.origin + corner(plane), extent(plane), kFaint, 6.0, 1.0);
   }
-  for (std::size_t i = 0; i < plan.wall.screens.size(); ++i) draw_screen(canvas, plan, i);
+  // Of two eyes' screens in one place the left one's is seen, as in the assembled wall.
+  for (const bool right_eye : {true, false}) {
+    for (std::size_t i = 0; i < plan.wall.screens.size(); ++i) {
+      if ((plan.wall.screens[i].eye == Eye::Right) == right_eye) draw_screen(canvas, plan, i);
+    }
+  }
   draw_foot_point(canvas, plan);
   draw_top_view(canvas, plan);
 }

@@ -100,6 +100,18 @@ TEST(WallPattern, TheOutermostPixelsAreWhite) {
   }
 }
 
+TEST(WallPlan, OfTwoEyesScreensTheLeftOneIsDrawnLast) {
+  Wall wall = load_wall("1x1@1000x600");
+  wall.screens.push_back(wall.screens.front());
+  wall.screens[0].id = "first-left";
+  wall.screens[0].eye = Eye::Left;
+  wall.screens[1].id = "then-right";
+  wall.screens[1].eye = Eye::Right;
+  const std::string svg = wall_plan_svg(wall);
+  EXPECT_LT(svg.find("then-right"), svg.find("first-left"));
+  EXPECT_NE(svg.find("left eye"), std::string::npos);
+}
+
 TEST(WallPattern, AScreenBeyondTheDrawingLimitIsRefusedWithALimitError) {
   try {
     static_cast<void>(wall_pattern(load_wall("1x1@40000x10"), 0));
