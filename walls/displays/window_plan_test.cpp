@@ -49,6 +49,18 @@ TEST(WindowPlan, AWindowWithoutASizeIsAsLargeAsItsScreens) {
   EXPECT_EQ(plans[0].rect, (Rect{0, 0, 40, 30}));
 }
 
+TEST(WindowPlan, AFullScreenWindowNamesItsMonitorAlsoOnceExpanded) {
+  Wall wall = load_wall("1x1@40x30");
+  wall.windows = {{.id = "w", .node = {}, .gpu = {}, .display = {}, .monitor = "DP-1", .rect = {}, .fullscreen = true}};
+  wall.screens[0].window = "w";
+  const auto plans = plan_windows(wall, {0});
+  ASSERT_EQ(plans.size(), 1U);
+  EXPECT_EQ(plans[0].monitor, "DP-1");
+  EXPECT_TRUE(plans[0].fullscreen);
+  EXPECT_FALSE(plans[0].decorated);
+  EXPECT_NE(expand_wall(wall).find("monitor = \"DP-1\""), std::string::npos);
+}
+
 TEST(WindowPlan, OnlyTheScreensAskedForAreShown) {
   const Wall wall = load_wall("2x1@40x30");
   const auto plans = plan_windows(wall, {1});
