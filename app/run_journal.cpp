@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::string_view kFrame = "frame ";
 constexpr std::string_view kRestart = "restart ";
+constexpr std::string_view kEnd = "end {}";
 
 }  // namespace
 
@@ -65,6 +66,10 @@ void RunJournal::add_restart(const std::string& why) {
   append(fmt::format("\n{}{}\n", kRestart, record.dump()));
 }
 
+void RunJournal::add_end() {
+  append(fmt::format("{}\n", kEnd));
+}
+
 RunJournal::Entries RunJournal::read() const {
   Entries entries;
   std::ifstream file(path_);
@@ -77,6 +82,7 @@ RunJournal::Entries RunJournal::read() const {
     if (!nlohmann::json::accept(record)) continue;
     if (line.starts_with(kFrame)) entries.frames.push_back(record);
     if (line.starts_with(kRestart)) entries.restarts.push_back(record);
+    entries.ended = entries.ended || line == kEnd;
   }
   return entries;
 }
@@ -95,7 +101,7 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
     std::optional<Error> lost;
     try {
       const auto code = static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
-      if (code != ExitCode::Hang && code != ExitCode::Lost) return code;
+      if ((code != ExitCode::Hang && code != ExitCode::Lost) || journal.read().ended) return code;
       lost.emplace(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
     } catch (const Error& error) {
       if (error.code() != ExitCode::Lost) throw;

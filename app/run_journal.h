@@ -26,10 +26,13 @@ class RunJournal {
   /// A frame is drawn and shown.
   void add_frame(const std::string& record);
   void add_restart(const std::string& why);
+  /// The run came to its end, whatever its exit code.
+  void add_end();
 
   struct Entries {
     std::vector<std::string> frames;    ///< records, in order
     std::vector<std::string> restarts;  ///< JSON objects: the frame that was to come, and why
+    bool ended = false;
   };
   /// A last line that was cut short is none.
   [[nodiscard]] Entries read() const;

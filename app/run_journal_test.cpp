@@ -16,6 +16,10 @@ TEST(RunJournal, KeepsFramesAndRestartsInOrder) {
   journal.add_frame(R"({"frame":2})");
   const auto entries = journal.read();
   EXPECT_EQ(entries.frames, (std::vector<std::string>{R"({"frame":0})", R"({"frame":1})", R"({"frame":2})"}));
+  EXPECT_FALSE(entries.ended);
+  journal.add_end();
+  EXPECT_TRUE(journal.read().ended);
+  EXPECT_EQ(journal.read().frames.size(), 3U);
   ASSERT_EQ(entries.restarts.size(), 1U);
   EXPECT_EQ(entries.restarts[0], R"({"frame":2,"why":"rank 1 was killed"})");
 }

@@ -242,6 +242,7 @@ bool WallDriver::finish() {
   agree_on_failure(session_.comm(), [&] {
     if (display_) display_->finish();
   });
+  if (journal_) journal_->add_end();
   return !remote_ || end_displays(session_.comm(), *remote_, manifest_);
 }
 

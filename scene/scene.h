@@ -158,7 +158,7 @@ struct Scene {
   std::vector<Instance> instances;  ///< in ascending order of first_surface
   /// The nodes that placed them: one per instance, or none at all. Nothing a picture shows: no part of content_hash.
   std::vector<std::string> node_names;
-  std::vector<Light> lights;        ///< see gives_light for when the renderer adds a headlight
+  std::vector<Light> lights;  ///< see gives_light for when the renderer adds a headlight
   std::vector<Camera> cameras;
   Rgb background;  ///< radiance where no surface is and no environment; lights nothing
   std::optional<Environment> environment;

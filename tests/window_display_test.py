@@ -121,14 +121,15 @@ def turned(folder, display, client):
     (folder / "turned.toml").write_text(TURNED)
     files = draw_files(folder, "turned.toml")
     left, right = png.read(files / "left.png"), png.read(files / "right.png")
-    rows = [left[2][4 * left[0] * y:][:4 * left[0]] for y in range(left[1])]
-    # Turned clockwise: the lowest pixel of a column is the first of a row.
-    columns = [b"".join(right[2][4 * (y * right[0] + x):][:4] for y in reversed(range(right[1]))) for x in range(right[0])]
+    # The files hold what panels are sent: the second one turned.
+    if right[:2] != (80, 160):
+        complain(f"the turned screen's file has {right[0]}x{right[1]} pixels")
+    rows, turned_rows = [[p[2][4 * p[0] * y:][:4 * p[0]] for y in range(p[1])] for p in (left, right)]
     run = Run(folder, display, "wall", "run", "turned.toml", *SCENE, *STILL)
 
     def shows_both():
         desktop = client.picture()
-        return cut(desktop, 30, 20, 120, 160) == rows and cut(desktop, 150, 20, 80, 160) == columns
+        return cut(desktop, 30, 20, 120, 160) == rows and cut(desktop, 150, 20, 80, 160) == turned_rows
 
     wait_until("a window with two screens, one turned", shows_both, run)
     run.process.send_signal(signal.SIGTERM)

@@ -124,7 +124,11 @@ TEST(FileDisplay, AFolderThatIsAFileIsAnIoError) {
 
 TEST(Manifest, HoldsWhatTheContractNames) {
   const Image<Rgba8> image({2, 1}, {1, 2, 3, 255});
-  RunManifest manifest{0xABC, 0x123, 7, {{"hpr", "0.1.0"}}, {}};
+  RunManifest manifest;
+  manifest.scene_hash = 0xABC;
+  manifest.wall_hash = 0x123;
+  manifest.seed = 7;
+  manifest.versions = {{"hpr", "0.1.0"}};
   manifest.frames.push_back(
       {3,
        12.5,

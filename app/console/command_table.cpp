@@ -69,11 +69,10 @@ glm::dvec3 point_of(const std::string& word) {
   std::istringstream stream(word);
   std::string part;
   int count = 0;
-  while (std::getline(stream, part, ',')) {
-    if (count == 3) break;
-    point[count++] = number_of(part);
+  for (; std::getline(stream, part, ','); ++count) {
+    if (count < 3) point[count] = number_of(part);
   }
-  if (count != 3 || stream.good() || word.ends_with(',')) {
+  if (count != 3 || word.ends_with(',')) {
     refuse(fmt::format("'{}' is not X,Y,Z", printable(word)), "0,1.5,-2");
   }
   return point;

@@ -167,7 +167,7 @@ void import_corners(const XmlFile& file, const std::vector<Machine>& machines, c
     into.wall.windows.push_back(std::move(window));
     into.wall.screens.push_back(std::move(screen));
   }
-  into.wall.viewer_given = true;  // ParaView's stands where its corners are measured from
+  into.wall.viewers.front().given = true;  // ParaView's stands where its corners are measured from
   if (assumed) {
     into.remarks.push_back(
         fmt::format("The file does not tell all screens' pixels: those have square ones, {} high, or as --pixels says.",

@@ -1,11 +1,14 @@
 #include "walls/link/display_process.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <condition_variable>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
-#include "core/file.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "walls/canvas.h"
@@ -162,7 +165,13 @@ std::string DisplayProcess::status() const {
 void DisplayProcess::write_status() {
   const std::string text = status();
   if (text == written_) return;
-  write_file_atomically(settings_.folder / "display.json", text);
+  // Whole at any time, and not worth waiting for the disk: it says what is, not what was.
+  const std::filesystem::path file = settings_.folder / "display.json";
+  const std::filesystem::path next = settings_.folder / ".display.json.next";
+  std::ofstream(next) << text;
+  std::error_code error;
+  std::filesystem::rename(next, file, error);
+  if (error) throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", file.string(), error.message()));
   written_ = text;
 }
 
