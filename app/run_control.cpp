@@ -3,20 +3,20 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 
 #include "app/console/forgivable.h"
 #include "cluster/collectives.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "walls/link/hosts.h"
+#include "walls/link/socket.h"
 
 namespace hpr {
 namespace {
@@ -59,18 +59,8 @@ std::string last_line(const std::string& text) {
 }  // namespace
 
 std::filesystem::path control_folder() {
-  const char* const runtime = std::getenv("XDG_RUNTIME_DIR");  // NOLINT(concurrency-mt-unsafe): nothing sets variables
-  const std::filesystem::path folder = runtime != nullptr && *runtime != '\0' ? std::filesystem::path(runtime) / "hpr"
-                                                                              : std::filesystem::temp_directory_path() /
-                                                                                    fmt::format("hpr-{}", ::geteuid());
-  const bool made = ::mkdir(folder.c_str(), S_IRWXU) == 0 || errno == EEXIST;
-  struct stat found {};
-  if (!made || ::lstat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode) || found.st_uid != ::geteuid() ||
-      (found.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    throw Error(ExitCode::Io, fmt::format("'{}' is no folder of this user's alone", folder.string()),
-                "remove it, or name another place with XDG_RUNTIME_DIR");
-  }
-  return folder;
+  make_private_folder(socket_folder());
+  return socket_folder();
 }
 
 RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& options,

@@ -11,8 +11,8 @@
 
 namespace hpr {
 
-/// Where running walls of this user are reached: hpr/ in $XDG_RUNTIME_DIR, else hpr-UID/ among the temporary files;
-/// nobody else may look into it. Throws Error (Io) when it cannot be made, or is another's.
+/// socket_folder(), made if missing: where running walls of this user are reached, and nobody else may write. Throws
+/// Error (Io) when it cannot be made, or is another's.
 [[nodiscard]] std::filesystem::path control_folder();
 
 /// Lets others tell a running wall what to do, between frames: every command of a console but those about pictures,

@@ -155,8 +155,8 @@ class SpanSource final : public std::streambuf {
 void save(const Scene& scene, std::streambuf& sink, bool with_names) {
   std::ostream stream(&sink);
   cereal::BinaryOutputArchive archive(stream);
-  archive(const_cast<Scene&>(scene));
   if (with_names) archive(scene.node_names);
+  archive(const_cast<Scene&>(scene));
 }
 
 }  // namespace
@@ -172,7 +172,7 @@ Scene scene_from_bytes(std::span<const std::byte> bytes) {
   std::istream stream(&source);
   cereal::BinaryInputArchive archive(stream);
   Scene scene;
-  archive(scene, scene.node_names);
+  archive(scene.node_names, scene);
   return scene;
 }
 

@@ -70,6 +70,7 @@ Scene full_scene() {
                    Camera{.name = "b", .eye = {}, .axes = glm::dmat3(1.0), .lens = OrthographicLens{1, 2, 3, 4}}};
   scene.background = {0.1F, 0.2F, 0.3F};
   scene.environment = Environment{Image<Rgb>({2, 1}, {1, 2, 3}), 0.5, 2.0};
+  scene.node_names = {"chair", "table"};
   scene.warnings = {"odd"};
   finish_scene(scene);
   return scene;
@@ -94,6 +95,7 @@ TEST(SceneBytes, ComeBackAsTheSameScene) {
   EXPECT_EQ(copy.environment->image, scene.environment->image);
   EXPECT_EQ(copy.lights[0].radius, 0.3);
   EXPECT_EQ(copy.warnings, scene.warnings);
+  EXPECT_EQ(copy.node_names, scene.node_names);
 }
 
 TEST(SceneBytes, OfAnEmptySceneComeBackToo) {

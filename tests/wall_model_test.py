@@ -141,7 +141,8 @@ def panels_are_sent_what_they_need_and_the_wall_stays(folder):
     plain = draw(folder, "plain", ONE.format(width=64, more=""))
     panel = draw(folder, "panel", ONE.format(width=64, more=', rotate = 90, mirror = "vertical", colour = { gain = [1, 0, 1] }'))
     upright = pixels(folder / "plain" / "a.png")
-    sent = pixels(folder / "panel" / "a.png")
+    sent = pixels(folder / "panel" / "a.panel.png")
+    check(pixels(folder / "panel" / "a.png") == upright, "the screen's own picture is not upright")
     check((len(sent[0]), len(sent)) == (48, 64), "a turned panel is sent an upright picture")
     for y in range(48):
         for x in range(64):

@@ -120,7 +120,7 @@ def four_windows(folder, display, client, picture):
 def turned(folder, display, client):
     (folder / "turned.toml").write_text(TURNED)
     files = draw_files(folder, "turned.toml")
-    left, right = png.read(files / "left.png"), png.read(files / "right.png")
+    left, right = png.read(files / "left.png"), png.read(files / "right.panel.png")
     # The files hold what panels are sent: the second one turned.
     if right[:2] != (80, 160):
         complain(f"the turned screen's file has {right[0]}x{right[1]} pixels")

@@ -109,9 +109,9 @@ struct DisplayKind {
   void (*check)(const Wall& wall, const DisplayOptions& options) = nullptr;
 };
 
-/// "file" (folder/<screen id>.png, what its panel is sent of the latest frame, and folder/<monitor id>.png; each file
-/// complete or untouched), "window", "web", "pipe" and
-/// "none".
+/// "file" (of the latest frame folder/<screen id>.png, where its panel is sent another picture also
+/// folder/<screen id>.panel.png, and folder/<monitor id>.png; each file complete or untouched), "window", "web", "pipe"
+/// and "none".
 [[nodiscard]] const std::vector<DisplayKind>& display_kinds();
 [[nodiscard]] const std::vector<std::string>& all_displays();
 

@@ -44,7 +44,10 @@ class FileDisplay final : public Display {
   FileDisplay(const Wall& wall, const DisplayOptions& options)
       : wall_(wall), folder_(options.folder.empty() ? "." : options.folder), keeps_frames_(options.keep_frames) {
     make_folder(folder_);
-    for (const WallScreen& screen : wall.screens) check_writable(folder_ / file_of(screen), options.overwrite);
+    for (const WallScreen& screen : wall.screens) {
+      check_writable(folder_ / file_of(screen), options.overwrite);
+      check_writable(folder_ / panel_file_of(screen), options.overwrite);
+    }
     for (const WallMonitor& monitor : wall.monitors) check_writable(folder_ / file_of(monitor), options.overwrite);
   }
 
@@ -62,12 +65,9 @@ class FileDisplay final : public Display {
       HPR_CHECK(picture.screen < wall_.screens.size());
       // Made where it is needed: this process shows few of the wall's screens.
       const ScanOut& scan_out = scan_outs_.try_emplace(picture.screen, wall_, picture.screen).first->second;
-      const std::string file = file_of(wall_.screens[picture.screen]);
-      if (scan_out.trivial()) {
-        write(file, picture.image);
-      } else {
-        write(file, scan_out.apply(picture.image));
-      }
+      const WallScreen& screen = wall_.screens[picture.screen];
+      write(file_of(screen), picture.image);
+      if (!scan_out.trivial()) write(panel_file_of(screen), scan_out.apply(picture.image));
     }
     for (const MonitorPicture& picture : frame.monitors) {
       write(file_of(wall_.monitors.at(picture.monitor)), picture.image);
@@ -79,6 +79,8 @@ class FileDisplay final : public Display {
   [[nodiscard]] static std::string file_of(const Shown& shown) {
     return shown.id + ".png";
   }
+
+  [[nodiscard]] static std::string panel_file_of(const WallScreen& screen) { return screen.id + ".panel.png"; }
 
   const Wall& wall_;
   std::filesystem::path folder_;

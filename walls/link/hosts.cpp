@@ -66,15 +66,17 @@ std::vector<LinkScreen> link_screens(const Wall& wall, const WallHost& host) {
   return screens;
 }
 
-std::filesystem::path display_socket(const Wall& wall, const std::string& host) {
+std::filesystem::path socket_folder() {
   const char* const runtime = std::getenv("XDG_RUNTIME_DIR");
-  const std::filesystem::path folder = runtime != nullptr && *runtime == '/'
-                                           ? std::filesystem::path(runtime) / "hpr"
-                                           : std::filesystem::path(fmt::format("/tmp/hpr-{}", ::geteuid()));
+  return runtime != nullptr && *runtime == '/' ? std::filesystem::path(runtime) / "hpr"
+                                               : std::filesystem::path(fmt::format("/tmp/hpr-{}", ::geteuid()));
+}
+
+std::filesystem::path display_socket(const Wall& wall, const std::string& host) {
   const bool plain = !host.empty() && host.size() <= kLongestHostInName && std::ranges::all_of(host, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.';
   });
-  return folder /
+  return socket_folder() /
          fmt::format("{}-{}.sock", hex16(wall.hash), plain ? host : hex16(xxh64(std::as_bytes(std::span(host)))));
 }
 

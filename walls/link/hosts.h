@@ -28,8 +28,11 @@ struct WallHost {
 /// As the ends of a link compare them.
 [[nodiscard]] std::vector<LinkScreen> link_screens(const Wall& wall, const WallHost& host);
 
-/// Where the display process of that wall and host listens unless told otherwise: in $XDG_RUNTIME_DIR/hpr, or in
-/// /tmp/hpr-UID. Only names it.
+/// Where this user's runs and displays are reached: hpr/ in $XDG_RUNTIME_DIR, or /tmp/hpr-UID. Only names it.
+[[nodiscard]] std::filesystem::path socket_folder();
+
+/// Where the display process of that wall and host listens unless told otherwise: in
+/// socket_folder(). Only names it.
 [[nodiscard]] std::filesystem::path display_socket(const Wall& wall, const std::string& host);
 
 }  // namespace hpr

@@ -43,24 +43,6 @@ bool same_user(int descriptor) {
   return peer.uid == ::geteuid() || peer.uid == 0;
 }
 
-/// In /tmp anybody could have made it before.
-void make_private_folder(const std::filesystem::path& folder) {
-  struct stat found {};
-  if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-    throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), words(errno)),
-                "set XDG_RUNTIME_DIR to a folder of yours, or use --listen");
-  }
-  if (::lstat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) {
-    throw Error(ExitCode::Io, fmt::format("'{}' is no folder", folder.string()), "name another place with --listen");
-  }
-  const bool ours = found.st_uid == ::geteuid();
-  const bool others_may_write = (found.st_mode & 022U) != 0;
-  if (!ours || others_may_write) {
-    throw Error(ExitCode::Io, fmt::format("others may change the folder '{}'", folder.string()),
-                "take it from them (chown, chmod 0700), or name another place with --listen");
-  }
-}
-
 /// What a killed process left is removed; what a living one listens on is not.
 void clear_way(const LinkAddress& address) {
   struct stat found {};
@@ -77,6 +59,23 @@ void clear_way(const LinkAddress& address) {
 }
 
 }  // namespace
+
+void make_private_folder(const std::filesystem::path& folder) {
+  struct stat found {};
+  if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
+    throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), words(errno)),
+                "set XDG_RUNTIME_DIR to a folder of yours, or use --listen");
+  }
+  if (::lstat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) {
+    throw Error(ExitCode::Io, fmt::format("'{}' is no folder", folder.string()), "name another place with --listen");
+  }
+  const bool ours = found.st_uid == ::geteuid();
+  const bool others_may_write = (found.st_mode & 022U) != 0;
+  if (!ours || others_may_write) {
+    throw Error(ExitCode::Io, fmt::format("others may change the folder '{}'", folder.string()),
+                "take it from them (chown, chmod 0700), or name another place with --listen");
+  }
+}
 
 Socket::~Socket() {
   if (descriptor_ >= 0) ::close(descriptor_);

@@ -28,6 +28,10 @@ class Socket {
   int descriptor_ = -1;
 };
 
+/// Makes the folder with mode 0700 where it is missing: in /tmp anybody could have made it before. Throws Error (Io)
+/// when it cannot be made, belongs to somebody else or lets others write.
+void make_private_folder(const std::filesystem::path& folder);
+
 /// A listening socket; a Unix socket's file goes with it.
 class Listener {
  public:
