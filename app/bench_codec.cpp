@@ -1,13 +1,13 @@
 #include "app/bench_codec.h"
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
 
 #include "app/bench_codec_peers.h"
+#include "app/bench_times.h"
 #include "walls/codec.h"
 
 namespace hpr {
@@ -23,18 +23,6 @@ constexpr Case kCases[] = {{"raw", 0}, {"lz4", 0}, {"zstd", 0}, {"jpeg", 0}, {"l
 
 std::string title_of(const Case& one) {
   return one.error == 0 ? one.codec : fmt::format("{} within {}", one.codec, one.error);
-}
-
-double median(std::vector<double>& times) {
-  std::ranges::nth_element(times, times.begin() + kRepetitions / 2);
-  return times[kRepetitions / 2];
-}
-
-/// CPU time of this thread: what others do on the machine counts less than on a clock.
-double thread_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) / 1e6;
 }
 
 struct Pair {

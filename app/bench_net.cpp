@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cstring>
 #include <functional>
+#include <utility>
 
+#include "app/bench_times.h"
 #include "cluster/collectives.h"
 #include "compositing/merge.h"
 #include "compositing/synthetic.h"
@@ -30,8 +32,7 @@ double median_ms(const std::function<void()>& work) {
     work();
     if (i >= 0) times.push_back(watch.ms());
   }
-  std::ranges::nth_element(times, times.begin() + kRepetitions / 2);
-  return times[kRepetitions / 2];
+  return median(std::move(times));
 }
 
 double gigabytes_per_second(std::size_t bytes, double ms) {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "app/bench_scene.h"
+#include "app/bench_times.h"
 #include "core/stopwatch.h"
 #include "raster/gl_functions.h"
 #include "raster/gl_objects.h"
@@ -104,11 +105,6 @@ void main() { id = uint(gl_PrimitiveID) + 1u; }
   std::array<float, 16> matrix_{};
   GLsizei index_count_ = 0;
 };
-
-double median(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
-  return values[values.size() / 2];
-}
 
 BenchRow bench_sphere(GlContext& context, std::uint32_t rows, std::uint32_t columns, int threads) {
   Scene scene;

@@ -6,12 +6,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <ctime>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 #include <span>
 
+#include "app/bench_times.h"
 #include "core/error.h"
 #include "image/tiles.h"
 #include "rt/denormals.h"
@@ -44,13 +44,6 @@ struct RaySet {
   embree::Rays kind;
   std::vector<BenchRay> rays;
 };
-
-/// CPU time of this thread in ms: what others do on the machine counts less than on a clock.
-double thread_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
 
 /// Answers of either side, summed so that no work can be left out.
 using Answers = std::uint64_t;

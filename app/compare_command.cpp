@@ -14,6 +14,7 @@
 #include "app/compare_report.h"
 #include "app/compare_threads.h"
 #include "app/launcher.h"
+#include "app/output.h"
 #include "app/simulate_option.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/blender.h"
@@ -133,7 +134,9 @@ class CompareCommand final : public Command {
     if (!picture_.empty() && !picture_.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
     }
-    for (const std::string& path : {csv_, html_, picture_, raw_}) {
+    const std::vector<std::string> results{csv_, html_, picture_, raw_};
+    check_distinct(results);
+    for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }
   }
@@ -191,7 +194,8 @@ class CompareCommand final : public Command {
                       "name a scene instead of --synthetic");
         }
       } else if (!fits(name, ranks)) {
-        throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, ranks));
+        throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, ranks),
+                    "leave it out, or choose another number with --ranks");
       }
       names.push_back(name);
     }

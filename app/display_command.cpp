@@ -3,36 +3,25 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-#include <array>
-#include <atomic>
 #include <csignal>
 #include <filesystem>
 
+#include "app/display_flags.h"
 #include "app/output.h"
 #include "app/remote_wall.h"
+#include "app/signals.h"
+#include "app/wall_run.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/units.h"
 #include "image/image_io.h"
-#include "walls/display.h"
 #include "walls/link/display_process.h"
 #include "walls/link/hosts.h"
 #include "walls/wall_file.h"
 
 namespace hpr {
 namespace {
-
-// Handlers reach nothing but globals.
-std::atomic<int> ended_by = 0;
-static_assert(std::atomic<int>::is_always_lock_free);
-
-extern "C" void remember_end(int signal) {
-  ended_by.store(signal);
-}
-
-constexpr std::array kEnds{SIGINT, SIGTERM, SIGHUP};
 
 class DisplayCommand final : public Command {
  public:
@@ -45,9 +34,8 @@ class DisplayCommand final : public Command {
     app.add_option("--wall", wall_, "a wall file, or CxR, or CxR@WxH")->required();
     app.add_option("--host", host_,
                    "whose screens: a host of the wall file, or a node's id (not needed where there is one)");
-    app.add_option("--show", show_, fmt::format("{}", fmt::join(all_displays(), " or ")))->capture_default_str();
-    app.add_option("-o,--output", folder_, "folder for display.json, and the pictures of the file display")
-        ->type_name("DIR");
+    show_.declare(app);
+    declare_overrides(app, overrides_);
     app.add_option("--listen", listen_, "instead of the socket wall run looks for; again for another")
         ->type_name("ADDR:PORT|PATH");
     app.add_option("--stale-after", stale_after_, "a screen without a new frame for so long is marked")
@@ -59,13 +47,12 @@ class DisplayCommand final : public Command {
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
-    ended_by.store(0);
-    struct sigaction action {};
-    action.sa_handler = remember_end;
-    for (const int signal : kEnds) ::sigaction(signal, &action, nullptr);
+    watch_interrupts();
+    // What tells a run to stop reaches all processes of a batch job.
+    for (const int signal : {SIGUSR1, SIGUSR2}) std::signal(signal, SIG_IGN);
     serve(globals);
     // As if the signal had ended us, but with everything put away.
-    if (const int signal = ended_by.load(); signal != 0) {
+    if (const int signal = last_signal(); signal != 0 && signal != SIGUSR1) {
       std::signal(signal, SIG_DFL);
       std::raise(signal);
     }
@@ -79,14 +66,9 @@ class DisplayCommand final : public Command {
       throw Error(ExitCode::Usage, fmt::format("--stale-after: '{}' is no time", printable(stale_after_)),
                   "write e.g. --stale-after 1s");
     }
-    if (show_ == "file" && folder_.empty()) {
-      throw Error(ExitCode::Usage, "the file display needs a folder", "name one with -o DIR, or use --show none");
-    }
-    if (std::ranges::find(all_displays(), show_) == all_displays().end()) {
-      throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(show_)),
-                  unknown_name_hint(show_, all_displays()));
-    }
-    Wall whole = load_wall(wall_);
+    const DisplayOptions options = show_.options(globals);
+    const DisplayKind& kind = show_.kind();
+    Wall whole = load_wall(wall_, overrides_);
     if (scale_ != 1.0) whole = scale_wall(std::move(whole), scale_);
     const WallHost host = find_host(whole, host_.empty() ? only_host(whole) : host_);
     const Wall wall = wall_of_host(whole, host);
@@ -98,22 +80,22 @@ class DisplayCommand final : public Command {
                               .screens = link_screens(whole, host),
                               .token = link_token(),
                               .listen = addresses(whole, host.host)};
-    const EmptyFolders tidy(folder_);
-    const auto display = make_display(show_, wall, {.folder = folder_, .overwrite = globals.force});
-    if (!folder_.empty()) {
+    const std::string& folder = show_.output;
+    const EmptyFolders tidy(folder);
+    kind.check(wall, options);
+    if (!folder.empty()) {
       std::error_code error;
-      std::filesystem::create_directories(folder_, error);
-      check_writable(std::filesystem::path(folder_) / "display.json", globals.force);
+      std::filesystem::create_directories(folder, error);
+      check_writable(std::filesystem::path(folder) / "display.json", globals.force);
     }
+    const auto display = kind.make(wall, options);
     // What writes pictures is loaded now, not when the first frame is to be shown.
-    if (show_ == "file") (void)encode_png(Image<Rgba8>({1, 1}));
-    std::vector<std::string> places;
-    for (const LinkAddress& address : settings.listen) places.push_back(address.text);
+    if (kind.name == "file") (void)encode_png(Image<Rgba8>({1, 1}));
     FrameReceiver receiver(std::move(settings));
-    DisplayProcess process(wall, host.host, *display, receiver, {folder_, *stale_after, once_});
+    DisplayProcess process(wall, host.host, *display, receiver, {folder, *stale_after, once_});
     log::info("display of host '{}': {} screen{}, listening on {}", host.host, wall.screens.size(),
-              wall.screens.size() == 1 ? "" : "s", fmt::join(places, " and "));
-    process.run([] { return ended_by.load() != 0; });
+              wall.screens.size() == 1 ? "" : "s", fmt::join(receiver.addresses(), " and "));
+    process.run([] { return take_request() == Request::Stop; });
   }
 
   [[nodiscard]] static std::string only_host(const Wall& wall) {
@@ -127,15 +109,15 @@ class DisplayCommand final : public Command {
 
   [[nodiscard]] std::vector<LinkAddress> addresses(const Wall& wall, const std::string& host) const {
     std::vector<LinkAddress> found;
-    for (const std::string& text : listen_) found.push_back(parse_address(text));
+    for (const std::string& text : listen_) found.push_back(parse_listen_address(text));
     if (found.empty()) found.push_back(socket_address(display_socket(wall, host)));
     return found;
   }
 
   std::string wall_;
   std::string host_;
-  std::string show_ = "file";
-  std::string folder_;
+  std::vector<std::string> overrides_;
+  DisplayFlags show_{.flag = "--show", .outside_job = true};
   std::vector<std::string> listen_;
   std::string stale_after_ = "1s";
   double scale_ = 1.0;

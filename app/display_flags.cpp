@@ -33,12 +33,14 @@ void say(const std::string& line) {
 }  // namespace
 
 void DisplayFlags::declare(CLI::App& app) {
-  app.add_option("--display", display,
-                 "file, window, web, web=ADDR:PORT, pipe, none, or remote: display processes, see hpr display")
+  const char* const remote_too = outside_job ? " or none" : ", none, or remote: display processes, see hpr display";
+  app.add_option(flag, display, fmt::format("file, window, web, web=ADDR:PORT, pipe{}", remote_too))
       ->capture_default_str();
   app.add_option("-o,--output", output,
-                 "folder for the file display's pictures and the manifest; file or - for the pipe display")
-      ->type_name("PATH");
+                 outside_job
+                     ? "folder for display.json, and the pictures of the file display"
+                     : "folder for the file display's pictures and the manifest; file or - for the pipe display")
+      ->type_name(outside_job ? "DIR" : "PATH");
   app.add_flag("--keep-frames", keep_frames, "the file display keeps every frame, in DIR/frame-000042/");
   app.add_option("--pipe-to", pipe_to, "the pipe display's frames go to this command's standard input")
       ->type_name("COMMAND");
@@ -52,14 +54,11 @@ void DisplayFlags::declare(CLI::App& app) {
 }
 
 const DisplayKind& DisplayFlags::kind() const {
-  static const DisplayKind elsewhere{kRemoteDisplay, false, false, find_display("none").make,
-                                     find_display("none").check};
-  if (remote()) return elsewhere;
-  const std::string name = name_in(display);
-  std::vector<std::string> names = all_displays();
-  if (std::ranges::find(names, name) != names.end()) return find_display(name);
-  names.emplace_back(kRemoteDisplay);
-  throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(name)), unknown_name_hint(name, names));
+  static const DisplayKind elsewhere{
+      .name = kRemoteDisplay, .make = find_display("none").make, .check = find_display("none").check};
+  static const std::vector<std::string> elsewhere_only{std::string(kRemoteDisplay)};
+  if (remote() && !outside_job) return elsewhere;
+  return find_display(name_in(display), outside_job ? std::span<const std::string>() : elsewhere_only);
 }
 
 DisplayOptions DisplayFlags::options(const Globals& globals) const {
@@ -69,17 +68,20 @@ DisplayOptions DisplayFlags::options(const Globals& globals) const {
     throw Error(ExitCode::Usage, fmt::format("the {} display takes no value", name), "only web=ADDR:PORT does");
   }
   if (name == "file" && output.empty()) {
-    throw Error(ExitCode::Usage, "the file display needs a folder", "name one with -o DIR, or use --display none");
+    throw Error(ExitCode::Usage, "the file display needs a folder",
+                fmt::format("name one with -o DIR, or use {} none", flag));
   }
   if (name != "file" && keep_frames) {
-    throw Error(ExitCode::Usage, "only the file display keeps frames", "use --display file with --keep-frames");
+    throw Error(ExitCode::Usage, "only the file display keeps frames",
+                fmt::format("use {} file with --keep-frames", flag));
   }
   if (name != "pipe" && !(pipe_to.empty() && pipe_screen.empty())) {
-    throw Error(ExitCode::Usage, "--pipe-to and --pipe-screen are the pipe display's", "add --display pipe");
+    throw Error(ExitCode::Usage, "--pipe-to and --pipe-screen are the pipe display's",
+                fmt::format("add {} pipe", flag));
   }
   DisplayOptions made{.folder = output, .overwrite = globals.force, .keep_frames = keep_frames};
   made.pipe = {.command = pipe_to,
-               .file = output,
+               .file = outside_job ? "" : output,
                .format = parse_pipe_format(pipe_format),
                .screen = pipe_screen,
                .frames_per_second = pipe_fps,

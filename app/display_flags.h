@@ -14,12 +14,14 @@ inline constexpr std::string_view kRemoteDisplay = "remote";
 
 /// The flags that say where pictures are shown, and how.
 struct DisplayFlags {
+  std::string flag = "--display";
+  bool outside_job = false;      ///< a display process: what is sent to display processes is no choice
   std::string display = "file";  ///< a name, or web=ADDR:PORT
-  std::string output;            ///< a folder for `file`, and for `remote` the manifest; a file for `pipe`
+  std::string output = {};       ///< a folder for `file`, and for `remote` the manifest; a file for `pipe`
   bool keep_frames = false;
-  std::string pipe_to;
+  std::string pipe_to = {};
   std::string pipe_format = "y4m";
-  std::string pipe_screen;
+  std::string pipe_screen = {};
   int pipe_fps = 30;
   std::string pipe_timeout = "30s";
 

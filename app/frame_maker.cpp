@@ -95,6 +95,7 @@ Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Pro
 }
 
 void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress) {
+  times_before_ = {};
   Sampling sampling = sampling_;
   if (budget_) {
     sampling.goal = {.samples = samples, .seconds = {}, .relmse = {}};
@@ -108,6 +109,7 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
 }
 
 void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Progress& progress) {
+  times_before_ = refining_ ? times_ : FrameTimes{};
   if (!refining_) {
     sampler_.reset();
     plan_for({}, screens);

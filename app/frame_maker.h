@@ -34,6 +34,8 @@ class FrameMaker {
   [[nodiscard]] const FramePlan& plan() const { return plan_; }
   [[nodiscard]] const Blocks& blocks() const { return blocks_; }
   [[nodiscard]] const FrameTimes& times() const { return times_; }
+  /// What of times() earlier frames took: those of the picture that is refined.
+  [[nodiscard]] const FrameTimes& times_before() const { return times_before_; }
   [[nodiscard]] std::optional<double> relmse() const { return relmse_; }
   /// What of the last frame was given up; none without a target.
   [[nodiscard]] const std::optional<BudgetRecord>& report() const { return report_; }
@@ -61,6 +63,7 @@ class FrameMaker {
   std::optional<FrameSampler> sampler_;  ///< of the frame at hand, or the picture that is refined
   bool refining_ = false;
   FrameTimes times_;
+  FrameTimes times_before_;
   std::optional<double> relmse_;
   std::optional<BudgetRecord> report_;
 };

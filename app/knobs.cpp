@@ -51,6 +51,11 @@ constexpr std::array kKnobs{
          "true: smooth surfaces of few triangles show their triangles where light grazes them"},
     Knob{"reference", "false, true", "path tracing in place of the passes: many more samples for the same noise",
          "false: what the passes leave out, caught by photons of some width"},
+    Knob{"codec", "raw, lz4, zstd, jpeg, auto", "time to encode and decode, against time on the link",
+         "jpeg: see --codec-quality; the others only what --codec-error allows", true},
+    Knob{"codec-quality", "1 to 100", "bytes", "low: blocks and ringing at edges, colours first", true},
+    Knob{"codec-error", "0 to 255 levels of 255, written 3 or 3/255", "0: up to twice the bytes of an error of 2",
+         "so many levels at most, in every pixel and channel, whatever the codec", true},
 };
 
 }  // namespace
@@ -61,10 +66,15 @@ std::span<const Knob> all_knobs() {
 
 const Knob& find_knob(const std::string& name) {
   const auto found = std::ranges::find(kKnobs, name, &Knob::name);
-  if (found != kKnobs.end()) return *found;
+  if (found != kKnobs.end() && !found->on_the_way) return *found;
+  if (found != kKnobs.end()) {
+    throw Error(ExitCode::Usage, fmt::format("'{}' changes no picture before it is sent", name),
+                "hpr bench codec SCENE measures what it costs and loses");
+  }
   std::vector<std::string> choices;
-  choices.reserve(kKnobs.size());
-  for (const Knob& knob : kKnobs) choices.emplace_back(knob.name);
+  for (const Knob& knob : kKnobs) {
+    if (!knob.on_the_way) choices.emplace_back(knob.name);
+  }
   throw Error(ExitCode::Usage, fmt::format("there is no knob '{}'", printable(name)), unknown_name_hint(name, choices));
 }
 
@@ -83,7 +93,8 @@ void set_knob(RenderOptions& options, const std::string& knob, const std::string
 std::string knobs_text() {
   std::string text =
       "Settings that trade speed for accuracy, options of `hpr render` and `hpr wall run` alike.\n"
-      "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene.\n";
+      "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene;\n"
+      "for those of pictures on their way to displays (`hpr wall run`) `hpr bench codec SCENE` does.\n";
   for (const Knob& knob : kKnobs) {
     text +=
         fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", knob.name, knob.range, knob.costs, knob.loses);

@@ -16,13 +16,14 @@
 #include <system_error>
 #include <utility>
 
+#include "app/terminal.h"
 #include "core/error.h"
 
 namespace hpr {
 namespace {
 
 /// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.
-constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
+constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
     {"OMPI_ALLOW_RUN_AS_ROOT", "1"},
     {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
     {"OMPI_MCA_rmaps_base_oversubscribe", "1"},
@@ -32,6 +33,7 @@ constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
     {"OMPI_MCA_btl", "self,vader,tcp"},
     {"OMPI_MCA_orte_execute_quiet", "1"},
     {"OMPI_MCA_opal_signal", ""},  // no stack dumps
+    {"HWLOC_COMPONENTS", "-gl"},   // asks X servers, also one that hangs, for nothing that is needed
 }};
 
 /// Tells rank 0, which reads from a pipe, that its launcher reads from a terminal.
@@ -40,8 +42,8 @@ constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
                          pid_t parent) {
-  // Ctrl-C is then for the parent alone, which passes on what it stands for.
-  if (options.interrupts == Interrupts::Stop) ::setpgid(0, 0);
+  // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
+  if (options.input == StandardInput::None) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
   if (options.input == StandardInput::None) {
@@ -49,10 +51,11 @@ constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
     if (null >= 0) ::dup2(null, STDIN_FILENO);
   }
   const bool typed = options.input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
-  if (stdout_pipe >= 0) ::dup2(stdout_pipe, STDOUT_FILENO);
+  ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
   if (typed) ::setenv(kTypedInput, "1", 1);
+  ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
   ::execvp(arguments.front(), arguments.data());
@@ -61,12 +64,22 @@ constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
 
 // The handler reaches nothing but globals.
 std::atomic<pid_t> launched = 0;
-std::atomic<bool> interrupted = false;
-std::atomic<int> early = 0;  ///< a signal that came before there was anybody to pass it to
+std::atomic<bool> stops = false;  ///< Interrupts::Stop
+std::atomic<int> interrupted_by = 0;
+std::atomic<bool> ends = false;  ///< nothing more is to be said
+std::atomic<int> early = 0;      ///< a signal that came before there was anybody to pass it to
 
 extern "C" void pass_on(int signal) {
   const int error = errno;
-  if (signal == SIGINT || signal == SIGTERM) signal = interrupted.exchange(true) ? SIGTERM : SIGUSR1;
+  if (signal == SIGINT || signal == SIGTERM || signal == SIGHUP) {
+    const bool again = interrupted_by.exchange(signal) != 0;
+    ends.store(again || !stops.load());
+    if (stops.load()) {
+      signal = again ? SIGTERM : SIGUSR1;
+    } else {
+      signal = again ? SIGKILL : SIGTERM;
+    }
+  }
   const pid_t to = launched.load();
   if (to > 0) {
     ::kill(to, signal);
@@ -76,21 +89,29 @@ extern "C" void pass_on(int signal) {
   errno = error;
 }
 
-/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks; with Interrupts::Stop also what
-/// interrupts.
+/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks, and so does what interrupts a
+/// job in a process group of its own: this process leaves when its ranks have. A second interrupt is not waited for.
 class PassedSignals {
  public:
-  explicit PassedSignals(Interrupts interrupts) : count_(interrupts == Interrupts::Stop ? kSignals.size() : 2) {
+  explicit PassedSignals(const JobOptions& options)
+      : count_(options.input == StandardInput::None ? kSignals.size() : 2) {
     launched.store(0);
     early.store(0);
-    interrupted.store(false);
+    interrupted_by.store(0);
+    ends.store(false);
+    stops.store(options.interrupts == Interrupts::Stop);
     struct sigaction action {};
     action.sa_handler = pass_on;
-    action.sa_flags = SA_RESTART;
-    for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &action, &before_.at(i));
+    for (std::size_t i = 0; i < count_; ++i) {
+      ::sigaction(kSignals.at(i), nullptr, &before_.at(i));
+      // What nohup, or a shell for its background, has us ignore stays ignored.
+      if (before_.at(i).sa_handler != SIG_IGN) ::sigaction(kSignals.at(i), &action, nullptr);
+    }
   }
   ~PassedSignals() {
     for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
+    // As if it had not been caught.
+    if (const int signal = interrupted_by.load(); signal != 0 && !stops.load()) ::raise(signal);
   }
   PassedSignals(const PassedSignals&) = delete;
   PassedSignals& operator=(const PassedSignals&) = delete;
@@ -103,19 +124,39 @@ class PassedSignals {
   static void to_nobody() { launched.store(0); }
 
  private:
-  static constexpr std::array kSignals{SIGUSR1, SIGUSR2, SIGINT, SIGTERM};
+  static constexpr std::array kSignals{SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
   std::size_t count_;  ///< of them, from the front
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
-std::string read_to_end(int pipe) {
-  std::string text;
+/// False with errno. A reader that stands still keeps nobody who wants to end this.
+bool write_all(int file, std::string_view text) {
+  while (!text.empty()) {
+    errno = EINTR;
+    const ssize_t written = ends.load() ? -1 : ::write(file, text.data(), text.size());
+    if (written < 0 && errno == EINTR && !ends.load()) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Collects what the job says on its standard output in `collected`, or says it here as it comes: mpiexec does not
+/// tell when nobody can take it. Returns the errno that ended that, and the job; 0: all was said.
+int hear_out(int pipe, std::string* collected, pid_t child) {
+  int failed = 0;
   std::array<char, 65536> buffer{};
   while (true) {
     const ssize_t got = ::read(pipe, buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return text;
-    text.append(buffer.data(), static_cast<std::size_t>(got));
+    if (got <= 0) return failed;
+    const std::string_view text(buffer.data(), static_cast<std::size_t>(got));
+    if (collected != nullptr) {
+      collected->append(text);
+    } else if (failed == 0 && !write_all(STDOUT_FILENO, text)) {
+      failed = errno;
+      if (!ends.load()) ::kill(child, SIGTERM);  // else it was told already, and twice is without mercy
+    }
   }
 }
 
@@ -170,10 +211,10 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   arguments.push_back(nullptr);
 
   std::array<int, 2> pipe{-1, -1};
-  if (options.captured_stdout != nullptr && ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   }
-  const PassedSignals passed(options.interrupts);
+  const PassedSignals passed(options);
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0)
@@ -181,16 +222,19 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   if (child == 0) become(arguments, options, pipe[1], parent);
   PassedSignals::to(child);
 
-  if (options.captured_stdout != nullptr) {
-    ::close(pipe[1]);
-    *options.captured_stdout = read_to_end(pipe[0]);
-    ::close(pipe[0]);
-  }
+  ::close(pipe[1]);
+  const int unsaid = hear_out(pipe[0], options.captured_stdout, child);
+  ::close(pipe[0]);
   int status = 0;
   while (::waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
   }
   PassedSignals::to_nobody();
+  if (unsaid != 0) {
+    throw Error(ExitCode::Io,
+                fmt::format("cannot write to standard output: {}", std::generic_category().message(unsaid)),
+                "free some space, or see who closed the pipe");
+  }
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <new>
@@ -21,6 +22,14 @@
 namespace hpr {
 namespace {
 
+/// CLI11 takes -1 for the largest number.
+std::string whole_number(const std::string& text) {
+  std::uint64_t number = 0;
+  const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (failed == std::errc() && end == text.data() + text.size()) return "";
+  return fmt::format("'{}' is no whole number from 0 to 2^64 - 1", printable(text));
+}
+
 void declare_globals(CLI::App& app, Globals& globals) {
   const auto group = [](CLI::Option* option) { option->group("Everywhere"); };
   group(app.add_flag_callback(
@@ -31,7 +40,7 @@ void declare_globals(CLI::App& app, Globals& globals) {
             ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast));
   group(app.add_option("--threads", globals.threads, "threads of one rank (default: cores / ranks of a host)")
             ->check(CLI::Range(1, 1024)));
-  group(app.add_option("--seed", globals.seed, "of everything random")->capture_default_str());
+  group(app.add_option("--seed", globals.seed, "of everything random")->check(whole_number)->capture_default_str());
   group(app.add_option("--backend", globals.backend, "OpenGL by: auto, egl, osmesa")->capture_default_str());
   group(
       app.add_option("--device", globals.device, "EGL device (default: by local rank)")->check(CLI::NonNegativeNumber));
@@ -153,9 +162,10 @@ ExitCode run(const std::vector<std::string>& words) {
   } catch (const CLI::ParseError& error) {
     throw usage_error(app, parsed, error);
   }
-  log::configure(globals.verbosity < 0    ? log::Level::Error
-                 : globals.verbosity == 0 ? log::Level::Info
-                                          : log::Level::Debug,
+  const bool listens = launched_rank() != 0 && globals.verbosity < 2;  // rank 0 speaks
+  log::configure(globals.verbosity < 0 || listens ? log::Level::Error
+                 : globals.verbosity == 0         ? log::Level::Info
+                                                  : log::Level::Debug,
                  "");
   (void)globals.scene_limits();  // malformed sizes and durations are found before any work
   (void)globals.hang_limit();
@@ -173,9 +183,12 @@ ExitCode run(const std::vector<std::string>& words) {
 int main(int argc, char** argv) {
   // A reader that goes away (hpr ... | head) shows as a failed write, not as a killed rank.
   std::signal(SIGPIPE, SIG_IGN);
+  // So does a file that may not grow further.
+  std::signal(SIGXFSZ, SIG_IGN);
   // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fcntl(standard, F_GETFD) < 0) (void)::open("/dev/null", O_RDWR);
+    // What is said on a closed stdout is lost, and that is an error where there is something to say.
+    if (::fcntl(standard, F_GETFD) < 0) (void)::open(standard == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR);
   }
   try {
     const hpr::ExitCode code = hpr::run(std::vector<std::string>(argv + 1, argv + argc));

@@ -26,6 +26,7 @@ OrbitCamera::OrbitCamera(const Camera& start, const Bounds& bounds) : camera_(st
   const double ahead = glm::dot(start.axes[2], start.eye - 0.5 * (bounds.low + bounds.high));
   distance_ = std::max(ahead, 0.1 * extent);
   nearest_ = 1e-4 * extent;
+  farthest_ = std::max(1e4 * extent, distance_);
 }
 
 void OrbitCamera::move(const OrbitInput& input) {
@@ -46,10 +47,13 @@ void OrbitCamera::move(const OrbitInput& input) {
 
   const double nearer = std::exp(-std::clamp(input.dolly, -10.0, 10.0));
   if (auto* const lens = std::get_if<OrthographicLens>(&camera_.lens)) {
-    lens->half_height *= nearer;
-    lens->half_width *= nearer;
+    const double low = std::min(nearest_, lens->half_height);
+    const double high = std::max(farthest_, lens->half_height);
+    const double factor = std::clamp(lens->half_height * nearer, low, high) / lens->half_height;
+    lens->half_height *= factor;
+    lens->half_width *= factor;
   } else {
-    distance_ = std::max(distance_ * nearer, nearest_);
+    distance_ = std::clamp(distance_ * nearer, nearest_, farthest_);
   }
   camera_.eye = target + distance_ * camera_.axes[2];
 }

@@ -12,6 +12,7 @@ class OrbitCamera {
   /// It looks at the middle of `bounds`, or at what lies as far away straight ahead.
   OrbitCamera(const Camera& start, const Bounds& bounds);
 
+  /// Stays at distances, and an orthographic camera at picture sizes, from which there is a way back.
   void move(const OrbitInput& input);
   /// The start's own bits until moved.
   [[nodiscard]] const Camera& camera() const { return camera_; }
@@ -21,6 +22,7 @@ class OrbitCamera {
   glm::dvec3 vertical_;
   double distance_;  ///< to what it looks at
   double nearest_;
+  double farthest_;
 };
 
 }  // namespace hpr

@@ -71,5 +71,26 @@ TEST(OrbitCamera, AnOrthographicCameraSeesLessInstead) {
   expect_near(orbit.camera().eye, camera.eye);
 }
 
+TEST(OrbitCamera, AfterAThousandNotchesEitherWayThereIsAWayBack) {
+  constexpr double kNotch = 0.15;
+  Camera flat = look_at({0.0, 0.0, 5.0}, {0.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.8);
+  flat.lens = OrthographicLens{.half_width = 2.0, .half_height = 1.0};
+  const auto seen = [](const OrbitCamera& orbit) {  // how much: by its distance, or its lens
+    const auto* const lens = std::get_if<OrthographicLens>(&orbit.camera().lens);
+    return lens != nullptr ? lens->half_height : orbit.camera().eye.z;
+  };
+  for (OrbitCamera orbit : {from_the_front(), OrbitCamera(flat, kBounds)}) {
+    const double start = seen(orbit);
+    for (const double way : {-kNotch, kNotch}) {
+      for (int i = 0; i < 1000; ++i) orbit.move({.dolly = way});
+      const double there = seen(orbit);
+      EXPECT_TRUE(way < 0.0 ? there > 1e3 * start : there < 1e-3 * start) << there;
+      int notches = 0;
+      for (; (way < 0.0) == (seen(orbit) > start) && notches < 100; ++notches) orbit.move({.dolly = -way});
+      EXPECT_LT(notches, 100);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hpr

@@ -5,10 +5,13 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "cluster/collectives.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/parallel.h"
 
 namespace hpr {
@@ -130,6 +133,15 @@ nlohmann::ordered_json not_finite_json(const RayCounts& rays) {
 
 }  // namespace
 
+void write_or_print(std::string_view text, const std::string& path, bool overwrite) {
+  if (path.empty()) {
+    fmt::print("{}", text);
+    return;
+  }
+  check_writable(path, overwrite);
+  write_file_atomically(path, text);
+}
+
 void write_stats(const std::filesystem::path& path, const RunStats& stats) {
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassTime& time : stats.times) {
@@ -163,6 +175,18 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
                       {"given_up", stats.budget->given_up}};
   }
   write_file_atomically(path, json.dump(2) + "\n");
+}
+
+void check_distinct(std::span<const std::string> paths) {
+  std::set<std::filesystem::path> named;
+  for (const std::string& path : paths) {
+    std::error_code error;
+    const std::filesystem::path plain = std::filesystem::absolute(path, error);
+    const std::filesystem::path place = std::filesystem::weakly_canonical(plain, error);
+    if (path.empty() || named.insert(error ? plain : place).second) continue;
+    throw Error(ExitCode::Usage, fmt::format("'{}' is named for two results", printable(path)),
+                "give each its own name");
+  }
 }
 
 }  // namespace hpr

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/frame.h"
@@ -82,6 +84,13 @@ struct FrameCost {
   return strict && stats.rays.not_finite > 0 ? ExitCode::CheckFailed : ExitCode::Done;
 }
 
+/// `text` to the file `path`, or to standard output where that is empty. Throws Error where the file is there and
+/// `overwrite` is not said, or cannot be written.
+void write_or_print(std::string_view text, const std::string& path, bool overwrite);
+
 void write_stats(const std::filesystem::path& path, const RunStats& stats);
+
+/// Throws Error (Usage) when two of these paths of results are one file. Empty ones are none.
+void check_distinct(std::span<const std::string> paths);
 
 }  // namespace hpr

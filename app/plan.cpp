@@ -5,6 +5,7 @@
 
 #include "app/frame.h"
 #include "app/primary_choice.h"
+#include "cluster/scene_distribution.h"
 #include "scene/surface_ranges.h"
 
 namespace hpr {
@@ -70,6 +71,13 @@ std::uint32_t photons_for(std::uint32_t most, std::span<const View> views) {
   return static_cast<std::uint32_t>(std::min<std::size_t>(most, std::max(pixels, kFewest)));
 }
 
+/// One rank composites nothing.
+void check_fits(const std::string& strategy, int ranks) {
+  if (ranks <= 1 || make_compositor(strategy)->fits(ranks)) return;
+  throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", strategy, ranks),
+              "choose other factors or another strategy, or another number of ranks (--ranks, --groups)");
+}
+
 }  // namespace
 
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
@@ -97,6 +105,10 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
                                       covering_surfaces(session.scene(), false));
   }
   plan.tiles = tiles_in(plan.layout, plan.mine.area);
+
+  if (!settings.strategy.empty()) {
+    agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });
+  }
 
   auto& lines = plan.explained;
   lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,

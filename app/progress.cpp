@@ -1,11 +1,12 @@
 #include "app/progress.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <utility>
+
+#include "app/terminal.h"
 
 namespace hpr {
 namespace {
@@ -16,31 +17,56 @@ constexpr std::size_t kBarWidth = 30;
 
 Progress::Progress(const std::string& mode, std::string what, std::size_t steps)
     : what_(std::move(what)), steps_(steps) {
-  const bool terminal = ::isatty(STDERR_FILENO) == 1;
+  const bool terminal = stderr_is_terminal();
   if (mode == "bar" || (mode == "auto" && terminal && steps != 1)) mode_ = Mode::Bar;
   if (mode == "line") mode_ = Mode::Line;
+}
+
+Progress::Progress(const std::string& mode, std::string what, std::size_t steps, const Pace& pace)
+    : Progress(mode, std::move(what), steps) {
+  pace_ = pace;
+  if (mode == "auto" && mode_ == Mode::None && !stderr_is_terminal()) mode_ = Mode::Log;
 }
 
 Progress::~Progress() {
   if (mode_ == Mode::Bar && drawn_) std::fputc('\n', stderr);
 }
 
-void Progress::show(std::size_t done, const std::string& detail) {
-  constexpr double kBetweenDrawings_ms = 50.0;
-  done_ = done;
-  const std::string count = steps_ == 0 ? fmt::format("{}", done_) : fmt::format("{}/{}", done_, steps_);
-  if (mode_ == Mode::Line) fmt::print(stderr, "hpr: {} {} {}\n", what_, count, detail);
-  if (mode_ != Mode::Bar) return;
-  if (drawn_ && done_ != steps_ && since_drawn_.ms() < kBetweenDrawings_ms) return;
-  if (steps_ == 0) {
-    fmt::print(stderr, "\r{} {} {}   ", what_, count, detail);
-  } else {
-    const std::size_t filled = kBarWidth * std::min(done_, steps_) / steps_;
-    fmt::print(stderr, "\r{} [{:<{}}] {} {}   ", what_, std::string(filled, '#'), kBarWidth, count, detail);
+bool Progress::due() const {
+  const auto passed = [&](std::chrono::duration<double> pace) { return since_drawn_.ms() >= 1000.0 * pace.count(); };
+  switch (mode_) {
+    case Mode::None:
+      return false;
+    case Mode::Bar:
+      return !drawn_ || done_ + 1 == steps_ || passed(pace_.terminal);
+    case Mode::Line:
+      return true;
+    case Mode::Log:
+      break;
   }
+  return passed(pace_.log);
+}
+
+void Progress::show(std::size_t done, const std::string& detail) {
+  done_ = done - 1;
+  const bool tell = due();
+  done_ = done;
+  if (!tell) return;
+  const std::string count = steps_ == 0 ? fmt::format("{}", done_) : fmt::format("{}/{}", done_, steps_);
+  since_drawn_.restart();
+  if (mode_ != Mode::Bar) {
+    fmt::print(stderr, "hpr: {} {} {}\n", what_, count, detail);
+    return;
+  }
+  std::string line = fmt::format("{} {} {}", what_, count, detail);
+  if (steps_ > 0) {
+    const std::size_t filled = kBarWidth * std::min(done_, steps_) / steps_;
+    line = fmt::format("{} [{:<{}}] {} {}", what_, std::string(filled, '#'), kBarWidth, count, detail);
+  }
+  fmt::print(stderr, "\r{:<{}}", line, std::max(line.size(), length_));
+  length_ = line.size();
   std::fflush(stderr);
   drawn_ = true;
-  since_drawn_.restart();
 }
 
 }  // namespace hpr

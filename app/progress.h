@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <string>
 
@@ -10,26 +11,40 @@ namespace hpr {
 /// Tells on stderr how far long work has come: a bar that redraws itself on a terminal, a line per step, or nothing.
 class Progress {
  public:
+  /// How often work that may go on for hours is told of.
+  struct Pace {
+    std::chrono::duration<double> terminal{1.0};
+    std::chrono::duration<double> log{10.0};
+  };
+
   /// `mode`: auto (a bar on a terminal, else nothing), bar, line or none. `what` names a step: "frame". `steps`: 0 when
   /// nobody knows how many.
   Progress(const std::string& mode, std::string what, std::size_t steps);
+  /// The same, but redraws the bar only so often, and where stderr is no terminal `auto` is a line every now and then.
+  Progress(const std::string& mode, std::string what, std::size_t steps, const Pace& pace);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void step(const std::string& detail) { show(done_ + 1, detail); }
+  /// False: nothing is ever told.
+  [[nodiscard]] bool tells() const { return mode_ != Mode::None; }
+  /// Whether the next step would be told of: what it takes to describe one may be saved otherwise.
+  [[nodiscard]] bool due() const;
   /// `done` steps in all are done. A bar is redrawn at most every 50 ms, but for the last step.
   void show(std::size_t done, const std::string& detail);
 
  private:
-  enum class Mode { None, Bar, Line };
+  enum class Mode { None, Bar, Line, Log };
 
   Mode mode_ = Mode::None;
   std::string what_;
   std::size_t steps_;
   std::size_t done_ = 0;
+  Pace pace_{std::chrono::milliseconds(50), std::chrono::seconds(10)};
   Stopwatch since_drawn_;
   bool drawn_ = false;
+  std::size_t length_ = 0;  ///< of the bar as it is drawn
 };
 
 }  // namespace hpr

@@ -17,6 +17,7 @@
 #include "cluster/collectives.h"
 #include "cluster/local_communicator.h"
 #include "cluster/mpi_communicator.h"
+#include "cluster/texts.h"
 #include "core/log.h"
 #include "core/parallel.h"
 
@@ -101,9 +102,9 @@ HostShare host_share(Communicator& comm, const Globals& globals) {
   HostShare share;
   share.host = mine;
   int ranks_here = 0;
-  const auto hosts = all_gather(comm, std::as_bytes(std::span(mine)));
+  const std::vector<std::string> hosts = all_gather_texts(comm, mine);
   for (int rank = 0; rank < comm.size(); ++rank) {
-    if (!std::ranges::equal(hosts[static_cast<std::size_t>(rank)], std::as_bytes(std::span(mine)))) continue;
+    if (hosts[static_cast<std::size_t>(rank)] != mine) continue;
     if (rank < comm.rank()) ++share.local_rank;
     ++ranks_here;
   }

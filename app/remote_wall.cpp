@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "app/launcher.h"
+#include "app/run_journal.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/log.h"
@@ -57,7 +58,10 @@ std::string link_token() {
 }
 
 void RemoteOptions::declare(CLI::App& app) {
-  const auto group = [](CLI::Option* option) { return option->group("With --display remote"); };
+  const auto group = [this](CLI::Option* option) {
+    declared_.push_back(option);
+    return option->group("With --display remote");
+  };
   group(app.add_option("--displays", displays, "where displays listen that are not on this machine"))
       ->delimiter(',')
       ->type_name("HOST=ADDR:PORT,...");
@@ -74,6 +78,16 @@ void RemoteOptions::declare(CLI::App& app) {
       ->capture_default_str();
   group(app.add_option("--codec-error", codec_error, "levels of 255 a shown colour may be off, e.g. 3/255"))
       ->capture_default_str();
+  group(
+      app.add_flag("--codec-deltas", codec_deltas, "send only the tiles that changed: for pictures that mostly stand"));
+}
+
+void RemoteOptions::refuse() const {
+  for (const CLI::Option* option : declared_) {
+    if (option->count() == 0) continue;
+    throw Error(ExitCode::Usage, fmt::format("{} is for displays outside the job", option->get_name()),
+                "add --display remote");
+  }
 }
 
 SenderSettings RemoteOptions::settings(const Wall& wall) const {
@@ -85,6 +99,7 @@ SenderSettings RemoteOptions::settings(const Wall& wall) const {
   settings.codec = codec;
   settings.codec_settings.quality = codec_quality;
   settings.codec_settings.error = levels_of(codec_error);
+  settings.codec_settings.deltas = codec_deltas;
   (void)make_codec(codec, settings.codec_settings);  // an unknown name is found before any work
   bool tcp = false;
   for (const std::string& entry : displays) {
@@ -124,7 +139,14 @@ std::unique_ptr<WallSender> connect_displays(Communicator& comm, const Wall& wal
   std::unique_ptr<WallSender> sender;
   agree_on_failure(comm, [&] {
     sender = std::make_unique<WallSender>(wall, owners, settings);
-    if (comm.rank() == 0) sender->wait_for_displays(kWaitForDisplays);
+    if (comm.rank() != 0) return;
+    try {
+      sender->wait_for_displays(kWaitForDisplays);
+    } catch (const Error&) {
+      // A display that refuses this job would refuse the next one.
+      if (auto journal = RunJournal::of_supervisor()) journal->add_end();
+      throw;
+    }
   });
   return sender;
 }

@@ -29,10 +29,16 @@ struct RemoteOptions {
   std::string codec = "auto";
   int codec_quality = 90;
   std::string codec_error = "0";  ///< "3", "3/255"
+  bool codec_deltas = false;
 
   void declare(CLI::App& app);
+  /// Throws Error (Usage) when one of them was given: nothing is sent to displays.
+  void refuse() const;
   /// Throws Error (Usage, Io) for what makes no sense for this wall. Without session, token and rank.
   [[nodiscard]] SenderSettings settings(const Wall& wall) const;
+
+ private:
+  std::vector<const CLI::Option*> declared_;
 };
 
 /// Collective. The link of each rank to the displays of its screens (`owners`: per screen the rank); rank 0 has waited

@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <optional>
-#include <set>
 
 #include "app/frame_sampler.h"
 #include "app/launcher.h"
@@ -92,12 +90,10 @@ class RenderCommand final : public Command {
       throw Error(ExitCode::Usage, "--resume goes on with the samples of a picture of several",
                   "ask for more with --spp, and name the picture with -o or the file with --checkpoint");
     }
-    std::set<std::filesystem::path> paths;
     const std::string beside = files_.is_png() ? files_.aov_file() : "";
-    for (const std::string& path : {files_.picture, files_.raw, options_.stats, beside, checkpoint_}) {
-      if (!path.empty() && !paths.insert(std::filesystem::weakly_canonical(path)).second) {
-        throw Error(ExitCode::Usage, fmt::format("'{}' is named for two results", path), "give each its own name");
-      }
+    const std::vector<std::string> results{files_.picture, files_.raw, options_.stats, beside, checkpoint_};
+    check_distinct(results);
+    for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
     }
   }

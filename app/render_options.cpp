@@ -277,6 +277,18 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   return settings;
 }
 
+std::vector<std::string> option_names() {
+  CLI::App app;
+  app.set_help_flag();
+  RenderOptions options;
+  options.declare(app);
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back(name);
+  }
+  return names;
+}
+
 void set_option(RenderOptions& options, const std::string& name, const std::string& value) {
   CLI::App app;
   options.declare(app);

@@ -69,6 +69,9 @@ struct RenderOptions {
   void settle_economies(FrameSettings& settings) const;
 };
 
+/// Of those RenderOptions declares, without their dashes.
+[[nodiscard]] std::vector<std::string> option_names();
+
 /// Sets one option, named without its dashes, as the command line would. Throws CLI::ParseError when there is none of
 /// this name or it does not take the value.
 void set_option(RenderOptions& options, const std::string& name, const std::string& value);

@@ -3,18 +3,18 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 
 #include "app/console/forgivable.h"
-#include "cluster/collectives.h"
+#include "app/console/hearing.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/stopwatch.h"
+#include "walls/link/bytes.h"
 #include "walls/link/hosts.h"
 #include "walls/link/socket.h"
 
@@ -23,32 +23,50 @@ namespace {
 
 constexpr std::string_view kPrefix = "wall-";
 constexpr std::string_view kSuffix = ".sock";
+constexpr std::string_view kRefused = "error ";  ///< then the exit code's number, and why
 
-/// A connected Unix socket; -1 where nobody listens.
-class Connection {
- public:
-  explicit Connection(const std::filesystem::path& path) : socket_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un name{};
-    name.sun_family = AF_UNIX;
-    const std::string text = path.string();
-    const bool fits = text.size() < sizeof name.sun_path;
-    if (fits) std::memcpy(name.sun_path, text.data(), text.size());
-    if (!fits || ::connect(socket_, reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0) {
-      ::close(socket_);
-      socket_ = -1;
+/// To the run that listens there. Throws LinkError.
+Socket connect_to(const std::filesystem::path& path) {
+  const LinkAddress address = socket_address(path);
+  Socket socket = start_connecting(address);
+  finish_connecting(socket, address.tcp);
+  return socket;
+}
+
+/// What a killed run left refuses; a run in the middle of a frame may be too busy to accept.
+bool is_left_over(const std::filesystem::path& path) {
+  try {
+    (void)connect_to(path);
+    return false;
+  } catch (const LinkError& error) {
+    return error.code() == ECONNREFUSED || error.code() == ENOENT;
+  }
+}
+
+/// Throws Error (Io).
+Socket call(const RunningWall& wall, const std::string& line) {
+  int code = 0;
+  try {
+    Socket socket = connect_to(wall.socket);
+    if (::send(socket.descriptor(), line.data(), line.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(line.size())) {
+      return socket;
     }
+  } catch (const LinkError& error) {
+    code = error.code();
   }
-  ~Connection() {
-    if (socket_ >= 0) ::close(socket_);
+  throw Error(ExitCode::Io, fmt::format("run {} does not answer", wall.run),
+              code == EAGAIN ? "too many wait for it already: try again after its frame"
+                             : "it may just have ended: hpr wall status");
+}
+
+/// `text`: "CODE why".
+[[noreturn]] void throw_refusal(const std::string& text) {
+  const std::size_t space = std::min(text.find(' '), text.size() - 1);
+  for (const ExitCode code : {ExitCode::BadInput, ExitCode::Io, ExitCode::Limit}) {
+    if (text.substr(0, space) == std::to_string(static_cast<int>(code))) throw Error(code, text.substr(space + 1));
   }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-
-  [[nodiscard]] int socket() const { return socket_; }
-
- private:
-  int socket_;
-};
+  throw Error(ExitCode::Usage, text.substr(space + 1), "hpr wall ctl help lists what can be said");
+}
 
 std::string last_line(const std::string& text) {
   if (!text.ends_with('\n')) return "";
@@ -64,8 +82,13 @@ std::filesystem::path control_folder() {
 }
 
 RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& options,
-                       std::function<std::string()> status)
-    : session_(session), controls_(session, globals, options, table_) {
+                       std::function<std::string()> status, std::function<void()> apply,
+                       std::function<void(const std::string&)> remember)
+    : session_(session),
+      controls_(session, globals, options, table_),
+      options_(options),
+      apply_(std::move(apply)),
+      remember_(std::move(remember)) {
   table_.add({"status", "", "what the wall shows and how long it takes, as JSON",
               [this, status](Words) { return session_.comm().rank() == 0 ? status() : std::string(); }});
   table_.add({"stop", "", "end the run after this frame", [this](Words) {
@@ -81,33 +104,49 @@ RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& 
   }
 }
 
-std::optional<std::string> RunControl::hear(std::chrono::milliseconds longest, std::optional<InputLine>& line) {
-  std::string said;
-  if (source_) line = source_->next(longest);
-  if (line) said = "+" + line->text;
-  std::vector<std::byte> bytes(std::as_bytes(std::span(said)).begin(), std::as_bytes(std::span(said)).end());
-  broadcast(session_.comm(), bytes);
-  if (bytes.empty()) return std::nullopt;
-  return std::string(reinterpret_cast<const char*>(bytes.data()) + 1, bytes.size() - 1);
+std::string RunControl::obey(const std::string& line) {
+  const std::uint64_t before = controls_.changes();
+  const RenderOptions options = options_;
+  std::string told = table_.run(line);
+  if (controls_.changes() == before) return told;
+  try {
+    apply_();
+  } catch (const Error& error) {
+    if (!is_forgivable(error)) throw;
+    options_ = options;
+    apply_();
+    throw;
+  }
+  remember_(line);
+  return told;
 }
 
-bool RunControl::attend(std::chrono::milliseconds longest) {
-  const std::uint64_t before = controls_.changes();
-  std::optional<InputLine> line;
-  while (const auto heard = hear(longest, line)) {
+void RunControl::replay(std::span<const std::string> lines) {
+  for (const std::string& line : lines) {
+    try {
+      (void)table_.run(line);
+    } catch (const Error& error) {
+      if (!is_forgivable(error)) throw;
+      log::warning("'{}' cannot be done again: {}", printable(line), error.what());
+    }
+  }
+}
+
+void RunControl::attend(std::chrono::milliseconds longest) {
+  std::optional<InputLine> from;
+  while (const auto line = hear_line(session_.comm(), source_ ? &*source_ : nullptr, longest, from).line) {
     std::string answer;
     try {
-      const std::string told = table_.run(*heard);
+      const std::string told = obey(*line);
       answer = told.empty() ? "ok\n" : told + "\nok\n";
     } catch (const Error& error) {
       if (!is_forgivable(error)) throw;
-      answer = fmt::format("error: {} ({})\n", error.what(), error.hint());
+      answer = fmt::format("{}{} {} ({})\n", kRefused, static_cast<int>(error.code()), error.what(), error.hint());
     }
-    if (line) source_->answer(*line, answer);
-    line.reset();
+    if (from) source_->answer(*from, answer);
+    from.reset();
     longest = {};
   }
-  return controls_.changes() != before;
 }
 
 std::vector<RunningWall> running_walls() {
@@ -116,7 +155,7 @@ std::vector<RunningWall> running_walls() {
   for (const auto& entry : std::filesystem::directory_iterator(control_folder())) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
-    if (Connection(entry.path()).socket() < 0) {
+    if (is_left_over(entry.path())) {
       std::filesystem::remove(entry.path(), ignored);
       continue;
     }
@@ -127,25 +166,18 @@ std::vector<RunningWall> running_walls() {
 }
 
 std::string ask(const RunningWall& wall, const std::string& line, std::chrono::milliseconds longest) {
-  const Connection connection(wall.socket);
-  const std::string said = line + "\n";
-  if (connection.socket() < 0 || ::send(connection.socket(), said.data(), said.size(), MSG_NOSIGNAL) < 0) {
-    throw Error(ExitCode::Io, fmt::format("run {} does not answer", wall.run),
-                "it may just have ended: hpr wall status");
-  }
+  const Socket socket = call(wall, line + "\n");
   const Stopwatch watch;
   std::string answer;
   while (true) {
     const std::string last = last_line(answer);
     if (last == "ok\n") return answer.substr(0, answer.size() - last.size());
-    if (last.starts_with("error: ")) {
-      throw Error(ExitCode::Usage, last.substr(7, last.size() - 8), "hpr wall ctl help lists what can be said");
-    }
-    pollfd ready{connection.socket(), POLLIN, 0};
-    const int left = static_cast<int>(static_cast<double>(longest.count()) - watch.ms());
+    if (last.starts_with(kRefused)) throw_refusal(last.substr(kRefused.size(), last.size() - kRefused.size() - 1));
+    pollfd ready{socket.descriptor(), POLLIN, 0};
+    const int left = static_cast<int>(std::min(static_cast<double>(longest.count()) - watch.ms(), 60'000.0));
     std::array<char, 4096> buffer{};
     if (left <= 0 || ::poll(&ready, 1, left) <= 0) break;
-    const ssize_t count = ::recv(connection.socket(), buffer.data(), buffer.size(), 0);
+    const ssize_t count = ::recv(socket.descriptor(), buffer.data(), buffer.size(), 0);
     if (count <= 0) break;
     answer.append(buffer.data(), static_cast<std::size_t>(count));
   }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "app/console/controls.h"
@@ -20,18 +21,29 @@ namespace hpr {
 class RunControl {
  public:
   /// Collective. All outlive this. `options`: what the commands change. `status`: one JSON document; called on rank 0.
-  RunControl(Session& session, const Globals& globals, RenderOptions& options, std::function<std::string()> status);
+  /// `apply`: called on all ranks after every line that changed something; where it throws what is_forgivable, the
+  /// options are put back and it is called again. `remember`: told every such line that could be applied.
+  RunControl(Session& session, const Globals& globals, RenderOptions& options, std::function<std::string()> status,
+             std::function<void()> apply, std::function<void(const std::string& line)> remember);
 
-  /// Collective. Carries out what was said, waiting for it at most `longest`; true when anything changed.
-  bool attend(std::chrono::milliseconds longest);
+  /// See Controls::keep().
+  void keep(const std::string& name, const std::string& why) { controls_.keep(name, why); }
+  /// Collective. Does once more what an earlier job of this run was told, without telling anybody.
+  void replay(std::span<const std::string> lines);
+
+  /// Collective. Carries out what was said, waiting for it at most `longest`.
+  void attend(std::chrono::milliseconds longest);
   [[nodiscard]] bool stops() const { return stops_; }
 
  private:
-  [[nodiscard]] std::optional<std::string> hear(std::chrono::milliseconds longest, std::optional<InputLine>& line);
+  [[nodiscard]] std::string obey(const std::string& line);
 
   Session& session_;
   CommandTable table_;
   Controls controls_;
+  RenderOptions& options_;
+  std::function<void()> apply_;
+  std::function<void(const std::string&)> remember_;
   std::optional<LineSource> source_;  ///< on rank 0
   bool stops_ = false;
 };
@@ -46,7 +58,7 @@ struct RunningWall {
 [[nodiscard]] std::vector<RunningWall> running_walls();
 
 /// Sends one line to a running wall and waits for its answer, at most `longest`. Throws Error: Io when nobody is there
-/// or the answer does not come; Usage when the wall refuses.
+/// or the answer does not come; what the wall's own error is (Usage, BadInput, Io, Limit) when it refuses.
 [[nodiscard]] std::string ask(const RunningWall& wall, const std::string& line, std::chrono::milliseconds longest);
 
 }  // namespace hpr

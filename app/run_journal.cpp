@@ -20,19 +20,20 @@ namespace {
 
 constexpr std::string_view kFrame = "frame ";
 constexpr std::string_view kRestart = "restart ";
+constexpr std::string_view kCommand = "command ";
 constexpr std::string_view kEnd = "end {}";
 
 }  // namespace
 
-RunJournal::RunJournal() : owns_(true) {
+RunJournal::RunJournal() {
   std::string name = (std::filesystem::temp_directory_path() / "hpr-run-XXXXXX").string();
-  const int file = ::mkstemp(name.data());
-  if (file < 0) {
+  file_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (file_ < 0) {
     throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", name, std::strerror(errno)),
                 "name a folder for temporary files in TMPDIR");
   }
-  ::close(file);
-  path_ = name;
+  ::unlink(name.c_str());
+  path_ = fmt::format("/proc/{}/fd/{}", ::getpid(), file_);
 }
 
 std::optional<RunJournal> RunJournal::of_supervisor() {
@@ -42,12 +43,11 @@ std::optional<RunJournal> RunJournal::of_supervisor() {
 }
 
 RunJournal::~RunJournal() {
-  std::error_code ignored;
-  if (owns_) std::filesystem::remove(path_, ignored);
+  if (file_ >= 0) ::close(file_);
 }
 
 RunJournal::RunJournal(RunJournal&& other) noexcept
-    : path_(std::move(other.path_)), owns_(std::exchange(other.owns_, false)) {}
+    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)) {}
 
 void RunJournal::append(const std::string& line) const {
   // One write: a job that is killed leaves whole lines and at most one part of one.
@@ -66,6 +66,11 @@ void RunJournal::add_restart(const std::string& why) {
   append(fmt::format("\n{}{}\n", kRestart, record.dump()));
 }
 
+void RunJournal::add_command(const std::string& line) {
+  append(fmt::format("{}{}\n", kCommand,
+                     nlohmann::json(line).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)));
+}
+
 void RunJournal::add_end() {
   append(fmt::format("{}\n", kEnd));
 }
@@ -82,6 +87,7 @@ RunJournal::Entries RunJournal::read() const {
     if (!nlohmann::json::accept(record)) continue;
     if (line.starts_with(kFrame)) entries.frames.push_back(record);
     if (line.starts_with(kRestart)) entries.restarts.push_back(record);
+    if (line.starts_with(kCommand)) entries.commands.push_back(nlohmann::json::parse(record).get<std::string>());
     entries.ended = entries.ended || line == kEnd;
   }
   return entries;

@@ -15,7 +15,7 @@ namespace hpr {
 /// again. Written by rank 0 and the supervisor, in turn.
 class RunJournal {
  public:
-  /// The supervisor's: a new file only this user may read; removed with this object.
+  /// The supervisor's: a new file only this user may read, without a name: gone with this process, however it ends.
   RunJournal();
   /// A job's: the file the supervisor named in the environment; none where nobody supervises.
   [[nodiscard]] static std::optional<RunJournal> of_supervisor();
@@ -25,6 +25,8 @@ class RunJournal {
 
   /// A frame is drawn and shown.
   void add_frame(const std::string& record);
+  /// The run was told this, and it changed something.
+  void add_command(const std::string& line);
   void add_restart(const std::string& why);
   /// The run came to its end, whatever its exit code.
   void add_end();
@@ -32,6 +34,7 @@ class RunJournal {
   struct Entries {
     std::vector<std::string> frames;    ///< records, in order
     std::vector<std::string> restarts;  ///< JSON objects: the frame that was to come, and why
+    std::vector<std::string> commands;  ///< lines, in order
     bool ended = false;
   };
   /// A last line that was cut short is none.
@@ -46,7 +49,7 @@ class RunJournal {
   void append(const std::string& line) const;
 
   std::filesystem::path path_;
-  bool owns_ = false;
+  int file_ = -1;  ///< the supervisor's
 };
 
 /// As run_ranks; where that starts a job of several ranks, one that loses a rank or stands still is started again, up

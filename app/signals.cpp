@@ -9,10 +9,12 @@ namespace {
 
 // Handlers reach nothing but globals.
 std::atomic<int> requested = 0;
+std::atomic<int> last = 0;
 static_assert(std::atomic<int>::is_always_lock_free);
 
 extern "C" void remember_request(int signal) {
   const int request = static_cast<int>(signal == SIGUSR2 ? Request::Write : Request::Stop);
+  last.store(signal);
   int before = requested.load();
   while (before < request && !requested.compare_exchange_weak(before, request)) {
   }
@@ -29,13 +31,19 @@ void watch_requests() {
 }
 
 void watch_interrupts() {
+  watch_requests();
   struct sigaction action {};
   action.sa_handler = remember_request;
-  action.sa_flags = SA_RESTART;
-  ::sigaction(SIGUSR1, &action, nullptr);
   action.sa_flags = static_cast<int>(SA_RESTART | static_cast<unsigned>(SA_RESETHAND));
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    ::sigaction(signal, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) ::sigaction(signal, &action, nullptr);  // nohup's wish stands
+  }
+}
+
+int last_signal() {
+  return last.load();
 }
 
 Request take_request() {

@@ -14,8 +14,11 @@ enum class Request : std::uint8_t {
 /// From now on SIGUSR1 and SIGUSR2 are remembered by this process instead of ending it.
 void watch_requests();
 
-/// From now on SIGUSR1, SIGINT and SIGTERM of this process are Request::Stop; a second SIGINT or SIGTERM ends it.
+/// The same, and SIGINT, SIGTERM and SIGHUP are Request::Stop; a second one of these three ends this process.
 void watch_interrupts();
+
+/// The signal that came last of those; 0: none.
+[[nodiscard]] int last_signal();
 
 /// The strongest request since the last call.
 [[nodiscard]] Request take_request();

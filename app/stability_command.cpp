@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "app/progress.h"
 #include "app/stability/stability.h"
@@ -30,6 +31,12 @@ class StabilityCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const std::vector<StabilityCase> cases = chosen_cases();
+    if (list_ && json_) {
+      nlohmann::ordered_json list = nlohmann::ordered_json::array();
+      for (const StabilityCase& one : cases) list.push_back({{"name", one.name}, {"about", one.about}});
+      fmt::print("{}\n", nlohmann::ordered_json{{"schema", "hpr.stability-cases/1"}, {"cases", list}}.dump(2));
+      return ExitCode::Done;
+    }
     if (list_) {
       for (const StabilityCase& one : cases) fmt::print("{:<20} {}\n", one.name, one.about);
       return ExitCode::Done;

@@ -125,7 +125,9 @@ class TradeoffCommand final : public Command {
       metrics_.push_back(report_.budget->metric);
     }
     how_.metrics = metrics_;
-    for (const std::string& path : {csv_, html_}) {
+    const std::vector<std::string> results{csv_, html_};
+    check_distinct(results);
+    for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }
   }

@@ -1,11 +1,15 @@
 #include "app/tradeoff.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/knobs.h"
 #include "core/error.h"
+#include "walls/codec.h"
 
 namespace hpr {
 namespace {
@@ -23,11 +27,23 @@ TradeoffPoint point(double ms, double flip, KnobValues knobs = {}) {
 
 TEST(Knobs, EachIsAnOptionThatTakesWhatItSays) {
   for (const Knob& knob : all_knobs()) {
+    EXPECT_NE(knobs_text().find("--" + std::string(knob.name)), std::string::npos);
+    if (knob.on_the_way) continue;
     RenderOptions options;
     const std::string range(knob.range);
     const std::string first = range.substr(0, range.find_first_of(",: "));
     EXPECT_NO_THROW(set_knob(options, std::string(knob.name), first)) << knob.name;
-    EXPECT_NE(knobs_text().find("--" + std::string(knob.name)), std::string::npos);
+  }
+}
+
+TEST(Knobs, ThoseOfPicturesOnTheirWayAreNotVaried) {
+  EXPECT_EQ(std::ranges::find(all_knobs(), "codec", &Knob::name)->range,
+            fmt::format("{}", fmt::join(all_codecs(), ", ")));
+  try {
+    (void)find_knob("codec");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.hint().find("bench codec"), std::string::npos);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "app/view_command.h"
 
+#include "app/launcher.h"
 #include "app/wall_run.h"
 #include "walls/displays/window_display.h"
 
@@ -29,9 +30,9 @@ class ViewCommand final : public Command {
   }
 
  private:
-  /// From what all ranks of this host find alike: the command line, and whether there is a desktop.
+  /// By the command line and, on rank 0, whether there is a desktop; the others will take its word.
   [[nodiscard]] std::string display() const {
-    if (address_.empty()) return has_desktop() ? "window" : "web";
+    if (address_.empty()) return launched_rank() == 0 && has_desktop() ? "window" : "web";
     return address_ == "true" ? "web" : "web=" + address_;  // a flag without a value is true
   }
 

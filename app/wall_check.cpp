@@ -15,6 +15,7 @@
 #include "walls/geometry.h"
 #include "walls/plan.h"
 #include "walls/stereo.h"
+#include "walls/warp_figures.h"
 
 namespace hpr {
 namespace {
@@ -66,6 +67,7 @@ struct RankNeed {
 /// Of each picture that is drawn: its keys, its radiance, the display colours that travel, and the screen's picture.
 constexpr std::uint64_t kBytesPerPixel = sizeof(Key) + sizeof(Rgb) + 2 * sizeof(Rgba8);
 
+/// Rays draw curved screens' own pixels; what OpenGL would need for them stands with their figures.
 /// Per rank that is named, and per node or the whole wall for the screens that name none.
 std::vector<RankNeed> needs_of(const Wall& wall) {
   std::vector<RankNeed> needs;
@@ -110,6 +112,22 @@ std::string describe_first_viewer(const Wall& wall, bool flat) {
   return fmt::format("viewer: none given; taken at {:g}, {:g}, {:g} m\n", at.x, at.y, at.z);
 }
 
+std::string describe_warp(const Wall& wall, const WarpFigures& figures) {
+  const WallScreen& screen = wall.screens[figures.screen];
+  std::string text = fmt::format("warp of \"{}\": ", screen.id);
+  if (figures.curve) {
+    text += fmt::format("{} points, {:.1f} x {:.1f} degrees for the viewer, {}x{} px as OpenGL draws it flat, ",
+                        figures.mesh_size, figures.curve->width_degrees, figures.curve->height_degrees,
+                        figures.curve->flat_pixels.width, figures.curve->flat_pixels.height);
+  } else if (figures.mesh_size > 0) {
+    text += fmt::format("{} triangles, ", figures.mesh_size);
+  }
+  text += fmt::format("{:.2f} % of its pixels lit", 100.0 * figures.lit);
+  if (screen.warp.light) text += ", blended";
+  if (screen.warp.floor) text += ", with a floor of black";
+  return text + "\n";
+}
+
 /// One line each for further viewers, trackers, stereo and monitors.
 std::string describe_more(const Wall& wall) {
   std::string text;
@@ -132,6 +150,7 @@ std::string describe_more(const Wall& wall) {
     text += fmt::format("stereo: {}, {} pictures for {}\n", stereo_names().at(static_cast<std::size_t>(wall.stereo)),
                         screen_eyes(wall).size(), plural(wall.screens.size(), "screen"));
   }
+  for (const WarpFigures& figures : warp_figures(wall)) text += describe_warp(wall, figures);
   for (const WallMonitor& monitor : wall.monitors) {
     text += fmt::format("monitor \"{}\": {} on {}x{} px\n", monitor.id, monitor.surface, monitor.pixels.width,
                         monitor.pixels.height);
@@ -151,6 +170,26 @@ Json memory_json(const Wall& wall) {
                          {"bytes", need.bytes}});
   }
   return Json{{"bytes_per_pixel", kBytesPerPixel}, {"bytes", sum_of(needs)}, {"ranks", std::move(ranks)}};
+}
+
+Json warps_json(const Wall& wall) {
+  Json warps = Json::array();
+  for (const WarpFigures& figures : warp_figures(wall)) {
+    const WallScreen& screen = wall.screens[figures.screen];
+    const char* const kind = figures.curve ? "positions" : "mesh";
+    Json warp{{"screen", screen.id},
+              {"mesh", figures.mesh_size > 0 ? Json(kind) : Json(nullptr)},
+              {"mesh_size", figures.mesh_size},
+              {"lit_percent", std::round(10'000.0 * figures.lit) / 100.0},
+              {"blend", screen.warp.light != nullptr},
+              {"black", screen.warp.floor != nullptr}};
+    if (figures.curve) {
+      warp["degrees"] = Json{figures.curve->width_degrees, figures.curve->height_degrees};
+      warp["flat_pixels"] = Json{figures.curve->flat_pixels.width, figures.curve->flat_pixels.height};
+    }
+    warps.push_back(std::move(warp));
+  }
+  return warps;
 }
 
 double tenths(double value) {
@@ -217,6 +256,7 @@ std::string check_json(const WallCheck& check) {
     document["viewers"] = wall.viewers.size();
     document["stereo"] = stereo_names().at(static_cast<std::size_t>(wall.stereo));
     document["pictures"] = screen_eyes(wall).size();
+    document["warps"] = warps_json(wall);
     document["memory"] = memory_json(wall);
   }
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -1,18 +1,21 @@
 #include "app/wall_command.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
-#include <system_error>
 
 #include "app/output.h"
 #include "app/wall_import.h"
+#include "app/wall_init.h"
+#include "app/wall_pattern.h"
 #include "app/wall_remote.h"
 #include "app/wall_run.h"
+#include "app/wall_script.h"
 #include "core/file.h"
 #include "core/names.h"
 #include "image/image_io.h"
-#include "walls/pattern.h"
+#include "walls/heat.h"
 #include "walls/plan.h"
 #include "walls/wall_schema.h"
 
@@ -22,10 +25,11 @@ namespace {
 class WallCommand final : public Command {
  public:
   [[nodiscard]] std::string_view name() const override { return "wall"; }
-  [[nodiscard]] std::string_view summary() const override { return "check, draw, expand or drive a wall of screens"; }
+  [[nodiscard]] std::string_view summary() const override { return "describe, check, draw or drive a wall of screens"; }
 
   void declare(CLI::App& app) override {
     app.require_subcommand(1);
+    add(app, make_wall_init_command());
     CLI::App& check = add(app, "check", "every error and oddity in a wall file");
     check.add_flag("--json", json_, "print one JSON document (hpr.wall-check/1)");
     declare_overrides(check, overrides_);
@@ -33,6 +37,12 @@ class WallCommand final : public Command {
 
     CLI::App& plan = add(app, "plan", "a picture of where the screens are and who drives them");
     plan.add_option("-o,--output", output_, "the picture")->required()->type_name("FILE.(svg|png)");
+    plan.add_option("--heat", heat_, "colour screens by what a run measured: its manifest")
+        ->type_name("DIR/manifest.json");
+    plan.add_option("--by", heat_by_, fmt::format("of the manifest: {}", fmt::join(heat_names(), ", ")))
+        ->capture_default_str()
+        ->needs("--heat");
+    declare_overrides(plan, overrides_);
     plan.callback([this] { action_ = [this](const Globals& globals) { return this->plan(globals); }; });
 
     CLI::App& expand = add(app, "expand", "the same wall as TOML with its grids written out");
@@ -47,23 +57,16 @@ class WallCommand final : public Command {
       };
     });
 
-    CLI::App& pattern = add(app, "pattern", "calibration pictures, one per screen");
-    pattern.add_option("-o,--output", output_, "where <screen id>.png go")->required()->type_name("DIR");
-    pattern.callback([this] { action_ = [this](const Globals& globals) { return this->pattern(globals); }; });
-
+    add(app, make_wall_pattern_command());
+    add(app, make_wall_import_command());
+    add(app, make_wall_script_command());
     CLI::App& run = *app.add_subcommand(std::string(run_->name()), std::string(run_->summary()));
     run_->declare(run);
     run.callback([this] {
       runs_ = true;
       action_ = [this](const Globals& globals) { return run_->run(globals); };
     });
-    others_.push_back(make_wall_import_command());
-    for (const auto& command : others_) {
-      CLI::App& sub = *app.add_subcommand(std::string(command->name()), std::string(command->summary()));
-      command->declare(sub);
-      sub.callback(
-          [this, &command] { action_ = [&command](const Globals& globals) { return command->run(globals); }; });
-    }
+    for (auto& command : make_wall_remote_commands()) add(app, std::move(command));
   }
 
   /// Only `run` draws; the rest reads a file and answers.
@@ -71,6 +74,15 @@ class WallCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override { return action_(globals); }
 
  private:
+  /// A subcommand in a file of its own.
+  void add(CLI::App& app, std::unique_ptr<Command> command) {
+    Command* const its = command.get();
+    others_.push_back(std::move(command));
+    CLI::App& sub = *app.add_subcommand(std::string(its->name()), std::string(its->summary()));
+    its->declare(sub);
+    sub.callback([this, its] { action_ = [its](const Globals& globals) { return its->run(globals); }; });
+  }
+
   CLI::App& add(CLI::App& app, const std::string& name, const std::string& summary) {
     CLI::App& sub = *app.add_subcommand(name, summary);
     sub.add_option("wall", wall_, "a wall file, or CxR, or CxR@WxH")->required()->type_name("WALL");
@@ -95,11 +107,18 @@ class WallCommand final : public Command {
                   "choose a name that ends in .svg or .png");
     }
     check_writable(output_, globals.force);
-    const Wall wall = load_wall(wall_);
+    const Wall wall = load_wall(wall_, overrides_);
+    std::optional<WallHeat> heat;
+    if (!heat_.empty()) {
+      const std::string file =
+          std::filesystem::is_directory(heat_) ? (std::filesystem::path(heat_) / "manifest.json").string() : heat_;
+      heat = wall_heat(wall, load_manifest(file), file, heat_by_);
+    }
+    const WallHeat* const colors = heat ? &*heat : nullptr;
     if (extension == ".svg") {
-      write_file_atomically(output_, wall_plan_svg(wall));
+      write_file_atomically(output_, wall_plan_svg(wall, colors));
     } else {
-      write_png(output_, wall_plan_image(wall));
+      write_png(output_, wall_plan_image(wall, colors));
     }
     return ExitCode::Done;
   }
@@ -109,28 +128,14 @@ class WallCommand final : public Command {
     return ExitCode::Done;
   }
 
-  [[nodiscard]] ExitCode pattern(const Globals& globals) const {
-    const Wall wall = load_wall(wall_);
-    const std::filesystem::path folder(output_);
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) {
-      throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()),
-                  "name a folder that can be written with -o");
-    }
-    const auto path_of = [&](const WallScreen& screen) { return folder / (screen.id + ".png"); };
-    for (const WallScreen& screen : wall.screens) check_writable(path_of(screen), globals.force);
-    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
-    for (std::size_t i = 0; i < wall.screens.size(); ++i) write_png(path_of(wall.screens[i]), wall_pattern(wall, i));
-    return ExitCode::Done;
-  }
-
   std::string wall_;
   std::vector<std::string> overrides_;
   std::string output_;
+  std::string heat_;
+  std::string heat_by_ = "ms";
   bool json_ = false;
   std::unique_ptr<Command> run_ = make_wall_run_command();
-  std::vector<std::unique_ptr<Command>> others_ = make_wall_remote_commands();
+  std::vector<std::unique_ptr<Command>> others_;
   bool runs_ = false;
   std::function<ExitCode(const Globals&)> action_;
 };

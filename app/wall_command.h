@@ -24,7 +24,7 @@ void report_findings(const WallCheck& check);
 /// The same as JSON, schema hpr.wall-check/1.
 [[nodiscard]] std::string check_json(const WallCheck& check);
 
-/// `hpr wall check|plan|expand|schema|pattern|import|run|status|ctl|stop`.
+/// `hpr wall init|check|plan|expand|schema|pattern|import|script|run|status|ctl|stop`.
 [[nodiscard]] std::unique_ptr<Command> make_wall_command();
 
 }  // namespace hpr

@@ -1,86 +1,47 @@
 #include "app/wall_driver.h"
 
+#include <fmt/format.h>
 #include <hpr/version.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "app/remote_wall.h"
+#include "app/screen_owners.h"
 #include "app/signals.h"
+#include "app/wall_status.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
+#include "cluster/texts.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "walls/geometry.h"
 #include "walls/link/sender.h"
+#include "walls/manifest_file.h"
 
 namespace hpr {
 namespace {
 
-/// A rank that writes pictures first loads the image module, which costs as much as encoding this many pixels.
-constexpr std::size_t kPixelsWorthAWriter = 4'000'000;
-
-/// Per screen the rank that shows it: the one the wall file names, else one on the screen's host, else any: no more
-/// ranks than the pixels keep busy, each with neighbouring screens. `remote`: displays outside the job show them.
-std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hosts, bool remote) {
-  const int ranks = static_cast<int>(hosts.size());
-  std::size_t pixels = 0;
-  for (const WallScreen& screen : wall.screens) pixels += screen.pixels.area();
-  const std::size_t writers = std::clamp<std::size_t>(pixels / kPixelsWorthAWriter, 1, hosts.size());
-
-  std::vector<int> owners;
-  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
-    const WallScreen& screen = wall.screens[i];
-    const auto node = std::ranges::find(wall.nodes, screen.node, &WallNode::id);
-    const auto same_window =
-        std::ranges::find(wall.screens.begin(), wall.screens.begin() + static_cast<std::ptrdiff_t>(i), screen.window,
-                          &WallScreen::window);
-    if (!screen.window.empty() && same_window != wall.screens.begin() + static_cast<std::ptrdiff_t>(i)) {
-      owners.push_back(owners[static_cast<std::size_t>(same_window - wall.screens.begin())]);
-      continue;
-    }
-    std::vector<int> on_its_host;
-    for (int rank = 0; rank < ranks; ++rank) {
-      if (node != wall.nodes.end() && node->host == hosts[static_cast<std::size_t>(rank)]) on_its_host.push_back(rank);
-    }
-    if (screen.rank >= 0 && screen.rank < ranks) {
-      owners.push_back(screen.rank);
-    } else if (!on_its_host.empty()) {
-      owners.push_back(on_its_host[i % on_its_host.size()]);
-    } else {
-      owners.push_back(static_cast<int>(i * writers / wall.screens.size()));
-    }
-    const bool any_host = node == wall.nodes.end() || node->host == "localhost" || node->host == "*";
-    if (screen.rank < 0 && on_its_host.empty() && !any_host && !remote) {
-      log::warning("no rank runs on host '{}' of screen '{}': rank {} shows it", node->host, screen.id, owners.back());
-    }
-    if (screen.rank >= ranks) {
-      log::warning("screen '{}' belongs to rank {}, but there are only {}: rank {} shows it", screen.id, screen.rank,
-                   ranks, owners.back());
-    }
-  }
-  return owners;
-}
-
 /// Of each picture that is drawn, its screen's rank.
-Showing showing_of(const Wall& wall, const std::vector<int>& owners, double exposure_stops) {
-  Showing showing;
-  for (const ScreenEye& picture : screen_eyes(wall)) {
-    showing.sizes.push_back(picture.pixels);
-    showing.shown_by.push_back(owners[picture.screen]);
-  }
-  showing.exposure_stops = exposure_stops;
-  return showing;
+std::vector<int> picture_owners(const Wall& wall, const std::vector<int>& owners) {
+  std::vector<int> shown_by;
+  for (const ScreenEye& picture : screen_eyes(wall)) shown_by.push_back(owners[picture.screen]);
+  return shown_by;
 }
 
-std::vector<std::string> hosts_of(Communicator& comm, const std::string& mine) {
-  std::vector<std::string> hosts;
-  for (const auto& name : all_gather(comm, std::as_bytes(std::span(mine)))) {
-    hosts.emplace_back(reinterpret_cast<const char*>(name.data()), name.size());
-  }
-  return hosts;
+bool has_points(const WallScreen& screen) {
+  return screen.warp.points != nullptr;
+}
+
+/// OpenGL needs other pictures than rays where screens are no planes, so the choice cannot be left to a measurement.
+FrameSettings settings_for(const Wall& wall, FrameSettings settings) {
+  const bool curved = std::ranges::any_of(wall.screens, has_points);
+  if (curved && settings.primary == Primary::Auto) settings.primary = Primary::Rays;
+  return settings;
 }
 
 /// A viewer who moves the camera waits no longer for a frame, unless told otherwise.
@@ -121,20 +82,23 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
       start_(run.options.choose_camera(session.scene())),
       fov_degrees_(run.options.fov_degrees),
       orbit_(start_, session.scene().bounds),
-      control_(session, globals, options_, [this] { return status(); }),
-      owners_(owners_of(wall, hosts_of(session.comm(), session.host()), run.display.remote())),
-      showing_(showing_of(wall, owners_, run.options.exposure)) {
-  if (run.display.kind().whole_wall) {
-    std::ranges::fill(owners_, 0);
-    showing_ = showing_of(wall, owners_, run.options.exposure);
-  }
-  frames_.emplace(session, settings, sampling_of(run), screens_in(0, resting_heads(wall)), target_of(run),
-                  resting_of(run));
+      control_(
+          session, globals, options_, [this] { return status(); }, [this] { plan_frames(); },
+          [this](const std::string& line) {
+            if (journal_) journal_->add_command(line);
+          }),
+      hosts_(all_gather_texts(session.comm(), session.host())),
+      owners_(owners_of(wall, hosts_, run.display.remote())) {
+  control_.keep("aov", "a wall shows pictures alone");
+  if (path_) control_.keep("camera", "it follows --path");
+  if (run.display.kind().whole_wall) std::ranges::fill(owners_, 0);
+  start_frames(settings, run);
   if (run.display.remote()) remote_ = connect_displays(session_.comm(), wall, owners_, run.remote);
   agree_on_failure(session_.comm(), [&] {
     DisplayOptions options = run.display.options(globals);
+    options.screens.emplace();
     for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
-      if (owners_[screen] == session_.comm().rank()) options.screens.push_back(screen);
+      if (owners_[screen] == session_.comm().rank()) options.screens->push_back(screen);
     }
     if (shows_any() && !remote_) display_ = run.display.kind().make(wall, options);
   });
@@ -146,42 +110,103 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
   take_over();
 }
 
-/// What an earlier job of this run did before it was lost.
+/// `run`: with its options as they are now.
+void WallDriver::start_frames(const FrameSettings& settings, const WallRun& run) {
+  const std::vector<View> views = screens_in(0, resting_heads(wall_));
+  const FrameSettings used = settings_for(wall_, settings);
+  curved_.emplace(views, used.primary == Primary::Rays);
+  for (const Size& size : curved_->sizes()) check_size(size, globals_);
+  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), run.options.exposure};
+  frames_.emplace(session_, used, sampling_of(run), curved_->drawn(views), target_of(run), resting_of(run));
+}
+
+std::vector<std::string> WallDriver::explained() const {
+  std::vector<std::string> lines = plan().explained;
+  std::size_t flat = 0;
+  const std::vector<ScreenEye> pictures = screen_eyes(wall_);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    if (has_points(wall_.screens[pictures[i].screen])) flat += curved_->sizes()[i].area();
+  }
+  if (flat == 0) return lines;
+  const auto count = std::ranges::count_if(wall_.screens, has_points);
+  const std::string what = fmt::format("warp: position maps of {} screen{}", count, count == 1 ? "" : "s");
+  lines.push_back(plan().primary == Primary::Rays
+                      ? what + ", rays go through their points"
+                      : fmt::format("{}, seen in flat pictures of {:.2f} million pixels (rays would be exact)", what,
+                                    static_cast<double>(flat) * 1e-6));
+  return lines;
+}
+
+/// What an earlier job of this run did before it was lost, or stopped.
 void WallDriver::take_over() {
-  std::uint64_t done = 0;
-  auto journal = session_.comm().rank() == 0 ? RunJournal::of_supervisor() : std::nullopt;
-  if (journal) {
-    journal_.emplace(std::move(*journal));
-    RunJournal::Entries entries = journal_->read();
+  std::string told = "[]";
+  agree_on_failure(session_.comm(), [&] {
+    if (session_.comm().rank() != 0) return;
+    RunJournal::Entries entries;
+    if (auto journal = RunJournal::of_supervisor()) {
+      journal_.emplace(std::move(*journal));
+      entries = journal_->read();
+    }
+    told = nlohmann::json(entries.commands).dump();
+    if (run_.resume && entries.frames.empty()) resume(entries.frames);
     if (!run_.open_ended()) {
       // The last picture is needed for what is written at the end.
       const auto most = static_cast<std::size_t>(run_.frames.value_or(1) - 1);
       entries.frames.resize(std::min(entries.frames.size(), most));
-      done = entries.frames.size();
+      first_frame_ = entries.frames.size();
       manifest_.earlier = std::move(entries.frames);
     }
-    manifest_.restarts = std::move(entries.restarts);
+    std::ranges::move(entries.restarts, std::back_inserter(manifest_.restarts));
+  });
+  first_frame_ = all_gather_value(session_.comm(), first_frame_)[0];
+  replay(told);
+}
+
+/// `told`: on rank 0, a JSON array of the lines the run was told before.
+void WallDriver::replay(const std::string& told) {
+  const auto lines = nlohmann::json::parse(broadcast_text(session_.comm(), told)).get<std::vector<std::string>>();
+  if (lines.empty()) return;
+  control_.replay(lines);
+  plan_frames();
+}
+
+/// Goes on after what the folder's manifest has, where there is one.
+void WallDriver::resume(std::vector<std::string>& frames) {
+  std::error_code error;
+  if (!std::filesystem::exists(run_.manifest(), error)) return;
+  ManifestFile before = load_manifest(run_.manifest().string());
+  const int asked = run_.frames.value_or(1);
+  std::string other;
+  if (before.wall_hash != manifest_.wall_hash) other = "another wall";
+  if (before.scene_hash != manifest_.scene_hash) other = "another scene";
+  if (before.seed != manifest_.seed) other = fmt::format("seed {}", before.seed);
+  if (before.stopped_of && *before.stopped_of != asked) other = fmt::format("{} frames", *before.stopped_of);
+  if (!other.empty()) {
+    throw Error(ExitCode::BadInput, fmt::format("'{}' is of a run with {}", run_.manifest().string(), other),
+                "go on with the same command line, or begin anew with --force in place of --resume");
   }
-  first_frame_ = all_gather_value(session_.comm(), done)[0];
+  log::info("going on after {} of {} frames", before.frames.size(), asked);
+  frames = std::move(before.frames);
+  manifest_.restarts = std::move(before.restarts);
+  // A job that is lost from here on starts again from all that was done.
+  if (journal_) std::ranges::for_each(frames, [&](const std::string& frame) { journal_->add_frame(frame); });
 }
 
 bool WallDriver::obey() {
-  if (control_.attend(std::chrono::milliseconds(0))) plan_frames();
+  control_.attend(std::chrono::milliseconds(0));
   return !control_.stops();
 }
 
 void WallDriver::plan_frames() {
   WallRun changed = run_;
   changed.options = options_;
-  showing_.exposure_stops = options_.exposure;
   const Camera start = options_.choose_camera(session_.scene());
   if (start.eye != start_.eye || start.axes != start_.axes || options_.fov_degrees != fov_degrees_) {
     orbit_ = OrbitCamera(start, session_.scene().bounds);
     start_ = start;
     fov_degrees_ = options_.fov_degrees;
   }
-  frames_.emplace(session_, options_.settings(globals_.seed), sampling_of(changed), screens_in(0, resting_heads(wall_)),
-                  target_of(run_), resting_of(changed));
+  start_frames(options_.settings(globals_.seed), changed);
 }
 
 std::string WallDriver::status() const {
@@ -190,8 +215,9 @@ std::string WallDriver::status() const {
   Json restarts = Json::array();
   const bool drawn = !manifest_.frames.empty();
   if (drawn) {
-    for (const ScreenRecord& screen : manifest_.frames.back().screens) {
-      screens.push_back(Json{{"id", screen.id}, {"state", to_string(screen.state)}});
+    const std::vector<ScreenState> now = states();
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      screens.push_back(Json{{"id", wall_.screens[i].id}, {"state", to_string(now[i])}});
     }
   }
   for (const std::string& restart : manifest_.restarts) restarts.push_back(Json::parse(restart));
@@ -213,8 +239,11 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   last_heads_ = heads_.at(number);
-  Frame& frame = frames_->make(screens_in(number, last_heads_), number, progress);
-  pictures_ = compose_screens(wall_, bring_to_screens(session_, frame, frames_->blocks(), showing_));
+  const std::vector<View> views = screens_in(number, last_heads_);
+  Frame& frame = frames_->make(curved_->drawn(views), number, progress);
+  std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
+  curved_->finish(views, pictures, session_.threads());
+  pictures_ = compose_screens(wall_, std::move(pictures));
   copies_ = monitors_.draw(session_.comm(), pictures_, owners_);
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   agree_on_failure(session_.comm(), [&] { show(number); });
@@ -222,20 +251,26 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
 }
 
 bool WallDriver::follow_viewers() {
-  DisplayInput mine = display_ ? display_->take_input() : DisplayInput{};
-  if (run_.open_ended() && take_request() == Request::Stop) mine.stop = true;
+  struct Asked {
+    DisplayInput input;
+    bool interrupt = false;
+  };
+  const Asked mine{display_ ? display_->take_input() : DisplayInput{}, take_request() == Request::Stop};
   OrbitInput motion;
   bool stop = false;
-  for (const DisplayInput& input : all_gather_value(session_.comm(), mine)) {
-    motion += input.orbit;
-    stop = stop || input.stop;
+  for (const Asked& asked : all_gather_value(session_.comm(), mine)) {
+    motion += asked.input.orbit;
+    stop = stop || asked.input.stop;
+    interrupted_ = interrupted_ || asked.interrupt;
   }
   orbit_.move(motion);
-  return !stop;
+  return !stop && !interrupted_;
 }
 
-bool WallDriver::settled() const {
-  return !path_ && frames_->refined(screens_in(0, last_heads_));
+bool WallDriver::settled() {
+  const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
+  if (path_ || heads_.plays_on(last)) return false;
+  return frames_->refined(curved_->drawn(screens_in(0, heads_.at(last + 1))));
 }
 
 bool WallDriver::finish() {
@@ -267,7 +302,7 @@ std::vector<View> WallDriver::screens_in(std::uint64_t frame, std::span<const He
 }
 
 bool WallDriver::shows_any() const {
-  const bool shows_monitors = monitors_.any() && session_.comm().rank() == 0;
+  const bool shows_monitors = run_.display.kind().monitors && monitors_.any() && session_.comm().rank() == 0;
   return shows_monitors || std::ranges::find(owners_, session_.comm().rank()) != owners_.end();
 }
 
@@ -286,22 +321,37 @@ void WallDriver::show(std::uint64_t number) {
   display_->show({number, mine, monitors});
 }
 
-/// Every rank hashes what it showed; rank 0 writes it down.
-void WallDriver::record(std::uint64_t number) {
-  std::vector<std::uint64_t> hashes(owners_.size(), 0);
-  for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
-    if (owners_[screen] == session_.comm().rank()) {
-      hashes[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
+/// Every rank tells of what it showed: the screens' records, on rank 0.
+std::vector<ScreenRecord> WallDriver::record_screens() {
+  // Per screen its hash, its bytes, and the microseconds it took and one; 0: not known.
+  const std::size_t count = owners_.size();
+  std::vector<std::uint64_t> told(3 * count, 0);
+  for (std::size_t screen = 0; screen < count; ++screen) {
+    if (owners_[screen] != session_.comm().rank()) continue;
+    told[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
+  }
+  for (const ScreenCost& cost : remote_ ? remote_->costs() : display_ ? display_->costs() : std::vector<ScreenCost>()) {
+    told[count + cost.screen] = cost.bytes;
+    told[2 * count + cost.screen] = static_cast<std::uint64_t>(1000.0 * cost.ms) + 1;
+  }
+  session_.comm().reduce_max(told, 0);  // all but the owner's are 0
+  std::vector<ScreenRecord> screens;
+  for (std::size_t i = 0; i < count; ++i) {
+    ScreenRecord screen{wall_.screens[i].id, wall_.screens[i].pixels, told[i], ScreenState::Fresh, owners_[i]};
+    if (const std::uint64_t microseconds = told[2 * count + i]; microseconds > 0) {
+      screen.ms = static_cast<double>(microseconds - 1) / 1000.0;
+      screen.bytes = told[count + i];
     }
+    screens.push_back(std::move(screen));
   }
+  return screens;
+}
+
+void WallDriver::record(std::uint64_t number) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
-  session_.comm().reduce_max(hashes, 0);  // all but the owner's are 0
   frames_->took(slowest);
-  FrameRecord frame{number, slowest, strategy(), {}, frames_->report()};
-  for (std::size_t screen = 0; screen < hashes.size(); ++screen) {
-    frame.screens.push_back(
-        {wall_.screens[screen].id, wall_.screens[screen].pixels, hashes[screen], ScreenState::Fresh});
-  }
+  FrameRecord frame{number, slowest, strategy(), record_screens(), frames_->report()};
+  frame.slowest = slowest_of(session_, *frames_, hosts_);
   frame.heads = heads_.report();
   for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) {
     frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, copies_[monitor], ScreenState::Fresh));
@@ -313,8 +363,17 @@ void WallDriver::record(std::uint64_t number) {
   constexpr std::size_t kMostRecords = 10'000;
   if (!run_.frames && manifest_.frames.size() == kMostRecords) {
     manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMostRecords / 2);
+    if (remote_ && session_.comm().rank() == 0) remote_->forget_before(manifest_.frames.front().frame);
   }
   manifest_.frames.push_back(std::move(frame));
+}
+
+std::vector<ScreenState> WallDriver::states() const {
+  const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
+  // Of the latest frames displays have not said anything yet.
+  const auto awaited = static_cast<std::uint64_t>(run_.remote.in_flight) + 1;
+  if (!remote_ || last < first_frame_ + awaited) return std::vector(owners_.size(), ScreenState::Fresh);
+  return remote_->outcome(last - awaited).screens;
 }
 
 std::string WallDriver::strategy() const {

@@ -17,6 +17,7 @@
 #include "app/wall_heads.h"
 #include "app/wall_monitors.h"
 #include "app/wall_run.h"
+#include "walls/curved.h"
 #include "walls/display.h"
 #include "walls/manifest.h"
 #include "walls/wall.h"
@@ -39,12 +40,16 @@ class WallDriver {
   WallDriver& operator=(const WallDriver&) = delete;
 
   [[nodiscard]] const FramePlan& plan() const { return frames_->plan(); }
+  /// One line per decision, with its reason.
+  [[nodiscard]] std::vector<std::string> explained() const;
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
   [[nodiscard]] const FrameTimes& times() const { return frames_->times(); }
   [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
   [[nodiscard]] std::optional<double> relmse() const { return frames_->relmse(); }
+  /// On rank 0: what the screens show, as far as displays outside the job have told by now.
+  [[nodiscard]] std::vector<ScreenState> states() const;
 
-  /// The frame to begin with: past 0 where an earlier job of this run was lost.
+  /// The frame to begin with: past 0 where an earlier job of this run was lost or stopped.
   [[nodiscard]] std::uint64_t first_frame() const { return first_frame_; }
   /// Collective. Does what others told the run since the last frame; false when they ended it.
   [[nodiscard]] bool obey();
@@ -55,8 +60,12 @@ class WallDriver {
   /// Collective. Moves the camera as viewers on all ranks asked since the last call; a camera on a path stays on it.
   /// False once one of them, or a signal, asked to end the run.
   [[nodiscard]] bool follow_viewers();
-  /// Whether the next frame would be the last one again.
-  [[nodiscard]] bool settled() const;
+  /// Whether it was a signal.
+  [[nodiscard]] bool interrupted() const { return interrupted_; }
+  /// On rank 0: the run ends before its last frame, and its manifest says so.
+  void note_stop(int frames) { manifest_.stopped_of = frames; }
+  /// Collective. Whether the next frame would be the last one again.
+  [[nodiscard]] bool settled();
   /// Collective. After the last frame. False: displays outside the job were meant to show it, and none ever did.
   [[nodiscard]] bool finish();
 
@@ -64,13 +73,17 @@ class WallDriver {
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
 
  private:
+  void start_frames(const FrameSettings& settings, const WallRun& run);
   [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const;
   [[nodiscard]] bool shows_any() const;
   void plan_frames();
   void take_over();
+  void replay(const std::string& told);
+  void resume(std::vector<std::string>& frames);
   [[nodiscard]] std::string status() const;
   void show(std::uint64_t number);
   void record(std::uint64_t number);
+  [[nodiscard]] std::vector<ScreenRecord> record_screens();
   [[nodiscard]] std::string strategy() const;
 
   const WallRun& run_;
@@ -85,8 +98,10 @@ class WallDriver {
   double fov_degrees_;
   OrbitCamera orbit_;  ///< where there is no path
   RunControl control_;
-  std::vector<int> owners_;  ///< per screen the rank that shows it
-  Showing showing_;          ///< of the pictures of screen_eyes()
+  std::vector<std::string> hosts_;  ///< per rank
+  std::vector<int> owners_;         ///< per screen the rank that shows it
+  Showing showing_;                 ///< of the pictures of screen_eyes()
+  std::optional<CurvedScreens> curved_;
   std::optional<FrameMaker> frames_;
   std::unique_ptr<Display> display_;
   std::unique_ptr<WallSender> remote_;  ///< in place of a display, to those outside the job
@@ -97,6 +112,7 @@ class WallDriver {
   std::vector<HeadPose> last_heads_;
   std::optional<RunJournal> journal_;  ///< on rank 0, where a supervisor looks on
   std::uint64_t first_frame_ = 0;
+  bool interrupted_ = false;
 };
 
 }  // namespace hpr

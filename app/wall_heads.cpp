@@ -26,8 +26,10 @@ WallHeads::WallHeads(const Wall& wall, Communicator& comm)
   check_on_root(comm, [&] {
     for (std::size_t i = 0; i < heads_.size(); ++i) {
       trackers_.push_back(make_tracker(wall.viewers[i].tracker, heads_[i]));
+      recorded_frames_ = std::max(recorded_frames_, trackers_.back()->ends_at() * wall.viewers[i].tracker.rate_hz);
     }
   });
+  recorded_frames_ = all_gather_value(comm, recorded_frames_)[0];
 }
 
 std::vector<HeadPose> WallHeads::at(std::uint64_t number) {
@@ -45,6 +47,10 @@ std::vector<HeadPose> WallHeads::at(std::uint64_t number) {
   HPR_CHECK(bytes.size() == own.size());
   std::memcpy(heads_.data(), bytes.data(), bytes.size());
   return heads_;
+}
+
+bool WallHeads::plays_on(std::uint64_t number) const {
+  return static_cast<double>(number) <= recorded_frames_;
 }
 
 std::vector<HeadRecord> WallHeads::report() const {

@@ -22,6 +22,9 @@ class WallHeads {
   /// so that a run is the same however long its frames take; what is live is asked for now.
   [[nodiscard]] std::vector<HeadPose> at(std::uint64_t number);
 
+  /// Whether later frames have other poses because recordings go on after frame `number`.
+  [[nodiscard]] bool plays_on(std::uint64_t number) const;
+
   /// Of at()'s last answer, those who are tracked.
   [[nodiscard]] std::vector<HeadRecord> report() const;
 
@@ -32,6 +35,7 @@ class WallHeads {
   std::vector<std::unique_ptr<Tracker>> trackers_;  ///< per viewer, on rank 0
   std::vector<HeadPose> heads_;
   bool any_tracked_ = false;
+  double recorded_frames_ = 0.0;  ///< until the longest recording has ended
 };
 
 }  // namespace hpr

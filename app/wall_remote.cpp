@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <iomanip>
 #include <nlohmann/json.hpp>
@@ -54,7 +56,7 @@ class WallRemoteCommand : public Command {
     if (!wait || wait->count() <= 0) {
       throw Error(ExitCode::Usage, fmt::format("--wait: '{}' is no duration", printable(wait_)), "write e.g. 10s");
     }
-    return std::chrono::duration_cast<std::chrono::milliseconds>(*wait);
+    return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*wait, kLongestWait));
   }
 
   std::string run_;
@@ -108,7 +110,11 @@ class WallCtlCommand final : public WallRemoteCommand {
     if (words.empty())
       throw Error(ExitCode::Usage, "there is nothing to tell", "write e.g. hpr wall ctl quality draft");
     for (const std::string& word : words) {
-      const bool plain = !word.empty() && word.find_first_of(" \t\"\\#") == std::string::npos;
+      if (std::ranges::any_of(word, [](unsigned char c) { return std::iscntrl(c) != 0; })) {
+        throw Error(ExitCode::Usage, fmt::format("'{}' holds what no line may", printable(word)),
+                    "tell one thing a time");
+      }
+      const bool plain = !word.empty() && word.find_first_of(" \"\\#") == std::string::npos;
       line << (line.tellp() > 0 ? " " : "");
       plain ? line << word : line << std::quoted(word);
     }

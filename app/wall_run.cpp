@@ -17,12 +17,16 @@
 #include "app/progress.h"
 #include "app/run_journal.h"
 #include "app/signals.h"
+#include "app/terminal.h"
 #include "app/wall_driver.h"
+#include "app/wall_status.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
+#include "cluster/texts.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/stopwatch.h"
 #include "image/image_io.h"
 #include "walls/assemble.h"
 #include "walls/geometry.h"
@@ -32,9 +36,6 @@
 
 namespace hpr {
 namespace {
-
-/// The assembled wall is a picture to look at, not the frame: larger walls are scaled down.
-constexpr int kLargestPicture = 8192;
 
 /// How well the target time was kept.
 void report_budget(const RunManifest& manifest) {
@@ -72,15 +73,10 @@ void write_results(const WallRun& run, const Wall& wall, const WallDriver& drive
                    std::span<const Image<Rgba8>> pictures) {
   if (run.writes_files() || !run.picture.empty()) {
     const std::vector<std::byte> picture = encode_png(draw_wall(wall, wall_picture(wall, kLargestPicture), pictures));
-    if (run.writes_files()) {
-      write_file_atomically(std::filesystem::path(run.display.output) / "wall.png", picture);
-      write_file_atomically(std::filesystem::path(run.display.output) / "manifest.json", to_json(driver.manifest()));
-    }
+    if (run.writes_files()) write_file_atomically(std::filesystem::path(run.display.output) / "wall.png", picture);
     if (!run.picture.empty()) write_file_atomically(run.picture, picture);
   }
-  if (run.display.remote() && !run.display.output.empty()) {
-    write_file_atomically(std::filesystem::path(run.display.output) / "manifest.json", to_json(driver.manifest()));
-  }
+  if (!run.manifest().empty()) write_file_atomically(run.manifest(), to_json(driver.manifest()));
   if (!run.options.stats.empty()) write_stats(run.options.stats, stats);
 }
 
@@ -88,9 +84,12 @@ void write_results(const WallRun& run, const Wall& wall, const WallDriver& drive
 /// run.
 bool wait_for_work(const WallRun& run, WallDriver& driver) {
   constexpr std::chrono::milliseconds kBetweenLooks{10};
-  while (true) {
+  // Displays outside the job take a run that sends nothing for one that is gone. Counted, so that all ranks agree.
+  constexpr int kLooksBeforeSignOfLife = 30;
+  for (int look = 0;; ++look) {
     if (!driver.follow_viewers() || !driver.obey()) return false;
     if (!run.open_ended() || !driver.settled()) return true;
+    if (run.display.remote() && look == kLooksBeforeSignOfLife) return true;
     std::this_thread::sleep_for(kBetweenLooks);
   }
 }
@@ -107,23 +106,30 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   }
   WallDriver driver(run, wall, settings, globals, session);
   if (run.options.explain && speaks) {
-    for (const std::string& line : driver.plan().explained) fmt::print("{}\n", line);
+    for (const std::string& line : driver.explained()) fmt::print("{}\n", line);
   }
   prepare(session, driver.plan());
+  const int frames = run.open_ended() ? 0 : run.frames.value_or(1);
+  bool stopped = false;
   {
-    const std::string mode = speaks ? globals.progress : "none";
+    const std::string mode = speaks && globals.verbosity >= 0 ? globals.progress : "none";
     const Sampling sampling = sampling_of(run);
-    const int frames = run.open_ended() ? 0 : run.frames.value_or(1);
-    Progress progress(sampling.sums() ? "none" : mode, "frame", static_cast<std::size_t>(frames));
+    // A terminal has room for one bar: that of the samples, where there are several.
+    const bool tells_samples = sampling.sums() && (mode != "auto" || stderr_is_terminal());
+    WallStatus status(tells_samples ? "none" : mode, driver.first_frame(), static_cast<std::size_t>(frames));
     for (int frame = static_cast<int>(driver.first_frame()); frame < frames || run.open_ended(); ++frame) {
       Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}: sample", frame + 1),
                        sampling.goal.samples.value_or(0));
+      const Stopwatch watch;
       driver.draw(static_cast<std::uint64_t>(frame), samples);
-      progress.step(fmt::format("{:.1f} ms", driver.last_cost().ms));
+      status.add(watch.ms(), driver.manifest().frames.back(), [&] { return driver.states(); });
       const bool last = !run.open_ended() && frame + 1 >= frames;
-      if (!last && !wait_for_work(run, driver)) break;
+      if (last || wait_for_work(run, driver)) continue;
+      stopped = driver.interrupted() && !run.open_ended();
+      break;
     }
   }
+  if (stopped) driver.note_stop(frames);
   const bool seen = driver.finish();
   RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
   stats.relmse = driver.relmse();
@@ -135,16 +141,20 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
     if (speaks) write_results(run, wall, driver, stats, pictures);
   });
   if (!seen) return ExitCode::Lost;
-  if (!speaks) return verdict(stats, run.options.strict);
+  const ExitCode code = stopped && !run.manifest().empty() ? ExitCode::Stopped : verdict(stats, run.options.strict);
+  if (!speaks) return code;
+  if (stopped)
+    log::info("stopped after frame {} of {}{}", driver.manifest().frames.back().frame + 1, frames,
+              run.manifest().empty() ? "" : "; --resume goes on");
   if (run.summary) print_summary(stats, wall, session.scene());
   if (!run.picture.empty()) {
     fmt::print("{}\n", run.picture);
   } else if (run.writes_files()) {
     fmt::print("{}\n", (std::filesystem::path(run.display.output) / "wall.png").string());
-  } else if (run.display.remote() && !run.display.output.empty()) {
-    fmt::print("{}\n", (std::filesystem::path(run.display.output) / "manifest.json").string());
+  } else if (!run.manifest().empty()) {
+    fmt::print("{}\n", run.manifest().string());
   }
-  return verdict(stats, run.options.strict);
+  return code;
 }
 
 void check_remote(const WallRun& run, const Wall& wall, const Globals& globals) {
@@ -152,7 +162,7 @@ void check_remote(const WallRun& run, const Wall& wall, const Globals& globals) 
   if (run.display.output.empty()) return;
   std::error_code error;
   std::filesystem::create_directories(run.display.output, error);
-  check_writable(std::filesystem::path(run.display.output) / "manifest.json", globals.force);
+  check_writable(run.manifest(), globals.force);
 }
 
 void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals) {
@@ -161,6 +171,10 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
     throw Error(ExitCode::Usage, "--explain writes to standard output, where the frames go",
                 "leave it out, or send the frames elsewhere");
   }
+  std::vector<std::string> results{run.picture, run.options.stats, run.manifest().string()};
+  if (run.writes_files()) results.push_back((std::filesystem::path(run.display.output) / "wall.png").string());
+  if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
+  check_distinct(results);
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),
@@ -171,11 +185,22 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   if (!run.options.stats.empty()) check_writable(run.options.stats, globals.force);
   // Last, as it may make its folder: what cannot be shown is found before any rank starts.
   run.display.kind().check(wall, display);
-  if (run.display.remote()) check_remote(run, wall, globals);
+  if (run.display.remote()) {
+    check_remote(run, wall, globals);
+  } else {
+    run.remote.refuse();
+  }
   if (run.writes_files()) {
     check_writable(std::filesystem::path(run.display.output) / "wall.png", globals.force);
-    check_writable(std::filesystem::path(run.display.output) / "manifest.json", globals.force);
+    check_writable(run.manifest(), globals.force);
   }
+}
+
+/// Collective. Where the display was chosen by what there is, hosts may differ: all ranks take rank 0's.
+WallRun with_display_of_root(const WallRun& run, Communicator& comm) {
+  WallRun agreed = run;
+  agreed.display.display = broadcast_text(comm, run.display.display);
+  return agreed;
 }
 
 /// A wrong path is found before any scene is loaded.
@@ -195,7 +220,13 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   Globals globals = given;
   // What stands there is what the job that was lost had written.
   if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
-  Wall wall = load_wall(run.wall, run.overrides);
+  globals.force |= run.resume;
+  if (run.resume && (run.open_ended() || run.manifest().empty())) {
+    throw Error(ExitCode::Usage, "--resume needs to know how many frames it goes on to, and which run with",
+                "use it with --frames N, --display file or remote, and -o DIR");
+  }
+  const bool starts_job = globals.ranks > 1 && !inside_mpi_job();  // whose rank 0 tells of the same findings
+  Wall wall = load_wall(run.wall, run.overrides, !starts_job);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
   const FrameSettings settings = run.options.settings(globals.seed);
   if (!settings.aovs.empty()) {
@@ -213,15 +244,17 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals);
   const std::string folder = run.writes_files() ? run.display.output : "";
   const EmptyFolders tidy(folder);
-  if (run.open_ended()) watch_interrupts();
+  run.open_ended() ? watch_interrupts() : watch_requests();
   if (!inside_mpi_job()) check_outputs(run, wall, globals);
   const auto body = [&](Communicator& comm) {
     const EmptyFolders tidy_in_job(folder);  // a rank that fails leaves run_ranks only to end the job
-    if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(run, wall, globals); });
+    const WallRun agreed = with_display_of_root(run, comm);
+    if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(agreed, wall, globals); });
     Session session(comm, globals, [&] { return run.options.load(run.scene, globals); });
-    return drive(run, wall, settings, globals, session);
+    return drive(agreed, wall, settings, globals, session);
   };
-  return run_supervised(globals, run.restarts, run.open_ended() ? Interrupts::Stop : Interrupts::End, body);
+  const int restarts = run.display.kind().stream ? 0 : run.restarts;
+  return run_supervised(globals, restarts, run.open_ended() ? Interrupts::Stop : Interrupts::End, body);
 }
 
 namespace {
@@ -242,6 +275,9 @@ class WallRunCommand final : public Command {
         ->capture_default_str();
     app.add_option("--frames", run_.frames, "how many frames (default: 1; window and web: until they are closed)")
         ->check(CLI::Range(1, 1'000'000));
+    app.add_flag("--until-stopped", run_.until_stopped, "go on until wall stop, Ctrl-C or SIGTERM")
+        ->excludes("--frames");
+    app.add_flag("--resume", run_.resume, "go on after the frames that the manifest in -o DIR has, if it is there");
     app.add_option("--path", run_.path, "where the camera goes in these frames, see docs/cli.md")->type_name("FILE");
     app.add_option("--target-ms", run_.target_ms, "what a frame may take; what is given up for it is in the manifest")
         ->check(CLI::Range(1e-3, 1e9));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,13 +26,21 @@ struct WallRun {
   std::string path;                    ///< of the camera; empty: it stands
   std::optional<double> target_ms;     ///< of a frame
   std::optional<double> target_error;  ///< estimated relMSE at which a frame has enough samples
+  bool until_stopped = false;          ///< whatever shows it
+  bool resume = false;                 ///< after the frames the folder's manifest has
   int restarts = 3;                    ///< of a job of several ranks that was lost
   bool summary = false;                ///< say on stdout what each pass did
   RemoteOptions remote;
   RenderOptions options;
 
   /// Whether it goes on until a viewer, SIGINT or SIGTERM ends it.
-  [[nodiscard]] bool open_ended() const { return !frames && display.kind().interactive; }
+  [[nodiscard]] bool open_ended() const { return !frames && (until_stopped || display.kind().interactive); }
+  /// Where its manifest goes; empty: it writes none.
+  [[nodiscard]] std::filesystem::path manifest() const {
+    return writes_files() || (display.remote() && !display.output.empty())
+               ? std::filesystem::path(display.output) / "manifest.json"
+               : std::filesystem::path();
+  }
   [[nodiscard]] bool writes_files() const { return display.kind().name == "file"; }
 };
 

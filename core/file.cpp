@@ -9,7 +9,9 @@
 #include <cerrno>
 #include <string>
 #include <system_error>
+#include <utility>
 
+#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -19,16 +21,13 @@ namespace {
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() { reset(); }
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
 
   [[nodiscard]] int get() const { return fd_; }
-  int reset() {
-    const int result = fd_ >= 0 ? ::close(fd_) : 0;
-    fd_ = -1;
-    return result;
-  }
 
  private:
   int fd_;
@@ -42,10 +41,10 @@ class Descriptor {
                   : "check the path and its permissions");
 }
 
-void write_all(const Descriptor& file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
+void write_all(int file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
   constexpr std::size_t kMost = std::size_t{1} << 30;
   while (!bytes.empty()) {
-    const ssize_t written = ::write(file.get(), bytes.data(), std::min(bytes.size(), kMost));
+    const ssize_t written = ::write(file, bytes.data(), std::min(bytes.size(), kMost));
     if (written < 0) {
       if (errno == EINTR) continue;
       fail("cannot write", path, errno);
@@ -129,23 +128,37 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_
   return bytes;
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const std::filesystem::path target = target_of(path);
-  std::string temporary;
-  Descriptor file(create_temporary(folder_of(target), temporary));
-  if (file.get() < 0) fail("cannot write", path, errno);
-  try {
-    write_all(file, bytes, path);
-    if (::fsync(file.get()) != 0) fail("cannot write", path, errno);
-    if (file.reset() != 0) fail("cannot write", path, errno);
-    if (::rename(temporary.c_str(), target.c_str()) != 0) fail("cannot write", path, errno);
-  } catch (...) {
-    ::unlink(temporary.c_str());
-    throw;
-  }
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(target_of(path_)) {
+  descriptor_ = create_temporary(folder_of(target_), temporary_);
+  if (descriptor_ < 0) fail("cannot write", path_, errno);
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      target_(std::move(other.target_)),
+      temporary_(std::exchange(other.temporary_, {})),
+      descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::commit() {
+  HPR_CHECK(descriptor_ >= 0);
+  if (::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
+  if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write", path_, errno);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot write", path_, errno);
+  temporary_.clear();
   // The rename itself is on disk only once the folder is synced; some file systems refuse that, and lose nothing by it.
-  const Descriptor folder(::open(folder_of(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const Descriptor folder(::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.get() >= 0) ::fsync(folder.get());
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  AtomicFile file(path);
+  write_all(file.descriptor(), bytes, path);
+  file.commit();
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view text) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,9 +14,33 @@ namespace hpr {
 /// directory), Limit when it is larger than `limit_bytes`.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes);
 
-/// Writes `bytes` so that `path` is either complete or untouched, also when the disk fills or the process dies:
-/// a temporary file beside it is written, synced, renamed, and the folder synced. A symbolic link stays, what it points
-/// at is replaced. Throws Error (Io), also when `path` is a folder, pipe or device.
+/// A file that is written piece by piece: `path` is either complete or untouched, also when the disk fills or the
+/// process dies. A symbolic link stays, what it points at is replaced.
+class AtomicFile {
+ public:
+  /// Makes a temporary file beside it. Throws Error (Io), also when `path` is a folder, pipe or device.
+  explicit AtomicFile(std::filesystem::path path);
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&&) = delete;
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+  /// Without commit() nothing of it is left.
+  ~AtomicFile();
+
+  /// What is to be written to.
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+
+  /// Once, when all is written: syncs and closes it, gives it its name, syncs the folder. Throws Error (Io).
+  void commit();
+
+ private:
+  std::filesystem::path path_;    ///< for errors
+  std::filesystem::path target_;  ///< where links lead
+  std::string temporary_;         ///< empty: it has its name
+  int descriptor_ = -1;
+};
+
+/// Writes `bytes` so that `path` is either complete or untouched, as an AtomicFile. Throws Error (Io).
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 

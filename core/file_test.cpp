@@ -9,6 +9,7 @@
 #include <csignal>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "core/error.h"
 
@@ -98,6 +99,28 @@ TEST_F(FileTest, AWriteThatFailsLeavesTheOldFileAndNothingElse) {
     EXPECT_EQ(code_of([&] { write_file_atomically(path("b"), std::string(5000, 'x')); }), ExitCode::Io);
   }
   EXPECT_EQ(text_of(path("a")), "old");
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FileTest, AFileWrittenInPiecesHasItsNameOnceItIsCommitted) {
+  write_file_atomically(path("a"), "old");
+  const auto put = [](const AtomicFile& file, std::string_view text) {
+    EXPECT_EQ(::write(file.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  };
+  {
+    AtomicFile given_up(path("a"));
+    put(given_up, "half");
+    EXPECT_EQ(files(), 2U);
+  }
+  EXPECT_EQ(files(), 1U);
+  EXPECT_EQ(text_of(path("a")), "old");
+  AtomicFile moved_from(path("a"));
+  put(moved_from, "ne");
+  AtomicFile file(std::move(moved_from));
+  put(file, "w");
+  EXPECT_EQ(text_of(path("a")), "old");
+  file.commit();
+  EXPECT_EQ(text_of(path("a")), "new");
   EXPECT_EQ(files(), 1U);
 }
 

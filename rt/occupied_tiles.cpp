@@ -17,7 +17,8 @@ constexpr double kRounding = 1.0 / 16384.0;
 /// Past this many instances looking at each costs more than rays that miss.
 constexpr std::size_t kMostBoxes = 200'000;
 
-/// The pixels a box of the world may be seen in; the whole view where it reaches behind the near plane.
+/// The pixels a box of the world may be seen in; the whole view where it reaches behind the near plane. Not of views
+/// whose pixels look through points of their own.
 Rect pixels_of(const View& view, const glm::dmat4& clip, const Bounds& box) {
   const Size size = view.size();
   const Rect all{0, 0, size.width, size.height};
@@ -59,7 +60,7 @@ std::vector<Bounds> mesh_boxes(const Scene& scene) {
 std::vector<std::uint8_t> occupied_tiles(const Scene& scene, const RayScene& rays, std::span<const Bounds> boxes,
                                          const View& view, const FrameLayout& layout, std::size_t screen) {
   const TileRun run = layout.tiles_of(screen);
-  const bool many = rays.geometries().size() > kMostBoxes;
+  const bool many = view.points || rays.geometries().size() > kMostBoxes;
   std::vector<std::uint8_t> occupied(run.count, many ? 1 : 0);
   if (many) return occupied;
   const glm::dmat4 clip = clip_from_world(view, view.eye);

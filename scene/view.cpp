@@ -17,13 +17,27 @@ double near_plane(double wanted, const Bounds& bounds) {
   return extent > 0.0 && std::isfinite(extent) ? 1e-4 * extent : 0.01;
 }
 
+/// What (x, y) of the view looks through, on the plane its edges are on.
+glm::dvec2 looked_through(const View& view, double x, double y) {
+  const auto share = [&](const glm::dvec2& jitter) {
+    return glm::dvec2((view.block.x0 + x + jitter.x) / view.screen.width,
+                      (view.block.y0 + y + jitter.y) / view.screen.height);
+  };
+  const glm::dvec2 at = share(view.jitter);
+  if (view.points) {
+    if (const auto seen = view.points->seen_at(at.x, at.y)) return *seen;
+    const glm::dvec2 middle = share(glm::dvec2(0.0));
+    if (const auto seen = view.points->seen_at(middle.x, middle.y)) return *seen;
+  }
+  return {view.left + (view.right - view.left) * at.x, view.top - (view.top - view.bottom) * at.y};
+}
+
 }  // namespace
 
 Ray view_ray(const View& view, double x, double y) {
-  const double px = view.left + (view.right - view.left) * ((view.block.x0 + x + view.jitter.x) / view.screen.width);
-  const double py = view.top - (view.top - view.bottom) * ((view.block.y0 + y + view.jitter.y) / view.screen.height);
-  if (view.orthographic) return {view.eye + view.axes * glm::dvec3(px, py, 0.0), -view.axes[2]};
-  return {view.eye, view.axes * glm::dvec3(px, py, -1.0)};
+  const glm::dvec2 place = looked_through(view, x, y);
+  if (view.orthographic) return {view.eye + view.axes * glm::dvec3(place, 0.0), -view.axes[2]};
+  return {view.eye, view.axes * glm::dvec3(place, -1.0)};
 }
 
 glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin) {

@@ -5,9 +5,11 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "image/image.h"
+#include "scene/point_map.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -32,6 +34,8 @@ struct View {
   std::uint32_t screen_number = 0;  ///< which screen of the wall: its blocks have the same one, and so the same noise
   /// Pixels from its centre, to the right and down, at which every pixel is looked through.
   glm::dvec2 jitter{0.0};
+  /// Rays go through these and no longer through the plane between the edges, which is all that rasterising knows.
+  std::optional<PixelPoints> points;
 
   [[nodiscard]] Size size() const { return {block.width(), block.height()}; }
 };
@@ -42,7 +46,8 @@ struct Ray {
 };
 
 /// The ray through (x, y) of the view, in pixels from its upper left corner: pixel centres are at + 0.5. The jitter is
-/// added to the place, so asked for a centre, it is the ray of that pixel's sample.
+/// added to the place, so asked for a centre, it is the ray of that pixel's sample. Where a screen of points has none,
+/// it is that of the place without jitter, else that of the plane.
 [[nodiscard]] Ray view_ray(const View& view, double x, double y);
 
 /// World relative to `origin` -> clip space, for a depth range of [0, 1] reversed: near is 1, infinity (or the

@@ -15,6 +15,8 @@ import subprocess
 import sys
 import tempfile
 
+import processes
+
 HPR = os.path.abspath(sys.argv[1])
 SAMPLES = 400
 COMMON = ["--progress", "line", "--threads", "1", "--photons", "1000"]
@@ -33,21 +35,9 @@ def run(folder, *arguments):
                           check=False)
 
 
-def children_of(pid):
-    found = []
-    for status in pathlib.Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = status.read_text().rsplit(")", 1)[1].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid:
-            found.append(int(status.parent.name))
-    return found
-
-
 def last_rank_of(pid):
     """A rank of the job that `pid` started: the youngest child of its mpiexec."""
-    return max(rank for mpiexec in children_of(pid) for rank in children_of(mpiexec))
+    return processes.ranks_of(pid)[-1]
 
 
 def interrupt(folder, wanted, target, *arguments):

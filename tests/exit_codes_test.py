@@ -157,6 +157,15 @@ def main():
     dense = ["compare", "--synthetic", "dense", "--size", "64x48", "--frames", "1"]
     expect_error("factors of another number of ranks", [*dense, "--ranks", "4", "--strategies", "radix-k:3"], [2],
                  ["radix-k:3", "4"])
+    expect_error("factors of another number of ranks in a render",
+                 ["render", "gen:cornell", "-o", "a.png", *SMALL, "--passes", "none", "--distribute", "sort-last", "--ranks", "3",
+                  "--strategy", "radix-k:2"], [2], ["radix-k:2", "3"])
+    expect_error("negative seed", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--seed", "-1"], [2], ["-1"])
+    expect_error("two results in one file", [*dense, "--ranks", "1", "-o", "k.png", "--raw", "./k.png"], [2], ["two results"])
+    expect_error("options of displays elsewhere", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--codec", "raw"],
+                 [2], ["--display remote"])
+    expect_error("a --set nobody acts on", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--set",
+                                            "render.strategy=tree"], [3], ["render"])
     expect_error("no factors", [*dense, "--ranks", "4", "--strategies", "tree,radix-k:2,x"], [2], ["x"])
     expect_error("sort-first without a scene", [*dense, "--ranks", "2", "--strategies", "sort-first"], [2], ["scene"])
     expect_error("unknown key of a cluster", [*dense, "--simulate", "hosts=2,latencey=2us"], [2], ["latency"])
@@ -189,6 +198,8 @@ def main():
                  [3], ["triangle.gltf"], prepare=write_gltf(3))
     expect_error("broken wall file", ["wall", "check", "wall.toml"], [3], ["wall.toml:3:"],
                  prepare=writer("wall.toml", "# a wall\n[wall]\nname = = 1\n"))
+    expect_error("screens too small to draw", ["wall", "check", "wall.toml"], [3], ["tile_size_m"],
+                 prepare=writer("wall.toml", TWICE.replace("[60, 30,", "[70, 30,").replace("[0.64, 0.36]", "[1e-200, 1e-200]")))
     expect_error("tile driven twice", ["wall", "check", "wall.toml"], [3], ["wall.toml:6:", "twice"],
                  prepare=writer("wall.toml", TWICE))
 

@@ -8,12 +8,15 @@ Prints what differs and leaves with 1.
 
 import os
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 
 import png
+import processes
 
 HPR = os.path.abspath(sys.argv[1])
 WALL = "2x1@80x48"
@@ -90,6 +93,27 @@ def through_a_fifo(folder):
     return got[0] if got else b""
 
 
+def lose_a_rank(folder):
+    """What a reader was given cannot be taken back: a job that is lost is not started again."""
+    run = subprocess.Popen([HPR, *RUN, "--frames", "100000", "--display", "pipe", "--pipe-to", "cat > lost.y4m", "--ranks", "2"],
+                           cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    lost = folder / "lost.y4m"
+    end = time.monotonic() + 60
+    while time.monotonic() < end and not (lost.exists() and lost.stat().st_size > 0):
+        time.sleep(0.1)
+    ranks = processes.ranks_of(run.pid)
+    if len(ranks) == 2:
+        os.kill(ranks[1], signal.SIGKILL)
+    try:
+        said = run.communicate(timeout=60)[1]
+    except subprocess.TimeoutExpired:
+        run.kill()
+        said = run.communicate()[1]
+    if len(ranks) != 2 or run.returncode != 7 or "starting it again" in said:
+        complain(f"a rank of {len(ranks)} was killed: left with {run.returncode}: {said[-900:]}")
+    lost.unlink(missing_ok=True)
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-pipe-") as scratch:
         folder = pathlib.Path(scratch)
@@ -112,14 +136,19 @@ def main():
             compare("the last frame of the wall", frames[1], png.read(folder / "files" / "wall.png"))
 
         hpr(folder, "--display", "pipe", "-o", "screen.y4m", "--pipe-screen", screens[0])
-        for i, frame in enumerate(planes_of((folder / "screen.y4m").read_bytes())):
+        frames = planes_of((folder / "screen.y4m").read_bytes())
+        if len(frames) != 2:
+            complain(f"{len(frames)} frames of {screens[0]} instead of 2")
+        for i, frame in enumerate(frames):
             compare(f"frame {i} of {screens[0]}", frame, kept[i][0])
         hpr(folder, "--display", "pipe", "-o", "screen.y4m", code=4)  # it exists
 
-        width, height, _ = png.read(folder / "files" / "wall.png")
+        hpr(folder, "--display", "file", "-o", "first", frames=1)
+        walls = b"".join(png.read(folder / name / "wall.png")[2] for name in ("first", "files"))
         fifo = through_a_fifo(folder)
-        if len(fifo) != 2 * 4 * width * height:
-            complain(f"{len(fifo)} bytes through the FIFO instead of {2 * 4 * width * height}")
+        if fifo != walls:
+            complain(f"{len(fifo)} bytes through the FIFO, not the {len(walls)} of the wall's two frames")
+        lose_a_rank(folder)
 
         stuck = hpr(folder, "--display", "pipe", "--pipe-to", "sleep 100", "--pipe-timeout", "300ms",
                     "--pipe-format", "rgba", code=4, frames=40)
@@ -128,7 +157,7 @@ def main():
         hpr(folder, "--display", "pipe", "--pipe-to", "exit 1", code=4)
         hpr(folder, "--display", "pipe", code=2)
         hpr(folder, "--display", "pipe", "-o", "-", "--explain", code=2)
-        left = {p.name for p in folder.iterdir()} - {"path.txt", "files", "wall.y4m", "screen.y4m", "fifo"}
+        left = {p.name for p in folder.iterdir()} - {"path.txt", "files", "first", "wall.y4m", "screen.y4m", "fifo"}
         if left:
             complain(f"left files: {left}")
     return 1 if failures else 0

@@ -29,7 +29,11 @@ def unfilter(kind, row, before):
 
 def read(path):
     """(width, height, bytes: RGBA row by row)."""
-    data = path.read_bytes()
+    return decode(path.read_bytes(), path)
+
+
+def decode(data, path="data"):
+    """The same of a file's bytes."""
     if data[:8] != b"\x89PNG\r\n\x1a\n":
         raise ValueError(f"{path}: no PNG file")
     parts = list(chunks(data))

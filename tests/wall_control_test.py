@@ -86,11 +86,15 @@ def told_and_stopped(folder):
         wall = Wall(folder, f"told-{ranks}", ranks, 100000)
         status = wall.wait_for_frame(2)
         check(status.get("schema") == "hpr.wall-status/1" and status.get("ranks") == ranks, f"status: {status}")
-        check({screen["id"] for screen in status.get("screens", [])} == {"0-0", "1-0"} or len(status["screens"]) == 2,
-              f"status has other screens: {status}")
+        check([screen["id"] for screen in status.get("screens", [])] == ["wall-r0c0", "wall-r0c1"], f"status has other screens: {status}")
         check("screen" in wall.say("status"), "status in words names the screens")
         check("move NODE" in wall.say("ctl", "help"), "ctl help lists the commands")
         wall.say("ctl", "hide", "nothing", code=2)
+        wall.say("ctl", "load", "nowhere.glb", code=4)
+        if ranks > 1:
+            wall.say("ctl", "set", "distribute", "sort-last")
+            wall.say("ctl", "strategy", "radix-k:3", code=2)  # cannot be drawn: the run goes on as before
+            wall.say("ctl", "set", "distribute", "auto")
         before = wall.wait_for_frame(3)["frame"]
         wall.say("ctl", "camera", "-8,1.7,3", "at", "-10,1.5,-2")
         wall.say("ctl", "passes", "none")
@@ -107,6 +111,37 @@ def told_and_stopped(folder):
         check(hashes(frames[-1]) == hashes(shown), "a wall told to look elsewhere shows another picture than one that does")
         check(not list(wall.runtime.glob("hpr/*.sock")), "a run that ended leaves its socket")
         wall.say("status", code=7)
+
+
+def stops_and_goes_on(folder):
+    """SIGUSR1 ends a run after its frame with 75; --resume goes on, and both are one run: of the same run only."""
+    whole = Wall(folder, "uncut", 1, 200)
+    whole.leave()
+    expected = [hashes(frame) for frame in whole.manifest()["frames"]]
+    for ranks in (1, 2):
+        name = f"stopped-{ranks}"
+        wall = Wall(folder, name, ranks, 200)
+        wall.wait_for_frame(2)
+        wall.job.send_signal(signal.SIGUSR1)
+        wall.leave(75)
+        done = len(wall.manifest()["frames"])
+        check(wall.manifest().get("stopped") == {"frames": done, "of": 200}, f"stopped: {wall.manifest().get('stopped')}")
+        check("--resume goes on" in wall.told(), f"the log does not tell how to go on: {wall.told()}")
+        command = [HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(wall.out), "--quality", "draft", "--resume"]
+        for options, words in ((["--frames", "201"], "200 frames"), (["--frames", "200", "--seed", "2"], "seed 1"),
+                               (["--frames", "200", "--set", "test.gap_rgba=[1,2,3,255]"], "another wall")):
+            refused = subprocess.run([*command, *options], capture_output=True, text=True, timeout=60, check=False)
+            check(refused.returncode == 3 and words in refused.stderr, f"{options}: {refused.returncode}, {refused.stderr}")
+        for options in (["--display", "none", "--frames", "200"], ["--until-stopped"]):
+            check(subprocess.run([*command, *options], capture_output=True, timeout=60, check=False).returncode == 2, f"takes {options}")
+        rest = subprocess.run([*command, "--frames", "200", "--ranks", str(3 - ranks)], capture_output=True, text=True, timeout=120,
+                              check=False)
+        check(rest.returncode == 0 and f"going on after {done} of 200" in rest.stderr, f"{rest.returncode}, {rest.stderr}")
+        check([hashes(frame) for frame in wall.manifest()["frames"]] == expected, f"{ranks} ranks: two parts differ from the whole")
+        check("stopped" not in wall.manifest(), "it is called stopped still")
+    nothing = Wall(folder, "from-nothing", 1, 3, "--resume")
+    nothing.leave()
+    check(len(nothing.manifest()["frames"]) == 3, "--resume without a manifest begins with the first frame")
 
 
 def survives_a_lost_rank(folder):
@@ -137,6 +172,7 @@ def survives_a_lost_rank(folder):
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-ctl-") as scratch:
         told_and_stopped(pathlib.Path(scratch))
+        stops_and_goes_on(pathlib.Path(scratch))
         survives_a_lost_rank(pathlib.Path(scratch))
     return 1 if FAILED else 0
 

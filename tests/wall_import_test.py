@@ -6,11 +6,11 @@ usage: wall_import_test.py HPR
 
 import json
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-HPR = str(pathlib.Path(sys.argv[1]).resolve())
+from program import expect, failures, run
+
 FILES = {
     "displaycluster": """<configuration>
   <dimensions numTilesWidth="2" numTilesHeight="1" screenWidth="64" screenHeight="48" mullionWidth="4" mullionHeight="4"/>
@@ -25,17 +25,6 @@ FILES = {
 {"topLeft": [0.1, 1, -2], "botLeft": [0.1, 0, -2], "botRight": [1.1, 0, -2], "eye": [0, 0.5, 1],
 "screenWidth": 64, "screenHeight": 64, "screenX": 70}]""",
 }
-failures = []
-
-
-def expect(condition, message):
-    if not condition:
-        failures.append(message)
-        print(f"failed: {message}")
-
-
-def run(folder, *arguments):
-    return subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=60, check=False)
 
 
 def check_round_trips(folder):

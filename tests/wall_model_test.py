@@ -7,15 +7,13 @@ Prints what differs or is missing and leaves with 1.
 """
 
 import json
-import os
 import pathlib
-import struct
-import subprocess
 import sys
 import tempfile
-import zlib
 
-HPR = os.path.abspath(sys.argv[1])
+import png
+from program import Failure, check, run_to
+
 SCENE = "gen:gallery"
 
 # An arc in stereo for a head that walks, with an operator's copy.
@@ -53,53 +51,17 @@ screens = [{{ id = "a", pixels = [{width}, 48], corners_m = {{ ll = [-0.4, -0.3,
 """
 
 
-class Failure(Exception):
-    pass
-
-
-def check(good, what):
-    if not good:
-        raise Failure(what)
-
-
-def run(folder, arguments, expected=0):
-    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    check(result.returncode == expected, f"hpr {' '.join(arguments)} left with {result.returncode}:\n{result.stderr[-2000:]}")
-    return result
-
-
 def draw(folder, name, text, *more):
     """The manifest of a run of a wall file."""
     (folder / f"{name}.toml").write_text(text)
-    run(folder, ["wall", "run", f"{name}.toml", SCENE, "-o", name, "--force", *more])
+    run_to(folder, ["wall", "run", f"{name}.toml", SCENE, "-o", name, "--force", *more])
     return json.loads((folder / name / "manifest.json").read_text())
 
 
 def pixels(path):
-    """Rows of (r, g, b, a) of an RGBA8 PNG without interlacing."""
-    data = path.read_bytes()
-    at, packed = 8, b""
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at : at + 8])
-        if kind == b"IHDR":
-            width, height, depth, color = struct.unpack(">IIBB", data[at + 8 : at + 18])
-            check((depth, color) == (8, 6), f"{path} is no RGBA8")
-        if kind == b"IDAT":
-            packed += data[at + 8 : at + 8 + size]
-        at += 12 + size
-    raw, stride, rows = zlib.decompress(packed), 4 * width, []
-    before = bytes(stride)
-    for y in range(height):
-        kind, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
-        for i in range(stride):
-            left = line[i - 4] if i >= 4 else 0
-            corner = before[i - 4] if i >= 4 else 0
-            guess = left + before[i] - corner
-            near = min((abs(guess - left), 0, left), (abs(guess - before[i]), 1, before[i]), (abs(guess - corner), 2, corner))[2]
-            line[i] = (line[i] + [0, left, before[i], (left + before[i]) // 2, near][kind]) & 255
-        before = bytes(line)
-        rows.append([tuple(line[i : i + 4]) for i in range(0, stride, 4)])
-    return rows
+    """Rows of (r, g, b, a)."""
+    width, height, values = png.read(path)
+    return [[tuple(values[4 * (y * width + x):][:4]) for x in range(width)] for y in range(height)]
 
 
 def heads_walk_the_same_for_any_number_of_ranks(folder):
@@ -156,14 +118,14 @@ def panels_are_sent_what_they_need_and_the_wall_stays(folder):
 
 def overrides_come_before_the_checks(folder):
     (folder / "one.toml").write_text(ONE.format(width=64, more=""))
-    found = json.loads(run(folder, ["wall", "check", "one.toml", "--json", "--set", "stereo.mode=anaglyph",
+    found = json.loads(run_to(folder, ["wall", "check", "one.toml", "--json", "--set", "stereo.mode=anaglyph",
                                     "--set", "surfaces.0.screens.0.pixels=[32, 24]"]).stdout)
     check(found["stereo"] == "anaglyph" and found["pictures"] == 2, f"wall check says {found}")
     check(found["memory"]["bytes"] == found["memory"]["bytes_per_pixel"] * 2 * 32 * 24, f"memory {found['memory']}")
     check(found["memory"]["ranks"][0]["screens"] == 1, f"memory {found['memory']}")
-    text = run(folder, ["wall", "expand", "one.toml", "--set", "name=other"]).stdout
+    text = run_to(folder, ["wall", "expand", "one.toml", "--set", "name=other"]).stdout
     check('name = "other"' in text, "expand does not show the override")
-    wrong = run(folder, ["wall", "run", "one.toml", SCENE, "--display", "none", "--set", "stereo.mode=anaglif"], 3)
+    wrong = run_to(folder, ["wall", "run", "one.toml", SCENE, "--display", "none", "--set", "stereo.mode=anaglif"], 3)
     check("hpr: error: --set stereo.mode=anaglif: 'mode' of stereo" in wrong.stderr, f"the error is {wrong.stderr}")
     check("did you mean 'anaglyph'?" in wrong.stderr, f"no hint in {wrong.stderr}")
 

@@ -9,6 +9,8 @@ Prints what one of them takes and the other refuses, and leaves with 1; with 77 
 import json
 import os
 import pathlib
+import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -73,8 +75,10 @@ VARIANTS = [
     ("window", "rect = [0, 0, 0, 36]"),
     ("window", "fullscreen = 1"),
     ("window", "rank = -1"),
+    ("window", "monitor = 'DP-1'"),
     ("viewer", "ipd_m = 0\neye_offset_m = [0, 0, -0.1]\nnear_m = 0.1\nclamp_distance_m = 0.1"),
     ("viewer", "ipd_m = -0.1"),
+    ("viewer", "ipd_m = true"),
     ("viewer", "near_m = 0"),
     ("viewer", "eye_offset_m = [0, 0]"),
     ("viewer", "tracker = { type = 'udp', port = 5005, lost = { after_ms = 5, then = 'rest' }, predict_ms = 3 }"),
@@ -89,6 +93,11 @@ VARIANTS = [
     ("surface", "viewer = 3"),
     ("surface", "grid = {}"),
     ("screen", ", rotate = 180, mirror = 'vertical', eye = 'left', warp = { mesh = 'm.pfm' }"),
+    ("screen", ", warp = { mesh = 'm.pfm', x_date = 3 }"),
+    ("screen", ", warp = {}"),
+    ("screen", ", warp = { mesh = 7 }"),
+    ("screen", ", warp = { mesh = '' }"),
+    ("screen", ", warp = { mesh = 'm.pfm', alpha = 'm.png' }"),
     ("screen", ", rotate = 45"),
     ("screen", ", mirror = 'both'"),
     ("screen", ", eye = 'third'"),
@@ -110,6 +119,7 @@ VARIANTS = [
     ("grid", GRID.replace("columns = 2\n", "")),
     ("grid", GRID.replace("[64, 36]", "[64, 0]")),
     ("grid", GRID.replace("[1.6, 0.9]", "[1.6, 0]")),
+    ("grid", GRID.replace("[1.6, 0.9]", "[1.6, 1e-200]")),
     ("grid", GRID + "gap_m = [0.1, -0.1]\ncentre_m = [0, 1, 0]\ncolumn_gaps_m = [0.2]\nrow_gaps_m = []"),
     ("grid", GRID + "gap_m = 0.1"),
     ("grid", GRID + "panel_rotate = 90\nmirror = 'horizontal'"),
@@ -129,6 +139,8 @@ def main():
     bad = 0
     verdicts = set()
     with tempfile.TemporaryDirectory(prefix="hpr-wall-schema-") as scratch:
+        shutil.copytree(EXAMPLES, scratch, dirs_exist_ok=True)  # with the files they name
+        (pathlib.Path(scratch) / "m.pfm").write_bytes(b"PF\n1 1\n-1.0\n" + struct.pack("<3f", 9.8, 0.45, 0.0))
         cases = [(file.name, file.read_text()) for file in sorted(EXAMPLES.glob("*.toml"))]
         for place, text in VARIANTS:
             parts = {key: "" for key in PLACES} | {"grid": GRID} | {place: text}

@@ -34,6 +34,16 @@ corners_m = { ll = [0, 0, 0], lr = [0.12, 0, 0], ul = [0, 0.16, 0] } },
 corners_m = { ll = [0.12, 0, 0], lr = [0.28, 0, 0], ul = [0.12, 0.08, 0] } },
 ]
 """
+# Each rank has a screen of its own.
+TWO_RANKS = """hpr_wall = 1
+windows = [{ id = "a", rank = 0 }, { id = "b", rank = 1 }]
+[[surfaces]]
+id = "wall"
+screens = [
+  { id = "left", pixels = [64, 64], window = "a", corners_m = { ll = [0, 0, 0], lr = [0.1, 0, 0], ul = [0, 0.1, 0] } },
+  { id = "right", pixels = [64, 64], window = "b", corners_m = { ll = [0.1, 0, 0], lr = [0.2, 0, 0], ul = [0.1, 0.1, 0] } },
+]
+"""
 failures = []
 
 
@@ -61,14 +71,15 @@ class Run:
         self.process = subprocess.Popen([HPR, *arguments], cwd=folder, env=environment(display), stderr=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
 
-    def ends(self, name, code=0):
+    def ends(self, name, code=0, seconds=30):
         try:
-            said = self.process.communicate(timeout=30)[1]
+            said = self.process.communicate(timeout=seconds)[1]
         except subprocess.TimeoutExpired:
             self.process.kill()
-            said = self.process.communicate()[1] + "\n(killed after 30 s)"
+            said = self.process.communicate()[1] + f"\n(killed after {seconds} s)"
         if self.process.returncode != code:
             complain(f"{name}: left with {self.process.returncode} instead of {code}: {said[-900:]}")
+        return said
 
 
 def wait_until(what, test, run, seconds=60):
@@ -136,18 +147,81 @@ def turned(folder, display, client):
     run.ends("one window, ended by SIGTERM")
 
 
+def server_lost(folder):
+    """An X server that goes away ends the run, with a word."""
+    with x11.Xvfb(200, 200) as server:
+        client = x11.Client(server.number)
+        empty = client.picture()
+        run = Run(folder, server.name, "wall", "run", "1x1@64x64", *SCENE, *STILL)
+        wait_until("a window before its X server goes", lambda: client.picture() != empty, run)
+        server.process.kill()
+        said = run.ends("its X server was killed", 7)
+        if f"hpr: error: the X server '{server.name}' is gone" not in said:
+            complain(f"its X server was killed: {said!r}")
+
+
+class Frozen:
+    """A run whose X server stands still; it takes half a minute to give up."""
+
+    def __init__(self, folder, server):
+        client = x11.Client(server.number)
+        empty = client.picture()
+        self.server = server
+        self.run = Run(folder, server.name, "wall", "run", "1x1@64x64", *SCENE, "--display", "window", "--frames", "1000000")
+        wait_until("a window before its X server freezes", lambda: client.picture() != empty, self.run)
+        server.process.send_signal(signal.SIGSTOP)
+
+    def ends(self):
+        said = self.run.ends("its X server stands still", 7, 60)
+        self.server.process.send_signal(signal.SIGCONT)
+        if "the desktop shows no frames any more" not in said:
+            complain(f"its X server stands still: {said!r}")
+
+
+def ranks_beside_a_stopped_server(folder):
+    """A job without windows asks nothing of a desktop, which may stand still."""
+    with x11.Xvfb(64, 64, first=1) as server:
+        server.process.send_signal(signal.SIGSTOP)
+        try:
+            subprocess.run([HPR, "wall", "run", "1x1@32x32", *SCENE, "--display", "none", "--ranks", "2"], cwd=folder,
+                           env=environment(None), check=True, capture_output=True, timeout=20)
+        except (subprocess.TimeoutExpired, subprocess.CalledProcessError) as error:
+            complain(f"two ranks beside an X server that stands still: {error} {error.stderr}")
+        finally:
+            server.process.send_signal(signal.SIGCONT)
+
+
+def view_with_two_minds(folder, server):
+    """Where one of two ranks has a desktop both do as the first one can: a page, or windows which the second cannot open."""
+    (folder / "two.toml").write_text(TWO_RANKS)
+    view = [HPR, "view", *SCENE, "--wall", "two.toml", "--frames", "2", "--hang-timeout", "20"]
+    with_desktop, without = ["-n", "1", "env", f"DISPLAY={server.name}", *view], ["-n", "1", "env", "-u", "DISPLAY", *view]
+    for name, ranks, code, words in (("second", [*without, ":", *with_desktop], 0, "http://127.0.0.1:"),
+                                     ("first", [*with_desktop, ":", *without], 5, "hpr: error: there is no desktop for windows")):
+        result = subprocess.run(["mpiexec", *ranks], cwd=folder, env=environment(None), capture_output=True, text=True, timeout=120,
+                                check=False)
+        if result.returncode != code or words not in result.stdout + result.stderr:
+            complain(f"view where the {name} rank alone has a desktop: left with {result.returncode}: {result.stdout} "
+                     f"{result.stderr[-900:]}")
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-window-") as scratch:
         folder = pathlib.Path(scratch)
         Run(folder, None, "wall", "run", "1x1@32x32", *SCENE, "--display", "window").ends("without a desktop", 5)
         if not x11.Xvfb.available:
             return 1 if failures else 77
-        with x11.Xvfb(500, 400) as server:
+        with x11.Xvfb(500, 400) as server, x11.Xvfb(200, 200) as standing:
+            frozen = Frozen(folder, standing)
             # The server must have somebody connected all the time, or it resets.
             client = x11.Client(server.number)
             four_windows(folder, server.name, client, sys.argv[2] if len(sys.argv) > 2 else None)
             turned(folder, server.name, client)
             Run(folder, server.name, "wall", "run", "1x1@32x32", *SCENE, "--display", "window", "--frames", "2").ends("two frames")
+            view_with_two_minds(folder, server)
+            server_lost(folder)
+            ranks_beside_a_stopped_server(folder)
+            frozen.ends()
     return 1 if failures else 0
 
 

@@ -11,22 +11,31 @@ ESCAPE = 9  # its key code
 
 
 class Xvfb:
-    """Runs one on a free display while it is entered; `available` tells whether it is installed."""
+    """Runs one on a free display while it is entered; `available` tells whether it is installed.
+
+    Not on one of the first ten displays unless told: Open MPI's launcher looks there for graphics cards, and what does not tell it
+    to leave that waits for a server that a test has stopped.
+    """
 
     available = shutil.which("Xvfb") is not None
 
-    def __init__(self, width, height):
+    def __init__(self, width, height, first=10):
+        self.first = first
         self.size = f"{width}x{height}x24"
 
     def __enter__(self):
-        self.process = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", self.size, "-nolisten", "tcp"],
-                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        if not select.select([self.process.stdout], [], [], 20)[0]:
-            self.__exit__()
-            raise RuntimeError("Xvfb does not start")
-        self.number = int(self.process.stdout.readline())
-        self.name = f":{self.number}"
-        return self
+        for number in range(self.first, self.first + 50):
+            self.process = subprocess.Popen(["Xvfb", f":{number}", "-displayfd", "1", "-screen", "0", self.size, "-nolisten", "tcp"],
+                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            if not select.select([self.process.stdout], [], [], 20)[0]:
+                break
+            if self.process.stdout.readline():
+                self.number = number
+                self.name = f":{number}"
+                return self
+            self.__exit__()  # the display is taken
+        self.__exit__()
+        raise RuntimeError("Xvfb does not start")
 
     def __exit__(self, *_):
         self.process.terminate()

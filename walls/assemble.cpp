@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "image/image_parts.h"
+
 namespace hpr {
 namespace {
 
@@ -88,9 +90,7 @@ Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<c
       const Size size{place.width(), place.height()};
       const bool there = screens[i] != nullptr && screens[i]->size().area() > 0;
       const Image<Rgba8> shown = there ? resample(*screens[i], size) : Image<Rgba8>(size, {0, 0, 0, 255});
-      for (int y = 0; y < size.height; ++y) {
-        std::ranges::copy(shown.row(y), result.row(place.y0 + y).begin() + place.x0);
-      }
+      paste(shown, place.x0, place.y0, result);
     }
   }
   return result;

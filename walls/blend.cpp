@@ -36,8 +36,10 @@ Fades fades_of(const Wall& wall, const WallScreen& screen) {
   const EdgeBlend& blend = screen.blend;
   Fades fades{blend.left, blend.right, blend.bottom, blend.top};
   if (!blend.automatic) return fades;
-  for (const WallScreen& other : wall.screens) {
-    if (&other != &screen && other.blend.any()) reach_over(screen, other, fades);
+  for (const auto* screens : {&wall.screens, &wall.elsewhere}) {
+    for (const WallScreen& other : *screens) {
+      if (&other != &screen && other.blend.any()) reach_over(screen, other, fades);
+    }
   }
   return fades;
 }
@@ -71,10 +73,12 @@ BlendWeights::BlendWeights(const Wall& wall, std::size_t screen) {
     areas_.push_back(area);
   };
   add(mine, {{0.0, 0.0}, {width_, height_}, false, {1, 1}});
-  for (const WallScreen& other : wall.screens) {
-    if (&other == &mine || !other.blend.any()) continue;
-    const auto box = seen_from(other, mine);
-    if (box && overlaps(*box, mine)) add(other, *box);
+  for (const auto* screens : {&wall.screens, &wall.elsewhere}) {
+    for (const WallScreen& other : *screens) {
+      if (&other == &mine || !other.blend.any()) continue;
+      const auto box = seen_from(other, mine);
+      if (box && overlaps(*box, mine)) add(other, *box);
+    }
   }
 }
 

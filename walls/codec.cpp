@@ -18,7 +18,7 @@ std::span<const CoderKind> all_coders() {
       CoderKind{"raw", [](const CodecSettings&) { return make_raw_coder(); }},
       CoderKind{"lz4", make_lz4_coder},
       CoderKind{"zstd", make_zstd_coder},
-      CoderKind{"jpeg", make_jpeg_coder},
+      CoderKind{"jpeg", make_jpeg_coder, true},
   };
   return kKinds;
 }

@@ -31,11 +31,11 @@ std::vector<const Image<Rgba8>*> pictures_by_screen(const Wall& wall, const Wall
 
 const std::vector<DisplayKind>& display_kinds() {
   static const std::vector<DisplayKind> kinds{
-      {"file", false, false, make_file_display, check_file_display},
-      {"window", false, true, make_window_display, check_window_display},
-      {"web", true, true, make_web_display, check_web_display},
-      {"pipe", true, false, make_pipe_display, check_pipe_display},
-      {"none", false, false, make_no_display, check_no_display},
+      {.name = "file", .monitors = true, .make = make_file_display, .check = check_file_display},
+      {.name = "window", .interactive = true, .make = make_window_display, .check = check_window_display},
+      {.name = "web", .whole_wall = true, .interactive = true, .make = make_web_display, .check = check_web_display},
+      {.name = "pipe", .whole_wall = true, .stream = true, .make = make_pipe_display, .check = check_pipe_display},
+      {.name = "none", .make = make_no_display, .check = check_no_display},
   };
   return kinds;
 }
@@ -49,19 +49,12 @@ const std::vector<std::string>& all_displays() {
   return names;
 }
 
-const DisplayKind& find_display(std::string_view name) {
+const DisplayKind& find_display(std::string_view name, std::span<const std::string> further) {
   const auto found = std::ranges::find(display_kinds(), name, &DisplayKind::name);
   if (found != display_kinds().end()) return *found;
-  throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(name)),
-              unknown_name_hint(name, all_displays()));
-}
-
-std::unique_ptr<Display> make_display(std::string_view name, const Wall& wall, const DisplayOptions& options) {
-  return find_display(name).make(wall, options);
-}
-
-void check_display(std::string_view name, const Wall& wall, const DisplayOptions& options) {
-  find_display(name).check(wall, options);
+  std::vector<std::string> choices = all_displays();
+  choices.insert(choices.end(), further.begin(), further.end());
+  throw Error(ExitCode::Usage, fmt::format("unknown display '{}'", printable(name)), unknown_name_hint(name, choices));
 }
 
 }  // namespace hpr

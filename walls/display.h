@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -33,6 +34,13 @@ struct WallFrame {
   std::uint64_t number = 0;
   std::span<const ScreenPicture> screens;
   std::span<const MonitorPicture> monitors = {};
+};
+
+/// What showing a screen took.
+struct ScreenCost {
+  std::size_t screen = 0;   ///< index into Wall::screens
+  double ms = 0.0;          ///< until it was handed over: encoding, writing
+  std::uint64_t bytes = 0;  ///< handed over
 };
 
 /// Per screen of the wall its picture; null where the frame has none.
@@ -67,6 +75,9 @@ class Display {
   /// Returns when the frame is handed over; its pictures may then change. Throws Error (Io, Lost).
   virtual void show(const WallFrame& frame) = 0;
 
+  /// What the last frame's screens took; empty where it is not known.
+  [[nodiscard]] virtual std::vector<ScreenCost> costs() const { return {}; }
+
   /// What the viewer asked for since this was last called; never waits.
   [[nodiscard]] virtual DisplayInput take_input() { return {}; }
 
@@ -94,8 +105,8 @@ struct DisplayOptions {
   bool overwrite = false;             ///< replace files that were there before the run
   bool keep_frames = false;           ///< for `file`: each frame into a folder of its own too
   PipeOptions pipe = {};
-  std::vector<std::size_t> screens = {};  ///< for `window`: those this process shows
-  std::string web_address = {};           ///< for `web`: ADDR:PORT; empty: loopback, a free port
+  std::optional<std::vector<std::size_t>> screens = {};  ///< for `window`: those this process shows; none: all
+  std::string web_address = {};                          ///< for `web`: ADDR:PORT; empty: loopback, a free port
   std::function<void(const std::string& line)> announce = nullptr;  ///< told where `web` is found
 };
 
@@ -104,8 +115,12 @@ struct DisplayKind {
   std::string_view name;
   bool whole_wall = false;   ///< one process shows all screens, whichever rank the wall file names
   bool interactive = false;  ///< has a viewer who moves the camera, and who ends the run
+  bool monitors = false;     ///< shows the operator's monitors too
+  bool stream = false;       ///< what it was given cannot be taken back: a job that is lost does not go on
+  /// Throws Error: Usage for options that do not fit, Io when what is to be written to cannot be or holds what may not
+  /// be overwritten, NoDevice without a desktop for windows. `wall` must outlive the display.
   std::unique_ptr<Display> (*make)(const Wall& wall, const DisplayOptions& options) = nullptr;
-  /// Finds, before long work, what would make `make` fail.
+  /// Throws what `make` would, as far as that can be told without opening anything; asked before long work.
   void (*check)(const Wall& wall, const DisplayOptions& options) = nullptr;
 };
 
@@ -115,15 +130,7 @@ struct DisplayKind {
 [[nodiscard]] const std::vector<DisplayKind>& display_kinds();
 [[nodiscard]] const std::vector<std::string>& all_displays();
 
-/// Throws Error (Usage) for an unknown name, with the choices.
-[[nodiscard]] const DisplayKind& find_display(std::string_view name);
-
-/// Throws Error: Usage for an unknown name or options that do not fit, Io when what is to be written to cannot be or
-/// holds what may not be overwritten, NoDevice without a desktop for windows. `wall` must outlive the display.
-[[nodiscard]] std::unique_ptr<Display> make_display(std::string_view name, const Wall& wall,
-                                                    const DisplayOptions& options);
-
-/// Throws what make_display would, as far as that can be told without opening anything; asked before long work.
-void check_display(std::string_view name, const Wall& wall, const DisplayOptions& options);
+/// Throws Error (Usage) for an unknown name, with the choices and `further` ones that the caller has.
+[[nodiscard]] const DisplayKind& find_display(std::string_view name, std::span<const std::string> further = {});
 
 }  // namespace hpr

@@ -44,11 +44,11 @@ TEST(Displays, AreMadeByNameAndUnknownNamesListTheChoices) {
   const Folder folder("displays");
   const Wall wall = load_wall("1x1@4x4");
   for (const std::string name : {"file", "none"}) {
-    EXPECT_EQ(make_display(name, wall, {folder.path(), false})->name(), name);
+    EXPECT_EQ(find_display(name).make(wall, {folder.path(), false})->name(), name);
     EXPECT_NE(std::ranges::find(all_displays(), name), all_displays().end());
   }
   try {
-    static_cast<void>(make_display("flie", wall, {}));
+    static_cast<void>(find_display("flie").make(wall, {}));
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::Usage);
@@ -59,7 +59,7 @@ TEST(Displays, AreMadeByNameAndUnknownNamesListTheChoices) {
 TEST(FileDisplay, WritesEachScreenUnderItsIdAndReplacesItsOwnFrames) {
   const Folder folder("frames");
   const Wall wall = load_wall("2x1@5x3");
-  const auto display = make_display("file", wall, {folder.path() / "sub", false});
+  const auto display = find_display("file").make(wall, {folder.path() / "sub", false});
   Image<Rgba8> image({5, 3}, {10, 20, 30, 255});
   for (std::uint64_t frame = 0; frame < 2; ++frame) {
     image.at(4, 0) = {static_cast<std::uint8_t>(frame), 1, 2, 255};
@@ -77,8 +77,8 @@ TEST(FileDisplay, KeepsEveryFrameInAFolderOfItsOwn) {
   const Folder folder("kept");
   const Wall wall = load_wall("1x1@2x1");
   const DisplayOptions options{.folder = folder.path(), .keep_frames = true};
-  check_display("file", wall, options);
-  const auto display = make_display("file", wall, options);
+  find_display("file").check(wall, options);
+  const auto display = find_display("file").make(wall, options);
   for (const std::uint64_t frame : {7U, 8U}) {
     const Image<Rgba8> image({2, 1}, {static_cast<std::uint8_t>(frame), 0, 0, 255});
     const std::vector<ScreenPicture> pictures{{0, image}};
@@ -93,10 +93,10 @@ TEST(FileDisplay, KeepsEveryFrameInAFolderOfItsOwn) {
   EXPECT_EQ(red_of(folder.path() / "frame-000008" / file), 8);
   // Frames of another run are not mixed with this one's.
   std::filesystem::remove(folder.path() / file);
-  EXPECT_THROW(check_display("file", wall, options), Error);
+  EXPECT_THROW(find_display("file").check(wall, options), Error);
   DisplayOptions forced = options;
   forced.overwrite = true;
-  EXPECT_NO_THROW(check_display("file", wall, forced));
+  EXPECT_NO_THROW(find_display("file").check(wall, forced));
 }
 
 TEST(FileDisplay, RefusesToReplaceAnotherRunsFilesUnlessForced) {
@@ -105,21 +105,21 @@ TEST(FileDisplay, RefusesToReplaceAnotherRunsFilesUnlessForced) {
   std::filesystem::create_directories(folder.path());
   write_file_atomically(folder.path() / "wall-r0c1.png", "someone's");
   try {
-    static_cast<void>(make_display("file", wall, {folder.path(), false}));
+    static_cast<void>(find_display("file").make(wall, {folder.path(), false}));
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::Io);
     EXPECT_NE(error.hint().find("--force"), std::string::npos);
   }
   EXPECT_EQ(folder.files(), 1U);
-  EXPECT_EQ(make_display("file", wall, {folder.path(), true})->name(), "file");
+  EXPECT_EQ(find_display("file").make(wall, {folder.path(), true})->name(), "file");
 }
 
 TEST(FileDisplay, AFolderThatIsAFileIsAnIoError) {
   const Folder folder("nofolder");
   const Wall wall = load_wall("1x1@5x3");
   write_file_atomically(folder.path(), "a file");
-  EXPECT_THROW(static_cast<void>(make_display("file", wall, {folder.path(), true})), Error);
+  EXPECT_THROW(static_cast<void>(find_display("file").make(wall, {folder.path(), true})), Error);
 }
 
 TEST(Manifest, HoldsWhatTheContractNames) {

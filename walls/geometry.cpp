@@ -8,6 +8,8 @@
 #include <optional>
 #include <variant>
 
+#include "walls/curved.h"
+
 namespace hpr {
 namespace {
 
@@ -59,14 +61,20 @@ View screen_view(const View& shared, const WallScreen& screen, const Placement& 
   } else {
     const double distance = -glm::dot(from_eye, axes[2]);
     const double held = std::max(distance, clamp);
-    // Moving the eye, not only dividing by another number, keeps what lies in the screen's plane where it is.
-    view.eye += view.axes[2] * (held - distance);
+    // Moving the eye, not only dividing by another number, keeps what lies in the screen's plane where it is. Of points
+    // none need lie there.
+    if (!screen.warp.points) view.eye += view.axes[2] * (held - distance);
     scale = 1.0 / held;
   }
   view.left = glm::dot(from_eye, axes[0]) * scale;
   view.right = (glm::dot(from_eye, axes[0]) + screen_width(screen)) * scale;
   view.bottom = glm::dot(from_eye, axes[1]) * scale;
   view.top = (glm::dot(from_eye, axes[1]) + screen_height(screen)) * scale;
+  if (screen.warp.points) {
+    view.points = pixel_points(screen, eye);
+    view.points->orthographic = view.orthographic;
+    view.points->scale = view.orthographic ? scale : 1.0;
+  }
   return view;
 }
 

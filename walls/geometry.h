@@ -46,6 +46,7 @@ struct WallExtent {
 /// camera's vertical angle. An orthographic camera shows its half height on half the wall's height, wherever the heads
 /// are. `bounds` (of the scene) choose the near plane where neither wall nor camera give one. An eye nearer to a
 /// screen's plane than clamp_distance_m, or behind it, is moved back for that screen.
+/// A screen with a position map is looked at through its points, by an eye that stays where it is.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
                                            const Bounds& bounds);
 /// With heads at rest.
@@ -64,6 +65,9 @@ struct WallPicture {
   std::vector<Rect> screens;  ///< one per screen of the wall, none empty
   std::vector<Rect> planes;   ///< what each of wall_planes() covers, gaps included
 };
+
+/// Pixels a side of an assembled wall that is looked at, or encoded: most programs take no larger picture well.
+inline constexpr int kLargestPicture = 8192;
 
 /// A flat wall as it stands, at its finest screen's pixels; any other wall plane by plane: upright ones side by side
 /// from left to right, ceilings above, floors below. Scaled down when a side would exceed `max_side` pixels. Edges are

@@ -36,6 +36,21 @@ Json json_of(const FrameRecord& frame) {
                             {"samples", frame.budget->samples},
                             {"given_up", frame.budget->given_up}};
   }
+  // Apart from the screens: those are the same from run to run.
+  for (const ScreenRecord& screen : frame.screens) {
+    if (screen.rank < 0) continue;
+    Json cost{{"id", screen.id}, {"rank", screen.rank}};
+    if (screen.ms) cost["ms"] = *screen.ms;
+    if (screen.bytes) cost["bytes"] = *screen.bytes;
+    record["costs"].push_back(std::move(cost));
+  }
+  if (frame.slowest) {
+    record["slowest"] = Json{{"rank", frame.slowest->rank},
+                             {"host", frame.slowest->host},
+                             {"ms", frame.slowest->ms},
+                             {"pass", frame.slowest->pass},
+                             {"pass_ms", frame.slowest->pass_ms}};
+  }
   for (const HeadRecord& head : frame.heads) record["heads"].push_back(json_of(head));
   for (const ScreenRecord& monitor : frame.monitors) record["monitors"].push_back(picture_json(monitor));
   if (frame.swap) {
@@ -79,6 +94,10 @@ std::string to_json(const RunManifest& manifest) {
   if (!manifest.restarts.empty()) {
     document["restarts"] = Json::array();
     for (const std::string& restart : manifest.restarts) document["restarts"].push_back(Json::parse(restart));
+  }
+  if (manifest.stopped_of) {
+    document["stopped"] =
+        Json{{"frames", manifest.earlier.size() + manifest.frames.size()}, {"of", *manifest.stopped_of}};
   }
   if (manifest.degraded_seconds) document["degraded_seconds"] = *manifest.degraded_seconds;
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -23,6 +23,18 @@ struct ScreenRecord {
   Size size;                ///< pixels
   std::uint64_t xxh64 = 0;  ///< of the RGBA8 pixels, row by row
   ScreenState state = ScreenState::Fresh;
+  int rank = -1;                            ///< that handed it over; -1: not told
+  std::optional<double> ms = {};            ///< handing it over: encoding, writing
+  std::optional<std::uint64_t> bytes = {};  ///< of what was handed over
+};
+
+/// The rank that did most for a frame: drawing and lighting, not waiting for others.
+struct SlowestRecord {
+  int rank = 0;
+  std::string host;
+  double ms = 0.0;
+  std::string pass;  ///< that took most of it
+  double pass_ms = 0.0;
 };
 
 /// What a frame with a target time was made with.
@@ -53,6 +65,7 @@ struct FrameRecord {
   std::optional<SwapRecord> swap = {};  ///< only with such displays
   std::vector<HeadRecord> heads = {};
   std::vector<ScreenRecord> monitors = {};
+  std::optional<SlowestRecord> slowest = {};
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
@@ -61,9 +74,10 @@ struct RunManifest {
   std::uint64_t wall_hash = 0;
   std::uint64_t seed = 0;
   std::map<std::string, std::string> versions;  ///< "hpr", "embree", "gl", ...
-  std::vector<std::string> earlier;   ///< records of the frames a job drew that was lost since, as JSON objects
-  std::vector<std::string> restarts;  ///< JSON objects: before which frame a job was started again, and why
-  std::vector<FrameRecord> frames;    ///< of this job
+  std::vector<std::string> earlier;    ///< records of the frames an earlier job of this run drew, as JSON objects
+  std::vector<std::string> restarts;   ///< JSON objects: before which frame a job was started again, and why
+  std::vector<FrameRecord> frames;     ///< of this job
+  std::optional<int> stopped_of = {};  ///< the frames it was to have, where it was stopped before
   /// How long displays outside the job were missing or behind; none where there are no such displays.
   std::optional<double> degraded_seconds = {};
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "image/image_parts.h"
 #include "walls/assemble.h"
 #include "walls/geometry.h"
 
@@ -57,19 +58,12 @@ Image<Rgba8> draw_monitor(const Wall& wall, const WallMonitor& monitor, const Mo
                           std::span<const Image<Rgba8>> pictures) {
   HPR_CHECK(pictures.size() == layout.places.size());
   Image<Rgba8> result(monitor.pixels, {0, 0, 0, 255});
-  const auto row_of = [&](const Rect& place, int y) {
-    return result.row(y).subspan(static_cast<std::size_t>(place.x0), static_cast<std::size_t>(place.width()));
-  };
-  for (int y = layout.surface.y0; y < layout.surface.y1; ++y) {
-    std::ranges::fill(row_of(layout.surface, y), wall.gap_color);
-  }
+  const Rect& surface = layout.surface;
+  paste(Image<Rgba8>({surface.width(), surface.height()}, wall.gap_color), surface.x0, surface.y0, result);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     const Rect& place = layout.places[i];
     if (pictures[i].size().area() == 0) continue;
-    const Image<Rgba8> small = resample(pictures[i], {place.width(), place.height()});
-    for (int y = 0; y < small.height(); ++y) {
-      std::ranges::copy(small.row(y), row_of(place, place.y0 + y).begin());
-    }
+    paste(resample(pictures[i], {place.width(), place.height()}), place.x0, place.y0, result);
   }
   return result;
 }

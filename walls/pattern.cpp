@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "walls/adjacent.h"
 #include "walls/canvas.h"
 #include "walls/geometry.h"
 #include "walls/plan.h"
@@ -22,6 +23,7 @@ constexpr Rgba8 kBackground{24, 26, 32, 255};
 constexpr Rgba8 kGrid{84, 88, 98, 255};
 constexpr Rgba8 kCircle{255, 210, 0, 255};
 constexpr Rgba8 kDiagonal{0, 200, 255, 255};
+constexpr Rgba8 kNeighbour{150, 255, 150, 255};
 
 /// Wall metres in the plane of a screen -> that screen's pixels.
 class ScreenPixels {
@@ -79,6 +81,83 @@ void draw_ramp(Canvas& canvas, Size size) {
   }
 }
 
+/// Millimetres from one tick to the next: few enough that they do not run together.
+double tick_mm(double pixels_per_mm) {
+  constexpr double kClosest = 5.0;
+  for (const double step : {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
+    if (step * pixels_per_mm >= kClosest) return step;
+  }
+  return 1000.0;
+}
+
+/// Along the top edge from the left and the left edge from the top; every tenth tick is long and numbered.
+void draw_rulers(Canvas& canvas, const WallScreen& screen) {
+  constexpr int kLong = 10;
+  const glm::dvec2 size(screen.pixels.width, screen.pixels.height);
+  const double metres = screen_width(screen);
+  const double pixels_per_mm = size.x / (1000.0 * metres);
+  const double step = tick_mm(pixels_per_mm);
+  const double unit = std::min(size.x, size.y) / 100.0;
+  if (unit < 1.0) return;
+  for (const bool across : {true, false}) {
+    const double length_mm = 1000.0 * (across ? metres : screen_height(screen));
+    for (int i = 1; i * step < length_mm; ++i) {
+      const double at = std::round(i * step * (across ? pixels_per_mm : size.y / length_mm));
+      const double tick = i % kLong == 0 ? 3.0 * unit : i % (kLong / 2) == 0 ? 2.0 * unit : unit;
+      across ? canvas.fill({at, 0.0}, {1.0, std::round(tick)}, kWhite)
+             : canvas.fill({0.0, at}, {std::round(tick), 1.0}, kWhite);
+      if (i % kLong != 0) continue;
+      const std::string number = fmt::format("{:g}", i * step);
+      const double height = std::max(5.0, 1.6 * unit);
+      canvas.text(across ? glm::dvec2(at, 3.0 * unit + 0.7 * height)
+                         : glm::dvec2(3.0 * unit + 0.4 * height * static_cast<double>(number.size()), at),
+                  number, height, kWhite);
+    }
+  }
+}
+
+/// Where the picture goes on, and as which screen.
+void draw_neighbours(Canvas& canvas, const Wall& wall, std::size_t index) {
+  const glm::dvec2 size(wall.screens[index].pixels.width, wall.screens[index].pixels.height);
+  const double arrow = 0.035 * std::min(size.x, size.y);
+  const double height = 0.9 * arrow;
+  if (height < 4.0) return;
+  const auto neighbours = adjacent_screens(wall, index);
+  const auto label = [&](Side side) -> std::string {
+    const auto found = neighbours.at(static_cast<std::size_t>(side));
+    return found ? wall.screens[*found].id : "";
+  };
+  const auto draw = [&](Side side, glm::dvec2 tip, glm::dvec2 back, bool upright) {
+    const std::string id = label(side);
+    if (id.empty()) return;
+    const glm::dvec2 across(back.y, -back.x);
+    canvas.polyline(std::array{tip + arrow * (back + 0.6 * across), tip, tip + arrow * (back - 0.6 * across)},
+                    kNeighbour, std::max(1.5, arrow / 6.0));
+    // Beside the arrow in either case: what is above and below has other things to show.
+    const double half_text = 0.3 * height * static_cast<double>(id.size());
+    canvas.text(upright ? tip + 0.5 * arrow * back + glm::dvec2(arrow + half_text, 0.0)
+                        : tip + (1.5 * arrow + half_text) * back,
+                id, height, kNeighbour);
+  };
+  draw(Side::Left, {0.01 * size.x, 0.28 * size.y}, {1.0, 0.0}, false);
+  draw(Side::Right, {0.99 * size.x, 0.28 * size.y}, {-1.0, 0.0}, false);
+  draw(Side::Up, {0.72 * size.x, 0.08 * size.y}, {0.0, 1.0}, true);
+  draw(Side::Down, {0.72 * size.x, 0.97 * size.y}, {0.0, -1.0}, true);
+}
+
+/// "wall05, rank 3 at :0.1 DP-2": who drives it, and at which output.
+std::string driver_of(const Wall& wall, const WallScreen& screen) {
+  std::string text = owner_of(wall, screen);
+  const auto window = std::ranges::find(wall.windows, screen.window, &WallWindow::id);
+  if (screen.window.empty() || window == wall.windows.end()) return text;
+  std::string output = window->display;
+  if (!window->monitor.empty()) output += (output.empty() ? "" : " ") + window->monitor;
+  if (window->monitor.empty() && !window->rect.empty()) {
+    output += fmt::format(" +{}+{}", window->rect.x0 + screen.viewport.x0, window->rect.y0 + screen.viewport.y0);
+  }
+  return output.empty() ? text : fmt::format("{} at {}", text, output);
+}
+
 /// Alternating pixels show a display that resamples.
 void draw_checkers(Image<Rgba8>& image) {
   constexpr int kSide = 24;
@@ -112,11 +191,14 @@ Image<Rgba8> wall_pattern(const Wall& wall, std::size_t index) {
   draw_shared_lines(canvas, wall, index, std::max(1.5, small / 180.0));
   canvas.frame({0.0, 0.0}, {w, h}, kWhite, 1.0);
 
+  draw_rulers(canvas, screen);
+  draw_neighbours(canvas, wall, index);
+
   // An id as large as fits, and what it stands for.
   const double letters = static_cast<double>(std::max<std::size_t>(screen.id.size(), 4));
   const double height = std::min(0.22 * h, 0.8 * w / (0.62 * letters));
   canvas.text({0.5 * w, 0.42 * h}, screen.id, height, kWhite);
-  const std::string facts = fmt::format("{} x {} px, {}", size.width, size.height, owner_of(wall, screen));
+  const std::string facts = fmt::format("{} x {} px, {}", size.width, size.height, driver_of(wall, screen));
   const double facts_height = std::min(0.06 * h, 0.8 * w / (0.62 * static_cast<double>(facts.size())));
   canvas.text({0.5 * w, 0.42 * h + 0.75 * height}, facts, facts_height, kWhite);
   const double arrow = 0.08 * small;

@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kWidth = 1280;
 constexpr int kMargin = 40;
-constexpr int kHead = 90;  ///< room for the title
+constexpr int kHead = 90;   ///< room for the title
+constexpr int kScale = 56;  ///< room for the scale of colours, where there is one
 constexpr int kTopViewHeight = 260;
 constexpr int kCaption = 34;  ///< between the two drawings
 constexpr Rgba8 kPaper{255, 255, 255, 255};
@@ -34,6 +35,24 @@ constexpr std::array<Rgba8, 8> kOwners{{{176, 206, 240, 255},
                                         {176, 226, 226, 255},
                                         {222, 208, 190, 255}}};
 
+/// From little to much, light enough for dark text; between them colours are mixed.
+constexpr std::array<Rgba8, 4> kHeat{
+    {{236, 244, 232, 255}, {253, 230, 138, 255}, {251, 170, 90, 255}, {240, 110, 90, 255}}};
+constexpr Rgba8 kNotMeasured{255, 255, 255, 255};
+
+/// `share` from 0 to 1.
+Rgba8 heat_color(double share) {
+  const double at = std::clamp(share, 0.0, 1.0) * (kHeat.size() - 1);
+  const auto below = std::min(static_cast<std::size_t>(at), kHeat.size() - 2);
+  const double part = at - static_cast<double>(below);
+  const auto mix = [&](std::uint8_t a, std::uint8_t b) {
+    return static_cast<std::uint8_t>(std::lround((1.0 - part) * a + part * b));
+  };
+  const Rgba8& a = kHeat.at(below);
+  const Rgba8& b = kHeat.at(below + 1);
+  return {mix(a.r, b.r), mix(a.g, b.g), mix(a.b, b.b), 255};
+}
+
 glm::dvec2 corner(const Rect& r) {
   return {r.x0, r.y0};
 }
@@ -48,19 +67,28 @@ std::string millimetres(double metres) {
 /// Everything that is drawn, laid out on one sheet.
 struct Plan {
   const Wall& wall;
+  const WallHeat* heat;  ///< none: coloured by owner
   WallPicture picture;
   glm::dvec2 origin;  ///< of the picture on the sheet
   Size sheet;
   std::vector<Rgba8> colors;  ///< per screen, by owner
 };
 
-Plan lay_out(const Wall& wall) {
+Plan lay_out(const Wall& wall, const WallHeat* heat) {
   constexpr int kTallest = 700;
   WallPicture picture = wall_picture(wall, kWidth - 2 * kMargin);
   if (picture.size.height > kTallest) picture = wall_picture(wall, kTallest);
-  const glm::dvec2 origin{0.5 * (kWidth - picture.size.width), kHead};
-  const Size sheet{kWidth, kHead + picture.size.height + kCaption + kTopViewHeight + kMargin};
-  Plan plan{wall, std::move(picture), origin, sheet, {}};
+  const int top = kHead + (heat != nullptr ? kScale : 0);
+  const glm::dvec2 origin{0.5 * (kWidth - picture.size.width), top};
+  const Size sheet{kWidth, top + picture.size.height + kCaption + kTopViewHeight + kMargin};
+  Plan plan{wall, heat, std::move(picture), origin, sheet, {}};
+  if (heat != nullptr) {
+    const double most = heat->largest();
+    for (const auto& value : heat->values) {
+      plan.colors.push_back(!value ? kNotMeasured : heat_color(most > 0.0 ? *value / most : 0.0));
+    }
+    return plan;
+  }
   std::vector<std::string> owners;
   for (const WallScreen& screen : wall.screens) {
     const std::string owner = owner_of(wall, screen);
@@ -88,13 +116,35 @@ void draw_head(Canvas& canvas, const Plan& plan) {
   canvas.text({0.5 * kWidth, 64.0}, facts, 14.0, kInk);
 }
 
-void draw_screen(Canvas& canvas, const Plan& plan, std::size_t index) {
-  const WallScreen& screen = plan.wall.screens[index];
-  const Rect& place = plan.picture.screens[index];
-  const glm::dvec2 at = plan.origin + corner(place);
-  canvas.fill(at, extent(place), plan.colors[index]);
-  canvas.frame(at, extent(place), kInk, 1.0);
+/// The scale of colours, and what they mean.
+void draw_scale(Canvas& canvas, const WallHeat& heat) {
+  constexpr int kSteps = 32;
+  constexpr double kStep = 10.0;
+  constexpr double kHeight = 14.0;
+  const double left = 0.5 * (kWidth - kSteps * kStep);
+  for (int i = 0; i < kSteps; ++i) {
+    canvas.fill({left + i * kStep, kHead}, {kStep, kHeight}, heat_color((i + 0.5) / kSteps));
+  }
+  canvas.frame({left, kHead}, {kSteps * kStep, kHeight}, kInk, 1.0);
+  const double most = heat.largest();
+  const double middle = kHead + 0.5 * kHeight;
+  canvas.text({left - 30.0, middle}, "0" + heat.unit, 13.0, kInk);
+  canvas.text({left + kSteps * kStep + 50.0, middle}, fmt::format("{:.3g}{}", most, heat.unit), 13.0, kInk);
+  canvas.text({0.5 * kWidth, kHead + kHeight + 18.0}, heat.title, 13.0, kInk);
+}
 
+/// What is written on a screen.
+std::vector<std::string> lines_of(const Plan& plan, std::size_t index) {
+  const WallScreen& screen = plan.wall.screens[index];
+  if (plan.heat != nullptr) {
+    std::vector<std::string> lines{screen.id};
+    const auto& value = plan.heat->values[index];
+    if (!value) lines.emplace_back("not measured");
+    const auto& notes = plan.heat->notes[index];
+    lines.insert(lines.end(), notes.begin(), notes.end());
+    if (!screen.node.empty()) lines.push_back(owner_of(plan.wall, screen));
+    return lines;
+  }
   std::vector<std::string> lines{
       screen.id, fmt::format("{} x {} px", screen.pixels.width, screen.pixels.height),
       fmt::format("{} x {} mm", millimetres(screen_width(screen)), millimetres(screen_height(screen))),
@@ -103,6 +153,16 @@ void draw_screen(Canvas& canvas, const Plan& plan, std::size_t index) {
   if (screen.rotate != 0) lines.push_back(fmt::format("turned {} degrees", screen.rotate));
   if (screen.mirror != Mirror::None) lines.push_back("mirrored");
   if (screen.eye != Eye::Both) lines.push_back(screen.eye == Eye::Left ? "left eye" : "right eye");
+  return lines;
+}
+
+void draw_screen(Canvas& canvas, const Plan& plan, std::size_t index) {
+  const Rect& place = plan.picture.screens[index];
+  const glm::dvec2 at = plan.origin + corner(place);
+  canvas.fill(at, extent(place), plan.colors[index]);
+  canvas.frame(at, extent(place), kInk, 1.0);
+
+  std::vector<std::string> lines = lines_of(plan, index);
   std::size_t longest = 0;
   for (const std::string& line : lines) longest = std::max(longest, line.size());
   // A letter is about 0.6 of the font's height wide.
@@ -146,7 +206,7 @@ void draw_top_view(Canvas& canvas, const Plan& plan) {
       high = glm::max(high, seen_from_above(p));
     }
   }
-  const double top = kHead + plan.picture.size.height + kCaption;
+  const double top = plan.origin.y + plan.picture.size.height + kCaption;
   const glm::dvec2 span = high - low;
   const double per_metre =
       std::min((kWidth - 6.0 * kMargin) / std::max(span.x, 1e-6), (kTopViewHeight - 50.0) / std::max(span.y, 1e-6));
@@ -183,6 +243,7 @@ void draw_top_view(Canvas& canvas, const Plan& plan) {
 void draw_plan(Canvas& canvas, const Plan& plan) {
   canvas.fill({0.0, 0.0}, {plan.sheet.width, plan.sheet.height}, kPaper);
   draw_head(canvas, plan);
+  if (plan.heat != nullptr) draw_scale(canvas, *plan.heat);
   for (const Rect& plane : plan.picture.planes) {
     canvas.fill(plan.origin + corner(plane), extent(plane), kGap);
     canvas.hatch(plan.origin + corner(plane), extent(plane), kFaint, 6.0, 1.0);
@@ -209,15 +270,15 @@ std::string owner_of(const Wall& wall, const WallScreen& screen) {
   return owner.empty() ? rank : fmt::format("{}, {}", owner, rank);
 }
 
-std::string wall_plan_svg(const Wall& wall) {
-  const Plan plan = lay_out(wall);
+std::string wall_plan_svg(const Wall& wall, const WallHeat* heat) {
+  const Plan plan = lay_out(wall, heat);
   SvgCanvas canvas(plan.sheet, wall.name);
   draw_plan(canvas, plan);
   return canvas.document();
 }
 
-Image<Rgba8> wall_plan_image(const Wall& wall) {
-  const Plan plan = lay_out(wall);
+Image<Rgba8> wall_plan_image(const Wall& wall, const WallHeat* heat) {
+  const Plan plan = lay_out(wall, heat);
   PixelCanvas canvas(plan.sheet);
   draw_plan(canvas, plan);
   return canvas.image();

@@ -4,6 +4,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
+#include "walls/heat.h"
 #include "walls/wall.h"
 
 namespace hpr {
@@ -11,8 +12,9 @@ namespace hpr {
 /// The plan of a wall, for people: its screens as they stand, to scale, with their ids, sizes in pixels and
 /// millimetres and owners (host, rank, window), gaps hatched, and the wall from above with its viewer.
 /// Both forms come from the same drawing code.
-[[nodiscard]] std::string wall_plan_svg(const Wall& wall);
-[[nodiscard]] Image<Rgba8> wall_plan_image(const Wall& wall);
+/// With `heat` screens are coloured by what a run measured of them instead of by their owners, and a scale tells how.
+[[nodiscard]] std::string wall_plan_svg(const Wall& wall, const WallHeat* heat = nullptr);
+[[nodiscard]] Image<Rgba8> wall_plan_image(const Wall& wall, const WallHeat* heat = nullptr);
 
 /// "pc (localhost), rank 0", "rank 2", or "any rank".
 [[nodiscard]] std::string owner_of(const Wall& wall, const WallScreen& screen);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <glm/geometric.hpp>
 
@@ -98,6 +99,39 @@ TEST(WallPattern, TheOutermostPixelsAreWhite) {
     EXPECT_EQ(image.at(0, y), (Rgba8{255, 255, 255, 255}));
     EXPECT_EQ(image.at(319, y), (Rgba8{255, 255, 255, 255}));
   }
+}
+
+TEST(WallPattern, RulersCountMillimetresFromTheLeftAndTheTop) {
+  // 640 pixels are 512 mm: a tick every 5 mm, a long one every 50.
+  const Image<Rgba8> image = wall_pattern(load_wall(example("desktop-3x2.toml")), 0);
+  constexpr Rgba8 kWhite{255, 255, 255, 255};
+  for (int i = 8; i < 90; ++i) {
+    const int at = static_cast<int>(std::lround(i * 5.0 * 640.0 / 512.0));
+    EXPECT_EQ(image.at(at, 2), kWhite) << i;
+    EXPECT_EQ(image.at(at, 9) == kWhite, i % 10 == 0) << i;
+    EXPECT_NE(image.at(at + 3, 2), kWhite) << i;
+  }
+  for (int i = 8; i < 50; ++i) EXPECT_EQ(image.at(2, static_cast<int>(std::lround(i * 5.0 * 360.0 / 288.0))), kWhite);
+}
+
+TEST(WallPattern, ArrowsPointToTheNeighboursThereAre) {
+  const Wall wall = load_wall(example("desktop-3x2.toml"));
+  const auto arrows = [&](std::size_t screen, const Rect& part) {
+    const Image<Rgba8> image = wall_pattern(wall, screen);
+    std::size_t count = 0;
+    for (int y = part.y0; y < part.y1; ++y) {
+      for (int x = part.x0; x < part.x1; ++x) count += image.at(x, y) == Rgba8{150, 255, 150, 255} ? 1U : 0U;
+    }
+    return count;
+  };
+  constexpr Rect kLeft{0, 80, 100, 130};
+  constexpr Rect kRight{540, 80, 640, 130};
+  constexpr Rect kBelow{400, 310, 540, 360};
+  EXPECT_EQ(arrows(0, kLeft), 0U);
+  EXPECT_GT(arrows(0, kRight), 20U);
+  EXPECT_GT(arrows(0, kBelow), 20U);
+  EXPECT_GT(arrows(4, kLeft), 20U);
+  EXPECT_EQ(arrows(4, kBelow), 0U);
 }
 
 TEST(WallPlan, OfTwoEyesScreensTheLeftOneIsDrawnLast) {

@@ -173,5 +173,37 @@ TEST(EdgeBlend, ATurnedNeighbourFadesAtItsOwnEdges) {
   EXPECT_EQ(BlendWeights(wall, 1).at(50.0, 50.0), 1.0);
 }
 
+/// A panel that splits what it is sent shows each eye's half in full: nothing of one eye may reach the other's.
+TEST(ScanOut, TwoEyesPicturesAreMountedEachInItsPlace) {
+  const auto wall_of = [](const std::string& mode, const std::string& look) {
+    return parsed("hpr_wall = 1\nstereo = { mode = \"" + mode +
+                  "\" }\nviewers = [{ ipd_m = 0.06 }]\n[[surfaces]]\nscreens = [{ id = \"s\", pixels = [8, 6], " +
+                  look + ", corners_m = { ll = [0, 0, 0], lr = [0.8, 0, 0], ul = [0, 0.6, 0] } }]\n");
+  };
+  const Image<Rgba8> picture = marked({8, 6});
+  const Wall beside = wall_of("side-by-side", "mirror = \"horizontal\"");
+  const Image<Rgba8> mirrored_beside = ScanOut(beside, 0).apply(picture);
+  EXPECT_EQ(mirrored_beside.at(0, 0), picture.at(3, 0));
+  EXPECT_EQ(mirrored_beside.at(4, 5), picture.at(7, 5));
+  const Wall turned = wall_of("top-bottom", "rotate = 180");
+  const Image<Rgba8> turned_above = ScanOut(turned, 0).apply(picture);
+  EXPECT_EQ(turned_above.at(0, 0), picture.at(7, 2));
+  EXPECT_EQ(turned_above.at(0, 3), picture.at(7, 5));
+  const Wall faded = wall_of("side-by-side", "edge_blend_m = { left = 0.4 }");
+  const ScanOut fades(faded, 0);
+  const Image<Rgba8> white(Size{8, 6}, Rgba8{255, 255, 255, 255});
+  const Image<Rgba8> shown = fades.apply(white);
+  for (int x = 0; x < 4; ++x) EXPECT_EQ(shown.at(x, 0), shown.at(x + 4, 0)) << x;
+  EXPECT_LT(shown.at(0, 0).r, shown.at(1, 0).r);
+  EXPECT_EQ(shown.at(3, 0).r, 255);
+  const WallReading refused = parse_wall(
+      "hpr_wall = 1\nstereo = { mode = \"side-by-side\" }\nviewers = [{ ipd_m = 0.06 }]\n[[surfaces]]\nscreens = [{ id "
+      "= "
+      "\"s\", pixels = [8, 6], rotate = 90, corners_m = { ll = [0, 0, 0], lr = [0.8, 0, 0], ul = [0, 0.6, 0] } }]\n",
+      "t.toml");
+  ASSERT_FALSE(refused.findings.empty());
+  EXPECT_NE(refused.findings.front().what.find("splits two eyes"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace hpr

@@ -2,17 +2,13 @@
 
 #include <algorithm>
 
+#include "image/image_parts.h"
+
 namespace hpr {
 namespace {
 
 bool puts_two_on_one(StereoMode mode) {
   return mode == StereoMode::SideBySide || mode == StereoMode::TopBottom || mode == StereoMode::Anaglyph;
-}
-
-void paste(const Image<Rgba8>& source, Image<Rgba8>& target, int x, int y) {
-  for (int row = 0; row < source.height(); ++row) {
-    std::ranges::copy(source.row(row), target.row(y + row).begin() + x);
-  }
 }
 
 }  // namespace
@@ -37,20 +33,34 @@ std::vector<ScreenEye> screen_eyes(const Wall& wall) {
   return pictures;
 }
 
+std::vector<Rect> eye_places(const Wall& wall, std::size_t screen) {
+  const Size size = wall.screens.at(screen).pixels;
+  std::vector<Rect> places;
+  for (const ScreenEye& picture : screen_eyes(wall)) {
+    if (picture.screen != screen) continue;
+    if (picture.pixels == size) return {{0, 0, size.width, size.height}};
+    const bool first = places.empty();
+    const int x = first ? 0 : size.width - picture.pixels.width;
+    const int y = first ? 0 : size.height - picture.pixels.height;
+    places.push_back({x, y, x + picture.pixels.width, y + picture.pixels.height});
+  }
+  return places;
+}
+
 Image<Rgba8> compose_eyes(StereoMode mode, const Image<Rgba8>& left, const Image<Rgba8>& right) {
   HPR_CHECK(puts_two_on_one(mode));
   if (mode == StereoMode::SideBySide) {
     HPR_CHECK(left.height() == right.height());
     Image<Rgba8> result({left.width() + right.width(), left.height()});
-    paste(left, result, 0, 0);
-    paste(right, result, left.width(), 0);
+    paste(left, 0, 0, result);
+    paste(right, left.width(), 0, result);
     return result;
   }
   if (mode == StereoMode::TopBottom) {
     HPR_CHECK(left.width() == right.width());
     Image<Rgba8> result({left.width(), left.height() + right.height()});
-    paste(left, result, 0, 0);
-    paste(right, result, 0, left.height());
+    paste(left, 0, 0, result);
+    paste(right, 0, left.height(), result);
     return result;
   }
   HPR_CHECK(left.size() == right.size());

@@ -22,6 +22,9 @@ struct ScreenEye {
 /// screen's pixels, the left (upper) one the smaller half.
 [[nodiscard]] std::vector<ScreenEye> screen_eyes(const Wall& wall);
 
+/// Which parts of a screen's pixels its pictures take, in the order of screen_eyes(); one part where they share it.
+[[nodiscard]] std::vector<Rect> eye_places(const Wall& wall, std::size_t screen);
+
 /// What the screen shows of two eyes' pictures of the sizes of screen_eyes(). Anaglyph: red of the left eye, green and
 /// blue of the right one.
 [[nodiscard]] Image<Rgba8> compose_eyes(StereoMode mode, const Image<Rgba8>& left, const Image<Rgba8>& right);

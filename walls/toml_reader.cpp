@@ -96,15 +96,25 @@ std::optional<int> TableReader::integer(std::string_view key, int low, int high)
   return std::nullopt;
 }
 
-std::optional<double> TableReader::real(std::string_view key, double low, double high) {
+std::optional<double> TableReader::number(std::string_view key) {
   const TomlValue* const value = find(key);
   if (value == nullptr) return std::nullopt;
-  if (value->type != TomlValue::Type::Real && value->type != TomlValue::Type::Integer) {
-    wrong_type(*value, key, "a number");
-    return std::nullopt;
-  }
-  if (value->real > low && value->real <= high) return value->real;
-  error(key, fmt::format("is {}", value->real), fmt::format("it must be finite, above {} and at most {}", low, high));
+  if (value->type == TomlValue::Type::Real || value->type == TomlValue::Type::Integer) return value->real;
+  wrong_type(*value, key, "a number");
+  return std::nullopt;
+}
+
+std::optional<double> TableReader::real(std::string_view key, double low, double high) {
+  const auto value = number(key);
+  if (!value || (*value > low && *value <= high)) return value;
+  error(key, fmt::format("is {}", *value), fmt::format("it must be finite, above {} and at most {}", low, high));
+  return std::nullopt;
+}
+
+std::optional<double> TableReader::real_from(std::string_view key, double low, double high) {
+  const auto value = number(key);
+  if (!value || (*value >= low && *value <= high)) return value;
+  error(key, fmt::format("is {}", *value), fmt::format("it must be finite, from {} to {}", low, high));
   return std::nullopt;
 }
 

@@ -39,6 +39,8 @@ class TableReader {
   [[nodiscard]] std::optional<int> integer(std::string_view key, int low, int high);
   /// Finite, in (low, high].
   [[nodiscard]] std::optional<double> real(std::string_view key, double low, double high);
+  /// Finite, in [low, high].
+  [[nodiscard]] std::optional<double> real_from(std::string_view key, double low, double high);
   [[nodiscard]] std::optional<glm::dvec3> point(std::string_view key);
   /// `count` finite numbers of at most `limit` in size.
   [[nodiscard]] std::optional<std::vector<double>> reals(std::string_view key, std::size_t count, double limit);
@@ -59,6 +61,7 @@ class TableReader {
  private:
   const TomlValue* typed(std::string_view key, TomlValue::Type type);
   void wrong_type(const TomlValue& value, std::string_view key, std::string_view wanted);
+  [[nodiscard]] std::optional<double> number(std::string_view key);
   bool check_count(const TomlValue& value, std::string_view key, std::size_t count, std::string_view of);
 
   const TomlValue& table_;

@@ -15,6 +15,8 @@ class Tracker {
   /// The head at `time`, in seconds since the run began: of the recording, or of a clock. Times never fall. Never
   /// waits.
   [[nodiscard]] virtual HeadPose sample(double time) = 0;
+  /// Seconds after which a recording has nothing new; 0: it is none.
+  [[nodiscard]] virtual double ends_at() const { return 0.0; }
 };
 
 /// Of a viewer with a tracker; `rest` is the head's pose before anything is known. Throws Error: Io and BadInput for a

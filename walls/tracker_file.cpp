@@ -8,6 +8,7 @@ class FileTracker final : public Tracker {
  public:
   explicit FileTracker(HeadPath path) : path_(std::move(path)) {}
   [[nodiscard]] HeadPose sample(double time) override { return path_.at(time); }
+  [[nodiscard]] double ends_at() const override { return path_.samples().back().time - path_.samples().front().time; }
 
  private:
   HeadPath path_;

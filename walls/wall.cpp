@@ -54,6 +54,16 @@ std::string blend_table(const EdgeBlend& blend) {
                      toml_number(blend.gamma));
 }
 
+std::string warp_table(const ScreenWarp& warp) {
+  std::string text;
+  const std::pair<const char*, const WarpFile*> files[] = {
+      {"mesh", &warp.mesh}, {"blend", &warp.blend}, {"black", &warp.black}};
+  for (const auto& [key, file] : files) {
+    if (!file->path.empty()) text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", key, toml_quote(file->path));
+  }
+  return fmt::format("{{ {} }}", text);
+}
+
 template <typename Choice>
 std::string name_in(const std::vector<std::string>& names, Choice choice) {
   return toml_quote(names.at(static_cast<std::size_t>(choice)));
@@ -71,6 +81,7 @@ std::string screen_line(const WallScreen& screen) {
   if (screen.eye != Eye::Both) line += ", eye = " + name_in(eye_names(), screen.eye);
   if (screen.color != PanelColor{}) line += ", colour = " + color_table(screen.color);
   if (screen.blend.any()) line += ", edge_blend_m = " + blend_table(screen.blend);
+  if (screen.warp.any()) line += ", warp = " + warp_table(screen.warp);
   return line + " },\n";
 }
 

@@ -7,6 +7,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
+#include "walls/warp.h"
 
 /// A tiled wall as plain data. Wall space is right-handed, in metres, y up, with the wall usually in -z of its viewer;
 /// pixel rectangles have their origin at the top left.
@@ -69,7 +70,7 @@ struct EdgeBlend {
   bool operator==(const EdgeBlend&) const = default;
 };
 
-/// A flat rectangle of lit pixels.
+/// A flat rectangle of lit pixels, or what a warp makes of it.
 struct WallScreen {
   std::string id;       ///< unique, fit to be a file name
   std::string surface;  ///< id of the surface it is part of
@@ -89,6 +90,7 @@ struct WallScreen {
   std::size_t viewer = 0;  ///< index into Wall::viewers
   PanelColor color;
   EdgeBlend blend;
+  ScreenWarp warp;
   Rect viewport;  ///< of the window, in the window's pixels, i.e. after turning
 
   bool operator==(const WallScreen&) const = default;
@@ -139,14 +141,15 @@ struct Wall {
   std::string name;
   std::vector<WallNode> nodes;
   std::vector<WallWindow> windows;
-  std::vector<WallScreen> screens;  ///< never empty; grids row by row from the top, left to right
+  std::vector<WallScreen> screens;    ///< never empty; grids row by row from the top, left to right
+  std::vector<WallScreen> elsewhere;  ///< of the same wall, shown by other processes: their light may overlap
   /// Never empty. The first stands at the camera's eye when it rests, and wall axes are the camera's.
   std::vector<WallViewer> viewers{WallViewer{}};
   StereoMode stereo = StereoMode::None;
   std::vector<WallMonitor> monitors;
   Rgba8 gap_color{32, 32, 36, 255};
-  std::uint64_t hash =
-      0;  ///< XXH64 of expand_wall() but for the name: equal walls, however written or called, have equal hashes
+  std::uint64_t hash = 0;  ///< XXH64 of expand_wall() but for the name: equal walls, however written or called, have
+                           ///< equal hashes, as far as the files they name are equal
 
   bool operator==(const Wall&) const = default;
 };

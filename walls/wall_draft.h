@@ -29,6 +29,7 @@ struct DraftScreen {
   WallScreen screen;  ///< node, rank and viewport are settled by link_wall
   TextPlace place;
   TextPlace window_place;
+  TextPlace warp_place;
   bool has_corners = false;  ///< and they are sound
 };
 
@@ -62,18 +63,24 @@ struct WallDraft {
   TextPlace stereo_place;
 };
 
-/// Reads `surfaces`: grids are expanded, in order.
-void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings);
+/// Reads `surfaces`: grids are expanded, in order. Files are looked for in `folder`.
+void read_surfaces(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
 
 /// Reads what a panel is sent besides the picture: mirror, eye, colour, edge_blend_m, and its turn, which is called
 /// `turn` there.
 void read_look(TableReader& reader, std::string_view turn, WallScreen& screen, Findings& findings);
+
+/// Reads the `warp` of a screen, whose pixels are known, and its files.
+void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen, Findings& findings);
 
 /// Reads `viewers` and `stereo`, and `test` as far as it is about them and the gaps. Files are looked for in `folder`.
 void read_viewers(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
 void read_test(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Rgba8& gap_color,
                Findings& findings);
 void read_monitors(TableReader& document, WallDraft& draft, Findings& findings);
+
+/// Metres a screen's sides have at least.
+inline constexpr double kSmallestSide_m = 1e-6;
 
 /// The screens of a grid with their corners; pure, so that the shorthand uses it as well.
 struct WallGrid {
@@ -95,11 +102,18 @@ struct WallGrid {
 [[nodiscard]] bool fits_arc(const WallGrid& grid, double radius);
 [[nodiscard]] std::vector<WallScreen> expand_grid(const WallGrid& grid, const std::string& surface);
 
-/// Checks what spans tables (references, doubles, overlaps) and settles who owns which screen.
-void link_wall(WallDraft& draft, Findings& findings);
+/// Checks what spans tables (references, doubles, overlaps) and settles who owns which screen. False: there is too much
+/// of something to check more.
+[[nodiscard]] bool link_wall(WallDraft& draft, Findings& findings);
+
+/// `id` is to be a picture's name.
+void check_file_name(const std::string& id, const TextPlace& place, Findings& findings);
 
 /// The same for viewers, stereo and monitors.
 void link_viewers(WallDraft& draft, Findings& findings);
+
+/// Of linked viewers: what they see of the points of position maps.
+void check_position_maps(const WallDraft& draft, Findings& findings);
 
 /// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
 void warn_about_neighbours(const WallDraft& draft, Findings& findings);

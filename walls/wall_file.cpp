@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
 
@@ -87,6 +88,17 @@ std::optional<std::pair<int, int>> pair_of(std::string_view text) {
   return std::pair(to_number(a), to_number(b));
 }
 
+/// What neighbours' files and later versions may hold.
+constexpr std::array<std::string_view, 4> kNotActedOn{"sync", "render", "transport", "fault"};
+
+/// A file may hold more than is acted on; what is asked for on the command line must not be lost.
+void refuse_without_effect(const std::string& override, Findings& findings) {
+  const std::string section = override.substr(0, override.find_first_of(".="));
+  if (std::ranges::find(kNotActedOn, section) == kNotActedOn.end()) return;
+  findings.error({}, fmt::format("--set {}: this version acts on nothing of '{}'", printable(override), section),
+                 "hpr wall run has options for it: --strategy, --quality, --codec, --swap-timeout...");
+}
+
 }  // namespace
 
 bool WallReading::ok() const {
@@ -100,6 +112,11 @@ void finish_wall(Wall& wall) {
   }
   Wall nameless = wall;
   nameless.name.clear();
+  for (WallScreen& screen : nameless.screens) {
+    for (WarpFile* const file : {&screen.warp.mesh, &screen.warp.blend, &screen.warp.black}) {
+      if (!file->path.empty()) file->path = hex16(file->content);
+    }
+  }
   const std::string text = expand_wall(nameless);
   wall.hash = xxh64(std::as_bytes(std::span(text)));
 }
@@ -122,14 +139,17 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   wall.name = document.text("name").value_or(std::filesystem::path(name).stem().string());
   read_nodes(document, draft, findings);
   read_windows(document, draft, findings);
-  read_surfaces(document, draft, findings);
+  read_surfaces(document, folder, draft, findings);
   read_viewers(document, folder, draft, findings);
   read_test(document, folder, draft, wall.gap_color, findings);
   read_monitors(document, draft, findings);
-  document.ignore({"sync", "render", "transport", "fault"});
+  for (const std::string_view section : kNotActedOn) document.ignore({section});
   document.finish();
-  link_wall(draft, findings);
-  link_viewers(draft, findings);
+  for (const std::string& override : overrides) refuse_without_effect(override, findings);
+  if (link_wall(draft, findings)) {
+    link_viewers(draft, findings);
+    check_position_maps(draft, findings);
+  }
   if (!findings.any_errors()) warn_about_neighbours(draft, findings);
 
   const bool sound = !findings.any_errors();
@@ -193,10 +213,11 @@ WallReading read_wall(const std::string& spec, const std::vector<std::string>& o
   return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec, overrides);
 }
 
-Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides) {
+Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides, bool tells_warnings) {
   WallReading reading = read_wall(spec, overrides);
   const auto first = std::ranges::find_if(reading.findings, &WallFinding::error);
   if (first != reading.findings.end()) throw Error(ExitCode::BadInput, first->what, first->hint, first->line);
+  if (!tells_warnings) return std::move(reading.wall);
   for (const WallFinding& finding : reading.findings) log::warning("{} ({})", finding.what, finding.hint);
   return std::move(reading.wall);
 }

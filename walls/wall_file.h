@@ -36,8 +36,9 @@ struct WallReading {
 /// an impossible shorthand.
 [[nodiscard]] WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides = {});
 
-/// The same for those who want the wall: logs warnings, throws the first error (BadInput) with file:line:column, the
-/// offending line and a hint.
-[[nodiscard]] Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides = {});
+/// The same for those who want the wall: logs warnings (unless another process of the run does), throws the first error
+/// (BadInput) with file:line:column, the offending line and a hint.
+[[nodiscard]] Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides = {},
+                             bool tells_warnings = true);
 
 }  // namespace hpr

@@ -291,13 +291,13 @@ TEST(WallFile, OddPixelShapesAndIgnoredKeysAreWarnings) {
   const std::string text =
       wall_text(12,
                 "  { id = \"b\", pixels = [36, 64], corners_m = { ll = [2, 0, 0], lr = [3.6, 0, 0], ul = "
-                "[2, 0.9, 0] }, warp = { mesh = \"m\" } },") +
+                "[2, 0.9, 0] }, overscan_px = 8 },") +
       "ipd_m = 0.06\n[sync]\nswap = \"barrier\"\n[x_site]\nroom = 7\n[render]\nstrategy = 3\n";
   EXPECT_EQ(errors_of(text), "");
   EXPECT_EQ(warnings_of(text),
             "t.toml:6:3: window \"w1\" shows no screen\n"
             "t.toml:12:3: the pixels of screen \"b\" are 44.44 x 14.06 mm, not square\n"
-            "t.toml:12:109: not acted on by this version: warp, sync, render\n");
+            "t.toml:12:116: not acted on by this version: overscan_px, sync, render\n");
 }
 
 TEST(WallFile, AShorthandIsAGridWithoutViewer) {
@@ -326,6 +326,15 @@ TEST(WallFile, AnExpandedWallIsTheSameWall) {
     ASSERT_TRUE(again.findings.empty()) << spec << ": " << again.findings.front().what;
     EXPECT_EQ(again.wall, wall) << spec;
   }
+}
+
+TEST(WallFile, AnExpandedWarpedWallIsTheSameWall) {
+  const std::string path = std::string(HPR_WALL_EXAMPLES) + "/half-cylinder.toml";
+  const Wall wall = load_wall(path);
+  ASSERT_TRUE(wall.screens.front().warp.points && wall.screens.front().warp.light);
+  const WallReading again = parse_wall(expand_wall(wall), path);
+  ASSERT_TRUE(again.findings.empty()) << again.findings.front().what;
+  EXPECT_EQ(again.wall, wall);
 }
 
 TEST(WallFile, TheHashChangesWithWhatIsSeenAndNotWithComments) {

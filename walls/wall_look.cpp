@@ -61,11 +61,8 @@ EdgeBlend read_blend(TableReader& reader, Findings& findings) {
   const std::pair<std::string_view, double*> widths[] = {
       {"left", &blend.left}, {"right", &blend.right}, {"bottom", &blend.bottom}, {"top", &blend.top}};
   for (const auto& [side, width] : widths) {
-    const TomlValue* const given = sides.find(side);
-    if (given == nullptr) continue;
-    const bool zero =
-        (given->type == TomlValue::Type::Integer || given->type == TomlValue::Type::Real) && given->real == 0.0;
-    if (!zero) *width = sides.real(side, 0.0, kMetresLimit).value_or(0.0);
+    if (!sides.has(side)) continue;
+    *width = sides.real_from(side, 0.0, kMetresLimit).value_or(0.0);
     if (blend.automatic && *width > 0.0) {
       sides.error(side, "stands beside auto", "either auto = true, or the width of each side");
     }

@@ -22,9 +22,10 @@ class Linker {
  public:
   Linker(WallDraft& draft, Findings& findings) : draft_(draft), findings_(findings) {}
 
-  void run() {
+  /// False: there is too much of something to check more.
+  bool run() {
     check_counts();
-    if (too_many_) return;
+    if (too_many_) return false;
     check_node_ids();
     link_windows();
     check_ranks();
@@ -34,18 +35,22 @@ class Linker {
     check_shared_windows();
     check_same_places();
     warn_about_idle_windows();
+    return true;
   }
 
  private:
   void check_counts() {
     const auto most = static_cast<std::size_t>(kMostScreens);
-    const std::size_t largest = std::max({draft_.nodes.size(), draft_.windows.size(), draft_.screens.size()});
+    const std::size_t largest = std::max({draft_.nodes.size(), draft_.windows.size(), draft_.screens.size(),
+                                          draft_.surfaces.size(), draft_.viewers.size(), draft_.monitors.size()});
     too_many_ = largest > most;
     if (!too_many_) return;
-    findings_.error({},
-                    fmt::format("the wall has {} nodes, {} windows and {} screens", draft_.nodes.size(),
-                                draft_.windows.size(), draft_.screens.size()),
-                    fmt::format("it may have {} of each", kMostScreens));
+    findings_.error(
+        {},
+        fmt::format("the wall has {} nodes, {} windows, {} screens, {} surfaces, {} viewers and {} monitors",
+                    draft_.nodes.size(), draft_.windows.size(), draft_.screens.size(), draft_.surfaces.size(),
+                    draft_.viewers.size(), draft_.monitors.size()),
+        fmt::format("it may have {} of each", kMostScreens));
   }
 
   void check_node_ids() {
@@ -189,10 +194,7 @@ class Linker {
     for (const DraftScreen& draft : draft_.screens) {
       const std::string& id = draft.screen.id;
       if (id.empty()) continue;
-      if (id == "wall") {
-        findings_.error(draft.place, "a screen must not be called \"wall\"",
-                        "wall.png is the picture of the whole wall");
-      }
+      check_file_name(id, draft.place, findings_);
       const auto [other, fresh] = seen.emplace(id, &draft);
       if (fresh) continue;
       const WallScreen& first = other->second->screen;
@@ -233,7 +235,7 @@ class Linker {
         const DraftScreen& b = draft_.screens[i];
         if (!a.has_corners || !b.has_corners || a.screen.id == b.screen.id) continue;
         const bool an_eye_each = a.screen.eye != Eye::Both && b.screen.eye != Eye::Both && a.screen.eye != b.screen.eye;
-        if (an_eye_each) continue;
+        if (an_eye_each || a.screen.warp.points || b.screen.warp.points) continue;
         const double near_enough = 1e-6 * screen_width(a.screen);
         const bool same = glm::distance(a.screen.lower_left, b.screen.lower_left) < near_enough &&
                           glm::distance(a.screen.lower_right, b.screen.lower_right) < near_enough &&
@@ -268,8 +270,17 @@ class Linker {
 
 }  // namespace
 
-void link_wall(WallDraft& draft, Findings& findings) {
-  Linker(draft, findings).run();
+void check_file_name(const std::string& id, const TextPlace& place, Findings& findings) {
+  if (id == "wall") {
+    findings.error(place, "a screen must not be called \"wall\"", "wall.png is the picture of the whole wall");
+  } else if (id.ends_with(".panel")) {
+    findings.error(place, fmt::format("\"{}\" ends as the pictures of panels do", id),
+                   "what a turned panel is sent is in SCREEN.panel.png: leave out the .panel");
+  }
+}
+
+bool link_wall(WallDraft& draft, Findings& findings) {
+  return Linker(draft, findings).run();
 }
 
 }  // namespace hpr

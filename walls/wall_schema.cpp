@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "walls/wall.h"
+#include "walls/wall_draft.h"
 #include "walls/wall_file.h"
 
 namespace hpr {
@@ -23,6 +24,11 @@ Json anything() {
 
 Json text() {
   return {{"type", "string"}};
+}
+
+/// The name of a file.
+Json file() {
+  return {{"type", "string"}, {"minLength", 1}};
 }
 
 Json name() {
@@ -46,6 +52,11 @@ Json positive(double high) {
   return {{"type", "number"}, {"exclusiveMinimum", 0}, {"maximum", high}};
 }
 
+/// At least what a screen's side must have, in metres.
+Json side() {
+  return number(kSmallestSide_m, kMetresLimit);
+}
+
 Json one_of(const std::vector<std::string>& names) {
   return {{"enum", names}};
 }
@@ -56,6 +67,11 @@ Json list(Json items) {
 
 Json list(Json items, std::size_t count) {
   return {{"type", "array"}, {"items", std::move(items)}, {"minItems", count}, {"maxItems", count}};
+}
+
+/// Not empty.
+Json some(Json items) {
+  return {{"type", "array"}, {"items", std::move(items)}, {"minItems", 1}};
 }
 
 Json point() {
@@ -111,6 +127,7 @@ Json window() {
                 {"node", text()},
                 {"gpu", text()},
                 {"display", text()},
+                {"monitor", text()},
                 {"rank", whole(0, (1 << 20) - 1)},
                 {"rect", rect()},
                 {"fullscreen", truth()},
@@ -153,7 +170,7 @@ Json grid() {
       look({{"columns", whole(1, kMostScreens)},
             {"rows", whole(1, kMostScreens)},
             {"tile_pixels", pixels()},
-            {"tile_size_m", list(positive(kMetresLimit), 2)},
+            {"tile_size_m", list(side(), 2)},
             {"gap_m", list(metres, 2)},
             {"column_gaps_m", list(metres)},
             {"row_gaps_m", list(metres)},
@@ -167,13 +184,23 @@ Json grid() {
   return schema;
 }
 
+Json warp() {
+  Json schema = table({{"mesh", file()}, {"blend", file()}, {"black", file()}});
+  for (const char* const key : {"mesh", "blend", "black"}) {
+    Json only = Json::object();
+    only["required"] = Json::array({key});
+    schema["anyOf"].push_back(only);
+  }
+  return schema;
+}
+
 Json screen() {
   return table(look({{"id", name()},
                      {"pixels", pixels()},
                      {"corners_m", table({{"ll", point()}, {"lr", point()}, {"ul", point()}}, {"ll", "lr", "ul"})},
                      {"window", text()},
                      {"viewport", rect()},
-                     {"warp", anything()},
+                     {"warp", warp()},
                      {"overscan_px", anything()}}),
                {"id", "pixels", "corners_m"});
 }
@@ -219,7 +246,7 @@ Json monitor() {
 
 std::string wall_schema() {
   const Json surface = with_either(
-      table({{"id", name()}, {"viewer", text()}, {"grid", grid()}, {"screens", list(screen())}, {"mpcdi", anything()}}),
+      table({{"id", name()}, {"viewer", text()}, {"grid", grid()}, {"screens", some(screen())}, {"mpcdi", anything()}}),
       "grid", "screens");
   const Json test = table({{"gap_rgba", list(whole(0, 255), 4)},
                            {"viewer_path", text()},

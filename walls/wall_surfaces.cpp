@@ -75,9 +75,10 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
   const auto pixels = read_pixels(reader, "tile_pixels");
   reader.require("tile_size_m", "[1.2096, 0.6804]");
   const auto size = reader.reals("tile_size_m", 2, kMetresLimit);
-  const bool positive = size && (*size)[0] > 0.0 && (*size)[1] > 0.0;
+  const bool positive = size && (*size)[0] >= kSmallestSide_m && (*size)[1] >= kSmallestSide_m;
   if (size && !positive) {
-    reader.error("tile_size_m", fmt::format("is {} x {} m", (*size)[0], (*size)[1]), "sizes must be positive");
+    reader.error("tile_size_m", fmt::format("is {} x {} m", (*size)[0], (*size)[1]),
+                 "sizes must be positive, and at least a thousandth of a millimetre");
   }
   const std::vector<double> gap = reader.reals("gap_m", 2, kMetresLimit).value_or(std::vector<double>{0.0, 0.0});
   grid.center = reader.point("centre_m").value_or(glm::dvec3(0.0));
@@ -121,7 +122,7 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
   const TomlValue* const list = reader.find("windows");
   std::vector<WallScreen> screens = expand_grid(grid, surface);
   for (std::size_t i = 0; i < screens.size(); ++i) {
-    DraftScreen screen{std::move(screens[i]), table.place, table.place, true};
+    DraftScreen screen{std::move(screens[i]), table.place, table.place, table.place, true};
     screen.screen.rotate = look.rotate;
     screen.screen.mirror = look.mirror;
     screen.screen.eye = look.eye;
@@ -149,8 +150,7 @@ bool read_corners(TableReader& reader, WallScreen& screen, Findings& findings) {
   if (!ll || !lr || !ul) return false;
   const glm::dvec3 right = *lr - *ll;
   const glm::dvec3 up = *ul - *ll;
-  constexpr double kSmallest = 1e-6;
-  if (glm::length(right) < kSmallest || glm::length(up) < kSmallest) {
+  if (glm::length(right) < kSmallestSide_m || glm::length(up) < kSmallestSide_m) {
     reader.error("corners_m", fmt::format("span {} x {} m", glm::length(right), glm::length(up)),
                  "a screen has a positive width (ll to lr) and height (ll to ul)");
     return false;
@@ -183,10 +183,11 @@ void warn_about_pixel_shape(const DraftScreen& draft, Findings& findings) {
           : "check pixels and metres of the lit area");
 }
 
-void read_screens(TableReader& surface, const std::string& surface_id, WallDraft& draft, Findings& findings) {
+void read_screens(TableReader& surface, const std::string& surface_id, const std::filesystem::path& folder,
+                  WallDraft& draft, Findings& findings) {
   for (const TomlValue* const table : surface.tables("screens")) {
     TableReader reader(*table, "screen", findings);
-    DraftScreen draft_screen{{}, table->place, reader.place("window"), false};
+    DraftScreen draft_screen{{}, table->place, reader.place("window"), reader.place("warp"), false};
     WallScreen& screen = draft_screen.screen;
     reader.require("id", "\"left\"");
     screen.id = reader.id("id").value_or("");
@@ -197,7 +198,8 @@ void read_screens(TableReader& surface, const std::string& surface_id, WallDraft
     screen.window = reader.text("window").value_or("");
     screen.viewport = reader.rect("viewport").value_or(Rect{});
     read_look(reader, "rotate", screen, findings);
-    reader.ignore({"warp", "overscan_px"});
+    read_warp(reader, folder, screen, findings);
+    reader.ignore({"overscan_px"});
     reader.finish();
     draft.screens.push_back(std::move(draft_screen));
   }
@@ -205,7 +207,7 @@ void read_screens(TableReader& surface, const std::string& surface_id, WallDraft
 
 }  // namespace
 
-void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings) {
+void read_surfaces(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings) {
   document.require("surfaces", "[{ id = \"wall\", grid = { ... } }]");
   const std::vector<const TomlValue*> surfaces = document.tables("surfaces");
   for (const TomlValue* const table : surfaces) {
@@ -223,13 +225,18 @@ void read_surfaces(TableReader& document, WallDraft& draft, Findings& findings) 
           "give either grid = { ... } or screens = [ ... ]");
     }
     if (const TomlValue* const grid = reader.table("grid")) read_grid(*grid, id, draft, findings);
-    read_screens(reader, id, draft, findings);
+    read_screens(reader, id, folder, draft, findings);
+    if (has_screens && !has_grid && draft.screens.size() == before) {
+      reader.error("screens", "hold no screen", "add one, or remove the surface");
+    }
     reader.ignore({"mpcdi"});
     reader.finish();
     // A grid's tiles are alike: one warning does.
     bool warned = false;
     for (std::size_t i = before; i < draft.screens.size() && !(has_grid && warned); ++i) {
-      if (draft.screens[i].has_corners) warn_about_pixel_shape(draft.screens[i], findings);
+      // Where a mesh says where the light falls, corners only say so about.
+      const bool measured = !draft.screens[i].screen.warp.mesh.path.empty();
+      if (draft.screens[i].has_corners && !measured) warn_about_pixel_shape(draft.screens[i], findings);
       warned = true;
     }
   }

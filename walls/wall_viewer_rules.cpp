@@ -83,6 +83,15 @@ void check_stereo(const WallDraft& draft, Findings& findings) {
     findings.warning(draft.stereo_place, "both eyes see the same: no viewer has an ipd_m",
                      "add ipd_m = 0.063 to the viewer");
   }
+  const bool two_on_a_panel = draft.stereo == StereoMode::SideBySide || draft.stereo == StereoMode::TopBottom;
+  for (const DraftScreen& turned : draft.screens) {
+    const int rotate = turned.screen.rotate;
+    if (!two_on_a_panel || turned.screen.eye != Eye::Both || rotate % 180 == 0) continue;
+    findings.error(turned.place,
+                   fmt::format("screen \"{}\" is turned by {} degrees, and its panel splits two eyes' pictures",
+                               turned.screen.id, rotate),
+                   "panels split the picture they are sent: mount this one upright, or choose another stereo mode");
+  }
   const auto is_flat = [](int side) { return side < 2; };
   for (const DraftScreen& draft_screen : draft.screens) {
     const WallScreen& screen = draft_screen.screen;
@@ -106,6 +115,7 @@ void check_monitors(WallDraft& draft, Findings& findings) {
       findings.error(draft_monitor.place, fmt::format("monitor \"{}\" is called as something else", monitor.id),
                      "its picture is a file beside the screens': give it its own id");
     }
+    check_file_name(monitor.id, draft_monitor.place, findings);
     if (monitor.surface.empty() && surfaces.size() == 1) monitor.surface = surfaces.front();
     if (std::ranges::find(surfaces, monitor.surface) != surfaces.end()) continue;
     findings.error(draft_monitor.surface_place,

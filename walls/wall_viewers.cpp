@@ -76,9 +76,7 @@ void read_viewers(TableReader& document, const std::filesystem::path& folder, Wa
     const auto position = reader.point("position_m");
     viewer.given = position.has_value();
     viewer.position = position.value_or(viewer.position);
-    const TomlValue* const ipd = reader.find("ipd_m");
-    const bool no_ipd = ipd != nullptr && ipd->type != TomlValue::Type::Text && ipd->real == 0.0;
-    if (!no_ipd) viewer.ipd_m = reader.real("ipd_m", 0.0, kWidestEyes).value_or(0.0);
+    viewer.ipd_m = reader.real_from("ipd_m", 0.0, kWidestEyes).value_or(0.0);
     viewer.eye_offset = reader.point("eye_offset_m").value_or(viewer.eye_offset);
     viewer.near_m = reader.real("near_m", 0.0, kMetresLimit).value_or(viewer.near_m);
     viewer.clamp_distance_m = reader.real("clamp_distance_m", 0.0, kMetresLimit).value_or(viewer.clamp_distance_m);

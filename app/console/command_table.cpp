@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <iomanip>
 #include <sstream>
 
@@ -18,7 +19,14 @@ std::vector<std::string> words_of(const std::string& line) {
   std::istringstream stream(line);
   std::vector<std::string> words;
   std::string word;
-  while (stream >> std::ws && stream.peek() != '#' && stream >> std::quoted(word)) words.push_back(word);
+  while (stream >> std::ws && stream.peek() != '#' && !stream.eof()) {
+    const bool quoted = stream.peek() == '"';
+    if (!(stream >> std::quoted(word))) {
+      if (quoted) refuse("a quote is not closed", "hide \"big chair\"");
+      break;
+    }
+    words.push_back(word);
+  }
   return words;
 }
 
@@ -32,7 +40,12 @@ std::string CommandTable::run(const std::string& line) const {
   const std::vector<std::string> words = words_of(line);
   if (words.empty()) return "";
   const auto found = std::ranges::find(commands_, words.front(), &SessionCommand::name);
-  if (found != commands_.end()) return found->run(Words(words).subspan(1));
+  if (found != commands_.end()) {
+    if (found->usage.empty() && words.size() > 1) {
+      refuse(fmt::format("'{}' takes nothing", words.front()), words.front());
+    }
+    return found->run(Words(words).subspan(1));
+  }
   std::vector<std::string> names;
   for (const SessionCommand& command : commands_) names.push_back(command.name);
   throw Error(ExitCode::Usage, fmt::format("there is no command '{}'", printable(words.front())),
@@ -76,6 +89,12 @@ glm::dvec3 point_of(const std::string& word) {
     refuse(fmt::format("'{}' is not X,Y,Z", printable(word)), "0,1.5,-2");
   }
   return point;
+}
+
+glm::dvec3 direction_of(const glm::dvec3& point) {
+  const double largest = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
+  if (!(largest > 0.0)) refuse("0,0,0 is no direction", "0,1,0");
+  return glm::normalize(point / largest);
 }
 
 }  // namespace hpr

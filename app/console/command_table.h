@@ -46,4 +46,7 @@ class CommandTable {
 [[nodiscard]] double number_of(const std::string& word);
 [[nodiscard]] glm::dvec3 point_of(const std::string& word);
 
+/// Of length 1, however long it was. Throws Error (Usage) for 0,0,0.
+[[nodiscard]] glm::dvec3 direction_of(const glm::dvec3& point);
+
 }  // namespace hpr

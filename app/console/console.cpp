@@ -63,7 +63,9 @@ std::string Console::render() {
   picture->sampler = std::make_unique<FrameSampler>(session_, picture->plan, sampling, 0, false);
   Progress progress(session_.comm().rank() == 0 ? globals_.progress : "none", "sample",
                     sampling.goal.samples.value_or(0));
+  drawing_ = true;
   (void)picture->sampler->draw(picture->blocks.views, {}, progress);  // without a checkpoint it does not stop early
+  drawing_ = false;
   picture->stats = gather_stats(session_, picture->plan, picture->sampler->times(),
                                 {watch.ms(), session_.comm().bytes_sent() - sent_before});
   picture->stats.relmse = picture->sampler->reached_so_far().relmse;

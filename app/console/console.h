@@ -19,6 +19,8 @@ class Console {
   /// Collective. What the line has to tell. Throws Error where nothing was done: the session stays as it was.
   [[nodiscard]] std::string run(const std::string& line) { return table_.run(line); }
   [[nodiscard]] bool quits() const { return quits_; }
+  /// After an error: it came in the middle of a picture, perhaps on one rank alone.
+  [[nodiscard]] bool drawing() const { return drawing_; }
 
  private:
   /// A picture as it was drawn, whatever changed since.
@@ -49,6 +51,7 @@ class Console {
   Controls controls_;
   std::unique_ptr<Picture> picture_;
   bool quits_ = false;
+  bool drawing_ = false;
 };
 
 }  // namespace hpr

@@ -8,8 +8,9 @@
 
 #include "app/console/console.h"
 #include "app/console/forgivable.h"
-#include "app/console/line_source.h"
+#include "app/console/hearing.h"
 #include "app/launcher.h"
+#include "app/remote_wall.h"
 #include "app/render_options.h"
 #include "app/report_error.h"
 #include "cluster/collectives.h"
@@ -59,23 +60,6 @@ class ConsoleCommand final : public Command {
   }
 
  private:
-  /// The next line, the same on all ranks; none when there will be none.
-  [[nodiscard]] static std::optional<std::string> hear(Communicator& comm, LineSource* source,
-                                                       std::optional<InputLine>& line) {
-    while (true) {
-      std::string said = "-";
-      if (source != nullptr) {
-        line = source->next(kHeartbeat);
-        said = line ? "+" + line->text : source->ended() ? "." : "-";
-      }
-      std::vector<std::byte> bytes(std::as_bytes(std::span(said)).begin(), std::as_bytes(std::span(said)).end());
-      broadcast(comm, bytes);
-      said.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-      if (said == ".") return std::nullopt;
-      if (said.starts_with('+')) return said.substr(1);
-    }
-  }
-
   ExitCode converse(Communicator& comm, Console& console) {
     const bool speaks = comm.rank() == 0;
     std::optional<LineSource> source;
@@ -83,29 +67,42 @@ class ConsoleCommand final : public Command {
       if (speaks) source.emplace(LineSource::Options{true, listen_});
     });
     const bool typed = speaks && input_is_typed();
-    if (speaks && !source->address().empty()) {
-      log::info("listening on {}{}", source->address(),
-                source->token().empty() ? "" : fmt::format(", first line: token {}", source->token()));
-    }
+    if (speaks) tell_where(*source);
     ExitCode worst = ExitCode::Done;
     while (!console.quits()) {
       if (typed) fmt::print("> ");
       if (speaks) std::fflush(stdout);
       std::optional<InputLine> line;
-      const auto heard = hear(comm, source ? &*source : nullptr, line);
-      if (!heard) break;
+      Heard heard;
+      while (!heard.line && !heard.ended) heard = hear_line(comm, source ? &*source : nullptr, kHeartbeat, line);
+      if (heard.ended) break;
       const bool scripted = all_gather_value(comm, speaks && !typed && line->from == STDIN_FILENO ? 1 : 0)[0] == 1;
       try {
-        const std::string told = console.run(*heard);
+        const std::string told = console.run(*heard.line);
         if (speaks) source->answer(*line, answer_of(told, *line));
       } catch (const Error& error) {
-        if (!is_forgivable(error)) throw;
+        if (!is_forgivable(error) || (console.drawing() && comm.size() > 1)) throw;
+        if (scripted && !keeps_going_ && speaks) throw in_line(error, *line);
         if (scripted && !keeps_going_) throw;
         worst = std::max(worst, scripted ? error.code() : ExitCode::Done);
         if (speaks) refuse_line(*source, *line, error);
       }
     }
     return worst;
+  }
+
+  static void tell_where(const LineSource& source) {
+    if (source.address().empty()) return;
+    log::info("listening on {}", source.address());
+    // Not the token of the environment: who set it knows it, and logs are read by others. One made up is told always.
+    if (!source.token().empty() && source.token() != link_token()) {
+      fmt::print(stderr, "hpr: the first line of a client is: token {}\n", source.token());
+    }
+  }
+
+  /// Which line of a script it was.
+  [[nodiscard]] static Error in_line(const Error& error, const InputLine& line) {
+    return {error.code(), fmt::format("line {}: {}", line.number, error.what()), error.hint(), line.text};
   }
 
   /// Clients of a socket see by a last line that an answer is whole.
@@ -117,7 +114,7 @@ class ConsoleCommand final : public Command {
 
   static void refuse_line(LineSource& source, const InputLine& line, const Error& error) {
     if (line.from == STDIN_FILENO) {
-      print_error(error);
+      print_error(input_is_typed() ? error : in_line(error, line));
     } else {
       source.answer(line, fmt::format("error: {} ({})\n", error.what(), error.hint()));
     }

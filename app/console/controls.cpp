@@ -4,7 +4,6 @@
 
 #include <CLI/Error.hpp>
 #include <algorithm>
-#include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
 #include "core/error.h"
@@ -40,7 +39,11 @@ std::string type_of(const Light& light) {
 }  // namespace
 
 Controls::Controls(Session& session, const Globals& globals, RenderOptions& options, CommandTable& table)
-    : session_(session), globals_(globals), options_(options), edits_(session.scene()) {
+    : session_(session),
+      globals_(globals),
+      options_(options),
+      initial_fov_degrees_(options.fov_degrees),
+      edits_(session.scene()) {
   add_scene_commands(table);
   add_light_commands(table);
   add_drawing_commands(table);
@@ -52,7 +55,7 @@ void Controls::add_scene_commands(CommandTable& table) {
   table.add({"move", "NODE by|to X,Y,Z", "metres, world space", [this](Words words) { return move(words); }});
   table.add({"turn", "NODE X,Y,Z DEGREES", "about that axis through its position", [this](Words words) {
                expect(words, 3, 3, "turn NODE 0,1,0 90");
-               edits_.turn(words[0], point_of(words[1]), number_of(words[2]));
+               edits_.turn(words[0], direction_of(point_of(words[1])), number_of(words[2]));
                return scene_changed();
              }});
   for (const bool hidden : {true, false}) {
@@ -135,8 +138,7 @@ std::string Controls::change_light(Words words) {
   } else if (what == "position") {
     edited.light.position = value;
   } else if (what == "direction") {
-    if (glm::length(value) == 0.0) refuse("0,0,0 is no direction", "light NAME direction 0,-1,0");
-    edited.light.direction = glm::normalize(value);
+    edited.light.direction = direction_of(value);
   } else {
     throw Error(ExitCode::Usage, fmt::format("a light has no '{}'", printable(what)),
                 unknown_name_hint(what, std::vector<std::string>{"on", "off", "intensity", "position", "direction"}));
@@ -146,11 +148,13 @@ std::string Controls::change_light(Words words) {
 
 std::string Controls::set_camera(Words words) {
   expect(words, 1, 7, "camera 0,1,5 at 0,1,0");
+  refuse_kept("camera");
   RenderOptions tried = options_;
   tried.camera.clear();
   tried.eye.clear();
   tried.at.clear();
   tried.up = RenderOptions().up;
+  tried.fov_degrees = initial_fov_degrees_;
   const auto triple = [](const std::string& word) {
     const glm::dvec3 point = point_of(word);
     return std::vector<double>{point.x, point.y, point.z};
@@ -180,10 +184,21 @@ std::string Controls::set_camera(Words words) {
   return "";
 }
 
+void Controls::refuse_kept(const std::string& name) const {
+  const auto found = kept_.find(name);
+  if (found != kept_.end()) refuse(fmt::format("'{}' stays as it is: {}", name, found->second), "quality draft");
+}
+
 std::string Controls::set(const std::string& option, Words words) {
   expect(words, 1, 1, option + " VALUE");
   for (const char* own : {"stats", "explain", "environment", "camera", "eye", "at", "up", "strict"}) {
     if (option == own) refuse(fmt::format("--{} is not set from here", option), "set photons 200000");
+  }
+  refuse_kept(option);
+  const std::vector<std::string> options = option_names();
+  if (std::ranges::find(options, option) == options.end()) {
+    throw Error(ExitCode::Usage, fmt::format("render has no option --{}", printable(option)),
+                unknown_name_hint(option, options));
   }
   RenderOptions tried = options_;
   try {

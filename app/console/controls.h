@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <map>
 #include <string>
 
 #include "app/console/command_table.h"
@@ -19,6 +19,8 @@ class Controls {
 
   /// Raised by every change: whoever keeps a plan or a picture sees by it that it is of an earlier state.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
+  /// From now on the command or option `name` is refused; `why` is what its user reads.
+  void keep(const std::string& name, const std::string& why) { kept_[name] = why; }
 
  private:
   void add_scene_commands(CommandTable& table);
@@ -33,10 +35,13 @@ class Controls {
   [[nodiscard]] std::string list_lights() const;
   [[nodiscard]] std::string list_cameras() const;
   std::string scene_changed();
+  void refuse_kept(const std::string& name) const;
 
   Session& session_;
   const Globals& globals_;
   RenderOptions& options_;
+  double initial_fov_degrees_;
+  std::map<std::string, std::string> kept_;
   SceneEdits edits_;
   std::uint64_t changes_ = 0;
 };

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <chrono>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
 
-#include "core/error.h"
+#include "core/stopwatch.h"
+#include "walls/link/socket.h"
 
 namespace hpr {
 
@@ -14,55 +14,54 @@ namespace hpr {
 struct InputLine {
   int from = 0;
   std::string text;
+  std::size_t number = 0;  ///< of all lines from there, from 1
 };
 
 /// Where the commands of a session come from: standard input, and clients of a socket. One user's alone: a Unix socket
-/// only its owner may open, or a TCP port whose clients first send the line `token TOKEN`.
+/// only its owner may open, or a TCP port whose clients first send the line `token TOKEN`, within two seconds.
 class LineSource {
  public:
   struct Options {
     bool standard_input = false;
-    /// A path for a Unix socket, or ADDRESS:PORT (numeric; port 0: a free one) for TCP; empty: no socket.
-    std::string listen;
+    std::string listen;  ///< as parse_listen_address() has it; empty: no socket
   };
 
-  /// Throws Error: Usage for a malformed address, Io when nothing can listen there.
+  /// Throws Error: Usage for a malformed address or one in use, Io when nothing can listen there.
   explicit LineSource(const Options& options);
-  ~LineSource();
-  LineSource(const LineSource&) = delete;
-  LineSource& operator=(const LineSource&) = delete;
 
   /// The next line, waiting at most so long for one.
   [[nodiscard]] std::optional<InputLine> next(std::chrono::milliseconds longest);
   /// True once no line can come any more: standard input ended and nobody listens.
-  [[nodiscard]] bool ended() const { return !standard_input_ && listener_ < 0 && clients_.empty(); }
+  [[nodiscard]] bool ended() const { return !standard_input_ && !listener_ && clients_.empty(); }
   /// Sends `text`, whole lines, where the line came from. A client that does not take it within a second is dropped.
   void answer(const InputLine& line, const std::string& text);
 
   /// What clients connect to: the path, or ADDRESS:PORT with the port that was taken; empty without a socket.
-  [[nodiscard]] const std::string& address() const { return address_; }
-  /// What TCP clients send first; empty for a Unix socket.
+  [[nodiscard]] std::string address() const { return listener_ ? listener_->address() : ""; }
+  /// What TCP clients send first: HPR_TOKEN, or made up where that is not set; empty for a Unix socket.
   [[nodiscard]] const std::string& token() const { return token_; }
 
  private:
   struct Client {
+    Socket socket;    ///< none of standard input
+    Stopwatch since;  ///< it connected
     std::string received;
     bool trusted = false;
+    std::size_t lines = 0;
   };
 
-  void listen_on_path(const std::string& path);
-  void listen_on_port(const std::string& address);
   void accept_client();
   /// What arrived is kept; false when the client left or sends what is no line.
   [[nodiscard]] bool read_from(int client);
   [[nodiscard]] std::optional<InputLine> take_line();
+  /// Takes in what comes within that time; false: nothing did.
+  bool watch(int longest_ms);
   void drop(int client);
+  void drop_silent_strangers();
 
   bool standard_input_;
-  int listener_ = -1;
-  std::string address_;
+  std::optional<Listener> listener_;
   std::string token_;
-  std::filesystem::path socket_file_;
   std::map<int, Client> clients_;  ///< by descriptor; standard input is one
 };
 

@@ -5,6 +5,7 @@
 
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "walls/codecs/coder.h"
 
 namespace hpr {
 namespace {
@@ -14,11 +15,11 @@ constexpr std::size_t kTriesEach = 2;  // the first one also pays for fresh memo
 }  // namespace
 
 AutoCodec::AutoCodec(const CodecSettings& settings) : settings_(settings) {
-  for (const char* const candidate : {"raw", "lz4", "zstd", "jpeg"}) {
-    if (settings.error == 0 && candidate == std::string_view("jpeg")) continue;
-    codecs_.push_back(make_codec(candidate, settings));
+  for (const CoderKind& kind : all_coders()) {
+    if (settings.error == 0 && kind.lossy) continue;
+    codecs_.push_back(make_codec(kind.name, settings));
     const double unknown = std::numeric_limits<double>::infinity();
-    rates_.push_back({candidate, unknown, unknown, unknown});
+    rates_.push_back({std::string(kind.name), unknown, unknown, unknown});
   }
 }
 

@@ -36,6 +36,7 @@ class Coder {
 struct CoderKind {
   std::string_view name;
   std::unique_ptr<Coder> (*make)(const CodecSettings& settings);
+  bool lossy = false;  ///< even where no error is allowed
 };
 [[nodiscard]] std::span<const CoderKind> all_coders();
 

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 #include <turbojpeg.h>
 
 #include <algorithm>
@@ -6,14 +5,12 @@
 #include <cstring>
 #include <new>
 
-#include "core/error.h"
 #include "walls/codecs/coder.h"
+#include "walls/codecs/jpeg_encoder.h"
 #include "walls/codecs/zstd_stream.h"
 
 namespace hpr {
 namespace {
-
-constexpr int kLargestSide = 65500;  // libjpeg's
 
 struct FreeTurbo {
   void operator()(void* handle) const { tjDestroy(handle); }
@@ -47,8 +44,6 @@ std::uint8_t corrected(std::uint8_t level, std::uint8_t steps, int step) {
   return static_cast<std::uint8_t>(std::clamp(level + static_cast<std::int8_t>(steps) * step, 0, 255));
 }
 
-/// JPEG by libjpeg-turbo, colours at full resolution: halved ones bleed over the borders of tiles sent side by side.
-///
 /// With a bound, what the receiver will see is looked at here, and a second part corrects it: per pixel the steps of
 /// 2 error + 1 that bring r, g and b within the bound, mostly 0, and what alpha lacks, as one Zstandard frame.
 class JpegCoder final : public Coder {
@@ -61,7 +56,7 @@ class JpegCoder final : public Coder {
     const std::size_t start = into.size();
     if (error_ > 0) into.resize(start + sizeof(Length));
     const std::size_t first = into.size();
-    append_jpeg(picture, into);
+    encoder_.append(picture, quality_, into);
     if (error_ == 0) {
       if (seen == nullptr) return;
       *seen = Image<Rgba8>(picture.size());
@@ -108,26 +103,6 @@ class JpegCoder final : public Coder {
     }
   }
 
-  void append_jpeg(const Image<Rgba8>& picture, std::vector<std::byte>& into) {
-    if (std::max(picture.width(), picture.height()) > kLargestSide) {
-      throw Error(ExitCode::Limit,
-                  fmt::format("jpeg cannot take a picture of {}x{} pixels", picture.width(), picture.height()),
-                  "use zstd");
-    }
-    const std::size_t start = into.size();
-    unsigned long size = tjBufSize(picture.width(), picture.height(), TJSAMP_444);
-    into.resize(start + size);
-    auto* into_bytes = reinterpret_cast<unsigned char*>(into.data() + start);
-    const int failed = tjCompress2(compressor_.get(), reinterpret_cast<const unsigned char*>(picture.pixels().data()),
-                                   picture.width(), 0, picture.height(), TJPF_RGBX, &into_bytes, &size, TJSAMP_444,
-                                   quality_, TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT);
-    if (failed != 0) {
-      throw Error(ExitCode::Internal,
-                  fmt::format("libjpeg-turbo cannot compress a picture: {}", tjGetErrorStr2(compressor_.get())));
-    }
-    into.resize(start + size);
-  }
-
   void read_jpeg(std::span<const std::byte> bytes, Image<Rgba8>& picture) {
     const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
     int width = 0;
@@ -159,7 +134,7 @@ class JpegCoder final : public Coder {
   int quality_;
   int error_;
   StepTable steps_{error_};
-  Turbo compressor_ = made(tjInitCompress());
+  JpegEncoder encoder_;
   Turbo decompressor_ = made(tjInitDecompress());
   ZstdStream zstd_;
   std::vector<std::uint8_t> corrections_;  ///< planes of r, g, b and alpha

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/names.h"
+#include "core/stopwatch.h"
 #include "image/image_io.h"
 #include "walls/scan_out.h"
 
@@ -56,23 +57,31 @@ class FileDisplay final : public Display {
   void show(const WallFrame& frame) override {
     const std::filesystem::path kept = folder_ / fmt::format("frame-{:06}", frame.number);
     if (keeps_frames_ && !(frame.screens.empty() && frame.monitors.empty())) make_folder(kept);
+    std::uint64_t bytes = 0;
     const auto write = [&](const std::string& file, const Image<Rgba8>& picture) {
       const std::vector<std::byte> png = encode_png(picture);
+      bytes += png.size();
       write_file_atomically(folder_ / file, png);
       if (keeps_frames_) write_file_atomically(kept / file, png);
     };
+    costs_.clear();
     for (const ScreenPicture& picture : frame.screens) {
       HPR_CHECK(picture.screen < wall_.screens.size());
+      const Stopwatch watch;
+      bytes = 0;
       // Made where it is needed: this process shows few of the wall's screens.
       const ScanOut& scan_out = scan_outs_.try_emplace(picture.screen, wall_, picture.screen).first->second;
       const WallScreen& screen = wall_.screens[picture.screen];
       write(file_of(screen), picture.image);
       if (!scan_out.trivial()) write(panel_file_of(screen), scan_out.apply(picture.image));
+      costs_.push_back({picture.screen, watch.ms(), bytes});
     }
     for (const MonitorPicture& picture : frame.monitors) {
       write(file_of(wall_.monitors.at(picture.monitor)), picture.image);
     }
   }
+
+  [[nodiscard]] std::vector<ScreenCost> costs() const override { return costs_; }
 
  private:
   template <typename Shown>
@@ -86,6 +95,7 @@ class FileDisplay final : public Display {
   std::filesystem::path folder_;
   bool keeps_frames_;
   std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
+  std::vector<ScreenCost> costs_;
 };
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <optional>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -15,9 +14,6 @@
 
 namespace hpr {
 namespace {
-
-/// Encoders rarely take more, and a stream has every frame.
-constexpr int kLargestPicture = 8192;
 
 std::optional<std::size_t> screen_of(const Wall& wall, const std::string& id) {
   if (id.empty()) return std::nullopt;
@@ -40,7 +36,9 @@ class PipeDisplay final : public Display {
         format_(options.format),
         screen_(screen_of(wall, options.screen)),
         picture_(wall_picture(wall, kLargestPicture)),
+        latest_(wall.screens.size()),
         sink_(open_sink(options)) {
+    if (screen_) latest_[*screen_] = Image<Rgba8>(wall.screens[*screen_].pixels, {0, 0, 0, 255});
     if (format_ == PipeFormat::Rgba) return;
     const std::string header =
         y4m_header(screen_ ? wall.screens[*screen_].pixels : picture_.size, options.frames_per_second);
@@ -51,12 +49,13 @@ class PipeDisplay final : public Display {
   [[nodiscard]] std::string_view name() const override { return "pipe"; }
 
   void show(const WallFrame& frame) override {
+    for (const ScreenPicture& picture : frame.screens) {
+      if (!screen_ || picture.screen == *screen_) latest_.at(picture.screen) = picture.image;
+    }
     if (screen_) {
-      const auto found = std::ranges::find(frame.screens, *screen_, &ScreenPicture::screen);
-      HPR_CHECK(found != frame.screens.end());
-      write(found->image);
+      write(latest_[*screen_]);
     } else {
-      write(draw_wall(wall_, picture_, pictures_by_screen(wall_, frame)));
+      write(draw_wall(wall_, picture_, latest_));
     }
   }
 
@@ -77,6 +76,7 @@ class PipeDisplay final : public Display {
   PipeFormat format_;
   std::optional<std::size_t> screen_;
   WallPicture picture_;
+  std::vector<Image<Rgba8>> latest_;  ///< per screen, as a frame need not have all; what has none yet is black
   Sink sink_;
   std::vector<std::byte> bytes_;  ///< the stream's header before its first frame; reused
 };

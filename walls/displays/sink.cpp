@@ -119,14 +119,7 @@ Sink Sink::to_file(const std::filesystem::path& path, std::chrono::milliseconds 
     sink.file_ = open_fifo(path, time_limit);
     return sink;
   }
-  sink.final_path_ = path;
-  sink.unfinished_ = path;
-  sink.unfinished_ += ".part";
-  sink.file_ = ::open(sink.unfinished_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (sink.file_ < 0) {
-    sink.unfinished_.clear();
-    sink.fail(errno);
-  }
+  sink.file_ = sink.unfinished_.emplace(path).descriptor();
   return sink;
 }
 
@@ -136,12 +129,10 @@ Sink::Sink(Sink&& other) noexcept
       file_(std::exchange(other.file_, -1)),
       owned_(other.owned_),
       child_(std::exchange(other.child_, 0)),
-      final_path_(std::exchange(other.final_path_, {})),
-      unfinished_(std::exchange(other.unfinished_, {})) {}
+      unfinished_(std::exchange(other.unfinished_, std::nullopt)) {}
 
 Sink::~Sink() {
   close();
-  if (!unfinished_.empty()) ::unlink(unfinished_.c_str());
   if (child_ <= 0) return;
   constexpr std::chrono::milliseconds kToEndByItself{1000};
   for (const int signal : {SIGTERM, SIGKILL}) {
@@ -152,7 +143,7 @@ Sink::~Sink() {
 }
 
 void Sink::close() {
-  if (owned_ && file_ >= 0) ::close(file_);
+  if (owned_ && !unfinished_ && file_ >= 0) ::close(file_);
   file_ = -1;
 }
 
@@ -203,11 +194,8 @@ int Sink::wait_for_child(std::chrono::milliseconds limit) {
 }
 
 void Sink::finish() {
-  if (!unfinished_.empty()) {
-    if (::fsync(file_) != 0 || ::rename(unfinished_.c_str(), final_path_.c_str()) != 0) fail(errno);
-    unfinished_.clear();
-  }
   close();
+  if (unfinished_) unfinished_->commit();
   if (child_ <= 0) return;
   const int status = wait_for_child(time_limit_);
   if (status < 0) {

@@ -5,8 +5,11 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
+
+#include "core/file.h"
 
 namespace hpr {
 
@@ -43,10 +46,9 @@ class Sink {
   std::string name_;  ///< for errors
   std::chrono::milliseconds time_limit_;
   int file_ = -1;
-  bool owned_ = true;                 ///< closed here, and never blocks
-  pid_t child_ = 0;                   ///< 0: none, or waited for
-  std::filesystem::path final_path_;  ///< of a regular file
-  std::filesystem::path unfinished_;  ///< its name until then
+  bool owned_ = true;                     ///< closed here, and never blocks
+  pid_t child_ = 0;                       ///< 0: none, or waited for
+  std::optional<AtomicFile> unfinished_;  ///< a regular file; it closes `file_`
 };
 
 }  // namespace hpr

@@ -35,7 +35,8 @@ std::unique_ptr<Display> make_web_display(const Wall& wall, const DisplayOptions
 }
 
 void check_web_display(const Wall& /*wall*/, const DisplayOptions& options) {
-  (void)parse_web_address(options.web_address);
+  const WebAddress address = parse_web_address(options.web_address);
+  if (address.port != 0) check_listening(address);
 }
 
 }  // namespace hpr

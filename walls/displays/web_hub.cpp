@@ -1,51 +1,37 @@
 #include "walls/displays/web_hub.h"
 
 #include <fmt/format.h>
-#include <turbojpeg.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "core/error.h"
 #include "walls/assemble.h"
 
 namespace hpr {
 namespace {
 
-/// Browsers show no larger picture well.
-constexpr int kLargestPicture = 8192;
 constexpr int kQuality = 90;
 constexpr double kRecent_ms = 2000.0;
-
-std::vector<std::byte> encode_jpeg(const Image<Rgba8>& image) {
-  struct End {
-    void operator()(void* handle) const { tjDestroy(handle); }
-  };
-  const std::unique_ptr<void, End> encoder(tjInitCompress());
-  std::vector<std::byte> jpeg(tjBufSize(image.width(), image.height(), TJSAMP_444));
-  auto* target = reinterpret_cast<unsigned char*>(jpeg.data());
-  auto size = static_cast<unsigned long>(jpeg.size());
-  const auto* const pixels = reinterpret_cast<const unsigned char*>(image.pixels().data());
-  if (encoder == nullptr || tjCompress2(encoder.get(), pixels, image.width(), 0, image.height(), TJPF_RGBA, &target,
-                                        &size, TJSAMP_444, kQuality, TJFLAG_NOREALLOC) != 0) {
-    throw Error(ExitCode::Internal, fmt::format("cannot encode a picture of {} x {} pixels as JPEG: {}", image.width(),
-                                                image.height(), tjGetErrorStr2(encoder.get())));
-  }
-  jpeg.resize(size);
-  return jpeg;
-}
 
 }  // namespace
 
 WebHub::WebHub(const Wall& wall)
-    : wall_(wall), assembled_(wall_picture(wall, kLargestPicture)), pictures_(1 + wall.screens.size()) {}
+    : wall_(wall), assembled_(wall_picture(wall, kLargestPicture)), pictures_(1 + wall.screens.size()) {
+  auto nothing = std::make_shared<Frame>();
+  nothing->screens.resize(wall.screens.size());
+  newest_ = std::move(nothing);
+}
 
 void WebHub::publish(const WallFrame& frame) {
-  auto made = std::make_shared<Frame>();
-  made->number = frame.number;
-  made->screens.resize(wall_.screens.size());
-  for (const ScreenPicture& picture : frame.screens) made->screens.at(picture.screen) = picture.image;
+  std::vector<std::shared_ptr<const Image<Rgba8>>> images;
+  for (const ScreenPicture& picture : frame.screens) {
+    images.push_back(std::make_shared<const Image<Rgba8>>(picture.image));
+  }
   const std::lock_guard lock(mutex_);
+  auto made = std::make_shared<Frame>(*newest_);
+  made->number = frame.number;
+  ++made->serial;
+  for (std::size_t i = 0; i < images.size(); ++i) made->screens.at(frame.screens[i].screen) = std::move(images[i]);
   newest_ = std::move(made);
   times_ms_.push_back(clock_.ms());
   forget_old_times(times_ms_.back());
@@ -68,7 +54,7 @@ void WebHub::add(const OrbitInput& motion) {
 std::string WebHub::status() {
   const std::lock_guard lock(mutex_);
   forget_old_times(clock_.ms());
-  return fmt::format(R"({{"frame": {}, "fps": {:.2f}}})", newest_ ? newest_->number : 0,
+  return fmt::format(R"({{"frame": {}, "fps": {:.2f}}})", newest_->number,
                      static_cast<double>(times_ms_.size()) * 1e3 / kRecent_ms);
 }
 
@@ -84,17 +70,24 @@ std::shared_ptr<const WebPicture> WebHub::picture(std::size_t stream) {
     const std::lock_guard lock(mutex_);
     frame = newest_;
   }
-  if (!frame) return nullptr;
-  const std::lock_guard lock(encoder_);
+  if (frame->serial == 0 || (stream > 0 && !frame->screens.at(stream - 1))) return nullptr;
+  const std::lock_guard lock(encoding_);
   auto& last = pictures_.at(stream);
-  if (!last || last->frame != frame->number) last = encode(*frame, stream);
+  if (!last || last->serial != frame->serial) last = encode(*frame, stream);
   return last;
 }
 
-std::shared_ptr<const WebPicture> WebHub::encode(const Frame& frame, std::size_t stream) const {
+std::shared_ptr<const WebPicture> WebHub::encode(const Frame& frame, std::size_t stream) {
   auto made = std::make_shared<WebPicture>();
   made->frame = frame.number;
-  made->jpeg = encode_jpeg(stream == 0 ? draw_wall(wall_, assembled_, frame.screens) : frame.screens.at(stream - 1));
+  made->serial = frame.serial;
+  if (stream > 0) {
+    encoder_.append(*frame.screens.at(stream - 1), kQuality, made->jpeg);
+    return made;
+  }
+  std::vector<const Image<Rgba8>*> screens;
+  for (const auto& screen : frame.screens) screens.push_back(screen.get());
+  encoder_.append(draw_wall(wall_, assembled_, screens), kQuality, made->jpeg);
   return made;
 }
 

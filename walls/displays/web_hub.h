@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/stopwatch.h"
+#include "walls/codecs/jpeg_encoder.h"
 #include "walls/display.h"
 #include "walls/geometry.h"
 
@@ -18,6 +19,7 @@ namespace hpr {
 /// One picture of a stream.
 struct WebPicture {
   std::uint64_t frame = 0;
+  std::uint64_t serial = 0;  ///< of what was published: a frame may be shown again with other pictures
   std::vector<std::byte> jpeg;
 };
 
@@ -29,12 +31,13 @@ class WebHub {
   explicit WebHub(const Wall& wall);
 
   // Of the run.
+  /// Screens the frame lacks keep the picture they have.
   void publish(const WallFrame& frame);
   [[nodiscard]] DisplayInput take_input();
 
   // Of the server.
-  /// The newest frame of a stream: 0 is the assembled wall, 1 + i screen i. Encoded when first asked for; null before
-  /// the first frame. Throws Error (Internal).
+  /// The newest picture of a stream: 0 is the assembled wall, 1 + i screen i. Encoded when first asked for; null before
+  /// the first one. Throws Error (Limit, Internal).
   [[nodiscard]] std::shared_ptr<const WebPicture> picture(std::size_t stream);
   /// The stream of a screen's id; none where there is no such screen.
   [[nodiscard]] std::optional<std::size_t> stream_of(std::string_view screen) const;
@@ -46,20 +49,22 @@ class WebHub {
  private:
   struct Frame {
     std::uint64_t number = 0;
-    std::vector<Image<Rgba8>> screens;
+    std::uint64_t serial = 0;
+    std::vector<std::shared_ptr<const Image<Rgba8>>> screens;  ///< null before a screen's first picture
   };
 
-  [[nodiscard]] std::shared_ptr<const WebPicture> encode(const Frame& frame, std::size_t stream) const;
+  [[nodiscard]] std::shared_ptr<const WebPicture> encode(const Frame& frame, std::size_t stream);
   void forget_old_times(double now_ms);
 
   const Wall& wall_;
   WallPicture assembled_;
   Stopwatch clock_;
   std::mutex mutex_;
-  std::shared_ptr<const Frame> newest_;
-  std::deque<double> times_ms_;  ///< of the last frames
+  std::shared_ptr<const Frame> newest_;  ///< never null
+  std::deque<double> times_ms_;          ///< of the last frames
   DisplayInput input_;
-  std::mutex encoder_;                                       ///< held while a picture is made
+  std::mutex encoding_;  ///< held while a picture is made
+  JpegEncoder encoder_;
   std::vector<std::shared_ptr<const WebPicture>> pictures_;  ///< per stream, the last one made
 };
 

@@ -2,7 +2,6 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
-#include <sys/random.h>
 #include <unistd.h>
 
 #include <array>
@@ -69,26 +68,6 @@ bool host_is_ours(std::string_view host) {
 bool origin_is_ours(std::string_view origin, std::string_view host) {
   constexpr std::string_view kScheme = "http://";
   return origin.starts_with(kScheme) && origin.substr(kScheme.size()) == host;
-}
-
-std::string random_token() {
-  std::array<unsigned char, 16> bytes{};
-  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw Error(ExitCode::Io, "the system gives no random numbers for the web display's key");
-  }
-  std::string token;
-  for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
-  return token;
-}
-
-bool same_token(std::string_view given, std::string_view token) {
-  if (given.size() != token.size()) return false;
-  unsigned difference = 0;
-  for (std::size_t i = 0; i < token.size(); ++i) {
-    const auto each = [](char c) { return static_cast<unsigned>(static_cast<unsigned char>(c)); };
-    difference |= each(given[i]) ^ each(token[i]);
-  }
-  return difference == 0;
 }
 
 std::string_view cookie_in(std::string_view header, std::string_view name) {

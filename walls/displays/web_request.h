@@ -25,10 +25,6 @@ struct WebAddress {
 /// Whether a request from a page at `origin` is one of our own page, which came from `host`.
 [[nodiscard]] bool origin_is_ours(std::string_view origin, std::string_view host);
 
-/// 32 hexadecimal digits nobody can guess. Throws Error (Io).
-[[nodiscard]] std::string random_token();
-/// In a time that does not tell how much of it is right.
-[[nodiscard]] bool same_token(std::string_view given, std::string_view token);
 /// The value of a cookie in a Cookie header; empty: there is none.
 [[nodiscard]] std::string_view cookie_in(std::string_view header, std::string_view name);
 

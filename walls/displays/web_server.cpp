@@ -13,7 +13,9 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/secrets.h"
 #include "walls/displays/web_page.h"
+#include "walls/link/socket.h"
 
 namespace hpr {
 namespace {
@@ -32,8 +34,8 @@ using Response = http::response<http::string_body>;
 constexpr int kMostConnections = 8;
 constexpr std::uint64_t kLargestBody_bytes = 4096;
 constexpr std::uint32_t kLargestHeader_bytes = 8192;
-constexpr seconds kToRead{10};       ///< a request, and between two of a connection
-constexpr seconds kToWrite{10};      ///< a part of a stream
+constexpr seconds kToRead{10};  ///< a request, and between two of a connection
+constexpr std::size_t kPiece_bytes = 65536;
 constexpr seconds kBetweenParts{2};  ///< the longest: what does not change is sent again, which finds viewers that left
 constexpr std::string_view kBoundary = "hpr-frame";
 
@@ -69,15 +71,37 @@ Response refusal(const Request& request, http::status status, const std::string&
   return response;
 }
 
+void listen(tcp::acceptor& acceptor, const WebAddress& address) {
+  boost::system::error_code error;
+  const tcp::endpoint endpoint(asio::ip::make_address(address.host, error), address.port);
+  if (!error) acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (!error) return;
+  throw Error(ExitCode::Io,
+              fmt::format("the web display cannot listen on {}:{}: {}", address.host, address.port, error.message()),
+              "choose another port, or let hpr choose one with --display web");
+}
+
+/// Of a coroutine nobody waits for.
+void warn_of(const std::exception_ptr& failure) {
+  try {
+    if (failure) std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    log::warning("the web display dropped a connection: {}", error.what());
+  }
+}
+
 }  // namespace
 
 class WebServer::Implementation {
  public:
-  Implementation(WebHub& hub, const WebAddress& address)
-      : hub_(hub), address_(address), token_(random_token()), acceptor_(io_) {
-    listen();
+  Implementation(WebHub& hub, const WebAddress& address, milliseconds to_write)
+      : hub_(hub), address_(address), to_write_(to_write), token_(random_token()), acceptor_(io_) {
+    listen(acceptor_, address);
     cookie_ = fmt::format("hpr-{}", acceptor_.local_endpoint().port());
-    asio::co_spawn(io_, accept(), asio::detached);
+    asio::co_spawn(io_, accept(), warn_of);
     thread_ = std::jthread([this] { io_.run(); });
   }
 
@@ -113,20 +137,6 @@ class WebServer::Implementation {
     int* taken_;
   };
 
-  void listen() {
-    boost::system::error_code error;
-    const tcp::endpoint endpoint(asio::ip::make_address(address_.host, error), address_.port);
-    if (!error) acceptor_.open(endpoint.protocol(), error);
-    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
-    if (!error) acceptor_.bind(endpoint, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    if (!error) return;
-    throw Error(
-        ExitCode::Io,
-        fmt::format("the web display cannot listen on {}:{}: {}", address_.host, address_.port, error.message()),
-        "choose another port, or let hpr choose one with --display web");
-  }
-
   Task<void> accept() {
     while (true) {
       boost::system::error_code error;
@@ -136,11 +146,12 @@ class WebServer::Implementation {
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
         continue;
       }
+      socket.set_option(tcp::no_delay(true), error);
       beast::tcp_stream stream(std::move(socket));
       if (connections_ < kMostConnections) {
-        asio::co_spawn(io_, serve(std::move(stream), Place(connections_)), asio::detached);
+        asio::co_spawn(io_, serve(std::move(stream), Place(connections_)), warn_of);
       } else if (refused_ < kMostConnections) {
-        asio::co_spawn(io_, turn_away(std::move(stream), Place(refused_)), asio::detached);
+        asio::co_spawn(io_, turn_away(std::move(stream), Place(refused_)), warn_of);
       }
     }
   }
@@ -169,9 +180,22 @@ class WebServer::Implementation {
 
   Task<bool> write(beast::tcp_stream& stream, const Response& response) {
     boost::system::error_code error;
-    stream.expires_after(kToWrite);
+    stream.expires_after(to_write_);
     co_await http::async_write(stream, response, asio::redirect_error(asio::use_awaitable, error));
     co_return !error;
+  }
+
+  /// In pieces with a time limit each: whoever reads slowly gets all of it late, who reads nothing is let go.
+  Task<bool> write_pieces(beast::tcp_stream& stream, asio::const_buffer bytes) {
+    while (bytes.size() > 0) {
+      const asio::const_buffer piece = asio::buffer(bytes, kPiece_bytes);
+      boost::system::error_code error;
+      stream.expires_after(to_write_);
+      co_await asio::async_write(stream, piece, asio::redirect_error(asio::use_awaitable, error));
+      if (error) co_return false;
+      bytes += piece.size();
+    }
+    co_return true;
   }
 
   /// The last answer of a connection. What the other side still sends is taken, or the answer would be lost to a reset.
@@ -324,15 +348,15 @@ class WebServer::Implementation {
       std::shared_ptr<const WebPicture> next = hub_.picture(which);
       if (next == last) {
         const bool news = co_await wait_for_news();
+        // Before the first picture nothing is written that would tell.
+        if (next == nullptr && !news && has_left(stream.socket().native_handle())) co_return;
         if (news || next == nullptr) continue;
       }
       head += fmt::format("Content-Type: image/jpeg\r\nContent-Length: {}\r\nX-Frame: {}\r\n\r\n", next->jpeg.size(),
                           next->frame);
-      const std::array<asio::const_buffer, 3> parts{asio::buffer(head), asio::buffer(next->jpeg), asio::buffer(tail)};
-      boost::system::error_code error;
-      stream.expires_after(kToWrite);
-      co_await asio::async_write(stream, parts, asio::redirect_error(asio::use_awaitable, error));
-      if (error) co_return;
+      if (!co_await write_pieces(stream, asio::buffer(head))) co_return;
+      if (!co_await write_pieces(stream, asio::buffer(next->jpeg))) co_return;
+      if (!co_await write_pieces(stream, asio::buffer(tail))) co_return;
       head.clear();
       last = std::move(next);
     }
@@ -340,6 +364,7 @@ class WebServer::Implementation {
 
   WebHub& hub_;
   WebAddress address_;
+  milliseconds to_write_;
   std::string token_;
   std::string cookie_;
   asio::io_context io_{1};
@@ -350,8 +375,14 @@ class WebServer::Implementation {
   std::jthread thread_;  ///< last: it ends before what it uses
 };
 
-WebServer::WebServer(WebHub& hub, const WebAddress& address)
-    : implementation_(std::make_unique<Implementation>(hub, address)) {}
+void check_listening(const WebAddress& address) {
+  asio::io_context io;
+  tcp::acceptor acceptor(io);
+  listen(acceptor, address);
+}
+
+WebServer::WebServer(WebHub& hub, const WebAddress& address, milliseconds to_write)
+    : implementation_(std::make_unique<Implementation>(hub, address, to_write)) {}
 
 WebServer::~WebServer() = default;
 

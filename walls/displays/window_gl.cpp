@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "walls/displays/x_server.h"
 
 namespace hpr {
 namespace {
@@ -75,6 +76,7 @@ void set_hints(const WindowPlan& plan, GLFWmonitor* monitor) {
 }  // namespace
 
 Desktop::Desktop() {
+  end_with_x_server();
   if (glfwInit() == GLFW_TRUE) return;
   throw Error(ExitCode::NoDevice, fmt::format("there is no desktop for windows: {}", glfw_reason()),
               "start it on a desktop, or set DISPLAY to one; or use --display web");

@@ -10,10 +10,6 @@ namespace {
 /// Larger desktops are rare; windows are placed on it, not scaled.
 constexpr int kLargestDesktop = 1 << 16;
 
-Size shown_size(const WallScreen& screen) {
-  return screen.rotate % 180 == 0 ? screen.pixels : Size{screen.pixels.height, screen.pixels.width};
-}
-
 Rect at(int x, int y, Size size) {
   return {x, y, x + size.width, y + size.height};
 }
@@ -36,27 +32,56 @@ std::vector<WindowPlan> plan_windows(const Wall& wall, const std::vector<std::si
   std::vector<WindowPlan> plans;
   for (const std::size_t index : screens) {
     const WallScreen& screen = wall.screens.at(index);
-    Pane pane{index, screen.viewport, screen.rotate, screen_height(screen) / screen.pixels.height / wall_height};
+    Pane pane{index, screen.viewport, screen.rotate, screen.mirror,
+              screen_height(screen) / screen.pixels.height / wall_height};
     const auto window = std::ranges::find(wall.windows, screen.window, &WallWindow::id);
     if (screen.window.empty() || window == wall.windows.end()) {
       const Rect place = picture.screens[index];
-      pane.place = at(0, 0, shown_size(screen));
-      plans.push_back(
-          {screen.id, at(place.x0, place.y0, shown_size(screen)), false, true, {}, {}, std::vector<Pane>{pane}});
+      pane.place = at(0, 0, panel_pixels(screen));
+      plans.push_back({.title = screen.id,
+                       .window = {},
+                       .rect = at(place.x0, place.y0, panel_pixels(screen)),
+                       .decorated = true,
+                       .monitor = {},
+                       .display = {},
+                       .panes = {pane}});
       continue;
     }
-    const auto known = std::ranges::find(plans, window->id, &WindowPlan::title);
+    const auto known = std::ranges::find(plans, window->id, &WindowPlan::window);
     if (known != plans.end()) {
       known->panes.push_back(pane);
       continue;
     }
-    plans.push_back({window->id, window->rect, window->fullscreen, window->rect.empty() && !window->fullscreen,
-                     window->monitor, window->display, std::vector<Pane>{pane}});
+    plans.push_back({.title = window->id,
+                     .window = window->id,
+                     .rect = window->rect,
+                     .fullscreen = window->fullscreen,
+                     .decorated = window->rect.empty() && !window->fullscreen,
+                     .monitor = window->monitor,
+                     .display = window->display,
+                     .panes = {pane}});
   }
   for (WindowPlan& plan : plans) {
     if (plan.rect.empty()) plan.rect = around(plan.panes);
   }
   return plans;
+}
+
+std::optional<std::size_t> pane_at(const WindowPlan& plan, const glm::dvec2& place) {
+  for (std::size_t i = 0; i < plan.panes.size(); ++i) {
+    const Rect& pane = plan.panes[i].place;
+    if (place.x >= pane.x0 && place.x < pane.x1 && place.y >= pane.y0 && place.y < pane.y1) return i;
+  }
+  return std::nullopt;
+}
+
+glm::dvec2 upright(const Pane& pane, const glm::dvec2& way) {
+  glm::dvec2 turned = way;
+  if (pane.mirror == Mirror::Horizontal) turned.x = -turned.x;
+  if (pane.mirror == Mirror::Vertical) turned.y = -turned.y;
+  // A clockwise quarter turn takes what goes right in the picture down on the pane.
+  for (int degrees = pane.rotate; degrees > 0; degrees -= 90) turned = {turned.y, -turned.x};
+  return turned;
 }
 
 }  // namespace hpr

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "walls/scan_out.h"
 #include "walls/wall_file.h"
 
 namespace hpr {
@@ -38,6 +41,52 @@ TEST(WindowPlan, ScreensOfOneWindowShareItAndTurnedOnesAreShownTurned) {
   ASSERT_EQ(plans[0].panes.size(), 2U);
   EXPECT_EQ(plans[0].panes[1].place, (Rect{40, 0, 70, 40}));
   EXPECT_EQ(plans[0].panes[1].rotate, 90);
+}
+
+TEST(WindowPlan, AWindowCalledAsAScreenWithoutOneHasItsOwnScreensOnly) {
+  Wall wall = load_wall("2x1@40x30");
+  wall.windows = {
+      {.id = wall.screens[0].id, .node = {}, .gpu = {}, .display = {}, .monitor = {}, .rect = {5, 6, 45, 36}}};
+  wall.screens[1].window = wall.screens[0].id;
+  wall.screens[1].viewport = {0, 0, 40, 30};
+  const auto plans = plan_windows(wall, {0, 1});
+  ASSERT_EQ(plans.size(), 2U);
+  EXPECT_EQ(plans[0].panes.size(), 1U);
+  EXPECT_EQ(plans[1].rect, (Rect{5, 6, 45, 36}));
+}
+
+TEST(WindowPlan, APlaceIsInThePaneThatCoversIt) {
+  WindowPlan plan;
+  plan.panes.resize(2);
+  plan.panes[0].place = {0, 0, 40, 30};
+  plan.panes[1].place = {40, 0, 70, 40};
+  EXPECT_EQ(pane_at(plan, {39.9, 0.0}), 0U);
+  EXPECT_EQ(pane_at(plan, {40.0, 35.0}), 1U);
+  EXPECT_EQ(pane_at(plan, {10.0, 35.0}), std::nullopt);
+  EXPECT_EQ(pane_at(plan, {-1.0, 0.0}), std::nullopt);
+}
+
+/// Where the one bright pixel of a screen's picture is on its panel.
+glm::dvec2 on_panel(const Wall& wall, int x, int y) {
+  Image<Rgba8> picture(wall.screens[0].pixels);
+  picture.at(x, y) = {255, 255, 255, 255};
+  const Image<Rgba8> sent = ScanOut(wall, 0).apply(picture);
+  const auto found = std::ranges::find(sent.pixels(), Rgba8{255, 255, 255, 255});
+  const auto index = static_cast<int>(found - sent.pixels().begin());
+  return {index % sent.width(), index / sent.width()};
+}
+
+TEST(WindowPlan, AWayOnThePanelIsTheOneItsPicturesPixelsGo) {
+  Wall wall = load_wall("1x1@40x30");
+  for (const int rotate : {0, 90, 180, 270}) {
+    for (const Mirror mirror : {Mirror::None, Mirror::Horizontal, Mirror::Vertical}) {
+      wall.screens[0].rotate = rotate;
+      wall.screens[0].mirror = mirror;
+      const glm::dvec2 way = on_panel(wall, 13, 12) - on_panel(wall, 10, 7);
+      const Pane pane = plan_windows(wall, {0})[0].panes[0];
+      EXPECT_EQ(upright(pane, way), glm::dvec2(3.0, 5.0)) << rotate << " degrees, mirror " << static_cast<int>(mirror);
+    }
+  }
 }
 
 TEST(WindowPlan, AWindowWithoutASizeIsAsLargeAsItsScreens) {

@@ -1,14 +1,11 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
-#include <exception>
-#include <mutex>
+#include <memory>
 #include <stop_token>
 #include <thread>
 #include <vector>
 
-#include "core/error.h"
 #include "image/color.h"
 #include "image/image.h"
 #include "walls/display.h"
@@ -27,8 +24,10 @@ struct PanePicture {
 /// never meet those of the threads that render.
 class WindowThread {
  public:
-  /// Returns once the windows are open. Throws Error (NoDevice, Hang).
-  explicit WindowThread(std::vector<WindowPlan> plans);
+  /// Returns once the windows are open; without any it only looks for a desktop. Throws Error: NoDevice, and Hang when
+  /// that takes longer than the limit.
+  explicit WindowThread(std::vector<WindowPlan> plans, std::chrono::seconds to_open = std::chrono::seconds(60));
+  /// Takes two seconds at most: a thread that does not come back from the desktop is left behind.
   ~WindowThread();
   WindowThread(const WindowThread&) = delete;
   WindowThread& operator=(const WindowThread&) = delete;
@@ -37,26 +36,13 @@ class WindowThread {
   void present(std::vector<PanePicture> pictures);
   [[nodiscard]] DisplayInput take_input();
 
-  // Of the window thread: what happened in a window.
-  void add(const OrbitInput& motion);
-  void ask_to_stop();
-  void ask_to_redraw();
-
  private:
-  void run(const std::stop_token& stop);
-  void serve(const std::stop_token& stop);
-  void wait_for(bool WindowThread::*state, std::chrono::seconds limit, const Error& late);
+  struct State;
 
-  std::vector<WindowPlan> plans_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool open_ = false;
-  bool presented_ = true;
-  bool redraw_ = false;
-  std::vector<PanePicture> pictures_;  ///< not yet taken by the thread
-  DisplayInput input_;
-  std::exception_ptr failure_;  ///< why the thread ended
-  std::jthread thread_;         ///< last: it uses all of the above
+  explicit WindowThread(std::shared_ptr<State> state);
+
+  std::shared_ptr<State> state_;  ///< the thread holds it too, and may outlive this
+  std::jthread thread_;
 };
 
 }  // namespace hpr

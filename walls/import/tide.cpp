@@ -49,8 +49,10 @@ class TideReader {
     grid.panels = {file_.integer(surface, path, "displaysPerScreenX", 1, kMostScreens, 1),
                    file_.integer(surface, path, "displaysPerScreenY", 1, kMostScreens, 1)};
     const double panels = 1.0 * grid.columns * grid.rows * grid.panels.width * grid.panels.height;
-    if (panels > kMostScreens) {
-      file_.fail(path, fmt::format("it has {:g} displays", panels), fmt::format("it may have {}", kMostScreens));
+    panels_ += panels;
+    if (panels_ > kMostScreens) {
+      file_.fail(path, fmt::format("up to here the wall has {:g} displays", panels_),
+                 fmt::format("it may have {}", kMostScreens));
     }
     grid.gap_x_pixels = file_.integer(surface, path, "bezelWidth", 1 - grid.panel.width, kMostScreenSide, 0);
     grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMostScreenSide, 0);
@@ -120,6 +122,7 @@ class TideReader {
   ImportSettings settings_;
   ImportedWall imported_;
   std::vector<ForeignGrid> grids_;
+  double panels_ = 0.0;                          ///< of all surfaces
   std::vector<std::vector<ForeignTile>> tiles_;  ///< of grids_
   std::map<std::array<int, 3>, std::string> places_;
   double right_m_ = 0.0;  ///< where the next surface begins

@@ -19,6 +19,34 @@ namespace {
               "write HOST:PORT, [IPV6]:PORT, or the path of a socket with a slash in it");
 }
 
+LinkAddress tcp_address(const std::string& text, unsigned lowest_port) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) no_address(text);
+  std::string host = text.substr(0, colon);
+  const std::string port = text.substr(colon + 1);
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  unsigned number = 0;
+  const auto [end, failed] = std::from_chars(port.data(), port.data() + port.size(), number);
+  if (failed != std::errc() || end != port.data() + port.size() || number < lowest_port || number > 65535)
+    no_address(text);
+
+  addrinfo wanted{};
+  wanted.ai_socktype = SOCK_STREAM;
+  addrinfo* list = nullptr;
+  const int code = ::getaddrinfo(host.c_str(), port.c_str(), &wanted, &list);
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(code == 0 ? list : nullptr, &::freeaddrinfo);
+  if (!found) {
+    throw Error(ExitCode::Io, fmt::format("cannot find the host of '{}': {}", printable(text), ::gai_strerror(code)),
+                "check the name, or write the number");
+  }
+  LinkAddress address;
+  address.text = text;
+  address.tcp = true;
+  std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
+  address.length = found->ai_addrlen;
+  return address;
+}
+
 }  // namespace
 
 LinkAddress socket_address(const std::filesystem::path& path) {
@@ -39,30 +67,13 @@ LinkAddress socket_address(const std::filesystem::path& path) {
 
 LinkAddress parse_address(const std::string& text) {
   if (text.find('/') != std::string::npos) return socket_address(text);
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0) no_address(text);
-  std::string host = text.substr(0, colon);
-  const std::string port = text.substr(colon + 1);
-  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  unsigned number = 0;
-  const auto [end, failed] = std::from_chars(port.data(), port.data() + port.size(), number);
-  if (failed != std::errc() || end != port.data() + port.size() || number == 0 || number > 65535) no_address(text);
+  return tcp_address(text, 1);
+}
 
-  addrinfo wanted{};
-  wanted.ai_socktype = SOCK_STREAM;
-  addrinfo* list = nullptr;
-  const int code = ::getaddrinfo(host.c_str(), port.c_str(), &wanted, &list);
-  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(code == 0 ? list : nullptr, &::freeaddrinfo);
-  if (!found) {
-    throw Error(ExitCode::Io, fmt::format("cannot find the host of '{}': {}", printable(text), ::gai_strerror(code)),
-                "check the name, or write the number");
-  }
-  LinkAddress address;
-  address.text = text;
-  address.tcp = true;
-  std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
-  address.length = found->ai_addrlen;
-  return address;
+LinkAddress parse_listen_address(const std::string& text) {
+  if (text.find('/') != std::string::npos) return socket_address(text);
+  if (!text.empty() && text.find(':') == std::string::npos) return socket_address("./" + text);
+  return tcp_address(text.starts_with(':') ? "127.0.0.1" + text : text, 0);
 }
 
 }  // namespace hpr

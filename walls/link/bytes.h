@@ -16,7 +16,13 @@ namespace hpr {
 /// again. Not an Error, as it ends no run.
 class LinkError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit LinkError(const std::string& what, int code = 0) : std::runtime_error(what), code_(code) {}
+
+  /// The system's (errno), where it was the system that failed; else 0.
+  [[nodiscard]] int code() const { return code_; }
+
+ private:
+  int code_;
 };
 
 /// Writes what ByteReader reads: little-endian, packed.

@@ -88,19 +88,20 @@ DisplayProcess::~DisplayProcess() {
 }
 
 void DisplayProcess::run(const std::function<bool()>& stop) {
-  while (!stop()) {
+  while (!stop() && !display_.take_input().stop) {
     if (auto presentation = receiver_.next(kTick)) present(*presentation);
     const ReceiverReport report = receiver_.report();
     update(report);
-    if (settings_.once && report.runs > 0 && report.idle) return;
+    if (settings_.once && report.runs > 0 && report.idle && !report.connected) break;
   }
+  display_.finish();
 }
 
 void DisplayProcess::present(Presentation& presentation) {
   std::vector<ScreenPicture> pictures;
   for (const auto& [screen, picture] : presentation.pictures) pictures.push_back({screen, picture});
   if (!pictures.empty()) display_.show({presentation.frame, pictures});
-  receiver_.shown(presentation);
+  if (!receiver_.shown(presentation)) return;
   for (auto& [screen, picture] : presentation.pictures) {
     screens_[screen].picture = std::move(picture);
     screens_[screen].frame = presentation.frame;
@@ -168,7 +169,10 @@ void DisplayProcess::write_status() {
   // Whole at any time, and not worth waiting for the disk: it says what is, not what was.
   const std::filesystem::path file = settings_.folder / "display.json";
   const std::filesystem::path next = settings_.folder / ".display.json.next";
-  std::ofstream(next) << text;
+  std::ofstream stream(next);
+  stream << text;
+  stream.close();
+  if (!stream) throw Error(ExitCode::Io, fmt::format("cannot write '{}'", next.string()));
   std::error_code error;
   std::filesystem::rename(next, file, error);
   if (error) throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", file.string(), error.message()));

@@ -44,8 +44,8 @@ class DisplayProcess {
   DisplayProcess(const DisplayProcess&) = delete;
   DisplayProcess& operator=(const DisplayProcess&) = delete;
 
-  /// Until `stop` says so, asked several times a second, or with `once` the first run has ended. Throws what the
-  /// display throws.
+  /// Until `stop` or whoever looks says so, asked several times a second, or with `once` the first run has ended.
+  /// Throws what the display throws.
   void run(const std::function<bool()>& stop);
 
  private:

@@ -55,7 +55,10 @@ WallHost find_host(const Wall& wall, const std::string& name) {
 Wall wall_of_host(const Wall& wall, const WallHost& host) {
   Wall part = wall;
   part.screens.clear();
-  for (const std::size_t screen : host.screens) part.screens.push_back(wall.screens[screen]);
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    const bool here = std::ranges::find(host.screens, i) != host.screens.end();
+    (here ? part.screens : part.elsewhere).push_back(wall.screens[i]);
+  }
   return part;
 }
 

@@ -244,6 +244,37 @@ TEST_F(LinkTest, AMissingDisplayHoldsNoFrameUp) {
   EXPECT_EQ(sender.outcome(4).screens, std::vector<ScreenState>(2, ScreenState::Lost));
 }
 
+TEST_F(LinkTest, WithDeltasOnlyWhatChangedIsSentAndAllIsShown) {
+  wall_ = load_wall("2x1@160x120");
+  auto display = std::make_unique<RunningDisplay>(wall_, "localhost", receiver());
+  SenderSettings settings = sender();
+  settings.codec_settings.deltas = true;
+  settings.send_budget = Seconds(5.0);
+  settings.swap_timeout = Seconds(5.0);
+  WallSender sender(wall_, owners(), settings);
+  sender.wait_for_displays(Seconds(5.0));
+  std::vector<Image<Rgba8>> images{picture(0, 7), picture(1, 7)};
+  const std::vector<ScreenPicture> pictures{{0, images[0]}, {1, images[1]}};
+  for (std::uint64_t frame = 0; frame < 4; ++frame) {
+    images[1].at(150, 110).r = static_cast<std::uint8_t>(frame);  // in one tile of six
+    sender.show({frame, pictures});
+    ASSERT_TRUE(within(5.0, [&] { return display->display().shown().size() == 2 * (frame + 1); }));
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto shown = display->display().shown()[2 * frame + i];
+      EXPECT_EQ(shown.picture, images[shown.screen]);
+      EXPECT_EQ(sender.costs()[i].bytes<160 * 120, frame> 0) << sender.costs()[i].bytes;
+    }
+  }
+  // Its last picture built on earlier ones.
+  display.reset();
+  display = std::make_unique<RunningDisplay>(wall_, "localhost", receiver());
+  ASSERT_TRUE(within(1.0, [&] { return display->display().shown().size() == 2; })) << "without another frame";
+  for (const auto& shown : display->display().shown()) EXPECT_EQ(shown.picture, images[shown.screen]);
+  sender.show({4, pictures});
+  ASSERT_TRUE(within(1.0, [&] { return display->display().shown().size() == 4; }));
+  EXPECT_EQ(display->report().screens[1].dropped, 0U);
+}
+
 TEST_F(LinkTest, ADisplayThatComesBackShowsTheCurrentFrame) {
   auto display = std::make_unique<RunningDisplay>(wall_, "localhost", receiver());
   SenderSettings settings = sender();
@@ -334,6 +365,7 @@ TEST(WallHosts, ScreensGoToTheirNodesHostsAndTheRestToThisOne) {
   EXPECT_EQ(find_host(wall, "left").host, "left");
   EXPECT_EQ(find_host(wall, "b").host, "localhost");
   EXPECT_EQ(wall_of_host(wall, hosts[1]).screens.size(), 2U);
+  EXPECT_EQ(wall_of_host(wall, hosts[1]).elsewhere, std::vector<WallScreen>{wall.screens[0]});
   try {
     (void)find_host(wall, "lefd");
     FAIL();
@@ -344,16 +376,6 @@ TEST(WallHosts, ScreensGoToTheirNodesHostsAndTheRestToThisOne) {
   EXPECT_NE(display_socket(wall, "left"), display_socket(wall, "localhost"));
   // A host's name never leads out of the folder.
   EXPECT_EQ(display_socket(wall, "../../x").parent_path(), display_socket(wall, "left").parent_path());
-}
-
-TEST(LinkAddress, IsAPathOrAHostAndAPort) {
-  EXPECT_FALSE(parse_address("/tmp/x.sock").tcp);
-  EXPECT_TRUE(parse_address("127.0.0.1:5005").tcp);
-  EXPECT_TRUE(parse_address("[::1]:5005").tcp);
-  for (const char* const bad : {"", "host", ":5", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:5x"}) {
-    EXPECT_THROW((void)parse_address(bad), Error) << bad;
-  }
-  EXPECT_THROW((void)parse_address("/" + std::string(200, 'x')), Error);
 }
 
 }  // namespace

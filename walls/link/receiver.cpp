@@ -60,7 +60,7 @@ std::optional<Presentation> FrameReceiver::next(double limit) {
     if (now >= until) return std::nullopt;
     (void)news_.wait_for(lock, std::chrono::duration<double>(wake - now));
   }
-  Presentation presentation{orders_.front().first, orders_.front().second, {}};
+  Presentation presentation{orders_.front().first, orders_.front().second, session_, {}};
   orders_.pop_front();
   for (std::size_t i = 0; i < screens_.size(); ++i) {
     Screen& screen = screens_[i];
@@ -78,10 +78,15 @@ std::optional<Presentation> FrameReceiver::next(double limit) {
   return presentation;
 }
 
-void FrameReceiver::shown(const Presentation& presentation) {
+bool FrameReceiver::shown(const Presentation& presentation) {
   const double at = now();
   const std::lock_guard lock(mutex_);
   showing_ = false;
+  if (presentation.session != session_) {
+    announce();
+    raise_alarm(alarm_);
+    return false;
+  }
   for (const auto& [screen, image] : presentation.pictures) {
     screens_[screen].report.frame = presentation.frame;
     screens_[screen].report.skew_s = at - presentation.asked;
@@ -91,6 +96,13 @@ void FrameReceiver::shown(const Presentation& presentation) {
   }
   announce();
   raise_alarm(alarm_);
+  return true;
+}
+
+std::vector<std::string> FrameReceiver::addresses() const {
+  std::vector<std::string> all;
+  for (const Listener& listener : listeners_) all.push_back(listener.address());
+  return all;
 }
 
 ReceiverReport FrameReceiver::report() const {
@@ -197,7 +209,8 @@ void FrameReceiver::answer(Peer& peer) {
     peer.hello = hello;
     peer.open = true;
     peer.since = settings_.clock();
-    ended_ = false;
+    // Ranks may link again between the end of a run and their own.
+    if (hello.role == LinkRole::Swap) ended_ = false;
   }
   peer.connection.queue(encode(reply));
   if (peer.open && hello.role == LinkRole::Swap) {
@@ -239,6 +252,7 @@ std::string FrameReceiver::objection(const Peer& peer, const Hello& hello) {
 
 void FrameReceiver::begin_session(const Hello& hello) {
   session_ = hello.session;
+  ended_ = false;
   for (const auto& other : peers_) {
     if (other->open) other->closing = true;  // left over from the run before
   }
@@ -305,6 +319,7 @@ void FrameReceiver::take_picture(Peer& peer, const Packet& packet) {
   screen.pending.insert_or_assign(header.frame, Pending{std::move(image), false});
   if (screen.pending.size() > kMostPending) screen.pending.erase(screen.pending.begin());
   announce();
+  if (ended_) show_rest();
 }
 
 /// Ready is what could be shown at once: nothing else is about to be.

@@ -35,7 +35,8 @@ struct ReceiverSettings {
 /// A frame that is to be shown now: the pictures of it that arrived whole, by screen.
 struct Presentation {
   std::uint64_t frame = 0;
-  double asked = 0.0;  ///< when it was to be shown, this process's clock
+  double asked = 0.0;                    ///< when it was to be shown, this process's clock
+  std::optional<std::uint64_t> session;  ///< the run's
   std::vector<std::pair<std::size_t, Image<Rgba8>>> pictures;
 };
 
@@ -68,11 +69,13 @@ class FrameReceiver {
 
   /// Waits for a frame's moment, for `limit` seconds at the most.
   [[nodiscard]] std::optional<Presentation> next(double limit);
-  /// The frame next() returned is on the screens.
-  void shown(const Presentation& presentation);
+  /// The frame next() returned is on the screens. False: it was another run's than the one that shows now.
+  bool shown(const Presentation& presentation);
   /// Seconds of the clock all its times are of.
   [[nodiscard]] double now() const { return settings_.clock(); }
   [[nodiscard]] ReceiverReport report() const;
+  /// Where it listens, with the ports that were taken.
+  [[nodiscard]] std::vector<std::string> addresses() const;
 
  private:
   struct Peer {

@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 
 namespace hpr {
 namespace {
@@ -58,6 +59,8 @@ WallSender::WallSender(const Wall& wall, std::span<const int> owners, const Send
       codecs_[host.screens[i]] = make_codec(settings.codec, codec);
     }
     frames.sent_anew.resize(frames.screens.size());
+    frames.pictures.resize(frames.screens.size());
+    frames.whole.resize(frames.screens.size(), true);
     if (!frames.screens.empty()) frames_.push_back(std::move(frames));
   }
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
@@ -96,18 +99,20 @@ void WallSender::wait_for_displays(std::chrono::duration<double> limit) {
 
 void WallSender::show(const WallFrame& frame) {
   std::vector<std::pair<std::size_t, LinkMessage>> packets;
+  costs_.clear();
+  restart_broken_streams();
   for (const ScreenPicture& picture : frame.screens) {
+    const Stopwatch watch;
     const auto link = std::ranges::find_if(
         frames_, [&](const FrameLink& l) { return std::ranges::find(l.screens, picture.screen) != l.screens.end(); });
     HPR_CHECK(link != frames_.end());
     const auto place =
         static_cast<std::size_t>(std::ranges::find(link->screens, picture.screen) - link->screens.begin());
     PacketHeader header{PacketType::Frame, link->numbers[place], frame.number, now_since_1970(), 0, 0};
-    std::vector<std::byte> encoded = codecs_[picture.screen]->encode(picture.image);
-    // What a codec cannot make smaller goes as it is.
-    if (encoded.size() > longest_picture(picture.image.size())) encoded = make_codec("raw", {})->encode(picture.image);
+    const std::vector<std::byte> encoded = encode(picture.screen, picture.image);
     packets.emplace_back(picture.screen,
                          std::make_shared<const std::vector<std::byte>>(encode_packet(header, encoded)));
+    costs_.push_back({picture.screen, watch.ms(), encoded.size()});
   }
   std::unique_lock lock(mutex_);
   for (FrameLink& link : frames_) {
@@ -116,6 +121,11 @@ void WallSender::show(const WallFrame& frame) {
       const auto packet = std::ranges::find(packets, screen, [](const auto& entry) { return entry.first; });
       HPR_CHECK(packet != packets.end());
       link.current.push_back(packet->second);
+    }
+    if (settings_.codec_settings.deltas) {
+      for (std::size_t i = 0; i < link.screens.size(); ++i) {
+        link.pictures[i] = std::ranges::find(frame.screens, link.screens[i], &ScreenPicture::screen)->image;
+      }
     }
     link.sent = false;
     hand_over(link);
@@ -132,6 +142,33 @@ void WallSender::show(const WallFrame& frame) {
   if (!news_.wait_for(lock, settings_.send_budget, [&] { return barrier_.all_ready(awaited); })) {
     barrier_.give_up(awaited, link_seconds());
   }
+}
+
+std::vector<std::byte> WallSender::encode(std::size_t screen, const Image<Rgba8>& picture) {
+  std::vector<std::byte> encoded = codecs_[screen]->encode(picture);
+  if (encoded.size() <= longest_picture(picture.size())) return encoded;
+  // What a codec cannot make smaller goes as it is.
+  codecs_[screen]->restart();
+  return make_codec("raw", {})->encode(picture);
+}
+
+void WallSender::restart_broken_streams() {
+  if (!settings_.codec_settings.deltas) return;
+  const std::lock_guard lock(mutex_);
+  for (FrameLink& link : frames_) {
+    for (std::size_t i = 0; i < link.screens.size(); ++i) {
+      if (link.whole[i] || !link.sent) codecs_[link.screens[i]]->restart();
+      link.whole[i] = false;
+    }
+  }
+}
+
+void WallSender::make_whole(FrameLink& link, std::size_t place) const {
+  link.whole[place] = true;
+  if (!settings_.codec_settings.deltas || place >= link.current.size()) return;
+  PacketHeader header = decode_header(std::span(*link.current[place]).first(kPacketHeaderBytes));
+  link.current[place] = std::make_shared<const std::vector<std::byte>>(
+      encode_packet(header, make_codec("raw", {})->encode(link.pictures[place])));
 }
 
 void WallSender::finish() {
@@ -159,6 +196,11 @@ void WallSender::finish() {
 SwapOutcome WallSender::outcome(std::uint64_t frame) const {
   const std::lock_guard lock(mutex_);
   return barrier_.outcome(frame);
+}
+
+void WallSender::forget_before(std::uint64_t frame) {
+  const std::lock_guard lock(mutex_);
+  barrier_.forget_before(frame);
 }
 
 bool WallSender::reached_any() const {
@@ -215,13 +257,17 @@ void WallSender::step_frames(FrameLink& link, double now) {
     const auto place = std::ranges::find(link.numbers, packet.header.screen) - link.numbers.begin();
     const auto i = static_cast<std::size_t>(place);
     if (packet.header.type != PacketType::Damaged || i >= link.current.size()) return;
+    make_whole(link, i);
     const std::uint64_t latest = decode_header(std::span(*link.current[i]).first(kPacketHeaderBytes)).frame;
     if (packet.header.frame != latest || link.sent_anew[i] == latest + 1) return;
     link.sent_anew[i] = latest + 1;
     link.link.connection().queue(link.current[i]);
   };
   // A display that comes back gets the current frame.
-  if (link.link.step(now, send_again) == ClientLink::Change::Up) link.sent = link.current.empty();
+  if (link.link.step(now, send_again) == ClientLink::Change::Up) {
+    link.sent = link.current.empty();
+    for (std::size_t i = 0; i < link.screens.size(); ++i) make_whole(link, i);
+  }
   hand_over(link);
 }
 

@@ -51,12 +51,16 @@ class WallSender {
   /// Hands over a frame: on this rank's screens; numbers ascend. Rank 0 then waits, within the budget, until the
   /// displays are ready for the frame `in_flight` before this one.
   void show(const WallFrame& frame);
+  /// What the last frame's screens of this rank took to encode, and their bytes.
+  [[nodiscard]] const std::vector<ScreenCost>& costs() const { return costs_; }
   /// After the last frame: returns when it is sent, on rank 0 shown, or after two seconds, or
   /// what budget and swap time-out ask for.
   void finish();
 
-  /// Rank 0, after finish().
+  /// Rank 0: what became of a frame that was shown and not forgotten; it is final after finish().
   [[nodiscard]] SwapOutcome outcome(std::uint64_t frame) const;
+  /// Rank 0: nobody will ask for the outcome of frames before this one.
+  void forget_before(std::uint64_t frame);
   [[nodiscard]] double degraded_seconds() const { return degraded_s_; }
   /// Whether any display ever answered; and if none did, why the first did not.
   [[nodiscard]] bool reached_any() const;
@@ -71,6 +75,8 @@ class WallSender {
     std::vector<LinkMessage> current;        ///< the latest frame's, one per screen
     bool sent = true;                        ///< `current` was handed to the connection
     std::vector<std::uint64_t> sent_anew{};  ///< per screen the frame last sent a second time, plus one
+    std::vector<Image<Rgba8>> pictures{};    ///< with deltas, of `current`: to be sent whole where it builds on nothing
+    std::vector<bool> whole{};               ///< with deltas, per screen: what comes next may build on nothing
   };
   /// Rank 0's agreement with a display.
   struct SwapLink {
@@ -88,6 +94,11 @@ class WallSender {
   void run(const std::stop_token& stop);
   void wait_for_news(double now);
   void step(double now);
+  /// With deltas: streams whose display may not have seen their last picture begin anew.
+  void restart_broken_streams();
+  [[nodiscard]] std::vector<std::byte> encode(std::size_t screen, const Image<Rgba8>& picture);
+  /// With deltas: `current` of this screen in place of what builds on an earlier picture.
+  void make_whole(FrameLink& link, std::size_t place) const;
   /// Queues the latest frame unless the connection still has its hands full.
   void hand_over(FrameLink& link) const;
   void step_frames(FrameLink& link, double now);
@@ -99,6 +110,7 @@ class WallSender {
 
   const Wall& wall_;
   SenderSettings settings_;
+  std::vector<ScreenCost> costs_;
   std::vector<std::unique_ptr<Codec>> codecs_;  ///< per screen; none where another rank owns it
   mutable std::mutex mutex_;                    ///< of all below
   std::condition_variable news_;

@@ -53,7 +53,7 @@ void clear_way(const LinkAddress& address) {
   const Socket probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (::connect(probe.descriptor(), plain(address), address.length) == 0 || errno != ECONNREFUSED) {
     throw Error(ExitCode::Usage, fmt::format("another process listens on '{}'", address.text),
-                "one display process per host and wall: end the other one, or use --listen");
+                "end the other one, or name another place with --listen");
   }
   ::unlink(address.text.c_str());
 }
@@ -69,9 +69,10 @@ void make_private_folder(const std::filesystem::path& folder) {
   if (::lstat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) {
     throw Error(ExitCode::Io, fmt::format("'{}' is no folder", folder.string()), "name another place with --listen");
   }
-  const bool ours = found.st_uid == ::geteuid();
-  const bool others_may_write = (found.st_mode & 022U) != 0;
-  if (!ours || others_may_write) {
+  // In /tmp others may write, but not touch what is ours.
+  const bool owner_is_trusted = found.st_uid == ::geteuid() || found.st_uid == 0;
+  const bool others_may_write = (found.st_mode & 002U) != 0 && (found.st_mode & S_ISVTX) == 0;
+  if (!owner_is_trusted || others_may_write) {
     throw Error(ExitCode::Io, fmt::format("others may change the folder '{}'", folder.string()),
                 "take it from them (chown, chmod 0700), or name another place with --listen");
   }
@@ -81,10 +82,10 @@ Socket::~Socket() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-Listener::Listener(const LinkAddress& address) : tcp_(address.tcp) {
+Listener::Listener(const LinkAddress& address) : tcp_(address.tcp), address_(address.text) {
   if (!tcp_) {
     const std::filesystem::path folder = std::filesystem::path(address.text).parent_path();
-    make_private_folder(folder.empty() ? "/" : folder);
+    make_private_folder(folder.empty() ? "." : folder);
     clear_way(address);
   }
   socket_ = Socket(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -96,18 +97,26 @@ Listener::Listener(const LinkAddress& address) : tcp_(address.tcp) {
                 fmt::format("cannot listen on '{}': {}", address.text, words(code)),
                 "name another place with --listen");
   }
-  if (!tcp_) path_ = address.text;
-  if ((!tcp_ && ::chmod(path_.c_str(), 0600) != 0) || ::listen(socket_.descriptor(), kBacklog) != 0) {
+  if ((!tcp_ && ::chmod(address.text.c_str(), 0600) != 0) || ::listen(socket_.descriptor(), kBacklog) != 0) {
     throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, words(errno)));
   }
+  if (!tcp_) return;
+  sockaddr_storage taken{};
+  socklen_t size = sizeof taken;
+  if (::getsockname(socket_.descriptor(), reinterpret_cast<sockaddr*>(&taken), &size) != 0) {
+    throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, words(errno)));
+  }
+  const in_port_t port = taken.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(taken).sin6_port
+                                                     : reinterpret_cast<const sockaddr_in&>(taken).sin_port;
+  address_ = fmt::format("{}:{}", address.text.substr(0, address.text.rfind(':')), ntohs(port));
 }
 
 Listener::~Listener() {
-  if (socket_ && !path_.empty()) ::unlink(path_.c_str());
+  if (socket_ && !tcp_) ::unlink(address_.c_str());
 }
 
 Listener::Listener(Listener&& other) noexcept
-    : socket_(std::move(other.socket_)), tcp_(other.tcp_), path_(std::exchange(other.path_, {})) {}
+    : socket_(std::move(other.socket_)), tcp_(other.tcp_), address_(other.address_) {}
 
 std::optional<Socket> Listener::accept() const {
   Socket made(::accept4(socket_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
@@ -122,10 +131,10 @@ std::optional<Socket> Listener::accept() const {
 
 Socket start_connecting(const LinkAddress& address) {
   Socket socket(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (!socket) throw LinkError(words(errno));
+  if (!socket) throw LinkError(words(errno), errno);
   if (address.tcp) tune(socket);
   if (::connect(socket.descriptor(), plain(address), address.length) != 0 && errno != EINPROGRESS) {
-    throw LinkError(words(errno));
+    throw LinkError(words(errno), errno);
   }
   return socket;
 }
@@ -134,8 +143,14 @@ void finish_connecting(const Socket& socket, bool tcp) {
   int code = 0;
   socklen_t size = sizeof code;
   if (::getsockopt(socket.descriptor(), SOL_SOCKET, SO_ERROR, &code, &size) != 0) code = errno;
-  if (code != 0) throw LinkError(words(code));
+  if (code != 0) throw LinkError(words(code), code);
   if (!tcp && !same_user(socket.descriptor())) throw LinkError("the socket belongs to another user");
+}
+
+bool has_left(int descriptor) {
+  char byte = 0;
+  const ssize_t got = ::recv(descriptor, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+  return got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
 }
 
 Socket make_alarm() {

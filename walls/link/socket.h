@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "walls/link/address.h"
@@ -29,7 +30,7 @@ class Socket {
 };
 
 /// Makes the folder with mode 0700 where it is missing: in /tmp anybody could have made it before. Throws Error (Io)
-/// when it cannot be made, belongs to somebody else or lets others write.
+/// when it cannot be made, or others may change what is ours in it.
 void make_private_folder(const std::filesystem::path& folder);
 
 /// A listening socket; a Unix socket's file goes with it.
@@ -37,7 +38,7 @@ class Listener {
  public:
   /// Makes a Unix socket's folder where it is missing (mode 0700; the socket has 0600) and takes the place of a socket
   /// nobody listens on any more. Throws Error: Usage when another process listens there, Io when it cannot be had, or
-  /// when its folder belongs to somebody else or lets others write.
+  /// when others may change what is in its folder.
   explicit Listener(const LinkAddress& address);
   ~Listener();
   Listener(Listener&& other) noexcept;
@@ -45,13 +46,15 @@ class Listener {
 
   [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
   [[nodiscard]] bool tcp() const { return tcp_; }
+  /// What it was given, with the port that was taken.
+  [[nodiscard]] const std::string& address() const { return address_; }
   /// Whoever waits, non-blocking; none when nobody does, or on a Unix socket another user.
   [[nodiscard]] std::optional<Socket> accept() const;
 
  private:
   Socket socket_;
   bool tcp_ = false;
-  std::filesystem::path path_;  ///< of the Unix socket
+  std::string address_;
 };
 
 /// Starts to connect, without waiting. Throws LinkError when it fails at once.
@@ -60,6 +63,9 @@ class Listener {
 /// Once such a socket can be written: throws LinkError when it did not connect, or when a Unix socket's listener is
 /// another user.
 void finish_connecting(const Socket& socket, bool tcp);
+
+/// Whether the other end of a stream has closed it. Takes nothing that arrived, and does not wait.
+[[nodiscard]] bool has_left(int descriptor);
 
 /// An eventfd: wakes whoever polls it.
 [[nodiscard]] Socket make_alarm();

@@ -89,11 +89,15 @@ void SwapBarrier::shown(std::size_t display, std::uint64_t number, double at) {
   if (frame != frames_.end() && !frame->second.shown[display]) frame->second.shown[display] = at;
 }
 
+std::uint64_t SwapBarrier::oldest_undecided() const {
+  const std::uint64_t newest = posted_.value_or(0);
+  return std::max(presented_ ? *presented_ + 1 : 0, newest - std::min<std::uint64_t>(newest, kMostReadyFrames));
+}
+
 std::vector<SwapDecision> SwapBarrier::due(double now) {
   std::vector<SwapDecision> decisions = std::move(late_decisions_);
   late_decisions_.clear();
-  const auto begin = presented_ ? frames_.upper_bound(*presented_) : frames_.begin();
-  for (auto frame = begin; frame != frames_.end(); ++frame) {
+  for (auto frame = frames_.lower_bound(oldest_undecided()); frame != frames_.end(); ++frame) {
     // A screen that was ready before its frame was posted here starts the clock now.
     const bool any = std::ranges::any_of(screens_, [&](const Screen& s) { return s.ready.contains(frame->first); });
     if (!frame->second.first_ready && any) frame->second.first_ready = now;
@@ -112,8 +116,7 @@ std::vector<SwapDecision> SwapBarrier::due(double now) {
 }
 
 std::optional<double> SwapBarrier::next_due() const {
-  const auto begin = presented_ ? frames_.upper_bound(*presented_) : frames_.begin();
-  for (auto frame = begin; frame != frames_.end(); ++frame) {
+  for (auto frame = frames_.lower_bound(oldest_undecided()); frame != frames_.end(); ++frame) {
     if (frame->second.first_ready) return *frame->second.first_ready + timeout_s_;
   }
   return std::nullopt;
@@ -161,6 +164,13 @@ SwapOutcome SwapBarrier::outcome(std::uint64_t number) const {
   }
   if (times.size() > 1) outcome.skew_s = std::ranges::max(times) - std::ranges::min(times);
   return outcome;
+}
+
+void SwapBarrier::forget_before(std::uint64_t frame) {
+  // The latest two may still be asked for by what displays say of them.
+  constexpr std::uint64_t kKept = 2;
+  const std::uint64_t newest = posted_.value_or(0);
+  frames_.erase(frames_.begin(), frames_.lower_bound(std::min(frame, newest - std::min(newest, kKept))));
 }
 
 double SwapBarrier::degraded_seconds(double now) const {

@@ -61,7 +61,10 @@ class SwapBarrier {
   /// Nobody waits any longer for those that are not ready for it.
   void give_up(std::uint64_t frame, double now);
 
+  /// Of a frame that was posted and not forgotten.
   [[nodiscard]] SwapOutcome outcome(std::uint64_t frame) const;
+  /// Forgets frames before this one, also those that nobody showed.
+  void forget_before(std::uint64_t frame);
   /// How long something was missing on the wall since the first frame.
   [[nodiscard]] double degraded_seconds(double now) const;
   [[nodiscard]] std::vector<SwapEvent> take_events();
@@ -85,6 +88,8 @@ class SwapBarrier {
     std::vector<std::optional<double>> shown;  ///< per display
   };
 
+  /// Frames before it were shown, or are older than what any display still holds.
+  [[nodiscard]] std::uint64_t oldest_undecided() const;
   [[nodiscard]] bool is_ready(std::size_t display, std::uint64_t frame) const;
   [[nodiscard]] bool has_frame(std::size_t display, std::uint64_t frame) const;
   /// Who has begun to take in a frame counts as keeping up with it.

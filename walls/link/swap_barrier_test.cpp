@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "walls/link/clock.h"
 
 namespace hpr {
@@ -158,6 +160,34 @@ TEST(SwapBarrier, GivingUpMakesTheSlowOneLate) {
   const auto events = barrier.take_events();
   ASSERT_EQ(events.size(), 2U) << "a second late is worth a line";
   EXPECT_EQ(events[0].kind, SwapEvent::Kind::Stale);
+}
+
+TEST(SwapBarrier, WhatIsForgottenChangesNothingForTheFramesThatCome) {
+  for (const bool shows : {true, false}) {
+    SwapBarrier barrier = two_displays();
+    const auto frame = [&](std::uint64_t number) {
+      const double now = static_cast<double>(number);
+      barrier.post(number, now);
+      if (!shows) return barrier.give_up(number, now);
+      ready(barrier, {0, 1, 2}, number, now);
+      ASSERT_EQ(barrier.due(now).size(), 2U);
+      barrier.shown(0, number, now + 0.01);
+      barrier.shown(1, number, now + 0.02);
+    };
+    for (std::uint64_t number = 0; number < 10; ++number) frame(number);
+    const SwapOutcome kept = barrier.outcome(8);
+    barrier.forget_before(8);
+    EXPECT_THROW((void)barrier.outcome(6), std::out_of_range);
+    EXPECT_EQ(barrier.outcome(8).screens, kept.screens);
+    barrier.forget_before(1000);
+    for (std::uint64_t number = 10; number < 13; ++number) frame(number);
+    EXPECT_EQ(barrier.outcome(12).screens, kept.screens) << shows;
+    EXPECT_TRUE(barrier.all_shown(12)) << "of those that keep up";
+    // Told late of a frame nobody remembers.
+    barrier.shown(0, 3, 14.0);
+    barrier.ready(0, 3, 14.0);
+    EXPECT_TRUE(barrier.due(14.0).empty());
+  }
 }
 
 TEST(ClockOffset, FollowsTheQuickestRoundTrip) {

@@ -3,18 +3,15 @@
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
-#include <sys/random.h>
 
 #include "core/check.h"
-#include "core/error.h"
+#include "core/secrets.h"
 
 namespace hpr {
 
 LinkNonce make_nonce() {
   LinkNonce nonce{};
-  if (::getrandom(nonce.data(), nonce.size(), 0) != static_cast<ssize_t>(nonce.size())) {
-    throw Error(ExitCode::Io, "the system has no random numbers for a handshake");
-  }
+  fill_random(std::as_writable_bytes(std::span(nonce)));
   return nonce;
 }
 
