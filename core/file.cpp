@@ -80,17 +80,31 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
   return target;
 }
 
-/// A new file in `folder`, with the permissions the user's umask gives. Its name is short whatever the final name is,
-/// so that no name the file system allows is too long for us.
-int create_temporary(const std::filesystem::path& folder, std::string& name) {
+/// Calls `make` with one name after the other in `folder` until it does not fail for the name being taken; returns what
+/// it did, and the name. Names are short whatever the final one is, so that none the file system allows is too long.
+template <typename Make>
+int with_temporary_name(const std::filesystem::path& folder, std::string& name, const Make& make) {
   constexpr int kTries = 10000;  // each one is a file that a killed run left behind
-  int fd = -1;
+  int result = -1;
   for (int i = 0; i < kTries; ++i) {
     name = (folder / fmt::format(".hpr-{}-{}.part", ::getpid(), i)).string();
-    fd = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd >= 0 || errno != EEXIST) break;
+    result = make(name.c_str());
+    if (result >= 0 || errno != EEXIST) break;
   }
-  return fd;
+  return result;
+}
+
+/// By which an open file without a name is given one.
+std::string link_of(int file) {
+  return fmt::format("/proc/self/fd/{}", file);
+}
+
+/// Without a name, so that nothing of it is left whatever ends the process; -1 where that cannot be had.
+int create_unnamed(const std::filesystem::path& folder) {
+  const int file = ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+  if (file < 0 || ::access(link_of(file).c_str(), F_OK) == 0) return file;
+  ::close(file);
+  return -1;
 }
 
 }  // namespace
@@ -129,7 +143,11 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_
 }
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(target_of(path_)) {
-  descriptor_ = create_temporary(folder_of(target_), temporary_);
+  descriptor_ = create_unnamed(folder_of(target_));
+  if (descriptor_ >= 0) return;
+  descriptor_ = with_temporary_name(folder_of(target_), temporary_, [](const char* name) {
+    return ::open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  });
   if (descriptor_ < 0) fail("cannot write", path_, errno);
 }
 
@@ -147,6 +165,16 @@ AtomicFile::~AtomicFile() {
 void AtomicFile::commit() {
   HPR_CHECK(descriptor_ >= 0);
   if (::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
+  if (temporary_.empty()) {  // a link replaces nothing, so what is there is replaced by a rename
+    const int linked = with_temporary_name(folder_of(target_), temporary_, [&](const char* name) {
+      return ::linkat(AT_FDCWD, link_of(descriptor_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW);
+    });
+    if (linked != 0) {
+      const int error = errno;
+      temporary_.clear();
+      fail("cannot write", path_, error);
+    }
+  }
   if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write", path_, errno);
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot write", path_, errno);
   temporary_.clear();

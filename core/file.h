@@ -18,7 +18,8 @@ namespace hpr {
 /// process dies. A symbolic link stays, what it points at is replaced.
 class AtomicFile {
  public:
-  /// Makes a temporary file beside it. Throws Error (Io), also when `path` is a folder, pipe or device.
+  /// Makes a file without a name in its folder, or where the file system has none of those one with a name of its own.
+  /// Throws Error (Io), also when `path` is a folder, pipe or device.
   explicit AtomicFile(std::filesystem::path path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
@@ -36,7 +37,7 @@ class AtomicFile {
  private:
   std::filesystem::path path_;    ///< for errors
   std::filesystem::path target_;  ///< where links lead
-  std::string temporary_;         ///< empty: it has its name
+  std::string temporary_;         ///< the name of its own; empty: it has none, or has its final one
   int descriptor_ = -1;
 };
 

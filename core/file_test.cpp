@@ -1,9 +1,11 @@
 #include "core/file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -110,7 +112,6 @@ TEST_F(FileTest, AFileWrittenInPiecesHasItsNameOnceItIsCommitted) {
   {
     AtomicFile given_up(path("a"));
     put(given_up, "half");
-    EXPECT_EQ(files(), 2U);
   }
   EXPECT_EQ(files(), 1U);
   EXPECT_EQ(text_of(path("a")), "old");
@@ -122,6 +123,22 @@ TEST_F(FileTest, AFileWrittenInPiecesHasItsNameOnceItIsCommitted) {
   file.commit();
   EXPECT_EQ(text_of(path("a")), "new");
   EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FileTest, NothingIsLeftOfAProcessThatDiesWhileItWrites) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const AtomicFile file(path("a"));
+    (void)!::write(file.descriptor(), "half", 4);
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  const int unnamed = ::open(path("").c_str(), O_WRONLY | O_TMPFILE, 0666);
+  if (unnamed < 0) GTEST_SKIP() << "the file system has no files without names";
+  ::close(unnamed);
+  EXPECT_EQ(files(), 0U);
 }
 
 TEST_F(FileTest, ANameOfTheGreatestLengthCanBeWritten) {
