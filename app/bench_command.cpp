@@ -77,8 +77,12 @@ class BenchCommand final : public Command {
 
   [[nodiscard]] ExitCode run_rays(const Globals& globals) const {
     const RayBuild build = ray_build_.build();
+    if (side_ % kTileSide != 0) {
+      throw Error(ExitCode::Usage, fmt::format("--side {} is no multiple of {}", side_, kTileSide),
+                  fmt::format("use --side {}", side_ / kTileSide * kTileSide));
+    }
     const Scene scene = scene_.empty() ? ray_bench_scene(triangles_) : load_scene(scene_, globals.scene_limits());
-    print(bench_rays(scene, side_ / kTileSide * kTileSide, build), this_machine().cpu);
+    print(bench_rays(scene, side_, build), this_machine().cpu);
     return ExitCode::Done;
   }
 

@@ -46,6 +46,29 @@ double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
+/// Whether `picture` has all channels of `other` but its alpha.
+bool lacks_alpha(const FloatImage& picture, const FloatImage& other) {
+  std::vector<std::string> with = picture.channels;
+  with.emplace_back("A");
+  return std::ranges::find(picture.channels, "A") == picture.channels.end() &&
+         std::ranges::is_permutation(with, other.channels);
+}
+
+/// The picture with an alpha of 1.
+FloatImage opaque(const FloatImage& picture) {
+  FloatImage result = picture;
+  const std::size_t channels = picture.channels.size();
+  result.channels.emplace_back("A");
+  result.values.clear();
+  result.values.reserve(picture.size.area() * (channels + 1));
+  for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
+    const auto from = picture.values.begin() + static_cast<std::ptrdiff_t>(pixel * channels);
+    result.values.insert(result.values.end(), from, from + static_cast<std::ptrdiff_t>(channels));
+    result.values.push_back(1.0F);
+  }
+  return result;
+}
+
 std::vector<Key> read_keys(const std::filesystem::path& path) {
   constexpr std::uint64_t kLargestFile = std::uint64_t{32} << 30U;
   const std::vector<std::byte> bytes = read_file(path, kLargestFile);
@@ -153,6 +176,8 @@ std::vector<std::string> quick_diff_metrics() {
 
 DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b, const std::string& name_b,
                          const DiffTolerance& tolerance, std::span<const std::string> metrics, int threads) {
+  if (lacks_alpha(a, b)) return diff_pictures(opaque(a), name_a, b, name_b, tolerance, metrics, threads);
+  if (lacks_alpha(b, a)) return diff_pictures(a, name_a, opaque(b), name_b, tolerance, metrics, threads);
   std::vector<std::string> sorted_a = a.channels;
   std::vector<std::string> sorted_b = b.channels;
   std::ranges::sort(sorted_a);
@@ -169,6 +194,13 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
   if (asks_for_colors(metrics)) report.colors = compare_colors(a, b, metrics, threads);
   const std::vector<float> other = in_order(b, a.channels);
   report.difference = compare_values(other, a.values, channels);
+  if (const std::vector<float> colors = colors_of(a); !colors.empty()) {
+    const Difference seen = compare_values(colors_of(b), colors, 3);
+    report.difference.rmse = seen.rmse;
+    report.difference.psnr = seen.psnr;
+    report.difference.mean = seen.mean;
+    report.difference.mean_error = seen.mean_error;
+  }
   report.largest.reserve(report.difference.pixels);
   for (std::size_t pixel = 0; pixel < report.difference.pixels; ++pixel) {
     float largest = 0.0F;

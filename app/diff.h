@@ -41,8 +41,9 @@ struct DiffReport {
 /// From black for 0 to pale yellow for 1, in equal steps of lightness.
 [[nodiscard]] Rgba8 heat_color(double share);
 
-/// Compares `b` with `a` value by value, channels by name, and colours as far as `metrics` asks for them. Throws Error
-/// (BadInput), naming both, when sizes or channels differ, or one is linear and the other is not.
+/// Compares `b` with `a` value by value, channels by name, and colours as far as `metrics` asks for them. Where only
+/// one has alpha, the other's is 1. rmse, psnr and mean are of colours where there are any. Throws Error (BadInput),
+/// naming both, when sizes or channels differ, or one is linear and the other is not.
 [[nodiscard]] DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b,
                                        const std::string& name_b, const DiffTolerance& tolerance,
                                        std::span<const std::string> metrics = diff_metrics(), int threads = 1);

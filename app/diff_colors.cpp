@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <vector>
 
 #include "image/color.h"
 #include "image/flip.h"
@@ -12,7 +11,16 @@
 namespace hpr {
 namespace {
 
-/// [height][width][3]; grey pictures have the same value three times. Empty for pictures without colours.
+std::size_t not_finite_pixels(std::span<const float> a, std::span<const float> b) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size(); i += 3) {
+    if (!all_finite(a.subspan(i, 3)) || !all_finite(b.subspan(i, 3))) ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
 std::vector<float> colors_of(const FloatImage& picture) {
   const auto place = [&](const char* channel) {
     return static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin());
@@ -28,16 +36,6 @@ std::vector<float> colors_of(const FloatImage& picture) {
   }
   return colors;
 }
-
-std::size_t not_finite_pixels(std::span<const float> a, std::span<const float> b) {
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < a.size(); i += 3) {
-    if (!all_finite(a.subspan(i, 3)) || !all_finite(b.subspan(i, 3))) ++count;
-  }
-  return count;
-}
-
-}  // namespace
 
 bool asks_for(std::span<const std::string> metrics, std::string_view metric) {
   return std::ranges::find(metrics, metric) != metrics.end();

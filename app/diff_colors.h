@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "image/image_io.h"
 #include "image/metrics.h"
@@ -19,6 +20,9 @@ struct ColorErrors {
   double ssim = std::numeric_limits<double>::quiet_NaN();
   double flip = std::numeric_limits<double>::quiet_NaN();
 };
+
+/// [height][width][3]: channels R, G and B, or three times Y. Empty for pictures that have neither.
+[[nodiscard]] std::vector<float> colors_of(const FloatImage& picture);
 
 /// Whether `metric` is one of `metrics`.
 [[nodiscard]] bool asks_for(std::span<const std::string> metrics, std::string_view metric);

@@ -53,6 +53,12 @@ class DiffCommand final : public Command {
                     unknown_name_hint(metric, diff_metrics()));
       }
     }
+    const bool keys = std::filesystem::path(a_).extension() == ".keys";
+    for (const std::string& metric : metrics_) {
+      if (!keys || metric == "max" || metric == "differing") continue;
+      throw Error(ExitCode::Usage, fmt::format("--metric {} is of pictures; keys have max and differing", metric),
+                  "compare the rendered pictures");
+    }
     if (metrics_.empty()) metrics_ = quick_diff_metrics();
     if (!(tolerance_.value >= 0.0)) {
       throw Error(ExitCode::Usage, "--fail is not a difference", "give a number from 0 on, like --fail 0.004");
@@ -65,9 +71,15 @@ class DiffCommand final : public Command {
       throw Error(ExitCode::Usage, fmt::format("-o {}: the map of differences is a PNG", printable(heat_)),
                   "name a .png file");
     }
-    if (std::filesystem::path(a_).extension() == ".keys") {
+    if (keys) {
       throw Error(ExitCode::Usage, "-o is for pictures: a file of keys does not know its width",
                   "compare the rendered pictures");
+    }
+    for (const std::string& compared : {a_, b_}) {
+      std::error_code error;
+      if (!std::filesystem::equivalent(heat_, compared, error)) continue;
+      throw Error(ExitCode::Usage, fmt::format("-o {}: that is one of the pictures", printable(heat_)),
+                  "name another file");
     }
     check_writable(heat_, globals.force);
   }

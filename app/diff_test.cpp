@@ -92,6 +92,26 @@ TEST(Diff, ChannelsAreMatchedByName) {
   EXPECT_TRUE(diff(a, b).passed);
 }
 
+TEST(Diff, APictureWithoutAlphaIsOpaque) {
+  const FloatImage plain{{1, 1}, {"R", "G", "B"}, {0.1F, 0.2F, 0.3F}};
+  const FloatImage opaque{{1, 1}, {"R", "G", "B", "A"}, {0.1F, 0.2F, 0.3F, 1.0F}};
+  const FloatImage veil{{1, 1}, {"A", "R", "G", "B"}, {0.5F, 0.1F, 0.2F, 0.3F}};
+  EXPECT_TRUE(diff(plain, opaque).passed);
+  EXPECT_TRUE(diff(opaque, plain).passed);
+  EXPECT_EQ(diff(plain, veil).difference.max, 0.5);
+}
+
+TEST(Diff, ErrorsOfColoursTakeNothingFromOtherChannels) {
+  const float kFar = std::numeric_limits<float>::infinity();
+  const FloatImage a{{1, 1}, {"R", "G", "B", "A", "depth.Z"}, {0.0F, 0.0F, 0.0F, 1.0F, kFar}};
+  const FloatImage b{{1, 1}, {"R", "G", "B", "A", "depth.Z"}, {0.1F, 0.1F, 0.1F, 1.0F, 2.0F}};
+  const Difference difference = diff(a, b).difference;
+  EXPECT_NEAR(difference.rmse, 0.1, 1e-8);
+  EXPECT_NEAR(difference.psnr, 20.0, 1e-5);
+  EXPECT_NEAR(difference.mean, 0.1, 1e-8);
+  EXPECT_EQ(difference.max, HUGE_VAL);
+}
+
 TEST(Diff, OtherSizesOrChannelsAreBadInputThatNamesBoth) {
   const FloatImage a{{2, 1}, {"R"}, {0, 0}};
   const FloatImage tall{{1, 2}, {"R"}, {0, 0}};

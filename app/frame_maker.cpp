@@ -122,6 +122,7 @@ void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Pro
   times_ = sampler_->times();
   relmse_ = sampler_->reached_so_far().relmse;
   write_report({most_samples(), 0, 0}, sampler_->reached_so_far().samples);
+  report_->resting = true;
 }
 
 void FrameMaker::took(double slowest_ms) {

@@ -45,7 +45,7 @@ FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampli
       sampling_(sampling),
       number_(frame),
       film_(sampling.sums() ? plan.layout : FrameLayout(), {plan.aovs, keeps_keys}),
-      keeps_keys_(keeps_keys) {}
+      keeps_keys_(sampling.sums() && film_.keys().tiles() > 0) {}
 
 void FrameSampler::load(const CheckpointSettings& checkpoint) {
   struct Start {

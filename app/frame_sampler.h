@@ -15,8 +15,8 @@ namespace hpr {
 /// takes their mean. A single look through the pixels' centres is that frame itself, and nothing is summed.
 class FrameSampler {
  public:
-  /// `frame`: its number, by which its noise differs from other frames'. `keeps_keys`: frame().keys are those of the
-  /// first sample; else they are the last one's.
+  /// `frame`: its number, by which its noise differs from other frames'. `keeps_keys`, and AOVs that need them:
+  /// frame().keys are those of the first sample; else they are the last one's, and none where no sample was drawn.
   FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame, bool keeps_keys);
 
   /// Collective. views[i] is screen i of the plan's layout. Between samples all ranks ask each other for signals (see

@@ -172,7 +172,8 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
     json["budget"] = {{"target_ms", stats.budget->target_ms},
                       {"resolution_scale", stats.budget->resolution_scale},
                       {"samples", stats.budget->samples},
-                      {"given_up", stats.budget->given_up}};
+                      {"given_up", stats.budget->given_up},
+                      {"resting", stats.budget->resting}};
   }
   write_file_atomically(path, json.dump(2) + "\n");
 }

@@ -53,7 +53,10 @@ class RenderCommand final : public Command {
     files_.colors = options_.wire.colors();
     if (checkpoint_.empty() && !files_.picture.empty()) checkpoint_ = files_.picture + ".checkpoint";
     if (!sampling.sums()) checkpoint_.clear();
-    if (!inside_mpi_job()) check_outputs(globals);
+    if (!inside_mpi_job()) {
+      check_outputs(globals);
+      for (const std::string& option : options_.without_use()) log::warning("--reference has no use for {}", option);
+    }
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
       if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(globals); });

@@ -227,6 +227,18 @@ Sampling RenderOptions::sampling() const {
   return sampling;
 }
 
+std::vector<std::string> RenderOptions::without_use() const {
+  std::vector<std::string> names;
+  if (!reference) return names;
+  if (passes != "auto") names.emplace_back("--passes");
+  if (photons) names.emplace_back("--photons");
+  if (photon_radius > 0.0) names.emplace_back("--photon-radius");
+  if (indirect) names.emplace_back("--indirect");
+  if (glossy_cutoff) names.emplace_back("--glossy-cutoff");
+  if (light_samples) names.emplace_back("--light-samples");
+  return names;
+}
+
 FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   FrameSettings settings;
   if (!std::isfinite(fov_degrees) || !std::isfinite(exposure)) {
@@ -237,6 +249,9 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
   settings.primary = parse_primary(primary);
   settings.shading = parse_shading(shading);
+  if (split_list(passes).empty()) {
+    throw Error(ExitCode::Usage, "--passes names none", "write auto, all, none, or a list such as shadow,reflection");
+  }
   settings.rays.auto_passes = passes == "auto";
   settings.rays.all_passes = passes == "all";
   if (passes != "auto" && passes != "none" && passes != "all") settings.rays.passes = split_list(passes);

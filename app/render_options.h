@@ -63,6 +63,9 @@ struct RenderOptions {
   /// The same.
   [[nodiscard]] Sampling sampling() const;
 
+  /// Options that were given beside --reference and change nothing with it.
+  [[nodiscard]] std::vector<std::string> without_use() const;
+
  private:
   void declare_light(CLI::App& app);
   void declare_economies(CLI::App& app);

@@ -148,9 +148,14 @@ class SceneCommand final : public Command {
   }
 
   [[nodiscard]] ExitCode make(const Globals& globals) const {
-    const std::string name = source_.substr(0, source_.find('?'));
-    const Generator& generator = find_generator(name);
-    std::string text = source_;
+    constexpr std::string_view kPrefix = "gen:";  // as `list` names them
+    std::string text = source_.starts_with(kPrefix) ? source_.substr(kPrefix.size()) : source_;
+    const Generator& generator = find_generator(text.substr(0, text.find('?')));
+    if (!output_.ends_with(".glb")) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("cannot write '{}': scenes are written as binary glTF", printable(output_)),
+                  "name a .glb file");
+    }
     const auto add = [&](const std::string& key, const std::string& value) {
       text += fmt::format("{}{}={}", text.find('?') == std::string::npos ? '?' : '&', key, value);
     };

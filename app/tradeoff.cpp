@@ -164,14 +164,15 @@ TradeoffBudget parse_budget(const std::string& text) {
 std::optional<std::size_t> best_within(std::span<const TradeoffPoint> points, const TradeoffBudget& budget,
                                        const std::string& metric) {
   std::optional<std::size_t> best;
-  double least = 0.0;
+  std::pair<double, double> least;  // of what is asked for, and of two alike the other
   for (std::size_t i = 0; i < points.size(); ++i) {
     const TradeoffPoint& point = points[i];
     const std::string& judged = budget.ms ? metric : budget.metric;
     const double error = badness(judged, point.error.of(judged));
     const bool within =
         budget.ms ? point.median_ms() <= *budget.ms && !std::isnan(error) : error <= badness(judged, budget.error);
-    const double value = budget.ms ? error : point.median_ms();
+    const auto value =
+        budget.ms ? std::pair(error, point.median_ms()) : std::pair(point.median_ms(), std::isnan(error) ? 0.0 : error);
     if (within && (!best || value < least)) {
       best = i;
       least = value;

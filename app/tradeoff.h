@@ -85,7 +85,8 @@ struct TradeoffBudget {
 /// Throws Error (Usage).
 [[nodiscard]] TradeoffBudget parse_budget(const std::string& text);
 
-/// Within time the most accurate point by `metric`; within an error the fastest. None when no point is within.
+/// Within time the most accurate point by `metric`, the fastest of several; within an error the fastest. None when no
+/// point is within.
 [[nodiscard]] std::optional<std::size_t> best_within(std::span<const TradeoffPoint> points,
                                                      const TradeoffBudget& budget, const std::string& metric);
 
@@ -128,9 +129,9 @@ struct TradeoffReport {
   std::vector<std::string> metrics;  ///< the first one decides the front
   std::vector<TradeoffPoint> points;
   std::optional<TradeoffBudget> budget;
-  std::optional<std::size_t> best;  ///< within the budget
-  std::string reference_crop_png;   ///< base64
-  std::string base_options;         ///< those of the command line that hold for all points
+  std::optional<std::size_t> best;        ///< within the budget
+  std::string reference_crop_png;         ///< base64
+  std::vector<std::string> base_options;  ///< words of the command line that hold for all points
 };
 
 }  // namespace hpr

@@ -13,6 +13,7 @@
 
 #include "app/cache_folder.h"
 #include "app/compare_options.h"
+#include "app/knobs.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
@@ -33,29 +34,34 @@ namespace {
 
 constexpr int kLargestSide = 16384;
 constexpr int kCropSide = 128;
+constexpr double kQuickMs = 200.0;
 constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
 
-/// The words of the command line that a frame of `hpr render` would take as well.
-std::string base_options(const std::vector<std::string>& args) {
-  static const std::set<std::string> kOwn{"--vary",   "--metric", "--reference", "--reference-spp", "--budget",
-                                          "--frames", "--html",   "--csv",       "--size"};
-  static const std::set<std::string> kFlags{"--json", "--resume", "--force", "-q", "-v", "-vv"};
-  std::string line;
+/// The words of the command line that a frame of `hpr render` would take as well, but for `scene`, what a sweep has of
+/// its own or varies, and what changes neither pictures nor times.
+std::vector<std::string> base_words(std::span<const std::string> args, const std::string& scene,
+                                    std::span<const std::string> varied) {
+  static const std::set<std::string> kOwn{
+      "--vary", "--metric", "--reference", "--reference-spp", "--budget",    "--frames",     "--html",
+      "--csv",  "--size",   "--progress",  "--hang-timeout",  "--limit-mem", "--limit-image"};
+  static const std::set<std::string> kFlags{"--json", "--resume", "--force", "--strict", "-q", "-v", "-vv"};
+  std::vector<std::string> words;
   bool scene_seen = false;
   for (std::size_t i = 1; i < args.size(); ++i) {
     const std::string name = args[i].substr(0, args[i].find('='));
     if (kFlags.contains(name)) continue;
-    if (kOwn.contains(name)) {
-      if (name == args[i]) ++i;
+    const bool is_varied = name.starts_with("--") && std::ranges::find(varied, name.substr(2)) != varied.end();
+    if (kOwn.contains(name) || is_varied) {
+      if (name == args[i] && !(is_varied && find_knob(name.substr(2)).range.starts_with("false"))) ++i;
       continue;
     }
-    if (!args[i].starts_with('-') && !scene_seen && !(i > 1 && args[i - 1].starts_with("--"))) {
+    if (args[i] == scene && !scene_seen) {
       scene_seen = true;
       continue;
     }
-    line += (line.empty() ? "" : " ") + args[i];
+    words.push_back(args[i]);
   }
-  return line;
+  return words;
 }
 
 class TradeoffCommand final : public Command {
@@ -152,6 +158,8 @@ class TradeoffCommand final : public Command {
       if (resume_ && std::filesystem::exists(state)) {
         const auto bytes = read_file(state, kLargestState);
         done = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
+      } else if (resume_) {
+        log::warning("--resume: no points of this sweep are kept, so it begins anew");
       }
     });
 
@@ -163,6 +171,11 @@ class TradeoffCommand final : public Command {
       const bool skips = all_gather_value(session.comm(), known != done.end() ? 1 : 0).front() == 1;
       if (!skips) {
         done.push_back(measure_point(session, options_, values, how_, globals, *reference, crop));
+        // The first frames of a process are slower than all others: where that shows, they are drawn once more.
+        const double took = all_gather_value(session.comm(), done.back().median_ms()).front();
+        if (measured == 0 && took < kQuickMs) {
+          done.back() = measure_point(session, options_, values, how_, globals, *reference, crop);
+        }
         ++measured;
         agree_on_failure(session.comm(), [&] {
           if (speaks) write_file_atomically(state, encode_points(identity, done));
@@ -182,7 +195,9 @@ class TradeoffCommand final : public Command {
     agree_on_failure(session.comm(), [&] {
       if (speaks) finish(session, *reference, crop, globals, state);
     });
-    return ExitCode::Done;
+    const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
+    const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
+    return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
   }
 
   [[nodiscard]] std::string sweep_identity(Session& session, const ReferencePicture& reference,
@@ -191,7 +206,7 @@ class TradeoffCommand final : public Command {
                        kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height, globals.seed,
                        session.comm().size(), session.threads(),
                        hex16(xxh64(std::as_bytes(reference.radiance.pixels()))), fmt::join(metrics_, ","), how_.frames,
-                       base_options(globals.args));
+                       fmt::join(base_words(globals.args, scene_, report_.knobs), " "));
   }
 
   void finish(Session& session, const ReferencePicture& reference, const Rect& crop, const Globals& globals,
@@ -206,13 +221,17 @@ class TradeoffCommand final : public Command {
     report_.seed = globals.seed;
     report_.reference = reference.about;
     report_.metrics = metrics_;
-    report_.base_options = base_options(globals.args);
+    report_.base_options = base_words(globals.args, scene_, report_.knobs);
     report_.reference_crop_png = crop_as_png(reference.radiance, crop, reference.linear);
     mark_pareto(report_.points, metrics_.front());
     if (report_.budget) report_.best = best_within(report_.points, *report_.budget, metrics_.front());
     if (!csv_.empty()) write_file_atomically(csv_, tradeoff_csv(report_));
     if (!html_.empty()) write_file_atomically(html_, tradeoff_html(report_));
     std::fputs((json_ ? tradeoff_json(report_) : tradeoff_table(report_)).c_str(), stdout);
+    if (std::fflush(stdout) != 0) {
+      throw Error(ExitCode::Io, "the result could not be written to standard output",
+                  "--resume writes it without measuring again");
+    }
     if (json_ && report_.budget) log::info("{}", answer(report_));
     std::error_code ignored;
     std::filesystem::remove(state, ignored);  // what is done needs no going on

@@ -41,6 +41,7 @@ std::string header(const TradeoffReport& report) {
 std::string cell(const std::string& metric, double value) {
   if (std::isnan(value)) return "<td>–</td>";
   if (std::isinf(value)) return "<td>∞</td>";
+  if (metric == "mean") return fmt::format("<td>{:.3g}</td>", value);
   return metric == "psnr" ? fmt::format("<td>{:.2f}</td>", value) : fmt::format("<td>{:.4g}</td>", value);
 }
 
@@ -64,9 +65,9 @@ std::string table(const TradeoffReport& report) {
     text += fmt::format("<td>{:.1f}</td>", point.median_ms());
     for (const std::string& metric : report.metrics) text += cell(metric, point.error.of(metric));
     const auto width = static_cast<std::size_t>(report.size.width);
-    text += fmt::format("<td>{:+.3g}</td><td>{:.2g}</td><td>{:.3g}</td><td>{},{}</td></tr>\n",
-                        percent * point.error.mean, percent * point.error.mean_error, point.error.worst,
-                        point.error.worst_pixel % width, point.error.worst_pixel / width);
+    for (const double share : {point.error.mean, point.error.mean_error}) text += cell("mean", percent * share);
+    text += fmt::format("<td>{:.3g}</td><td>{},{}</td></tr>\n", point.error.worst, point.error.worst_pixel % width,
+                        point.error.worst_pixel / width);
   }
   return text + "</tbody></table></div>\n";
 }
@@ -114,6 +115,20 @@ std::string crops(const TradeoffReport& report) {
 
 }  // namespace
 
+namespace {
+
+/// What a plot with a scale of logarithms cannot show.
+std::string left_out(const TradeoffReport& report, const std::string& metric) {
+  std::string rows;
+  for (std::size_t i = 0; i < report.points.size(); ++i) {
+    if (badness(metric, report.points[i].error.of(metric)) != 0.0) continue;
+    rows += fmt::format("{}{}", rows.empty() ? "" : ", ", i + 1);
+  }
+  return rows.empty() ? "" : fmt::format(" Not drawn, as without any error: {}.", rows);
+}
+
+}  // namespace
+
 std::string tradeoff_html(const TradeoffReport& report) {
   std::string body = header(report);
   for (const std::string& metric : report.metrics) {
@@ -121,8 +136,8 @@ std::string tradeoff_html(const TradeoffReport& report) {
     if (svg.empty()) continue;
     body += fmt::format(
         "<figure>\n{}<figcaption>Error by {} over time; numbers are rows of the table, filled marks are "
-        "those nothing beats by {}.</figcaption>\n</figure>\n",
-        svg, metric, report.metrics.front());
+        "those nothing beats by {}.{}</figcaption>\n</figure>\n",
+        svg, metric, report.metrics.front(), left_out(report, metric));
   }
   body += "<h2>All points</h2>\n" + table(report) + slopes(report);
   body += "<h2>Where the time goes</h2>\n<figure>\n" + plot_shares_of_passes(report) +

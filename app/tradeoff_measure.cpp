@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -109,12 +110,13 @@ ReferencePicture read_reference(const std::string& path, Size size, const Global
   if (std::max({r, g, b}) == channels) {
     throw Error(ExitCode::BadInput, fmt::format("{} has no channels R, G and B", path), "name a picture in colours");
   }
-  if (!all_finite(file.values)) {
-    throw Error(ExitCode::BadInput, fmt::format("{} has values that are not finite", path), "mend the picture");
-  }
   for (std::size_t i = 0; i < size.area(); ++i) {
     const float* const pixel = file.values.data() + i * channels;
-    reference.radiance.pixels()[i] = {pixel[r], pixel[g], pixel[b]};
+    const std::array<float, 3> color{pixel[r], pixel[g], pixel[b]};
+    if (!all_finite(color)) {
+      throw Error(ExitCode::BadInput, fmt::format("{} has colours that are not finite", path), "mend the picture");
+    }
+    reference.radiance.pixels()[i] = {color[0], color[1], color[2]};
   }
   reference.about.mean = mean_of(reference.radiance);
   return reference;
@@ -214,6 +216,10 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
     if (!draw(kept, *sampler)) return std::nullopt;
   }
   const SampleProgress reached = sampler->reached_so_far();
+  if (speaks && reached.samples > how.reference_spp) {
+    log::info("the truth has {} samples, of an earlier run, where {} were asked for", reached.samples,
+              how.reference_spp);
+  }
   reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size, ColorFormat::Float32);
   reference.about = {.how = passes ? "passes at best" : "path tracing",
                      .spp = reached.samples,
@@ -269,6 +275,7 @@ TradeoffPoint measure_point(Session& session, const RenderOptions& options, cons
   // What the first frame of new settings makes for all that follow is not a frame's own cost: where frames are quick,
   // one goes before those that count.
   for (int frame = 0; frame <= how.frames && (frame == 0 || spent < kLongEnoughMs); ++frame) {
+    if (setup.plan.lit) session.lighter(setup.plan.rays).forget_photons();  // of the same sample, in the frame before
     const std::size_t sent_before = session.comm().bytes_sent();
     const Stopwatch watch;
     Progress silent("none", "sample", 0);

@@ -29,8 +29,8 @@ struct ReferencePicture {
 };
 
 /// Collective. Reads or renders the truth. Rendered ones are kept in `cache` under a name that says what they are of,
-/// and gone on with where they have too few samples. None when a signal stopped it: its samples are in `cache` then.
-/// Throws Error: Usage, Io, BadInput for a picture of another size.
+/// and gone on with where they have too few samples; where they have more, all count. None when a signal stopped it:
+/// its samples are in `cache` then. Throws Error: Usage, Io, BadInput for a picture of another size.
 [[nodiscard]] std::optional<ReferencePicture> find_reference(Session& session, const RenderOptions& options,
                                                              const TradeoffMeasurement& how, const Globals& globals,
                                                              const std::filesystem::path& cache);

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "app/shell_line.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -78,6 +80,7 @@ Json point_json(const TradeoffPoint& point, std::size_t width) {
             {"refraction", point.rays.refraction},
             {"ambient-occlusion", point.rays.ambient_occlusion},
             {"photon", point.rays.photon}}},
+          {"not_finite", point.rays.not_finite},
           {"bytes_sent", point.bytes_sent}};
 }
 
@@ -103,14 +106,19 @@ std::string describe(const KnobValues& knobs) {
 }
 
 std::string command_for(const TradeoffReport& report, const TradeoffPoint& point) {
-  std::string line =
-      fmt::format("hpr render {} -o picture.png --size {}x{}", report.scene, report.size.width, report.size.height);
-  if (!report.base_options.empty()) line += " " + report.base_options;
+  std::vector<std::string> words{"hpr",
+                                 "render",
+                                 report.scene,
+                                 "-o",
+                                 "picture.png",
+                                 "--size",
+                                 fmt::format("{}x{}", report.size.width, report.size.height)};
+  std::ranges::copy(report.base_options, std::back_inserter(words));
   for (auto [knob, value] : point.knobs) {
     std::ranges::replace(value, '+', ',');
-    line += fmt::format(" --{}={}", knob, value);
+    words.push_back(fmt::format("--{}={}", knob, value));
   }
-  return line;
+  return shell_line(words);
 }
 
 std::string answer(const TradeoffReport& report) {
@@ -142,9 +150,11 @@ std::string tradeoff_table(const TradeoffReport& report) {
     row.push_back(fmt::format("{:.1f}", point.median_ms()));
     for (const std::string& metric : report.metrics) row.push_back(metric_text(metric, point.error));
     const double percent = 100.0 / report.reference.mean;
-    row.push_back(report.reference.mean > 0.0
-                      ? fmt::format("{:+.2f} +- {:.2f}", percent * point.error.mean, percent * point.error.mean_error)
-                      : "-");
+    const std::string mean = fmt::format("{:+.2f}", percent * point.error.mean);
+    row.push_back(!(report.reference.mean > 0.0) ? "-"
+                  : std::isfinite(point.error.mean_error)
+                      ? fmt::format("{} +- {:.2f}", mean, percent * point.error.mean_error)
+                      : mean);
   }
   std::string text = fmt::format("{} at {}x{} against {}{}\n", report.scene, report.size.width, report.size.height,
                                  report.reference.how,
@@ -266,6 +276,7 @@ std::vector<TradeoffPoint> decode_points(const std::string& text, const std::str
       point.rays.refraction = rays.at("refraction");
       point.rays.ambient_occlusion = rays.at("ambient-occlusion");
       point.rays.photon = rays.at("photon");
+      point.rays.not_finite = from.at("not_finite");
       point.bytes_sent = from.at("bytes_sent");
       point.samples = from.at("samples");
       const Json& error = from.at("error");

@@ -126,6 +126,13 @@ TEST(Budget, TimeAsksForTheLeastError) {
   EXPECT_EQ(best_within(points, parse_budget("9ms"), "flip"), std::nullopt);
 }
 
+TEST(Budget, OfErrorsAlikeTheFastestIsBest) {
+  const std::vector<TradeoffPoint> points{point(20, 0.1), point(10, 0.1), point(15, 0.1)};
+  EXPECT_EQ(best_within(points, parse_budget("1s"), "flip"), 1U);
+  const std::vector<TradeoffPoint> alike{point(10, 0.2), point(10, 0.1)};
+  EXPECT_EQ(best_within(alike, parse_budget("flip=0.3"), "flip"), 1U);
+}
+
 TEST(Budget, ErrorAsksForTheLeastTime) {
   const std::vector<TradeoffPoint> points{point(10, 0.5), point(30, 0.2), point(40, 0.1)};
   EXPECT_EQ(best_within(points, parse_budget("flip=0.3"), "flip"), 1U);

@@ -42,14 +42,17 @@ void report_budget(const RunManifest& manifest) {
   std::vector<double> ms;
   std::map<std::string, std::size_t> given_up;
   for (const FrameRecord& frame : manifest.frames) {
+    if (frame.budget->resting) continue;
     ms.push_back(frame.ms);
     for (const std::string& what : frame.budget->given_up) ++given_up[what];
   }
+  if (ms.empty()) return;
   std::ranges::sort(ms);
+  const auto within = [&](std::size_t percent) { return ms[(percent * ms.size() + 99) / 100 - 1]; };  // nearest rank
   std::vector<std::string> words;
   for (const auto& [what, frames] : given_up) words.push_back(fmt::format("{} in {}", what, frames));
   log::info("{} frames: half took up to {:.1f} ms, 95 % up to {:.1f} ms, target {:.1f} ms; given up: {}", ms.size(),
-            ms[(ms.size() - 1) / 2], ms[(ms.size() - 1) * 95 / 100], manifest.frames.back().budget->target_ms,
+            within(50), within(95), manifest.frames.back().budget->target_ms,
             words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, ", ")));
 }
 
@@ -238,6 +241,10 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
       throw Error(ExitCode::Usage, "--target-ms and --target-error take finite numbers", "write e.g. --target-ms 33");
     }
   }
+  if (run.target_error && !(*run.target_error >= 1e-12 && *run.target_error <= 1e12)) {
+    throw Error(ExitCode::Usage, fmt::format("--target-error {:g} is not from 1e-12 to 1e12", *run.target_error),
+                "write e.g. --target-error 1e-3");
+  }
   (void)run.options.wire.colors();
   (void)run.options.sampling();  // malformed numbers are found before any work
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
@@ -281,8 +288,7 @@ class WallRunCommand final : public Command {
     app.add_option("--path", run_.path, "where the camera goes in these frames, see docs/cli.md")->type_name("FILE");
     app.add_option("--target-ms", run_.target_ms, "what a frame may take; what is given up for it is in the manifest")
         ->check(CLI::Range(1e-3, 1e9));
-    app.add_option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples")
-        ->check(CLI::Range(1e-12, 1e12));
+    app.add_option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples");
     app.add_option("--restarts", run_.restarts, "how often a job of several ranks that is lost is started again")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "app/output.h"
+#include "app/shell_line.h"
 #include "core/names.h"
 #include "walls/display.h"
 #include "walls/host_list.h"
@@ -95,12 +96,6 @@ if [[ $code != 0 && $out/manifest.json -nt $out/hosts ]] && grep -q '^  "stopped
   exit 0
 fi
 )";
-
-std::string shell_quote(std::string_view text) {
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? std::string(R"('\'')") : std::string(1, c);
-  return quoted + "'";
-}
 
 void check_host(const std::string& host) {
   if (!host.empty() && host != "localhost" && host.find_first_of("[],*") == std::string::npos) {

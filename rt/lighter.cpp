@@ -326,4 +326,8 @@ void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
   (void)state_->send_photons(number, &comm);
 }
 
+void Lighter::forget_photons() {
+  if (state_->photons) state_->photons->forget();
+}
+
 }  // namespace hpr

@@ -131,6 +131,9 @@ class Lighter {
   /// them itself; pictures are the same.
   void send_photons(Communicator& comm, const SampleNumber& number = {});
 
+  /// What the last sample left behind is made anew, so that the same sample once more takes as long as the first time.
+  void forget_photons();
+
   /// Lights the pixels of `tiles` (indices into the layout of `keys`; screen i of it is seen by views[i], of equal
   /// size) and makes them active in all layers of `output`, whose other tiles stay as they are. The background stands
   /// where a key is 0. Values are finite.

@@ -26,9 +26,12 @@ class PhotonSender {
   PhotonSender(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& rays,
                const LightSet& lights, const RaySettings& settings);
 
-  /// The maps of a sample; kept until another sample is asked for. With a communicator, collective: its ranks share the
-  /// work, and each gets all photons.
+  /// The maps of a sample; kept until another sample is asked for, or forget(). With a communicator, collective: its
+  /// ranks share the work, and each gets all photons.
   const PhotonMaps& send(const SampleNumber& number, Communicator* comm);
+
+  /// The next maps are made anew, with the radii of before.
+  void forget() { sent_.reset(); }
 
   /// Of this rank, since the last call.
   [[nodiscard]] PhotonCounts take_counts();

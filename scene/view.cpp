@@ -94,7 +94,7 @@ View make_view(const Camera& camera, Size size, const Bounds& bounds) {
     view.near_distance = near_plane(lens->near_distance, bounds);
   } else {
     const auto& box = std::get<OrthographicLens>(camera.lens);
-    half_height = box.half_height;
+    half_height = std::max(box.half_height, box.half_width / aspect);
     view.orthographic = true;
     view.near_distance = box.near_distance;
     view.far_distance = box.far_distance;

@@ -204,5 +204,17 @@ TEST(FramingCamera, SeesAllOfTheBounds) {
   }
 }
 
+TEST(MakeView, AnOrthographicCameraShowsItsBoxInPicturesOfAnyShape) {
+  Camera camera;
+  camera.lens = OrthographicLens{2.0, 1.0, 0.1, 10.0};
+  for (const Size size : {Size{64, 64}, Size{128, 64}, Size{256, 64}}) {
+    const View view = make_view(camera, size, {});
+    EXPECT_GE(view.right, 2.0) << size.width;
+    EXPECT_GE(view.top, 1.0) << size.width;
+    EXPECT_TRUE(view.right == 2.0 || view.top == 1.0) << size.width;
+    EXPECT_DOUBLE_EQ(view.right / view.top, static_cast<double>(size.width) / size.height);
+  }
+}
+
 }  // namespace
 }  // namespace hpr

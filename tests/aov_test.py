@@ -102,6 +102,12 @@ def main():
             check(one[name].tobytes() == three[name].tobytes(), f"{name} has other bits with three ranks")
         check(one["R"].tobytes() != pictures["one sample"]["R"].tobytes(), "four samples are one")
 
+        for samples in (2, 7):
+            render(folder, "-o", f"of{samples}.exr", "--spp", str(samples), "--aov", "depth,id,normal")
+        first, more = (exr.read(folder / f"of{samples}.exr")[2] for samples in (2, 7))
+        for name in ("depth.Z", "id.X", "normal.X"):
+            check(first[name].tobytes() == more[name].tobytes(), f"{name} is not of the first sample")
+
         render(folder, "-o", "b.exr")
         check(exr.read(folder / "b.exr")[2]["G"].tobytes() == pictures["one sample"]["G"].tobytes(),
               "asking for layers changes the picture")

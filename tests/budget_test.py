@@ -159,17 +159,21 @@ def target(folder):
     for ranks in ("1", "3"):
         frames = frames_of(folder, *walk, "--ranks", ranks, "--target-ms", "0.5", "--stats", "b.json")
         last = frames[-1]["budget"]
-        check(all(set(f["budget"]) == {"target_ms", "resolution_scale", "samples", "given_up"} for f in frames),
+        check(all(set(f["budget"]) == {"target_ms", "resolution_scale", "samples", "given_up", "resting"} for f in frames),
               f"a frame's budget has other keys: {last}")
         check(last["given_up"][:1] == ["half-resolution"] and last["given_up"][-1] == "resolution"
               and last["resolution_scale"] < 1 and last["target_ms"] == 0.5, f"0.5 ms give up no more than {last}")
         check(json.loads((folder / "b.json").read_text())["budget"] == last, "--stats tell another budget")
+    said = hpr(folder, "wall", "run", "1x1@64x48", "gen:cornell", "-o", "told", *walk, "--target-ms", "0.5").stderr
+    took = sorted(f["ms"] for f in json.loads((folder / "told" / "manifest.json").read_text())["frames"])
+    check(f"95 % up to {took[-1]:.1f} ms" in said, f"the slowest of 12 is {took[-1]:.1f} ms, and it says {said}")
     frames = frames_of(folder, *walk, "--target-ms", "1e6")
     check(frames[-1]["budget"]["given_up"] == [], f"with all the time: {frames[-1]['budget']}")
     check("budget" not in frames_of(folder, *walk)[0], "a budget nobody asked for")
 
     still = frames_of(folder, "--frames", "6", "--target-ms", "0.5", "--spp", "4")
     check([f["budget"]["samples"] for f in still[1:]] == [1, 2, 3, 4, 4], f"at rest: {[f['budget'] for f in still]}")
+    check([f["budget"]["resting"] for f in still] == [False] + 5 * [True], f"rest: {[f['budget'] for f in still]}")
     check(all(f["budget"]["given_up"] == [] and f["budget"]["resolution_scale"] == 1 for f in still[1:]),
           "something is given up at rest")
     check(hashes(still[4]) == hashes(still[5]) == hashes(frames_of(folder, "--frames", "2", "--spp", "4")[1]),

@@ -123,12 +123,13 @@ def refusals(folder, state):
 
 def enough_samples(folder):
     """A checkpoint that has all that is asked for."""
-    code, message, _ = interrupt(folder, signal.SIGUSR1, itself, "-o", "e.exr", "--spp", "1000000")
+    layers = ["--aov", "depth,id"]
+    code, message, _ = interrupt(folder, signal.SIGUSR1, itself, "-o", "e.exr", "--spp", "1000000", *layers)
     check(code == 75, f"a million samples: left with {code}")
     stopped_at = samples_in(message)
-    result = run(folder, "-o", "e.exr", "--spp", str(stopped_at), "--resume")
+    result = run(folder, "-o", "e.exr", "--spp", str(stopped_at), "--resume", *layers)
     check(result.returncode == 0, f"resuming at the goal: left with {result.returncode}: {result.stderr[-800:]}")
-    result = run(folder, "-o", "f.exr", "--spp", str(stopped_at), "--ranks", "2")
+    result = run(folder, "-o", "f.exr", "--spp", str(stopped_at), "--ranks", "2", *layers)
     check((folder / "e.exr").read_bytes() == (folder / "f.exr").read_bytes(), "a checkpoint at its goal gives other bits")
 
 

@@ -162,6 +162,9 @@ def main():
                   "--strategy", "radix-k:2"], [2], ["radix-k:2", "3"])
     expect_error("negative seed", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--seed", "-1"], [2], ["-1"])
     expect_error("two results in one file", [*dense, "--ranks", "1", "-o", "k.png", "--raw", "./k.png"], [2], ["two results"])
+    expect_error("a scene's file of another kind", ["scene", "make", "cornell", "-o", "c.gltf"], [2], [".glb"])
+    expect_error("an empty list of passes", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--passes", ""], [2], ["none"])
+    expect_error("tiles that do not fit", ["bench", "rays", "gen:cornell", "--side", "127"], [2], ["--side 64"])
     expect_error("options of displays elsewhere", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--codec", "raw"],
                  [2], ["--display remote"])
     expect_error("a --set nobody acts on", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--set",

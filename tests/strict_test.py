@@ -99,6 +99,17 @@ def main():
         replaced(folder, "environment", ["good.gltf", "--environment", "sky.exr"],
                  "2 values are no finite numbers, the first in pixel 2,1")
 
+        # Light past what floats hold, of a point of a sweep.
+        (folder / "far.exr").write_bytes(exr(4, 3, [[(3.4e38, 3.4e38, 3.4e38)] * 4] * 3))
+        hpr(folder, "good.gltf", "-o", "truth.png")
+        for strict, code in (([], 0), (["--strict"], 1)):
+            swept = subprocess.run([HPR, "tradeoff", "gen:tetra", "--environment", "far.exr", "--filter", "mitchell", "--vary", "spp=16",
+                                    "--reference", "truth.png", "--frames", "1", "--size", "100x70", "--json", *strict], cwd=folder,
+                                   capture_output=True, text=True, timeout=120, check=False,
+                                   env={**os.environ, "HPR_CACHE": str(folder / "cache")})
+            check(swept.returncode == code, f"a sweep past floats {strict}: {swept.returncode}: {swept.stderr}")
+            check(json.loads(swept.stdout)["points"][0]["not_finite"] > 0, "a sweep past floats counts none")
+
         # What would be brighter than a float can be is taken as 1e12 by the loader, so the picture stays finite, strict or not.
         (folder / "bright.gltf").write_text(json.dumps(quad((0, 0, 1), 3.4e38)))
         found = []

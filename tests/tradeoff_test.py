@@ -11,6 +11,7 @@ import json
 import math
 import os
 import pathlib
+import shlex
 import signal
 import subprocess
 import sys
@@ -129,6 +130,42 @@ def going_on(folder):
     check(not states[0].exists(), "a finished sweep leaves its points behind")
 
 
+def photons_cost_in_every_point(folder):
+    report = sweep(folder, "--passes", "shadow,photon", "--vary", "spp=1,2", "--vary", "photons=20000", "--reference", "path")
+    one, two = (point["rays"]["photon"] for point in report["points"])
+    check(one > 10000 and abs(two / one - 2.0) < 0.1, f"one sample sends {one} photons, two {two}")
+
+
+def commands_can_be_run(folder):
+    """Whatever stands where on the line; words that a shell would take apart are quoted."""
+    hpr(folder, "scene", "make", "cornell", "-o", "my scene.glb")
+    report = json.loads(hpr(folder, "tradeoff", "--json", "--spp", "4", "my scene.glb", "--size", "32x32", "--passes", "shadow", "--vary", "spp=2,3",
+                            "--vary", "no-terminator-fix=true", "--reference-spp", "16", "--frames", "1", "--no-terminator-fix",
+                            "--budget", "3600s").stdout)
+    words = shlex.split(report["best_under_budget"]["command"])
+    check(words[:3] == ["hpr", "render", "my scene.glb"] and words.count("my scene.glb") == 1, f"the command is {words}")
+    check("shadow" in words and "--spp" not in words, f"the command is {words}")
+    hpr(folder, *words[1:])
+
+
+def nothing_is_lost_with_the_output(folder):
+    arguments = ["tradeoff", "gen:cornell", "--size", "32x32", "--reference-spp", "16", "--vary", "spp=7,8", "--frames", "1", "--metric", "relmse"]
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        result = subprocess.run([HPR, *arguments], cwd=folder, stdout=full, stderr=subprocess.PIPE, text=True, timeout=300, check=False,
+                                env={**os.environ, "HPR_CACHE": str(folder / "cache")})
+    check(result.returncode == 4, f"a full disk: left with {result.returncode}")
+    kept = list((folder / "cache").glob("tradeoff-*.json"))
+    check(len(kept) == 1, f"a full disk: {len(kept)} sweeps are kept")
+    said = hpr(folder, *arguments, "--resume", "--progress", "line").stderr
+    check("anew" not in said, "what is kept is measured again")
+    check("anew" in hpr(folder, *arguments, "--resume").stderr, "begins anew without a word")
+
+
+def a_truth_may_have_layers(folder):
+    hpr(folder, "render", "gen:tetra", "-o", "layers.exr", "--aov", "depth", "--size", "32x32", "--spp", "2")
+    hpr(folder, "tradeoff", "gen:tetra", "--size", "32x32", "--vary", "spp=1", "--reference", "layers.exr", "--frames", "1")
+
+
 def refusals(folder):
     hpr(folder, "tradeoff", "gen:cornell", code=2)
     for wrong in ("ssp=1", "spp", "spp=0", "spp=1,1", "photons=many", "passes=shaddow"):
@@ -140,6 +177,7 @@ def refusals(folder):
 
 
 with tempfile.TemporaryDirectory() as scratch:
-    for part in (knobs, errors_are_those_of_diff, front_and_budgets, ranks_agree, going_on, refusals):
+    for part in (knobs, errors_are_those_of_diff, front_and_budgets, ranks_agree, going_on, photons_cost_in_every_point,
+                 commands_can_be_run, nothing_is_lost_with_the_output, a_truth_may_have_layers, refusals):
         part(pathlib.Path(scratch))
 sys.exit(1 if failures else 0)

@@ -34,7 +34,8 @@ Json json_of(const FrameRecord& frame) {
     record["budget"] = Json{{"target_ms", frame.budget->target_ms},
                             {"resolution_scale", frame.budget->resolution_scale},
                             {"samples", frame.budget->samples},
-                            {"given_up", frame.budget->given_up}};
+                            {"given_up", frame.budget->given_up},
+                            {"resting", frame.budget->resting}};
   }
   // Apart from the screens: those are the same from run to run.
   for (const ScreenRecord& screen : frame.screens) {

@@ -43,6 +43,7 @@ struct BudgetRecord {
   double resolution_scale = 1.0;      ///< of the screens' pixels a side
   std::uint32_t samples = 1;          ///< of the picture shown
   std::vector<std::string> given_up;  ///< in the order in which it is
+  bool resting = false;               ///< it added to a picture seen from one place, and has no target
 };
 
 /// How the displays outside the job showed a frame.
