@@ -75,7 +75,11 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
     scattered = shared_scattering(point, light);
   }
   const double cosine = std::abs(glm::dot(point.material.normal, light.to_light));
-  const glm::dvec3 radiance = point.throughput * scattered * light.weight * cosine;
+  glm::dvec3 radiance = point.throughput * scattered * light.weight * cosine;
+  // The headlight is wherever it is asked for.
+  if (light.casts_shadows) {
+    radiance *= left_of_light(point.media, point.surface, point.material, light.to_light, light.distance);
+  }
   if (radiance == glm::dvec3(0.0)) return;
   wave_.samples.push_back({index, 1.0F, light, radiance});
 }

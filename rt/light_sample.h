@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 
+#include "rt/medium.h"
+
 namespace hpr {
 
 /// Light that would fall on a place if nothing stood between.
@@ -23,6 +25,7 @@ struct PhotonStart {
   glm::dvec3 flux{0.0};                 ///< of one photon of one: divide by how many are sent
   std::uint32_t surface = 0xFFFFFFFFU;  ///< that emits it, if any
   double offset = 0.0;                  ///< metres to leave the emitting surface by
+  Media media = {};                     ///< what it starts in
 };
 
 }  // namespace hpr

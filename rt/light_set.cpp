@@ -64,6 +64,21 @@ LightSet::LightSet(const Scene& scene)
   all_ = make_choices(true);
   if (listed_ > 0) sampled_ = make_choices(false);
   sum_powers();
+  find_media(scene);
+}
+
+/// A light lies in one place; a mesh that emits, where its first triangle does.
+void LightSet::find_media(const Scene& scene) {
+  const MediumFinder finder(scene);
+  if (!finder.absorbs()) return;
+  for (const Light& light : punctual_) {
+    media_.push_back(stands_somewhere(light) ? finder.at(light.position) : Media{});
+  }
+  for (std::size_t i = 0; i < triangles_.size(); ++i) {
+    const TriangleLight& triangle = triangles_[i];
+    const bool same = i > 0 && triangles_[i - 1].instance == triangle.instance;
+    media_.push_back(same ? Media(media_.back()) : finder.at(triangle.v0 + (triangle.e1 + triangle.e2) / 3.0));
+  }
 }
 
 LightSet::Choices LightSet::make_choices(bool punctual) const {
@@ -262,6 +277,7 @@ std::optional<PhotonStart> LightSet::emit(double u_choice, const glm::dvec2& u_p
         emit_from_outside(lit_, -from, seen.pdf > 0.0 ? seen.radiance * (disc / seen.pdf) : glm::dvec3(0.0), u_place);
   }
   start.flux /= picked.probability;
+  if (picked.index < media_.size()) start.media = media_[picked.index];
   return start;
 }
 

@@ -95,6 +95,7 @@ class LightSet {
   [[nodiscard]] const Choices& one() const { return listed_ > 0 ? sampled_ : all_; }
   [[nodiscard]] Choices make_choices(bool punctual) const;
   void sum_powers();
+  void find_media(const Scene& scene);
   [[nodiscard]] double outside_share(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal) const;
   [[nodiscard]] std::optional<Chosen> choose(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
                                              double u) const;
@@ -116,7 +117,8 @@ class LightSet {
   std::optional<EnvironmentMap> environment_;
   std::size_t listed_ = 0;
   Choices all_;
-  Choices sampled_;  ///< without the listed ones; empty when none is listed
+  Choices sampled_;           ///< without the listed ones; empty when none is listed
+  std::vector<Media> media_;  ///< of every light but the environment; none where no solid absorbs
   std::vector<double> power_sums_;
   double power_ = 0.0;
 };

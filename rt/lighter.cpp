@@ -64,6 +64,7 @@ struct Lighter::State {
   RaySpace space;
   Surfaces surfaces;
   LightSet lights;
+  MediumFinder media;
   std::vector<std::unique_ptr<Pass>> passes;  ///< those that run
   std::uint8_t shared = 0;                    ///< components, see SharedLight
   std::array<bool, kLobes.size()> followed_lobes{};
@@ -96,7 +97,7 @@ struct Lighter::State {
 };
 
 Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source)
-    : scene(lit), settings(std::move(chosen)), space(lit.bounds), surfaces(lit, space), lights(lit) {
+    : scene(lit), settings(std::move(chosen)), space(lit.bounds), surfaces(lit, space), lights(lit), media(lit) {
   shared = shared_components(settings);
   const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
@@ -290,12 +291,15 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
     return;
   }
   const PhotonMaps* const photons = state.send_photons(number, nullptr);
+  std::vector<Media> eyes;
+  for (const View& view : views) eyes.push_back(state.media.of_eye(view));
   parallel_for(state.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);
     set_active(output, tile);
     std::unique_ptr<Scratch> scratch = state.take_scratch();
     scratch->work.view = &views[place.screen];
+    scratch->work.eye_media = eyes[place.screen];
     scratch->work.photons = photons;
     state.light_tile(*scratch, {place.pixels, number, keys.tile(tile)}, tile, output);
     const std::lock_guard lock(state.mutex);

@@ -43,20 +43,20 @@ glm::dvec3 mapped_normal(const Scene& scene, const Material& material, const Sur
   return mapped / length;
 }
 
-/// KHR_materials_volume: after `attenuation_distance` the attenuation colour is left.
+}  // namespace
+
 glm::dvec3 absorption_of(const Material& material) {
+  glm::dvec3 absorption(0.0);
+  if (!std::isfinite(material.attenuation_distance)) return absorption;
   // What hides all but 1e-30 of the light hides all of it; held finite, so that no distance makes it NaN.
   constexpr double kLeastLeft = 1e-30;
   constexpr double kMost = 1e30;
-  glm::dvec3 absorption(0.0);
   for (int c = 0; c < 3; ++c) {
     const double left = std::clamp(static_cast<double>(material.attenuation_color[c]), kLeastLeft, 1.0);
     absorption[c] = std::min(-std::log(left) / static_cast<double>(material.attenuation_distance), kMost);
   }
   return absorption;
 }
-
-}  // namespace
 
 MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface) {
   const Material& material = scene.materials[surface.material];
@@ -99,7 +99,7 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   }
   point.transmission = std::clamp(transmission, 0.0, 1.0);
   point.solid = material.thickness > 0.0F;
-  if (point.solid && std::isfinite(material.attenuation_distance)) point.absorption = absorption_of(material);
+  if (point.solid) point.absorption = absorption_of(material);
   return point;
 }
 

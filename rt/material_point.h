@@ -28,6 +28,9 @@ struct MaterialPoint {
 /// The material with its textures read at the surface's coordinates, vertex colours and normal map applied.
 [[nodiscard]] MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface);
 
+/// 1/m, finite: KHR_materials_volume's, by which `attenuation_distance` metres leave the attenuation colour.
+[[nodiscard]] glm::dvec3 absorption_of(const Material& material);
+
 /// Coverage alone, for rays that may pass: cheaper than evaluate_material. `uv` and `color_alpha` of the place.
 [[nodiscard]] double evaluate_alpha(const Scene& scene, const Material& material, const std::array<glm::vec2, 2>& uv,
                                     double color_alpha);

@@ -11,6 +11,7 @@
 #include "rt/bsdf.h"
 #include "rt/light_set.h"
 #include "rt/lighter.h"
+#include "rt/medium.h"
 #include "rt/ray_walk.h"
 #include "rt/sampler.h"
 #include "rt/surfaces.h"
@@ -23,7 +24,7 @@ struct PathPoint {
   MaterialPoint material;
   Bsdf bsdf;
   glm::dvec3 throughput{1.0};   ///< what of its radiance reaches the pixel
-  glm::dvec3 medium{0.0};       ///< 1/m: absorption on the viewer's side
+  Media media;                  ///< on the viewer's side
   glm::dvec3 seen_from{0.0};    ///< the place before, where lights were sampled
   glm::dvec3 seen_normal{0.0};  ///< and its normal
   double seen_pdf = 0.0;        ///< density with which the way here was chosen; 0: it was the only one
@@ -31,6 +32,7 @@ struct PathPoint {
   std::array<float, kLobes.size()> follows{};
   std::array<bool, kLobes.size()> may_follow{};  ///< whether one might have
   Sampler sampler;
+  double share = 1.0;                       ///< of the pixel that the first surface of the path covers
   std::uint32_t pixel = 0;                  ///< of the tile
   std::uint16_t depth = 0;                  ///< bounces from the eye
   Component component = Component::Direct;  ///< where its light counts
@@ -67,6 +69,7 @@ struct TileWork {
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
   const PhotonMaps* photons = nullptr;               ///< null when none were sent
   const View* view = nullptr;                        ///< of the tile at hand
+  Media eye_media = {};                              ///< what the eye of that view lies in
   bool wants_components = false;
   bool wants_cost = false;
 
@@ -132,9 +135,9 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 /// The component that light from a followed lobe of `point` counts in.
 [[nodiscard]] Component component_after(const PathPoint& point, Component first);
 
-/// Completes a point whose surface, throughput, sampler, depth and medium are set: reads its material and decides which
-/// lobes are followed.
-void finish_point(const TileWork& tile, PathPoint& point);
+/// Completes a point whose surface, throughput, sampler, depth and media are set: reads its material, takes off what
+/// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
+void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
 
 /// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach.
 void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -25,16 +24,9 @@ struct Following {
   glm::dvec3 direction{0.0};
   glm::dvec3 throughput{0.0};
   double pdf = 0.0;
-  glm::dvec3 medium{0.0};
+  Media media;
   Sampler sampler;
 };
-
-/// What absorbs light on the side of `point` that `direction` leads to.
-glm::dvec3 medium_towards(const PathPoint& point, const glm::dvec3& direction) {
-  if (!point.material.solid) return point.medium;
-  const bool viewers_side = glm::dot(direction, point.surface.geometric_normal) > 0.0;
-  return viewers_side == point.surface.inside ? point.material.absorption : glm::dvec3(0.0);
-}
 
 }  // namespace
 
@@ -42,8 +34,9 @@ Component component_after(const PathPoint& point, Component first) {
   return point.depth == 0 ? first : point.component;
 }
 
-void finish_point(const TileWork& tile, PathPoint& point) {
+void finish_point(const TileWork& tile, PathPoint& point, double metres) {
   point.material = evaluate_material(tile.scene, point.surface);
+  if (metres > 0.0) point.throughput *= left_at(point.media, point.surface, point.material, metres);
   point.bsdf = Bsdf(point.material, point.surface);
   if (point.depth >= tile.settings.max_depth) return;
   std::array<double, kLobes.size()> bright{};
@@ -76,8 +69,8 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     if (!sample) continue;
     const glm::dvec3 throughput = factor * point.throughput * sample->weight;
     if (brightness(throughput) < kLeastThroughput) continue;
-    rays.push_back(
-        {&point, sample->direction, throughput, sample->pdf, medium_towards(point, sample->direction), sampler});
+    rays.push_back({&point, sample->direction, throughput, sample->pdf,
+                    media_towards(point.media, point.surface, point.material, sample->direction), sampler});
   }
   tile.requests.clear();
   for (Following& ray : rays) {
@@ -103,10 +96,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     PathPoint& reached = next.emplace_back();
     reached.surface = *hits[i];
     reached.throughput = ray.throughput;
-    if (ray.medium != glm::dvec3(0.0)) {
-      reached.throughput *= glm::exp(-ray.medium * glm::distance(reached.surface.position, place));
-    }
-    reached.medium = ray.medium;
+    reached.media = ray.media;
     reached.seen_from = place;
     reached.seen_normal = ray.from->bsdf.light_normal();
     reached.seen_pdf = ray.pdf;
@@ -114,7 +104,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     reached.pixel = ray.from->pixel;
     reached.depth = static_cast<std::uint16_t>(ray.from->depth + 1);
     reached.component = part;
-    finish_point(tile, reached);
+    finish_point(tile, reached, glm::distance(reached.surface.position, place));
   }
 }
 

@@ -23,8 +23,9 @@ bool has_coverage(const Scene& scene) {
   return std::ranges::any_of(scene.materials, [](const Material& m) { return m.alpha_mode != AlphaMode::Opaque; });
 }
 
-/// The path of one pixel, at the eye. The near plane cuts as it does in rasterised pictures.
-Path path_from_eye(const View& view, const PathSettings& settings, int x, int y, const SampleNumber& number) {
+/// The path of one pixel, at the eye, which lies in `media`. The near plane cuts as it does in rasterised pictures.
+Path path_from_eye(const View& view, const Media& media, const PathSettings& settings, int x, int y,
+                   const SampleNumber& number) {
   Path path;
   path.sampler =
       Sampler(pixel_stream({settings.seed, number.frame}, view.screen_number, view.block.x0 + x, view.block.y0 + y),
@@ -33,6 +34,8 @@ Path path_from_eye(const View& view, const PathSettings& settings, int x, int y,
   const Ray ray = view_ray(view, x + place.x, y + place.y);
   path.origin = ray.origin + view.near_distance * ray.direction;
   path.direction = glm::normalize(ray.direction);
+  path.media = media;
+  path.travelled = glm::distance(ray.origin, path.origin);
   path.reach = view.orthographic ? view.far_distance - view.near_distance : std::numeric_limits<double>::infinity();
   return path;
 }
@@ -62,16 +65,17 @@ PathCounts& PathCounts::operator+=(const PathCounts& other) {
 }
 
 struct PathTracer::State {
-  explicit State(PathScene scene) : shared(std::move(scene)) {}
+  explicit State(PathScene scene) : shared(std::move(scene)), media(shared.scene) {}
 
   PathScene shared;
+  MediumFinder media;
   std::vector<std::unique_ptr<PathWave>> idle;  ///< kept from tile to tile: fresh pages cost time
   std::mutex mutex;
   PathCounts counts;
 
   std::unique_ptr<PathWave> take_wave();
-  void trace_tile(PathWave& wave, const View& view, const TilePlace& place, const SampleNumber& number,
-                  std::span<Rgb> pixels) const;
+  void trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
+                  const SampleNumber& number, std::span<Rgb> pixels) const;
 };
 
 std::unique_ptr<PathWave> PathTracer::State::take_wave() {
@@ -86,8 +90,8 @@ std::unique_ptr<PathWave> PathTracer::State::take_wave() {
   return std::make_unique<PathWave>(shared);
 }
 
-void PathTracer::State::trace_tile(PathWave& wave, const View& view, const TilePlace& place, const SampleNumber& number,
-                                   std::span<Rgb> pixels) const {
+void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
+                                   const SampleNumber& number, std::span<Rgb> pixels) const {
   const DenormalsAsZero mode;
   std::ranges::fill(pixels, Rgb{});
   const Rect& rect = place.pixels;
@@ -96,7 +100,7 @@ void PathTracer::State::trace_tile(PathWave& wave, const View& view, const TileP
     wave.start(view, static_cast<std::size_t>(bottom - top) * kTileSide);
     for (int y = top; y < bottom; ++y) {
       for (int x = rect.x0; x < rect.x1; ++x) {
-        Path path = path_from_eye(view, shared.settings, x, y, number);
+        Path path = path_from_eye(view, eye, shared.settings, x, y, number);
         path.pixel = static_cast<std::uint32_t>((y - top) * kTileSide + x - rect.x0);
         wave.add(path);
       }
@@ -136,12 +140,14 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
   for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
 
   State& state = *state_;
+  std::vector<Media> eyes;
+  for (const View& view : views) eyes.push_back(state.media.of_eye(view));
   parallel_for(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);
     radiance.set_active(tile);
     std::unique_ptr<PathWave> wave = state.take_wave();
-    state.trace_tile(*wave, views[place.screen], place, number, radiance.tile(tile));
+    state.trace_tile(*wave, views[place.screen], eyes[place.screen], place, number, radiance.tile(tile));
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(wave));
   });

@@ -22,10 +22,6 @@ double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
 }
 
-glm::dvec3 absorbed(const glm::dvec3& absorption, double metres) {
-  return glm::exp(-absorption * metres);
-}
-
 /// By how much radiance is squeezed (or, on its way out, stretched) where it is refracted.
 double squeeze_of(const MaterialPoint& material, const SurfacePoint& point) {
   if (!material.solid || !(material.ior > 0.0)) return 1.0;
@@ -155,7 +151,8 @@ void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
     }
   }
   const MaterialPoint material = evaluate_material(shared_.scene, point);
-  if (point.inside && material.solid) path.throughput *= absorbed(material.absorption, path.travelled);
+  path.throughput *= path.segments == 1 ? left_after(path.media.here, path.travelled)
+                                        : left_at(path.media, point, material, path.travelled);
   if (material.emission != glm::dvec3(0.0)) add_emission(path, point, surface, material.emission);
   if (material.unlit) return;
   if (path.segments >= shared_.settings.max_depth) {
@@ -200,6 +197,7 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
   }
   if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
   if (!survives(path)) return;
+  path.media = media_towards(path.media, point, material, sample->direction);
   path.origin = ray_origin(point, sample->direction);
   path.direction = sample->direction;
   path.reach = std::numeric_limits<double>::infinity();
@@ -223,11 +221,12 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   if (scattered.value == glm::dvec3(0.0)) return;
   double weight = std::abs(glm::dot(material.normal, light->to_light));
   if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);
-  const glm::dvec3 radiance = path.throughput * scattered.value * light->weight * weight;
+  glm::dvec3 radiance = path.throughput * scattered.value * light->weight * weight;
   if (!light->casts_shadows) {
     radiance_[path.pixel] += radiance;
     return;
   }
+  radiance *= left_of_light(path.media, point, material, light->to_light, light->distance);
 
   ShadowRay& ray = shadows_.emplace_back();
   ray.pixel = path.pixel;

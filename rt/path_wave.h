@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rt/bsdf.h"
+#include "rt/medium.h"
 #include "rt/path_tracer.h"
 #include "rt/surfaces.h"
 
@@ -33,6 +34,7 @@ struct Path {
   double squeeze = 1.0;    ///< the part of throughput that is radiance squeezed by refraction, not energy lost
   double travelled = 0.0;  ///< metres since then, if it passed surfaces by chance
   double reach = 0.0;      ///< metres
+  Media media;             ///< that the ray goes through
   Sampler sampler;
   std::uint32_t pixel = 0;
   int segments = 1;  ///< including the one ahead

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
@@ -82,6 +81,7 @@ struct PhotonTracer::Flight {
   glm::dvec3 origin{0.0};  ///< ray space: off that surface
   glm::dvec3 direction{0.0};
   glm::dvec3 flux{0.0};
+  Media media;               ///< that it flies through
   double travelled = 0.0;    ///< metres from where it was scattered last to `place`
   std::uint32_t photon = 0;  ///< of the block
   int bounces = 0;
@@ -151,6 +151,7 @@ void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double 
     if (!carries_light(flight.flux)) continue;
     flight.place = begin->origin;
     flight.direction = begin->direction;
+    flight.media = begin->media;
     glm::dvec3 origin = begin->origin;
     if (begin->surface != kNoSurface) {
       surfaces_.load(begin->surface, block.triangle);
@@ -195,7 +196,7 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& bl
     ++block.traced.counts.lost;
     return false;
   }
-  if (surface.inside && material.solid) flight.flux *= glm::exp(-material.absorption * flight.travelled);
+  flight.flux *= left_at(flight.media, surface, material, flight.travelled);
   if (!carries_light(flight.flux)) return false;
 
   const Bsdf bsdf(material, surface, Carried::Flux);
@@ -239,6 +240,7 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   flight.flux *= sample->weight * (whole / chances[chosen] * adjoint(surface, material.normal, sample->direction));
   if (!carries_light(flight.flux)) return false;
   flight.followed = flight.followed && follows;
+  flight.media = media_towards(flight.media, surface, material, sample->direction);
   flight.direction = sample->direction;
   flight.place = surface.position;
   flight.travelled = 0.0;

@@ -64,7 +64,7 @@ void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t index,
     const auto pixels = layer->tile(index);
     for (const PathPoint& point : points) {
       const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
-      const Rgb part = to_rgb(point.throughput * value);
+      const Rgb part = to_rgb(point.share * value);
       Rgb& sum = pixels[point.pixel];
       sum = {sum.r + part.r, sum.g + part.g, sum.b + part.b};
     }
