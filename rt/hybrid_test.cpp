@@ -44,8 +44,7 @@ Scene room(const Material& thing, bool is_sheet) {
   return scene;
 }
 
-glm::dvec3 mean_of(const Scene& scene, const RaySettings& settings, std::uint32_t samples) {
-  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples) {
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
   Lighter lighter(scene, settings);
   glm::dvec3 sum(0.0);
@@ -63,8 +62,9 @@ glm::dvec3 mean_of(const Scene& scene, const RaySettings& settings, std::uint32_
 }
 
 void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3) {
-  const glm::dvec3 reference = mean_of(scene, {.max_depth = 64, .terminator_fix = false, .reference = true}, 512);
-  const glm::dvec3 hybrid = mean_of(scene,
+  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+  const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 512);
+  const glm::dvec3 hybrid = mean_of(scene, view,
                                     {.max_depth = 24,
                                      .glossy_cutoff = glossy_cutoff,
                                      .photons = 20'000,
@@ -102,6 +102,38 @@ TEST(Hybrid, ARoughMetalBallThatRaysFollowAsSettingsSay) {
 
 TEST(Hybrid, AGlassBall) {
   expect_the_same_light(room(test::clear_glass(1.5F, 1.0F), false));
+}
+
+/// Mostly coloured by its base, and light goes through and through it.
+Material half_glass(float roughness) {
+  Material material = test::clear_glass(1.5F, 1.0F);
+  material.transmission = 0.5F;
+  material.base_color = glm::vec4(0.9F, 0.9F, 0.9F, 1.0F);
+  material.roughness = roughness;
+  return material;
+}
+
+TEST(Hybrid, ABallOfHalfGlass) {
+  expect_the_same_light(room(half_glass(0.0F), false));
+}
+
+TEST(Hybrid, ABallOfHalfGlassInAFurnaceGivesBackNoMoreThanArrives) {
+  for (const float roughness : {0.0F, 0.4F}) {
+    Scene scene;
+    place(scene, add_mesh(scene, test::sphere(1.0, 32, add_material(scene, half_glass(roughness)))));
+    scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
+    finish_scene(scene);
+    const View view = test::view_from({0, 0, 4}, {0, 0, 0}, {16, 16}, scene, 0.45);
+    const glm::dvec3 reference =
+        mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 64);
+    const RaySettings best{.max_depth = 24, .photons = 20'000, .global_photons = true, .terminator_fix = false};
+    const glm::dvec3 hybrid = mean_of(scene, view, best, 16);
+    for (const glm::dvec3& light : {reference, hybrid}) {
+      EXPECT_LE(light.g, 1.0) << roughness;
+      EXPECT_GT(light.g, 0.6) << roughness;
+    }
+    EXPECT_NEAR(hybrid.g / reference.g, 1.0, 0.025) << roughness;
+  }
 }
 
 TEST(Hybrid, AClearSheet) {
