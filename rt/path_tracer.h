@@ -47,6 +47,7 @@ struct PathCounts {
   std::uint64_t transmission = 0;
   std::uint64_t shadow = 0;
   std::uint64_t invalid = 0;     ///< of those above, rays Embree could not bear: they missed
+  std::uint64_t cut = 0;         ///< rays that ended among surfaces of partial coverage, see kMostPassed
   std::uint64_t too_long = 0;    ///< paths cut at max_depth
   std::uint64_t not_finite = 0;  ///< samples that were no finite number: they are black
   ScreenPixel first_not_finite;  ///< of those; else kNoPixel

@@ -5,11 +5,10 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "rt/ray_walk.h"
+
 namespace hpr {
 namespace {
-
-/// A path that passes more surfaces in a row than this is caught between coincident ones.
-constexpr int kMostPassed = 1000;
 
 /// The power heuristic with exponent 2: the weight of a direction found with density `own` where another technique has
 /// `other`. As a ratio, so that large densities do not overflow.
@@ -147,10 +146,16 @@ void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
   path.travelled += glm::distance(path.origin, point.position);
   const Material& look = shared_.scene.materials[point.material];
   if (look.alpha_mode != AlphaMode::Opaque) {
-    if (passes_by_chance(evaluate_alpha(shared_.scene, look, point.uv, point.color.a), path.sampler)) {
-      if (++path.passed > kMostPassed) return;
-      path.origin = ray_origin(point, path.direction);
-      next_[kind].push_back(path);
+    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    if (passes_by_chance(coverage, path.sampler)) {
+      const glm::dvec3 origin = ray_origin(point, path.direction);
+      const double gained = glm::dot(origin - path.origin, path.direction);
+      path.origin = origin;
+      if (passes_on(path.passed, coverage, gained)) {
+        next_[kind].push_back(path);
+      } else {
+        ++counts_.cut;
+      }
       return;
     }
   }
@@ -290,12 +295,18 @@ void PathWave::pass_covers() {
     shared_.surfaces.load(hits_[i], triangle_);
     const SurfacePoint point = shared_.surfaces.meet(triangle_, ray.origin, ray.direction);
     const Material& look = shared_.scene.materials[point.material];
-    ray.radiance *= 1.0 - evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
-    if (!(largest(ray.radiance) > 0.0) || ++ray.passed > kMostPassed) continue;
+    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    ray.radiance *= 1.0 - coverage;
+    if (!(largest(ray.radiance) > 0.0)) continue;
     const glm::dvec3 origin = ray_origin(point, ray.direction);
-    ray.reach = std::max(ray.reach - glm::dot(origin - ray.origin, ray.direction), 0.0);
+    const double gained = glm::dot(origin - ray.origin, ray.direction);
+    ray.reach = std::max(ray.reach - gained, 0.0);
     ray.origin = origin;
-    shadows_[left++] = ray;
+    if (passes_on(ray.passed, coverage, gained)) {
+      shadows_[left++] = ray;
+    } else {
+      ++counts_.cut;
+    }
   }
   shadows_.resize(left);
 }
