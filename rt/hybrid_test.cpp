@@ -63,7 +63,8 @@ glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& sett
 
 void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3) {
   const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
-  const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 512);
+  const glm::dvec3 reference = mean_of(
+      scene, view, {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = false, .reference = true}, 512);
   const glm::dvec3 hybrid = mean_of(scene, view,
                                     {.max_depth = 24,
                                      .glossy_cutoff = glossy_cutoff,
@@ -201,6 +202,67 @@ TEST(Hybrid, ABallBeforeASphereOfLightASpotAndASun) {
     light.inner_cone_radians = 0.3F;
     light.outer_cone_radians = 0.6F;
   }
+  expect_the_same_light(scene);
+}
+
+/// A wall of light that is none, behind a floor of some material. The lamp is far weaker.
+Scene beside_an_unlit_wall(const Material& floor) {
+  Scene scene;
+  place(scene, add_mesh(scene, quad({-2, -1, 0}, {4, 0, 0}, {0, 0, -2}, add_material(scene, floor))));
+  Material poster = test::matte({2.0F, 1.0F, 0.5F});
+  poster.unlit = true;
+  place(scene, add_mesh(scene, quad({-2, -1, -2}, {4, 0, 0}, {0, 3, 0}, add_material(scene, poster))));
+  Light& light = scene.lights.emplace_back();
+  light.position = {0.3, 0.8, -0.5};
+  light.intensity = glm::vec3(0.2F);
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Hybrid, AMatteFloorBesideAnUnlitWall) {
+  expect_the_same_light(beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F})));
+}
+
+TEST(Hybrid, WhatAnUnlitWallIsSaidToEmitIsNoLight) {
+  Scene scene = beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F}));
+  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+  for (const bool reference : {false, true}) {
+    const RaySettings settings{.photons = 1000, .global_photons = true, .reference = reference};
+    for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
+    const glm::dvec3 dark = mean_of(scene, view, settings, 4);
+    scene.materials[1].emissive = glm::vec3(5.0F);
+    EXPECT_EQ(mean_of(scene, view, settings, 4), dark) << reference;
+  }
+}
+
+TEST(Hybrid, AMirrorBesideAnUnlitWall) {
+  expect_the_same_light(beside_an_unlit_wall(test::mirror(0.9F)));
+}
+
+TEST(Hybrid, AMetalFloorBesideAnUnlitWall) {
+  for (const float roughness : {0.2F, 0.5F}) {
+    Material metal = test::mirror(0.9F);
+    metal.roughness = roughness;
+    expect_the_same_light(beside_an_unlit_wall(metal));
+  }
+  Material metal = test::mirror(0.9F);
+  metal.roughness = 0.5F;
+  expect_the_same_light(beside_an_unlit_wall(metal), 1.0);
+}
+
+TEST(Hybrid, APolishedFloorBesideAnUnlitWall) {
+  Material plastic = test::matte({0.8F, 0.8F, 0.8F});
+  plastic.ior = 1.5F;
+  plastic.roughness = 0.2F;
+  expect_the_same_light(beside_an_unlit_wall(plastic));
+}
+
+TEST(Hybrid, AFrostedSheetBeforeAnUnlitWall) {
+  Scene scene = beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F}));
+  Material sheet = test::clear_glass(1.5F, 0.0F);
+  sheet.roughness = 0.4F;
+  place(scene, add_mesh(scene, quad({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, add_material(scene, sheet))));
+  finish_scene(scene);
   expect_the_same_light(scene);
 }
 

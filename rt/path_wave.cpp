@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "rt/photon_gather.h"
 #include "rt/ray_walk.h"
 
 namespace hpr {
@@ -49,16 +50,25 @@ bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double squee
 }
 
 struct Scattered {
-  glm::dvec3 value{0.0};  ///< f, of all lobes with more than one direction
-  double pdf = 0.0;       ///< of choosing such a lobe, and in it this direction
+  glm::dvec3 value{0.0};     ///< f, of all lobes with more than one direction
+  glm::dvec3 followed{0.0};  ///< of those that the passes follow
+  double pdf = 0.0;          ///< of choosing such a lobe, and in it this direction
 };
 
-Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
+glm::dvec3 share_of(const glm::dvec3& part, const glm::dvec3& whole) {
+  glm::dvec3 share(0.0);
+  for (int c = 0; c < 3; ++c) share[c] = whole[c] > 0.0 ? part[c] / whole[c] : 0.0;
+  return share;
+}
+
+Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction,
+                   double glossy_cutoff) {
   Scattered scattered;
   const Scattering all = bsdf.scattering(direction);
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
     if (!(chances[i] > 0.0)) continue;
     scattered.value += all.value[i];
+    if (is_followed(bsdf, kLobes[i], glossy_cutoff)) scattered.followed += all.value[i];
     scattered.pdf += chances[i] * all.pdf[i];
   }
   return scattered;
@@ -161,8 +171,12 @@ void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
   }
   const MaterialPoint material = evaluate_material(shared_.scene, point);
   if (point.inside && material.solid) path.throughput *= absorbed(material.absorption, path.travelled);
+  if (material.unlit) {
+    // A colour to be looked at, not light: seen, mirrored and seen through glass, as the passes show it.
+    radiance_[path.pixel] += path.throughput * path.followed * material.emission;
+    return;
+  }
   if (material.emission != glm::dvec3(0.0)) add_emission(path, point, surface, material.emission);
-  if (material.unlit) return;
   if (path.segments >= shared_.settings.max_depth) {
     ++counts_.too_long;
     return;
@@ -197,10 +211,11 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
     path.throughput *= sample->weight / chances[chosen];
     path.pdf = 0.0;
   } else {
-    const Scattered scattered = evaluate(bsdf, chances, sample->direction);
+    const Scattered scattered = evaluate(bsdf, chances, sample->direction, shared_.settings.glossy_cutoff);
     if (!(scattered.pdf > 0.0)) return;
     const double cosine = std::abs(glm::dot(material.normal, sample->direction));
     path.throughput *= scattered.value * (cosine / scattered.pdf);
+    path.followed *= share_of(scattered.followed, scattered.value);
     path.pdf = scattered.pdf;
   }
   if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
@@ -224,7 +239,7 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   if (!light || light->weight == glm::dvec3(0.0)) return;
   const Technique technique = shared_.settings.technique;
   if (technique == Technique::Surfaces && light->pdf > 0.0) return;
-  const Scattered scattered = evaluate(bsdf, chances, light->to_light);
+  const Scattered scattered = evaluate(bsdf, chances, light->to_light, shared_.settings.glossy_cutoff);
   if (scattered.value == glm::dvec3(0.0)) return;
   double weight = std::abs(glm::dot(material.normal, light->to_light));
   if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);
