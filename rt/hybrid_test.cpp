@@ -61,16 +61,17 @@ glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& sett
   return sum / (256.0 * samples);
 }
 
-void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3) {
+void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool terminator_fix = false) {
   const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
   const glm::dvec3 reference = mean_of(
-      scene, view, {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = false, .reference = true}, 512);
+      scene, view,
+      {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = terminator_fix, .reference = true}, 512);
   const glm::dvec3 hybrid = mean_of(scene, view,
                                     {.max_depth = 24,
                                      .glossy_cutoff = glossy_cutoff,
                                      .photons = 20'000,
                                      .global_photons = true,
-                                     .terminator_fix = false},
+                                     .terminator_fix = terminator_fix},
                                     48);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
 }
@@ -157,6 +158,17 @@ TEST(Hybrid, AFrostedSheetBeforeAPointOfLight) {
   light.position = {0.1, -0.3, -0.5};
   light.intensity = glm::vec3(1.0F);
   expect_the_same_light(scene);
+}
+
+TEST(Hybrid, ACoarseShellOfFrostedGlassAboutALampWhoseShadowRaysAreLifted) {
+  Scene scene;
+  Material frosted = test::clear_glass(1.5F, 0.0F);
+  frosted.roughness = 0.6F;
+  place(scene, add_mesh(scene, test::sphere(0.6, 6, add_material(scene, frosted))),
+        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.3, -0.5, 1));
+  scene.lights.emplace_back().position = {0.1, -0.3, -0.5};
+  finish_scene(scene);
+  expect_the_same_light(scene, 0.3, true);
 }
 
 /// A ball on a floor under a sky of clouds, one far brighter than the others.

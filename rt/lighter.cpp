@@ -139,6 +139,7 @@ void Lighter::State::build_reference() {
   own.seed = settings.seed;
   own.max_depth = settings.max_depth;
   own.glossy_cutoff = settings.glossy_cutoff;
+  own.terminator_fix = settings.terminator_fix;
   own.spread_in_pixel = false;  // views are jittered
   own.threads = settings.threads;
   reference.emplace(scene, whole_scene(), lights, own);

@@ -30,8 +30,8 @@ struct PathSettings {
   int roulette_from = 4;  ///< bounces every path is let make; past max_depth: no roulette
   Technique technique = Technique::Both;
   double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_gather.h) show unlit surfaces, others do not
-  /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift). It changes the
-  /// integral, so the reference does without.
+  /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift), as the passes do.
+  /// It changes the integral: what is compared with others does without.
   bool terminator_fix = false;
   /// Each pixel's sample looks through a place of its own, spread evenly over the pixel (a box filter); false: through
   /// the pixel's centre.

@@ -253,7 +253,8 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   ray.pixel = path.pixel;
   ray.radiance = radiance;
   ray.origin = ray_origin(point, light->to_light);
-  if (shared_.settings.terminator_fix) ray.origin += point.lift;
+  const bool viewers_side = glm::dot(light->to_light, point.geometric_normal) > 0.0;
+  if (shared_.settings.terminator_fix && viewers_side) ray.origin += point.lift;
   ray.direction = light->to_light;
   ray.reach = light->distance;
   if (!std::isfinite(light->distance)) return;
