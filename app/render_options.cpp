@@ -234,7 +234,6 @@ std::vector<std::string> RenderOptions::without_use() const {
   if (photons) names.emplace_back("--photons");
   if (photon_radius > 0.0) names.emplace_back("--photon-radius");
   if (indirect) names.emplace_back("--indirect");
-  if (glossy_cutoff) names.emplace_back("--glossy-cutoff");
   if (light_samples) names.emplace_back("--light-samples");
   return names;
 }

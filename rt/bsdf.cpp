@@ -58,6 +58,21 @@ double fresnel_exact(double cosine, double eta) {
   return 0.5 * (square(parallel) + square(perpendicular));
 }
 
+/// The share of even light from all sides that enters a medium of a higher index, relative to its own: 1 less the mean
+/// of fresnel_exact over the projected hemisphere (Egan and Hilgeman, "Optical Properties of Inhomogeneous Materials",
+/// 1979, appendix). Below 1.01, where the closed form loses its digits, less than 0.0032 is reflected: none is.
+double entering(double index) {
+  if (!(index > 1.01)) return 1.0;
+  const double n = std::min(index, 1e4);
+  const double n2 = square(n);
+  const double n4 = square(n2);
+  const double reflected = 0.5 + (n - 1.0) * (3.0 * n + 1.0) / (6.0 * square(n + 1.0)) +
+                           n2 * square((n2 - 1.0) / (n2 + 1.0)) / (n2 + 1.0) * std::log((n - 1.0) / (n + 1.0)) -
+                           2.0 * n * n2 * (n2 + 2.0 * n - 1.0) / ((n2 + 1.0) * (n4 - 1.0)) +
+                           8.0 * n4 * (n4 + 1.0) / ((n2 + 1.0) * square(n4 - 1.0)) * std::log(n);
+  return 1.0 - reflected;
+}
+
 }  // namespace
 
 Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried carried)
@@ -84,6 +99,7 @@ Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried c
   if (all_mirror_) return;
   eta_ = solid_ && surface.inside ? 1.0 / material.ior : material.ior;
   if (solid_ && carried == Carried::Radiance) squeeze_ = 1.0 / square(eta_);
+  if (diffuse_ > 0.0) view_enters_ = (1.0 - dielectric_fresnel(normal_view_)) / entering(std::max(eta_, 1.0 / eta_));
 }
 
 bool Bsdf::same_side(const glm::dvec3& to_light) const {
@@ -153,6 +169,13 @@ std::optional<Bsdf::Facet> Bsdf::facet(Lobe lobe, const glm::dvec3& to_light) co
   return facet;
 }
 
+/// What the specular layer leaves to the diffuse lobe.
+double Bsdf::below(const glm::dvec3& to_light, double dielectric) const {
+  if (!exact_) return 1.0 - dielectric;
+  if (all_mirror_) return 0.0;
+  return view_enters_ * (1.0 - dielectric_fresnel(glm::dot(normal_, to_light)));
+}
+
 glm::dvec3 Bsdf::reflected(const glm::dvec3& to_light, bool diffuse, bool specular) const {
   glm::dvec3 result(0.0);
   if (!scatters_ || !same_side(to_light)) return result;
@@ -160,7 +183,7 @@ glm::dvec3 Bsdf::reflected(const glm::dvec3& to_light, bool diffuse, bool specul
   const glm::dvec3 sum = view_ + to_light;
   const double length = glm::length(sum);
   const double dielectric = dielectric_fresnel(0.5 * length);
-  if (diffuse) result = (diffuse_ / std::numbers::pi * (1.0 - dielectric)) * base_color_;
+  if (diffuse) result = (diffuse_ / std::numbers::pi * below(to_light, dielectric)) * base_color_;
   if (!specular || roughness_ < kDeltaRoughness) return result;
   const double common = distribution(sum / length) * shadowing(glm::dot(normal_, to_light));
   return result + common * fresnel(0.5 * length, dielectric);
@@ -212,7 +235,7 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
   const glm::dvec3 sum = view_ + to_light;
   const double length = glm::length(sum);
   const double dielectric = dielectric_fresnel(0.5 * length);
-  all.value[kDiffuse] = (diffuse_ / std::numbers::pi * (1.0 - dielectric)) * base_color_;
+  all.value[kDiffuse] = (diffuse_ / std::numbers::pi * below(to_light, dielectric)) * base_color_;
   if (present(Lobe::Diffuse)) all.pdf[kDiffuse] = glm::dot(normal_, to_light) / std::numbers::pi;
   if (roughness_ < kDeltaRoughness) return all;
   const double facets = distribution(sum / length);
@@ -225,7 +248,8 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
 bool Bsdf::present(Lobe lobe) const {
   if (!scatters_) return false;
   if (lobe == Lobe::Reflection) return reflects_ || metallic_ > 0.0;
-  return lobe == Lobe::Diffuse ? !all_mirror_ && diffuse_ * largest(base_color_) > 0.0 : largest(tint_) > 0.0;
+  if (lobe == Lobe::Transmission) return largest(tint_) > 0.0;
+  return !all_mirror_ && diffuse_ * largest(base_color_) > 0.0 && (!exact_ || view_enters_ > 0.0);
 }
 
 glm::dvec3 Bsdf::weight(Lobe lobe) const {
@@ -236,6 +260,7 @@ glm::dvec3 Bsdf::weight(Lobe lobe) const {
     return single ? straight : glm::max(straight, kLeastWeight);
   }
   if (lobe == Lobe::Diffuse) {
+    if (exact_) return (diffuse_ * view_enters_) * base_color_;
     return (diffuse_ * std::max(1.0 - dielectric_fresnel(normal_view_), kLeastWeight)) * base_color_;
   }
   const double through = 1.0 - dielectric_fresnel(normal_view_);

@@ -43,8 +43,13 @@ struct BsdfSample {
 /// nothing at any angle, where Schlick's term alone would. All directions point away from the surface and have unit
 /// length.
 ///
+/// The base of surfaces that transmit in part, which light enters and leaves by Fresnel's equations, scatters in
+/// proportion to (1 - F(n.v)) (1 - F(n.l)) (Shirley, Smits, Hu, Lafortune, "A practitioners' assessment of light
+/// reflection models", 1997): from outside a smooth white one loses nothing, from inside nothing comes from where all
+/// is reflected. That of others scatters by 1 - F(v.h), as the specification has it.
+///
 /// As the specification has it, a white opaque dielectric reflects up to 1.3 times what arrives towards grazing viewers
-/// and 1.05 times in the mean; metals and surfaces that transmit everything never exceed 1.
+/// and 1.05 times in the mean; metals and surfaces that transmit never exceed 1.
 ///
 /// Light that is let through takes the base colour once: at a thin sheet's single crossing; at a solid's surface its
 /// square root, so that the two surfaces of a pane together show it.
@@ -97,6 +102,7 @@ class Bsdf {
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }
   [[nodiscard]] double dielectric_fresnel(double cosine) const;
   [[nodiscard]] glm::dvec3 fresnel(double cosine, double dielectric) const;
+  [[nodiscard]] double below(const glm::dvec3& to_light, double dielectric) const;
   [[nodiscard]] double distribution(const glm::dvec3& half) const;
   [[nodiscard]] double shadowing(double normal_light) const;
   [[nodiscard]] std::optional<Facet> facet(Lobe lobe, const glm::dvec3& to_light) const;
@@ -116,10 +122,11 @@ class Bsdf {
   double roughness_ = 1.0;
   double alpha2_ = 1.0;
   double metallic_ = 0.0;
-  double diffuse_ = 0.0;  ///< share of light that has a chance to be scattered by the base
-  double f0_ = 0.04;      ///< of the dielectric, looked at straight
-  double eta_ = 1.5;      ///< index behind the surface over the index before it
-  double squeeze_ = 1.0;  ///< of what is carried by refraction: 1 / eta^2 for radiance
+  double diffuse_ = 0.0;      ///< share of light that has a chance to be scattered by the base
+  double view_enters_ = 0.0;  ///< where it transmits in part: 1 - F(n.v), over its mean from outside
+  double f0_ = 0.04;          ///< of the dielectric, looked at straight
+  double eta_ = 1.5;          ///< index behind the surface over the index before it
+  double squeeze_ = 1.0;      ///< of what is carried by refraction: 1 / eta^2 for radiance
   bool solid_ = false;
   bool exact_ = false;       ///< Fresnel's equations in place of Schlick's
   bool reflects_ = true;     ///< has a specular layer at all

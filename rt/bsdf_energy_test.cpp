@@ -176,6 +176,58 @@ TEST(BsdfEnergy, AnIndexOfZeroReflectsEverything) {
   }
 }
 
+MaterialPoint half_glass(double roughness, double transmission, bool solid, double ior = 1.5) {
+  MaterialPoint material = solid ? test::glass(roughness, ior) : test::sheet(roughness, ior);
+  material.transmission = transmission;
+  return material;
+}
+
+TEST(BsdfEnergy, ASurfaceThatTransmitsInPartNeverGivesBackMoreThanArrives) {
+  const double critical = std::asin(1.0 / 1.5);
+  for (const double roughness : {0.0, 0.1, 0.3, 0.6, 1.0}) {
+    for (const double transmission : {0.05, 0.5, 0.95}) {
+      for (const double polar : {0.0, critical - 0.02, critical + 1e-6, 0.9, 1.3, 1.5}) {
+        for (const int side : {0, 1, 2}) {
+          const Bsdf bsdf =
+              bsdf_of(half_glass(roughness, transmission, side < 2), direction(polar, 0.2), side == 1, Carried::Flux);
+          EXPECT_LE(albedo(bsdf), 1.0 + 2e-3) << roughness << ' ' << transmission << ' ' << polar << ' ' << side;
+        }
+      }
+    }
+  }
+}
+
+TEST(BsdfEnergy, FromOutsideASmoothSurfaceThatTransmitsInPartLosesNothing) {
+  for (const double ior : {1.0, 1.005, 1.02, 1.33, 1.5, 2.4, 10.0}) {
+    for (const double polar : {0.0, 0.8, 1.3, 1.55}) {
+      for (const bool solid : {false, true}) {
+        const double left =
+            albedo(bsdf_of(half_glass(0.0, 0.5, solid, ior), direction(polar, 0.2), false, Carried::Flux));
+        EXPECT_NEAR(left, 1.0, 2e-3) << ior << ' ' << polar << ' ' << solid;
+      }
+    }
+  }
+}
+
+// A path that chooses a lobe by its weight is not to grow by it: where hardly any light enters, weight and light vanish
+// together.
+TEST(BsdfEnergy, WhatIsScatteredDiffuselyBelowASpecularLayerIsNearItsWeight) {
+  const double critical = std::asin(1.0 / 1.5);
+  for (const double polar : {0.0, critical - 0.1, critical - 1e-6, critical - 1e-12}) {
+    const Bsdf inside = bsdf_of(half_glass(0.0, 0.5, true), direction(polar, 0.2), true);
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      const auto sample = inside.sample(Lobe::Diffuse, Sampler(5, i).two());
+      ASSERT_TRUE(sample) << polar;
+      EXPECT_LE(sample->weight.g, 1.2 * inside.weight(Lobe::Diffuse).g) << polar;
+    }
+  }
+  const Bsdf beyond = bsdf_of(half_glass(0.3, 0.5, true), direction(critical + 1e-6, 0.2), true);
+  EXPECT_FALSE(beyond.present(Lobe::Diffuse));
+  EXPECT_EQ(beyond.weight(Lobe::Diffuse), glm::dvec3(0.0));
+  EXPECT_EQ(beyond.pdf(Lobe::Diffuse, test::kUp), 0.0);
+  EXPECT_FALSE(beyond.sample(Lobe::Diffuse, {0.5, 0.5}));
+}
+
 TEST(BsdfEnergy, WeightsAreNearTheLobesShares) {
   for (const double roughness : {0.1, 0.4}) {
     for (const double polar : {0.2, 0.9}) {

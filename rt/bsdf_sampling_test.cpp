@@ -158,6 +158,13 @@ TEST(BsdfSampling, DiffuseDirectionsFollowTheirDensity) {
   expect_all(test::dielectric(0.7, 0.5), Lobe::Diffuse, false, "diffuse");
 }
 
+TEST(BsdfSampling, DiffuseDirectionsFollowTheirDensityWhereLightIsLetThroughToo) {
+  MaterialPoint material = test::glass(0.7);
+  material.transmission = 0.5;
+  expect_all(material, Lobe::Diffuse, false, "half glass");
+  expect_all(material, Lobe::Diffuse, true, "out of half glass");
+}
+
 TEST(BsdfSampling, ReflectedDirectionsFollowTheirDensity) {
   for (const double roughness : {0.05, 0.3, 1.0}) {
     expect_all(test::metal(roughness, 0.9), Lobe::Reflection, false, "metal");

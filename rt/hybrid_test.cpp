@@ -44,8 +44,7 @@ Scene room(const Material& thing, bool is_sheet) {
   return scene;
 }
 
-glm::dvec3 mean_of(const Scene& scene, const RaySettings& settings, std::uint32_t samples) {
-  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples) {
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
   Lighter lighter(scene, settings);
   glm::dvec3 sum(0.0);
@@ -62,14 +61,17 @@ glm::dvec3 mean_of(const Scene& scene, const RaySettings& settings, std::uint32_
   return sum / (256.0 * samples);
 }
 
-void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3) {
-  const glm::dvec3 reference = mean_of(scene, {.max_depth = 64, .terminator_fix = false, .reference = true}, 512);
-  const glm::dvec3 hybrid = mean_of(scene,
+void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool terminator_fix = false) {
+  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+  const glm::dvec3 reference = mean_of(
+      scene, view,
+      {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = terminator_fix, .reference = true}, 512);
+  const glm::dvec3 hybrid = mean_of(scene, view,
                                     {.max_depth = 24,
                                      .glossy_cutoff = glossy_cutoff,
                                      .photons = 20'000,
                                      .global_photons = true,
-                                     .terminator_fix = false},
+                                     .terminator_fix = terminator_fix},
                                     48);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
 }
@@ -104,6 +106,38 @@ TEST(Hybrid, AGlassBall) {
   expect_the_same_light(room(test::clear_glass(1.5F, 1.0F), false));
 }
 
+/// Mostly coloured by its base, and light goes through and through it.
+Material half_glass(float roughness) {
+  Material material = test::clear_glass(1.5F, 1.0F);
+  material.transmission = 0.5F;
+  material.base_color = glm::vec4(0.9F, 0.9F, 0.9F, 1.0F);
+  material.roughness = roughness;
+  return material;
+}
+
+TEST(Hybrid, ABallOfHalfGlass) {
+  expect_the_same_light(room(half_glass(0.0F), false));
+}
+
+TEST(Hybrid, ABallOfHalfGlassInAFurnaceGivesBackNoMoreThanArrives) {
+  for (const float roughness : {0.0F, 0.4F}) {
+    Scene scene;
+    place(scene, add_mesh(scene, test::sphere(1.0, 32, add_material(scene, half_glass(roughness)))));
+    scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
+    finish_scene(scene);
+    const View view = test::view_from({0, 0, 4}, {0, 0, 0}, {16, 16}, scene, 0.45);
+    const glm::dvec3 reference =
+        mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 64);
+    const RaySettings best{.max_depth = 24, .photons = 20'000, .global_photons = true, .terminator_fix = false};
+    const glm::dvec3 hybrid = mean_of(scene, view, best, 16);
+    for (const glm::dvec3& light : {reference, hybrid}) {
+      EXPECT_LE(light.g, 1.0) << roughness;
+      EXPECT_GT(light.g, 0.6) << roughness;
+    }
+    EXPECT_NEAR(hybrid.g / reference.g, 1.0, 0.025) << roughness;
+  }
+}
+
 TEST(Hybrid, AClearSheet) {
   expect_the_same_light(room(test::clear_glass(1.5F, 0.0F), true));
 }
@@ -124,6 +158,17 @@ TEST(Hybrid, AFrostedSheetBeforeAPointOfLight) {
   light.position = {0.1, -0.3, -0.5};
   light.intensity = glm::vec3(1.0F);
   expect_the_same_light(scene);
+}
+
+TEST(Hybrid, ACoarseShellOfFrostedGlassAboutALampWhoseShadowRaysAreLifted) {
+  Scene scene;
+  Material frosted = test::clear_glass(1.5F, 0.0F);
+  frosted.roughness = 0.6F;
+  place(scene, add_mesh(scene, test::sphere(0.6, 6, add_material(scene, frosted))),
+        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.3, -0.5, 1));
+  scene.lights.emplace_back().position = {0.1, -0.3, -0.5};
+  finish_scene(scene);
+  expect_the_same_light(scene, 0.3, true);
 }
 
 /// A ball on a floor under a sky of clouds, one far brighter than the others.
@@ -169,6 +214,67 @@ TEST(Hybrid, ABallBeforeASphereOfLightASpotAndASun) {
     light.inner_cone_radians = 0.3F;
     light.outer_cone_radians = 0.6F;
   }
+  expect_the_same_light(scene);
+}
+
+/// A wall of light that is none, behind a floor of some material. The lamp is far weaker.
+Scene beside_an_unlit_wall(const Material& floor) {
+  Scene scene;
+  place(scene, add_mesh(scene, quad({-2, -1, 0}, {4, 0, 0}, {0, 0, -2}, add_material(scene, floor))));
+  Material poster = test::matte({2.0F, 1.0F, 0.5F});
+  poster.unlit = true;
+  place(scene, add_mesh(scene, quad({-2, -1, -2}, {4, 0, 0}, {0, 3, 0}, add_material(scene, poster))));
+  Light& light = scene.lights.emplace_back();
+  light.position = {0.3, 0.8, -0.5};
+  light.intensity = glm::vec3(0.2F);
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Hybrid, AMatteFloorBesideAnUnlitWall) {
+  expect_the_same_light(beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F})));
+}
+
+TEST(Hybrid, WhatAnUnlitWallIsSaidToEmitIsNoLight) {
+  Scene scene = beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F}));
+  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+  for (const bool reference : {false, true}) {
+    const RaySettings settings{.photons = 1000, .global_photons = true, .reference = reference};
+    for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
+    const glm::dvec3 dark = mean_of(scene, view, settings, 4);
+    scene.materials[1].emissive = glm::vec3(5.0F);
+    EXPECT_EQ(mean_of(scene, view, settings, 4), dark) << reference;
+  }
+}
+
+TEST(Hybrid, AMirrorBesideAnUnlitWall) {
+  expect_the_same_light(beside_an_unlit_wall(test::mirror(0.9F)));
+}
+
+TEST(Hybrid, AMetalFloorBesideAnUnlitWall) {
+  for (const float roughness : {0.2F, 0.5F}) {
+    Material metal = test::mirror(0.9F);
+    metal.roughness = roughness;
+    expect_the_same_light(beside_an_unlit_wall(metal));
+  }
+  Material metal = test::mirror(0.9F);
+  metal.roughness = 0.5F;
+  expect_the_same_light(beside_an_unlit_wall(metal), 1.0);
+}
+
+TEST(Hybrid, APolishedFloorBesideAnUnlitWall) {
+  Material plastic = test::matte({0.8F, 0.8F, 0.8F});
+  plastic.ior = 1.5F;
+  plastic.roughness = 0.2F;
+  expect_the_same_light(beside_an_unlit_wall(plastic));
+}
+
+TEST(Hybrid, AFrostedSheetBeforeAnUnlitWall) {
+  Scene scene = beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F}));
+  Material sheet = test::clear_glass(1.5F, 0.0F);
+  sheet.roughness = 0.4F;
+  place(scene, add_mesh(scene, quad({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, add_material(scene, sheet))));
+  finish_scene(scene);
   expect_the_same_light(scene);
 }
 

@@ -53,6 +53,7 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
   ambient_occlusion += other.ambient_occlusion;
   photon += other.photon;
   invalid += other.invalid;
+  cut += other.cut;
   not_finite += other.not_finite;
   first_not_finite = std::min(first_not_finite, other.first_not_finite);
   return *this;
@@ -79,6 +80,7 @@ struct Lighter::State {
   std::mutex mutex;
   RayCounts counts;
   double photon_ms = 0.0;  ///< spent on sending, since light() last told
+  bool has_told = false;   ///< that rays were cut
   std::vector<PassTime> times;
 
   State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source);
@@ -90,6 +92,7 @@ struct Lighter::State {
   void trace_reference(std::span<const View> views, std::span<const std::size_t> tiles, const LightOutput& output,
                        const SampleNumber& number);
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
+  void tell_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
   void light_tile(Scratch& scratch, const TileJob& job, std::size_t index, const LightOutput& output) const;
   void light_waiting(Scratch& scratch) const;
@@ -136,6 +139,8 @@ void Lighter::State::build_reference() {
   PathSettings own;
   own.seed = settings.seed;
   own.max_depth = settings.max_depth;
+  own.glossy_cutoff = settings.glossy_cutoff;
+  own.terminator_fix = settings.terminator_fix;
   own.spread_in_pixel = false;  // views are jittered
   own.threads = settings.threads;
   reference.emplace(scene, whole_scene(), lights, own);
@@ -159,6 +164,7 @@ void Lighter::State::trace_reference(std::span<const View> views, std::span<cons
   counts.reflection = traced.diffuse + traced.reflection;
   counts.refraction = traced.transmission;
   counts.invalid = traced.invalid;
+  counts.cut = traced.cut;
   counts.not_finite = traced.not_finite;
   counts.first_not_finite = traced.first_not_finite;
   times = {{"reference", watch.ms() * settings.threads}};
@@ -170,6 +176,12 @@ const PhotonMaps* Lighter::State::send_photons(const SampleNumber& number, Commu
   const PhotonMaps& maps = photons->send(number, comm);
   photon_ms += watch.ms();
   return &maps;
+}
+
+void Lighter::State::tell_of_cut_rays() {
+  if (counts.cut == 0 || std::exchange(has_told, true)) return;
+  log::warning("{} rays of one sample passed {} surfaces that cover in part; they do not see what is behind",
+               counts.cut, kMostPassed);
 }
 
 std::unique_ptr<Scratch> Lighter::State::take_scratch() {
@@ -288,6 +300,7 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
   State& state = *state_;
   if (state.reference) {
     state.trace_reference(views, tiles, output, number);
+    state.tell_of_cut_rays();
     return;
   }
   const PhotonMaps* const photons = state.send_photons(number, nullptr);
@@ -310,13 +323,16 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
   std::vector<double> ms(kFirstPassStep + state.passes.size(), 0.0);
   for (const auto& scratch : state.idle) {
     state.counts += std::exchange(scratch->work.counts, {});
+    state.counts.cut += std::exchange(scratch->work.scratch.cut, 0);
     for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
   }
   if (state.photons) {
     const PhotonCounts sent = state.photons->take_counts();
     state.counts.photon = sent.rays;
     state.counts.invalid += sent.invalid;
+    state.counts.cut += sent.cut;
   }
+  state.tell_of_cut_rays();
   state.times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
   for (std::size_t i = 0; i < state.passes.size(); ++i) {
     double& spent = ms[kFirstPassStep + i];

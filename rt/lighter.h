@@ -68,6 +68,7 @@ struct RayCounts {
   std::uint64_t ambient_occlusion = 0;
   std::uint64_t photon = 0;
   std::uint64_t invalid = 0;     ///< of those above, rays Embree could not bear: they missed
+  std::uint64_t cut = 0;         ///< rays that ended among surfaces of partial coverage, see kMostPassed
   std::uint64_t not_finite = 0;  ///< pixels whose radiance was no finite number: they are black
   ScreenPixel first_not_finite;  ///< of those, in order of screen and row, whoever met it; else kNoPixel
 

@@ -341,5 +341,31 @@ TEST(Lighter, LocalShadingPutsTheDisplayColourIntoTheKeys) {
   }
 }
 
+// A flat floor whose normals pretend a hill, higher than the wall that stands on it: lifted rays look over the wall.
+TEST(Lighter, TheReferenceLiftsShadowRaysAsSettingsSay) {
+  Scene scene;
+  const std::uint32_t white = add_material(scene, test::matte());
+  Mesh hill = quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, white);
+  for (const glm::vec3& corner : hill.positions) {
+    hill.normals.push_back(glm::normalize(glm::vec3(0.5F * corner.x, 1.0F, 0.5F * corner.z)));
+  }
+  place(scene, add_mesh(scene, hill));
+  place(scene, add_mesh(scene, quad({0, 0, 1}, {0, 0.1F, 0}, {0, 0, -2}, white)));
+  Light& sun = scene.lights.emplace_back();
+  sun.type = LightType::Directional;
+  sun.direction = glm::normalize(glm::vec3(-1.0F, -0.2F, 0.0F));
+  finish_scene(scene);
+  const View view = test::view_from({-0.5, 4, 0}, {-0.5, 0, 0}, {32, 32}, scene, 0.3, {1.0, 0.0, 0.0});
+  const auto sum = [&](bool fix) {
+    const Image<Rgb> image = test::light(scene, view, {.terminator_fix = fix, .reference = true}).image;
+    double total = 0.0;
+    for (int y = 0; y < 32; ++y) {
+      for (int x = 0; x < 32; ++x) total += image.at(x, y).g;
+    }
+    return total;
+  };
+  EXPECT_GT(sum(true), 1.1 * sum(false));
+}
+
 }  // namespace
 }  // namespace hpr

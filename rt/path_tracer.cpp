@@ -58,6 +58,7 @@ PathCounts& PathCounts::operator+=(const PathCounts& other) {
   transmission += other.transmission;
   shadow += other.shadow;
   invalid += other.invalid;
+  cut += other.cut;
   too_long += other.too_long;
   not_finite += other.not_finite;
   first_not_finite = std::min(first_not_finite, other.first_not_finite);

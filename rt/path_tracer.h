@@ -29,8 +29,9 @@ struct PathSettings {
       64;  ///< ray segments of the longest path: 1 shows what emits, 2 adds its light on surfaces, and so on
   int roulette_from = 4;  ///< bounces every path is let make; past max_depth: no roulette
   Technique technique = Technique::Both;
-  /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift). It changes the
-  /// integral, so the reference does without.
+  double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_gather.h) show unlit surfaces, others do not
+  /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift), as the passes do.
+  /// It changes the integral: what is compared with others does without.
   bool terminator_fix = false;
   /// Each pixel's sample looks through a place of its own, spread evenly over the pixel (a box filter); false: through
   /// the pixel's centre.
@@ -47,6 +48,7 @@ struct PathCounts {
   std::uint64_t transmission = 0;
   std::uint64_t shadow = 0;
   std::uint64_t invalid = 0;     ///< of those above, rays Embree could not bear: they missed
+  std::uint64_t cut = 0;         ///< rays that ended among surfaces of partial coverage, see kMostPassed
   std::uint64_t too_long = 0;    ///< paths cut at max_depth
   std::uint64_t not_finite = 0;  ///< samples that were no finite number: they are black
   ScreenPixel first_not_finite;  ///< of those; else kNoPixel

@@ -5,11 +5,11 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "rt/photon_gather.h"
+#include "rt/ray_walk.h"
+
 namespace hpr {
 namespace {
-
-/// A path that passes more surfaces in a row than this is caught between coincident ones.
-constexpr int kMostPassed = 1000;
 
 /// The power heuristic with exponent 2: the weight of a direction found with density `own` where another technique has
 /// `other`. As a ratio, so that large densities do not overflow.
@@ -46,16 +46,25 @@ bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double squee
 }
 
 struct Scattered {
-  glm::dvec3 value{0.0};  ///< f, of all lobes with more than one direction
-  double pdf = 0.0;       ///< of choosing such a lobe, and in it this direction
+  glm::dvec3 value{0.0};     ///< f, of all lobes with more than one direction
+  glm::dvec3 followed{0.0};  ///< of those that the passes follow
+  double pdf = 0.0;          ///< of choosing such a lobe, and in it this direction
 };
 
-Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
+glm::dvec3 share_of(const glm::dvec3& part, const glm::dvec3& whole) {
+  glm::dvec3 share(0.0);
+  for (int c = 0; c < 3; ++c) share[c] = whole[c] > 0.0 ? part[c] / whole[c] : 0.0;
+  return share;
+}
+
+Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction,
+                   double glossy_cutoff) {
   Scattered scattered;
   const Scattering all = bsdf.scattering(direction);
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
     if (!(chances[i] > 0.0)) continue;
     scattered.value += all.value[i];
+    if (is_followed(bsdf, kLobes[i], glossy_cutoff)) scattered.followed += all.value[i];
     scattered.pdf += chances[i] * all.pdf[i];
   }
   return scattered;
@@ -115,7 +124,7 @@ void PathWave::trace_paths() {
     for (Path& path : paths_[kind]) {
       const std::uint32_t surface = hits_[ray++];
       if (surface == kNoSurface) {
-        miss(path, kind);
+        miss(path);
       } else {
         arrive(path, kind, surface);
       }
@@ -123,9 +132,12 @@ void PathWave::trace_paths() {
   }
 }
 
-void PathWave::miss(const Path& path, std::size_t kind) {
-  // A background is a backdrop: seen, mirrored and seen through glass, but no light.
-  if (kind == kind_of(Lobe::Diffuse) && !shared_.scene.environment) return;
+void PathWave::miss(const Path& path) {
+  // A background is a backdrop, to be looked at as unlit surfaces are: no light.
+  if (!shared_.scene.environment) {
+    radiance_[path.pixel] += path.throughput * path.followed * shared_.lights.environment(path.direction);
+    return;
+  }
   const glm::dvec3 light = shared_.lights.environment(path.direction);
   double weight = 1.0;
   if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
@@ -143,18 +155,28 @@ void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
   path.travelled += glm::distance(path.origin, point.position);
   const Material& look = shared_.scene.materials[point.material];
   if (look.alpha_mode != AlphaMode::Opaque) {
-    if (passes_by_chance(evaluate_alpha(shared_.scene, look, point.uv, point.color.a), path.sampler)) {
-      if (++path.passed > kMostPassed) return;
-      path.origin = ray_origin(point, path.direction);
-      next_[kind].push_back(path);
+    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    if (passes_by_chance(coverage, path.sampler)) {
+      const glm::dvec3 origin = ray_origin(point, path.direction);
+      const double gained = glm::dot(origin - path.origin, path.direction);
+      path.origin = origin;
+      if (passes_on(path.passed, coverage, gained)) {
+        next_[kind].push_back(path);
+      } else {
+        ++counts_.cut;
+      }
       return;
     }
   }
   const MaterialPoint material = evaluate_material(shared_.scene, point);
   path.throughput *= path.segments == 1 ? left_after(path.media.here, path.travelled)
                                         : left_at(path.media, point, material, path.travelled);
+  if (material.unlit) {
+    // A colour to be looked at, not light: seen, mirrored and seen through glass, as the passes show it.
+    radiance_[path.pixel] += path.throughput * path.followed * material.emission;
+    return;
+  }
   if (material.emission != glm::dvec3(0.0)) add_emission(path, point, surface, material.emission);
-  if (material.unlit) return;
   if (path.segments >= shared_.settings.max_depth) {
     ++counts_.too_long;
     return;
@@ -189,10 +211,11 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
     path.throughput *= sample->weight / chances[chosen];
     path.pdf = 0.0;
   } else {
-    const Scattered scattered = evaluate(bsdf, chances, sample->direction);
+    const Scattered scattered = evaluate(bsdf, chances, sample->direction, shared_.settings.glossy_cutoff);
     if (!(scattered.pdf > 0.0)) return;
     const double cosine = std::abs(glm::dot(material.normal, sample->direction));
     path.throughput *= scattered.value * (cosine / scattered.pdf);
+    path.followed *= share_of(scattered.followed, scattered.value);
     path.pdf = scattered.pdf;
   }
   if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
@@ -217,7 +240,7 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   if (!light || light->weight == glm::dvec3(0.0)) return;
   const Technique technique = shared_.settings.technique;
   if (technique == Technique::Surfaces && light->pdf > 0.0) return;
-  const Scattered scattered = evaluate(bsdf, chances, light->to_light);
+  const Scattered scattered = evaluate(bsdf, chances, light->to_light, shared_.settings.glossy_cutoff);
   if (scattered.value == glm::dvec3(0.0)) return;
   double weight = std::abs(glm::dot(material.normal, light->to_light));
   if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);
@@ -232,7 +255,8 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   ray.pixel = path.pixel;
   ray.radiance = radiance;
   ray.origin = ray_origin(point, light->to_light);
-  if (shared_.settings.terminator_fix) ray.origin += point.lift;
+  const bool viewers_side = glm::dot(light->to_light, point.geometric_normal) > 0.0;
+  if (shared_.settings.terminator_fix && viewers_side) ray.origin += point.lift;
   ray.direction = light->to_light;
   ray.reach = light->distance;
   if (!std::isfinite(light->distance)) return;
@@ -289,12 +313,18 @@ void PathWave::pass_covers() {
     shared_.surfaces.load(hits_[i], triangle_);
     const SurfacePoint point = shared_.surfaces.meet(triangle_, ray.origin, ray.direction);
     const Material& look = shared_.scene.materials[point.material];
-    ray.radiance *= 1.0 - evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
-    if (!(largest(ray.radiance) > 0.0) || ++ray.passed > kMostPassed) continue;
+    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    ray.radiance *= 1.0 - coverage;
+    if (!(largest(ray.radiance) > 0.0)) continue;
     const glm::dvec3 origin = ray_origin(point, ray.direction);
-    ray.reach = std::max(ray.reach - glm::dot(origin - ray.origin, ray.direction), 0.0);
+    const double gained = glm::dot(origin - ray.origin, ray.direction);
+    ray.reach = std::max(ray.reach - gained, 0.0);
     ray.origin = origin;
-    shadows_[left++] = ray;
+    if (passes_on(ray.passed, coverage, gained)) {
+      shadows_[left++] = ray;
+    } else {
+      ++counts_.cut;
+    }
   }
   shadows_.resize(left);
 }

@@ -28,6 +28,7 @@ struct Path {
   glm::dvec3 origin{0.0};  ///< world
   glm::dvec3 direction{0.0, 0.0, -1.0};
   glm::dvec3 throughput{1.0};  ///< what of the radiance met reaches the pixel
+  glm::dvec3 followed{1.0};    ///< the part of throughput that came by lobes the passes follow
   glm::dvec3 from{0.0};        ///< where it was scattered last, and the normal (light_normal) lights were chosen by
   glm::dvec3 from_normal{0.0};
   double pdf = 0.0;        ///< of the direction it was sent in, per solid angle; 0: the only one
@@ -73,7 +74,7 @@ class PathWave {
 
   void trace_paths();
   void arrive(Path& path, std::size_t kind, std::uint32_t surface);
-  void miss(const Path& path, std::size_t kind);
+  void miss(const Path& path);
   void add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface, const glm::dvec3& emission);
   void scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material);
   void ask_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,

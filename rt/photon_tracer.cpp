@@ -12,6 +12,7 @@
 #include "core/parallel.h"
 #include "rt/denormals.h"
 #include "rt/photon_gather.h"
+#include "rt/ray_walk.h"
 
 namespace hpr {
 namespace {
@@ -64,6 +65,7 @@ PhotonCounts& PhotonCounts::operator+=(const PhotonCounts& other) {
   global += other.global;
   rays += other.rays;
   invalid += other.invalid;
+  cut += other.cut;
   lost += other.lost;
   return *this;
 }
@@ -85,7 +87,7 @@ struct PhotonTracer::Flight {
   double travelled = 0.0;    ///< metres from where it was scattered last to `place`
   std::uint32_t photon = 0;  ///< of the block
   int bounces = 0;
-  int passed = 0;        ///< surfaces passed that do not cover all
+  int passed = 0;        ///< surfaces since then that do not cover all
   bool followed = true;  ///< has met followed lobes only
 };
 
@@ -190,10 +192,11 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& bl
   const MaterialPoint material = evaluate_material(scene_, surface);
   flight.travelled += glm::distance(surface.position, flight.place);
   if (passes_by_chance(material.alpha, flight.sampler)) {
+    const double gained = glm::dot(surface.position - flight.place, flight.direction);
     flight.place = surface.position;
     flight.origin = space_.from_world(ray_origin(surface, flight.direction));
-    if (++flight.passed <= settings_.max_bounces) return true;
-    ++block.traced.counts.lost;
+    if (passes_on(flight.passed, material.alpha, gained)) return true;
+    ++block.traced.counts.cut;
     return false;
   }
   flight.flux *= left_at(flight.media, surface, material, flight.travelled);
@@ -244,6 +247,7 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   flight.direction = sample->direction;
   flight.place = surface.position;
   flight.travelled = 0.0;
+  flight.passed = 0;
   flight.origin = space_.from_world(ray_origin(surface, flight.direction));
   ++flight.bounces;
   return true;

@@ -32,6 +32,7 @@ struct PhotonCounts {
   std::uint64_t global = 0;
   std::uint64_t rays = 0;
   std::uint64_t invalid = 0;  ///< of the rays, those Embree could not bear
+  std::uint64_t cut = 0;      ///< photons that ended among surfaces of partial coverage, see kMostPassed
   std::uint64_t lost = 0;     ///< photons still under way after so many bounces, or no longer finite
 
   PhotonCounts& operator+=(const PhotonCounts& other);

@@ -24,20 +24,21 @@ double RayWalk::coverage_of(const SurfacePoint& point) const {
   return evaluate_alpha(scene_, scene_.materials[point.material], point.uv, point.color.a);
 }
 
-void RayWalk::go_beyond(RayRequest& ray, const SurfacePoint& point) {
+double RayWalk::go_beyond(RayRequest& ray, const SurfacePoint& point) {
   const glm::dvec3 origin = ray_origin(point, ray.direction);
-  if (std::isfinite(ray.reach)) {
-    ray.reach = std::max(0.0, ray.reach - glm::dot(origin - ray.origin, ray.direction));
-  }
+  const double gained = glm::dot(origin - ray.origin, ray.direction);
+  if (std::isfinite(ray.reach)) ray.reach = std::max(0.0, ray.reach - gained);
   ray.origin = origin;
+  return gained;
 }
 
 void RayWalk::visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, const Visit& visit) const {
   if (holed_ == nullptr) return;
   scratch.waiting.resize(rays.size());
   std::iota(scratch.waiting.begin(), scratch.waiting.end(), 0U);
+  scratch.passed.assign(rays.size(), 0);
   WorldTriangle triangle;
-  for (int layer = 0; layer < kMostLayers && !scratch.waiting.empty(); ++layer) {
+  while (!scratch.waiting.empty()) {
     scratch.batch.clear();
     for (const std::uint32_t ray : scratch.waiting) push(rays[ray], scratch.batch);
     scratch.surfaces.resize(scratch.waiting.size());
@@ -48,9 +49,13 @@ void RayWalk::visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, cons
       const std::uint32_t ray = scratch.waiting[i];
       surfaces_.load(scratch.surfaces[i], triangle);
       const SurfacePoint point = surfaces_.meet(triangle, rays[ray].origin, rays[ray].direction);
-      if (!visit(ray, point, coverage_of(point))) continue;
-      go_beyond(rays[ray], point);
-      scratch.waiting[left++] = ray;
+      const double coverage = coverage_of(point);
+      if (!visit(ray, point, coverage)) continue;
+      if (passes_on(scratch.passed[ray], coverage, go_beyond(rays[ray], point))) {
+        scratch.waiting[left++] = ray;
+      } else {
+        ++scratch.cut;
+      }
     }
     scratch.waiting.resize(left);
   }

@@ -15,6 +15,17 @@
 
 namespace hpr {
 
+/// Surfaces of partial coverage that light is followed through in a row, by the passes and by the reference. Whatever
+/// is met past them is not there.
+inline constexpr int kMostPassed = 1000;
+
+/// Counts a surface that a ray has passed, and came `gained` metres farther by it; false when it is one too many. What
+/// covers nothing does not count, unless nothing was gained: then the ray is caught between coincident surfaces.
+[[nodiscard]] inline bool passes_on(int& passed, double coverage, double gained) {
+  if (!(coverage > 0.0) && gained > 0.0) return true;
+  return ++passed <= kMostPassed;
+}
+
 /// A ray that is wanted, in world coordinates.
 struct RayRequest {
   glm::dvec3 origin{0.0};      ///< off the surface it leaves
@@ -31,6 +42,8 @@ struct WalkScratch {
   std::vector<std::uint8_t> blocked;
   std::vector<std::uint32_t> waiting;
   std::vector<RayRequest> rest;
+  std::vector<int> passed;  ///< per ray, see passes_on
+  std::uint64_t cut = 0;    ///< rays that ended among too many surfaces; who reads it sets it back
 };
 
 /// Rays through a scene some of whose surfaces cover only part of what is behind them (alpha MASK and BLEND): such a
@@ -53,7 +66,8 @@ class RayWalk {
 
   /// What visit_holed calls: ray i meets a surface that covers so much; returns whether the ray goes on.
   using Visit = std::function<bool(std::size_t ray, const SurfacePoint& point, double coverage)>;
-  /// Calls `visit` for every surface of partial coverage along each ray, nearest first. `rays` are used up.
+  /// Calls `visit` for every surface of partial coverage along each ray, nearest first, while it passes_on. `rays` are
+  /// used up.
   void visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, const Visit& visit) const;
 
   /// Metres: the largest coordinate of a place as rays see it, which says what rounding it costs.
@@ -62,11 +76,9 @@ class RayWalk {
   [[nodiscard]] bool has_holes() const { return holed_ != nullptr; }
 
  private:
-  static constexpr int kMostLayers = 64;
-
   [[nodiscard]] double coverage_of(const SurfacePoint& point) const;
-  /// Moves the ray's origin behind a surface it met.
-  static void go_beyond(RayRequest& ray, const SurfacePoint& point);
+  /// Moves the ray's origin behind a surface it met. Returns the metres gained.
+  static double go_beyond(RayRequest& ray, const SurfacePoint& point);
   void push(const RayRequest& ray, RayBatch& batch) const;
 
   const Scene& scene_;

@@ -60,6 +60,7 @@ std::size_t count_lights(const Scene& scene, const std::vector<const Material*>&
 }  // namespace
 
 bool emits(const Scene& scene, const Material& material) {
+  if (material.unlit) return false;  // shows its colour and lights nothing
   if (!(std::max({material.emissive.r, material.emissive.g, material.emissive.b}) > 0.0F)) return false;
   if (!material.emissive_texture.present()) return true;
   const auto pixels = scene.textures[static_cast<std::size_t>(material.emissive_texture.texture)].image.pixels();

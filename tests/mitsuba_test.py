@@ -162,7 +162,7 @@ def main():
 
     # Every way HPR has to make a picture: its name, the command, and the largest relMSE in units of the noise.
     # Photons shift light by their radius, which shrinks from sample to sample: the hybrid's error is not noise alone.
-    ways = [("reference", ["--reference"], 1.3), ("hybrid", ["--quality", "best", "--no-terminator-fix"], 3.0)]
+    ways = [("reference", ["--reference", "--no-terminator-fix"], 1.3), ("hybrid", ["--quality", "best", "--no-terminator-fix"], 3.0)]
     ways = [way for way in ways if way[0] in options.ways.split(",")]
     failures = 0
     with tempfile.TemporaryDirectory() as scratch:
