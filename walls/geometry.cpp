@@ -152,8 +152,13 @@ glm::dvec3 eye_position(const WallViewer& viewer, const HeadPose& head, Eye eye)
 std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
                              const Bounds& bounds) {
   HPR_CHECK(heads.size() == wall.viewers.size());
-  const Placement placement = place_viewer(wall, wall_extent(wall), camera);
-  const View shared = make_view(camera, {1, 1}, bounds);
+  const WallExtent extent = wall_extent(wall);
+  const Placement placement = place_viewer(wall, extent, camera);
+  View shared = make_view(camera, {1, 1}, bounds);
+  if (const auto* const box = std::get_if<OrthographicLens>(&camera.lens)) {  // in the shape of the wall, all of it
+    shared.top = std::max(box->half_height, box->half_width * extent.height / extent.width);
+    shared.bottom = -shared.top;
+  }
   std::vector<View> views;
   for (const ScreenEye& picture : screen_eyes(wall)) {
     const WallScreen& screen = wall.screens[picture.screen];
