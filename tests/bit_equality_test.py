@@ -21,7 +21,7 @@ import tempfile
 HPR = os.path.abspath(sys.argv[1])
 FULL = sys.argv[2:] == ["--full"]
 SCENE = "gen:gallery"
-SIZE = (1280, 1024) if FULL else (256, 192)
+SIZE = (1280, 1024) if FULL else (192, 144)
 FEW = ["--photons", "5000"]
 WAYS = {
     "raster": FEW,
@@ -107,7 +107,7 @@ def main():
         folder = pathlib.Path(scratch)
         ranks, threads = ("1", "2", "3", "4", "7"), ("1", "2")
         distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
-        drawn = list(itertools.product(ranks, distributions, choices_of("--strategy", folder), threads, backends))
+        drawn = list(itertools.product(ranks if FULL else ("1", "2", "3", "7"), distributions, choices_of("--strategy", folder), threads, backends))
         traced = list(itertools.product(ranks, distributions, ("auto",), threads, backends[:1]))
         lit = list(itertools.product(ranks, distributions if FULL else ("sort-first", "sort-last"), ("auto",), threads,
                                      backends[:1]))
