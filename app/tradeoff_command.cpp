@@ -41,17 +41,17 @@ constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
 /// its own or varies, and what changes neither pictures nor times.
 std::vector<std::string> base_words(std::span<const std::string> args, const std::string& scene,
                                     std::span<const std::string> varied) {
-  static const std::set<std::string> kOwn{
+  static const std::set<std::string> own{
       "--vary", "--metric", "--reference", "--reference-spp", "--budget",    "--frames",     "--html",
       "--csv",  "--size",   "--progress",  "--hang-timeout",  "--limit-mem", "--limit-image"};
-  static const std::set<std::string> kFlags{"--json", "--resume", "--force", "--strict", "-q", "-v", "-vv"};
+  static const std::set<std::string> flags{"--json", "--resume", "--force", "--strict", "-q", "-v", "-vv"};
   std::vector<std::string> words;
   bool scene_seen = false;
   for (std::size_t i = 1; i < args.size(); ++i) {
     const std::string name = args[i].substr(0, args[i].find('='));
-    if (kFlags.contains(name)) continue;
+    if (flags.contains(name)) continue;
     const bool is_varied = name.starts_with("--") && std::ranges::find(varied, name.substr(2)) != varied.end();
-    if (kOwn.contains(name) || is_varied) {
+    if (own.contains(name) || is_varied) {
       if (name == args[i] && !(is_varied && find_knob(name.substr(2)).range.starts_with("false"))) ++i;
       continue;
     }
@@ -153,15 +153,7 @@ class TradeoffCommand final : public Command {
     const std::string identity = sweep_identity(session, *reference, globals);
     const std::filesystem::path state =
         cache / fmt::format("tradeoff-{}.json", hex16(xxh64(std::as_bytes(std::span(identity)))));
-    std::vector<TradeoffPoint> done;
-    check_on_root(session.comm(), [&] {
-      if (resume_ && std::filesystem::exists(state)) {
-        const auto bytes = read_file(state, kLargestState);
-        done = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
-      } else if (resume_) {
-        log::warning("--resume: no points of this sweep are kept, so it begins anew");
-      }
-    });
+    std::vector<TradeoffPoint> done = kept_points(session.comm(), state, identity);
 
     Progress progress(speaks ? globals.progress : "none", "point", all_.size());
     const Stopwatch watch;
@@ -170,12 +162,7 @@ class TradeoffCommand final : public Command {
       const auto known = std::ranges::find(done, values, &TradeoffPoint::knobs);
       const bool skips = all_gather_value(session.comm(), known != done.end() ? 1 : 0).front() == 1;
       if (!skips) {
-        done.push_back(measure_point(session, options_, values, how_, globals, *reference, crop));
-        // The first frames of a process are slower than all others: where that shows, they are drawn once more.
-        const double took = all_gather_value(session.comm(), done.back().median_ms()).front();
-        if (measured == 0 && took < kQuickMs) {
-          done.back() = measure_point(session, options_, values, how_, globals, *reference, crop);
-        }
+        done.push_back(measured_point(session, values, globals, *reference, crop, measured == 0));
         ++measured;
         agree_on_failure(session.comm(), [&] {
           if (speaks) write_file_atomically(state, encode_points(identity, done));
@@ -198,6 +185,30 @@ class TradeoffCommand final : public Command {
     const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
     const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
     return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
+  }
+
+  /// Those of this sweep that an earlier run measured, on rank 0.
+  [[nodiscard]] std::vector<TradeoffPoint> kept_points(Communicator& comm, const std::filesystem::path& state,
+                                                       const std::string& identity) const {
+    std::vector<TradeoffPoint> kept;
+    check_on_root(comm, [&] {
+      if (resume_ && std::filesystem::exists(state)) {
+        const auto bytes = read_file(state, kLargestState);
+        kept = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
+      } else if (resume_) {
+        log::warning("--resume: no points of this sweep are kept, so it begins anew");
+      }
+    });
+    return kept;
+  }
+
+  /// The first frames of a process are slower than all others: where that shows, they are drawn once more.
+  [[nodiscard]] TradeoffPoint measured_point(Session& session, const KnobValues& values, const Globals& globals,
+                                             const ReferencePicture& reference, const Rect& crop, bool first) const {
+    TradeoffPoint point = measure_point(session, options_, values, how_, globals, reference, crop);
+    const double took = all_gather_value(session.comm(), point.median_ms()).front();
+    if (!first || took >= kQuickMs) return point;
+    return measure_point(session, options_, values, how_, globals, reference, crop);
   }
 
   [[nodiscard]] std::string sweep_identity(Session& session, const ReferencePicture& reference,

@@ -122,6 +122,11 @@ ReferencePicture read_reference(const std::string& path, Size size, const Global
   return reference;
 }
 
+void tell_of_more(std::uint32_t samples, std::uint32_t asked_for) {
+  if (samples <= asked_for) return;
+  log::info("the truth has {} samples, of an earlier run, where {} were asked for", samples, asked_for);
+}
+
 PictureError compare(const Image<Rgb>& picture, const ReferencePicture& reference, double exposure_stops,
                      std::span<const std::string> metrics, int threads, Image<float>* flip_map) {
   std::vector<float> ours = values_of(picture);
@@ -194,7 +199,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   CheckpointSettings kept;
   kept.identity = identity_of(session, setup.plan, setup.blocks.views, setup.sampling);
   std::string name;
-  for (const auto& [key, value] : kept.identity) name += key + "=" + value + "\n";
+  for (const auto& [key, value] : kept.identity) name += fmt::format("{}={}\n", key, value);
   kept.path = cache / fmt::format("reference-{}.checkpoint", hex16(xxh64(std::as_bytes(std::span(name)))));
   kept.at_end = true;
   kept.resume = all_gather_value(session.comm(), std::filesystem::exists(kept.path) ? 1 : 0).front() == 1;
@@ -216,10 +221,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
     if (!draw(kept, *sampler)) return std::nullopt;
   }
   const SampleProgress reached = sampler->reached_so_far();
-  if (speaks && reached.samples > how.reference_spp) {
-    log::info("the truth has {} samples, of an earlier run, where {} were asked for", reached.samples,
-              how.reference_spp);
-  }
+  if (speaks) tell_of_more(reached.samples, how.reference_spp);
   reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size, ColorFormat::Float32);
   reference.about = {.how = passes ? "passes at best" : "path tracing",
                      .spp = reached.samples,

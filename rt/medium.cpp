@@ -6,6 +6,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <map>
+#include <span>
 
 namespace hpr {
 namespace {
@@ -132,10 +133,10 @@ Media MediumFinder::at(const glm::dvec3& place) const {
   }
   std::ranges::stable_sort(crossings, {}, &Crossing::along);
   const auto here = std::ranges::lower_bound(crossings, 0.0, {}, &Crossing::along);
-  const std::vector<std::uint32_t> up = left_unentered(std::ranges::subrange(here, crossings.end()), true);
+  const std::vector<std::uint32_t> up = left_unentered(std::span(here, crossings.end()), true);
   // Down the line, what leaves goes in and what enters goes out.
   std::ranges::reverse(crossings.begin(), here);
-  std::vector<std::uint32_t> down = left_unentered(std::ranges::subrange(crossings.begin(), here), false);
+  std::vector<std::uint32_t> down = left_unentered(std::span(crossings.begin(), here), false);
   std::vector<glm::dvec3> found;
   for (const std::uint32_t material : up) {
     const auto both = std::ranges::find(down, material);
