@@ -18,7 +18,7 @@ import tempfile
 import processes
 
 HPR = os.path.abspath(sys.argv[1])
-SAMPLES = 200
+SAMPLES = 100
 COMMON = ["--progress", "line", "--threads", "1", "--photons", "1000"]
 ARGUMENTS = ["render", "gen:gallery", "--size", "96x64", *COMMON]
 failures = []
