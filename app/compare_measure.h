@@ -10,6 +10,7 @@
 #include "cluster/counting_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
+#include "image/image_parts.h"
 
 /// Measuring one strategy on one frame, whatever its pixels are.
 namespace hpr {
@@ -31,10 +32,9 @@ template <typename Pixel>
   const Size screen = input.screen;
   Image<Pixel> wall(Size{screen.width * input.grid.width, screen.height * input.grid.height});
   for (std::size_t i = 0; i < layer.layout().screens(); ++i) {
-    const Image<Pixel> part = to_image(layer, i);
     const int left = static_cast<int>(i) % input.grid.width * screen.width;
     const int top = static_cast<int>(i) / input.grid.width * screen.height;
-    for (int y = 0; y < screen.height; ++y) std::ranges::copy(part.row(y), wall.row(top + y).begin() + left);
+    paste(to_image(layer, i), left, top, wall);
   }
   return wall;
 }

@@ -52,7 +52,7 @@ class DisplayCommand final : public Command {
     for (const int signal : {SIGUSR1, SIGUSR2}) std::signal(signal, SIG_IGN);
     serve(globals);
     // As if the signal had ended us, but with everything put away.
-    if (const int signal = last_signal(); signal != 0 && signal != SIGUSR1) {
+    if (const int signal = last_signal(); signal != 0) {
       std::signal(signal, SIG_DFL);
       std::raise(signal);
     }

@@ -16,7 +16,6 @@
 #include <system_error>
 #include <utility>
 
-#include "app/terminal.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -38,6 +37,8 @@ constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
 
 /// Tells rank 0, which reads from a pipe, that its launcher reads from a terminal.
 constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
+/// Tells the ranks of a job, whose stderr is a pipe, that their launcher's is a terminal.
+constexpr const char* kTerminalVariable = "HPR_TERMINAL";
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
@@ -196,6 +197,11 @@ std::string program_path() {
 bool input_is_typed() {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
   return ::isatty(STDIN_FILENO) == 1 || std::getenv(kTypedInput) != nullptr;
+}
+
+bool stderr_is_terminal() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
+  return ::isatty(STDERR_FILENO) == 1 || (inside_mpi_job() && std::getenv(kTerminalVariable) != nullptr);
 }
 
 int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options) {

@@ -32,6 +32,8 @@ struct JobOptions {
 
 /// Whether somebody types what this process reads on standard input, at a terminal of its own or its launcher's.
 [[nodiscard]] bool input_is_typed();
+/// Whether somebody looks on at a terminal: what is drawn on stderr may be drawn over.
+[[nodiscard]] bool stderr_is_terminal();
 
 /// True when this process was started by mpirun, mpiexec or srun as one rank of a job.
 [[nodiscard]] bool inside_mpi_job();

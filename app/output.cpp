@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/parallel.h"
+#include "walls/budget_json.h"
 
 namespace hpr {
 namespace {
@@ -168,13 +169,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
       {"bytes_sent", stats.bytes_sent},
       {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
       {"ranks", stats.ranks}};
-  if (stats.budget) {
-    json["budget"] = {{"target_ms", stats.budget->target_ms},
-                      {"resolution_scale", stats.budget->resolution_scale},
-                      {"samples", stats.budget->samples},
-                      {"given_up", stats.budget->given_up},
-                      {"resting", stats.budget->resting}};
-  }
+  if (stats.budget) json["budget"] = budget_json(*stats.budget);
   write_file_atomically(path, json.dump(2) + "\n");
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "app/frame.h"
+#include "image/image_parts.h"
 #include "walls/manifest.h"
 
 namespace hpr {
@@ -33,10 +33,7 @@ template <typename Pixel>
     const View& view = blocks.views[block];
     if (view.size() == view.screen) return to_image(layer, block);
     if (image.size() != view.screen) image = Image<Pixel>(view.screen);
-    const Image<Pixel> part = to_image(layer, block);
-    for (int y = 0; y < part.height(); ++y) {
-      std::ranges::copy(part.row(y), image.row(view.block.y0 + y).begin() + view.block.x0);
-    }
+    paste(to_image(layer, block), view.block.x0, view.block.y0, image);
   }
   return image;
 }

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "app/terminal.h"
+#include "app/launcher.h"
 
 namespace hpr {
 namespace {
@@ -32,13 +32,13 @@ Progress::~Progress() {
   if (mode_ == Mode::Bar && drawn_) std::fputc('\n', stderr);
 }
 
-bool Progress::due() const {
+bool Progress::due(std::size_t done) const {
   const auto passed = [&](std::chrono::duration<double> pace) { return since_drawn_.ms() >= 1000.0 * pace.count(); };
   switch (mode_) {
     case Mode::None:
       return false;
     case Mode::Bar:
-      return !drawn_ || done_ + 1 == steps_ || passed(pace_.terminal);
+      return !drawn_ || done == steps_ || passed(pace_.terminal);
     case Mode::Line:
       return true;
     case Mode::Log:
@@ -48,10 +48,8 @@ bool Progress::due() const {
 }
 
 void Progress::show(std::size_t done, const std::string& detail) {
-  done_ = done - 1;
-  const bool tell = due();
   done_ = done;
-  if (!tell) return;
+  if (!due(done)) return;
   const std::string count = steps_ == 0 ? fmt::format("{}", done_) : fmt::format("{}/{}", done_, steps_);
   since_drawn_.restart();
   if (mode_ != Mode::Bar) {

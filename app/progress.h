@@ -29,8 +29,8 @@ class Progress {
   void step(const std::string& detail) { show(done_ + 1, detail); }
   /// False: nothing is ever told.
   [[nodiscard]] bool tells() const { return mode_ != Mode::None; }
-  /// Whether the next step would be told of: what it takes to describe one may be saved otherwise.
-  [[nodiscard]] bool due() const;
+  /// Whether show(done) would tell: what it takes to describe a step may be saved otherwise.
+  [[nodiscard]] bool due(std::size_t done) const;
   /// `done` steps in all are done. A bar is redrawn at most every 50 ms, but for the last step.
   void show(std::size_t done, const std::string& detail);
 

@@ -63,11 +63,11 @@ TEST(Progress, AShorterLineWipesOutALongerOne) {
 
 TEST(Progress, IsDueWhereAStepWouldBeToldOf) {
   Progress silent("none", "frame", 2);
-  EXPECT_FALSE(silent.due());
+  EXPECT_FALSE(silent.due(1));
   Progress lines("line", "frame", 2);
-  EXPECT_TRUE(lines.due());
+  EXPECT_TRUE(lines.due(1));
   Progress log("auto", "frame", 2, Progress::Pace{0s, 1h});
-  EXPECT_FALSE(log.due());
+  EXPECT_FALSE(log.due(1));
 }
 
 }  // namespace

@@ -132,9 +132,9 @@ void RunControl::replay(std::span<const std::string> lines) {
   }
 }
 
-void RunControl::attend(std::chrono::milliseconds longest) {
+void RunControl::attend() {
   std::optional<InputLine> from;
-  while (const auto line = hear_line(session_.comm(), source_ ? &*source_ : nullptr, longest, from).line) {
+  while (const auto line = hear_line(session_.comm(), source_ ? &*source_ : nullptr, {}, from).line) {
     std::string answer;
     try {
       const std::string told = obey(*line);
@@ -144,8 +144,6 @@ void RunControl::attend(std::chrono::milliseconds longest) {
       answer = fmt::format("{}{} {} ({})\n", kRefused, static_cast<int>(error.code()), error.what(), error.hint());
     }
     if (from) source_->answer(*from, answer);
-    from.reset();
-    longest = {};
   }
 }
 

@@ -31,8 +31,8 @@ class RunControl {
   /// Collective. Does once more what an earlier job of this run was told, without telling anybody.
   void replay(std::span<const std::string> lines);
 
-  /// Collective. Carries out what was said, waiting for it at most `longest`.
-  void attend(std::chrono::milliseconds longest);
+  /// Collective. Carries out what was said by now; never waits.
+  void attend();
   [[nodiscard]] bool stops() const { return stops_; }
 
  private:

@@ -17,6 +17,7 @@
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
+#include "app/shell_line.h"
 #include "app/signals.h"
 #include "app/tradeoff_html.h"
 #include "app/tradeoff_measure.h"
@@ -44,7 +45,8 @@ std::vector<std::string> base_words(std::span<const std::string> args, const std
   static const std::set<std::string> own{
       "--vary", "--metric", "--reference", "--reference-spp", "--budget",    "--frames",     "--html",
       "--csv",  "--size",   "--progress",  "--hang-timeout",  "--limit-mem", "--limit-image"};
-  static const std::set<std::string> flags{"--json", "--resume", "--force", "--strict", "-q", "-v", "-vv"};
+  static const std::set<std::string> flags{"--json",    "--resume", "--force", "--strict", "--quiet",
+                                           "--verbose", "-q",       "-v",      "-vv"};
   std::vector<std::string> words;
   bool scene_seen = false;
   for (std::size_t i = 1; i < args.size(); ++i) {
@@ -223,8 +225,7 @@ class TradeoffCommand final : public Command {
   void finish(Session& session, const ReferencePicture& reference, const Rect& crop, const Globals& globals,
               const std::filesystem::path& state) {
     report_.scene = scene_;
-    report_.command = "hpr";
-    for (const std::string& word : globals.args) report_.command += " " + word;
+    report_.command = "hpr " + shell_line(globals.args);
     report_.machine = this_machine();
     report_.ranks = session.comm().size();
     report_.threads = session.threads();

@@ -60,17 +60,12 @@ class WallCommand final : public Command {
     add(app, make_wall_pattern_command());
     add(app, make_wall_import_command());
     add(app, make_wall_script_command());
-    CLI::App& run = *app.add_subcommand(std::string(run_->name()), std::string(run_->summary()));
-    run_->declare(run);
-    run.callback([this] {
-      runs_ = true;
-      action_ = [this](const Globals& globals) { return run_->run(globals); };
-    });
+    add(app, make_wall_run_command());
     for (auto& command : make_wall_remote_commands()) add(app, std::move(command));
   }
 
-  /// Only `run` draws; the rest reads a file and answers.
-  [[nodiscard]] bool collective() const override { return runs_; }
+  /// As what is asked for is.
+  [[nodiscard]] bool collective() const override { return collective_; }
   [[nodiscard]] ExitCode run(const Globals& globals) override { return action_(globals); }
 
  private:
@@ -80,7 +75,10 @@ class WallCommand final : public Command {
     others_.push_back(std::move(command));
     CLI::App& sub = *app.add_subcommand(std::string(its->name()), std::string(its->summary()));
     its->declare(sub);
-    sub.callback([this, its] { action_ = [its](const Globals& globals) { return its->run(globals); }; });
+    sub.callback([this, its] {
+      collective_ = its->collective();
+      action_ = [its](const Globals& globals) { return its->run(globals); };
+    });
   }
 
   CLI::App& add(CLI::App& app, const std::string& name, const std::string& summary) {
@@ -134,9 +132,8 @@ class WallCommand final : public Command {
   std::string heat_;
   std::string heat_by_ = "ms";
   bool json_ = false;
-  std::unique_ptr<Command> run_ = make_wall_run_command();
   std::vector<std::unique_ptr<Command>> others_;
-  bool runs_ = false;
+  bool collective_ = false;
   std::function<ExitCode(const Globals&)> action_;
 };
 

@@ -193,7 +193,7 @@ void WallDriver::resume(std::vector<std::string>& frames) {
 }
 
 bool WallDriver::obey() {
-  control_.attend(std::chrono::milliseconds(0));
+  control_.attend();
   return !control_.stops();
 }
 

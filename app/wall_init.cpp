@@ -1,12 +1,12 @@
 #include "app/wall_init.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <charconv>
 #include <cmath>
 
 #include "app/output.h"
+#include "app/shell_line.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/units.h"
@@ -74,7 +74,7 @@ class WallInitCommand final : public Command {
     }
     if (!size_.empty()) wall.tile_size_m = metres_pair("--tile-size-m", size_, false);
     if (!gap_.empty()) wall.gap_m = metres_pair("--gap-m", gap_, true);
-    wall.command = fmt::format("hpr {}", fmt::join(globals.args, " "));
+    wall.command = "hpr " + shell_line(globals.args);
     const std::string text = write_wall_template(wall);
     for (const WallFinding& finding : parse_wall(text, "the new wall").findings) {
       if (finding.error) throw Error(ExitCode::Usage, finding.what, finding.hint, finding.line);

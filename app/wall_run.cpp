@@ -17,7 +17,6 @@
 #include "app/progress.h"
 #include "app/run_journal.h"
 #include "app/signals.h"
-#include "app/terminal.h"
 #include "app/wall_driver.h"
 #include "app/wall_status.h"
 #include "cluster/collectives.h"
@@ -36,6 +35,11 @@
 
 namespace hpr {
 namespace {
+
+/// The file of the assembled wall; empty: none.
+std::filesystem::path assembled_file(const WallRun& run) {
+  return run.writes_files() ? std::filesystem::path(run.display.output) / "wall.png" : std::filesystem::path();
+}
 
 /// How well the target time was kept.
 void report_budget(const RunManifest& manifest) {
@@ -76,7 +80,7 @@ void write_results(const WallRun& run, const Wall& wall, const WallDriver& drive
                    std::span<const Image<Rgba8>> pictures) {
   if (run.writes_files() || !run.picture.empty()) {
     const std::vector<std::byte> picture = encode_png(draw_wall(wall, wall_picture(wall, kLargestPicture), pictures));
-    if (run.writes_files()) write_file_atomically(std::filesystem::path(run.display.output) / "wall.png", picture);
+    if (run.writes_files()) write_file_atomically(assembled_file(run), picture);
     if (!run.picture.empty()) write_file_atomically(run.picture, picture);
   }
   if (!run.manifest().empty()) write_file_atomically(run.manifest(), to_json(driver.manifest()));
@@ -153,7 +157,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   if (!run.picture.empty()) {
     fmt::print("{}\n", run.picture);
   } else if (run.writes_files()) {
-    fmt::print("{}\n", (std::filesystem::path(run.display.output) / "wall.png").string());
+    fmt::print("{}\n", assembled_file(run).string());
   } else if (!run.manifest().empty()) {
     fmt::print("{}\n", run.manifest().string());
   }
@@ -174,8 +178,8 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
     throw Error(ExitCode::Usage, "--explain writes to standard output, where the frames go",
                 "leave it out, or send the frames elsewhere");
   }
-  std::vector<std::string> results{run.picture, run.options.stats, run.manifest().string()};
-  if (run.writes_files()) results.push_back((std::filesystem::path(run.display.output) / "wall.png").string());
+  std::vector<std::string> results{run.picture, run.options.stats, run.manifest().string(),
+                                   assembled_file(run).string()};
   if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
   check_distinct(results);
   if (!run.picture.empty()) {
@@ -194,7 +198,7 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
     run.remote.refuse();
   }
   if (run.writes_files()) {
-    check_writable(std::filesystem::path(run.display.output) / "wall.png", globals.force);
+    check_writable(assembled_file(run), globals.force);
     check_writable(run.manifest(), globals.force);
   }
 }

@@ -148,7 +148,7 @@ class WallScriptCommand final : public Command {
       throw Error(ExitCode::Usage, "the displays of a script have no command to pipe to",
                   "use --show window, web, file or none");
     }
-    script.command = fmt::format("hpr {}", fmt::join(globals.args, " "));
+    script.command = "hpr " + shell_line(globals.args);
     const std::string text = write_slurm_script(load_wall(script.wall), script);
     write_or_print(text, output_, globals.force);
     return ExitCode::Done;

@@ -34,7 +34,7 @@ class WallStatus {
     ++done_;
     if (!progress_.tells()) return;
     frame_ms_.push_back(ms);
-    if (!progress_.due()) return progress_.show(done_, "");
+    if (!progress_.due(done_)) return;
     progress_.show(done_, describe_status(frame_ms_, frame, states()));
     frame_ms_.clear();
   }

@@ -1,11 +1,12 @@
 #include "core/secrets.h"
 
-#include <fmt/format.h>
 #include <sys/random.h>
 
 #include <array>
+#include <cstdint>
 
 #include "core/error.h"
+#include "core/hash.h"
 
 namespace hpr {
 
@@ -15,11 +16,9 @@ void fill_random(std::span<std::byte> bytes) {
 }
 
 std::string random_token() {
-  std::array<std::byte, 16> bytes{};
-  fill_random(bytes);
-  std::string token;
-  for (const std::byte byte : bytes) token += fmt::format("{:02x}", static_cast<unsigned>(byte));
-  return token;
+  std::array<std::uint64_t, 2> words{};
+  fill_random(std::as_writable_bytes(std::span(words)));
+  return hex16(words[0]) + hex16(words[1]);
 }
 
 bool same_token(std::string_view given, std::string_view token) {

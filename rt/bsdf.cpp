@@ -172,7 +172,6 @@ std::optional<Bsdf::Facet> Bsdf::facet(Lobe lobe, const glm::dvec3& to_light) co
 /// What the specular layer leaves to the diffuse lobe.
 double Bsdf::below(const glm::dvec3& to_light, double dielectric) const {
   if (!exact_) return 1.0 - dielectric;
-  if (all_mirror_) return 0.0;
   return view_enters_ * (1.0 - dielectric_fresnel(glm::dot(normal_, to_light)));
 }
 

@@ -9,17 +9,14 @@
 namespace hpr {
 namespace {
 
-PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, const Ray& ray,
-                      const SurfacePoint& surface, double share) {
+PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, const SurfacePoint& surface,
+                      double share) {
+  const View& view = *tile.view;
   PathPoint point;
   point.surface = surface;
   point.share = share;
-  point.throughput = glm::dvec3(share);
   point.media = tile.eye_media;
-  if (point.media.here != glm::dvec3(0.0)) {
-    point.throughput *= left_after(point.media.here, glm::distance(ray.origin, surface.position));
-  }
-  const View& view = *tile.view;
+  point.throughput = share * left_after(point.media.here, glm::distance(view.eye, surface.position));
   point.sampler = Sampler(pixel_stream({tile.settings.seed, job.number.frame}, view.screen_number,
                                        view.block.x0 + job.place.x0 + x, view.block.y0 + job.place.y0 + y),
                           job.number.sample);
@@ -51,7 +48,7 @@ class FirstPoints {
         }
         tile_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
         points_.push_back(
-            first_point(tile_, job_, x, y, ray, tile_.surfaces.meet(triangle, ray.origin, ray.direction), share));
+            first_point(tile_, job_, x, y, tile_.surfaces.meet(triangle, ray.origin, ray.direction), share));
       }
     }
   }
@@ -99,7 +96,7 @@ class FirstPoints {
       if (share >= kLeastThroughput) {
         const int x = static_cast<int>(pixel) % kTileSide;
         const int y = static_cast<int>(pixel) / kTileSide;
-        points_.push_back(first_point(tile_, job_, x, y, ray_of(x, y), surface, share));
+        points_.push_back(first_point(tile_, job_, x, y, surface, share));
       }
       left_[pixel] *= 1.0 - coverage;
       return left_[pixel] >= kLeastThroughput;

@@ -180,7 +180,7 @@ const PhotonMaps* Lighter::State::send_photons(const SampleNumber& number, Commu
 
 void Lighter::State::tell_of_cut_rays() {
   if (counts.cut == 0 || std::exchange(has_told, true)) return;
-  log::warning("{} rays of one sample passed {} surfaces that cover in part; they do not see what is behind",
+  log::warning("{} rays of one sample passed {} surfaces that cover in part; what is behind is not all seen",
                counts.cut, kMostPassed);
 }
 
@@ -304,8 +304,7 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
     return;
   }
   const PhotonMaps* const photons = state.send_photons(number, nullptr);
-  std::vector<Media> eyes;
-  for (const View& view : views) eyes.push_back(state.media.of_eye(view));
+  const std::vector<Media> eyes = state.media.of_eyes(views);
   parallel_for(state.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);

@@ -8,6 +8,8 @@
 #include <map>
 #include <span>
 
+#include "scene/boxes.h"
+
 namespace hpr {
 namespace {
 
@@ -21,25 +23,6 @@ bool is_solid(const Material& material) {
 bool is_absorber(const Material& material) {
   return is_solid(material) && std::isfinite(material.attenuation_distance) &&
          material.attenuation_color != glm::vec3(1.0F);
-}
-
-/// In the mesh's own coordinates. It has at least one position.
-Bounds box_of(const Mesh& mesh) {
-  glm::vec3 low = mesh.positions.front();
-  glm::vec3 high = low;
-  for (const glm::vec3& position : mesh.positions) {
-    low = glm::min(low, position);
-    high = glm::max(high, position);
-  }
-  return {glm::dvec3(low), glm::dvec3(high)};
-}
-
-Bounds placed(const Bounds& box, const glm::dmat4& to_world) {
-  const glm::dvec3 center(to_world * glm::dvec4(0.5 * (box.low + box.high), 1.0));
-  const glm::dvec3 half = 0.5 * (box.high - box.low);
-  glm::dvec3 reach(0.0);
-  for (int axis = 0; axis < 3; ++axis) reach += glm::abs(glm::dvec3(to_world[axis])) * half[axis];
-  return {center - reach, center + reach};
 }
 
 bool meets_line(const Bounds& box, const glm::dvec3& place) {
@@ -88,10 +71,10 @@ MediumFinder::MediumFinder(const Scene& scene) : scene_(scene) {
     const Material& material = scene.materials[mesh.material];
     // What is flat beyond measure bounds nothing.
     const glm::dmat4 from_world = glm::inverse(instance.to_world);
-    if (!is_solid(material) || mesh.positions.empty() || !std::isfinite(from_world[0][0])) continue;
-    if (!of_mesh.contains(instance.mesh)) of_mesh.emplace(instance.mesh, box_of(mesh));
+    if (!is_solid(material) || mesh.triangles.empty() || !std::isfinite(from_world[0][0])) continue;
+    if (!of_mesh.contains(instance.mesh)) of_mesh.emplace(instance.mesh, mesh_bounds(mesh));
     const Solid& solid =
-        solids_.emplace_back(Solid{i, placed(of_mesh.at(instance.mesh), instance.to_world), from_world});
+        solids_.emplace_back(Solid{i, transformed(instance.to_world, of_mesh.at(instance.mesh)), from_world});
     if (!is_absorber(material)) continue;
     Bounds& box = of_material.try_emplace(mesh.material, solid.box).first->second;
     box.low = glm::min(box.low, solid.box.low);
@@ -148,8 +131,19 @@ Media MediumFinder::at(const glm::dvec3& place) const {
   return {found[0], found[1]};
 }
 
-Media MediumFinder::of_eye(const View& view) const {
-  return view.orthographic ? Media{} : at(view.eye);
+std::vector<Media> MediumFinder::of_eyes(std::span<const View> views) const {
+  std::vector<Media> media;
+  for (const View& view : views) {
+    const auto same = [&](const View& other) {
+      return other.eye == view.eye && other.orthographic == view.orthographic;
+    };
+    const auto before = views.first(media.size());
+    const auto known = static_cast<std::size_t>(std::ranges::find_if(before, same) - before.begin());
+    const bool found = known < media.size();
+    const Media own = found ? media[known] : view.orthographic ? Media{} : at(view.eye);
+    media.push_back(own);
+  }
+  return media;
 }
 
 }  // namespace hpr

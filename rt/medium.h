@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "rt/material_point.h"
@@ -67,8 +68,9 @@ class MediumFinder {
   /// nothing. Exact up to double rounding, but for places on a wall.
   [[nodiscard]] Media at(const glm::dvec3& place) const;
 
-  /// What the eye lies in. An orthographic view has no such place: its rays start in what absorbs nothing.
-  [[nodiscard]] Media of_eye(const View& view) const;
+  /// What the eye of each view lies in, looked for once where they share it. An orthographic view has no such place:
+  /// its rays start in what absorbs nothing.
+  [[nodiscard]] std::vector<Media> of_eyes(std::span<const View> views) const;
 
  private:
   struct Solid {

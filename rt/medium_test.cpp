@@ -224,9 +224,9 @@ TEST(Medium, FindsTheSolidsAPlaceLiesIn) {
   expect_at({100, 0, 0}, 0.0, 0.0);
   expect_at(glm::dvec3(std::numeric_limits<double>::quiet_NaN()), 0.0, 0.0);
   View view;
-  EXPECT_NEAR(finder.of_eye(view).here.g, absorption, 1e-6);
+  EXPECT_NEAR(finder.of_eyes({&view, 1}).front().here.g, absorption, 1e-6);
   view.orthographic = true;
-  EXPECT_EQ(finder.of_eye(view), Media{});
+  EXPECT_EQ(finder.of_eyes({&view, 1}).front(), Media{});
 }
 
 TEST(Medium, IsNotLookedForWhereNothingAbsorbs) {

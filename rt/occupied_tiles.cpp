@@ -8,6 +8,8 @@
 #include <glm/vec4.hpp>
 #include <limits>
 
+#include "scene/boxes.h"
+
 namespace hpr {
 namespace {
 
@@ -46,13 +48,7 @@ Rect pixels_of(const View& view, const glm::dmat4& clip, const Bounds& box) {
 std::vector<Bounds> mesh_boxes(const Scene& scene) {
   std::vector<Bounds> boxes;
   for (const Mesh& mesh : scene.meshes) {
-    Bounds& box = boxes.emplace_back();
-    if (mesh.positions.empty()) continue;
-    box = {glm::dvec3(mesh.positions.front()), glm::dvec3(mesh.positions.front())};
-    for (const glm::vec3& position : mesh.positions) {
-      box.low = glm::min(box.low, glm::dvec3(position));
-      box.high = glm::max(box.high, glm::dvec3(position));
-    }
+    boxes.push_back(mesh.triangles.empty() ? Bounds{} : mesh_bounds(mesh));
   }
   return boxes;
 }
@@ -67,13 +63,8 @@ std::vector<std::uint8_t> occupied_tiles(const Scene& scene, const RayScene& ray
   const glm::dvec3 margin(kRounding / rays.space().scale);
   for (const RayGeometry& geometry : rays.geometries()) {
     const Instance& instance = scene.instances[geometry.instance];
-    const Bounds& box = boxes[instance.mesh];
-    const glm::dmat3 linear(instance.to_world);
-    const glm::dvec3 center = glm::dvec3(instance.to_world * glm::dvec4(0.5 * (box.low + box.high), 1.0));
-    const glm::dvec3 half = 0.5 * (box.high - box.low);
-    const glm::dvec3 reach =
-        glm::abs(linear[0]) * half.x + glm::abs(linear[1]) * half.y + glm::abs(linear[2]) * half.z + margin;
-    const Rect pixels = pixels_of(view, clip, {center - reach, center + reach});
+    const Bounds world = transformed(instance.to_world, boxes[instance.mesh]);
+    const Rect pixels = pixels_of(view, clip, {world.low - margin, world.high + margin});
     for (int y = pixels.y0 / kTileSide * kTileSide; y < pixels.y1; y += kTileSide) {
       for (int x = pixels.x0 / kTileSide * kTileSide; x < pixels.x1; x += kTileSide) {
         occupied[layout.tile_at(screen, x, y) - run.first] = 1;

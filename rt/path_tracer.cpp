@@ -141,8 +141,7 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
   for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
 
   State& state = *state_;
-  std::vector<Media> eyes;
-  for (const View& view : views) eyes.push_back(state.media.of_eye(view));
+  const std::vector<Media> eyes = state.media.of_eyes(views);
   parallel_for(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);

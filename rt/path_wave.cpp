@@ -46,28 +46,31 @@ bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double squee
 }
 
 struct Scattered {
-  glm::dvec3 value{0.0};     ///< f, of all lobes with more than one direction
-  glm::dvec3 followed{0.0};  ///< of those that the passes follow
-  double pdf = 0.0;          ///< of choosing such a lobe, and in it this direction
+  Scattering lobes;
+  glm::dvec3 value{0.0};  ///< f, of all lobes with more than one direction
+  double pdf = 0.0;       ///< of choosing such a lobe, and in it this direction
 };
 
-glm::dvec3 share_of(const glm::dvec3& part, const glm::dvec3& whole) {
-  glm::dvec3 share(0.0);
-  for (int c = 0; c < 3; ++c) share[c] = whole[c] > 0.0 ? part[c] / whole[c] : 0.0;
-  return share;
-}
-
-Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction,
-                   double glossy_cutoff) {
-  Scattered scattered;
-  const Scattering all = bsdf.scattering(direction);
+Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
+  Scattered scattered{.lobes = bsdf.scattering(direction)};
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
     if (!(chances[i] > 0.0)) continue;
-    scattered.value += all.value[i];
-    if (is_followed(bsdf, kLobes[i], glossy_cutoff)) scattered.followed += all.value[i];
-    scattered.pdf += chances[i] * all.pdf[i];
+    scattered.value += scattered.lobes.value[i];
+    scattered.pdf += chances[i] * scattered.lobes.pdf[i];
   }
   return scattered;
+}
+
+/// What share of the scattered light comes by lobes that the passes follow.
+glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances,
+                          const Scattered& scattered, double glossy_cutoff) {
+  glm::dvec3 followed(0.0);
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    if (chances[i] > 0.0 && is_followed(bsdf, kLobes[i], glossy_cutoff)) followed += scattered.lobes.value[i];
+  }
+  glm::dvec3 share(0.0);
+  for (int c = 0; c < 3; ++c) share[c] = scattered.value[c] > 0.0 ? followed[c] / scattered.value[c] : 0.0;
+  return share;
 }
 
 std::size_t pick(const std::array<double, kLobes.size()>& chances, double u) {
@@ -134,11 +137,11 @@ void PathWave::trace_paths() {
 
 void PathWave::miss(const Path& path) {
   // A background is a backdrop, to be looked at as unlit surfaces are: no light.
+  const glm::dvec3 light = shared_.lights.environment(path.direction);
   if (!shared_.scene.environment) {
-    radiance_[path.pixel] += path.throughput * path.followed * shared_.lights.environment(path.direction);
+    radiance_[path.pixel] += path.throughput * path.followed * light;
     return;
   }
-  const glm::dvec3 light = shared_.lights.environment(path.direction);
   double weight = 1.0;
   if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
     const double by_light = shared_.lights.environment_pdf_any(path.from, path.from_normal, path.direction);
@@ -211,11 +214,11 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
     path.throughput *= sample->weight / chances[chosen];
     path.pdf = 0.0;
   } else {
-    const Scattered scattered = evaluate(bsdf, chances, sample->direction, shared_.settings.glossy_cutoff);
+    const Scattered scattered = evaluate(bsdf, chances, sample->direction);
     if (!(scattered.pdf > 0.0)) return;
     const double cosine = std::abs(glm::dot(material.normal, sample->direction));
     path.throughput *= scattered.value * (cosine / scattered.pdf);
-    path.followed *= share_of(scattered.followed, scattered.value);
+    path.followed *= followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
     path.pdf = scattered.pdf;
   }
   if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
@@ -240,7 +243,7 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   if (!light || light->weight == glm::dvec3(0.0)) return;
   const Technique technique = shared_.settings.technique;
   if (technique == Technique::Surfaces && light->pdf > 0.0) return;
-  const Scattered scattered = evaluate(bsdf, chances, light->to_light, shared_.settings.glossy_cutoff);
+  const Scattered scattered = evaluate(bsdf, chances, light->to_light);
   if (scattered.value == glm::dvec3(0.0)) return;
   double weight = std::abs(glm::dot(material.normal, light->to_light));
   if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);

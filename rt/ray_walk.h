@@ -15,8 +15,8 @@
 
 namespace hpr {
 
-/// Surfaces of partial coverage that light is followed through in a row, by the passes and by the reference. Whatever
-/// is met past them is not there.
+/// Surfaces of partial coverage that light is followed through in a row, by the passes and by the reference. Past
+/// them the passes see what covers wholly, the reference and photons nothing.
 inline constexpr int kMostPassed = 1000;
 
 /// Counts a surface that a ray has passed, and came `gained` metres farther by it; false when it is one too many. What

@@ -80,20 +80,13 @@ def turned(pixels, width, height):
     return bytes(result)
 
 
-def rgba(path):
-    width, height, values = png.decode(path.read_bytes(), path)
-    if len(values) == 3 * width * height:
-        values = b"".join(bytes(values[i:i + 3]) + b"\xff" for i in range(0, len(values), 3))
-    return width, height, bytes(values)
-
-
 def check_panels(folder):
     (folder / "turned.toml").write_text(TURNED)
     made = run(folder, "wall", "pattern", "turned.toml", "-o", "pattern")
     expect(made.returncode == 0, made.stderr)
-    width, height, upright = rgba(folder / "pattern" / "wall-r0c1.png")
+    width, height, upright = png.read(folder / "pattern" / "wall-r0c1.png")
     expect((width, height) == (320, 200), f"{width} x {height}")
-    expect(rgba(folder / "pattern" / "wall-r0c1.panel.png") == (200, 320, turned(upright, 320, 200)), "the panel's picture")
+    expect(png.read(folder / "pattern" / "wall-r0c1.panel.png") == (200, 320, turned(upright, 320, 200)), "the panel's picture")
     hosts = run(folder, "wall", "init", "--cols", "4", "--rows", "1", "--hosts", "a,b", "--tile-pixels", "64x48", "-o", "hosts.toml")
     one = run(folder, "wall", "pattern", "hosts.toml", "--host", "b", "-o", "one")
     expect(hosts.returncode == 0 and one.returncode == 0, one.stderr)
@@ -109,7 +102,7 @@ def check_panels(folder):
 
 def bars(path):
     """The frame's number as the bars have it, the highest bit at the left."""
-    width, height, pixels = rgba(path)
+    width, height, pixels = png.read(path)
     left, wide, y = width // 10, int(0.8 * width) // 16, int(0.65 * height) + int(0.05 * height) // 2
     bits = [pixels[4 * (y * width + left + wide * i + wide // 2 + 1)] for i in range(16)]
     if any(bit not in (0, 255) for bit in bits):

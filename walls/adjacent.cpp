@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "walls/geometry.h"
+#include "walls/stereo.h"
+
 namespace hpr {
 namespace {
 
@@ -10,7 +13,7 @@ namespace {
 glm::dvec3 middle_of(const WallScreen& screen, Side side) {
   const glm::dvec3 right = screen.lower_right - screen.lower_left;
   const glm::dvec3 up = screen.upper_left - screen.lower_left;
-  const glm::dvec3 center = screen.lower_left + 0.5 * (right + up);
+  const glm::dvec3 center = screen_center(screen);
   switch (side) {
     case Side::Left:
       return center - 0.5 * right;
@@ -27,10 +30,6 @@ glm::dvec3 middle_of(const WallScreen& screen, Side side) {
 Side opposite(Side side) {
   constexpr std::array kOpposite{Side::Right, Side::Left, Side::Down, Side::Up};
   return kOpposite.at(static_cast<std::size_t>(side));
-}
-
-bool for_other_eyes(const WallScreen& a, const WallScreen& b) {
-  return a.eye != Eye::Both && b.eye != Eye::Both && a.eye != b.eye;
 }
 
 }  // namespace

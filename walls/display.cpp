@@ -23,12 +23,6 @@ OrbitInput& OrbitInput::operator+=(const OrbitInput& other) {
   return *this;
 }
 
-std::vector<const Image<Rgba8>*> pictures_by_screen(const Wall& wall, const WallFrame& frame) {
-  std::vector<const Image<Rgba8>*> pictures(wall.screens.size(), nullptr);
-  for (const ScreenPicture& picture : frame.screens) pictures.at(picture.screen) = &picture.image;
-  return pictures;
-}
-
 const std::vector<DisplayKind>& display_kinds() {
   static const std::vector<DisplayKind> kinds{
       {.name = "file", .monitors = true, .make = make_file_display, .check = check_file_display},

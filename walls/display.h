@@ -43,9 +43,6 @@ struct ScreenCost {
   std::uint64_t bytes = 0;  ///< handed over
 };
 
-/// Per screen of the wall its picture; null where the frame has none.
-[[nodiscard]] std::vector<const Image<Rgba8>*> pictures_by_screen(const Wall& wall, const WallFrame& frame);
-
 /// How the viewer moved the camera about what it looks at, summed over a while.
 struct OrbitInput {
   double turn_right = 0.0;  ///< radians by which the scene turns to the right

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "image/image_parts.h"
 #include "walls/canvas.h"
 
 namespace hpr {
@@ -27,9 +28,7 @@ Rect all_bars(Size size) {
 }
 
 void fill(Image<Rgba8>& image, const Rect& rect, Rgba8 color) {
-  for (int y = rect.y0; y < rect.y1; ++y)
-    std::ranges::fill(image.row(y).subspan(static_cast<std::size_t>(rect.x0), static_cast<std::size_t>(rect.width())),
-                      color);
+  paste(Image<Rgba8>({rect.width(), rect.height()}, color), rect.x0, rect.y0, image);
 }
 
 }  // namespace
@@ -56,8 +55,7 @@ void draw_frame_counter(Image<Rgba8>& pattern, std::uint64_t frame) {
   PixelCanvas canvas(size);
   canvas.fill({0.0, 0.0}, {size.width, size.height}, kBlack);
   canvas.text({0.5 * size.width, 0.5 * size.height}, fmt::format("frame {}", frame), 0.8 * size.height, kWhite);
-  const Image<Rgba8> number = canvas.image();
-  for (int y = 0; y < size.height; ++y) std::ranges::copy(number.row(y), pattern.row(all.y1 + y).begin() + all.x0);
+  paste(canvas.image(), all.x0, all.y1, pattern);
 }
 
 }  // namespace hpr

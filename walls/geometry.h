@@ -43,10 +43,10 @@ struct WallExtent {
 /// With a viewer in the file the wall is a window into the scene: the first viewer's head at rest is at the camera's
 /// eye, wall axes are the camera's axes, a metre is a unit of the scene, and heads that move move before that window.
 /// Without one, a flat wall shows what the camera sees: the viewer is placed so that the wall's height subtends the
-/// camera's vertical angle. An orthographic camera shows its half height on half the wall's height, wherever the heads
-/// are. `bounds` (of the scene) choose the near plane where neither wall nor camera give one. An eye nearer to a
-/// screen's plane than clamp_distance_m, or behind it, is moved back for that screen.
-/// A screen with a position map is looked at through its points, by an eye that stays where it is.
+/// camera's vertical angle. An orthographic camera's box is shown whole, and more where the wall has another shape,
+/// wherever the heads are. `bounds` (of the scene) choose the near plane where neither wall nor camera give one. An eye
+/// nearer to a screen's plane than clamp_distance_m, or behind it, is moved back for that screen. A screen with a
+/// position map is looked at through its points, by an eye that stays where it is.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
                                            const Bounds& bounds);
 /// With heads at rest.

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/hash.h"
+#include "walls/budget_json.h"
 
 namespace hpr {
 namespace {
@@ -30,13 +31,7 @@ Json json_of(const FrameRecord& frame) {
     screens.back()["state"] = to_string(screen.state);
   }
   Json record{{"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
-  if (frame.budget) {
-    record["budget"] = Json{{"target_ms", frame.budget->target_ms},
-                            {"resolution_scale", frame.budget->resolution_scale},
-                            {"samples", frame.budget->samples},
-                            {"given_up", frame.budget->given_up},
-                            {"resting", frame.budget->resting}};
-  }
+  if (frame.budget) record["budget"] = budget_json(*frame.budget);
   // Apart from the screens: those are the same from run to run.
   for (const ScreenRecord& screen : frame.screens) {
     if (screen.rank < 0) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/check.h"
 #include "image/enlarge.h"
@@ -140,7 +141,7 @@ void ScanOut::read_warp(const Wall& wall, std::size_t screen) {
 Image<Rgba8> ScanOut::apply(const Image<Rgba8>& picture) const {
   Image<Rgba8> sent = sources_.size().area() > 0 ? warped(picture, sources_, 1) : picture;
   for (int channel = 0; shades_ && channel < 3; ++channel) shade(sent, channel);
-  if (parts_.size() < 2) return mounted(sent);
+  if (parts_.size() < 2) return mounted(std::move(sent));
   // Each eye's picture is turned in its place: left stays left.
   Image<Rgba8> joined = sent;
   for (const Rect& place : parts_) {
@@ -149,9 +150,10 @@ Image<Rgba8> ScanOut::apply(const Image<Rgba8>& picture) const {
   return joined;
 }
 
-Image<Rgba8> ScanOut::mounted(const Image<Rgba8>& picture) const {
-  const Image<Rgba8> turned = turn_clockwise(picture, rotate_);
-  return mirror_ == Mirror::None ? turned : mirrored(turned, mirror_);
+Image<Rgba8> ScanOut::mounted(Image<Rgba8> picture) const {
+  if (rotate_ != 0) picture = turn_clockwise(picture, rotate_);
+  if (mirror_ != Mirror::None) picture = mirrored(picture, mirror_);
+  return picture;
 }
 
 void ScanOut::shade(Image<Rgba8>& picture, int channel) const {

@@ -31,7 +31,7 @@ class ScanOut {
 
  private:
   /// A picture as its panel is mounted.
-  [[nodiscard]] Image<Rgba8> mounted(const Image<Rgba8>& picture) const;
+  [[nodiscard]] Image<Rgba8> mounted(Image<Rgba8> picture) const;
   void read_blend(const Wall& wall, std::size_t screen);
   void read_warp(const Wall& wall, std::size_t screen);
   void shade(Image<Rgba8>& picture, int channel) const;

@@ -88,6 +88,27 @@ TEST(ScanOut, ColoursFollowTheFormulaPerChannel) {
   EXPECT_NEAR(panel_level(color, 2, 0.1, 1.0), std::pow(encode_srgb(0.2F), 2.0), 1e-6);
 }
 
+TEST(ScanOut, PanelsAreSentWhatTheFormulaSays) {
+  Wall wall = load_wall("1x1@256x1");
+  PanelColor& color = wall.screens.front().color;
+  color.gain = {0.5, 1.0, 1.7};
+  color.black = {0.1, 0.0, 0.02};
+  color.gamma = {1.0, 2.0, 0.6};
+  Image<Rgba8> ramp({256, 1});
+  for (int x = 0; x < 256; ++x) {
+    const auto level = static_cast<std::uint8_t>(x);
+    ramp.at(x, 0) = {level, level, level, 255};
+  }
+  const Image<Rgba8> sent = ScanOut(wall, 0).apply(ramp);
+  for (int x = 0; x < 256; ++x) {
+    const auto light = static_cast<double>(srgb_to_linear(static_cast<std::uint8_t>(x)));
+    const auto wanted = [&](int channel) { return std::lround(255.0 * panel_level(color, channel, light, 1.0)); };
+    EXPECT_EQ(sent.at(x, 0).r, wanted(0)) << x;
+    EXPECT_EQ(sent.at(x, 0).g, wanted(1)) << x;
+    EXPECT_EQ(sent.at(x, 0).b, wanted(2)) << x;
+  }
+}
+
 TEST(ScanOut, APanelWithPlainColoursIsSentTheSameBits) {
   const Wall wall = parsed(
       "hpr_wall = 1\n[[surfaces]]\n[surfaces.grid]\ncolumns = 1\nrows = 1\ntile_pixels = [256, 2]\ntile_size_m = "

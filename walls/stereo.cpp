@@ -13,6 +13,10 @@ bool puts_two_on_one(StereoMode mode) {
 
 }  // namespace
 
+bool for_other_eyes(const WallScreen& a, const WallScreen& b) {
+  return a.eye != Eye::Both && b.eye != Eye::Both && a.eye != b.eye;
+}
+
 std::vector<ScreenEye> screen_eyes(const Wall& wall) {
   std::vector<ScreenEye> pictures;
   for (std::size_t i = 0; i < wall.screens.size(); ++i) {

@@ -17,6 +17,9 @@ struct ScreenEye {
   bool operator==(const ScreenEye&) const = default;
 };
 
+/// Whether each of the two screens is for an eye of its own.
+[[nodiscard]] bool for_other_eyes(const WallScreen& a, const WallScreen& b);
+
 /// The pictures a wall needs, screen after screen: one each, but the left and then the right eye's of screens for both
 /// where the stereo mode puts two pictures on one panel. Side by side and above each other each has half of the
 /// screen's pixels, the left (upper) one the smaller half.

@@ -148,7 +148,7 @@ const BadLine kBadLines[] = {
     {"CalledWall", 12,
      "  { id = \"wall\", window = \"w1\", pixels = [64, 36], corners_m = { ll = [2, 0, 0], lr = [3.6, 0, 0], ul = [2, "
      "0.9, 0] } },",
-     "t.toml:12:3: a screen must not be called \"wall\"", "wall.png"},
+     "t.toml:12:3: a picture must not be called \"wall\"", "wall.png"},
     {"WindowTooSmall", 5, "  { id = \"w0\", node = \"n0\", rank = 0, rect = [0, 0, 64, 35] },",
      "t.toml:11:3: screen \"a\" needs 64 x 36 pixels at (0, 0) of window \"w0\", which has 64 x 35", "that size"},
     {"Skewed", 12,

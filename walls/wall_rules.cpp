@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/names.h"
+#include "walls/stereo.h"
 #include "walls/wall_draft.h"
 #include "walls/wall_file.h"
 
@@ -234,8 +235,7 @@ class Linker {
         const DraftScreen& a = draft_.screens[j];
         const DraftScreen& b = draft_.screens[i];
         if (!a.has_corners || !b.has_corners || a.screen.id == b.screen.id) continue;
-        const bool an_eye_each = a.screen.eye != Eye::Both && b.screen.eye != Eye::Both && a.screen.eye != b.screen.eye;
-        if (an_eye_each || a.screen.warp.points || b.screen.warp.points) continue;
+        if (for_other_eyes(a.screen, b.screen) || a.screen.warp.points || b.screen.warp.points) continue;
         const double near_enough = 1e-6 * screen_width(a.screen);
         const bool same = glm::distance(a.screen.lower_left, b.screen.lower_left) < near_enough &&
                           glm::distance(a.screen.lower_right, b.screen.lower_right) < near_enough &&
@@ -272,7 +272,7 @@ class Linker {
 
 void check_file_name(const std::string& id, const TextPlace& place, Findings& findings) {
   if (id == "wall") {
-    findings.error(place, "a screen must not be called \"wall\"", "wall.png is the picture of the whole wall");
+    findings.error(place, "a picture must not be called \"wall\"", "wall.png is the picture of the whole wall");
   } else if (id.ends_with(".panel")) {
     findings.error(place, fmt::format("\"{}\" ends as the pictures of panels do", id),
                    "what a turned panel is sent is in SCREEN.panel.png: leave out the .panel");

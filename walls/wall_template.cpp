@@ -127,7 +127,8 @@ std::string windows_of_grid(const WallTemplate& wall) {
   for (int row = 0; row < wall.rows; ++row) {
     text += "  ";
     for (int column = 0; column < wall.columns; ++column) {
-      text += fmt::format("\"w{}-{}\",{}", row, column, column + 1 < wall.columns ? " " : "\n");
+      const auto screen = static_cast<std::size_t>(row * wall.columns + column);
+      text += fmt::format("\"{}\",{}", window_id(wall, screen), column + 1 < wall.columns ? " " : "\n");
     }
   }
   return text + "]\n";

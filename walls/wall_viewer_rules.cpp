@@ -105,7 +105,7 @@ void check_stereo(const WallDraft& draft, Findings& findings) {
 }
 
 void check_monitors(WallDraft& draft, Findings& findings) {
-  std::set<std::string> taken{"wall"};
+  std::set<std::string> taken;
   for (const DraftScreen& screen : draft.screens) taken.insert(screen.screen.id);
   std::vector<std::string> surfaces;
   for (const DraftSurface& surface : draft.surfaces) surfaces.push_back(surface.id);

@@ -9,6 +9,8 @@
 #include <functional>
 #include <glm/common.hpp>
 #include <optional>
+#include <span>
+#include <tuple>
 
 #include "core/check.h"
 #include "core/error.h"

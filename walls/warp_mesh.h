@@ -3,10 +3,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <glm/vec2.hpp>
-#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "walls/warped_picture.h"

@@ -4,9 +4,9 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <glm/vec3.hpp>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 

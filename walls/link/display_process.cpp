@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
+#include "image/image_parts.h"
 #include "walls/canvas.h"
 
 namespace hpr {
@@ -46,9 +47,8 @@ Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& words) {
   PixelCanvas canvas({width, height});
   canvas.fill({0.0, 0.0}, {width, height}, kBadgeColor);
   canvas.text({width / 2.0, height / 2.0}, words, text, kBadgeText);
-  const Image<Rgba8> badge = canvas.image();
   Image<Rgba8> result = picture;
-  for (int y = 0; y < height; ++y) std::ranges::copy(badge.row(y), result.row(y).begin());
+  paste(canvas.image(), 0, 0, result);
   return result;
 }
 

@@ -71,7 +71,7 @@ void make_private_folder(const std::filesystem::path& folder) {
   }
   // In /tmp others may write, but not touch what is ours.
   const bool owner_is_trusted = found.st_uid == ::geteuid() || found.st_uid == 0;
-  const bool others_may_write = (found.st_mode & 002U) != 0 && (found.st_mode & S_ISVTX) == 0;
+  const bool others_may_write = (found.st_mode & 022U) != 0 && (found.st_mode & S_ISVTX) == 0;
   if (!owner_is_trusted || others_may_write) {
     throw Error(ExitCode::Io, fmt::format("others may change the folder '{}'", folder.string()),
                 "take it from them (chown, chmod 0700), or name another place with --listen");

@@ -1,0 +1,29 @@
+#include "scene/boxes.h"
+
+#include <glm/common.hpp>
+#include <limits>
+
+namespace hpr {
+
+Bounds mesh_bounds(const Mesh& mesh) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Bounds bounds{glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const glm::dvec3 p(mesh.positions[triangle[corner]]);
+      bounds.low = glm::min(bounds.low, p);
+      bounds.high = glm::max(bounds.high, p);
+    }
+  }
+  return bounds;
+}
+
+Bounds transformed(const glm::dmat4& matrix, const Bounds& box) {
+  const glm::dvec3 half = 0.5 * (box.high - box.low);
+  const glm::dvec3 center = glm::dvec3(matrix * glm::dvec4(0.5 * (box.low + box.high), 1.0));
+  glm::dvec3 reach(0.0);
+  for (int axis = 0; axis < 3; ++axis) reach += glm::abs(glm::dvec3(matrix[axis])) * half[axis];
+  return {center - reach, center + reach};
+}
+
+}  // namespace hpr
