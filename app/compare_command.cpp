@@ -134,7 +134,7 @@ class CompareCommand final : public Command {
     if (!picture_.empty() && !picture_.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
     }
-    const std::vector<std::string> results{csv_, html_, picture_, raw_};
+    const std::vector<std::string> results{csv_, html_, picture_, raw_, globals.trace};
     check_distinct(results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
@@ -289,6 +289,7 @@ class CompareCommand final : public Command {
     add("--ranks", std::to_string(ranks));
     if (last && !picture_.empty()) add("-o", picture_);
     if (last && !raw_.empty()) add("--raw", raw_);
+    if (last && !globals.trace.empty()) add("--trace", globals.trace);
     add("--backend", globals.backend);
     if (globals.device >= 0) add("--device", std::to_string(globals.device));
     if (globals.threads > 0) add("--threads", std::to_string(globals.threads));

@@ -10,6 +10,7 @@
 #include "cluster/counting_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
+#include "core/trace.h"
 #include "image/image_parts.h"
 
 /// Measuring one strategy on one frame, whatever its pixels are.
@@ -52,8 +53,12 @@ Sample measure_frame(CountingCommunicator& comm, Assembler& assembler, TileLayer
   const std::size_t bytes_before = comm.bytes_sent();
   const std::size_t messages_before = comm.messages_sent();
   const double start = comm.seconds();
-  const Composited mine = composite(shown_by);
+  const Composited mine = [&] {
+    const trace::Span span("composite");
+    return composite(shown_by);
+  }();
   const double composited = comm.seconds();
+  const trace::Span span("collect");
   if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, shown_by);
   const Sample sample{(composited - start) * 1e3, (comm.seconds() - composited) * 1e3, comm.bytes_sent() - bytes_before,
                       comm.messages_sent() - messages_before};

@@ -1,6 +1,7 @@
 #include "app/frame.h"
 
 #include "core/stopwatch.h"
+#include "core/trace.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
 //
@@ -37,6 +38,7 @@ void prepare(Session& session, const FramePlan& plan) {
 
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys) {
   Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
+  const trace::Span span("raster");
   for (std::size_t screen = 0; screen < views.size(); ++screen) {
     const std::vector<Rect> parts = parts_of(plan, screen);
     if (!parts.empty()) rasterizer.draw(views[screen], screen, parts, keys);
@@ -46,6 +48,7 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
                               TileLayer<Key>& keys) {
   PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays.build);
+  const trace::Span span("primary rays");
   PrimaryRayStats stats;
   for (std::size_t screen = 0; screen < views.size(); ++screen) {
     const std::vector<Rect> parts = parts_of(plan, screen);
@@ -61,6 +64,7 @@ namespace {
 /// Merges the group's layers; returns the tiles this rank ends up owning.
 std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {
   if (plan.mine.group.size() == 1) return plan.tiles;
+  const trace::Span span("composite");
   Compositor& compositor = session.compositor(plan.strategy, plan.mine.group);
   return compositor.composite(session.group(plan.mine.group), keys, plan.tiles).tiles;
 }
@@ -115,6 +119,7 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
 
 Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
                  const FrameSample& sample) {
+  const trace::Span span("sample", "number", sample.number.sample);
   FrameTimes taken;
   Stopwatch watch;
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
@@ -127,8 +132,12 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   taken.primary_ms = watch.ms();
 
   const bool lights = plan.lit || plan.shading == Shading::Local;
-  if (lights) session.lighter(plan.rays).send_photons(session.comm(), sample.number);
+  if (lights) {
+    const trace::Span photons("photons");
+    session.lighter(plan.rays).send_photons(session.comm(), sample.number);
+  }
   if (plan.shading == Shading::Local) {
+    const trace::Span shading("light");
     shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
   }
 
@@ -140,6 +149,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   if (plan.shading == Shading::Local) {
     unpack_colors(keys, frame.owned, session.scene().background, frame.radiance);
   } else if (plan.lit) {
+    const trace::Span light("light");
     session.lighter(plan.rays).light(views, keys, frame.owned, frame.aovs.output(frame.radiance), sample.number);
     mark_rank(session, frame);
   }

@@ -16,6 +16,8 @@
 #include "app/knobs.h"
 #include "app/launcher.h"
 #include "app/report_error.h"
+#include "app/trace_file.h"
+#include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"
 
@@ -51,6 +53,9 @@ void declare_globals(CLI::App& app, Globals& globals) {
   group(app.add_option("--limit-image", globals.limit_image, "refuse pictures larger than this, e.g. 8192x8192"));
   group(app.add_option("--hang-timeout", globals.hang_timeout, "longest wait for another rank, e.g. 30s"));
   group(app.add_flag("--force", globals.force, "overwrite files"));
+  group(app.add_option("--trace", globals.trace,
+                       "write what ranks and threads did when, as chrome://tracing and Perfetto show it")
+            ->type_name("FILE.json"));
 }
 
 std::vector<std::string> names_of(const std::vector<std::unique_ptr<Command>>& commands) {
@@ -171,7 +176,9 @@ ExitCode run(const std::vector<std::string>& words) {
   (void)globals.hang_limit();
   for (const auto& command : commands) {
     if (!app.got_subcommand(std::string(command->name()))) continue;
-    return command->collective() || launched_rank() == 0 ? command->run(globals) : ExitCode::Done;
+    if (launched_rank() == 0 && !globals.trace.empty()) check_writable(globals.trace, globals.force);
+    if (command->collective()) return command->run(globals);
+    return launched_rank() == 0 ? traced_alone(globals, [&] { return command->run(globals); }) : ExitCode::Done;
   }
   return ExitCode::Usage;
 }

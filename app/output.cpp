@@ -165,6 +165,8 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
         {"refraction", stats.rays.refraction},
         {"ambient-occlusion", stats.rays.ambient_occlusion},
         {"photon", stats.rays.photon}}},
+      {"rays_cut", stats.rays.cut},
+      {"rays_invalid", stats.rays.invalid},
       {"not_finite", not_finite_json(stats.rays)},
       {"bytes_sent", stats.bytes_sent},
       {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},

@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/parallel.h"
+#include "core/trace.h"
 #include "image/enlarge.h"
 
 namespace hpr {
@@ -106,6 +107,7 @@ std::vector<ExrLayer> CollectedPicture::exr_layers() const {
 }
 
 void CollectedPicture::write(const std::string& scene_name) const {
+  const trace::Span span("write picture");
   if (!files_.raw.empty()) {
     write_file_atomically(files_.raw, std::as_bytes(join_blocks(*frame_.keys, blocks_, 0).pixels()));
   }

@@ -14,6 +14,7 @@
 #include "app/command.h"
 #include "app/launcher.h"
 #include "app/report_error.h"
+#include "app/trace_file.h"
 #include "cluster/collectives.h"
 #include "cluster/local_communicator.h"
 #include "cluster/mpi_communicator.h"
@@ -114,8 +115,9 @@ HostShare host_share(Communicator& comm, const Globals& globals) {
   return share;
 }
 
-ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body,
+ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& untraced,
                    const JobOptions& options) {
+  const auto body = [&](Communicator& comm) { return traced(comm, globals, untraced); };
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
   if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
   ExitCode code = ExitCode::Done;

@@ -1,5 +1,6 @@
 #include "app/screens.h"
 
+#include "core/trace.h"
 #include "image/enlarge.h"
 
 namespace hpr {
@@ -15,6 +16,7 @@ Size made_size(const Blocks& blocks, std::size_t screen) {
 
 std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const Blocks& blocks,
                                            const Showing& showing) {
+  const trace::Span span("bring to screens");
   const std::size_t screens = showing.sizes.size();
   bool as_made = true;
   for (std::size_t screen = 0; screen < screens; ++screen) {

@@ -9,17 +9,27 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/trace.h"
 #include "scene/surface_ranges.h"
 
 namespace hpr {
+namespace {
+
+Scene load_scene_of_all(Communicator& comm, const std::function<Scene()>& load) {
+  const trace::Span span("load scene");
+  return distribute_scene(comm, load);
+}
+
+}  // namespace
 
 Session::Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load)
     : comm_(comm),
       share_(host_share(comm, globals)),
-      scene_(distribute_scene(comm_, load)),
+      scene_(load_scene_of_all(comm_, load)),
       requirements_(requirements_of(scene_)) {
   warn_of_scene();
   agree_on_failure(comm_, [&] {
+    const trace::Span span("start OpenGL");
     gl_ = make_gl_context({.backend = globals.backend,
                            .device = globals.device,
                            .local_rank = share_.local_rank,
@@ -30,7 +40,7 @@ Session::Session(Communicator& comm, const Globals& globals, const std::function
 }
 
 void Session::load(const std::function<Scene()>& load) {
-  Scene scene = distribute_scene(comm_, load);
+  Scene scene = load_scene_of_all(comm_, load);
   forget_scene();
   scene_ = std::move(scene);
   requirements_ = requirements_of(scene_);
@@ -75,6 +85,7 @@ void Session::compare_rasterizers() {
 
 Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
   if (!rasterizer_ || !std::ranges::equal(objects, objects_)) {
+    const trace::Span span("upload geometry");
     rasterizer_.reset();  // frees its GPU memory before the next one takes some
     objects_.assign(objects.begin(), objects.end());
     rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, objects_, share_.threads);
@@ -100,6 +111,7 @@ PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const 
     traced_objects_.assign(objects.begin(), objects.end());
     const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_surfaces(scene_, false);
     if (!everything) {
+      const trace::Span span("build ray scene");
       traced_share_ =
           std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, traced_objects_, build);
     }
@@ -112,6 +124,7 @@ PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const 
 const RayScene& Session::ray_scene(const RayBuild& build) {
   build_rays_by(build);
   if (!ray_scene_) {
+    const trace::Span span("build ray scene");
     ray_scene_ = std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads,
                                             covering_surfaces(scene_, false), build);
   }
@@ -121,6 +134,7 @@ const RayScene& Session::ray_scene(const RayBuild& build) {
 Lighter& Session::lighter(const RaySettings& settings) {
   build_rays_by(settings.build);
   if (!lighter_ || ray_settings_ != settings) {
+    const trace::Span span("prepare light");
     RaySettings own = settings;
     own.threads = share_.threads;
     lighter_ = std::make_unique<Lighter>(scene_, own, requirements_,

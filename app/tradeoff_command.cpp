@@ -43,8 +43,8 @@ constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
 std::vector<std::string> base_words(std::span<const std::string> args, const std::string& scene,
                                     std::span<const std::string> varied) {
   static const std::set<std::string> own{
-      "--vary", "--metric", "--reference", "--reference-spp", "--budget",    "--frames",     "--html",
-      "--csv",  "--size",   "--progress",  "--hang-timeout",  "--limit-mem", "--limit-image"};
+      "--vary", "--metric", "--reference", "--reference-spp", "--budget",    "--frames",      "--html",
+      "--csv",  "--size",   "--progress",  "--hang-timeout",  "--limit-mem", "--limit-image", "--trace"};
   static const std::set<std::string> flags{"--json",    "--resume", "--force", "--strict", "--quiet",
                                            "--verbose", "-q",       "-v",      "-vv"};
   std::vector<std::string> words;
@@ -133,7 +133,7 @@ class TradeoffCommand final : public Command {
       metrics_.push_back(report_.budget->metric);
     }
     how_.metrics = metrics_;
-    const std::vector<std::string> results{csv_, html_};
+    const std::vector<std::string> results{csv_, html_, globals.trace};
     check_distinct(results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);

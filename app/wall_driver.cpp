@@ -19,6 +19,7 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "core/trace.h"
 #include "walls/geometry.h"
 #include "walls/link/sender.h"
 #include "walls/manifest_file.h"
@@ -236,6 +237,7 @@ std::string WallDriver::status() const {
 WallDriver::~WallDriver() = default;
 
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
+  const trace::Span span("frame", "number", number);
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   last_heads_ = heads_.at(number);
@@ -308,6 +310,7 @@ bool WallDriver::shows_any() const {
 
 void WallDriver::show(std::uint64_t number) {
   if (!display_ && !remote_) return;
+  const trace::Span span("show");
   std::vector<ScreenPicture> mine;
   for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
     if (owners_[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});

@@ -179,7 +179,7 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
                 "leave it out, or send the frames elsewhere");
   }
   std::vector<std::string> results{run.picture, run.options.stats, run.manifest().string(),
-                                   assembled_file(run).string()};
+                                   assembled_file(run).string(), globals.trace};
   if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
   check_distinct(results);
   if (!run.picture.empty()) {

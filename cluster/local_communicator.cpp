@@ -16,6 +16,7 @@
 
 #include "core/check.h"
 #include "core/error.h"
+#include "core/trace.h"
 
 namespace hpr {
 namespace {
@@ -302,6 +303,7 @@ void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communica
   std::exception_ptr first_failure;
   const auto run = [&](int rank) {
     LocalCommunicator comm(office, {}, worlds, rank);
+    const trace::Lane lane(rank);
     try {
       body(comm);
     } catch (...) {

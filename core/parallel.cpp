@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/trace.h"
+
 namespace hpr {
 
 int usable_cores() {
@@ -34,7 +36,12 @@ void parallel_for(int threads, std::size_t count, const std::function<void(std::
   {
     const std::size_t helpers = std::min<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)), count);
     std::vector<std::jthread> team;
-    for (std::size_t i = 1; i < helpers; ++i) team.emplace_back(work);
+    for (std::size_t i = 1; i < helpers; ++i) {
+      team.emplace_back([&work, i] {
+        const trace::Lane lane(static_cast<int>(i));
+        work();
+      });
+    }
     work();
   }
   if (first_failure) std::rethrow_exception(first_failure);

@@ -12,6 +12,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "core/trace.h"
 #include "rt/denormals.h"
 #include "rt/direct_light.h"
 #include "rt/first_points.h"
@@ -249,6 +250,7 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
 
 void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_t index,
                                 const LightOutput& output) const {
+  const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
   TileWork& tile = scratch.work;
   tile.wants_components =

@@ -11,6 +11,7 @@
 
 #include "core/check.h"
 #include "core/parallel.h"
+#include "core/trace.h"
 #include "rt/denormals.h"
 #include "rt/embree_compat.h"
 #include "rt/occupied_tiles.h"
@@ -349,6 +350,7 @@ void PrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rec
   parallel_for(threads_, run.count, [&](std::size_t i) {
     if (occupied[i] == 0) return;
     const std::size_t tile = run.first + i;
+    const trace::Span span("trace tile", "tile", tile);
     const Rect place = layout.place(tile).pixels;
     const DenormalsAsZero mode;
     TileTracer tracer(scene_, rays_, view);

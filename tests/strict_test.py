@@ -95,6 +95,7 @@ def main():
         result = hpr(folder, "good.gltf", "-o", "a.exr", "--strict", "--stats", "a.json")
         stats = json.loads((folder / "a.json").read_text()) if result.returncode == 0 else None
         check(stats and stats["not_finite"] == {"pixels": 0, "first": None}, f"nothing wrong: {result.stderr} {stats}")
+        check(stats and stats["rays_cut"] == 0 and stats["rays_invalid"] == 0, f"nothing wrong, and rays cut: {stats}")
         replaced(folder, "normals", ["normal.gltf"], "1 values are no finite numbers, the first at vertex 1")
         replaced(folder, "environment", ["good.gltf", "--environment", "sky.exr"],
                  "2 values are no finite numbers, the first in pixel 2,1")

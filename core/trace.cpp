@@ -1,0 +1,63 @@
+#include "core/trace.h"
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <utility>
+
+namespace hpr::trace {
+namespace {
+
+std::atomic<bool> on = false;
+std::mutex mutex;
+Record record;  // NOLINT(cert-err58-cpp): an empty vector
+
+thread_local int this_lane = 0;
+
+}  // namespace
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+void start() {
+  const std::lock_guard lock(mutex);
+  record = {};
+  on.store(true);
+}
+
+bool recording() {
+  return on.load(std::memory_order_relaxed);
+}
+
+Record finish() {
+  on.store(false);
+  const std::lock_guard lock(mutex);
+  return std::exchange(record, {});
+}
+
+Span::Span(std::string_view name, const char* detail, std::uint64_t amount) : records_(recording()) {
+  if (!records_) return;
+  event_ = {std::string(name), now_ns(), 0, this_lane, detail, amount};
+}
+
+Span::~Span() {
+  if (!records_) return;
+  event_.end_ns = now_ns();
+  const std::lock_guard lock(mutex);
+  if (!on.load()) return;
+  if (record.events.size() >= kMostEvents) {
+    ++record.dropped;
+  } else {
+    record.events.push_back(std::move(event_));
+  }
+}
+
+Lane::Lane(int lane) : before_(std::exchange(this_lane, lane)) {}
+
+Lane::~Lane() {
+  this_lane = before_;
+}
+
+}  // namespace hpr::trace
