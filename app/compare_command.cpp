@@ -16,6 +16,7 @@
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/simulate_option.h"
+#include "app/trace_file.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/blender.h"
 #include "compositing/compositor.h"
@@ -134,8 +135,8 @@ class CompareCommand final : public Command {
     if (!picture_.empty() && !picture_.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture_)));
     }
-    const std::vector<std::string> results{csv_, html_, picture_, raw_, globals.trace};
-    check_distinct(results);
+    const std::vector<std::string> results{csv_, html_, picture_, raw_};
+    check_distinct(results, globals.trace);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }
@@ -237,6 +238,12 @@ class CompareCommand final : public Command {
 
   /// One process: ranks are threads, or MPI jobs of this program that hand over their runs.
   [[nodiscard]] ExitCode run_here(const Globals& globals, const CompareInput& input) const {
+    const bool on_threads = transport_ == "threads" || !simulate_.empty();
+    if (on_threads) return traced_alone(globals, [&] { return measure_here(globals, input); });
+    return measure_here(globals, input);
+  }
+
+  [[nodiscard]] ExitCode measure_here(const Globals& globals, const CompareInput& input) const {
     CompareResult result;
     const std::vector<int> counts = rank_counts();
     for (const int ranks : counts) check_memory(globals, input, ranks);  // all before any is measured

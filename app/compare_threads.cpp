@@ -5,13 +5,15 @@
 #include "app/simulate_option.h"
 #include "cluster/local_communicator.h"
 #include "cluster/simulated_communicator.h"
+#include "cluster/tracing_communicator.h"
 
 namespace hpr {
 
 CompareResult compare_on_threads(int ranks, const std::string& simulate, std::chrono::nanoseconds hang_timeout,
                                  const CompareInput& input, const CompareSettings& settings) {
   CompareResult result;
-  const auto compare = [&](Communicator& comm) {
+  const auto compare = [&](Communicator& untraced) {
+    TracingCommunicator comm(untraced);
     CompareResult here = compare_strategies(comm, input, settings);
     if (comm.rank() == 0) result = std::move(here);
   };

@@ -17,7 +17,6 @@
 #include "app/launcher.h"
 #include "app/report_error.h"
 #include "app/trace_file.h"
-#include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"
 
@@ -176,7 +175,7 @@ ExitCode run(const std::vector<std::string>& words) {
   (void)globals.hang_limit();
   for (const auto& command : commands) {
     if (!app.got_subcommand(std::string(command->name()))) continue;
-    if (launched_rank() == 0 && !globals.trace.empty()) check_writable(globals.trace, globals.force);
+    if (!inside_mpi_job() || (launched_rank() == 0 && !command->collective())) check_trace(globals);
     if (command->collective()) return command->run(globals);
     return launched_rank() == 0 ? traced_alone(globals, [&] { return command->run(globals); }) : ExitCode::Done;
   }

@@ -175,9 +175,11 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
   write_file_atomically(path, json.dump(2) + "\n");
 }
 
-void check_distinct(std::span<const std::string> paths) {
+void check_distinct(std::span<const std::string> paths, const std::string& trace) {
   std::set<std::filesystem::path> named;
-  for (const std::string& path : paths) {
+  std::vector<std::string> all(paths.begin(), paths.end());
+  all.push_back(trace);
+  for (const std::string& path : all) {
     std::error_code error;
     const std::filesystem::path plain = std::filesystem::absolute(path, error);
     const std::filesystem::path place = std::filesystem::weakly_canonical(plain, error);

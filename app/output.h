@@ -87,7 +87,7 @@ void write_or_print(std::string_view text, const std::string& path, bool overwri
 
 void write_stats(const std::filesystem::path& path, const RunStats& stats);
 
-/// Throws Error (Usage) when two of these paths of results are one file. Empty ones are none.
-void check_distinct(std::span<const std::string> paths);
+/// Throws Error (Usage) when two of these paths of results, or one and `trace`, are one file. Empty ones are none.
+void check_distinct(std::span<const std::string> paths, const std::string& trace);
 
 }  // namespace hpr

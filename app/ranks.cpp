@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "app/command.h"
+#include "app/host_name.h"
 #include "app/launcher.h"
 #include "app/report_error.h"
 #include "app/trace_file.h"
@@ -24,12 +25,6 @@
 
 namespace hpr {
 namespace {
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
-}
 
 /// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 speaks first, so
 /// that an error all ranks agreed on is printed once.
@@ -97,6 +92,12 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
 }
 
 }  // namespace
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
 
 HostShare host_share(Communicator& comm, const Globals& globals) {
   const std::string mine = host_name();

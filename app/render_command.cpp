@@ -94,9 +94,8 @@ class RenderCommand final : public Command {
                   "ask for more with --spp, and name the picture with -o or the file with --checkpoint");
     }
     const std::string beside = files_.is_png() ? files_.aov_file() : "";
-    const std::vector<std::string> results{files_.picture, files_.raw,  options_.stats,
-                                           beside,         checkpoint_, globals.trace};
-    check_distinct(results);
+    const std::vector<std::string> results{files_.picture, files_.raw, options_.stats, beside, checkpoint_};
+    check_distinct(results, globals.trace);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
     }

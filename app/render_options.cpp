@@ -144,9 +144,10 @@ void RenderOptions::declare_light(CLI::App& app) {
   app.add_option("--photons", photons, "sent per sample, where the scene requires any")
       ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
   app.add_flag_function(
-      "--indirect,!--no-indirect", [this](std::int64_t count) { indirect = count > 0; },
-      "photons carry all indirect light, not caustics alone (default: with --quality best, or where --passes "
-      "names photon)");
+         "--indirect,!--no-indirect", [this](std::int64_t count) { indirect = count > 0; },
+         "photons carry all indirect light, not caustics alone (default: with --quality best, or where --passes "
+         "names photon)")
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");
 }
@@ -240,8 +241,8 @@ std::vector<std::string> RenderOptions::without_use() const {
 
 FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   FrameSettings settings;
-  if (!std::isfinite(fov_degrees) || !std::isfinite(exposure)) {
-    throw Error(ExitCode::Usage, "--fov and --exposure take finite numbers", "write e.g. --fov 45");
+  if (!std::isfinite(fov_degrees) || !std::isfinite(exposure) || !std::isfinite(glossy_cutoff.value_or(0.0))) {
+    throw Error(ExitCode::Usage, "--fov, --exposure and --glossy-cutoff take finite numbers", "write e.g. --fov 45");
   }
   if (distribute != "auto") settings.distribution = parse_distribution(distribute);
   settings.groups = groups;

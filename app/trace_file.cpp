@@ -2,23 +2,32 @@
 
 #include <fmt/format.h>
 #include <hpr/version.h>
-#include <unistd.h>
 
-#include <array>
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
 #include <vector>
 
+#include "app/host_name.h"
+#include "app/launcher.h"
 #include "app/shell_line.h"
 #include "cluster/collectives.h"
 #include "cluster/local_communicator.h"
 #include "cluster/scene_distribution.h"
-#include "cluster/texts.h"
 #include "cluster/tracing_communicator.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/trace.h"
 
 namespace hpr {
@@ -26,47 +35,62 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
-}
-
-/// When the ranks met, by this rank's clock. Ranks of rank 0's host have the same clock as it.
-std::int64_t meet(Communicator& comm, const std::vector<std::string>& hosts) {
+/// When the ranks met, by this rank's clock. Ranks of rank 0's host have its clock: times so close are no chance.
+std::int64_t meet(Communicator& comm) {
+  constexpr std::int64_t kSameClock = 1'000'000'000;
   barrier(comm);
   const std::vector<std::int64_t> met = all_gather_value(comm, trace::now_ns());
-  const auto mine = static_cast<std::size_t>(comm.rank());
-  return hosts[mine] == hosts[0] ? met[0] : met[mine];
+  const std::int64_t mine = met[static_cast<std::size_t>(comm.rank())];
+  return std::abs(mine - met[0]) < kSameClock ? met[0] : mine;
 }
 
 Json named(const char* what, int rank, int lane, const std::string& name) {
   return {{"name", what}, {"ph", "M"}, {"pid", rank}, {"tid", lane}, {"args", {{"name", name}}}};
 }
 
-/// This rank's events, one to a line.
+/// This process's events, one to a line: `rank`'s, or those of ranks that are its threads.
 std::string lines_of(int rank, const std::string& host, const trace::Record& record, std::int64_t zero) {
-  std::string lines = named("process_name", rank, 0, fmt::format("rank {} on {}", rank, host)).dump();
-  lines +=
-      ",\n" +
-      Json{{"name", "process_sort_index"}, {"ph", "M"}, {"pid", rank}, {"tid", 0}, {"args", {{"sort_index", rank}}}}
-          .dump();
-  std::set<int> lanes;
+  std::vector<Json> lines;
+  std::set<std::pair<int, int>> rows;
+  const auto add_row = [&](int process, int lane) {
+    if (!rows.insert({process, lane}).second) return;
+    lines.push_back(named("thread_name", process, lane, lane == 0 ? "main" : fmt::format("thread {}", lane)));
+  };
+  std::set<int> processes;
   for (const trace::Event& event : record.events) {
-    if (lanes.insert(event.lane).second) {
-      const std::string name = event.lane == 0 ? "main" : fmt::format("thread {}", event.lane);
-      lines += ",\n" + named("thread_name", rank, event.lane, name).dump();
+    const int process = rank + event.rank;
+    if (processes.insert(process).second) {
+      lines.push_back(named("process_name", process, 0, fmt::format("rank {} on {}", process, host)));
+      lines.push_back({{"name", "process_sort_index"},
+                       {"ph", "M"},
+                       {"pid", process},
+                       {"tid", 0},
+                       {"args", {{"sort_index", process}}}});
     }
-    Json line{{"name", event.name},
-              {"ph", "X"},
-              {"ts", static_cast<double>(event.begin_ns - zero) / 1000.0},
-              {"dur", static_cast<double>(event.end_ns - event.begin_ns) / 1000.0},
-              {"pid", rank},
-              {"tid", event.lane}};
+    add_row(process, event.lane);
+    Json& line = lines.emplace_back(Json{{"name", event.name},
+                                         {"ph", "X"},
+                                         {"ts", static_cast<double>(event.begin_ns - zero) / 1000.0},
+                                         {"dur", static_cast<double>(event.end_ns - event.begin_ns) / 1000.0},
+                                         {"pid", process},
+                                         {"tid", event.lane}});
     if (event.detail != nullptr) line["args"][event.detail] = event.amount;
-    lines += ",\n" + line.dump(-1, ' ', false, Json::error_handler_t::replace);
   }
-  return lines;
+  std::string text;
+  for (const Json& line : lines) text += (text.empty() ? "" : ",\n") + line.dump();
+  return text;
+}
+
+constexpr std::string_view kBeginning = "{\"displayTimeUnit\"";
+
+/// Whether a file stands there that is no trace. An empty one is nothing to lose.
+bool holds_something_else(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;
+  std::ifstream file(path, std::ios::binary);
+  std::string start(kBeginning.size(), '\0');
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  return file.gcount() > 0 && start != kBeginning;
 }
 
 std::string document(const std::vector<std::vector<std::byte>>& lines, const std::vector<std::string>& args,
@@ -75,8 +99,9 @@ std::string document(const std::vector<std::vector<std::byte>>& lines, const std
                    {"command", "hpr " + shell_line(args)},
                    {"version", fmt::format("{} ({})", kVersion, kCommit)},
                    {"dropped", dropped}};
-  std::string text = fmt::format("{{\"displayTimeUnit\": \"ms\", \"otherData\": {},\n\"traceEvents\": [\n",
-                                 about.dump(-1, ' ', false, Json::error_handler_t::replace));
+  std::string text(kBeginning);
+  text += fmt::format(": \"ms\", \"otherData\": {},\n\"traceEvents\": [\n",
+                      about.dump(-1, ' ', false, Json::error_handler_t::replace));
   for (std::size_t rank = 0; rank < lines.size(); ++rank) {
     if (rank > 0) text += ",\n";
     text.append(reinterpret_cast<const char*>(lines[rank].data()), lines[rank].size());
@@ -88,8 +113,9 @@ std::string document(const std::vector<std::vector<std::byte>>& lines, const std
 
 ExitCode traced(Communicator& comm, const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
   if (globals.trace.empty()) return body(comm);
+  if (inside_mpi_job()) check_on_root(comm, [&] { check_trace(globals); });
   const std::string host = host_name();
-  const std::int64_t zero = meet(comm, all_gather_texts(comm, host));
+  const std::int64_t zero = meet(comm);
   trace::start();
   TracingCommunicator watched(comm);
   ExitCode code = ExitCode::Internal;
@@ -107,12 +133,27 @@ ExitCode traced(Communicator& comm, const Globals& globals, const std::function<
   const std::vector<std::vector<std::byte>> lines = gather(comm, std::as_bytes(std::span(mine)));
   agree_on_failure(comm, [&] {
     if (comm.rank() != 0) return;
+    if (holds_something_else(globals.trace)) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("'{}' now holds something else, so there is no trace", printable(globals.trace)),
+                  "give --trace a name of its own");
+    }
     write_file_atomically(globals.trace, document(lines, globals.args, dropped));
     if (dropped > 0) {
       log::warning("--trace: {} spans past the first {} of a rank are left out", dropped, trace::kMostEvents);
     }
   });
   return code;
+}
+
+void check_trace(const Globals& globals) {
+  if (globals.trace.empty()) return;
+  const bool resumes = std::ranges::find(globals.args, "--resume") != globals.args.end();
+  check_writable(globals.trace, globals.force || resumes);
+  if (!holds_something_else(globals.trace)) return;
+  throw Error(ExitCode::Usage,
+              fmt::format("'{}' is no trace, and --trace replaces nothing else", printable(globals.trace)),
+              "name another file, or remove it first");
 }
 
 ExitCode traced_alone(const Globals& globals, const std::function<ExitCode()>& body) {

@@ -38,30 +38,23 @@ constexpr int kCropSide = 128;
 constexpr double kQuickMs = 200.0;
 constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
 
-/// The words of the command line that a frame of `hpr render` would take as well, but for `scene`, what a sweep has of
-/// its own or varies, and what changes neither pictures nor times.
-std::vector<std::string> base_words(std::span<const std::string> args, const std::string& scene,
-                                    std::span<const std::string> varied) {
-  static const std::set<std::string> own{
-      "--vary", "--metric", "--reference", "--reference-spp", "--budget",    "--frames",      "--html",
-      "--csv",  "--size",   "--progress",  "--hang-timeout",  "--limit-mem", "--limit-image", "--trace"};
-  static const std::set<std::string> flags{"--json",    "--resume", "--force", "--strict", "--quiet",
-                                           "--verbose", "-q",       "-v",      "-vv"};
+/// What the command line says that a frame of `hpr render` would take as well, but for what a sweep has of its own or
+/// varies, and what changes neither pictures nor times. The same for any order and spelling of the options.
+std::vector<std::string> base_words(const CLI::App& app, std::span<const std::string> varied) {
+  static const std::set<std::string> left_out{"vary",     "metric",       "reference", "reference-spp", "budget",
+                                              "frames",   "html",         "csv",       "size",          "json",
+                                              "progress", "hang-timeout", "limit-mem", "limit-image",   "trace",
+                                              "resume",   "force",        "strict",    "quiet",         "verbose"};
   std::vector<std::string> words;
-  bool scene_seen = false;
-  for (std::size_t i = 1; i < args.size(); ++i) {
-    const std::string name = args[i].substr(0, args[i].find('='));
-    if (flags.contains(name)) continue;
-    const bool is_varied = name.starts_with("--") && std::ranges::find(varied, name.substr(2)) != varied.end();
-    if (own.contains(name) || is_varied) {
-      if (name == args[i] && !(is_varied && find_knob(name.substr(2)).range.starts_with("false"))) ++i;
-      continue;
+  for (const CLI::App* level = &app; level != nullptr; level = level->get_parent()) {
+    for (const CLI::Option* option : level->get_options()) {
+      if (option->count() == 0 || option->get_lnames().empty()) continue;
+      const std::string& name = option->get_lnames().front();
+      if (left_out.contains(name) || std::ranges::find(varied, name) != varied.end()) continue;
+      const std::string value = fmt::format("{}", fmt::join(option->reduced_results(), ","));
+      const bool is_set_flag = option->get_expected_max() == 0 && value == "true";
+      words.push_back(is_set_flag ? "--" + name : fmt::format("--{}={}", name, value));
     }
-    if (args[i] == scene && !scene_seen) {
-      scene_seen = true;
-      continue;
-    }
-    words.push_back(args[i]);
   }
   return words;
 }
@@ -75,6 +68,7 @@ class TradeoffCommand final : public Command {
   }
 
   void declare(CLI::App& app) override {
+    app_ = &app;
     app.add_option("scene", scene_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
     app.add_option("--vary", vary_, "a knob and its values, spp=1,4,16; again for another knob (see hpr help knobs)")
         ->type_name("K=V,V,...")
@@ -133,8 +127,8 @@ class TradeoffCommand final : public Command {
       metrics_.push_back(report_.budget->metric);
     }
     how_.metrics = metrics_;
-    const std::vector<std::string> results{csv_, html_, globals.trace};
-    check_distinct(results);
+    const std::vector<std::string> results{csv_, html_};
+    check_distinct(results, globals.trace);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }
@@ -172,8 +166,11 @@ class TradeoffCommand final : public Command {
       }
       report_.points.push_back(skips && speaks ? *known : skips ? TradeoffPoint{} : done.back());
       const auto left = static_cast<double>(all_.size() - report_.points.size());
-      const double pace = measured > 0 ? 1e-3 * watch.ms() / static_cast<double>(measured) : 0.0;
-      progress.step(fmt::format("{}, about {:.0f} s left", describe(values), left * pace));
+      std::string step = describe(values);
+      if (measured > 0) {
+        step += fmt::format(", about {:.0f} s left", left * 1e-3 * watch.ms() / static_cast<double>(measured));
+      }
+      progress.step(step);
       const Request mine = take_request();
       const std::vector<Request> requests = all_gather_value(session.comm(), mine);
       if (std::ranges::max(requests) == Request::Stop && report_.points.size() < all_.size()) {
@@ -182,22 +179,35 @@ class TradeoffCommand final : public Command {
       }
     }
     agree_on_failure(session.comm(), [&] {
-      if (speaks) finish(session, *reference, crop, globals, state);
+      if (!speaks) return;
+      finish(session, *reference, crop, globals);
+      try {
+        forget(state, identity, std::move(done));
+      } catch (const Error& error) {
+        log::warning("{}", error.what());  // the sweep is done all the same
+      }
     });
     const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
     const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
     return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
   }
 
-  /// Those of this sweep that an earlier run measured, on rank 0.
+  /// Those of such a sweep that an earlier run measured, on rank 0; without --resume this one measures its own anew.
   [[nodiscard]] std::vector<TradeoffPoint> kept_points(Communicator& comm, const std::filesystem::path& state,
                                                        const std::string& identity) const {
     std::vector<TradeoffPoint> kept;
     check_on_root(comm, [&] {
-      if (resume_ && std::filesystem::exists(state)) {
-        const auto bytes = read_file(state, kLargestState);
-        kept = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
-      } else if (resume_) {
+      try {
+        std::error_code ignored;
+        if (std::filesystem::exists(state, ignored)) {
+          const auto bytes = read_file(state, kLargestState);
+          kept = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
+        }
+      } catch (const Error&) {
+        if (resume_) throw;
+      }
+      if (!resume_) std::erase_if(kept, [&](const TradeoffPoint& point) { return is_mine(point); });
+      if (resume_ && std::ranges::none_of(kept, [&](const TradeoffPoint& point) { return is_mine(point); })) {
         log::warning("--resume: no points of this sweep are kept, so it begins anew");
       }
     });
@@ -215,15 +225,29 @@ class TradeoffCommand final : public Command {
 
   [[nodiscard]] std::string sweep_identity(Session& session, const ReferencePicture& reference,
                                            const Globals& globals) const {
-    return fmt::format("{} {} {} {}x{} seed {} ranks {} threads {} truth {} metrics {} frames {} options {}", kVersion,
-                       kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height, globals.seed,
-                       session.comm().size(), session.threads(),
+    return fmt::format("{} {} {} {}x{} seed {} ranks {} threads {} truth {} metrics {} frames {} options {} varied {}",
+                       kVersion, kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height,
+                       globals.seed, session.comm().size(), session.threads(),
                        hex16(xxh64(std::as_bytes(reference.radiance.pixels()))), fmt::join(metrics_, ","), how_.frames,
-                       fmt::join(base_words(globals.args, scene_, report_.knobs), " "));
+                       fmt::join(base_words(*app_, report_.knobs), " "), fmt::join(report_.knobs, " "));
   }
 
-  void finish(Session& session, const ReferencePicture& reference, const Rect& crop, const Globals& globals,
-              const std::filesystem::path& state) {
+  /// What is done needs no going on; what an earlier run of other values kept stays.
+  void forget(const std::filesystem::path& state, const std::string& identity, std::vector<TradeoffPoint> done) const {
+    std::erase_if(done, [&](const TradeoffPoint& point) { return is_mine(point); });
+    if (!done.empty()) {
+      write_file_atomically(state, encode_points(identity, done));
+      return;
+    }
+    std::error_code ignored;
+    std::filesystem::remove(state, ignored);
+  }
+
+  [[nodiscard]] bool is_mine(const TradeoffPoint& point) const {
+    return std::ranges::find(all_, point.knobs) != all_.end();
+  }
+
+  void finish(Session& session, const ReferencePicture& reference, const Rect& crop, const Globals& globals) {
     report_.scene = scene_;
     report_.command = "hpr " + shell_line(globals.args);
     report_.machine = this_machine();
@@ -233,7 +257,7 @@ class TradeoffCommand final : public Command {
     report_.seed = globals.seed;
     report_.reference = reference.about;
     report_.metrics = metrics_;
-    report_.base_options = base_words(globals.args, scene_, report_.knobs);
+    report_.base_options = base_words(*app_, report_.knobs);
     report_.reference_crop_png = crop_as_png(reference.radiance, crop, reference.linear);
     mark_pareto(report_.points, metrics_.front());
     if (report_.budget) report_.best = best_within(report_.points, *report_.budget, metrics_.front());
@@ -245,10 +269,9 @@ class TradeoffCommand final : public Command {
                   "--resume writes it without measuring again");
     }
     if (json_ && report_.budget) log::info("{}", answer(report_));
-    std::error_code ignored;
-    std::filesystem::remove(state, ignored);  // what is done needs no going on
   }
 
+  const CLI::App* app_ = nullptr;
   std::string scene_;
   std::vector<std::string> vary_;
   std::vector<std::string> metrics_;

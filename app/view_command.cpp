@@ -19,8 +19,7 @@ class ViewCommand final : public Command {
     app.add_flag("--web", address_, "=ADDR:PORT: in a browser instead of windows; by default on loopback, a free port");
     app.add_option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
         ->check(CLI::Range(1, 1'000'000));
-    app.add_option("--target-ms", run_.target_ms, "what a frame may take while the camera moves (default: 50)")
-        ->check(CLI::Range(1e-3, 1e9));
+    declare_target_ms(app, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
     run_.options.declare(app);
   }
 

@@ -179,9 +179,9 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
                 "leave it out, or send the frames elsewhere");
   }
   std::vector<std::string> results{run.picture, run.options.stats, run.manifest().string(),
-                                   assembled_file(run).string(), globals.trace};
+                                   assembled_file(run).string()};
   if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
-  check_distinct(results);
+  check_distinct(results, globals.trace);
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),
@@ -290,8 +290,7 @@ class WallRunCommand final : public Command {
         ->excludes("--frames");
     app.add_flag("--resume", run_.resume, "go on after the frames that the manifest in -o DIR has, if it is there");
     app.add_option("--path", run_.path, "where the camera goes in these frames, see docs/cli.md")->type_name("FILE");
-    app.add_option("--target-ms", run_.target_ms, "what a frame may take; what is given up for it is in the manifest")
-        ->check(CLI::Range(1e-3, 1e9));
+    declare_target_ms(app, run_.target_ms, "what a frame may take; what is given up for it is in the manifest");
     app.add_option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples");
     app.add_option("--restarts", run_.restarts, "how often a job of several ranks that is lost is started again")
         ->check(CLI::Range(0, 1000))
@@ -307,6 +306,14 @@ class WallRunCommand final : public Command {
 };
 
 }  // namespace
+
+void declare_target_ms(CLI::App& app, std::optional<double>& target_ms, const std::string& text) {
+  const std::map<std::string, double> units{{"us", 1e-3}, {"ms", 1.0}, {"s", 1e3}, {"min", 6e4}};
+  app.add_option("--target-ms", target_ms, text)
+      ->check(CLI::Range(1e-3, 1e9))
+      ->transform(CLI::AsNumberWithUnit(units))
+      ->type_name("MS");
+}
 
 void declare_overrides(CLI::App& app, std::vector<std::string>& overrides) {
   app.add_option("--set", overrides, "put a value over one of the wall file's, e.g. stereo.mode=anaglyph")

@@ -50,6 +50,9 @@ struct WallRun {
 /// `--set PATH=VALUE`, as often as wanted.
 void declare_overrides(CLI::App& app, std::vector<std::string>& overrides);
 
+/// `--target-ms`: milliseconds, or another unit that is named.
+void declare_target_ms(CLI::App& app, std::optional<double>& target_ms, const std::string& text);
+
 /// `hpr wall run WALL SCENE`.
 [[nodiscard]] std::unique_ptr<Command> make_wall_run_command();
 

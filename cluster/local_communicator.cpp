@@ -303,7 +303,7 @@ void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communica
   std::exception_ptr first_failure;
   const auto run = [&](int rank) {
     LocalCommunicator comm(office, {}, worlds, rank);
-    const trace::Lane lane(rank);
+    const trace::InRow row({rank, 0});
     try {
       body(comm);
     } catch (...) {

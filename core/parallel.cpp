@@ -37,8 +37,8 @@ void parallel_for(int threads, std::size_t count, const std::function<void(std::
     const std::size_t helpers = std::min<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)), count);
     std::vector<std::jthread> team;
     for (std::size_t i = 1; i < helpers; ++i) {
-      team.emplace_back([&work, i] {
-        const trace::Lane lane(static_cast<int>(i));
+      team.emplace_back([&work, i, rank = trace::row_of_this_thread().rank] {
+        const trace::InRow row({rank, static_cast<int>(i)});
         work();
       });
     }

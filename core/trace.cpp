@@ -12,7 +12,7 @@ std::atomic<bool> on = false;
 std::mutex mutex;
 Record record;  // NOLINT(cert-err58-cpp): an empty vector
 
-thread_local int this_lane = 0;
+thread_local Row this_row;
 
 }  // namespace
 
@@ -37,9 +37,9 @@ Record finish() {
   return std::exchange(record, {});
 }
 
-Span::Span(std::string_view name, const char* detail, std::uint64_t amount) : records_(recording()) {
+Span::Span(const char* name, const char* detail, std::uint64_t amount) : records_(recording()) {
   if (!records_) return;
-  event_ = {std::string(name), now_ns(), 0, this_lane, detail, amount};
+  event_ = {name, now_ns(), 0, this_row.rank, this_row.lane, detail, amount};
 }
 
 Span::~Span() {
@@ -50,14 +50,18 @@ Span::~Span() {
   if (record.events.size() >= kMostEvents) {
     ++record.dropped;
   } else {
-    record.events.push_back(std::move(event_));
+    record.events.push_back(event_);
   }
 }
 
-Lane::Lane(int lane) : before_(std::exchange(this_lane, lane)) {}
+Row row_of_this_thread() {
+  return this_row;
+}
 
-Lane::~Lane() {
-  this_lane = before_;
+InRow::InRow(Row row) : before_(std::exchange(this_row, row)) {}
+
+InRow::~InRow() {
+  this_row = before_;
 }
 
 }  // namespace hpr::trace

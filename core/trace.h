@@ -1,42 +1,41 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <string>
-#include <string_view>
 #include <vector>
 
 /// Where the time goes: spans of what this process does, as trace viewers show them. Costs a look at a flag where
 /// nobody records.
 namespace hpr::trace {
 
-/// Something that was done.
+/// Something that was done. Texts are literals.
 struct Event {
-  std::string name;
+  const char* name = "";
   std::int64_t begin_ns = 0;  ///< of the process's steady clock
   std::int64_t end_ns = 0;
+  int rank = 0;  ///< where ranks are threads of one process; else 0
   int lane = 0;
   const char* detail = nullptr;  ///< what `amount` is; null: it says nothing
   std::uint64_t amount = 0;
 };
 
-/// Records from now on.
+struct Record {
+  std::vector<Event> events;  ///< in the order they ended
+  std::uint64_t dropped = 0;  ///< past kMostEvents
+};
+inline constexpr std::size_t kMostEvents = 1'000'000;
+
+/// Records what ends from now on; an earlier record is lost.
 void start();
 [[nodiscard]] bool recording();
-
-/// What was recorded, in the order it ended, and nothing is from here on. Past kMostEvents none is taken any more.
-struct Record {
-  std::vector<Event> events;
-  std::uint64_t dropped = 0;
-};
+/// Ends the recording and hands it over.
 [[nodiscard]] Record finish();
-inline constexpr std::size_t kMostEvents = 1'000'000;
 
 /// The time from here to the end of its life.
 class Span {
  public:
-  explicit Span(std::string_view name) : Span(name, nullptr, 0) {}
-  /// `detail` must outlive the record: a literal.
-  Span(std::string_view name, const char* detail, std::uint64_t amount);
+  explicit Span(const char* name) : Span(name, nullptr, 0) {}
+  Span(const char* name, const char* detail, std::uint64_t amount);
   ~Span();
   Span(const Span&) = delete;
   Span& operator=(const Span&) = delete;
@@ -52,16 +51,23 @@ class Span {
   bool records_;
 };
 
-/// While it lives, what this thread does stands in row `lane` of its process; 0 is the row of the main thread.
-class Lane {
+/// Whose work a thread does: a rank, where ranks are threads, and one of that rank's threads; 0 is its main one.
+struct Row {
+  int rank = 0;
+  int lane = 0;
+};
+[[nodiscard]] Row row_of_this_thread();
+
+/// While it lives, what this thread does stands in that row.
+class InRow {
  public:
-  explicit Lane(int lane);
-  ~Lane();
-  Lane(const Lane&) = delete;
-  Lane& operator=(const Lane&) = delete;
+  explicit InRow(Row row);
+  ~InRow();
+  InRow(const InRow&) = delete;
+  InRow& operator=(const InRow&) = delete;
 
  private:
-  int before_;
+  Row before_;
 };
 
 /// Nanoseconds of the clock that events are timed by.

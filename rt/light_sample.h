@@ -25,6 +25,8 @@ struct PhotonStart {
   glm::dvec3 flux{0.0};                 ///< of one photon of one: divide by how many are sent
   std::uint32_t surface = 0xFFFFFFFFU;  ///< that emits it, if any
   double offset = 0.0;                  ///< metres to leave the emitting surface by
+  glm::dvec3 center{0.0};               ///< of a light with a range, world
+  double range = 0.0;                   ///< metres from there at which its light ends, see range_window; 0: nowhere
   Media media = {};                     ///< what it starts in
 };
 

@@ -182,6 +182,21 @@ TEST(NormalMap, IsMirroredWithItsInstance) {
   }
 }
 
+TEST(NormalMap, IsCarriedIntoTheWorldAsByTheFilesTangents) {
+  const glm::dmat4 stretched = glm::scale(glm::dmat4(1.0), {2.0, 0.5, 1.0});
+  const glm::dvec3 at(1.2, 0.15, 0.0);
+  const auto c = std::cos(0.6F);
+  const auto s = std::sin(0.6F);
+  for (const double side : {1.0, -1.0}) {
+    const glm::dvec3 eye(1.2, 0.15, 2.0 * side);
+    Scene scene = mapped_quad(220, 90, stretched);
+    scene.materials[0].normal_texture.transform = {c, -s, s, c, 0, 0};  // turned: neither axis is the scale's
+    const glm::dvec3 derived = normal_seen(scene, eye, at);
+    scene.meshes[0].tangents.assign(4, {c, -s, 0.0F, 1.0F});
+    EXPECT_LT(glm::distance(derived, normal_seen(scene, eye, at)), 1e-6) << side;
+  }
+}
+
 TEST(NormalMap, IsScaledAndTurnedByItsTextureTransform) {
   Scene scene = mapped_quad(255, 128);
   const glm::dvec3 at(0.6, 0.3, 0.0);

@@ -12,6 +12,7 @@
 #include "core/parallel.h"
 #include "rt/denormals.h"
 #include "rt/photon_gather.h"
+#include "rt/punctual_light.h"
 #include "rt/ray_walk.h"
 
 namespace hpr {
@@ -83,8 +84,10 @@ struct PhotonTracer::Flight {
   glm::dvec3 origin{0.0};  ///< ray space: off that surface
   glm::dvec3 direction{0.0};
   glm::dvec3 flux{0.0};
-  Media media;               ///< that it flies through
-  double travelled = 0.0;    ///< metres from where it was scattered last to `place`
+  Media media;             ///< that it flies through
+  double travelled = 0.0;  ///< metres from where it was scattered last to `place`
+  glm::dvec3 center{0.0};  ///< of its light, and how far that reaches (PhotonStart)
+  double range = 0.0;
   std::uint32_t photon = 0;  ///< of the block
   int bounces = 0;
   int passed = 0;        ///< surfaces since then that do not cover all
@@ -154,6 +157,8 @@ void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double 
     flight.place = begin->origin;
     flight.direction = begin->direction;
     flight.media = begin->media;
+    flight.center = begin->center;
+    flight.range = begin->range;
     glm::dvec3 origin = begin->origin;
     if (begin->surface != kNoSurface) {
       surfaces_.load(begin->surface, block.triangle);
@@ -200,6 +205,7 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& bl
     return false;
   }
   flight.flux *= left_at(flight.media, surface, material, flight.travelled);
+  if (flight.bounces == 0) flight.flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
   if (!carries_light(flight.flux)) return false;
 
   const Bsdf bsdf(material, surface, Carried::Flux);

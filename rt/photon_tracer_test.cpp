@@ -95,6 +95,23 @@ TEST(PhotonTracerTest, PassesAndSeedsHavePhotonsOfTheirOwn) {
   EXPECT_FALSE(same(tracer.trace({.seed = 2}, {0, 100}, 100), first));
 }
 
+TEST(PhotonTracerTest, ALightsRangeEndsTheFirstLegOfItsPhotons) {
+  const PhotonRoom room = matte_room(0.5F);
+  const auto within = [&](double range) {
+    const PhotonSource down = [=](double, const glm::dvec2&, const glm::dvec2&) {
+      return std::optional(PhotonStart{.direction = {0.0, -1.0, 0.0}, .flux = glm::dvec3(1.0), .range = range});
+    };
+    return room.trace(down, 1000).global;
+  };
+  const std::vector<Photon> everywhere = within(0.0);
+  ASSERT_GT(everywhere.size(), 500U);
+  EXPECT_TRUE(within(0.9).empty());  // the floor lies 1 m below
+  const std::vector<Photon> some = within(1.25);
+  ASSERT_EQ(some.size(), everywhere.size());  // what was scattered goes on as far as it likes
+  const double left = 1.0 - 0.8 * 0.8 * 0.8 * 0.8;
+  for (std::size_t i = 0; i < some.size(); ++i) EXPECT_NEAR(some[i].flux[0], left * everywhere[i].flux[0], 1e-6);
+}
+
 TEST(PhotonTracerTest, NoPhotonsOneNoLightAndAnEmptySceneAreFine) {
   const PhotonRoom room = matte_room(0.5F);
   EXPECT_TRUE(same(room.trace(test::glowing_room(), 0), {}));

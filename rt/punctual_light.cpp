@@ -17,13 +17,6 @@ constexpr glm::dvec3 kHeadlightLift{0.25, 0.4, 0.1};
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The window that brings a light to zero at its range, as the extension recommends.
-double range_window(double distance, double range) {
-  if (range <= 0.0) return 1.0;
-  const double ratio = distance / range;
-  return std::clamp(1.0 - ratio * ratio * ratio * ratio, 0.0, 1.0);
-}
-
 /// The spot's ramp over the cosine off its axis: zero at `foot`, and one where it would be `width` higher.
 struct SpotRamp {
   double foot = 0.0;
@@ -96,6 +89,12 @@ LightSample sample_headlight(const Light& light, const glm::dvec3& place, const 
 }
 
 }  // namespace
+
+double range_window(double distance, double range) {
+  if (range <= 0.0) return 1.0;
+  const double ratio = distance / range;
+  return std::clamp(1.0 - ratio * ratio * ratio * ratio, 0.0, 1.0);
+}
 
 LightSample sample_punctual(const Light& light, const glm::dvec3& place, const View& view, const glm::dvec2& u) {
   if (light.type == LightType::Directional) return sample_directional(light, u);
@@ -176,6 +175,8 @@ PhotonStart emit_punctual(const Light& light, const LitSphere& lit, const glm::d
   }
   PhotonStart start;
   start.origin = light.position;
+  start.center = light.position;
+  start.range = light.range;
   start.flux = flux;
   start.direction = light.type == LightType::Spot
                         ? warp::in_cone(glm::normalize(glm::dvec3(light.direction)),

@@ -16,6 +16,9 @@ struct LitSphere {
   double radius = 0.0;
 };
 
+/// The window that brings a light to zero at its range, as KHR_lights_punctual recommends; 1 for a range of 0.
+[[nodiscard]] double range_window(double distance, double range);
+
 /// KHR_lights_punctual: W/sr over the squared distance (point, spot), windowed by the range; W/m^2 (directional); the
 /// spot's ramp is the squared one the extension recommends. Lights with a radius are spheres, sampled over the cone
 /// they are seen in (Shirley, Wang, Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996); range
@@ -33,8 +36,9 @@ struct LitSphere {
 /// meaning. 0 for a headlight.
 [[nodiscard]] glm::dvec3 power_of(const Light& light, const LitSphere& lit);
 
-/// A photon of a light that is no headlight; its flux is the light's power. Photons of directional lights start on a
-/// disc at the sphere's side. `u_place` is used by lights with an extent, and by directional ones.
+/// A photon of a light that is no headlight; its flux is the light's power, before its range takes any. Photons of
+/// directional lights start on a disc at the sphere's side. `u_place` is used by lights with an extent, and by
+/// directional ones.
 [[nodiscard]] PhotonStart emit_punctual(const Light& light, const LitSphere& lit, const glm::dvec2& u_place,
                                         const glm::dvec2& u_direction);
 

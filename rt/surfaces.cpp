@@ -209,14 +209,16 @@ void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weight
   const glm::uvec3& corners = mesh.triangles[triangle.index];
   // Seen from behind, the mapped normal turns round as a whole.
   const double side = point.inside ? -1.0 : 1.0;
-  if (!mesh.tangents.empty()) {
-    glm::dvec3 along(0.0);
-    glm::dvec3 normal(0.0);
+  const auto between = [&](const auto& of_vertices) {
+    glm::dvec3 sum(0.0);
     for (int corner = 0; corner < 3; ++corner) {
-      const double weight = weights[static_cast<std::size_t>(corner)];
-      along += weight * glm::dvec3(mesh.tangents[corners[corner]]);
-      normal += weight * glm::dvec3(mesh.normals[corners[corner]]);
+      sum += weights[static_cast<std::size_t>(corner)] * glm::dvec3(of_vertices[corners[corner]]);
     }
+    return sum;
+  };
+  if (!mesh.tangents.empty()) {
+    const glm::dvec3 along = between(mesh.tangents);
+    const glm::dvec3 normal = between(mesh.normals);
     // glTF 2.0, section 3.7.2.1; both carried into the world, so that mirroring mirrors them.
     const glm::dvec3 across = static_cast<double>(mesh.tangents[corners.x].w) * glm::cross(normal, along);
     const glm::dmat3 linear(instance.to_world);
@@ -234,15 +236,21 @@ void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weight
   const glm::dvec2 uv0 = transformed_uv(map, uvs[corners.x]);
   const glm::dvec2 d1 = transformed_uv(map, uvs[corners.y]) - uv0;
   const glm::dvec2 d2 = transformed_uv(map, uvs[corners.z]) - uv0;
+  // In the mesh's own coordinates and carried into the world as the file's are, so that stretching treats both alike.
+  const glm::dvec3 p0(mesh.positions[corners.x]);
+  const glm::dvec3 e1 = glm::dvec3(mesh.positions[corners.y]) - p0;
+  const glm::dvec3 e2 = glm::dvec3(mesh.positions[corners.z]) - p0;
+  const glm::dvec3 normal = unit(between(mesh.normals), direction_of_cross(e1, e2));
   // Positions as a linear function of u and v, times the determinant of the differences.
   const double turn = d1.x * d2.y - d1.y * d2.x < 0.0 ? -1.0 : 1.0;
-  const glm::dvec3 by_u = turn * (d2.y * triangle.e1 - d1.y * triangle.e2);
-  const glm::dvec3 by_v = turn * (d1.x * triangle.e2 - d2.x * triangle.e1);
-  const glm::dvec3& normal = point.shading_normal;
-  point.tangent = side * unit(by_u - glm::dot(by_u, normal) * normal, glm::dvec3(0.0));
-  point.bitangent = glm::cross(normal, point.tangent);
+  const glm::dvec3 by_u = turn * (d2.y * e1 - d1.y * e2);
+  const glm::dvec3 by_v = turn * (d1.x * e2 - d2.x * e1);
+  const glm::dvec3 along = unit(by_u - glm::dot(by_u, normal) * normal, glm::dvec3(0.0));
+  const glm::dvec3 across = glm::cross(normal, along);
+  const glm::dmat3 linear(instance.to_world);
+  point.tangent = side * unit(linear * along, glm::dvec3(0.0));
   // The map's y points up, v points down.
-  if (side * glm::dot(point.bitangent, by_v) > 0.0) point.bitangent = -point.bitangent;
+  point.bitangent = (glm::dot(across, by_v) > 0.0 ? -side : side) * unit(linear * across, glm::dvec3(0.0));
 }
 
 }  // namespace hpr

@@ -48,6 +48,22 @@ double coverage(const Scene& scene, const Material& material, const Mesh& mesh, 
   if (const TextureRef& texture = material.base_color_texture; texture.present()) {
     alpha *= read(scene, texture, Encoding::Srgb, uv_at(mesh, texture.uv_set, corners, at)).a;
   }
+  if (!mesh.colors.empty()) {
+    const auto vertex = [&](std::uint32_t corner) { return static_cast<double>(mesh.colors[corner].a); };
+    alpha *= (1.0 - at.x - at.y) * vertex(corners.x) + at.x * vertex(corners.y) + at.y * vertex(corners.z);
+  }
+  if (material.alpha_mode == AlphaMode::Blend) return std::clamp(alpha, 0.0, 1.0);
+  return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
+}
+
+/// No place of the triangle has more.
+double most_coverage(const Material& material, const Mesh& mesh, const glm::uvec3& corners) {
+  if (material.alpha_mode == AlphaMode::Opaque) return 1.0;
+  auto alpha = static_cast<double>(material.base_color.a);
+  if (!mesh.colors.empty()) {
+    alpha *=
+        static_cast<double>(std::max({mesh.colors[corners.x].a, mesh.colors[corners.y].a, mesh.colors[corners.z].a}));
+  }
   if (material.alpha_mode == AlphaMode::Blend) return std::clamp(alpha, 0.0, 1.0);
   return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
 }
@@ -146,6 +162,7 @@ void TriangleLights::estimate_brightness(TriangleLight& triangle) const {
       }
     }
   }
+  peak *= most_coverage(material, mesh, corners);
   if (!(peak > 0.0)) return;
   // The middles of parts^2 equal triangles.
   glm::dvec3 sum(0.0);

@@ -78,6 +78,28 @@ TEST(TriangleLights, TheDensityOfASampleIsFoundAgainFromItsPlace) {
   }
 }
 
+TEST(TriangleLights, WhatTheAlphaOfVertexColorsTakesEmitsNothing) {
+  Scene scene = lamp(1.0, 1.0);
+  scene.meshes[0].colors.assign(3, {1.0F, 1.0F, 1.0F, 0.25F});
+  const TriangleLights opaque(scene);
+  const double bright = estimated_irradiance(opaque, glm::dvec3(0.0));
+  scene.materials[0].alpha_mode = AlphaMode::Blend;
+  const TriangleLights veil(scene);
+  ASSERT_EQ(veil.size(), 1U);
+  EXPECT_NEAR(veil[0].mean.r, 0.25 * opaque[0].mean.r, 1e-6);
+  EXPECT_NEAR(estimated_irradiance(veil, glm::dvec3(0.0)), 0.25 * bright, 1e-6);
+  scene.materials[0].alpha_mode = AlphaMode::Mask;
+  EXPECT_EQ(TriangleLights(scene).size(), 0U);
+  // Alpha reaches the cutoff half way from the first corner to the other side.
+  scene.meshes[0].colors[1].a = scene.meshes[0].colors[2].a = 0.75F;
+  const TriangleLights half(scene);
+  ASSERT_EQ(half.size(), 1U);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    const LightSample sample = half.sample(0, glm::dvec3(0.0), Sampler(5, i).two());
+    EXPECT_EQ(sample.weight.r > 0.0, sample.goal.x + sample.goal.y >= -0.5) << sample.goal.x << ' ' << sample.goal.y;
+  }
+}
+
 TEST(TriangleLights, TexturesAreReadWhereTheSampleFalls) {
   Scene scene = lamp(1.0, 1.0);
   scene.textures.resize(1);

@@ -92,6 +92,7 @@ def resolution(folder):
 
 
 def half_resolution(folder):
+    usage(folder, "cutoff", "render", "gen:cornell", "-o", "refused.png", "--glossy-cutoff=nan", says="--glossy-cutoff")
     passes = ("--passes", "shadow,reflection,refraction,ambient-occlusion,photon", "--photons", "5000")
     whole = render(folder, *passes)
     half = same_bits(folder, "half resolution", *passes, "--half-resolution",
@@ -168,7 +169,8 @@ def target(folder):
     said = hpr(folder, "wall", "run", "1x1@64x48", "gen:cornell", "-o", "told", *walk, "--target-ms", "0.5").stderr
     took = sorted(f["ms"] for f in json.loads((folder / "told" / "manifest.json").read_text())["frames"])
     check(f"95 % up to {took[-1]:.1f} ms" in said, f"the slowest of 12 is {took[-1]:.1f} ms, and it says {said}")
-    frames = frames_of(folder, *walk, "--target-ms", "1e6")
+    frames = frames_of(folder, *walk, "--target-ms", "1000s")
+    check(frames[-1]["budget"]["target_ms"] == 1e6, f"1000 s are {frames[-1]['budget']['target_ms']} ms")
     check(frames[-1]["budget"]["given_up"] == [], f"with all the time: {frames[-1]['budget']}")
     check("budget" not in frames_of(folder, *walk)[0], "a budget nobody asked for")
 

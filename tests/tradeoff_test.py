@@ -124,6 +124,9 @@ def going_on(folder):
     check(process.returncode == 75, f"USR1 made it leave with {process.returncode}")
     kept = json.loads(states[0].read_text())["points"]
     check(0 < len(kept) < 30, f"{len(kept)} points are kept")
+    # Other sweeps meanwhile take nothing away: of another knob, or of other values.
+    hpr(folder, "tradeoff", "gen:cornell", "--size", SIZE, "--reference-spp", "16", "--frames", "1", "--vary", "max-depth=1")
+    hpr(folder, "tradeoff", "gen:cornell", "--size", SIZE, "--reference-spp", "16", "--frames", "1", "--vary", "spp=3")
     report = json.loads(hpr(folder, *arguments, "--resume").stdout)
     check(len(report["points"]) == 30, "points are missing")
     check([p["ms"]["median"] for p in report["points"][:len(kept)]] == [p["all_ms"][0] for p in kept], "kept points were measured again")
@@ -144,8 +147,20 @@ def commands_can_be_run(folder):
                             "--budget", "3600s").stdout)
     words = shlex.split(report["best_under_budget"]["command"])
     check(words[:3] == ["hpr", "render", "my scene.glb"] and words.count("my scene.glb") == 1, f"the command is {words}")
-    check("shadow" in words and "--spp" not in words, f"the command is {words}")
+    check("--passes=shadow" in words and "--spp" not in words, f"the command is {words}")
     hpr(folder, *words[1:])
+    # Globals before the command, lists of several words, and the negation of a flag that is varied.
+    report = json.loads(hpr(folder, "--seed", "3", "tradeoff", "--metric", "relmse", "flip", "--no-indirect", "--vary", "indirect=true",
+                            "--json", "--size", "32x32", "--reference-spp", "16", "--frames", "1", "--budget", "3600s", "--eye=0,0,3.4",
+                            "--at=0,0,0", "--", "gen:cornell").stdout)
+    words = shlex.split(report["best_under_budget"]["command"])
+    check(words[:3] == ["hpr", "render", "gen:cornell"] and {"--seed=3", "--eye=0,0,3.4", "--indirect=true"} <= set(words)
+          and not {"--", "flip", "tradeoff", "--no-indirect"} & set(words), f"the command is {words}")
+    hpr(folder, *words[1:], "--force", "--stats", "best.json")
+    drawn = json.loads((folder / "best.json").read_text())["rays"]
+    check(drawn == {**report["points"][0]["rays"]}, f"the command draws {drawn}, the sweep {report['points'][0]['rays']}")
+    hpr(folder, "render", "gen:cornell", "--size", "32x32", "-o", "last.png", "--no-indirect", "--indirect", "--stats", "last.json")
+    check(json.loads((folder / "last.json").read_text())["rays"]["photon"] > 0, "of two flags the last one does not count")
 
 
 def nothing_is_lost_with_the_output(folder):

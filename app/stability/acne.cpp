@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <vector>
@@ -95,32 +97,47 @@ std::size_t shadowed_in_a_wide_scene(double size, int threads) {
   return shadowed_pixels(std::move(scene), at, threads);
 }
 
-/// Pixels of a floor that see light although a cover lies `gap` scene radii above it; both are squares of 2 by 2 radii.
-std::size_t lit_under_cover(double gap, double size, int threads) {
-  const Placement at{size, {}};
-  const glm::dmat4 to_world = shapes::placed({}, size);
-  Scene floor;
-  add_placed(floor, parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), matte(), to_world);
-  floor.lights = {sun(0.7)};
-  Scene covered = floor;
-  add_placed(covered, parallelogram({-1.5, -1.5, gap}, {3, 0, 0}, {0, 3, 0}), matte(), to_world);
-  finish_scene(floor);
-  finish_scene(covered);
-  // What the floor's pixels show is named by keys, so that the cover does not hide it from the eye.
-  const View view = view_of(floor, at, {0.2, 0.1, 2.5});
-  RaySettings settings;
-  settings.threads = threads;
-  const TileLayer<Key> keys = lit_picture(floor, view, settings).keys;
-  settings.passes = {"shadow"};
-  TileLayer<Rgb> radiance(keys.layout());
-  Lighter(covered, settings).light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
-  const Image<Rgb> image = to_image(radiance, 0);
-  std::size_t lit = 0;
-  for (int y = 0; y < kPicture.height; ++y) {
-    for (int x = 0; x < kPicture.width; ++x) lit += image.at(x, y).r > 0.0F ? 1U : 0U;
+/// A floor of 2 by 2 radii under the sun, looked at from above.
+class SunnyFloor {
+ public:
+  SunnyFloor(double size, int threads) : to_world_(shapes::placed({}, size)) {
+    add_placed(floor_, parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), matte(), to_world_);
+    floor_.lights = {sun(0.7)};
+    finish_scene(floor_);
+    view_ = view_of(floor_, {size, {}}, {0.2, 0.1, 2.5});
+    settings_.threads = threads;
+    keys_ = lit_picture(floor_, view_, settings_).keys;
+    settings_.passes = {"shadow"};
+    shows_light_ = 4 * lit_pixels(floor_) > kPicture.area();
   }
-  return lit;
-}
+
+  /// Pixels that see light although a cover lies `gap` radii above; all, where the bare floor is dark: that proves
+  /// nothing.
+  [[nodiscard]] std::size_t lit_under_cover(double gap) const {
+    if (!shows_light_) return kPicture.area();
+    Scene covered = floor_;
+    add_placed(covered, parallelogram({-1.5, -1.5, gap}, {3, 0, 0}, {0, 3, 0}), matte(), to_world_);
+    finish_scene(covered);
+    return lit_pixels(covered);
+  }
+
+ private:
+  /// What the floor's pixels show is named by keys, so that the cover does not hide it from the eye.
+  [[nodiscard]] std::size_t lit_pixels(const Scene& scene) const {
+    TileLayer<Rgb> radiance(keys_.layout());
+    Lighter(scene, settings_).light(std::span(&view_, 1), keys_, all_tiles(keys_.layout()), {.radiance = &radiance});
+    const Image<Rgb> image = to_image(radiance, 0);
+    return static_cast<std::size_t>(
+        std::ranges::count_if(image.pixels(), [](const Rgb& color) { return color.r > 0.0F; }));
+  }
+
+  glm::dmat4 to_world_;
+  Scene floor_;
+  View view_;
+  RaySettings settings_;
+  TileLayer<Key> keys_;
+  bool shows_light_ = false;
+};
 
 }  // namespace
 
@@ -148,7 +165,7 @@ std::vector<StabilityFinding> acne(const Globals& globals) {
     small.curve.points.emplace_back(size, count);
   }
   const auto holds_small = [&](double size) { return shadowed_in_a_wide_scene(size, threads) == 0; };
-  if (!holds_small(1e-8)) small.breaks_at = breaking_point(1e-4, 1e-8, 0.2, holds_small);
+  small.breaks_at = breaking_point_if_any(1e-4, 1e-8, 0.2, holds_small);
 
   // The floor's corners lie 1 radius off the middle, its edges are 2 long.
   constexpr double kOffset = kOriginSteps * kFloatStep * 3.0;
@@ -156,9 +173,10 @@ std::vector<StabilityFinding> acne(const Globals& globals) {
       finding("acne/thin-wall", "floor under a cover 2.9e-6 (two offsets) .. 1e-2 radii above it, scales 1e-3 .. 1e3",
               0.0, "lit pixels", "an origin is moved by 4 steps, and Embree errs by 3");
   thin.curve.x = "gap, in radii of the scene";
+  const std::array floors{SunnyFloor(1e-3, threads), SunnyFloor(1.0, threads), SunnyFloor(1e3, threads)};
   const auto worst_lit = [&](double gap) {
     std::size_t lit = 0;
-    for (const double scale : {1e-3, 1.0, 1e3}) lit = std::max(lit, lit_under_cover(gap, scale, threads));
+    for (const SunnyFloor& floor : floors) lit = std::max(lit, floor.lit_under_cover(gap));
     return static_cast<double>(lit);
   };
   for (const double gap : {0.5 * kOffset, kOffset, 2.0 * kOffset, 1e-4, 1e-2}) {
@@ -166,7 +184,7 @@ std::vector<StabilityFinding> acne(const Globals& globals) {
     if (gap >= 2.0 * kOffset) thin.measured = worse(thin.measured, lit);
     thin.curve.points.emplace_back(gap, lit);
   }
-  thin.breaks_at = breaking_point(2.0 * kOffset, 1e-9, 0.05, [&](double gap) { return worst_lit(gap) == 0.0; });
+  thin.breaks_at = breaking_point_if_any(2.0 * kOffset, 1e-9, 0.05, [&](double gap) { return worst_lit(gap) == 0.0; });
   return {terminator, scales, small, thin};
 }
 

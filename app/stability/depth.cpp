@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "app/stability/cases.h"
@@ -110,23 +111,36 @@ bool standard_order_kept(double z, double gap, bool fixed_point) {
   return true;
 }
 
-StabilityFinding standard_mapping(bool fixed_point) {
+/// The distance up to which all pairs keep their order; that of the nearest one where even that does not.
+double reach_of(const std::function<bool(int pair)>& keeps_order) {
+  double reach = distance_of(0);
+  for (int pair = 0; pair < kPairs && keeps_order(pair); ++pair) reach = distance_of(pair);
+  return reach;
+}
+
+/// How much farther the order of what was drawn holds than that of a standard mapping would.
+StabilityFinding reach(const Gaps& breaks) {
   StabilityFinding finding;
-  finding.name = fixed_point ? "depth-order/standard-z-24-bit" : "depth-order/standard-z-float";
-  finding.parameter = fmt::format("computed for comparison: a standard mapping, near {:g}, far {:g} m", kNear, kFar);
-  finding.unit = "m, farthest distance at which a relative gap of 1e-6 is told apart";
-  // A step of 2^-24 in depth n / z is z^2 2^-24 / n metres; nearer than 2 n a float's step is half of it.
-  finding.limit = 2.0 * kPromisedGap * kNear / kFloatRounding;
-  finding.why = "depth n / z in steps of 2^-24 resolves gaps of z 2^-24 / n: a comparison, nothing HPR draws with.";
+  finding.name = "depth-order/reach";
+  finding.parameter =
+      fmt::format("a relative gap of 1e-6, near {:g} m; standard mapping, far {:g} m, computed", kNear, kFar);
+  finding.unit = "times as far as a standard mapping in float or 24 bits";
+  finding.bound = Bound::AtLeast;
+  // Order holds to the farthest pair; depth n / z in steps of 2^-24 resolves gaps of z 2^-24 / n.
+  finding.limit = distance_of(kPairs - 1) / (2.0 * kPromisedGap * kNear / kFloatRounding);
+  finding.why = "A standard mapping has steps of 2^-24 in n / z, twice as fine nearer than 2 n in float.";
   finding.curve.x = "distance, m";
   for (int pair = 0; pair < kPairs; ++pair) {
     const double z = distance_of(pair);
-    const double gap =
-        breaking_point(1e12, 1e-9, 0.01, [&](double g) { return standard_order_kept(z, g, fixed_point); });
-    if (gap <= kPromisedGap) finding.measured = std::max(finding.measured, z);
-    finding.curve.points.emplace_back(z, gap);
+    finding.curve.points.emplace_back(
+        z, breaking_point(1e12, 1e-9, 0.01, [&](double gap) { return standard_order_kept(z, gap, false); }));
     finding.curve.expected.emplace_back(z, z * kFloatRounding / kNear);
   }
+  const auto standard = [&](bool fixed_point) {
+    return reach_of([&](int pair) { return standard_order_kept(distance_of(pair), kPromisedGap, fixed_point); });
+  };
+  const double drawn = reach_of([&](int pair) { return breaks.at(static_cast<std::size_t>(pair)) <= kPromisedGap; });
+  finding.measured = drawn / std::max(standard(false), standard(true));
   return finding;
 }
 
@@ -160,7 +174,7 @@ std::vector<StabilityFinding> depth_order(const Globals& globals) {
   }
   gap.measured = *std::ranges::max_element(breaks);
   order.breaks_at = gap.measured;
-  return {order, gap, standard_mapping(false), standard_mapping(true)};
+  return {order, gap, reach(breaks)};
 }
 
 }  // namespace hpr::stability

@@ -118,7 +118,7 @@ std::vector<StabilityFinding> frusta(const Globals& globals) {
     }
     std::ranges::reverse(finding.curve.points);
     finding.breaks_at =
-        breaking_point(1e-6, 1e-300, 0.1, [&](double d) { return corner_error(beside, d) <= finding.limit; });
+        breaking_point_if_any(1e-6, 1e-300, 0.1, [&](double d) { return corner_error(beside, d) <= finding.limit; });
     findings.push_back(finding);
   }
   for (const auto& [distance, wrong] : drawn.curve.points) drawn.measured = std::max(drawn.measured, wrong);

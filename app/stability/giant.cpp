@@ -122,8 +122,8 @@ std::vector<StabilityFinding> horizon(Drawer& drawer) {
     rows.curve.points.emplace_back(reach, wrong(reach));
     if (reach < 2.0 * kPromised) rows.measured = std::max(rows.measured, rows.curve.points.back().second);
   }
-  if (rows.holds() && wrong(1e30) > 0.0) {
-    rows.breaks_at = breaking_point(kPromised, 1e30, 0.2, [&](double reach) { return wrong(reach) <= 0.0; });
+  if (rows.holds()) {
+    rows.breaks_at = breaking_point_if_any(kPromised, 1e30, 0.2, [&](double reach) { return wrong(reach) <= 0.0; });
   }
   for (const double turned : kTurns) {
     const Seen seen = seen_ground(drawer, kPromised, turned);
@@ -185,9 +185,9 @@ StabilityFinding checker(const Globals& globals, std::uint64_t& not_finite) {
     finding.curve.points.emplace_back(reach, wrong);
     if (reach <= 1e4) finding.measured = std::max(finding.measured, wrong);
   }
-  if (finding.holds() && finding.curve.points.back().second > 0.0) {
-    finding.breaks_at =
-        breaking_point(1e4, 1e9, 0.2, [&](double reach) { return wrong_squares(globals, reach, not_finite) <= 0.0; });
+  if (finding.holds()) {
+    finding.breaks_at = breaking_point_if_any(
+        1e4, 1e9, 0.2, [&](double reach) { return wrong_squares(globals, reach, not_finite) <= 0.0; });
   }
   return finding;
 }
@@ -226,7 +226,7 @@ StabilityFinding close_wall(const Globals& globals, std::uint64_t& not_finite) {
     if (power >= -4) finding.measured = std::max(finding.measured, finding.curve.points.back().second);
   }
   if (finding.holds()) {
-    finding.breaks_at = breaking_point(1e-4, 1e-12, 0.1, [&](double d) { return wrong(d) <= 0.0; });
+    finding.breaks_at = breaking_point_if_any(1e-4, 1e-12, 0.1, [&](double d) { return wrong(d) <= 0.0; });
   }
   return finding;
 }

@@ -53,7 +53,7 @@ StabilityFinding near_surface() {
     near.curve.expected.emplace_back(height, limit(height));
   }
   const auto holds = [&](double height) { return error(height) <= near.limit; };
-  if (!holds(1e-18)) near.breaks_at = breaking_point(kNearest, 1e-18, 0.2, holds);
+  near.breaks_at = breaking_point_if_any(kNearest, 1e-18, 0.2, holds);
   return near;
 }
 
@@ -106,21 +106,21 @@ double off_the_point(bool sphere, double size) {
 StabilityFinding far_away(bool sphere) {
   StabilityFinding far = finding(sphere ? "lights/far-sphere" : "lights/far-triangle",
                                  "size 1e-1 .. 1e-6 of the distance, at 45 degrees, one sample, against a point light",
-                                 0.0, "relative", "one sample of a light of size q sees cosine and distance off by q");
+                                 1.0, "of what a light of that size may be off",
+                                 "one sample of a light of size q sees cosine and distance off by q");
   // d(cos / r^2) <= (tan 45 + 2) q to first order, corners reaching up to sqrt(2) q about the middle; then floats.
   const auto limit = [](double q) { return 3.0 * std::sqrt(2.0) * q * (1.0 + 2.0 * q) + 8.0 * kFloatRounding; };
   constexpr double kSmallest = 1e-6;
-  far.limit = limit(kSmallest);
   far.curve.x = "size over distance";
   for (const double q : {1e-9, kSmallest, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
     const double off = off_the_point(sphere, q);
-    if (q == kSmallest) far.measured = off;
+    if (q >= kSmallest) far.measured = worse(far.measured, off / limit(q));
     far.curve.points.emplace_back(q, off);
     far.curve.expected.emplace_back(q, limit(q));
   }
   // Smaller lights still are points.
-  const auto holds = [&](double q) { return off_the_point(sphere, q) <= far.limit; };
-  if (!holds(1e-18)) far.breaks_at = breaking_point(kSmallest, 1e-18, 0.2, holds);
+  const auto holds = [&](double q) { return off_the_point(sphere, q) <= limit(kSmallest); };
+  far.breaks_at = breaking_point_if_any(kSmallest, 1e-18, 0.2, holds);
   return far;
 }
 
@@ -143,7 +143,7 @@ StabilityFinding horizon() {
     low.curve.points.emplace_back(radians, off);
   }
   for (const double radians : {0.0, -1e-30, -1e-3}) low.measured = worse(low.measured, at_elevation(radians));
-  low.breaks_at = breaking_point(1e-6, 1e-12, 0.1, [&](double radians) { return error(radians) <= low.limit; });
+  low.breaks_at = breaking_point_if_any(1e-6, 1e-12, 0.1, [&](double radians) { return error(radians) <= low.limit; });
   return low;
 }
 

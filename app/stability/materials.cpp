@@ -28,7 +28,7 @@ Bsdf bsdf_at(const MaterialPoint& material, double polar, Carried carried) {
   return Bsdf(material, point, carried);
 }
 
-/// The most of a furnace's light that samples of all lobes, each chosen by nobody, give back together in the mean.
+/// What of a furnace's light samples of all lobes, each chosen by nobody, give back together in the mean.
 double furnace(const MaterialPoint& material, double polar) {
   const Bsdf bsdf = bsdf_at(material, polar, Carried::Flux);
   double sum = 0.0;
@@ -59,6 +59,32 @@ StabilityFinding energy() {
     most.curve.points.emplace_back(roughness, worst);
   }
   return most;
+}
+
+StabilityFinding kept_energy() {
+  constexpr double kRoughest = 0.01;
+  constexpr double kSteepest = 1.56;
+  const double masked = std::tan(kSteepest) * kRoughest * kRoughest;  // alpha tan
+  StabilityFinding least =
+      finding("materials/furnace-smooth", "white metal of roughness 0 .. 0.01, looked at from 0 to 89.4 degrees",
+              1.0 - masked * masked - 1.0 / kSamples, "of what arrives",
+              "Smith's masking takes (alpha tan)^2 / 4 on either way, the horizon as much; and one sample in 4096");
+  least.bound = Bound::AtLeast;
+  least.measured = 1.0;
+  least.curve.x = "roughness";
+  for (const double roughness : {0.0, 1e-4, 9e-4, 1.1e-3, kRoughest}) {
+    double worst = 1.0;
+    for (const double polar : {0.0, 0.5, 1.0, 1.4, kSteepest}) {
+      MaterialPoint metal;
+      metal.metallic = 1.0;
+      metal.roughness = roughness;
+      const double shown = furnace(metal, polar);
+      worst = std::isfinite(shown) ? std::min(worst, shown) : 0.0;
+    }
+    least.measured = std::min(least.measured, worst);
+    least.curve.points.emplace_back(roughness, worst);
+  }
+  return least;
 }
 
 /// What a white metal shows of surroundings of radiance (1 + x) / 2 along direction (x, y, z).
@@ -167,7 +193,7 @@ std::vector<StabilityFinding> indices(int threads) {
 }  // namespace
 
 std::vector<StabilityFinding> materials(const Globals& globals) {
-  std::vector<StabilityFinding> all{energy(), smooth()};
+  std::vector<StabilityFinding> all{energy(), kept_energy(), smooth()};
   for (StabilityFinding& one : indices(threads_of(globals))) all.push_back(std::move(one));
   return all;
 }

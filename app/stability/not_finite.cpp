@@ -167,7 +167,7 @@ std::vector<StabilityFinding> overflow() {
     bright.curve.points.emplace_back(radiance, count);
   }
   bright.breaks_at =
-      breaking_point(9e37, 3.4e38, 0.01, [](double radiance) { return glare(radiance, 1).not_finite == 0; });
+      breaking_point_if_any(9e37, 3.4e38, 0.01, [](double radiance) { return glare(radiance, 1).not_finite == 0; });
 
   StabilityFinding named =
       finding("not-finite/first-pixel", "past that, the first pixel named by 1, 2 and 3 threads", 0.0,

@@ -59,7 +59,8 @@ StabilityFinding exact_places(Drawer& drawer) {
     if (metres <= kPromised) finding.measured = std::max(finding.measured, share);
   }
   if (finding.holds()) {
-    finding.breaks_at = breaking_point(kPromised, kFarthest, 0.05, [&](double d) { return differing(d) <= 0.0; });
+    finding.breaks_at =
+        breaking_point_if_any(kPromised, kFarthest, 0.05, [&](double d) { return differing(d) <= 0.0; });
   }
   return finding;
 }
@@ -89,7 +90,8 @@ StabilityFinding any_places(Drawer& drawer) {
     if (metres <= kPromised) finding.measured = std::max(finding.measured, finding.curve.points.back().second);
   }
   if (finding.holds()) {
-    finding.breaks_at = breaking_point(kPromised, kFarthest, 0.05, [&](double d) { return share(d) <= finding.limit; });
+    finding.breaks_at =
+        breaking_point_if_any(kPromised, kFarthest, 0.05, [&](double d) { return share(d) <= finding.limit; });
   }
   return finding;
 }
@@ -143,7 +145,8 @@ StabilityFinding baked(Drawer& drawer) {
     }
   }
   if (finding.holds()) {
-    finding.breaks_at = breaking_point(kPromisedBaked, 1e9, 0.05, [&](double d) { return share(d) <= finding.limit; });
+    finding.breaks_at =
+        breaking_point_if_any(kPromisedBaked, 1e9, 0.05, [&](double d) { return share(d) <= finding.limit; });
   }
   return finding;
 }

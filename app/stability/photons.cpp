@@ -128,7 +128,7 @@ StabilityFinding faint(int threads) {
     kept.curve.points.emplace_back(flux, lost(flux));
     kept.measured = worse(kept.measured, kept.curve.points.back().second);
   }
-  kept.breaks_at = breaking_point(1e-37, 1e-46, 0.05, [&](double flux) { return lost(flux) <= kept.limit; });
+  kept.breaks_at = breaking_point_if_any(1e-37, 1e-46, 0.05, [&](double flux) { return lost(flux) <= kept.limit; });
   return kept;
 }
 

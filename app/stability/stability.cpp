@@ -35,6 +35,12 @@ double breaking_point(double good, double bad, double relative, const std::funct
   return sign * std::exp(outside);
 }
 
+std::optional<double> breaking_point_if_any(double good, double bad, double relative,
+                                            const std::function<bool(double)>& holds) {
+  if (!holds(good) || holds(bad)) return std::nullopt;
+  return breaking_point(good, bad, relative, holds);
+}
+
 std::string stability_json(std::span<const StabilityFinding> findings) {
   Json json{{"schema", "hpr.stability/1"}, {"cases", Json::array()}};
   for (const StabilityFinding& finding : findings) {

@@ -55,6 +55,10 @@ struct StabilityCase {
 /// relative) times.
 [[nodiscard]] double breaking_point(double good, double bad, double relative, const std::function<bool(double)>& holds);
 
+/// The same where it is not known that `good` holds and `bad` does not: nullopt unless it is so.
+[[nodiscard]] std::optional<double> breaking_point_if_any(double good, double bad, double relative,
+                                                          const std::function<bool(double)>& holds);
+
 /// The report as schema hpr.stability/1, as a table for people, and as one HTML page with a plot for each curve.
 [[nodiscard]] std::string stability_json(std::span<const StabilityFinding> findings);
 [[nodiscard]] std::string stability_table(std::span<const StabilityFinding> findings);

@@ -237,7 +237,8 @@ std::vector<StabilityFinding> watertight(const Globals& globals) {
     if (radius >= kSmallestBall) at_edges.measured += missed * static_cast<double>(kTrialRays);
     at_edges.curve.points.emplace_back(radius, missed);
   }
-  at_edges.breaks_at = breaking_point(kSmallestBall, 1e-7, 0.2, [&](double r) { return missed_by_size(r) == 0.0; });
+  at_edges.breaks_at =
+      breaking_point_if_any(kSmallestBall, 1e-7, 0.2, [&](double r) { return missed_by_size(r) == 0.0; });
 
   StabilityFinding at_vertices = finding("watertight/vertices", both + ", past vertices at 4e-5 radii", 0.0, "1",
                                          "only next to a vertex may rounding let every triangle refuse a ray");
@@ -251,7 +252,7 @@ std::vector<StabilityFinding> watertight(const Globals& globals) {
     at_vertices.curve.points.emplace_back(beside, missed_beside(beside));
   }
   at_vertices.breaks_at =
-      breaking_point(kClearOfVertices, 1e-9, 0.2, [&](double d) { return missed_beside(d) == 0.0; });
+      breaking_point_if_any(kClearOfVertices, 1e-9, 0.2, [&](double d) { return missed_beside(d) == 0.0; });
 
   StabilityFinding doubles = finding("watertight/double-hits", "the same 1e7 rays", 0.0, "1",
                                      "a ray that leaves a surface by the origin rule does not meet it again");
