@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <set>
 
@@ -151,45 +152,51 @@ class TradeoffCommand final : public Command {
         cache / fmt::format("tradeoff-{}.json", hex16(xxh64(std::as_bytes(std::span(identity)))));
     std::vector<TradeoffPoint> done = kept_points(session.comm(), state, identity);
 
+    const MeasuredPoint measure = [&](const KnobValues& values, bool first) {
+      done.push_back(measured_point(session, values, globals, *reference, crop, first));
+      agree_on_failure(session.comm(), [&] {
+        if (speaks) write_file_atomically(state, encode_points(identity, done));
+      });
+    };
+    if (!measure_all(session, globals, done, measure)) return ExitCode::Stopped;
+    agree_on_failure(session.comm(), [&] {
+      if (!speaks) return;
+      finish(session, *reference, crop, globals);
+      forget(state, identity, std::move(done));
+    });
+    const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
+    const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
+    return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
+  }
+
+  /// Collective: measures a point and puts it behind those that are done.
+  using MeasuredPoint = std::function<void(const KnobValues& values, bool first)>;
+
+  /// Collective: the report's points, those that are done already (on rank 0) and what is measured of the others. False
+  /// when it was asked to stop before the last one.
+  [[nodiscard]] bool measure_all(Session& session, const Globals& globals, const std::vector<TradeoffPoint>& done,
+                                 const MeasuredPoint& measure) {
+    const bool speaks = session.rank() == 0;
     Progress progress(speaks ? globals.progress : "none", "point", all_.size());
     const Stopwatch watch;
     std::size_t measured = 0;
     for (const KnobValues& values : all_) {
       const auto known = std::ranges::find(done, values, &TradeoffPoint::knobs);
       const bool skips = all_gather_value(session.comm(), known != done.end() ? 1 : 0).front() == 1;
-      if (!skips) {
-        done.push_back(measured_point(session, values, globals, *reference, crop, measured == 0));
-        ++measured;
-        agree_on_failure(session.comm(), [&] {
-          if (speaks) write_file_atomically(state, encode_points(identity, done));
-        });
+      if (skips) {
+        report_.points.push_back(speaks ? *known : TradeoffPoint{});
+      } else {
+        measure(values, measured++ == 0);
+        report_.points.push_back(done.back());
       }
-      report_.points.push_back(skips && speaks ? *known : skips ? TradeoffPoint{} : done.back());
-      const auto left = static_cast<double>(all_.size() - report_.points.size());
-      std::string step = describe(values);
-      if (measured > 0) {
-        step += fmt::format(", about {:.0f} s left", left * 1e-3 * watch.ms() / static_cast<double>(measured));
-      }
-      progress.step(step);
-      const Request mine = take_request();
-      const std::vector<Request> requests = all_gather_value(session.comm(), mine);
-      if (std::ranges::max(requests) == Request::Stop && report_.points.size() < all_.size()) {
-        if (speaks) log::info("stopped after {} of {} points: --resume goes on", report_.points.size(), all_.size());
-        return ExitCode::Stopped;
-      }
+      const std::size_t left = all_.size() - report_.points.size();
+      progress.step(describe(values) + time_left(left, measured, watch.ms()));
+      const std::vector<Request> requests = all_gather_value(session.comm(), take_request());
+      if (std::ranges::max(requests) != Request::Stop || left == 0) continue;
+      if (speaks) log::info("stopped after {} of {} points: --resume goes on", report_.points.size(), all_.size());
+      return false;
     }
-    agree_on_failure(session.comm(), [&] {
-      if (!speaks) return;
-      finish(session, *reference, crop, globals);
-      try {
-        forget(state, identity, std::move(done));
-      } catch (const Error& error) {
-        log::warning("{}", error.what());  // the sweep is done all the same
-      }
-    });
-    const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
-    const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
-    return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
+    return true;
   }
 
   /// Those of such a sweep that an earlier run measured, on rank 0; without --resume this one measures its own anew.
@@ -232,15 +239,27 @@ class TradeoffCommand final : public Command {
                        fmt::join(base_words(*app_, report_.knobs), " "), fmt::join(report_.knobs, " "));
   }
 
-  /// What is done needs no going on; what an earlier run of other values kept stays.
+  /// What is done needs no going on; what an earlier run of other values kept stays. The sweep is done all the same
+  /// where that cannot be written.
   void forget(const std::filesystem::path& state, const std::string& identity, std::vector<TradeoffPoint> done) const {
     std::erase_if(done, [&](const TradeoffPoint& point) { return is_mine(point); });
-    if (!done.empty()) {
-      write_file_atomically(state, encode_points(identity, done));
+    std::error_code ignored;
+    if (done.empty()) {
+      std::filesystem::remove(state, ignored);
       return;
     }
-    std::error_code ignored;
-    std::filesystem::remove(state, ignored);
+    try {
+      write_file_atomically(state, encode_points(identity, done));
+    } catch (const Error& error) {
+      log::warning("{}", error.what());
+    }
+  }
+
+  /// Nothing before a point was measured.
+  [[nodiscard]] static std::string time_left(std::size_t points, std::size_t measured, double ms) {
+    if (measured == 0) return "";
+    return fmt::format(", about {:.0f} s left",
+                       1e-3 * ms * static_cast<double>(points) / static_cast<double>(measured));
   }
 
   [[nodiscard]] bool is_mine(const TradeoffPoint& point) const {

@@ -33,9 +33,9 @@ Scene pairs_of(const Gaps& gaps) {
   for (const bool front : {false, true}) {
     for (int pair = 0; pair < kPairs; ++pair) {
       const double z = distance_of(pair) * (front ? 1.0 : 1.0 + gaps.at(static_cast<std::size_t>(pair)));
-      const double left = -1.0 + (pair + 0.125) / (kPairs / 2);
+      const double left = -1.0 + (pair + 0.125) / (kPairs / 2.0);
       const glm::dmat4 moved = glm::translate(glm::dmat4(1.0), {left * z, 0.0, -z});
-      scene.instances.push_back({0, glm::scale(moved, {0.75 / (kPairs / 2) * z, z, 1.0}), 0});
+      scene.instances.push_back({0, glm::scale(moved, {0.75 / (kPairs / 2.0) * z, z, 1.0}), 0});
     }
   }
   finish_scene(scene);
