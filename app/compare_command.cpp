@@ -238,10 +238,11 @@ class CompareCommand final : public Command {
 
   /// One process: ranks are threads, or MPI jobs of this program that hand over their runs.
   [[nodiscard]] ExitCode run_here(const Globals& globals, const CompareInput& input) const {
-    const bool on_threads = transport_ == "threads" || !simulate_.empty();
-    if (on_threads) return traced_alone(globals, [&] { return measure_here(globals, input); });
+    if (on_threads()) return traced_alone(globals, [&] { return measure_here(globals, input); });
     return measure_here(globals, input);
   }
+
+  [[nodiscard]] bool on_threads() const { return transport_ == "threads" || !simulate_.empty(); }
 
   [[nodiscard]] ExitCode measure_here(const Globals& globals, const CompareInput& input) const {
     CompareResult result;
@@ -250,7 +251,7 @@ class CompareCommand final : public Command {
     for (std::size_t i = 0; i < counts.size(); ++i) {
       const int ranks = counts[i];
       std::vector<CompareRun> runs;
-      if (transport_ == "threads" || !simulate_.empty()) {
+      if (on_threads()) {
         CompareResult here = compare_on_threads(ranks, simulate_, globals.hang_limit(), input, settings_for(ranks));
         runs = std::move(here.runs);
         result.frame = std::move(here.frame);

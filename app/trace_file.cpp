@@ -50,34 +50,33 @@ Json named(const char* what, int rank, int lane, const std::string& name) {
 
 /// This process's events, one to a line: `rank`'s, or those of ranks that are its threads.
 std::string lines_of(int rank, const std::string& host, const trace::Record& record, std::int64_t zero) {
-  std::vector<Json> lines;
-  std::set<std::pair<int, int>> rows;
-  const auto add_row = [&](int process, int lane) {
-    if (!rows.insert({process, lane}).second) return;
-    lines.push_back(named("thread_name", process, lane, lane == 0 ? "main" : fmt::format("thread {}", lane)));
-  };
+  std::string text;
+  const auto add = [&](const Json& line) { text += (text.empty() ? "" : ",\n") + line.dump(); };
   std::set<int> processes;
+  std::set<std::pair<int, int>> rows;
   for (const trace::Event& event : record.events) {
     const int process = rank + event.rank;
     if (processes.insert(process).second) {
-      lines.push_back(named("process_name", process, 0, fmt::format("rank {} on {}", process, host)));
-      lines.push_back({{"name", "process_sort_index"},
-                       {"ph", "M"},
-                       {"pid", process},
-                       {"tid", 0},
-                       {"args", {{"sort_index", process}}}});
+      add(named("process_name", process, 0, fmt::format("rank {} on {}", process, host)));
+      add({{"name", "process_sort_index"},
+           {"ph", "M"},
+           {"pid", process},
+           {"tid", 0},
+           {"args", {{"sort_index", process}}}});
     }
-    add_row(process, event.lane);
-    Json& line = lines.emplace_back(Json{{"name", event.name},
-                                         {"ph", "X"},
-                                         {"ts", static_cast<double>(event.begin_ns - zero) / 1000.0},
-                                         {"dur", static_cast<double>(event.end_ns - event.begin_ns) / 1000.0},
-                                         {"pid", process},
-                                         {"tid", event.lane}});
+    if (rows.insert({process, event.lane}).second) {
+      const std::string name = event.lane == 0 ? "main" : fmt::format("thread {}", event.lane);
+      add(named("thread_name", process, event.lane, name));
+    }
+    Json line{{"name", event.name},
+              {"ph", "X"},
+              {"ts", static_cast<double>(event.begin_ns - zero) / 1000.0},
+              {"dur", static_cast<double>(event.end_ns - event.begin_ns) / 1000.0},
+              {"pid", process},
+              {"tid", event.lane}};
     if (event.detail != nullptr) line["args"][event.detail] = event.amount;
+    add(line);
   }
-  std::string text;
-  for (const Json& line : lines) text += (text.empty() ? "" : ",\n") + line.dump();
   return text;
 }
 

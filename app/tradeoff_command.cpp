@@ -5,7 +5,6 @@
 #include <hpr/version.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -14,7 +13,6 @@
 
 #include "app/cache_folder.h"
 #include "app/compare_options.h"
-#include "app/knobs.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"

@@ -15,6 +15,7 @@ import sys
 import tempfile
 
 import exr
+from checks import check, failures
 
 HPR = os.path.abspath(sys.argv[1])
 SIZE = (160, 96)
@@ -22,13 +23,6 @@ PARTS = ("direct", "shadow", "reflection", "refraction", "ambient-occlusion", "p
 ALL = "depth,id,normal,albedo," + ",".join(PARTS) + ",rank,cost"
 CHANNELS = {"R", "G", "B", "depth.Z", "id.X", "normal.X", "normal.Y", "normal.Z", "rank.X", "cost.X",
             *(f"{part}.{letter}" for part in ("albedo", *PARTS) for letter in "RGB")}
-failures = []
-
-
-def check(holds, message):
-    if not holds:
-        failures.append(message)
-        print(message)
 
 
 def render(folder, *arguments):

@@ -17,17 +17,12 @@ import tempfile
 
 import processes
 
+from checks import check, failures
+
 HPR = os.path.abspath(sys.argv[1])
 SAMPLES = 100
 COMMON = ["--progress", "line", "--threads", "1", "--photons", "1000"]
 ARGUMENTS = ["render", "gen:gallery", "--size", "96x64", *COMMON]
-failures = []
-
-
-def check(holds, message):
-    if not holds:
-        failures.append(message)
-        print(message)
 
 
 def run(folder, *arguments):

@@ -16,16 +16,11 @@ import sys
 import tempfile
 import time
 
+from checks import check, failures
+
 HPR = os.path.abspath(sys.argv[1])
 CAMERA = ["--eye", "0.278,0.273,-0.8", "--at", "0.278,0.273,0.28"]
-FAILED = []
 SAID = set()
-
-
-def check(holds, what):
-    if not holds:
-        print(what)
-        FAILED.append(what)
 
 
 def hpr(arguments, folder, said="", code=0):
@@ -190,7 +185,7 @@ def main():
         listed = console(folder, ["help"]).stdout
         commands = {line.split()[0] for line in listed.splitlines() if line}
         check(commands and commands <= SAID, f"commands without a test: {sorted(commands - SAID)}")
-    return 1 if FAILED else 0
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":

@@ -14,15 +14,9 @@ import sys
 import tempfile
 
 import unused_features
+from checks import check, failures
 
 HPR = os.path.abspath(sys.argv[1])
-failures = []
-
-
-def check(holds, message):
-    if not holds:
-        failures.append(message)
-        print(message)
 
 
 def render(folder, scene, *arguments, ranks="2"):

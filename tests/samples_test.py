@@ -14,16 +14,10 @@ import sys
 import tempfile
 
 import exr
+from checks import check, failures
 
 HPR = os.path.abspath(sys.argv[1])
 MATTE = "gen:cornell"
-failures = []
-
-
-def check(holds, message):
-    if not holds:
-        failures.append(message)
-        print(message)
 
 
 def hpr(folder, *arguments):

@@ -13,14 +13,9 @@ import subprocess
 import sys
 import tempfile
 
+from checks import check, failures
+
 HPR = os.path.abspath(sys.argv[1])
-FAILED = []
-
-
-def check(holds, what):
-    if not holds:
-        print(what)
-        FAILED.append(what)
 
 
 def hpr(folder, *arguments, code=0):
@@ -132,7 +127,7 @@ def main():
         pictures(pathlib.Path(scratch))
         other_commands(pathlib.Path(scratch))
         refusals(pathlib.Path(scratch))
-    return 1 if FAILED else 0
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":

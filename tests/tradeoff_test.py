@@ -19,16 +19,11 @@ import tempfile
 import time
 import xml.dom.minidom
 
+from checks import check, failures
+
 HPR = os.path.abspath(sys.argv[1])
 SOURCE = pathlib.Path(sys.argv[2])
 SIZE = "96x64"
-failures = []
-
-
-def check(holds, message):
-    if not holds:
-        failures.append(message)
-        print(message)
 
 
 def hpr(folder, *arguments, code=0):

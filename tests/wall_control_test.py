@@ -15,14 +15,9 @@ import sys
 import tempfile
 import time
 
+from checks import check, failures
+
 HPR = os.path.abspath(sys.argv[1])
-FAILED = []
-
-
-def check(holds, what):
-    if not holds:
-        print(what)
-        FAILED.append(what)
 
 
 class Wall:
@@ -174,7 +169,7 @@ def main():
         told_and_stopped(pathlib.Path(scratch))
         stops_and_goes_on(pathlib.Path(scratch))
         survives_a_lost_rank(pathlib.Path(scratch))
-    return 1 if FAILED else 0
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":
