@@ -17,18 +17,6 @@ glm::dvec4 texel_of(const Scene& scene, const TextureRef& reference, Encoding en
                         transformed_uv(reference, set));
 }
 
-double coverage(const Material& material, double alpha) {
-  switch (material.alpha_mode) {
-    case AlphaMode::Mask:
-      return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
-    case AlphaMode::Blend:
-      return std::clamp(alpha, 0.0, 1.0);
-    case AlphaMode::Opaque:
-      break;
-  }
-  return 1.0;
-}
-
 /// What a normal map of tangent space makes of the normal; the unmapped one where the result turns away from the viewer
 /// or has no direction.
 glm::dvec3 mapped_normal(const Scene& scene, const Material& material, const SurfacePoint& surface) {
@@ -67,7 +55,7 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   glm::dvec4 base = glm::dvec4(material.base_color) * surface.color;
   if (material.base_color_texture.present()) base *= texel(material.base_color_texture, Encoding::Srgb);
   point.base_color = glm::clamp(glm::dvec3(base), 0.0, 1.0);
-  point.alpha = coverage(material, base.a);
+  point.alpha = coverage_of(material, base.a);
   point.normal = material.normal_texture.present() ? mapped_normal(scene, material, surface) : surface.facing_normal();
   if (material.unlit) {
     point.unlit = true;
@@ -103,6 +91,18 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   return point;
 }
 
+double coverage_of(const Material& material, double alpha) {
+  switch (material.alpha_mode) {
+    case AlphaMode::Mask:
+      return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
+    case AlphaMode::Blend:
+      return std::clamp(alpha, 0.0, 1.0);
+    case AlphaMode::Opaque:
+      break;
+  }
+  return 1.0;
+}
+
 double evaluate_alpha(const Scene& scene, const Material& material, const std::array<glm::vec2, 2>& uv,
                       double color_alpha) {
   if (material.alpha_mode == AlphaMode::Opaque) return 1.0;
@@ -110,7 +110,7 @@ double evaluate_alpha(const Scene& scene, const Material& material, const std::a
   if (material.base_color_texture.present()) {
     alpha *= texel_of(scene, material.base_color_texture, Encoding::Srgb, uv).a;
   }
-  return coverage(material, alpha);
+  return coverage_of(material, alpha);
 }
 
 }  // namespace hpr

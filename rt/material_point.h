@@ -31,6 +31,9 @@ struct MaterialPoint {
 /// 1/m, finite: KHR_materials_volume's, by which `attenuation_distance` metres leave the attenuation colour.
 [[nodiscard]] glm::dvec3 absorption_of(const Material& material);
 
+/// What of a surface with this alpha is there, as the material's mode has it.
+[[nodiscard]] double coverage_of(const Material& material, double alpha);
+
 /// Coverage alone, for rays that may pass: cheaper than evaluate_material. `uv` and `color_alpha` of the place.
 [[nodiscard]] double evaluate_alpha(const Scene& scene, const Material& material, const std::array<glm::vec2, 2>& uv,
                                     double color_alpha);

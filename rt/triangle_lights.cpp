@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "rt/material_point.h"
 #include "rt/ray_space.h"
 #include "rt/spherical_triangle.h"
 #include "rt/surfaces.h"
@@ -44,28 +45,23 @@ glm::dvec4 read(const Scene& scene, const TextureRef& reference, Encoding encodi
 double coverage(const Scene& scene, const Material& material, const Mesh& mesh, const glm::uvec3& corners,
                 const glm::dvec2& at) {
   if (material.alpha_mode == AlphaMode::Opaque) return 1.0;
-  auto alpha = static_cast<double>(material.base_color.a);
-  if (const TextureRef& texture = material.base_color_texture; texture.present()) {
-    alpha *= read(scene, texture, Encoding::Srgb, uv_at(mesh, texture.uv_set, corners, at)).a;
-  }
+  double alpha = 1.0;
   if (!mesh.colors.empty()) {
     const auto vertex = [&](std::uint32_t corner) { return static_cast<double>(mesh.colors[corner].a); };
-    alpha *= (1.0 - at.x - at.y) * vertex(corners.x) + at.x * vertex(corners.y) + at.y * vertex(corners.z);
+    alpha = (1.0 - at.x - at.y) * vertex(corners.x) + at.x * vertex(corners.y) + at.y * vertex(corners.z);
   }
-  if (material.alpha_mode == AlphaMode::Blend) return std::clamp(alpha, 0.0, 1.0);
-  return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
+  return evaluate_alpha(scene, material,
+                        {glm::vec2(uv_at(mesh, 0, corners, at)), glm::vec2(uv_at(mesh, 1, corners, at))}, alpha);
 }
 
 /// No place of the triangle has more.
 double most_coverage(const Material& material, const Mesh& mesh, const glm::uvec3& corners) {
-  if (material.alpha_mode == AlphaMode::Opaque) return 1.0;
   auto alpha = static_cast<double>(material.base_color.a);
   if (!mesh.colors.empty()) {
     alpha *=
         static_cast<double>(std::max({mesh.colors[corners.x].a, mesh.colors[corners.y].a, mesh.colors[corners.z].a}));
   }
-  if (material.alpha_mode == AlphaMode::Blend) return std::clamp(alpha, 0.0, 1.0);
-  return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
+  return coverage_of(material, alpha);
 }
 
 /// The texels a triangle may show, bilinear neighbours included: [low, high] in texels, not yet wrapped.
