@@ -7,16 +7,14 @@ Prints what differs and leaves with 1.
 """
 
 import json
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
 import exr
-from checks import check, failures
+from program import HPR, expect, failures
 
-HPR = os.path.abspath(sys.argv[1])
 SCENE = "gen:gallery"
 
 
@@ -27,7 +25,7 @@ def hpr(folder, *arguments):
 def render(folder, *arguments, scene=SCENE):
     result = hpr(folder, "render", scene, "--size", "168x104", "-o", "a.exr", "--stats", "a.json", "--explain",
                  "--force", *arguments)
-    check(result.returncode == 0, f"{' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
+    expect(result.returncode == 0, f"{' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     return (folder / "a.exr").read_bytes(), result.stdout
 
 
@@ -35,20 +33,20 @@ def refusals(folder):
     for option, nearest in (("--embree-quality=hihg", "did you mean 'high'?"), ("--deterministic=yes", "choices: off, on"),
                             ("--depth-format=25", "choices: 32f, 24, 16"), ("--color-format=16", "choices: 32f, 16f, 8")):
         result = hpr(folder, "render", SCENE, "--explain", option)
-        check(result.returncode == 2 and nearest in result.stderr, f"{option}: {result.returncode} {result.stderr}")
+        expect(result.returncode == 2 and nearest in result.stderr, f"{option}: {result.returncode} {result.stderr}")
 
 
 def rays(folder):
     expected, plan = render(folder, "--primary", "rays")
-    check("embree" not in plan, f"the default is explained: {plan}")
+    expect("embree" not in plan, f"the default is explained: {plan}")
     for quality in ("low", "high"):
         picture, plan = render(folder, "--primary", "rays", "--embree-quality", quality)
-        check(picture == expected, f"--embree-quality {quality} changes bits")
-        check(f"embree: {quality} build quality, AVX2 on every rank" in plan, f"{quality} is not explained: {plan}")
+        expect(picture == expected, f"--embree-quality {quality} changes bits")
+        expect(f"embree: {quality} build quality, AVX2 on every rank" in plan, f"{quality} is not explained: {plan}")
     free, plan = render(folder, "--deterministic", "off")
-    check("widest instructions" in plan, f"--deterministic off is not explained: {plan}")
+    expect("widest instructions" in plan, f"--deterministic off is not explained: {plan}")
     again, _ = render(folder, "--deterministic", "off", "--ranks", "2")
-    check(free == again, "ranks of one host differ with --deterministic off")
+    expect(free == again, "ranks of one host differ with --deterministic off")
 
 
 def depths(folder):
@@ -61,27 +59,27 @@ def depths(folder):
     for bits in ("32f", "24", "16"):
         expected, plan = render(folder, "--depth-format", bits, "--raw", "a.keys")
         keys = (folder / "a.keys").read_bytes()
-        check(("gains nothing" in plan) == (bits != "32f"), f"{bits} on one rank: {plan}")
+        expect(("gains nothing" in plan) == (bits != "32f"), f"{bits} on one rank: {plan}")
         for way in ways:
             picture, plan = render(folder, "--depth-format", bits, "--raw", "a.keys", *way)
-            check((folder / "a.keys").read_bytes() == keys, f"--depth-format {bits} {' '.join(way)}: other keys")
-            check(picture == expected, f"--depth-format {bits} {' '.join(way)}: another picture")
+            expect((folder / "a.keys").read_bytes() == keys, f"--depth-format {bits} {' '.join(way)}: other keys")
+            expect(picture == expected, f"--depth-format {bits} {' '.join(way)}: another picture")
             if "radix-k" in way:
                 sent.append(json.loads((folder / "a.json").read_text())["bytes_sent"])
         seen.add(keys)
-    check(len(seen) == 3, "formats have the same keys")
-    check(sent[0] > sent[1] > sent[2], f"bytes sent do not shrink: {sent}")
+    expect(len(seen) == 3, "formats have the same keys")
+    expect(sent[0] > sent[1] > sent[2], f"bytes sent do not shrink: {sent}")
     result = hpr(folder, "render", SCENE, "--explain", "--depth-format", "24", "--primary", "rays")
-    check(result.returncode == 2 and "--primary raster" in result.stderr, f"depths of rays: {result.stderr}")
+    expect(result.returncode == 2 and "--primary raster" in result.stderr, f"depths of rays: {result.stderr}")
 
 
 def colors(folder):
     sent = []
     for name in ("32f", "16f", "8"):
         expected, plan = render(folder, "--color-format", name)
-        check((f"colors: {name}" in plan) == (name != "32f"), f"--color-format {name}: {plan}")
+        expect((f"colors: {name}" in plan) == (name != "32f"), f"--color-format {name}: {plan}")
         picture, _ = render(folder, "--color-format", name, "--ranks", "3")
-        check(picture == expected, f"--color-format {name}: three ranks have other bits")
+        expect(picture == expected, f"--color-format {name}: three ranks have other bits")
         sent.append(json.loads((folder / "a.json").read_text())["bytes_sent"])
         image = exr.read(folder / "a.exr")[2]
         if name == "32f":
@@ -92,8 +90,8 @@ def colors(folder):
             for value, true in zip(image[channel], exact[channel]):
                 shown = min(max(true, 0.0), 1.0) if name == "8" else true
                 worst = max(worst, abs(value - shown) / (max(abs(shown), 2 ** -14) if name == "16f" else 1.0))
-        check(0.0 < worst <= (2 ** -11 if name == "16f" else 0.005), f"--color-format {name}: off by {worst}")
-    check(sent[0] > sent[1] > sent[2], f"bytes of colours do not shrink: {sent}")
+        expect(0.0 < worst <= (2 ** -11 if name == "16f" else 0.005), f"--color-format {name}: off by {worst}")
+    expect(sent[0] > sent[1] > sent[2], f"bytes of colours do not shrink: {sent}")
 
 
 def main():

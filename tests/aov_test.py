@@ -7,7 +7,6 @@ Prints what is wrong and leaves with 1.
 """
 
 import math
-import os
 import pathlib
 import struct
 import subprocess
@@ -15,9 +14,8 @@ import sys
 import tempfile
 
 import exr
-from checks import check, failures
+from program import HPR, expect, failures
 
-HPR = os.path.abspath(sys.argv[1])
 SIZE = (160, 96)
 PARTS = ("direct", "shadow", "reflection", "refraction", "ambient-occlusion", "photon")
 ALL = "depth,id,normal,albedo," + ",".join(PARTS) + ",rank,cost"
@@ -28,7 +26,7 @@ CHANNELS = {"R", "G", "B", "depth.Z", "id.X", "normal.X", "normal.Y", "normal.Z"
 def render(folder, *arguments):
     result = subprocess.run([HPR, "render", "gen:gallery", "--size", f"{SIZE[0]}x{SIZE[1]}", "--force", *arguments],
                             cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    check(result.returncode == 0, f"{' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
+    expect(result.returncode == 0, f"{' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     return result
 
 
@@ -40,10 +38,10 @@ def check_sums(case, layers):
             parts = [layers[f"{part}.{letter}"][i] for part in PARTS]
             bound = 2.0 ** -23 * sum(map(abs, [color, *parts])) + 1e-40
             worst = max(worst, abs(math.fsum(parts) - color) / bound)
-    check(worst <= 1.0, f"{case}: the parts miss the colour by {worst:.3g} times what rounding explains")
+    expect(worst <= 1.0, f"{case}: the parts miss the colour by {worst:.3g} times what rounding explains")
     for part in ("direct", "shadow", "reflection"):
-        check(any(layers[f"{part}.G"]), f"{case}: {part} is all zero")
-    check(all(value <= 0.0 for value in layers["shadow.R"]), f"{case}: shadows that add light")
+        expect(any(layers[f"{part}.G"]), f"{case}: {part} is all zero")
+    expect(all(value <= 0.0 for value in layers["shadow.R"]), f"{case}: shadows that add light")
 
 
 def check_surfaces(case, layers, keys):
@@ -53,18 +51,18 @@ def check_surfaces(case, layers, keys):
         surface, depth = ~key & 0xFFFFFFFF, struct.unpack("<f", struct.pack("<I", key >> 32))[0]
         length = math.hypot(*(layers[f"normal.{axis}"][i] for axis in "XYZ"))
         if key == 0:
-            check(layers["id.X"][i] == 0xFFFFFFFF and layers["depth.Z"][i] == math.inf, f"{case}: pixel {i} is empty")
+            expect(layers["id.X"][i] == 0xFFFFFFFF and layers["depth.Z"][i] == math.inf, f"{case}: pixel {i} is empty")
             continue
         seen += 1
-        check(layers["id.X"][i] == surface, f"{case}: pixel {i} has id {layers['id.X'][i]}, not {surface}")
-        check(abs(length - 1.0) < 1e-5, f"{case}: pixel {i} has a normal of length {length}")
+        expect(layers["id.X"][i] == surface, f"{case}: pixel {i} has id {layers['id.X'][i]}, not {surface}")
+        expect(abs(length - 1.0) < 1e-5, f"{case}: pixel {i} has a normal of length {length}")
         # The product of depth and distance is the near distance, the same for all pixels.
         near = layers["depth.Z"][i] * depth
         check_surfaces.near = check_surfaces.near or near
-        check(abs(near / check_surfaces.near - 1.0) < 1e-6, f"{case}: pixel {i} has depth {layers['depth.Z'][i]}")
+        expect(abs(near / check_surfaces.near - 1.0) < 1e-6, f"{case}: pixel {i} has depth {layers['depth.Z'][i]}")
         if len(failures) > 10:
             return
-    check(seen > len(keys) // 4, f"{case}: {seen} pixels show something")
+    expect(seen > len(keys) // 4, f"{case}: {seen} pixels show something")
 
 
 check_surfaces.near = None
@@ -83,32 +81,32 @@ def main():
                                 "four samples, three ranks": ["--spp", "4", "--ranks", "3", "--distribute", "sort-last"]}.items():
             render(folder, "-o", "a.exr", "--raw", "a.keys", "--aov", ALL, *arguments)
             width, height, layers = exr.read(folder / "a.exr")
-            check((width, height) == SIZE, f"{case}: {width}x{height} pixels")
-            check(set(layers) == CHANNELS, f"{case}: channels {set(layers) ^ CHANNELS} too many or missing")
+            expect((width, height) == SIZE, f"{case}: {width}x{height} pixels")
+            expect(set(layers) == CHANNELS, f"{case}: channels {set(layers) ^ CHANNELS} too many or missing")
             check_sums(case, layers)
             check_surfaces(case, layers, read_keys(folder / "a.keys"))
-            check(all(cost >= 0.0 for cost in layers["cost.X"]) and any(layers["cost.X"]), f"{case}: no cost")
+            expect(all(cost >= 0.0 for cost in layers["cost.X"]) and any(layers["cost.X"]), f"{case}: no cost")
             pictures[case] = layers
         ranks = {int(rank) for rank in pictures["four samples, three ranks"]["rank.X"]}
-        check(ranks == {0, 1, 2}, f"ranks {ranks} lit the picture of three")
+        expect(ranks == {0, 1, 2}, f"ranks {ranks} lit the picture of three")
         one, three = pictures["four samples"], pictures["four samples, three ranks"]
         for name in CHANNELS - {"rank.X"}:
-            check(one[name].tobytes() == three[name].tobytes(), f"{name} has other bits with three ranks")
-        check(one["R"].tobytes() != pictures["one sample"]["R"].tobytes(), "four samples are one")
+            expect(one[name].tobytes() == three[name].tobytes(), f"{name} has other bits with three ranks")
+        expect(one["R"].tobytes() != pictures["one sample"]["R"].tobytes(), "four samples are one")
 
         for samples in (2, 7):
             render(folder, "-o", f"of{samples}.exr", "--spp", str(samples), "--aov", "depth,id,normal")
         first, more = (exr.read(folder / f"of{samples}.exr")[2] for samples in (2, 7))
         for name in ("depth.Z", "id.X", "normal.X"):
-            check(first[name].tobytes() == more[name].tobytes(), f"{name} is not of the first sample")
+            expect(first[name].tobytes() == more[name].tobytes(), f"{name} is not of the first sample")
 
         render(folder, "-o", "b.exr")
-        check(exr.read(folder / "b.exr")[2]["G"].tobytes() == pictures["one sample"]["G"].tobytes(),
+        expect(exr.read(folder / "b.exr")[2]["G"].tobytes() == pictures["one sample"]["G"].tobytes(),
               "asking for layers changes the picture")
         render(folder, "-o", "c.png", "--aov", "id,albedo")
         beside = exr.read(folder / "c.aov.exr")[2]
-        check(set(beside) == {"R", "G", "B", "id.X", "albedo.R", "albedo.G", "albedo.B"}, f"beside a PNG: {set(beside)}")
-        check(beside["id.X"].tobytes() == pictures["one sample"]["id.X"].tobytes(), "other ids beside a PNG")
+        expect(set(beside) == {"R", "G", "B", "id.X", "albedo.R", "albedo.G", "albedo.B"}, f"beside a PNG: {set(beside)}")
+        expect(beside["id.X"].tobytes() == pictures["one sample"]["id.X"].tobytes(), "other ids beside a PNG")
     return 1 if failures else 0
 
 

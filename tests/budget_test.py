@@ -7,7 +7,6 @@ Prints what differs and leaves with 1.
 """
 
 import json
-import os
 import pathlib
 import struct
 import subprocess
@@ -15,14 +14,12 @@ import sys
 import tempfile
 
 import exr
-from checks import check, failures
-
-HPR = os.path.abspath(sys.argv[1])
+from program import HPR, expect, failures
 
 
 def hpr(folder, *arguments, code=0):
     result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    check(result.returncode == code,
+    expect(result.returncode == code,
           f"hpr {' '.join(arguments)} left with {result.returncode} instead of {code}: {result.stderr[-1000:]}")
     return result
 
@@ -44,38 +41,38 @@ SPREADS = [("--ranks", "2"), ("--ranks", "3"), ("--threads", "2"), ("--ranks", "
 def same_bits(folder, name, *arguments, picture="a.png"):
     expected = render(folder, *arguments, picture=picture)
     for spread in SPREADS:
-        check(render(folder, *arguments, *spread, picture=picture) == expected, f"{name}: other bits with {' '.join(spread)}")
+        expect(render(folder, *arguments, *spread, picture=picture) == expected, f"{name}: other bits with {' '.join(spread)}")
     return expected
 
 
 def usage(folder, name, *arguments, says):
     result = hpr(folder, *arguments, code=2)
-    check(says in result.stderr, f"{name}: does not say {says!r}: {result.stderr[-400:]}")
-    check(not list(folder.glob("refused*")), f"{name}: left a file")
+    expect(says in result.stderr, f"{name}: does not say {says!r}: {result.stderr[-400:]}")
+    expect(not list(folder.glob("refused*")), f"{name}: left a file")
 
 
 def resolution(folder):
     whole = render(folder, "--spp", "2", picture="a.exr")
     render(folder, "--spp", "32", scene="gen:cornell", picture="whole.png")
-    check(render(folder, "--resolution-scale", "1") == render(folder), "a scale of 1 changes the picture")
+    expect(render(folder, "--resolution-scale", "1") == render(folder), "a scale of 1 changes the picture")
     errors = []
     for scale in ("0.75", "0.5", "0.25"):
         made = same_bits(folder, f"scale {scale}", "--resolution-scale", scale, "--spp", "2", picture="a.exr")
-        check(made != whole, f"scale {scale} changes nothing")
+        expect(made != whole, f"scale {scale} changes nothing")
         size = exr.read(folder / "a.exr")[:2]
-        check(size == (171, 105), f"scale {scale}: the picture has {size} pixels")
+        expect(size == (171, 105), f"scale {scale}: the picture has {size} pixels")
         render(folder, "--spp", "32", "--resolution-scale", scale, scene="gen:cornell")
         errors.append(rmse(folder, "a.png", "whole.png"))
-    check(errors == sorted(errors), f"errors do not grow as the resolution falls: {errors}")
+    expect(errors == sorted(errors), f"errors do not grow as the resolution falls: {errors}")
     same_bits(folder, "scale 0.5, as .png", "--resolution-scale", "0.5")
     same_bits(folder, "scale 0.3, local", "--resolution-scale", "0.3", "--shading", "local")
     hpr(folder, "render", "gen:cornell", "-o", "dot.png", "--size", "4x1", "--resolution-scale", "0.1")
-    check(struct.unpack(">II", (folder / "dot.png").read_bytes()[16:24]) == (4, 1), "one pixel does not show as 4x1")
+    expect(struct.unpack(">II", (folder / "dot.png").read_bytes()[16:24]) == (4, 1), "one pixel does not show as 4x1")
     render(folder, "--resolution-scale", "0.5")
     few = json.loads((folder / "a.json").read_text())["rays"]["shadow"]
     render(folder)
     many = json.loads((folder / "a.json").read_text())["rays"]["shadow"]
-    check(0.2 < few / many < 0.3, f"half the pixels a side take {few} of {many} shadow rays")
+    expect(0.2 < few / many < 0.3, f"half the pixels a side take {few} of {many} shadow rays")
     for scale in ("0", "0.05", "1.5", "-1", "nan", "inf", "much"):
         usage(folder, f"scale {scale}", "render", "gen:cornell", "-o", "refused.png", f"--resolution-scale={scale}",
               says="--resolution-scale")
@@ -90,7 +87,7 @@ def half_resolution(folder):
     whole = render(folder, *passes)
     half = same_bits(folder, "half resolution", *passes, "--half-resolution",
                      "shadow,reflection,refraction,ambient-occlusion,photon")
-    check(half != whole, "half resolution changes nothing")
+    expect(half != whole, "half resolution changes nothing")
     usage(folder, "no pass", "render", "gen:cornell", "-o", "refused.png", "--half-resolution", "photons", says="photon")
     for other in (("--reference",), ("--shading", "local")):
         usage(folder, other[0], "render", "gen:cornell", "-o", "refused.png", "--half-resolution", "photon", *other,
@@ -104,19 +101,19 @@ def wall(folder, name, *arguments):
         frames = json.loads((folder / "wall" / "manifest.json").read_text())["frames"]
         screens = [(s["id"], s["width"], s["height"], s["xxh64"]) for f in frames for s in f["screens"]]
         png = (folder / "wall" / f"{screens[0][0]}.png").read_bytes()
-        check(struct.unpack(">II", png[16:24]) == (61, 47), f"{name}: a screen of another size")
+        expect(struct.unpack(">II", png[16:24]) == (61, 47), f"{name}: a screen of another size")
         expected = expected or screens
-        check(screens == expected, f"{name}: another wall with {ranks} ranks")
+        expect(screens == expected, f"{name}: another wall with {ranks} ranks")
     return expected
 
 
 def photon_radius(folder):
     caustic = ("--passes", "photon", "--photons", "20000")
     chosen = same_bits(folder, "photons", *caustic)
-    check(render(folder, *caustic, "--photon-radius", "0") == chosen, "a radius of 0 is not the one chosen")
+    expect(render(folder, *caustic, "--photon-radius", "0") == chosen, "a radius of 0 is not the one chosen")
     wide = same_bits(folder, "radius 0.3", *caustic, "--photon-radius", "0.3")
     narrow = render(folder, *caustic, "--photon-radius", "0.03")
-    check(len({chosen, wide, narrow}) == 3, "the radius changes nothing")
+    expect(len({chosen, wide, narrow}) == 3, "the radius changes nothing")
     for radius in ("-1", "nan", "inf", "wide"):
         usage(folder, f"radius {radius}", "render", "gen:cornell", "-o", "refused.png", f"--photon-radius={radius}",
               says="--photon-radius")
@@ -135,17 +132,17 @@ def path(folder):
     (folder / "walk.txt").write_text("# two keys\neye -4,1.7,4 at 0,1.6,-2\n\neye 4,1.7,3 at 2,1.5,-2 fov 60\n")
     walk = ("--path", "walk.txt", "--frames", "3")
     expected = [hashes(frame) for frame in frames_of(folder, *walk)]
-    check(len({tuple(each) for each in expected}) == 3, "the path does not move the camera")
+    expect(len({tuple(each) for each in expected}) == 3, "the path does not move the camera")
     for ranks in ("2", "3"):
-        check([hashes(frame) for frame in frames_of(folder, *walk, "--ranks", ranks)] == expected,
+        expect([hashes(frame) for frame in frames_of(folder, *walk, "--ranks", ranks)] == expected,
               f"another walk with {ranks} ranks")
     first = frames_of(folder, "--eye", "-4,1.7,4", "--at", "0,1.6,-2")[0]
-    check(hashes(first) == expected[0], "the path does not begin at its first key")
+    expect(hashes(first) == expected[0], "the path does not begin at its first key")
     refused = ("wall", "run", "1x1@16x16", "gen:cornell", "-o", "refused", "--path")
     usage(folder, "path and camera", *refused, "walk.txt", "--camera", "0", says="--path")
     (folder / "bad.txt").write_text("eye 0,0,1 at 0,0,0\neye 0,0 at 0,0,0\n")
     result = hpr(folder, *refused, "bad.txt", code=3)
-    check("bad.txt:2" in result.stderr, f"the wrong key is not named: {result.stderr}")
+    expect("bad.txt:2" in result.stderr, f"the wrong key is not named: {result.stderr}")
     hpr(folder, *refused, "missing.txt", code=4)
 
 
@@ -154,28 +151,28 @@ def target(folder):
     for ranks in ("1", "3"):
         frames = frames_of(folder, *walk, "--ranks", ranks, "--target-ms", "0.5", "--stats", "b.json")
         last = frames[-1]["budget"]
-        check(all(set(f["budget"]) == {"target_ms", "resolution_scale", "samples", "given_up", "resting"} for f in frames),
+        expect(all(set(f["budget"]) == {"target_ms", "resolution_scale", "samples", "given_up", "resting"} for f in frames),
               f"a frame's budget has other keys: {last}")
-        check(last["given_up"][:1] == ["half-resolution"] and last["given_up"][-1] == "resolution"
+        expect(last["given_up"][:1] == ["half-resolution"] and last["given_up"][-1] == "resolution"
               and last["resolution_scale"] < 1 and last["target_ms"] == 0.5, f"0.5 ms give up no more than {last}")
-        check(json.loads((folder / "b.json").read_text())["budget"] == last, "--stats tell another budget")
+        expect(json.loads((folder / "b.json").read_text())["budget"] == last, "--stats tell another budget")
     said = hpr(folder, "wall", "run", "1x1@64x48", "gen:cornell", "-o", "told", *walk, "--target-ms", "0.5").stderr
     took = sorted(f["ms"] for f in json.loads((folder / "told" / "manifest.json").read_text())["frames"])
-    check(f"95 % up to {took[-1]:.1f} ms" in said, f"the slowest of 12 is {took[-1]:.1f} ms, and it says {said}")
+    expect(f"95 % up to {took[-1]:.1f} ms" in said, f"the slowest of 12 is {took[-1]:.1f} ms, and it says {said}")
     frames = frames_of(folder, *walk, "--target-ms", "1000s")
-    check(frames[-1]["budget"]["target_ms"] == 1e6, f"1000 s are {frames[-1]['budget']['target_ms']} ms")
-    check(frames[-1]["budget"]["given_up"] == [], f"with all the time: {frames[-1]['budget']}")
-    check("budget" not in frames_of(folder, *walk)[0], "a budget nobody asked for")
+    expect(frames[-1]["budget"]["target_ms"] == 1e6, f"1000 s are {frames[-1]['budget']['target_ms']} ms")
+    expect(frames[-1]["budget"]["given_up"] == [], f"with all the time: {frames[-1]['budget']}")
+    expect("budget" not in frames_of(folder, *walk)[0], "a budget nobody asked for")
 
     still = frames_of(folder, "--frames", "6", "--target-ms", "0.5", "--spp", "4")
-    check([f["budget"]["samples"] for f in still[1:]] == [1, 2, 3, 4, 4], f"at rest: {[f['budget'] for f in still]}")
-    check([f["budget"]["resting"] for f in still] == [False] + 5 * [True], f"rest: {[f['budget'] for f in still]}")
-    check(all(f["budget"]["given_up"] == [] and f["budget"]["resolution_scale"] == 1 for f in still[1:]),
+    expect([f["budget"]["samples"] for f in still[1:]] == [1, 2, 3, 4, 4], f"at rest: {[f['budget'] for f in still]}")
+    expect([f["budget"]["resting"] for f in still] == [False] + 5 * [True], f"rest: {[f['budget'] for f in still]}")
+    expect(all(f["budget"]["given_up"] == [] and f["budget"]["resolution_scale"] == 1 for f in still[1:]),
           "something is given up at rest")
-    check(hashes(still[4]) == hashes(still[5]) == hashes(frames_of(folder, "--frames", "2", "--spp", "4")[1]),
+    expect(hashes(still[4]) == hashes(still[5]) == hashes(frames_of(folder, "--frames", "2", "--spp", "4")[1]),
           "a refined picture is another one than without a target")
     exact = frames_of(folder, "--target-error", "0.5", "--stats", "e.json")
-    check(len(exact) == 1 and json.loads((folder / "e.json").read_text())["samples"] >= 16, "no samples for the error")
+    expect(len(exact) == 1 and json.loads((folder / "e.json").read_text())["samples"] >= 16, "no samples for the error")
     for option in ("--target-ms", "--target-error"):
         for value in ("0", "-3", "nan", "inf", "soon"):
             usage(folder, f"{option} {value}", "wall", "run", "1x1@16x16", "gen:cornell", "-o", "refused", f"{option}={value}",
@@ -191,7 +188,7 @@ def main():
         path(folder)
         target(folder)
         plain = wall(folder, "wall")
-        check(wall(folder, "wall at half", "--resolution-scale", "0.5") != plain, "a wall's scale changes nothing")
+        expect(wall(folder, "wall at half", "--resolution-scale", "0.5") != plain, "a wall's scale changes nothing")
     return 1 if failures else 0
 
 

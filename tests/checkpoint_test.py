@@ -16,10 +16,8 @@ import sys
 import tempfile
 
 import processes
+from program import HPR, expect, failures
 
-from checks import check, failures
-
-HPR = os.path.abspath(sys.argv[1])
 SAMPLES = 100
 COMMON = ["--progress", "line", "--threads", "1", "--photons", "1000"]
 ARGUMENTS = ["render", "gen:gallery", "--size", "96x64", *COMMON]
@@ -63,19 +61,19 @@ def itself(pid):
 
 def stop_and_resume(folder, whole, case, target, before, after):
     code, message, sent_at = interrupt(folder, signal.SIGUSR1, target, "-o", "a.exr", "--spp", str(SAMPLES), *before)
-    check(code == 75, f"{case}: left with {code} instead of 75: {message[-800:]}")
-    check(not (folder / "a.exr").exists(), f"{case}: stopped, but wrote a picture")
+    expect(code == 75, f"{case}: left with {code} instead of 75: {message[-800:]}")
+    expect(not (folder / "a.exr").exists(), f"{case}: stopped, but wrote a picture")
     stopped_at = samples_in(message)
-    check(stopped_at is not None and sent_at <= stopped_at < SAMPLES, f"{case}: sent at {sent_at}, stopped at {stopped_at}")
+    expect(stopped_at is not None and sent_at <= stopped_at < SAMPLES, f"{case}: sent at {sent_at}, stopped at {stopped_at}")
     if not (folder / "a.exr.checkpoint").exists():
-        check(False, f"{case}: no checkpoint")
+        expect(False, f"{case}: no checkpoint")
         return
     result = run(folder, "-o", "a.exr", "--spp", str(SAMPLES), "--resume", *after)
-    check(result.returncode == 0, f"{case}: resuming left with {result.returncode}: {result.stderr[-800:]}")
-    check(f"after {stopped_at} samples" in result.stderr, f"{case}: does not say where it goes on")
-    check(f"hpr: sample {stopped_at} " not in result.stderr, f"{case}: drew samples again")
+    expect(result.returncode == 0, f"{case}: resuming left with {result.returncode}: {result.stderr[-800:]}")
+    expect(f"after {stopped_at} samples" in result.stderr, f"{case}: does not say where it goes on")
+    expect(f"hpr: sample {stopped_at} " not in result.stderr, f"{case}: drew samples again")
     same = (folder / "a.exr").exists() and (folder / "a.exr").read_bytes() == whole
-    check(same, f"{case}: other bits than a run without a break")
+    expect(same, f"{case}: other bits than a run without a break")
     for name in ("a.exr", "a.exr.checkpoint"):
         (folder / name).unlink(missing_ok=True)
 
@@ -83,11 +81,11 @@ def stop_and_resume(folder, whole, case, target, before, after):
 def write_and_go_on(folder, whole):
     code, message, _ = interrupt(folder, signal.SIGUSR2, itself, "-o", "b.exr", "--spp", str(SAMPLES),
                                  "--checkpoint", "b.state")
-    check(code == 0, f"USR2: left with {code}: {message[-800:]}")
-    check((folder / "b.exr").read_bytes() == whole, "USR2: other bits than a run without a break")
+    expect(code == 0, f"USR2: left with {code}: {message[-800:]}")
+    expect((folder / "b.exr").read_bytes() == whole, "USR2: other bits than a run without a break")
     written_at = samples_in(message)
     state = folder / "b.state"
-    check(written_at is not None and state.exists(), "USR2: no checkpoint")
+    expect(written_at is not None and state.exists(), "USR2: no checkpoint")
     return state
 
 
@@ -101,31 +99,31 @@ def refusals(folder, state):
     for field, arguments in foreign.items():
         result = subprocess.run([HPR, "render", *arguments, *COMMON, "--spp", "20", *resume], cwd=folder,
                                 capture_output=True, text=True, timeout=300, check=False)
-        check(result.returncode == 3 and "another run" in result.stderr and field in result.stderr,
+        expect(result.returncode == 3 and "another run" in result.stderr and field in result.stderr,
               f"another {field}: left with {result.returncode}: {result.stderr}")
     whole = bytearray(state.read_bytes())
     whole[len(whole) // 2] ^= 1
     (folder / "damaged").write_bytes(whole)
     for ranks in ("1", "2"):
         result = run(folder, "--spp", str(SAMPLES), "--resume", "--checkpoint", "damaged", "-o", "c.exr", "--ranks", ranks)
-        check(result.returncode == 3 and "damaged" in result.stderr, f"damaged, {ranks} ranks: {result.returncode}")
+        expect(result.returncode == 3 and "damaged" in result.stderr, f"damaged, {ranks} ranks: {result.returncode}")
     result = run(folder, "--spp", "20", "--resume", "--checkpoint", "none", "-o", "c.exr")
-    check(result.returncode == 4, f"no checkpoint: left with {result.returncode}")
+    expect(result.returncode == 4, f"no checkpoint: left with {result.returncode}")
     result = run(folder, "--spp", "20", "-o", "c.exr", "--checkpoint", state.name)
-    check(result.returncode == 4 and "--force" in result.stderr, f"checkpoint in the way: left with {result.returncode}")
-    check(not (folder / "c.exr").exists(), "a refused run wrote a picture")
+    expect(result.returncode == 4 and "--force" in result.stderr, f"checkpoint in the way: left with {result.returncode}")
+    expect(not (folder / "c.exr").exists(), "a refused run wrote a picture")
 
 
 def enough_samples(folder):
     """A checkpoint that has all that is asked for."""
     layers = ["--aov", "depth,id"]
     code, message, _ = interrupt(folder, signal.SIGUSR1, itself, "-o", "e.exr", "--spp", "1000000", *layers)
-    check(code == 75, f"a million samples: left with {code}")
+    expect(code == 75, f"a million samples: left with {code}")
     stopped_at = samples_in(message)
     result = run(folder, "-o", "e.exr", "--spp", str(stopped_at), "--resume", *layers)
-    check(result.returncode == 0, f"resuming at the goal: left with {result.returncode}: {result.stderr[-800:]}")
+    expect(result.returncode == 0, f"resuming at the goal: left with {result.returncode}: {result.stderr[-800:]}")
     result = run(folder, "-o", "f.exr", "--spp", str(stopped_at), "--ranks", "2", *layers)
-    check((folder / "e.exr").read_bytes() == (folder / "f.exr").read_bytes(), "a checkpoint at its goal gives other bits")
+    expect((folder / "e.exr").read_bytes() == (folder / "f.exr").read_bytes(), "a checkpoint at its goal gives other bits")
 
 
 def main():

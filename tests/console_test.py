@@ -16,9 +16,8 @@ import sys
 import tempfile
 import time
 
-from checks import check, failures
+from program import HPR, expect, failures
 
-HPR = os.path.abspath(sys.argv[1])
 CAMERA = ["--eye", "0.278,0.273,-0.8", "--at", "0.278,0.273,0.28"]
 SAID = set()
 
@@ -26,7 +25,7 @@ SAID = set()
 def hpr(arguments, folder, said="", code=0):
     result = subprocess.run([HPR, *arguments], cwd=folder, input=said, capture_output=True, text=True, timeout=120,
                             check=False)
-    check(result.returncode == code, f"hpr {' '.join(arguments)} left with {result.returncode}, not {code}:\n"
+    expect(result.returncode == code, f"hpr {' '.join(arguments)} left with {result.returncode}, not {code}:\n"
           f"{result.stderr[-2000:]}")
     return result
 
@@ -50,7 +49,7 @@ def change_scene(folder, source, target, change):
 
 
 def same_file(folder, a, b, what):
-    check((folder / a).read_bytes() == (folder / b).read_bytes(), f"{what}: {a} differs from {b}")
+    expect((folder / a).read_bytes() == (folder / b).read_bytes(), f"{what}: {a} differs from {b}")
 
 
 def named_nodes(document):
@@ -71,14 +70,14 @@ def draws_as_render_does(folder):
     console(folder, ["render", "save console.png", "stats console.json"])
     hpr(["render", "room.glb", "--size", "96x64", "-o", "render.png"], folder)
     same_file(folder, "console.png", "render.png", "the scene as loaded")
-    check(json.loads((folder / "console.json").read_text())["schema"] == "hpr.stats/1", "stats writes no hpr.stats/1")
+    expect(json.loads((folder / "console.json").read_text())["schema"] == "hpr.stats/1", "stats writes no hpr.stats/1")
 
     console(folder, ["size 80x48", "quality draft", "spp 2", "passes shadow", "strategy tree", "set max-depth 3",
                      "camera 0.3,0.3,-0.9 at 0.28,0.27,0.28 up 0,1,0 fov 35", "explain", "render", "save other.exr"])
     hpr(["render", "room.glb", "--size", "80x48", "--quality", "draft", "--spp", "2", "--passes", "shadow", "--max-depth",
          "3", "--eye", "0.3,0.3,-0.9", "--at", "0.28,0.27,0.28", "--fov", "35", "-o", "other-render.exr"], folder)
     result = hpr(["diff", "other.exr", "other-render.exr", "--fail", "0"], folder)
-    check(result.returncode == 0, "options set line by line draw another picture")
+    expect(result.returncode == 0, "options set line by line draw another picture")
 
 
 def changes_are_those_of_a_file(folder):
@@ -92,7 +91,7 @@ def changes_are_those_of_a_file(folder):
 
     def moved(changed):
         node = named_nodes(changed)[name]
-        check("matrix" not in node, "the test needs nodes without a matrix")
+        expect("matrix" not in node, "the test needs nodes without a matrix")
         node["translation"] = [place[0] - 0.0625, place[1] + 0.125, place[2] + 0.03125]
 
     change_scene(folder, "room.glb", "without.glb", without)
@@ -109,7 +108,7 @@ def changes_are_those_of_a_file(folder):
                          f'turn "{name}" 0,1,0 30', "render", f"save turned{out}"], "--ranks", str(ranks))
         for scene in ("without", "moved", "room"):
             result = hpr(["diff", f"{scene}{out}", f"{scene}.exr", "--fail", "0"], folder)
-            check(result.returncode == 0, f"{ranks} ranks: {scene} differs from the file's picture")
+            expect(result.returncode == 0, f"{ranks} ranks: {scene} differs from the file's picture")
         for scene in ("without", "moved", "turned"):
             hpr(["diff", f"{scene}{out}", "room.exr", "--fail", "0"], folder, code=1)
     same_file(folder, "turned-1.exr", "turned-3.exr", "the same script on another number of ranks")
@@ -123,8 +122,8 @@ def lights_and_loading(folder):
               "load room.glb", "render", "save loaded.png", "quit", "render"]
     result = console(folder, script, "--passes", "shadow", scene="gen:gallery")
     same_file(folder, "dark.png", "off.png", "a light without intensity is a light put out")
-    check((folder / "red.png").read_bytes() != (folder / "dark.png").read_bytes(), "a light changes nothing")
-    check(result.stdout.count("pixels,") == 4, f"after quit nothing is drawn:\n{result.stdout}")
+    expect((folder / "red.png").read_bytes() != (folder / "dark.png").read_bytes(), "a light changes nothing")
+    expect(result.stdout.count("pixels,") == 4, f"after quit nothing is drawn:\n{result.stdout}")
     hpr(["render", "room.glb", "--size", "96x64", "--passes", "shadow", "-o", "fresh.png"], folder)
     same_file(folder, "loaded.png", "fresh.png", "a scene loaded later")
     console(folder, script, "--passes", "shadow", "--force", "--ranks", "2", scene="gen:gallery")
@@ -133,13 +132,13 @@ def lights_and_loading(folder):
 
 def mistakes(folder):
     result = console(folder, ["rendr", "save never.png"], code=2)
-    check("did you mean 'render'" in result.stderr, f"the nearest command is not named: {result.stderr}")
-    check(not (folder / "never.png").exists(), "a script went on after its mistake")
+    expect("did you mean 'render'" in result.stderr, f"the nearest command is not named: {result.stderr}")
+    expect(not (folder / "never.png").exists(), "a script went on after its mistake")
     result = console(folder, ["save early.png", "hide nothing", "move x", "size big", "set photons -1", "set stats x.json",
                               "load missing.glb", "camera 3", "save nowhere/x.png", "render", "save nowhere/x.png",
                               "save late.png"], "--keep-going", code=4)
-    check(result.stderr.count("hpr: error:") == 10, f"ten mistakes, each told once:\n{result.stderr}")
-    check((folder / "late.png").read_bytes() == (folder / "render.png").read_bytes(), "a mistake changed the picture")
+    expect(result.stderr.count("hpr: error:") == 10, f"ten mistakes, each told once:\n{result.stderr}")
+    expect((folder / "late.png").read_bytes() == (folder / "render.png").read_bytes(), "a mistake changed the picture")
 
 
 def say(connection, line):
@@ -164,12 +163,12 @@ def over_a_socket(folder):
             with socket.socket(socket.AF_UNIX) as connection:
                 connection.settimeout(60)
                 connection.connect(path)
-                check(say(connection, "help").endswith("ok\n"), "help over a socket")
-                check(say(connection, "hide nothing").startswith("error: the scene has no node"), "a mistake over a socket")
-                check("pixels" in say(connection, "render"), "render over a socket")
+                expect(say(connection, "help").endswith("ok\n"), "help over a socket")
+                expect(say(connection, "hide nothing").startswith("error: the scene has no node"), "a mistake over a socket")
+                expect("pixels" in say(connection, "render"), "render over a socket")
                 say(connection, f"save socket-{ranks}.png")
                 say(connection, "quit")
-            check(job.wait(timeout=60) == 0, f"a session over a socket left with {job.returncode}")
+            expect(job.wait(timeout=60) == 0, f"a session over a socket left with {job.returncode}")
         same_file(folder, f"socket-{ranks}.png", "render.png", "a picture asked for over a socket")
 
 
@@ -184,7 +183,7 @@ def main():
         over_a_socket(folder)
         listed = console(folder, ["help"]).stdout
         commands = {line.split()[0] for line in listed.splitlines() if line}
-        check(commands and commands <= SAID, f"commands without a test: {sorted(commands - SAID)}")
+        expect(commands and commands <= SAID, f"commands without a test: {sorted(commands - SAID)}")
     return 1 if failures else 0
 
 

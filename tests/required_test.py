@@ -7,16 +7,13 @@ Times are no test: bench/required.py --check looks at them. Prints what differs 
 """
 
 import json
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
 import unused_features
-from checks import check, failures
-
-HPR = os.path.abspath(sys.argv[1])
+from program import HPR, expect, failures
 
 
 def render(folder, scene, *arguments, ranks="2"):
@@ -24,7 +21,7 @@ def render(folder, scene, *arguments, ranks="2"):
     result = subprocess.run([HPR, "render", scene, "-o", "a.exr", "--stats", "a.json", "--size", "200x120", "--force",
                              "--ranks", ranks, *arguments], cwd=folder, capture_output=True, text=True, timeout=300,
                             check=False)
-    check(result.returncode == 0, f"{scene} {' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
+    expect(result.returncode == 0, f"{scene} {' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     stats = json.loads((folder / "a.json").read_text())
     counters = {**stats["rays"], "bytes": stats["bytes_sent"], "plan": stats["plan"],
                 "steps": [step["name"] for step in stats["passes"]]}
@@ -39,15 +36,15 @@ def unused(folder, generated, layouts):
     """The scene with each feature, under one name, as that stands in the picture's head."""
     made = subprocess.run([HPR, "scene", "make", generated, "-o", "scene.glb", "--force"], cwd=folder, check=False,
                           capture_output=True, text=True)
-    check(made.returncode == 0, f"scene make {generated}: {made.stderr}")
+    expect(made.returncode == 0, f"scene make {generated}: {made.stderr}")
     plain = (folder / "scene.glb").read_bytes()
     for layout in layouts:
         picture, counters = render(folder, "scene.glb", *layout)
         for feature in unused_features.FEATURES:
             (folder / "scene.glb").write_bytes(unused_features.added_to(plain, feature))
             other, took = render(folder, "scene.glb", *layout)
-            check(took == counters, f"{generated}: {feature} costs {differences(counters, took)}")
-            check(other == picture, f"{generated}: {feature} changes the picture")
+            expect(took == counters, f"{generated}: {feature} costs {differences(counters, took)}")
+            expect(other == picture, f"{generated}: {feature} changes the picture")
         (folder / "scene.glb").write_bytes(plain)
 
 
@@ -55,18 +52,18 @@ def options(folder, scene):
     picture, counters = render(folder, scene)
     for name, arguments in unused_features.OPTIONS.items():
         other, took = render(folder, scene, *arguments)
-        check(took == counters, f"{scene}: {name} costs {differences(counters, took)}")
-        check(other == picture, f"{scene}: {name} changes the picture")
+        expect(took == counters, f"{scene}: {name} costs {differences(counters, took)}")
+        expect(other == picture, f"{scene}: {name} changes the picture")
 
 
 def all_passes(folder, scene):
     """What a plan leaves out would have shown nothing, and would have cost something."""
     picture, counters = render(folder, scene, "--distribute", "sort-last")
     other, took = render(folder, scene, "--distribute", "sort-last", "--passes", "all")
-    check(other == picture, f"{scene}: --passes all shows more than auto")
-    check(len(took["steps"]) > len(counters["steps"]), f"{scene}: nothing was left out")
+    expect(other == picture, f"{scene}: --passes all shows more than auto")
+    expect(len(took["steps"]) > len(counters["steps"]), f"{scene}: nothing was left out")
     for kind in ("shadow", "reflection", "refraction"):
-        check(took[kind] == counters[kind], f"{scene}: auto does not trace {took[kind]} {kind} rays but {counters[kind]}")
+        expect(took[kind] == counters[kind], f"{scene}: auto does not trace {took[kind]} {kind} rays but {counters[kind]}")
 
 
 def main():

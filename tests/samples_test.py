@@ -7,22 +7,20 @@ Prints what differs and leaves with 1.
 """
 
 import json
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
 import exr
-from checks import check, failures
+from program import HPR, expect, failures
 
-HPR = os.path.abspath(sys.argv[1])
 MATTE = "gen:cornell"
 
 
 def hpr(folder, *arguments):
     result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    check(result.returncode == 0, f"hpr {' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
+    expect(result.returncode == 0, f"hpr {' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     return result
 
 
@@ -34,8 +32,8 @@ def render(folder, *arguments, scene="gen:gallery"):
 def spread_differently(folder):
     """Ways to spread 4 samples of a picture whose owners change with a strategy that balances what is drawn."""
     expected = render(folder, "--spp", "4", "--filter", "gaussian")
-    check(expected != render(folder, "--spp", "4"), "the filter makes no difference")
-    check(expected != render(folder, "--spp", "4", "--filter", "gaussian", "--seed", "2"), "the seed makes no difference")
+    expect(expected != render(folder, "--spp", "4"), "the filter makes no difference")
+    expect(expected != render(folder, "--spp", "4", "--filter", "gaussian", "--seed", "2"), "the seed makes no difference")
     ways = [("--threads", "2"), ("--ranks", "2"), ("--ranks", "3", "--distribute", "hybrid"),
             ("--ranks", "3", "--distribute", "sort-last", "--strategy", "direct-send"),
             ("--ranks", "4", "--distribute", "sort-last", "--strategy", "binary-swap"),
@@ -43,13 +41,13 @@ def spread_differently(folder):
             ("--ranks", "2", "--distribute", "sort-last", "--strategy", "radix-k", "--threads", "2"),
             ("--ranks", "7", "--distribute", "hybrid", "--strategy", "tree")]
     for way in ways:
-        check(render(folder, "--spp", "4", "--filter", "gaussian", *way) == expected, f"other bits with {' '.join(way)}")
+        expect(render(folder, "--spp", "4", "--filter", "gaussian", *way) == expected, f"other bits with {' '.join(way)}")
 
 
 def one_sample(folder):
     plain = render(folder)
-    check(render(folder, "--spp", "1") == plain, "--spp 1 is not the default")
-    check(render(folder, "--spp", "1", "--filter", "box") != plain, "a filter's one sample looks through the centre")
+    expect(render(folder, "--spp", "1") == plain, "--spp 1 is not the default")
+    expect(render(folder, "--spp", "1", "--filter", "box") != plain, "a filter's one sample looks through the centre")
 
 
 def squared_error(folder, reference, samples):
@@ -66,17 +64,17 @@ def convergence(folder):
     error, stats = {}, None
     for samples in (4, 16, 64):
         error[samples], stats = squared_error(folder, reference, samples)
-        check(stats["samples"] == samples and 0 < stats["ms_per_sample"] <= stats["ms"], f"stats of {samples} samples")
-    check(error[64] < error[16] / 3 < error[4] / 9, f"samples do not help as they should: {error}")
+        expect(stats["samples"] == samples and 0 < stats["ms_per_sample"] <= stats["ms"], f"stats of {samples} samples")
+    expect(error[64] < error[16] / 3 < error[4] / 9, f"samples do not help as they should: {error}")
     # Edges alone are sampled far better than independent samples would do.
-    check(error[64] / 2 < stats["estimated_relmse"] < 100 * error[64],
+    expect(error[64] / 2 < stats["estimated_relmse"] < 100 * error[64],
           f"estimated {stats['estimated_relmse']}, measured {error[64]}")
     target = 2 * stats["estimated_relmse"]
     reached, stats = squared_error(folder, reference, f"until:relmse={target}")
-    check(stats["estimated_relmse"] <= target and 16 <= stats["samples"] < 64, f"until {target}: {stats['samples']} samples")
-    check(reached <= 2 * target, f"until {target}: {reached} is left")
+    expect(stats["estimated_relmse"] <= target and 16 <= stats["samples"] < 64, f"until {target}: {stats['samples']} samples")
+    expect(reached <= 2 * target, f"until {target}: {reached} is left")
     expected = render(folder, "--spp", f"until:relmse={target}", scene=MATTE)
-    check(render(folder, "--spp", f"until:relmse={target}", "--ranks", "3", "--distribute", "sort-last",
+    expect(render(folder, "--spp", f"until:relmse={target}", "--ranks", "3", "--distribute", "sort-last",
                  scene=MATTE) == expected, "three ranks stop elsewhere")
 
 
@@ -84,7 +82,7 @@ def until_a_time(folder):
     for ranks in ("1", "3"):
         render(folder, "--spp", "until:1s", "--ranks", ranks)
         stats = json.loads((folder / "a.json").read_text())
-        check(stats["samples"] > 1 and 1000 <= stats["ms"] < 20000, f"until 1 s, {ranks} ranks: {stats['ms']} ms")
+        expect(stats["samples"] > 1 and 1000 <= stats["ms"] < 20000, f"until 1 s, {ranks} ranks: {stats['ms']} ms")
 
 
 def a_wall(folder):
@@ -93,9 +91,9 @@ def a_wall(folder):
         hpr(folder, "wall", "run", "3x1@96x64", "gen:gallery", "-o", name, "--ranks", ranks, "--spp", samples, "--frames", "2")
         frames = json.loads((folder / name / "manifest.json").read_text())["frames"]
         hashes.append([[screen["xxh64"] for screen in frame["screens"]] for frame in frames])
-    check(hashes[0] == hashes[1], "a wall of four samples has other bits with three ranks")
-    check(hashes[0][0] != hashes[0][1], "two frames have the same noise")
-    check(hashes[0][0] != hashes[2][0], "four samples are one")
+    expect(hashes[0] == hashes[1], "a wall of four samples has other bits with three ranks")
+    expect(hashes[0][0] != hashes[0][1], "two frames have the same noise")
+    expect(hashes[0][0] != hashes[2][0], "four samples are one")
 
 
 def main():

@@ -7,20 +7,16 @@ Prints what differs or is missing and leaves with 1.
 """
 
 import json
-import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-from checks import check, failures
-
-HPR = os.path.abspath(sys.argv[1])
+from program import expect, failures, run
 
 
 def hpr(folder, *arguments, code=0):
-    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
-    check(result.returncode == code, f"hpr {' '.join(arguments)} left with {result.returncode}: {result.stderr[-600:]}")
+    result = run(folder, *arguments)
+    expect(result.returncode == code, f"hpr {' '.join(arguments)} left with {result.returncode}: {result.stderr[-600:]}")
     return result
 
 
@@ -29,16 +25,16 @@ def trace_of(folder, ranks, *arguments):
     hpr(folder, *arguments, "--trace", "trace.json", "--force")
     document = json.loads((folder / "trace.json").read_text())
     about, events = document["otherData"], document["traceEvents"]
-    check(about["schema"] == "hpr.trace/1" and about["dropped"] == 0, f"about: {about}")
-    check(about["command"].startswith(f"hpr {arguments[0]}"), f"another command: {about['command']}")
+    expect(about["schema"] == "hpr.trace/1" and about["dropped"] == 0, f"about: {about}")
+    expect(about["command"].startswith(f"hpr {arguments[0]}"), f"another command: {about['command']}")
     names = {e["pid"]: e["args"]["name"] for e in events if e["ph"] == "M" and e["name"] == "process_name"}
-    check(sorted(names) == list(range(ranks)), f"{arguments}: processes {names}")
-    check(all(names[rank].startswith(f"rank {rank} on ") for rank in names), f"names of processes: {names}")
+    expect(sorted(names) == list(range(ranks)), f"{arguments}: processes {names}")
+    expect(all(names[rank].startswith(f"rank {rank} on ") for rank in names), f"names of processes: {names}")
     spans = [e for e in events if e["ph"] == "X"]
-    check(all(e["dur"] >= 0 and e["ts"] >= 0 for e in spans), "a span before the ranks met, or one that ends before it begins")
+    expect(all(e["dur"] >= 0 and e["ts"] >= 0 for e in spans), "a span before the ranks met, or one that ends before it begins")
     rows = {(e["pid"], e["tid"]) for e in spans}
     told = {(e["pid"], e["tid"]) for e in events if e["ph"] == "M" and e["name"] == "thread_name"}
-    check(rows == told, f"rows without a name, or names without a row: {rows ^ told}")
+    expect(rows == told, f"rows without a name, or names without a row: {rows ^ told}")
     for row in rows:
         nested(sorted((e for e in spans if (e["pid"], e["tid"]) == row), key=lambda e: (e["ts"], -e["dur"])), row)
     return [[e for e in spans if e["pid"] == rank] for rank in range(ranks)]
@@ -51,7 +47,7 @@ def nested(spans, row):
         end = span["ts"] + span["dur"]
         while open_until and open_until[-1] <= span["ts"] + 1e-3:
             open_until.pop()
-        check(not open_until or end <= open_until[-1] + 1e-3, f"row {row}: {span['name']} reaches past what it began in")
+        expect(not open_until or end <= open_until[-1] + 1e-3, f"row {row}: {span['name']} reaches past what it began in")
         open_until.append(end)
 
 
@@ -64,62 +60,62 @@ def pictures(folder):
     hpr(folder, *base)
     plain = (folder / "a.png").read_bytes()
     alone = trace_of(folder, 1, *base, "--threads", "2")[0]
-    check((folder / "a.png").read_bytes() == plain, "a trace changes the picture")
+    expect((folder / "a.png").read_bytes() == plain, "a trace changes the picture")
     wanted = {"run", "load scene", "start OpenGL", "upload geometry", "prepare light", "build ray scene", "sample", "raster",
               "photons", "light", "light tile", "write picture"}
-    check(wanted <= names(alone), f"one rank: no {wanted - names(alone)}")
+    expect(wanted <= names(alone), f"one rank: no {wanted - names(alone)}")
     samples = sorted(s["args"]["number"] for s in alone if s["name"] == "sample")
-    check(samples == [0, 1], f"samples {samples}")
+    expect(samples == [0, 1], f"samples {samples}")
     tiles = sorted(s["args"]["tile"] for s in alone if s["name"] == "light tile")
-    check(tiles == sorted(2 * list(range(12))), f"tiles of 200x130, twice: {tiles}")
-    check({s["tid"] for s in alone if s["name"] == "light tile"} <= {0, 1}, "two threads light in other rows than 0 and 1")
+    expect(tiles == sorted(2 * list(range(12))), f"tiles of 200x130, twice: {tiles}")
+    expect({s["tid"] for s in alone if s["name"] == "light tile"} <= {0, 1}, "two threads light in other rows than 0 and 1")
 
     ranks = trace_of(folder, 3, *base, "--ranks", "3", "--distribute", "sort-last", "--strategy", "binary-swap")
-    check((folder / "a.png").read_bytes() == plain, "a trace of 3 ranks changes the picture")
+    expect((folder / "a.png").read_bytes() == plain, "a trace of 3 ranks changes the picture")
     for rank, spans in enumerate(ranks):
-        check({"raster", "composite", "exchange"} <= names(spans), f"rank {rank} does not composite: {names(spans)}")
-        check(any(s["args"]["bytes"] > 0 for s in spans if s["name"] == "exchange"), f"rank {rank} sends nothing")
-    check("write picture" in names(ranks[0]) and "write picture" not in names(ranks[1]), "who writes the picture")
+        expect({"raster", "composite", "exchange"} <= names(spans), f"rank {rank} does not composite: {names(spans)}")
+        expect(any(s["args"]["bytes"] > 0 for s in spans if s["name"] == "exchange"), f"rank {rank} sends nothing")
+    expect("write picture" in names(ranks[0]) and "write picture" not in names(ranks[1]), "who writes the picture")
     rays = trace_of(folder, 1, *base, "--primary", "rays")[0]
-    check({"primary rays", "trace tile"} <= names(rays) and "raster" not in names(rays), f"by rays: {names(rays)}")
-    check("path trace tile" in names(trace_of(folder, 1, *base, "--reference")[0]), "the reference traces no tile")
+    expect({"primary rays", "trace tile"} <= names(rays) and "raster" not in names(rays), f"by rays: {names(rays)}")
+    expect("path trace tile" in names(trace_of(folder, 1, *base, "--reference")[0]), "the reference traces no tile")
 
 
 def other_commands(folder):
     wall = trace_of(folder, 2, "wall", "run", "2x1@64x48", "gen:cornell", "-o", "wall", "--frames", "3", "--ranks", "2")
     for rank, spans in enumerate(wall):
-        check([s["args"]["number"] for s in spans if s["name"] == "frame"] == [0, 1, 2], f"rank {rank}: other frames")
-        check("bring to screens" in names(spans), f"rank {rank}: {names(spans)}")
-    check("show" in names(wall[0]), "nobody shows the wall")
+        expect([s["args"]["number"] for s in spans if s["name"] == "frame"] == [0, 1, 2], f"rank {rank}: other frames")
+        expect("bring to screens" in names(spans), f"rank {rank}: {names(spans)}")
+    expect("show" in names(wall[0]), "nobody shows the wall")
     compare = ("compare", "--synthetic", "dense", "--size", "256x128", "--strategies", "direct-send", "--frames", "2")
     last = trace_of(folder, 3, *compare, "--ranks", "2,3")  # of the jobs, the last
-    check(all({"composite", "collect"} <= names(spans) for spans in last), f"compare: {[names(spans) for spans in last]}")
+    expect(all({"composite", "collect"} <= names(spans) for spans in last), f"compare: {[names(spans) for spans in last]}")
     threads = ("--transport", "threads")
     for spans in trace_of(folder, 2, *compare, "--ranks", "2", *threads):
-        check({"composite", "exchange"} <= names(spans), f"ranks on threads: {names(spans)}")
-    check("run" in names(trace_of(folder, 1, "diff", "a.png", "a.png")[0]), "diff leaves no trace")
+        expect({"composite", "exchange"} <= names(spans), f"ranks on threads: {names(spans)}")
+    expect("run" in names(trace_of(folder, 1, "diff", "a.png", "a.png")[0]), "diff leaves no trace")
 
 
 def refusals(folder):
     (folder / "there.json").write_text("kept")
     base = ("render", "gen:cornell", "--size", "32x32", "-o", "b.png", "--force")
     hpr(folder, *base[:-1], "--trace", "there.json", code=4)
-    check((folder / "there.json").read_text() == "kept" and not (folder / "b.png").exists(), "a refused trace leaves something")
+    expect((folder / "there.json").read_text() == "kept" and not (folder / "b.png").exists(), "a refused trace leaves something")
     hpr(folder, *base, "--trace", "nowhere/trace.json", code=4)
     hpr(folder, *base, "--trace", "again.json")
     hpr(folder, "diff", "b.png", "b.png", "--trace", "again.json", code=4)
     steps = ("render", "gen:cornell", "--size", "32x32", "-o", "c.png", "--spp", "2", "--trace", "again.json")
     hpr(folder, *steps, code=4)
     going_on = hpr(folder, *steps, "--resume", code=4).stderr
-    check("c.png.checkpoint" in going_on and "again.json" not in going_on, f"--resume is refused for its trace: {going_on}")
+    expect("c.png.checkpoint" in going_on and "again.json" not in going_on, f"--resume is refused for its trace: {going_on}")
     hpr(folder, *steps, "--ranks", "2", code=4)
     hpr(folder, *base, "--trace", "b.png", code=2)
     hpr(folder, *base, "--trace", "there.json", code=2)  # not even with --force: it is no trace
-    check((folder / "there.json").read_text() == "kept", "a file that is no trace was replaced")
+    expect((folder / "there.json").read_text() == "kept", "a file that is no trace was replaced")
     hpr(folder, "scene", "make", "tetra", "-o", "made.glb", "--trace", "made.glb", code=2)
-    check((folder / "made.glb").read_bytes()[:4] == b"glTF", "a trace took the place of the command's own result")
+    expect((folder / "made.glb").read_bytes()[:4] == b"glTF", "a trace took the place of the command's own result")
     hpr(folder, "render", "nothing.glb", "-o", "b.png", "--trace", "none.json", code=4)
-    check(not (folder / "none.json").exists(), "a run that failed leaves a trace")
+    expect(not (folder / "none.json").exists(), "a run that failed leaves a trace")
 
 
 def main():

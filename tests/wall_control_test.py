@@ -15,9 +15,7 @@ import sys
 import tempfile
 import time
 
-from checks import check, failures
-
-HPR = os.path.abspath(sys.argv[1])
+from program import HPR, expect, failures
 
 
 class Wall:
@@ -36,7 +34,7 @@ class Wall:
     def say(self, *words, code=0):
         result = subprocess.run([HPR, "wall", *words], env=self.environment, capture_output=True, text=True, timeout=60,
                                 check=False)
-        check(result.returncode == code, f"hpr wall {' '.join(words)} left with {result.returncode}: {result.stderr}")
+        expect(result.returncode == code, f"hpr wall {' '.join(words)} left with {result.returncode}: {result.stderr}")
         return result.stdout
 
     def wait_for_frame(self, number):
@@ -47,7 +45,7 @@ class Wall:
             if result.returncode == 0 and json.loads(result.stdout)["frame"] >= number:
                 return json.loads(result.stdout)
             time.sleep(0.05)
-        check(False, f"no frame {number}:\n{self.told()}")
+        expect(False, f"no frame {number}:\n{self.told()}")
         return {}
 
     def ranks(self):
@@ -61,7 +59,7 @@ class Wall:
 
     def leave(self, code=0):
         left = self.job.wait(timeout=120)
-        check(left == code, f"the run left with {left}, not {code}:\n{self.told()}")
+        expect(left == code, f"the run left with {left}, not {code}:\n{self.told()}")
 
     def told(self):
         self.log.flush()
@@ -80,10 +78,10 @@ def told_and_stopped(folder):
     for ranks in (1, 2):
         wall = Wall(folder, f"told-{ranks}", ranks, 100000)
         status = wall.wait_for_frame(2)
-        check(status.get("schema") == "hpr.wall-status/1" and status.get("ranks") == ranks, f"status: {status}")
-        check([screen["id"] for screen in status.get("screens", [])] == ["wall-r0c0", "wall-r0c1"], f"status has other screens: {status}")
-        check("screen" in wall.say("status"), "status in words names the screens")
-        check("move NODE" in wall.say("ctl", "help"), "ctl help lists the commands")
+        expect(status.get("schema") == "hpr.wall-status/1" and status.get("ranks") == ranks, f"status: {status}")
+        expect([screen["id"] for screen in status.get("screens", [])] == ["wall-r0c0", "wall-r0c1"], f"status has other screens: {status}")
+        expect("screen" in wall.say("status"), "status in words names the screens")
+        expect("move NODE" in wall.say("ctl", "help"), "ctl help lists the commands")
         wall.say("ctl", "hide", "nothing", code=2)
         wall.say("ctl", "load", "nowhere.glb", code=4)
         if ranks > 1:
@@ -97,14 +95,14 @@ def told_and_stopped(folder):
         wall.say("stop")
         wall.leave()
         frames = wall.manifest()["frames"]
-        check(hashes(frames[0]) != hashes(frames[-1]), "the camera moved, the picture did not")
+        expect(hashes(frames[0]) != hashes(frames[-1]), "the camera moved, the picture did not")
         out = folder / f"direct-{ranks}"
         direct = subprocess.run([HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(out), "--quality", "draft", "--passes",
                                  "none", "--frames", str(frames[-1]["frame"] + 1), "--eye=-8,1.7,3", "--at=-10,1.5,-2"], capture_output=True, text=True, timeout=60, check=False)
-        check(direct.returncode == 0, direct.stderr)
+        expect(direct.returncode == 0, direct.stderr)
         shown = json.loads((out / "manifest.json").read_text())["frames"][-1]  # of one number, and so of one noise
-        check(hashes(frames[-1]) == hashes(shown), "a wall told to look elsewhere shows another picture than one that does")
-        check(not list(wall.runtime.glob("hpr/*.sock")), "a run that ended leaves its socket")
+        expect(hashes(frames[-1]) == hashes(shown), "a wall told to look elsewhere shows another picture than one that does")
+        expect(not list(wall.runtime.glob("hpr/*.sock")), "a run that ended leaves its socket")
         wall.say("status", code=7)
 
 
@@ -120,23 +118,23 @@ def stops_and_goes_on(folder):
         wall.job.send_signal(signal.SIGUSR1)
         wall.leave(75)
         done = len(wall.manifest()["frames"])
-        check(wall.manifest().get("stopped") == {"frames": done, "of": 200}, f"stopped: {wall.manifest().get('stopped')}")
-        check("--resume goes on" in wall.told(), f"the log does not tell how to go on: {wall.told()}")
+        expect(wall.manifest().get("stopped") == {"frames": done, "of": 200}, f"stopped: {wall.manifest().get('stopped')}")
+        expect("--resume goes on" in wall.told(), f"the log does not tell how to go on: {wall.told()}")
         command = [HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(wall.out), "--quality", "draft", "--resume"]
         for options, words in ((["--frames", "201"], "200 frames"), (["--frames", "200", "--seed", "2"], "seed 1"),
                                (["--frames", "200", "--set", "test.gap_rgba=[1,2,3,255]"], "another wall")):
             refused = subprocess.run([*command, *options], capture_output=True, text=True, timeout=60, check=False)
-            check(refused.returncode == 3 and words in refused.stderr, f"{options}: {refused.returncode}, {refused.stderr}")
+            expect(refused.returncode == 3 and words in refused.stderr, f"{options}: {refused.returncode}, {refused.stderr}")
         for options in (["--display", "none", "--frames", "200"], ["--until-stopped"]):
-            check(subprocess.run([*command, *options], capture_output=True, timeout=60, check=False).returncode == 2, f"takes {options}")
+            expect(subprocess.run([*command, *options], capture_output=True, timeout=60, check=False).returncode == 2, f"takes {options}")
         rest = subprocess.run([*command, "--frames", "200", "--ranks", str(3 - ranks)], capture_output=True, text=True, timeout=120,
                               check=False)
-        check(rest.returncode == 0 and f"going on after {done} of 200" in rest.stderr, f"{rest.returncode}, {rest.stderr}")
-        check([hashes(frame) for frame in wall.manifest()["frames"]] == expected, f"{ranks} ranks: two parts differ from the whole")
-        check("stopped" not in wall.manifest(), "it is called stopped still")
+        expect(rest.returncode == 0 and f"going on after {done} of 200" in rest.stderr, f"{rest.returncode}, {rest.stderr}")
+        expect([hashes(frame) for frame in wall.manifest()["frames"]] == expected, f"{ranks} ranks: two parts differ from the whole")
+        expect("stopped" not in wall.manifest(), "it is called stopped still")
     nothing = Wall(folder, "from-nothing", 1, 3, "--resume")
     nothing.leave()
-    check(len(nothing.manifest()["frames"]) == 3, "--resume without a manifest begins with the first frame")
+    expect(len(nothing.manifest()["frames"]) == 3, "--resume without a manifest begins with the first frame")
 
 
 def survives_a_lost_rank(folder):
@@ -147,17 +145,17 @@ def survives_a_lost_rank(folder):
         wall = Wall(folder, f"lost-{how.name}", 2, 150, "--hang-timeout", "2")
         wall.wait_for_frame(3)
         ranks = wall.ranks()
-        check(len(ranks) == 2, f"the job has ranks {ranks}")
+        expect(len(ranks) == 2, f"the job has ranks {ranks}")
         if ranks:
             os.kill(ranks[-1], how)
         wall.leave()
         manifest = wall.manifest()
         numbers = [frame["frame"] for frame in manifest["frames"]]
-        check(numbers == list(range(150)), f"{how.name}: frames {numbers[:5]} ... {numbers[-5:]}, {len(numbers)} of 150")
+        expect(numbers == list(range(150)), f"{how.name}: frames {numbers[:5]} ... {numbers[-5:]}, {len(numbers)} of 150")
         restarts = manifest.get("restarts", [])
-        check(len(restarts) == 1 and 3 <= restarts[0]["frame"] < 150, f"{how.name}: restarts {restarts}")
-        check([hashes(frame) for frame in manifest["frames"]] == expected, f"{how.name}: other frames than those of a whole run")
-        check("starting it again from frame" in wall.told(), "the log does not tell of the restart")
+        expect(len(restarts) == 1 and 3 <= restarts[0]["frame"] < 150, f"{how.name}: restarts {restarts}")
+        expect([hashes(frame) for frame in manifest["frames"]] == expected, f"{how.name}: other frames than those of a whole run")
+        expect("starting it again from frame" in wall.told(), "the log does not tell of the restart")
     wall = Wall(folder, "given-up", 2, 100000, "--restarts", "0")
     wall.wait_for_frame(3)
     os.kill(wall.ranks()[0], signal.SIGKILL)
