@@ -46,19 +46,6 @@ void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
 
 }  // namespace
 
-void RayBatch::push(const glm::dvec3& origin, const glm::dvec3& direction, double reach) {
-  static_assert(kWidth == embree::kWidth);
-  const std::size_t lane = size_ % kWidth;
-  if (size_ / kWidth == packets_.size()) packets_.emplace_back();
-  Packet& packet = packets_[size_ / kWidth];
-  for (int axis = 0; axis < 3; ++axis) {
-    packet.origin[axis][lane] = static_cast<float>(origin[axis]);
-    packet.direction[axis][lane] = static_cast<float>(direction[axis]);
-  }
-  packet.reach[lane] = static_cast<float>(reach);
-  ++size_;
-}
-
 namespace {
 
 /// What is the same in every packet.
@@ -97,6 +84,7 @@ bool validate(const Packet& packet, int* valid) {
 /// it may not.
 template <typename Packet>
 std::uint64_t load(const Packet& packet, std::size_t count, embree::RayPacket& rays, int* valid) {
+  static_assert(sizeof packet.reach == kWidth * sizeof(float));
   std::memcpy(rays.org_x, packet.origin, sizeof packet.origin);
   static_assert(offsetof(embree::RayPacket, org_z) == 2 * sizeof(rays.org_x));
   std::memcpy(rays.dir_x, packet.direction, sizeof packet.direction);

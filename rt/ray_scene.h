@@ -25,7 +25,17 @@ class RayBatch {
  public:
   void clear() { size_ = 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
-  void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach);
+  void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach) {
+    const std::size_t lane = size_ % kWidth;
+    if (size_ / kWidth == packets_.size()) packets_.emplace_back();
+    Packet& packet = packets_[size_ / kWidth];
+    for (int axis = 0; axis < 3; ++axis) {
+      packet.origin[axis][lane] = static_cast<float>(origin[axis]);
+      packet.direction[axis][lane] = static_cast<float>(direction[axis]);
+    }
+    packet.reach[lane] = static_cast<float>(reach);
+    ++size_;
+  }
 
  private:
   friend class RayScene;
