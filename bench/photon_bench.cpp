@@ -5,15 +5,18 @@
 #include <random>
 #include <vector>
 
+#include "rt/photon_gather.h"
 #include "rt/photon_map.h"
 
-// A million photons on the walls of a room: sorting them into a map, and gathering about 50 at a place. The floor of a
+// A million photons on the walls of a room: sorting them into a map, and the light of about 50 gathered at a place. The
+// floor of a
 // build is to move each photon once to where it belongs, a scattered copy; that of a gather is to read and sum fifty
 // photons that lie side by side somewhere.
 namespace {
 
 constexpr std::size_t kPhotons = 1'000'000;
 constexpr double kGathered = 50.0;
+constexpr double kGlossyCutoff = 0.3;
 
 struct Place {
   glm::dvec3 position;
@@ -43,6 +46,20 @@ std::vector<hpr::Photon> photons_of_a_room() {
   }
   return photons;
 }
+
+/// A place as the picture shows it, of rough plastic: seen from in front, a little from the side.
+struct Seen {
+  explicit Seen(const Place& place) {
+    surface.position = place.position;
+    surface.geometric_normal = surface.shading_normal = material.normal = place.normal;
+    surface.to_viewer = glm::normalize(2.0 * place.normal - place.position);
+    material.roughness = 0.5;
+    bsdf = hpr::Bsdf(material, surface);
+  }
+  hpr::SurfacePoint surface;
+  hpr::MaterialPoint material;
+  hpr::Bsdf bsdf;
+};
 
 hpr::RaySpace room_space() {
   return hpr::RaySpace(hpr::Bounds{glm::dvec3(-1.0), glm::dvec3(1.0)});
@@ -92,10 +109,8 @@ void photon_gather(benchmark::State& state) {
   for (const Place& place : places) gathered += map.count(place.position, place.normal);
   std::size_t i = 0;
   for (auto _ : state) {
-    const Place& place = places[i++ % places.size()];
-    benchmark::DoNotOptimize(map.gather(place.position, place.normal, [&](const glm::dvec3& from) {
-      return glm::dvec3(glm::dot(from, place.normal));
-    }));
+    const Seen seen(places[i++ % places.size()]);
+    benchmark::DoNotOptimize(hpr::gather_photons(map, seen.surface, seen.bsdf, seen.material.normal, kGlossyCutoff));
   }
   state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(places.size());
 }

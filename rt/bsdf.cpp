@@ -188,6 +188,28 @@ glm::dvec3 Bsdf::reflected(const glm::dvec3& to_light, bool diffuse, bool specul
   return result + common * fresnel(0.5 * length, dielectric);
 }
 
+ReflectionTerms Bsdf::reflection_terms(bool diffuse, bool specular) const {
+  ReflectionTerms terms;
+  if (!scatters_) return terms;
+  terms.view = view_;
+  terms.normal = normal_;
+  terms.geometric_normal = geometric_normal_;
+  if (diffuse) terms.diffuse = (diffuse_ / std::numbers::pi * (exact_ ? view_enters_ : 1.0)) * base_color_;
+  terms.tint = metallic_ * base_color_;
+  terms.edge_on = static_cast<float>(kEdgeOn);
+  terms.normal_view = static_cast<float>(normal_view_);
+  terms.view_smith = static_cast<float>(view_smith_);
+  terms.alpha2 = static_cast<float>(alpha2_);
+  terms.metallic = static_cast<float>(metallic_);
+  if (all_mirror_ || reflects_) {
+    terms.f0 = all_mirror_ ? 1.0F : static_cast<float>(f0_);
+    terms.rise = 1.0F - terms.f0;
+  }
+  if (exact_ && reflects_ && !all_mirror_) terms.eta = static_cast<float>(eta_);
+  terms.specular = specular && roughness_ >= kDeltaRoughness;
+  return terms;
+}
+
 glm::dvec3 Bsdf::value(Lobe lobe, const glm::dvec3& to_light) const {
   if (lobe != Lobe::Transmission) return reflected(to_light, lobe == Lobe::Diffuse, lobe == Lobe::Reflection);
   if (is_delta(lobe)) return glm::dvec3(0.0);

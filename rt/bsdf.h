@@ -35,6 +35,24 @@ struct BsdfSample {
   double pdf = 0.0;           ///< per solid angle; 0 when the lobe has one direction only
 };
 
+/// What Bsdf::reflected() works from, in single precision: for many directions at once.
+struct ReflectionTerms {
+  glm::vec3 view{0.0F};
+  glm::vec3 normal{0.0F};
+  glm::vec3 geometric_normal{0.0F};
+  glm::vec3 diffuse{0.0F};  ///< of the base, 1/sr, before Fresnel's term
+  glm::vec3 tint{0.0F};     ///< of the metal, its share included
+  float edge_on = 0.0F;     ///< cosines to the normal up to here are none
+  float normal_view = 0.0F;
+  float view_smith = 1.0F;
+  float alpha2 = 1.0F;
+  float metallic = 0.0F;  ///< share
+  float f0 = 0.0F;        ///< of the dielectric, whose Schlick term is f0 + rise (1 - v.h)^5
+  float rise = 0.0F;
+  float eta = 0.0F;       ///< its index where Fresnel's own equations hold, else 0
+  bool specular = false;  ///< whether facets reflect
+};
+
 /// How a surface scatters light at one place: glTF 2.0, appendix B, with KHR_materials_transmission, _volume and _ior.
 /// A dielectric base (Lambert, or transmission, under a specular layer) mixed with a metal; GGX distribution (Walter,
 /// Marschner, Li, Torrance, "Microfacet Models for Refraction through Rough Surfaces", 2007) with alpha = roughness^2,
@@ -65,6 +83,8 @@ class Bsdf {
   [[nodiscard]] glm::dvec3 value(Lobe lobe, const glm::dvec3& to_light) const;
   /// The sum over Diffuse and Reflection, or one of them: cheaper than one by one.
   [[nodiscard]] glm::dvec3 reflected(const glm::dvec3& to_light, bool diffuse = true, bool specular = true) const;
+  /// The same for many directions: what it is worked out from. A surface that scatters nothing has black terms.
+  [[nodiscard]] ReflectionTerms reflection_terms(bool diffuse, bool specular) const;
   /// The density of sample(lobe), per solid angle; 0 where value is 0 by direction, and for lobes of one direction.
   [[nodiscard]] double pdf(Lobe lobe, const glm::dvec3& to_light) const;
   /// value and pdf of every lobe, bit for bit, in one go.

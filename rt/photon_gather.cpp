@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "rt/photon_reflection.h"
+
 namespace hpr {
 
 bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
@@ -25,14 +27,20 @@ glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, con
   const bool specular = gathers(Lobe::Reflection);
   if (!diffuse && !specular) return glm::dvec3(0.0);
   const bool flat = shading_normal == surface.geometric_normal;
-  const glm::dvec3 light = map.gather(surface.position, surface.geometric_normal, [&](const glm::dvec3& from) {
-    const glm::dvec3 value = bsdf.reflected(from, diffuse, specular);
-    if (flat) return value;
-    // Photons fall on the true surface, light is to fall on the one the shading normal pretends.
-    constexpr double kGrazing = 1e-3;
-    const double falls = std::abs(glm::dot(from, surface.geometric_normal));
-    return value * (std::abs(glm::dot(from, shading_normal)) / std::max(falls, kGrazing));
+  const ReflectionTerms terms = bsdf.reflection_terms(diffuse, specular);
+  FoundPhotons found;
+  glm::dvec3 light(0.0);
+  map.visit(surface.position, surface.geometric_normal, [&](const Photon& photon, double weight) {
+    const std::size_t i = found.count++;
+    found.direction[i] = photon.direction;
+    found.weight[i] = static_cast<float>(weight);
+    for (std::size_t c = 0; c < 3; ++c) found.flux[c][i] = photon.flux[c];
+    if (found.count < FoundPhotons::kMost) return;
+    light += reflect_photons(terms, !flat, found);
+    found.count = 0;
   });
+  if (found.count > 0) light += reflect_photons(terms, !flat, found);
+  light *= map.density();
   const double sum = light.r + light.g + light.b;
   return std::isfinite(sum) ? light : glm::dvec3(0.0);
 }

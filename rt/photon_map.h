@@ -79,6 +79,30 @@ class PhotonMap {
     return sum * density_;
   }
 
+  /// The photons that such a gather counts, in its order, each with its weight: found(photon, weight). Times density(),
+  /// weights and fluxes make 1/m^2.
+  template <typename Visit>
+  void visit(const glm::dvec3& place, const glm::dvec3& normal, Visit&& found) const {
+    if (size_ == 0) return;
+    const glm::dvec3 at = space_.from_world(place);
+    std::array<Row, 9> rows;
+    const std::size_t count = find_rows(at, normal, rows);
+    for (std::size_t row = 0; row < count; ++row) {
+      for (const Photon* photon = rows[row].first; photon != rows[row].last; ++photon) {
+        const glm::dvec3 way(photon->position[0] - at.x, photon->position[1] - at.y, photon->position[2] - at.z);
+        const double distance2 = glm::dot(way, way);
+        if (!(distance2 < radius2_)) continue;
+        if (!(std::abs(glm::dot(way, normal)) <= flatness_)) continue;
+        const glm::dvec3 facing = unpack_unscaled(photon->normal);
+        const double cosine = glm::dot(facing, normal);
+        if (!(cosine > 0.0) || cosine * cosine < kLeastCosine2 * glm::dot(facing, facing)) continue;
+        found(*photon, 1.0 - distance2 * inverse_radius2_);
+      }
+    }
+  }
+
+  [[nodiscard]] double density() const { return density_; }
+
   /// How many photons such a gather counts.
   [[nodiscard]] std::size_t count(const glm::dvec3& place, const glm::dvec3& normal) const {
     std::size_t found = 0;
@@ -112,26 +136,6 @@ class PhotonMap {
   /// Those of the 3 x 3 rows about `at` (ray space) that come within the radius and within kFlatness of the plane, cut
   /// to the cells that do. Their first photons are on their way into the cache.
   std::size_t find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<Row, 9>& rows) const;
-
-  template <typename Visit>
-  void visit(const glm::dvec3& place, const glm::dvec3& normal, Visit&& found) const {
-    if (size_ == 0) return;
-    const glm::dvec3 at = space_.from_world(place);
-    std::array<Row, 9> rows;
-    const std::size_t count = find_rows(at, normal, rows);
-    for (std::size_t row = 0; row < count; ++row) {
-      for (const Photon* photon = rows[row].first; photon != rows[row].last; ++photon) {
-        const glm::dvec3 way(photon->position[0] - at.x, photon->position[1] - at.y, photon->position[2] - at.z);
-        const double distance2 = glm::dot(way, way);
-        if (!(distance2 < radius2_)) continue;
-        if (!(std::abs(glm::dot(way, normal)) <= flatness_)) continue;
-        const glm::dvec3 facing = unpack_unscaled(photon->normal);
-        const double cosine = glm::dot(facing, normal);
-        if (!(cosine > 0.0) || cosine * cosine < kLeastCosine2 * glm::dot(facing, facing)) continue;
-        found(*photon, 1.0 - distance2 * inverse_radius2_);
-      }
-    }
-  }
 
   static constexpr double kMiddle = 1073741824.0;  // 2^30 cells each way
   static constexpr double kLast = 2.0 * kMiddle - 2.0;
