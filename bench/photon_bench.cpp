@@ -107,10 +107,12 @@ void photon_gather(benchmark::State& state) {
   }
   std::size_t gathered = 0;
   for (const Place& place : places) gathered += map.count(place.position, place.normal);
+  hpr::FoundPhotons found;
   std::size_t i = 0;
   for (auto _ : state) {
     const Seen seen(places[i++ % places.size()]);
-    benchmark::DoNotOptimize(hpr::gather_photons(map, seen.surface, seen.bsdf, seen.material.normal, kGlossyCutoff));
+    benchmark::DoNotOptimize(
+        hpr::gather_photons(map, seen.surface, seen.bsdf, seen.material.normal, kGlossyCutoff, found));
   }
   state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(places.size());
 }

@@ -12,6 +12,7 @@
 #include "rt/light_set.h"
 #include "rt/lighter.h"
 #include "rt/medium.h"
+#include "rt/photon_search.h"
 #include "rt/ray_walk.h"
 #include "rt/sampler.h"
 #include "rt/surfaces.h"
@@ -79,6 +80,7 @@ struct TileWork {
   RayCounts counts = {};
   WalkScratch scratch = {};
   std::vector<RayRequest> requests = {};
+  FoundPhotons found_photons = {};
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {

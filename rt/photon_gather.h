@@ -23,8 +23,8 @@ namespace hpr {
 [[nodiscard]] bool takes_photons(const Bsdf& bsdf, double glossy_cutoff);
 
 /// The radiance towards the viewer that the lobes not followed make of the photons about `surface`. `bsdf` is of that
-/// surface with the normal `shading_normal`, and carries radiance. Never NaN.
+/// surface with the normal `shading_normal`, and carries radiance. Never NaN. `found` is overwritten.
 [[nodiscard]] glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, const Bsdf& bsdf,
-                                        const glm::dvec3& shading_normal, double glossy_cutoff);
+                                        const glm::dvec3& shading_normal, double glossy_cutoff, FoundPhotons& found);
 
 }  // namespace hpr

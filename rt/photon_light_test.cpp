@@ -118,6 +118,7 @@ glm::dvec3 by_chance(const Eye& eye, glm::dvec3 origin, glm::dvec3 direction, Sa
 
 glm::dvec3 by_photons(const Eye& eye, const PhotonMap& caustic, const PhotonMap& global, glm::dvec3 origin,
                       glm::dvec3 direction, Sampler& sampler) {
+  FoundPhotons found;
   glm::dvec3 light(0.0);
   glm::dvec3 throughput(1.0);
   for (int bounce = 0; bounce < 64; ++bounce) {
@@ -126,7 +127,7 @@ glm::dvec3 by_photons(const Eye& eye, const PhotonMap& caustic, const PhotonMap&
     const Bsdf bsdf(at->material, at->surface);
     light += throughput * direct_light(eye, *at, bsdf, sampler);
     for (const PhotonMap* map : {&caustic, &global})
-      light += throughput * gather_photons(*map, at->surface, bsdf, at->material.normal, eye.cutoff());
+      light += throughput * gather_photons(*map, at->surface, bsdf, at->material.normal, eye.cutoff(), found);
     const auto followed = [&](Lobe lobe) { return is_followed(bsdf, lobe, eye.cutoff()); };
     if (!eye.go_on(*at, bsdf, followed, sampler, throughput, origin, direction)) break;
   }

@@ -82,21 +82,45 @@ void PhotonMap::sort(std::span<const Photon> photons) {
   const std::uint32_t again = starts_[0] + starts_[1];
   std::uint32_t before = 0;
   for (std::uint32_t slot = 0; slot < slots_; ++slot) before += std::exchange(starts_[slot], before);
-  photons_ = std::make_unique_for_overwrite<Photon[]>(size_ + again);
-  constexpr std::size_t kAhead = 16;  // every photon goes to another cache line, whose way is long
+  places_ = std::make_unique_for_overwrite<PhotonPlace[]>(size_ + again + kReadBeyond);
+  lights_ = std::make_unique_for_overwrite<PhotonLight[]>(size_ + again);
+  constexpr std::size_t kAhead = 16;  // every photon goes to other cache lines, whose way is long
   for (std::size_t i = 0; i < photons.size(); ++i) {
-    if (i + kAhead < photons.size()) __builtin_prefetch(photons_.get() + starts_[slots[i + kAhead]], 1);
-    if (slots[i] != slots_) photons_[starts_[slots[i]]++] = photons[i];
+    if (i + kAhead < photons.size()) {
+      __builtin_prefetch(places_.get() + starts_[slots[i + kAhead]], 1);
+      __builtin_prefetch(lights_.get() + starts_[slots[i + kAhead]], 1);
+    }
+    if (slots[i] == slots_) continue;
+    const std::uint32_t to = starts_[slots[i]]++;
+    places_[to] = {photons[i].position, photons[i].normal};
+    lights_[to] = {photons[i].direction, photons[i].flux};
   }
   // Each start now stands where the next slot begins.
   std::copy_backward(starts_.get(), starts_.get() + slots_, starts_.get() + slots_ + 1);
   starts_[0] = 0;
   starts_[slots_ + 1] = starts_[slots_] + starts_[1];
   starts_[slots_ + 2] = starts_[slots_] + starts_[2];
-  std::copy_n(photons_.get(), again, photons_.get() + size_);
+  std::copy_n(places_.get(), again, places_.get() + size_);
+  std::copy_n(lights_.get(), again, lights_.get() + size_);
+  std::fill_n(places_.get() + size_ + again, kReadBeyond, PhotonPlace{});
 }
 
-std::size_t PhotonMap::find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<Row, 9>& rows) const {
+void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, FoundPhotons& found) const {
+  found.count = 0;
+  if (size_ == 0) return;
+  PhotonSearch search;
+  search.place = space_.from_world(place);
+  search.normal = normal;
+  search.radius2 = radius2_;
+  search.inverse_radius2 = inverse_radius2_;
+  search.flatness = flatness_;
+  search.least_cosine2 = kLeastCosine2;
+  std::array<PhotonRow, 9> rows;
+  const std::size_t count = find_rows(search.place, normal, rows);
+  find_photons(search, std::span(rows).first(count), places_.get(), found);
+}
+
+std::size_t PhotonMap::find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<PhotonRow, 9>& rows) const {
   // Lengths are in cells from here on, and a little too long, so that no rounding loses a photon.
   constexpr double kSlack = 4e-6;
   const glm::dvec3 place = in_cells(at);
@@ -131,9 +155,10 @@ std::size_t PhotonMap::find_rows(const glm::dvec3& at, const glm::dvec3& normal,
       const auto last = static_cast<std::uint32_t>(fraction.x + high + 1.0);
       const std::uint32_t slot =
           slot_of(cell_x - 1 + first, cell_y + static_cast<std::uint32_t>(y), cell_z + static_cast<std::uint32_t>(z));
-      const Row row{photons_.get() + starts_[slot], photons_.get() + starts_[slot + (last - first) + 1]};
-      __builtin_prefetch(row.first);
-      __builtin_prefetch(row.first + 2);
+      const PhotonRow row{starts_[slot], starts_[slot + (last - first) + 1]};
+      if (row.first == row.last) continue;
+      __builtin_prefetch(places_.get() + row.first);
+      __builtin_prefetch(places_.get() + row.first + 4);
       rows[count++] = row;
     }
   }

@@ -10,6 +10,8 @@
 #include <numbers>
 #include <span>
 
+#include "rt/photon_reflection.h"
+#include "rt/photon_search.h"
 #include "rt/ray_space.h"
 
 namespace hpr {
@@ -59,55 +61,42 @@ class PhotonMap {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double radius() const { return radius_; }
 
-  /// The photons' density about `place` (world) on the surface with `normal` (unit length, geometric), each weighted by
-  /// its flux and `value(direction)`, a glm::dvec3 for the unit direction it came from: irradiance in W/m^2 for a value
-  /// of 1, reflected radiance for that of a BRDF (flux density holds the cosine).
+  /// The photons whose density about `place` (world) on the surface with `normal` (unit length, geometric) counts: that
+  /// lie within the radius, within kFlatness of it off the tangent plane, and on a surface turned by less than 60
+  /// degrees from this one. None for places without photons, far away, or not finite.
   ///
-  /// Photons count that lie within the radius, within kFlatness of it off the tangent plane, and on a surface turned by
-  /// less than 60 degrees from this one. Zero for places without photons, far away, or not finite.
-  ///
-  /// They are weighted by Epanechnikov's kernel 2 / (pi r^2) (1 - d^2 / r^2): of all kernels the one with the least
-  /// mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at the rim, so that what lies
-  /// there matters little and pictures are continuous.
+  /// They are weighted by Epanechnikov's kernel 2 / (pi r^2) (1 - d^2 / r^2), of which density() is the factor: of all
+  /// kernels the one with the least mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at
+  /// the rim, so that what lies there matters little and pictures are continuous.
+  void find(const glm::dvec3& place, const glm::dvec3& normal, FoundPhotons& found) const;
+
+  /// 1/m^2: times this, the sum of weights and fluxes is an irradiance.
+  [[nodiscard]] double density() const { return density_; }
+
+  /// By FoundPhotons::index.
+  [[nodiscard]] const PhotonLight* lights() const { return lights_.get(); }
+
+  /// The photons' density there, each weighted by its flux and `value(direction)`, a glm::dvec3 for the unit direction
+  /// it came from: irradiance in W/m^2 for a value of 1, reflected radiance for that of a BRDF (flux density holds the
+  /// cosine).
   template <typename Value>
   [[nodiscard]] glm::dvec3 gather(const glm::dvec3& place, const glm::dvec3& normal, Value&& value) const {
+    FoundPhotons found;
+    find(place, normal, found);
     glm::dvec3 sum(0.0);
-    visit(place, normal, [&](const Photon& photon, double weight) {
-      const glm::dvec3 flux(photon.flux[0], photon.flux[1], photon.flux[2]);
-      sum += weight * flux * value(unpack_direction(photon.direction));
-    });
+    for (std::size_t i = 0; i < found.count; ++i) {
+      const PhotonLight& light = lights_[found.index[i]];
+      const glm::dvec3 flux(light.flux[0], light.flux[1], light.flux[2]);
+      sum += static_cast<double>(found.weight[i]) * flux * value(unpack_direction(light.direction));
+    }
     return sum * density_;
   }
 
-  /// The photons that such a gather counts, in its order, each with its weight: found(photon, weight). Times density(),
-  /// weights and fluxes make 1/m^2.
-  template <typename Visit>
-  void visit(const glm::dvec3& place, const glm::dvec3& normal, Visit&& found) const {
-    if (size_ == 0) return;
-    const glm::dvec3 at = space_.from_world(place);
-    std::array<Row, 9> rows;
-    const std::size_t count = find_rows(at, normal, rows);
-    for (std::size_t row = 0; row < count; ++row) {
-      for (const Photon* photon = rows[row].first; photon != rows[row].last; ++photon) {
-        const glm::dvec3 way(photon->position[0] - at.x, photon->position[1] - at.y, photon->position[2] - at.z);
-        const double distance2 = glm::dot(way, way);
-        if (!(distance2 < radius2_)) continue;
-        if (!(std::abs(glm::dot(way, normal)) <= flatness_)) continue;
-        const glm::dvec3 facing = unpack_unscaled(photon->normal);
-        const double cosine = glm::dot(facing, normal);
-        if (!(cosine > 0.0) || cosine * cosine < kLeastCosine2 * glm::dot(facing, facing)) continue;
-        found(*photon, 1.0 - distance2 * inverse_radius2_);
-      }
-    }
-  }
-
-  [[nodiscard]] double density() const { return density_; }
-
   /// How many photons such a gather counts.
   [[nodiscard]] std::size_t count(const glm::dvec3& place, const glm::dvec3& normal) const {
-    std::size_t found = 0;
-    visit(place, normal, [&](const Photon& /*photon*/, double /*weight*/) { ++found; });
-    return found;
+    FoundPhotons found;
+    find(place, normal, found);
+    return found.count;
   }
 
   /// A share of the radius, so that a map means the same at any scale; wide enough for a sphere of 2.5 radii.
@@ -128,14 +117,9 @@ class PhotonMap {
     return (x + y * row_step_ + z * layer_step_) & (slots_ - 1);
   }
 
-  /// Photons side by side that a gather must look at.
-  struct Row {
-    const Photon* first;
-    const Photon* last;
-  };
   /// Those of the 3 x 3 rows about `at` (ray space) that come within the radius and within kFlatness of the plane, cut
   /// to the cells that do. Their first photons are on their way into the cache.
-  std::size_t find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<Row, 9>& rows) const;
+  std::size_t find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<PhotonRow, 9>& rows) const;
 
   static constexpr double kMiddle = 1073741824.0;  // 2^30 cells each way
   static constexpr double kLast = 2.0 * kMiddle - 2.0;
@@ -156,8 +140,9 @@ class PhotonMap {
   std::uint32_t slots_ = 0;  ///< a power of two
   std::uint32_t row_step_ = 0;
   std::uint32_t layer_step_ = 0;
-  /// By slot; those of the first two slots stand once more behind the last, so that runs need not wrap around.
-  std::unique_ptr<Photon[]> photons_;
+  // By slot; those of the first two slots stand once more behind the last, so that runs need not wrap around.
+  std::unique_ptr<PhotonPlace[]> places_;  ///< and kReadBeyond more
+  std::unique_ptr<PhotonLight[]> lights_;
   std::unique_ptr<std::uint32_t[]> starts_;  ///< [slots_ + 3]: where each slot's photons begin
 };
 

@@ -22,7 +22,8 @@ class PhotonPass final : public Pass {
       if (point.borrows_light(Component::Photon)) continue;
       glm::dvec3 light(0.0);
       for (const PhotonMap* map : {&tile.photons->caustic, &tile.photons->global}) {
-        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff);
+        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff,
+                                tile.found_photons);
       }
       if (light != glm::dvec3(0.0)) {
         tile.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);

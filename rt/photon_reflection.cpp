@@ -10,58 +10,20 @@
 // After foreach_target.h, as Highway asks.
 #include <hwy/highway.h>
 
+#include "rt/packed_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace hpr {  // NOLINT(modernize-concat-nested-namespaces): HWY_NAMESPACE is a macro
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
+static_assert(kReadBeyond >= kPlaces);
 
-/// Sums are kept in so many places whatever the width of vectors, so that all add in one order.
-constexpr std::size_t kSums = 16;
 /// Cosines of light that falls on the true surface count as this much at the least.
 constexpr float kGrazing = 1e-3F;
-static_assert(FoundPhotons::kMost % kSums == 0);
-
-using Floats = hn::CappedTag<float, kSums>;
-using Words = hn::RebindToSigned<Floats>;
-using Vector = hn::Vec<Floats>;
-using Mask = hn::Mask<Floats>;
-
-struct Vector3 {
-  Vector x, y, z;
-};
-
-HWY_INLINE Vector all(float value) {
-  return hn::Set(Floats(), value);
-}
-
-HWY_INLINE Vector square(Vector a) {
-  return hn::Mul(a, a);
-}
-
-HWY_INLINE Vector dot(const Vector3& a, const glm::vec3& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, all(b.x)), hn::Mul(a.y, all(b.y))), hn::Mul(a.z, all(b.z)));
-}
-
-HWY_INLINE Vector length2(const Vector3& a) {
-  return hn::Add(hn::Add(square(a.x), square(a.y)), square(a.z));
-}
-
-HWY_INLINE Vector3 scaled(const Vector3& a, Vector by) {
-  return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)};
-}
 
 /// As unpack_direction.
 HWY_INLINE Vector3 unpack(hn::Vec<Words> packed) {
-  constexpr float kStep = 1.0F / 32767.0F;
-  const Floats floats;
-  Vector3 d;
-  d.x = hn::Mul(hn::ConvertTo(floats, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed))), all(kStep));
-  d.y = hn::Mul(hn::ConvertTo(floats, hn::ShiftRight<16>(packed)), all(kStep));
-  d.z = hn::Sub(hn::Sub(all(1.0F), hn::Abs(d.x)), hn::Abs(d.y));
-  const Vector fold = hn::Max(hn::Neg(d.z), hn::Zero(floats));
-  d.x = hn::Sub(d.x, hn::CopySign(fold, d.x));
-  d.y = hn::Sub(d.y, hn::CopySign(fold, d.y));
+  const Vector3 d = unpack_unscaled(packed);
   return scaled(d, hn::Div(all(1.0F), hn::Sqrt(length2(d))));
 }
 
@@ -131,24 +93,28 @@ HWY_INLINE Vector channel(const Reflected& reflected, float diffuse, float tint)
   return hn::Add(colored, reflected.grey);
 }
 
-/// `count` is a multiple of kSums; `sums` has kSums places for each channel.
-void add_reflected(const ReflectionTerms& terms, bool leans, const FoundPhotons& photons, std::size_t count,
-                   float* sums) {
+/// `count` is a multiple of kPlaces; `sums` has kPlaces places for each channel.
+void add_reflected(const ReflectionTerms& terms, bool leans, const PhotonLight* lights, const std::uint32_t* index,
+                   const float* weight, std::size_t count, float* sums) {
   constexpr std::size_t kLanes = hn::MaxLanes(Floats());
-  constexpr std::size_t kVectors = kSums / kLanes;
+  constexpr std::size_t kVectors = kPlaces / kLanes;
+  constexpr int kWords = sizeof(PhotonLight) / sizeof(float);
   const Floats floats;
+  const Words words;
+  const auto* const numbers = reinterpret_cast<const std::int32_t*>(index);
+  const float* const flux = lights->flux.data();
   std::array<Vector3, kVectors> kept;
   for (Vector3& sum : kept) sum = {hn::Zero(floats), hn::Zero(floats), hn::Zero(floats)};
-  for (std::size_t first = 0; first < count; first += kSums) {
+  for (std::size_t first = 0; first < count; first += kPlaces) {
     for (std::size_t i = 0; i < kVectors; ++i) {
       const std::size_t at = first + i * kLanes;
-      const auto packed = hn::LoadU(hn::RebindToUnsigned<Floats>(), &photons.direction[at]);
-      const Reflected reflected = reflect(terms, leans, unpack(hn::BitCast(Words(), packed)));
-      const Vector weight = hn::LoadU(floats, &photons.weight[at]);
-      const auto add = [&](Vector& sum, std::size_t c) {
-        const auto index = static_cast<int>(c);
-        const Vector flux = hn::Mul(weight, hn::LoadU(floats, &photons.flux[c][at]));
-        sum = hn::Add(sum, hn::Mul(flux, channel(reflected, terms.diffuse[index], terms.tint[index])));
+      const auto where = hn::Mul(hn::LoadU(words, numbers + at), hn::Set(words, kWords));
+      const auto packed = hn::GatherIndex(words, reinterpret_cast<const std::int32_t*>(&lights->direction), where);
+      const Reflected reflected = reflect(terms, leans, unpack(packed));
+      const Vector weights = hn::LoadU(floats, weight + at);
+      const auto add = [&](Vector& sum, int c) {
+        const Vector weighed = hn::Mul(weights, hn::GatherIndex(floats, flux + c, where));
+        sum = hn::Add(sum, hn::Mul(weighed, channel(reflected, terms.diffuse[c], terms.tint[c])));
       };
       add(kept[i].x, 0);
       add(kept[i].y, 1);
@@ -157,8 +123,8 @@ void add_reflected(const ReflectionTerms& terms, bool leans, const FoundPhotons&
   }
   for (std::size_t i = 0; i < kVectors; ++i) {
     hn::StoreU(kept[i].x, floats, sums + i * kLanes);
-    hn::StoreU(kept[i].y, floats, sums + kSums + i * kLanes);
-    hn::StoreU(kept[i].z, floats, sums + 2 * kSums + i * kLanes);
+    hn::StoreU(kept[i].y, floats, sums + kPlaces + i * kLanes);
+    hn::StoreU(kept[i].z, floats, sums + 2 * kPlaces + i * kLanes);
   }
 }
 
@@ -171,18 +137,18 @@ namespace hpr {
 
 HWY_EXPORT(add_reflected);
 
-glm::dvec3 reflect_photons(const ReflectionTerms& terms, bool leans, FoundPhotons& photons) {
-  constexpr std::size_t kSums = HWY_NAMESPACE::kSums;
-  std::size_t padded = photons.count;
-  for (; padded % kSums != 0; ++padded) {
-    photons.direction[padded] = 0;
-    photons.weight[padded] = 0.0F;
-    for (auto& flux : photons.flux) flux[padded] = 0.0F;
+glm::dvec3 reflect_photons(const ReflectionTerms& terms, bool leans, const PhotonLight* lights, FoundPhotons& found) {
+  constexpr std::size_t kPlaces = HWY_NAMESPACE::kPlaces;
+  std::size_t padded = found.count;
+  for (; padded % kPlaces != 0; ++padded) {
+    found.index[padded] = found.index[0];
+    found.weight[padded] = 0.0F;
   }
-  std::array<float, 3 * kSums> sums;
-  HWY_DYNAMIC_DISPATCH(add_reflected)(terms, leans, photons, padded, sums.data());
+  std::array<float, 3 * kPlaces> sums;
+  HWY_DYNAMIC_DISPATCH(add_reflected)
+  (terms, leans, lights, found.index.data(), found.weight.data(), padded, sums.data());
   glm::dvec3 sum(0.0);
-  for (std::size_t i = 0; i < kSums; ++i) sum += glm::dvec3(sums[i], sums[kSums + i], sums[2 * kSums + i]);
+  for (std::size_t i = 0; i < kPlaces; ++i) sum += glm::dvec3(sums[i], sums[kPlaces + i], sums[2 * kPlaces + i]);
   return sum;
 }
 

@@ -1,0 +1,71 @@
+// No include guard of the usual kind: this is compiled once per instruction set.
+#if defined(HPR_RT_PACKED_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef HPR_RT_PACKED_LANES_INL_H_
+#undef HPR_RT_PACKED_LANES_INL_H_
+#else
+#define HPR_RT_PACKED_LANES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+
+HWY_BEFORE_NAMESPACE();
+namespace hpr {  // NOLINT(modernize-concat-nested-namespaces): HWY_NAMESPACE is a macro
+/// Vectors of three, many at a time, in single precision. Only operations that every processor rounds alike.
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Numbers that are worked on together stand in so many places whatever the width of vectors.
+constexpr std::size_t kPlaces = 16;
+
+using Floats = hn::CappedTag<float, kPlaces>;
+using Words = hn::RebindToSigned<Floats>;
+using Vector = hn::Vec<Floats>;
+using Mask = hn::Mask<Floats>;
+
+struct Vector3 {
+  Vector x, y, z;
+};
+
+HWY_INLINE Vector all(float value) {
+  return hn::Set(Floats(), value);
+}
+
+HWY_INLINE Vector square(Vector a) {
+  return hn::Mul(a, a);
+}
+
+HWY_INLINE Vector dot(const Vector3& a, const glm::vec3& b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, all(b.x)), hn::Mul(a.y, all(b.y))), hn::Mul(a.z, all(b.z)));
+}
+
+HWY_INLINE Vector length2(const Vector3& a) {
+  return hn::Add(hn::Add(square(a.x), square(a.y)), square(a.z));
+}
+
+HWY_INLINE Vector3 scaled(const Vector3& a, Vector by) {
+  return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)};
+}
+
+/// As unpack_unscaled in photon_map.h.
+HWY_INLINE Vector3 unpack_unscaled(hn::Vec<Words> packed) {
+  constexpr float kStep = 1.0F / 32767.0F;
+  const Floats floats;
+  Vector3 d;
+  d.x = hn::Mul(hn::ConvertTo(floats, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed))), all(kStep));
+  d.y = hn::Mul(hn::ConvertTo(floats, hn::ShiftRight<16>(packed)), all(kStep));
+  d.z = hn::Sub(hn::Sub(all(1.0F), hn::Abs(d.x)), hn::Abs(d.y));
+  const Vector fold = hn::Max(hn::Neg(d.z), hn::Zero(floats));
+  d.x = hn::Sub(d.x, hn::CopySign(fold, d.x));
+  d.y = hn::Sub(d.y, hn::CopySign(fold, d.y));
+  return d;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace hpr
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+namespace hpr {
+
+/// Where a photon of a map lies, in ray space.
+struct PhotonPlace {
+  std::array<float, 3> position{};
+  std::uint32_t normal = 0;  ///< packed: geometric, on the side it arrived on
+};
+static_assert(sizeof(PhotonPlace) == 16);
+
+/// Photons a gather has found: to be used anew for the next, as growing takes time.
+struct FoundPhotons {
+  std::size_t count = 0;
+  std::vector<std::uint32_t> index;  ///< of the map's; `count` of them
+  std::vector<float> weight;         ///< likewise
+};
+
+/// Photons about a place on a surface, in ray space.
+struct PhotonSearch {
+  glm::dvec3 place{0.0};
+  glm::dvec3 normal{0.0};  ///< of the surface, unit length
+  double radius2 = 0.0;    ///< photons count that lie nearer than its root,
+  double inverse_radius2 = 0.0;
+  double flatness = 0.0;       ///< so much off the plane at the most,
+  double least_cosine2 = 0.0;  ///< and on surfaces whose normal has a cosine to this one of at least its root
+};
+
+/// Photons side by side.
+struct PhotonRow {
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;  ///< exclusive
+};
+
+/// So many places behind the last one may be read.
+inline constexpr std::size_t kReadBeyond = 16;
+
+/// Finds the photons of some rows of `places` that count, in their order, with Epanechnikov's weight 1 - d^2 / r^2. In
+/// single precision, in steps that no processor rounds otherwise.
+void find_photons(const PhotonSearch& search, std::span<const PhotonRow> rows, const PhotonPlace* places,
+                  FoundPhotons& found);
+
+}  // namespace hpr
