@@ -21,6 +21,9 @@ constexpr std::uint64_t kRowShare = 0xC13FA9A9U;
 constexpr std::uint64_t kLayerShare = 0x91E10DA6U;
 constexpr int kFewestSlotBits = 8;
 
+/// The words of their lights are counted by 32 bits with a sign.
+constexpr std::size_t kMost = std::size_t{1} << 29U;
+
 std::int16_t to_int16(double x) {
   return static_cast<std::int16_t>(std::lround(std::clamp(x, -1.0, 1.0) * 32767.0));
 }
@@ -47,8 +50,8 @@ std::uint32_t pack_direction(const glm::dvec3& direction) {
 
 PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius) : space_(space) {
   if (!(radius > 0.0) || !std::isfinite(radius) || photons.empty()) return;
-  if (photons.size() > (std::size_t{1} << 31U)) {
-    throw Error(ExitCode::Limit, "more than 2^31 photons in one map", "send fewer photons in a pass: --photons");
+  if (photons.size() > kMost) {
+    throw Error(ExitCode::Limit, "more than 2^29 photons in one map", "send fewer photons in a pass: --photons");
   }
   const double scaled = std::max(radius * space.scale, kLeastRadius);
   radius_ = scaled / space.scale;
@@ -110,59 +113,23 @@ void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, FoundPho
   if (size_ == 0) return;
   PhotonSearch search;
   search.place = space_.from_world(place);
+  const glm::dvec3 cell = in_cells(search.place);
+  if (!inside(cell)) return;
+  const auto x = static_cast<std::uint32_t>(cell.x);
+  const auto y = static_cast<std::uint32_t>(cell.y);
+  const auto z = static_cast<std::uint32_t>(cell.z);
+  search.in_cell = cell - glm::dvec3(x, y, z);
+  search.cell = x + y * row_step_ + z * layer_step_;
+  search.row_step = row_step_;
+  search.layer_step = layer_step_;
+  search.last_slot = slots_ - 1;
   search.normal = normal;
   search.radius2 = radius2_;
   search.inverse_radius2 = inverse_radius2_;
+  search.cells_per_unit = cells_per_unit_;
   search.flatness = flatness_;
   search.least_cosine2 = kLeastCosine2;
-  std::array<PhotonRow, 9> rows;
-  const std::size_t count = find_rows(search.place, normal, rows);
-  find_photons(search, std::span(rows).first(count), places_.get(), found);
-}
-
-std::size_t PhotonMap::find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<PhotonRow, 9>& rows) const {
-  // Lengths are in cells from here on, and a little too long, so that no rounding loses a photon.
-  constexpr double kSlack = 4e-6;
-  const glm::dvec3 place = in_cells(at);
-  if (!inside(place)) return 0;
-  const auto cell_x = static_cast<std::uint32_t>(place.x);
-  const auto cell_y = static_cast<std::uint32_t>(place.y);
-  const auto cell_z = static_cast<std::uint32_t>(place.z);
-  const glm::dvec3 fraction = place - glm::dvec3(cell_x, cell_y, cell_z);
-  const double slope = std::abs(normal.x) < kSlack ? kSlack : normal.x;
-  const double per_slope = 1.0 / slope;
-  const double flat = flatness_ * cells_per_unit_ + 0.5 * (std::abs(normal.y) + std::abs(normal.z)) + 4.0 * kSlack;
-  const auto gap = [](int step, double inside_cell) {  // to the nearest point of that cell
-    return step == 0 ? 0.0 : step < 0 ? inside_cell : 1.0 - inside_cell;
-  };
-  std::size_t count = 0;
-  for (int z = -1; z <= 1; ++z) {
-    const double gap_z = gap(z, fraction.z);
-    for (int y = -1; y <= 1; ++y) {
-      const double gap_y = gap(y, fraction.y);
-      const double width2 = 1.0 - gap_y * gap_y - gap_z * gap_z;
-      if (!(width2 > 0.0)) continue;
-      const double width = std::sqrt(width2);
-      // How far along x the row's box may touch the slab about the plane.
-      const double middle = normal.y * (y + 0.5 - fraction.y) + normal.z * (z + 0.5 - fraction.z);
-      const double one = (-flat - middle) * per_slope;
-      const double other = (flat - middle) * per_slope;
-      const double low = std::max(-width, std::min(one, other));
-      const double high = std::min(width, std::max(one, other));
-      if (!(low <= high)) continue;
-      // 0, 1 or 2 of the three cells about the place: truncation rounds down what is positive.
-      const auto first = static_cast<std::uint32_t>(fraction.x + low + 1.0);
-      const auto last = static_cast<std::uint32_t>(fraction.x + high + 1.0);
-      const std::uint32_t slot =
-          slot_of(cell_x - 1 + first, cell_y + static_cast<std::uint32_t>(y), cell_z + static_cast<std::uint32_t>(z));
-      const PhotonRow row{starts_[slot], starts_[slot + (last - first) + 1]};
-      if (row.first == row.last) continue;
-      __builtin_prefetch(places_.get() + row.first);
-      __builtin_prefetch(places_.get() + row.first + 4);
-      rows[count++] = row;
-    }
-  }
-  return count;
+  find_photons(search, starts_.get(), places_.get(), found);
 }
 
 double progressive_radius(double first, std::uint64_t pass) {

@@ -55,7 +55,7 @@ class PhotonMap {
   PhotonMap() = default;
 
   /// `radius` in metres; not positive, not a number or infinite: the map stays empty. Photons whose position or flux is
-  /// not finite are left out. Throws Error (Limit) past 2^31 photons.
+  /// not finite are left out. Throws Error (Limit) past 2^29 photons.
   PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius);
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -116,10 +116,6 @@ class PhotonMap {
   [[nodiscard]] std::uint32_t slot_of(std::uint32_t x, std::uint32_t y, std::uint32_t z) const {
     return (x + y * row_step_ + z * layer_step_) & (slots_ - 1);
   }
-
-  /// Those of the 3 x 3 rows about `at` (ray space) that come within the radius and within kFlatness of the plane, cut
-  /// to the cells that do. Their first photons are on their way into the cache.
-  std::size_t find_rows(const glm::dvec3& at, const glm::dvec3& normal, std::array<PhotonRow, 9>& rows) const;
 
   static constexpr double kMiddle = 1073741824.0;  // 2^30 cells each way
   static constexpr double kLast = 2.0 * kMiddle - 2.0;

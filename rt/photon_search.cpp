@@ -1,5 +1,7 @@
 #include "rt/photon_search.h"
 
+#include <cmath>
+
 // Highway compiles this file once per instruction set by including it again.
 #undef HWY_TARGET_INCLUDE
 // NOLINTNEXTLINE(readability-identifier-naming): the name is Highway's
@@ -13,6 +15,62 @@
 HWY_BEFORE_NAMESPACE();
 namespace hpr {  // NOLINT(modernize-concat-nested-namespaces): HWY_NAMESPACE is a macro
 namespace HWY_NAMESPACE {
+
+/// Rows about a place: kRows of kPlaces are used.
+constexpr std::size_t kRows = 9;
+constexpr std::array<float, kPlaces> kRowY{-1, 0, 1, -1, 0, 1, -1, 0, 1};
+constexpr std::array<float, kPlaces> kRowZ{-1, -1, -1, 0, 0, 0, 1, 1, 1};
+
+struct Rows {
+  alignas(64) std::array<std::int32_t, kPlaces> first;  ///< of the places' photons
+  alignas(64) std::array<std::int32_t, kPlaces> last;   ///< exclusive; not above `first` where a row has none
+};
+
+/// From a place in its cell to the nearest point of the cell one step on.
+HWY_INLINE Vector gap(Vector step, float in_cell) {
+  const Vector aside = hn::IfThenElse(hn::Lt(step, hn::Zero(Floats())), all(in_cell), all(1.0F - in_cell));
+  return hn::IfThenZeroElse(hn::Eq(step, hn::Zero(Floats())), aside);
+}
+
+/// Lengths are in cells here, and a little too long, so that no rounding loses a photon.
+HWY_INLINE void find_rows(const PhotonSearch& search, const std::uint32_t* starts, Rows& rows) {
+  constexpr float kSlack = 4e-6F;
+  const Floats floats;
+  const Words words;
+  const glm::vec3 in_cell(search.in_cell);
+  const glm::vec3 normal(search.normal);
+  const float slope = std::abs(normal.x) < kSlack ? kSlack : normal.x;
+  const float flat = static_cast<float>(search.flatness * search.cells_per_unit) +
+                     0.5F * (std::abs(normal.y) + std::abs(normal.z)) + 4.0F * kSlack;
+  const auto* const begins = reinterpret_cast<const std::int32_t*>(starts);
+  for (std::size_t i = 0; i < kPlaces; i += hn::Lanes(floats)) {
+    const Vector y = hn::LoadU(floats, &kRowY[i]);
+    const Vector z = hn::LoadU(floats, &kRowZ[i]);
+    const Vector width2 = hn::Sub(hn::Sub(all(1.0F), square(gap(y, in_cell.y))), square(gap(z, in_cell.z)));
+    const Vector width = hn::Sqrt(hn::Max(width2, hn::Zero(floats)));
+    // How far along x the row's box may touch the slab about the plane.
+    const Vector middle = hn::Add(hn::Mul(all(normal.y), hn::Add(y, all(0.5F - in_cell.y))),
+                                  hn::Mul(all(normal.z), hn::Add(z, all(0.5F - in_cell.z))));
+    const Vector one = hn::Mul(hn::Sub(all(-flat), middle), all(1.0F / slope));
+    const Vector other = hn::Mul(hn::Sub(all(flat), middle), all(1.0F / slope));
+    const Vector low = hn::Max(hn::Neg(width), hn::Min(one, other));
+    const Vector high = hn::Min(width, hn::Max(one, other));
+    const Mask touches = hn::And(hn::Gt(width2, hn::Zero(floats)), hn::Le(low, high));
+    // 0, 1 or 2 of the three cells about the place: truncation rounds down what is positive.
+    const auto first = hn::ConvertTo(words, hn::Add(low, all(1.0F + in_cell.x)));
+    const auto last = hn::ConvertTo(words, hn::Add(high, all(1.0F + in_cell.x)));
+    const auto ahead =
+        hn::Add(hn::Mul(hn::ConvertTo(words, y), hn::Set(words, static_cast<std::int32_t>(search.row_step))),
+                hn::Mul(hn::ConvertTo(words, z), hn::Set(words, static_cast<std::int32_t>(search.layer_step))));
+    const auto unwrapped = hn::Add(hn::Set(words, static_cast<std::int32_t>(search.cell - 1)), hn::Add(ahead, first));
+    const auto in_words = hn::RebindMask(words, touches);
+    const auto slot =
+        hn::IfThenElseZero(in_words, hn::And(unwrapped, hn::Set(words, static_cast<std::int32_t>(search.last_slot))));
+    const auto cells = hn::IfThenElseZero(in_words, hn::Add(hn::Sub(last, first), hn::Set(words, 1)));
+    hn::StoreU(hn::GatherIndex(words, begins, slot), words, &rows.first[i]);
+    hn::StoreU(hn::GatherIndex(words, begins, hn::Add(slot, cells)), words, &rows.last[i]);
+  }
+}
 
 /// What is the same for every photon, in all lanes.
 struct Wanted {
@@ -47,24 +105,35 @@ HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* places, Vector& w
   return hn::And(near, turned);
 }
 
-/// There is room for all photons of the rows, and a vector more.
-std::size_t collect(const PhotonSearch& search, const PhotonRow* rows, std::size_t row_count, const PhotonPlace* places,
-                    std::uint32_t* index, float* weight) {
+/// As find_photons.
+void find(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* places, FoundPhotons& found) {
+  Rows rows;
+  find_rows(search, starts, rows);
+  std::size_t most = kReadBeyond;
+  for (std::size_t row = 0; row < kRows; ++row) {
+    most += static_cast<std::size_t>(rows.last[row] - rows.first[row]);
+    __builtin_prefetch(places + rows.first[row]);
+    __builtin_prefetch(places + rows.first[row] + 4);
+  }
+  if (found.index.size() < most) {
+    found.index.resize(2 * most);
+    found.weight.resize(2 * most);
+  }
   const Wanted wanted(search);
   const hn::RebindToUnsigned<Floats> unsigneds;
-  const std::size_t lanes = hn::Lanes(Floats());
   std::size_t count = 0;
-  for (std::size_t row = 0; row < row_count; ++row) {
-    for (std::size_t i = rows[row].first; i < rows[row].last; i += lanes) {
+  for (std::size_t row = 0; row < kRows; ++row) {
+    const auto last = static_cast<std::size_t>(rows.last[row]);
+    for (auto i = static_cast<std::size_t>(rows.first[row]); i < last; i += hn::Lanes(Floats())) {
       Vector weights;
-      const Mask counts = hn::And(judge(wanted, places + i, weights), hn::FirstN(Floats(), rows[row].last - i));
+      const Mask counts = hn::And(judge(wanted, places + i, weights), hn::FirstN(Floats(), last - i));
       const auto numbers = hn::Iota(unsigneds, static_cast<std::uint32_t>(i));
-      hn::StoreU(hn::Compress(numbers, hn::RebindMask(unsigneds, counts)), unsigneds, index + count);
-      hn::StoreU(hn::Compress(weights, counts), Floats(), weight + count);
+      hn::StoreU(hn::Compress(numbers, hn::RebindMask(unsigneds, counts)), unsigneds, found.index.data() + count);
+      hn::StoreU(hn::Compress(weights, counts), Floats(), found.weight.data() + count);
       count += hn::CountTrue(Floats(), counts);
     }
   }
-  return count;
+  found.count = count;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -74,18 +143,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace hpr {
 
-HWY_EXPORT(collect);
+HWY_EXPORT(find);
 
-void find_photons(const PhotonSearch& search, std::span<const PhotonRow> rows, const PhotonPlace* places,
+void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* places,
                   FoundPhotons& found) {
-  std::size_t most = kReadBeyond;
-  for (const PhotonRow& row : rows) most += row.last - row.first;
-  if (found.index.size() < most) {
-    found.index.resize(2 * most);
-    found.weight.resize(2 * most);
-  }
-  found.count =
-      HWY_DYNAMIC_DISPATCH(collect)(search, rows.data(), rows.size(), places, found.index.data(), found.weight.data());
+  HWY_DYNAMIC_DISPATCH(find)(search, starts, places, found);
 }
 
 }  // namespace hpr
