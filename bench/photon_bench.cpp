@@ -40,7 +40,7 @@ std::vector<hpr::Photon> photons_of_a_room() {
     const Place place = random_place(random);
     for (int axis = 0; axis < 3; ++axis)
       photon.position[static_cast<std::size_t>(axis)] = static_cast<float>(place.position[axis]);
-    photon.normal = hpr::pack_direction(place.normal);
+    photon.facing = hpr::pack_facing(place.normal);
     photon.direction = hpr::pack_direction(place.normal - 0.5 * place.position);
     photon.flux = {1e-6F, 2e-6F, 3e-6F};
   }

@@ -9,6 +9,13 @@
 namespace hpr {
 namespace {
 
+Sampler sampler_of(const TileWork& tile, const TileJob& job, int x, int y) {
+  const View& view = *tile.view;
+  return {pixel_stream({tile.settings.seed, job.number.frame}, view.screen_number, view.block.x0 + job.place.x0 + x,
+                       view.block.y0 + job.place.y0 + y),
+          job.number.sample};
+}
+
 PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, const SurfacePoint& surface,
                       double share) {
   const View& view = *tile.view;
@@ -17,9 +24,7 @@ PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, co
   point.share = share;
   point.media = tile.eye_media;
   point.throughput = share * left_after(point.media.here, glm::distance(view.eye, surface.position));
-  point.sampler = Sampler(pixel_stream({tile.settings.seed, job.number.frame}, view.screen_number,
-                                       view.block.x0 + job.place.x0 + x, view.block.y0 + job.place.y0 + y),
-                          job.number.sample);
+  point.sampler = sampler_of(tile, job, x, y);
   point.pixel = static_cast<std::uint32_t>(y * kTileSide + x);
   finish_point(tile, point);
   return point;
@@ -39,7 +44,7 @@ class FirstPoints {
       for (int x = 0; x < job_.place.width(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         const double share = left_.empty() ? 1.0 : left_[pixel];
-        if (share < kLeastThroughput) continue;
+        if (!(share > 0.0)) continue;
         const Ray ray = ray_of(x, y);
         if (job_.keys[pixel] == kNoKey) {
           tile_.add(static_cast<std::uint32_t>(pixel), Component::Direct,
@@ -92,14 +97,15 @@ class FirstPoints {
     std::vector<RayRequest> rays = std::move(tile_.requests);
     tile_.rays->visit_holed(rays, tile_.scratch, [&](std::size_t i, const SurfacePoint& surface, double coverage) {
       const std::uint32_t pixel = rays[i].owner;
-      const double share = left_[pixel] * coverage;
-      if (share >= kLeastThroughput) {
-        const int x = static_cast<int>(pixel) % kTileSide;
-        const int y = static_cast<int>(pixel) / kTileSide;
-        points_.push_back(first_point(tile_, job_, x, y, surface, share));
-      }
+      const int x = static_cast<int>(pixel) % kTileSide;
+      const int y = static_cast<int>(pixel) / kTileSide;
+      Sampler sampler = sampler_of(tile_, job_, x, y).branch(surface.surface);
+      const double covered = left_[pixel] * coverage;
+      const double share = covered * survival(covered, sampler);
+      if (share > 0.0) points_.push_back(first_point(tile_, job_, x, y, surface, share));
       left_[pixel] *= 1.0 - coverage;
-      return left_[pixel] >= kLeastThroughput;
+      left_[pixel] *= survival(left_[pixel], sampler);
+      return left_[pixel] > 0.0;
     });
     tile_.requests = std::move(rays);
   }

@@ -44,8 +44,10 @@ Scene room(const Material& thing, bool is_sheet) {
   return scene;
 }
 
-glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples) {
-  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+/// Keys are those of `covering`, what of the scene covers all behind it; null: all of it.
+glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples,
+                   const Scene* covering = nullptr) {
+  const TileLayer<Key> keys = test::cast_keys(covering != nullptr ? *covering : scene, std::span(&view, 1));
   Lighter lighter(scene, settings);
   glm::dvec3 sum(0.0);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
@@ -61,18 +63,20 @@ glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& sett
   return sum / (256.0 * samples);
 }
 
-void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool terminator_fix = false) {
+void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool terminator_fix = false,
+                           const Scene* covering = nullptr) {
   const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
-  const glm::dvec3 reference = mean_of(
-      scene, view,
-      {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = terminator_fix, .reference = true}, 512);
+  const glm::dvec3 reference =
+      mean_of(scene, view,
+              {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = terminator_fix, .reference = true},
+              512, covering);
   const glm::dvec3 hybrid = mean_of(scene, view,
                                     {.max_depth = 24,
                                      .glossy_cutoff = glossy_cutoff,
                                      .photons = 20'000,
                                      .global_photons = true,
                                      .terminator_fix = terminator_fix},
-                                    48);
+                                    48, covering);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
 }
 
@@ -276,6 +280,30 @@ TEST(Hybrid, AFrostedSheetBeforeAnUnlitWall) {
   place(scene, add_mesh(scene, quad({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, add_material(scene, sheet))));
   finish_scene(scene);
   expect_the_same_light(scene);
+}
+
+/// The room with its last thing covering `alpha` of what is behind.
+void expect_the_same_light_behind(Scene scene, double alpha) {
+  Scene covering = scene;
+  covering.instances.pop_back();
+  finish_scene(covering);
+  scene.materials.back().alpha_mode = AlphaMode::Blend;
+  scene.materials.back().base_color.a = static_cast<float>(alpha);
+  expect_the_same_light(scene, 0.3, false, &covering);
+}
+
+TEST(Hybrid, ASheetThatCoversInPart) {
+  for (const double alpha : {0.5, 0.1})
+    expect_the_same_light_behind(room(test::matte({0.8F, 0.8F, 0.2F}), true), alpha);
+}
+
+TEST(Hybrid, ADecalCloseToTheFloor) {
+  Scene scene = room(test::matte({0.8F, 0.8F, 0.2F}), true);
+  scene.instances.pop_back();
+  place(scene, add_mesh(scene, quad({-0.9F, -0.999F, 0.9F}, {1.8F, 0, 0}, {0, 0, -1.8F},
+                                    static_cast<std::uint32_t>(scene.materials.size() - 1))));
+  finish_scene(scene);
+  expect_the_same_light_behind(std::move(scene), 0.5);
 }
 
 TEST(Hybrid, AVeil) {

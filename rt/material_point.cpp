@@ -94,7 +94,8 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
 double coverage_of(const Material& material, double alpha) {
   switch (material.alpha_mode) {
     case AlphaMode::Mask:
-      return alpha >= static_cast<double>(material.alpha_cutoff) ? 1.0 : 0.0;
+      // As the cutoff is rounded, so that what a file calls equal is.
+      return static_cast<float>(alpha) >= material.alpha_cutoff ? 1.0 : 0.0;
     case AlphaMode::Blend:
       return std::clamp(alpha, 0.0, 1.0);
     case AlphaMode::Opaque:

@@ -75,6 +75,10 @@ TEST(MaterialPoint, CoverageGoesByTheModeOfAlpha) {
   EXPECT_EQ(coverage(AlphaMode::Mask, 0.0F, 0.0), 1.0) << "alpha at the cutoff is covered";
   material.base_color_texture.texture = -1;
   EXPECT_EQ(coverage(AlphaMode::Mask, 0.5F, 1.0), 1.0);
+  EXPECT_EQ(coverage(AlphaMode::Mask, 0.5F, 1.0 - 0x1p-53), 1.0) << "as far as the cutoff's digits go";
+  material.base_color.a = 1.0F;
+  material.base_color_texture.texture = 0;
+  EXPECT_EQ(coverage(AlphaMode::Mask, 51.0F / 255.0F, 1.0), 1.0);
 }
 
 TEST(MaterialPoint, OcclusionIsHeldBackByItsStrength) {

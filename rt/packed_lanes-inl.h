@@ -50,18 +50,27 @@ HWY_INLINE Vector3 scaled(const Vector3& a, Vector by) {
   return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)};
 }
 
-/// As unpack_unscaled in photon_map.h.
-HWY_INLINE Vector3 unpack_unscaled(hn::Vec<Words> packed) {
-  constexpr float kStep = 1.0F / 32767.0F;
+/// A direction, not of unit length, from where it lies on the unfolded octahedron, in steps of 1 / `most`.
+HWY_INLINE Vector3 fold(hn::Vec<Words> x, hn::Vec<Words> y, float most) {
   const Floats floats;
   Vector3 d;
-  d.x = hn::Mul(hn::ConvertTo(floats, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed))), all(kStep));
-  d.y = hn::Mul(hn::ConvertTo(floats, hn::ShiftRight<16>(packed)), all(kStep));
+  d.x = hn::Mul(hn::ConvertTo(floats, x), all(1.0F / most));
+  d.y = hn::Mul(hn::ConvertTo(floats, y), all(1.0F / most));
   d.z = hn::Sub(hn::Sub(all(1.0F), hn::Abs(d.x)), hn::Abs(d.y));
   const Vector fold = hn::Max(hn::Neg(d.z), hn::Zero(floats));
   d.x = hn::Sub(d.x, hn::CopySign(fold, d.x));
   d.y = hn::Sub(d.y, hn::CopySign(fold, d.y));
   return d;
+}
+
+/// As unpack_unscaled in photon_map.h.
+HWY_INLINE Vector3 unpack_unscaled(hn::Vec<Words> packed) {
+  return fold(hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)), hn::ShiftRight<16>(packed), 32767.0F);
+}
+
+/// Of pack_facing.
+HWY_INLINE Vector3 unpack_facing(hn::Vec<Words> packed) {
+  return fold(hn::ShiftRight<20>(hn::ShiftLeft<20>(packed)), hn::ShiftRight<20>(hn::ShiftLeft<8>(packed)), 2047.0F);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -131,8 +131,15 @@ class Pass {
 [[nodiscard]] std::unique_ptr<Pass> make_photon_pass();
 
 /// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
-/// step, 1 / (2 * 255 * 12.92).
+/// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
 inline constexpr double kLeastThroughput = 1.0 / 65536.0;
+
+/// What a path whose throughput is so bright is to be multiplied by: 1, or what roulette makes of it, 0 where it ends.
+[[nodiscard]] inline double survival(double brightness, Sampler& sampler) {
+  if (!(brightness < kLeastThroughput)) return 1.0;
+  const double chance = brightness / kLeastThroughput;
+  return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
+}
 
 /// The component that light from a followed lobe of `point` counts in.
 [[nodiscard]] Component component_after(const PathPoint& point, Component first);

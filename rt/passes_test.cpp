@@ -40,6 +40,21 @@ TEST(Passes, RunWhenNamedAndNotWhenOthersAre) {
   EXPECT_FALSE(runs(scene_with(test::matte(), 1), {.passes = {"reflection"}}, "reflection"));
 }
 
+TEST(Passes, FollowWhatTheGlossyCutoffSays) {
+  Material metal = test::mirror(0.5F);
+  for (const float roughness : {0.2F, 0.5F}) {
+    metal.roughness = roughness;
+    const Scene scene = scene_with(metal, 1);
+    for (const double cutoff : {0.0, 0.1, 0.3, 1.0}) {
+      const RaySettings settings{.glossy_cutoff = cutoff, .photons = 1000};
+      EXPECT_EQ(runs(scene, settings, "reflection"), roughness < cutoff) << roughness << ' ' << cutoff;
+      EXPECT_EQ(runs(scene, settings, "photon"), roughness < cutoff) << roughness << ' ' << cutoff;
+    }
+  }
+  metal.roughness = 0.0F;
+  EXPECT_TRUE(runs(scene_with(metal, 1), {.glossy_cutoff = 0.0}, "reflection")) << "a mirror is followed anyhow";
+}
+
 TEST(Passes, SayWhy) {
   for (const PassPlan& plan : plan_passes(requirements_of(scene_with(test::matte(), 2)), {}))
     EXPECT_FALSE(plan.why.empty());

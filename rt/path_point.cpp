@@ -45,17 +45,16 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
     if (!tile.followed_lobes[i]) continue;
     if (!is_followed(point.bsdf, lobe, tile.settings.glossy_cutoff)) continue;
     bright[i] = brightness(point.throughput * point.bsdf.weight(lobe));
-    if (bright[i] < kLeastThroughput) bright[i] = 0.0;
     point.may_follow[i] = bright[i] > 0.0;
-    point.follows[i] = point.may_follow[i] ? 1.0F : 0.0F;
+    point.follows[i] = static_cast<float>(survival(bright[i], point.sampler));
   }
   const auto reflection = static_cast<std::size_t>(Lobe::Reflection);
   const auto transmission = static_cast<std::size_t>(Lobe::Transmission);
   if (point.depth < kChoosingDepth || !point.may_follow[reflection] || !point.may_follow[transmission]) return;
   const double share = std::clamp(bright[reflection] / (bright[reflection] + bright[transmission]), 0.1, 0.9);
   const bool reflects = point.sampler.one() < share;
-  point.follows[reflection] = reflects ? static_cast<float>(1.0 / share) : 0.0F;
-  point.follows[transmission] = reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - share));
+  point.follows[reflection] *= reflects ? static_cast<float>(1.0 / share) : 0.0F;
+  point.follows[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - share));
 }
 
 void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
@@ -67,8 +66,9 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
     const auto sample = point.bsdf.sample(lobe, sampler.two());
     if (!sample) continue;
-    const glm::dvec3 throughput = factor * point.throughput * sample->weight;
-    if (brightness(throughput) < kLeastThroughput) continue;
+    glm::dvec3 throughput = factor * point.throughput * sample->weight;
+    throughput *= survival(brightness(throughput), sampler);
+    if (throughput == glm::dvec3(0.0)) continue;
     rays.push_back({&point, sample->direction, throughput, sample->pdf,
                     media_towards(point.media, point.surface, point.material, sample->direction), sampler});
   }

@@ -13,6 +13,10 @@ bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
   return lobe == Lobe::Reflection && (bsdf.roughness() < glossy_cutoff || bsdf.is_delta(lobe));
 }
 
+bool follows_reflections(const Requirements& scene, double glossy_cutoff) {
+  return scene.least_roughness < std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
+}
+
 bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {
   return std::ranges::any_of(kLobes,
                              [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); });
@@ -26,7 +30,7 @@ glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, con
   const bool diffuse = gathers(Lobe::Diffuse);
   const bool specular = gathers(Lobe::Reflection);
   if (!diffuse && !specular) return glm::dvec3(0.0);
-  map.find(surface.position, surface.geometric_normal, found);
+  map.find(surface.position, surface.geometric_normal, surface.layer, found);
   if (found.count == 0) return glm::dvec3(0.0);
   const bool leans = shading_normal != surface.geometric_normal;
   const ReflectionTerms terms = bsdf.reflection_terms(diffuse, specular);

@@ -5,6 +5,7 @@
 #include "rt/bsdf.h"
 #include "rt/photon_map.h"
 #include "rt/surfaces.h"
+#include "scene/requirements.h"
 
 /// How light is shared out between the eye's paths and photon maps. Wherever a path from the eye arrives:
 ///
@@ -18,6 +19,9 @@ namespace hpr {
 /// Whether the eye's paths follow this lobe: reflection of a roughness below `glossy_cutoff`, or in one direction only;
 /// transmission always, as what lies behind a surface is seldom what lights it.
 [[nodiscard]] bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff);
+
+/// Whether the eye's paths follow reflections of anything in the scene, as far as its least roughness tells.
+[[nodiscard]] bool follows_reflections(const Requirements& scene, double glossy_cutoff);
 
 /// Whether some lobe is not.
 [[nodiscard]] bool takes_photons(const Bsdf& bsdf, double glossy_cutoff);

@@ -24,8 +24,22 @@ constexpr int kFewestSlotBits = 8;
 /// The words of their lights are counted by 32 bits with a sign.
 constexpr std::size_t kMost = std::size_t{1} << 29U;
 
-std::int16_t to_int16(double x) {
-  return static_cast<std::int16_t>(std::lround(std::clamp(x, -1.0, 1.0) * 32767.0));
+/// The octahedron unfolded: a direction as x and y in [-1, 1].
+glm::dvec2 unfold(const glm::dvec3& direction) {
+  const double size = std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z);
+  if (!(size > 0.0) || !std::isfinite(size)) return glm::dvec2(0.0);
+  const double x = direction.x / size;
+  const double y = direction.y / size;
+  if (!(direction.z < 0.0)) return {x, y};
+  return {std::copysign(1.0 - std::abs(y), x), std::copysign(1.0 - std::abs(x), y)};
+}
+
+/// The low bits of a whole number with a sign.
+template <unsigned kBits>
+std::uint32_t to_bits(double x) {
+  constexpr double kSteps = (1U << (kBits - 1U)) - 1U;
+  const auto number = static_cast<std::int32_t>(std::lround(std::clamp(x, -1.0, 1.0) * kSteps));
+  return static_cast<std::uint32_t>(number) & ((1U << kBits) - 1U);
 }
 
 bool finite(const std::array<float, 3>& v) {
@@ -35,17 +49,13 @@ bool finite(const std::array<float, 3>& v) {
 }  // namespace
 
 std::uint32_t pack_direction(const glm::dvec3& direction) {
-  const double size = std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z);
-  if (!(size > 0.0) || !std::isfinite(size)) return 0;
-  double x = direction.x / size;
-  double y = direction.y / size;
-  if (direction.z < 0.0) {
-    const double folded_x = std::copysign(1.0 - std::abs(y), x);
-    y = std::copysign(1.0 - std::abs(x), y);
-    x = folded_x;
-  }
-  return std::uint32_t{static_cast<std::uint16_t>(to_int16(x))} |
-         (std::uint32_t{static_cast<std::uint16_t>(to_int16(y))} << 16U);
+  const glm::dvec2 at = unfold(direction);
+  return to_bits<16>(at.x) | (to_bits<16>(at.y) << 16U);
+}
+
+std::uint32_t pack_facing(const glm::dvec3& normal, std::uint8_t layer) {
+  const glm::dvec2 at = unfold(normal);
+  return to_bits<12>(at.x) | (to_bits<12>(at.y) << 12U) | (std::uint32_t{layer} << 24U);
 }
 
 PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius) : space_(space) {
@@ -95,7 +105,7 @@ void PhotonMap::sort(std::span<const Photon> photons) {
     }
     if (slots[i] == slots_) continue;
     const std::uint32_t to = starts_[slots[i]]++;
-    places_[to] = {photons[i].position, photons[i].normal};
+    places_[to] = {photons[i].position, photons[i].facing};
     lights_[to] = {photons[i].direction, photons[i].flux};
   }
   // Each start now stands where the next slot begins.
@@ -108,7 +118,7 @@ void PhotonMap::sort(std::span<const Photon> photons) {
   std::fill_n(places_.get() + size_ + again, kReadBeyond, PhotonPlace{});
 }
 
-void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, FoundPhotons& found) const {
+void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const {
   found.count = 0;
   if (size_ == 0) return;
   PhotonSearch search;
@@ -124,6 +134,7 @@ void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, FoundPho
   search.layer_step = layer_step_;
   search.last_slot = slots_ - 1;
   search.normal = normal;
+  search.layer = layer;
   search.radius2 = radius2_;
   search.inverse_radius2 = inverse_radius2_;
   search.cells_per_unit = cells_per_unit_;

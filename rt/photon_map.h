@@ -32,10 +32,13 @@ namespace hpr {
   return glm::normalize(unpack_unscaled(packed));
 }
 
+/// A normal and a layer in 32 bits, 12 for each side of the octahedron: off by 1.2e-3 rad at most.
+[[nodiscard]] std::uint32_t pack_facing(const glm::dvec3& normal, std::uint8_t layer = 0);
+
 /// Light that has arrived on a surface. As it is sent between ranks.
 struct Photon {
   std::array<float, 3> position{};  ///< ray space
-  std::uint32_t normal = 0;         ///< packed: geometric, on the side it arrived on
+  std::uint32_t facing = 0;         ///< packed: the geometric normal on the side it arrived on, and SurfacePoint::layer
   std::uint32_t direction = 0;      ///< packed: towards where it came from
   std::array<float, 3> flux{};      ///< W
 
@@ -62,13 +65,13 @@ class PhotonMap {
   [[nodiscard]] double radius() const { return radius_; }
 
   /// The photons whose density about `place` (world) on the surface with `normal` (unit length, geometric) counts: that
-  /// lie within the radius, within kFlatness of it off the tangent plane, and on a surface turned by less than 60
-  /// degrees from this one. None for places without photons, far away, or not finite.
+  /// lie within the radius, within kFlatness of it off the tangent plane, and on a surface of the same layer turned by
+  /// less than 60 degrees from this one. None for places without photons, far away, or not finite.
   ///
   /// They are weighted by Epanechnikov's kernel 2 / (pi r^2) (1 - d^2 / r^2), of which density() is the factor: of all
   /// kernels the one with the least mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at
   /// the rim, so that what lies there matters little and pictures are continuous.
-  void find(const glm::dvec3& place, const glm::dvec3& normal, FoundPhotons& found) const;
+  void find(const glm::dvec3& place, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const;
 
   /// 1/m^2: times this, the sum of weights and fluxes is an irradiance.
   [[nodiscard]] double density() const { return density_; }
@@ -76,13 +79,13 @@ class PhotonMap {
   /// By FoundPhotons::index.
   [[nodiscard]] const PhotonLight* lights() const { return lights_.get(); }
 
-  /// The photons' density there, each weighted by its flux and `value(direction)`, a glm::dvec3 for the unit direction
-  /// it came from: irradiance in W/m^2 for a value of 1, reflected radiance for that of a BRDF (flux density holds the
-  /// cosine).
+  /// The photons' density there on layer 0, each weighted by its flux and `value(direction)`, a glm::dvec3 for the unit
+  /// direction it came from: irradiance in W/m^2 for a value of 1, reflected radiance for that of a BRDF (flux density
+  /// holds the cosine).
   template <typename Value>
   [[nodiscard]] glm::dvec3 gather(const glm::dvec3& place, const glm::dvec3& normal, Value&& value) const {
     FoundPhotons found;
-    find(place, normal, found);
+    find(place, normal, 0, found);
     glm::dvec3 sum(0.0);
     for (std::size_t i = 0; i < found.count; ++i) {
       const PhotonLight& light = lights_[found.index[i]];
@@ -95,7 +98,7 @@ class PhotonMap {
   /// How many photons such a gather counts.
   [[nodiscard]] std::size_t count(const glm::dvec3& place, const glm::dvec3& normal) const {
     FoundPhotons found;
-    find(place, normal, found);
+    find(place, normal, 0, found);
     return found.count;
   }
 

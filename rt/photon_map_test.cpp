@@ -23,7 +23,7 @@ Photon photon_at(const glm::dvec3& position, const glm::dvec3& normal = kUp, con
     photon.position[axis] = static_cast<float>(position[static_cast<int>(axis)]);
     photon.flux[axis] = static_cast<float>(flux[static_cast<int>(axis)]);
   }
-  photon.normal = pack_direction(normal);
+  photon.facing = pack_facing(normal);
   photon.direction = pack_direction(normal + 0.25 * position);
   return photon;
 }
@@ -52,6 +52,18 @@ struct Gathered {
   glm::dvec3 sum{0.0};
 };
 
+/// The octahedron of 12 bits a side, folded.
+glm::dvec3 facing_of(const Photon& photon) {
+  const auto number = [](std::uint32_t bits) {
+    return static_cast<double>(bits < 2048 ? static_cast<int>(bits) : static_cast<int>(bits) - 4096) / 2047.0;
+  };
+  const double x = number(photon.facing & 0xFFFU);
+  const double y = number(photon.facing >> 12U & 0xFFFU);
+  const double z = 1.0 - std::abs(x) - std::abs(y);
+  const double fold = std::max(-z, 0.0);
+  return glm::normalize(glm::dvec3(x - std::copysign(fold, x), y - std::copysign(fold, y), z));
+}
+
 /// What the map promises, photon by photon.
 Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& place, const glm::dvec3& normal, double radius) {
   Gathered result;
@@ -60,7 +72,7 @@ Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& place, co
     const double distance = glm::length(way);
     if (!(distance < radius)) continue;
     if (std::abs(glm::dot(way, normal)) > PhotonMap::kFlatness * radius + 2.0 * kFloatStep) continue;
-    const double cosine = glm::dot(unpack_direction(photon.normal), normal);
+    const double cosine = glm::dot(facing_of(photon), normal);
     if (cosine < 0.5) continue;
     ++result.count;
     const double kernel = 2.0 / (std::numbers::pi * radius * radius) * (1.0 - distance * distance / (radius * radius));

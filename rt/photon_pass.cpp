@@ -11,7 +11,12 @@ class PhotonPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "photon"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
-    return settings.global_photons && !scene.photon.needed ? scene.indirect : scene.photon;
+    const bool bundled =
+        scene.shadow.needed && (scene.refraction.needed || follows_reflections(scene, settings.glossy_cutoff));
+    if (settings.global_photons && !bundled) return scene.indirect;
+    if (bundled == scene.photon.needed) return scene.photon;
+    return {bundled, bundled ? "lights reach materials smoother than the glossy cutoff, which bundle it into caustics"
+                             : "no light is bundled by materials smoother than the glossy cutoff"};
   }
   [[nodiscard]] bool runs_by_default(const RaySettings& settings) const override { return settings.photons > 0; }
   [[nodiscard]] bool gathers_photons() const override { return true; }

@@ -80,11 +80,13 @@ struct Wanted {
     inverse_radius2 = all(static_cast<float>(search.inverse_radius2));
     flatness = all(static_cast<float>(search.flatness));
     least_cosine2 = all(static_cast<float>(search.least_cosine2));
+    layer = hn::Set(Words(), static_cast<std::int32_t>(search.layer));
   }
   glm::vec3 high;  ///< the place: as a float, and what that leaves out
   glm::vec3 low;
   glm::vec3 normal;
   Vector radius2, inverse_radius2, flatness, least_cosine2;
+  hn::Vec<Words> layer;
 };
 
 /// Whether each of the photons at `places` counts, and its weight.
@@ -96,13 +98,16 @@ HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* places, Vector& w
                     hn::Sub(hn::Sub(z, all(wanted.high.z)), all(wanted.low.z))};
   const Vector distance2 = length2(way);
   weight = hn::Sub(all(1.0F), hn::Mul(distance2, wanted.inverse_radius2));
-  const Vector3 facing = unpack_unscaled(hn::BitCast(Words(), packed));
+  const auto words = hn::BitCast(Words(), packed);
+  const Vector3 facing = unpack_facing(words);
+  const auto layer = hn::And(hn::ShiftRight<24>(words), hn::Set(Words(), 0xFF));
+  const Mask same_layer = hn::RebindMask(Floats(), hn::Eq(layer, wanted.layer));
   const Vector cosine = dot(facing, wanted.normal);
   const Mask near =
       hn::And(hn::Lt(distance2, wanted.radius2), hn::Le(hn::Abs(dot(way, wanted.normal)), wanted.flatness));
   const Mask turned = hn::And(hn::Gt(cosine, hn::Zero(Floats())),
                               hn::Ge(square(cosine), hn::Mul(wanted.least_cosine2, length2(facing))));
-  return hn::And(near, turned);
+  return hn::And(same_layer, hn::And(near, turned));
 }
 
 /// As find_photons.

@@ -11,7 +11,7 @@ namespace hpr {
 /// Where a photon of a map lies, in ray space.
 struct PhotonPlace {
   std::array<float, 3> position{};
-  std::uint32_t normal = 0;  ///< packed: geometric, on the side it arrived on
+  std::uint32_t facing = 0;  ///< packed, see Photon
 };
 static_assert(sizeof(PhotonPlace) == 16);
 
@@ -31,6 +31,7 @@ struct PhotonSearch {
   std::uint32_t layer_step = 0;
   std::uint32_t last_slot = 0;  ///< as many slots as a power of two, less one
   glm::dvec3 normal{0.0};       ///< of the surface, unit length
+  std::uint8_t layer = 0;       ///< photons count of the same,
   double radius2 = 0.0;         ///< photons count that lie nearer than its root,
   double inverse_radius2 = 0.0;
   double cells_per_unit = 0.0;

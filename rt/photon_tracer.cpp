@@ -192,10 +192,30 @@ void PhotonTracer::move(Block& block) const {
   std::swap(block.flights, block.next);
 }
 
+void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const {
+  const glm::dvec3 at = space_.from_world(surface.position);
+  Photon photon;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    photon.position[axis] = static_cast<float>(at[static_cast<int>(axis)]);
+    photon.flux[axis] = static_cast<float>(flux[static_cast<int>(axis)]);
+  }
+  photon.facing = pack_facing(surface.geometric_normal, surface.layer);
+  photon.direction = pack_direction(surface.to_viewer);
+  block.kept.push_back({flight.photon, flight.followed, photon});
+}
+
 /// Keeps the photon if it is wanted here and sends it on; false when it ends.
 bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& block) const {
   const MaterialPoint material = evaluate_material(scene_, surface);
   flight.travelled += glm::distance(surface.position, flight.place);
+  glm::dvec3 flux = flight.flux * left_at(flight.media, surface, material, flight.travelled);
+  if (flight.bounces == 0) flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
+  const Bsdf bsdf(material, surface, Carried::Flux);
+  // Whoever gathers counts as much of the surface as there is: all that falls on it is kept, passing or not.
+  if (flight.bounces > 0 && material.alpha > 0.0 && carries_light(flux) &&
+      takes_photons(bsdf, settings_.glossy_cutoff)) {
+    keep(flight, flux, surface, block);
+  }
   if (passes_by_chance(material.alpha, flight.sampler)) {
     const double gained = glm::dot(surface.position - flight.place, flight.direction);
     flight.place = surface.position;
@@ -204,22 +224,8 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& bl
     ++block.traced.counts.cut;
     return false;
   }
-  flight.flux *= left_at(flight.media, surface, material, flight.travelled);
-  if (flight.bounces == 0) flight.flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
+  flight.flux = flux;
   if (!carries_light(flight.flux)) return false;
-
-  const Bsdf bsdf(material, surface, Carried::Flux);
-  if (flight.bounces > 0 && takes_photons(bsdf, settings_.glossy_cutoff)) {
-    const glm::dvec3 at = space_.from_world(surface.position);
-    Photon photon;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      photon.position[axis] = static_cast<float>(at[static_cast<int>(axis)]);
-      photon.flux[axis] = static_cast<float>(flight.flux[static_cast<int>(axis)]);
-    }
-    photon.normal = pack_direction(surface.geometric_normal);
-    photon.direction = pack_direction(surface.to_viewer);
-    block.kept.push_back({flight.photon, flight.followed, photon});
-  }
   if (flight.bounces < settings_.max_bounces) return scatter(flight, surface, material, bsdf);
   ++block.traced.counts.lost;
   return false;

@@ -90,6 +90,7 @@ class PhotonTracer {
   void start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const;
   void move(Block& block) const;
   [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, Block& block) const;
+  void keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const;
   [[nodiscard]] bool scatter(Flight& flight, const SurfacePoint& surface, const MaterialPoint& material,
                              const Bsdf& bsdf) const;
 

@@ -1,4 +1,5 @@
 #include "rt/pass.h"
+#include "rt/photon_gather.h"
 
 namespace hpr {
 namespace {
@@ -7,10 +8,13 @@ namespace {
 class ReflectionPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "reflection"; }
-  /// Settings may follow rougher surfaces than those that mirror to the eye; what is followed takes no photons.
+  /// Settings may follow rougher surfaces than those that mirror to the eye, or smoother ones alone; what is followed
+  /// takes no photons.
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
-    if (scene.reflection.needed || !(scene.least_roughness < settings.glossy_cutoff)) return scene.reflection;
-    return {true, "materials are smoother than the glossy cutoff"};
+    const bool followed = follows_reflections(scene, settings.glossy_cutoff);
+    if (followed == scene.reflection.needed) return scene.reflection;
+    return {followed, followed ? "materials are smoother than the glossy cutoff"
+                               : "no material is smoother than the glossy cutoff"};
   }
   [[nodiscard]] const Lobe* follows() const override { return &kLobe; }
 

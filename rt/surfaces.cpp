@@ -199,6 +199,9 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   }
   point.surface = triangle.surface;
   point.material = mesh.material;
+  if (scene_.materials[mesh.material].alpha_mode == AlphaMode::Blend) {
+    point.layer = static_cast<std::uint8_t>(1 + triangle.instance % 255);
+  }
   if (scene_.materials[mesh.material].normal_texture.present()) add_tangents(triangle, weight, point);
   return point;
 }

@@ -46,6 +46,9 @@ struct SurfacePoint {
   glm::dvec3 bitangent{0.0};
   std::uint32_t surface = 0xFFFFFFFFU;
   std::uint32_t material = 0;
+  /// 0; of materials that cover in part one of 255 by the instance: photons of one layer don't light another, however
+  /// close they lie.
+  std::uint8_t layer = 0;
   bool inside = false;  ///< the viewer is behind the face, by its winding; mirroring instances swap it
 
   /// The normal to shade with. A smooth one at a silhouette may turn away from the viewer; the geometric one never does

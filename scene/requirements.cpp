@@ -22,14 +22,22 @@ std::vector<const Material*> visible_materials(const Scene& scene) {
   return materials;
 }
 
-/// The least roughness a material can reach anywhere: filtering never goes below the least texel.
-float least_roughness(const Scene& scene, const Material& material) {
-  if (!material.metallic_roughness_texture.present()) return material.roughness;
+/// The least texel of one channel of the texture of roughness and metalness, 1 without: filtering never goes below it.
+float least_texel(const Scene& scene, const Material& material, std::uint8_t Rgba8::*channel) {
+  if (!material.metallic_roughness_texture.present()) return 1.0F;
   const auto texture = static_cast<std::size_t>(material.metallic_roughness_texture.texture);
   const auto pixels = scene.textures[texture].image.pixels();
-  if (pixels.empty()) return material.roughness;
-  const auto least = std::ranges::min_element(pixels, {}, &Rgba8::g);
-  return material.roughness * (static_cast<float>(least->g) / 255.0F);
+  if (pixels.empty()) return 1.0F;
+  return static_cast<float>((*std::ranges::min_element(pixels, {}, channel)).*channel) / 255.0F;
+}
+
+/// The least a material can reach anywhere.
+float least_roughness(const Scene& scene, const Material& material) {
+  return material.roughness * least_texel(scene, material, &Rgba8::g);
+}
+
+float least_metallic(const Scene& scene, const Material& material) {
+  return material.metallic * least_texel(scene, material, &Rgba8::b);
 }
 
 bool shines(const std::optional<Environment>& environment) {
@@ -42,16 +50,34 @@ std::string counted(std::size_t count, const char* one, const char* many) {
   return count == 1 ? fmt::format("1 {}", one) : fmt::format("{} {}", count, many);
 }
 
-/// Whether a material has a diffuse part, or a specular one too rough to be followed.
-bool scatters(const Material* material) {
-  const bool black = material->base_color.r <= 0.0F && material->base_color.g <= 0.0F && material->base_color.b <= 0.0F;
-  return !material->unlit && !black && (material->metallic < 1.0F || material->roughness >= kMirrorRoughness);
+bool is_black(const Material& material) {
+  return material.base_color.r <= 0.0F && material.base_color.g <= 0.0F && material.base_color.b <= 0.0F;
+}
+
+/// Whether a material has a diffuse part.
+bool is_matte(const Scene& scene, const Material& material) {
+  return !material.unlit && !is_black(material) && least_metallic(scene, material) < 1.0F;
+}
+
+/// Whether it has that, or a specular part too rough to be followed. A dielectric's reflects whatever its colour.
+bool scatters(const Scene& scene, const Material& material) {
+  if (is_matte(scene, material)) return true;
+  const bool reflects = !is_black(material) || (least_metallic(scene, material) < 1.0F && material.ior != 1.0F);
+  return !material.unlit && reflects && material.roughness >= kMirrorRoughness;
+}
+
+bool mirrors(const Scene& scene, const Material& material) {
+  return !material.unlit && least_roughness(scene, material) < kMirrorRoughness;
+}
+
+bool casts_shadows(const Light& light) {
+  return light.type != LightType::Headlight &&
+         std::max({light.intensity.r, light.intensity.g, light.intensity.b}) > 0.0F;
 }
 
 /// Lights that cast shadows: all but headlights; an emitting material is one, and so is the environment.
 std::size_t count_lights(const Scene& scene, const std::vector<const Material*>& materials) {
-  const auto punctual =
-      std::ranges::count_if(scene.lights, [](const Light& light) { return light.type != LightType::Headlight; });
+  const auto punctual = std::ranges::count_if(scene.lights, casts_shadows);
   const auto emitting =
       std::ranges::count_if(materials, [&](const Material* material) { return emits(scene, *material); });
   return static_cast<std::size_t>(punctual + emitting) + (shines(scene.environment) ? 1 : 0);
@@ -79,10 +105,13 @@ bool gives_light(const Scene& scene) {
 Requirements requirements_of(const Scene& scene) {
   const std::vector<const Material*> materials = visible_materials(scene);
   const std::size_t lights = count_lights(scene, materials);
-  const auto smooth = static_cast<std::size_t>(std::ranges::count_if(
-      materials, [&](const Material* material) { return least_roughness(scene, *material) < kMirrorRoughness; }));
-  const auto clear = static_cast<std::size_t>(
-      std::ranges::count_if(materials, [](const Material* material) { return material->transmission > 0.0F; }));
+  const auto count = [&](const auto& is) {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(materials, [&](const Material* material) { return is(scene, *material); }));
+  };
+  const std::size_t smooth = count(mirrors);
+  const std::size_t clear =
+      count([](const Scene&, const Material& material) { return !material.unlit && material.transmission > 0.0F; });
 
   Requirements needs;
   if (materials.empty()) {
@@ -99,17 +128,19 @@ Requirements requirements_of(const Scene& scene) {
   needs.photon = lights > 0 && smooth + clear > 0
                      ? Requirement{true, "lights reach smooth or clear materials, which bundle it into caustics"}
                      : Requirement{false, "no light can be bundled into caustics"};
-  const auto rough = static_cast<std::size_t>(std::ranges::count_if(materials, scatters));
+  const std::size_t rough = count(scatters);
+  const std::size_t matte = count(is_matte);
   for (const Material* material : materials) {
+    if (material->unlit) continue;
     needs.least_roughness = std::min(needs.least_roughness, least_roughness(scene, *material));
   }
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};
   needs.ambient_occlusion =
-      rough > 0
-          ? Requirement{true, counted(rough, "material scatters ambient light", "materials scatter ambient light")}
-          : Requirement{false, "no material scatters light"};
+      matte > 0
+          ? Requirement{true, counted(matte, "material scatters ambient light", "materials scatter ambient light")}
+          : Requirement{false, "no material is matte"};
   return needs;
 }
 

@@ -19,7 +19,7 @@ struct Requirements {
   Requirement photon;             ///< caustics: light that smooth surfaces bundle
   Requirement indirect;           ///< light that rough surfaces scatter on to others
   Requirement ambient_occlusion;  ///< a cheap stand-in for that
-  float least_roughness = 1.0F;   ///< of any visible material, anywhere: what is followed beyond kMirrorRoughness
+  float least_roughness = 1.0F;   ///< of any visible lit material, anywhere
 };
 
 [[nodiscard]] Requirements requirements_of(const Scene& scene);

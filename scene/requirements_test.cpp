@@ -93,6 +93,45 @@ TEST(Requirements, CausticsNeedBothALightAndASurfaceThatBundles) {
   EXPECT_TRUE(requirements_of(scene_of(rough(0.0F), {Light{}})).photon.needed);
 }
 
+TEST(Requirements, RoughPlasticScattersWhateverItsColour) {
+  Material black = rough(1.0F);
+  black.metallic = 0.0F;
+  black.base_color = {0.0F, 0.0F, 0.0F, 1.0F};
+  EXPECT_TRUE(requirements_of(scene_of(black, {Light{}})).indirect.needed);
+  EXPECT_FALSE(requirements_of(scene_of(black, {Light{}})).ambient_occlusion.needed);
+  black.ior = 1.0F;
+  EXPECT_FALSE(requirements_of(scene_of(black, {Light{}})).indirect.needed);
+  black.metallic = 1.0F;
+  black.ior = 1.5F;
+  EXPECT_FALSE(requirements_of(scene_of(black, {Light{}})).indirect.needed);
+}
+
+TEST(Requirements, ATexelWithoutMetalIsMatte) {
+  Material metal = rough(0.1F);
+  metal.metallic = 1.0F;
+  Scene scene = scene_of(metal, {Light{}});
+  EXPECT_FALSE(requirements_of(scene).ambient_occlusion.needed);
+  scene.textures.emplace_back();
+  scene.textures[0].image = Image<Rgba8>({2, 2}, Rgba8{0, 255, 255, 255});
+  scene.materials[0].metallic_roughness_texture.texture = 0;
+  EXPECT_FALSE(requirements_of(scene).ambient_occlusion.needed);
+  scene.textures[0].image.at(1, 0).b = 0;
+  EXPECT_TRUE(requirements_of(scene).ambient_occlusion.needed);
+  EXPECT_TRUE(requirements_of(scene).indirect.needed);
+}
+
+TEST(Requirements, UnlitMaterialsAndDarkLightsAskForNothing) {
+  Material poster = rough(0.0F);
+  poster.unlit = true;
+  const Requirements needs = requirements_of(scene_of(poster, {Light{}}));
+  EXPECT_FALSE(needs.reflection.needed);
+  EXPECT_FALSE(needs.photon.needed);
+  EXPECT_EQ(needs.least_roughness, 1.0F);
+  Light dark;
+  dark.intensity = glm::vec3(0.0F);
+  EXPECT_FALSE(requirements_of(scene_of(rough(1.0F), {dark})).shadow.needed);
+}
+
 TEST(Requirements, AnEmptySceneNeedsNothingAndSaysWhy) {
   Scene scene;
   scene.lights.resize(1);

@@ -196,8 +196,8 @@ StabilityFinding longest_sum(std::uint64_t seed) {
   RandomStream random(seed);
   std::vector<Photon> photons(kMost);
   for (Photon& photon : photons) {
-    photon.normal = pack_direction({0.0, 0.0, 1.0});
-    photon.direction = photon.normal;
+    photon.facing = pack_facing({0.0, 0.0, 1.0});
+    photon.direction = pack_direction({0.0, 0.0, 1.0});
     photon.flux.fill(static_cast<float>(std::pow(10.0, 12.0 * random.one() - 6.0)));
   }
   const RaySpace space(Bounds{glm::dvec3(-1.0), glm::dvec3(1.0)});
