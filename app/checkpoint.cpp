@@ -98,6 +98,15 @@ void get_layer(Reader& in, TileLayer<Pixel>& layer) {
   }
 }
 
+RunIdentity get_identity(Reader& in) {
+  RunIdentity found(std::min<std::uint64_t>(in.get<std::uint64_t>(), 1024));
+  for (auto& [field, value] : found) {
+    field = in.text();
+    value = in.text();
+  }
+  return found;
+}
+
 void compare_identities(const RunIdentity& found, const RunIdentity& expected, const std::string& name) {
   for (std::size_t i = 0; i < std::max(found.size(), expected.size()); ++i) {
     if (i < found.size() && i < expected.size() && found[i] == expected[i]) continue;
@@ -153,15 +162,15 @@ std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film
   return out.take();
 }
 
+RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name) {
+  Reader in(checked_part(bytes, name), name);
+  return get_identity(in);
+}
+
 SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name, const RunIdentity& identity,
                                  Film& film) {
   Reader in(checked_part(bytes, name), name);
-  RunIdentity found(std::min<std::uint64_t>(in.get<std::uint64_t>(), 1024));
-  for (auto& [field, value] : found) {
-    field = in.text();
-    value = in.text();
-  }
-  compare_identities(found, identity, name);
+  compare_identities(get_identity(in), identity, name);
   Film::Counters counters;
   counters.samples = in.get<std::uint32_t>();
   counters.weights = in.get<std::array<double, 2>>();

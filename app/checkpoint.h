@@ -21,13 +21,18 @@ struct CheckpointSettings {
   std::filesystem::path path;  ///< empty: none is written
   bool resume = false;         ///< begin with what stands there
   RunIdentity identity;
-  bool at_end = false;  ///< also when the goal is reached, for a later run that wants more
+  bool at_end = false;      ///< also when the goal is reached, for a later run that wants more
+  bool takes_more = false;  ///< one that holds more samples than are asked for will do
 };
 
 /// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the
 /// counters, every layer's active tiles, and the XXH64 of all that.
 [[nodiscard]] std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film,
                                                        const SampleProgress& progress);
+
+/// Of which run a checkpoint is. Throws Error (BadInput) when `bytes` are no checkpoint, damaged, or of another
+/// version.
+[[nodiscard]] RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name);
 
 /// Fills `film`, a new one of the same layout and content. `name` stands in errors. Throws Error (BadInput) when
 /// `bytes` are no checkpoint, damaged, of another version, or of a run with another identity: then the error names what

@@ -9,6 +9,7 @@
 #include "app/signals.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
@@ -58,6 +59,11 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
     const auto bytes = read_file(checkpoint.path, std::numeric_limits<std::uint64_t>::max());
     const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity, film_);
     start = {film_.counters(), found.seconds, found.relmse.value_or(-1.0)};
+    if (checkpoint.takes_more || found.samples <= sampling_.goal.samples.value_or(found.samples)) return;
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: the checkpoint holds {} samples, more than the {} asked for", checkpoint.path.string(),
+                            found.samples, *sampling_.goal.samples),
+                "ask for as many with --spp, or start anew without --resume");
   });
   start = all_gather_value(session_.comm(), start).front();
   film_.set_counters(start.counters);
@@ -76,6 +82,18 @@ void FrameSampler::write(const CheckpointSettings& checkpoint) {
     if (session_.rank() != 0) return;
     write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity, film_, so_far_));
   });
+}
+
+bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
+  try {
+    write(checkpoint);
+  } catch (const Error& error) {
+    // On every rank alike. Samples that cannot be written are not to be lost as well.
+    if (session_.rank() == 0) log::error("{}: going on without a checkpoint; {}", error.what(), error.hint());
+    return false;
+  }
+  if (session_.rank() == 0) log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
+  return true;
 }
 
 void FrameSampler::add_sample(std::span<const View> views) {
@@ -116,9 +134,8 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     }
     progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
     if (word.request == Request::None || reached(sampling_, so_far_)) continue;
-    write(checkpoint);
-    if (session_.rank() == 0) log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
-    if (word.request == Request::Stop) return false;
+    progress.end();
+    if (tries_to_write(checkpoint) && word.request == Request::Stop) return false;
   }
   if (checkpoint.at_end && homes_) write(checkpoint);
   finish();

@@ -36,6 +36,8 @@ class FrameSampler {
  private:
   void load(const CheckpointSettings& checkpoint);
   void write(const CheckpointSettings& checkpoint);
+  /// Tells whether it could.
+  bool tries_to_write(const CheckpointSettings& checkpoint);
   void add_sample(std::span<const View> views);
   void finish();
 

@@ -167,6 +167,7 @@ ExitCode run(const std::vector<std::string>& words) {
     throw usage_error(app, parsed, error);
   }
   const bool listens = launched_rank() != 0 && globals.verbosity < 2;  // rank 0 speaks
+  if (globals.verbosity < 0 && globals.progress == "auto") globals.progress = "none";
   log::configure(globals.verbosity < 0 || listens ? log::Level::Error
                  : globals.verbosity == 0         ? log::Level::Info
                                                   : log::Level::Debug,

@@ -116,6 +116,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
                  stats.rays.not_finite, first.x, first.y, first.screen);
   }
   stats.samples = times.samples;
+  stats.samples_in_all = times.samples;
   for (const std::size_t sent : all_gather_value(comm, cost.bytes_sent)) stats.bytes_sent += sent;
   stats.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
   return stats;
@@ -154,6 +155,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
       {"schema", "hpr.stats/1"},
       {"ms", stats.ms},
       {"samples", stats.samples},
+      {"samples_in_all", stats.samples_in_all},
       {"ms_per_sample", stats.ms / std::max(stats.samples, 1)},
       {"estimated_relmse", stats.relmse ? nlohmann::ordered_json(*stats.relmse) : nlohmann::ordered_json(nullptr)},
       {"plan", stats.plan},

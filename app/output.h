@@ -55,6 +55,7 @@ void check_size(Size size, const Globals& globals);
 struct RunStats {
   double ms = 0.0;                     ///< one frame, all its samples, slowest rank
   int samples = 1;                     ///< drawn by this run
+  int samples_in_all = 1;              ///< of the picture: with those of a checkpoint
   std::optional<double> relmse;        ///< of a frame of several samples, as their halves tell it
   std::optional<BudgetRecord> budget;  ///< of a frame with a target time
   std::vector<std::string> plan;

@@ -137,8 +137,9 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
     if (pass.runs && pass.name == "photon") {
-      lines.push_back(fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
-                                  settings.photons_fit_frame ? "of the quality, but no more than pixels" : "as asked"));
+      lines.push_back(
+          fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
+                      settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));
       if (plan.rays.photon_radius > 0.0) {
         lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
       }

@@ -29,7 +29,13 @@ Progress::Progress(const std::string& mode, std::string what, std::size_t steps,
 }
 
 Progress::~Progress() {
+  end();
+}
+
+void Progress::end() {
   if (mode_ == Mode::Bar && drawn_) std::fputc('\n', stderr);
+  drawn_ = false;
+  length_ = 0;
 }
 
 bool Progress::due(std::size_t done) const {

@@ -33,6 +33,8 @@ class Progress {
   [[nodiscard]] bool due(std::size_t done) const;
   /// `done` steps in all are done. A bar is redrawn at most every 50 ms, but for the last step.
   void show(std::size_t done, const std::string& detail);
+  /// Leaves the bar as it stands: what is told next has a line of its own.
+  void end();
 
  private:
   enum class Mode { None, Bar, Line, Log };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <optional>
 
 #include "app/frame_sampler.h"
@@ -12,6 +13,7 @@
 #include "app/resolution.h"
 #include "app/run_identity.h"
 #include "app/signals.h"
+#include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -101,11 +103,22 @@ class RenderCommand final : public Command {
     }
   }
 
+  /// Measured again, the choice may be another one; a checkpoint says which it was.
+  [[nodiscard]] Primary primary_before(Communicator& comm) const {
+    Primary primary = Primary::Auto;
+    check_on_root(comm, [&] {
+      primary = primary_of(identity_in(read_file(checkpoint_, std::numeric_limits<std::uint64_t>::max()), checkpoint_));
+    });
+    return all_gather_value(comm, primary).front();
+  }
+
   ExitCode draw(Session& session, const Globals& globals, const FrameSettings& settings, const Sampling& sampling,
                 Size size) {
     const View view = make_view(options_.choose_camera(session.scene()), size, session.scene().bounds);
     const Blocks blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.resolution_scale));
-    FramePlan plan = plan_frame(session, settings, blocks.views);
+    FrameSettings chosen = settings;
+    if (resume_ && settings.primary == Primary::Auto) chosen.primary = primary_before(session.comm());
+    FramePlan plan = plan_frame(session, chosen, blocks.views);
     plan.lit = !files_.picture.empty() || !options_.stats.empty();
     const bool speaks = session.comm().rank() == 0;
     if (options_.explain && speaks) {
@@ -120,12 +133,15 @@ class RenderCommand final : public Command {
     FrameSampler sampler(session, plan, sampling, 0, !files_.raw.empty());
     Progress progress(speaks ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
     CheckpointSettings checkpoint{checkpoint_, resume_, {}};
-    if (!checkpoint_.empty()) checkpoint.identity = identity_of(session, plan, blocks.views, sampling);
+    if (!checkpoint_.empty())
+      checkpoint.identity = identity_of(session, plan, blocks.views, sampling, !files_.raw.empty());
     if (!sampler.draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
+    progress.end();
     const CollectedPicture picture(session, sampler.frame(), blocks, size, files_);
     const FrameCost cost{watch.ms(), session.comm().bytes_sent() - sent_before};
     RunStats stats = gather_stats(session, plan, sampler.times(), cost);
     stats.relmse = sampler.reached_so_far().relmse;
+    stats.samples_in_all = static_cast<int>(sampler.reached_so_far().samples);
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;
       picture.write(session.scene().name);

@@ -133,7 +133,9 @@ void RenderOptions::declare_light(CLI::App& app) {
                  "one sample, box for more)");
   app.add_option("--passes", passes, "auto: what the scene requires; all: those it does not too; none; or a list")
       ->capture_default_str();
-  app.add_option("--max-depth", max_depth, "reflections and refractions in a row")->check(CLI::Range(1, 64));
+  app.add_option("--max-depth", max_depth,
+                 "reflections and refractions in a row; of the reference: segments of a path, the first from the eye")
+      ->check(CLI::Range(1, 64));
   app.add_option("--environment", environment,
                  "light from all around: a latitude-longitude picture, or one radiance R,G,B; replaces the scene's own")
       ->type_name("FILE|R,G,B");

@@ -11,6 +11,10 @@
 namespace hpr {
 namespace {
 
+constexpr const char* kKeys = "way to keys";
+constexpr const char* kByRays = "by rays";
+constexpr const char* kByRaster = "by raster";
+
 /// Every bit of a view but its jitter, which belongs to the sample.
 std::string describe(const View& view) {
   std::array<double, 17> numbers{view.eye.x, view.eye.y, view.eye.z};
@@ -32,7 +36,7 @@ std::string describe(const View& view) {
 }  // namespace
 
 RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span<const View> views,
-                        const Sampling& sampling) {
+                        const Sampling& sampling, bool keeps_keys) {
   const RaySettings& rays = plan.rays;
   RunIdentity identity{
       {"program", fmt::format("hpr {} ({})", kVersion, kCommit)},
@@ -49,7 +53,7 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
     if (pass.runs) passes.push_back(pass.name);
   }
   identity.emplace_back("list of passes", fmt::format("'{}'", fmt::join(passes, ",")));
-  identity.emplace_back("keys", plan.primary == Primary::Rays ? "by rays" : "by raster");
+  identity.emplace_back(kKeys, plan.primary == Primary::Rays ? kByRays : kByRaster);
   identity.emplace_back("depth format", std::string(kDepthFormatNames.at(static_cast<std::size_t>(plan.depth_format))));
   identity.emplace_back("light", rays.reference ? "the reference" : "passes");
   identity.emplace_back("instructions of rays", rays.build.same_instructions ? "the same everywhere" : "the widest");
@@ -64,7 +68,17 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   std::vector<std::string_view> aovs;
   for (const Aov aov : plan.aovs) aovs.push_back(name_of(aov));
   identity.emplace_back("list of AOVs", fmt::format("'{}'", fmt::join(aovs, ",")));
+  identity.emplace_back("--raw", keeps_keys ? "given" : "left out");
   return identity;
+}
+
+Primary primary_of(const RunIdentity& identity) {
+  for (const auto& [field, value] : identity) {
+    if (field != kKeys) continue;
+    if (value == kByRays) return Primary::Rays;
+    if (value == kByRaster) return Primary::Raster;
+  }
+  return Primary::Auto;
 }
 
 }  // namespace hpr

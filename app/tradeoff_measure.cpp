@@ -197,11 +197,12 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   const Setup setup = set_up(session, best, how.size, globals.seed ^ kOtherSeed);
 
   CheckpointSettings kept;
-  kept.identity = identity_of(session, setup.plan, setup.blocks.views, setup.sampling);
+  kept.identity = identity_of(session, setup.plan, setup.blocks.views, setup.sampling, false);
   std::string name;
   for (const auto& [key, value] : kept.identity) name += fmt::format("{}={}\n", key, value);
   kept.path = cache / fmt::format("reference-{}.checkpoint", hex16(xxh64(std::as_bytes(std::span(name)))));
   kept.at_end = true;
+  kept.takes_more = true;
   kept.resume = all_gather_value(session.comm(), std::filesystem::exists(kept.path) ? 1 : 0).front() == 1;
 
   const bool speaks = session.rank() == 0;

@@ -10,6 +10,7 @@ wrong and leaves with 1.
 
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -95,7 +96,7 @@ def refusals(folder, state):
     foreign = {"scene": ["gen:cornell", *size], "seed": [*scene, *size, "--seed", "2"], "view": [*scene, "--size", "95x64"],
                "filter": [*scene, *size, "--filter", "gaussian"], "view 0": [*scene, *size, "--fov", "30"],
                "passes": [*scene, *size, "--passes", "none"], "depth": [*scene, *size, "--max-depth", "3"],
-               "AOVs": [*scene, *size, "--aov", "id"]}
+               "AOVs": [*scene, *size, "--aov", "id"], "--raw": [*scene, *size, "--raw", "c.keys"]}
     for field, arguments in foreign.items():
         result = subprocess.run([HPR, "render", *arguments, *COMMON, "--spp", "20", *resume], cwd=folder,
                                 capture_output=True, text=True, timeout=300, check=False)
@@ -122,8 +123,37 @@ def enough_samples(folder):
     stopped_at = samples_in(message)
     result = run(folder, "-o", "e.exr", "--spp", str(stopped_at), "--resume", *layers)
     expect(result.returncode == 0, f"resuming at the goal: left with {result.returncode}: {result.stderr[-800:]}")
+    if stopped_at > 1:
+        fewer = run(folder, "-o", "g.exr", "--spp", str(stopped_at - 1), "--resume", "--checkpoint", "e.exr.checkpoint", *layers)
+        expect(fewer.returncode == 3 and "more than" in fewer.stderr, f"fewer samples than there are: {fewer.returncode}: {fewer.stderr}")
     result = run(folder, "-o", "f.exr", "--spp", str(stopped_at), "--ranks", "2", *layers)
     expect((folder / "e.exr").read_bytes() == (folder / "f.exr").read_bytes(), "a checkpoint at its goal gives other bits")
+
+
+def by_what_was_chosen_before(folder):
+    """A choice that is measured may be another one the next time."""
+    for chosen in ("rays", "raster"):
+        code, message, _ = interrupt(folder, signal.SIGUSR1, itself, "-o", "h.exr", "--spp", "1000000", "--primary", chosen)
+        expect(code == 75, f"--primary {chosen}: left with {code}")
+        goal = str(samples_in(message) + 1)
+        result = run(folder, "-o", "h.exr", "--spp", goal, "--resume", "--primary", "auto")
+        expect(result.returncode == 0, f"--primary auto after {chosen}: left with {result.returncode}: {result.stderr[-800:]}")
+        for name in ("h.exr", "h.exr.checkpoint"):
+            (folder / name).unlink(missing_ok=True)
+
+
+def nowhere_to_write(folder, whole):
+    """Samples that can't be put down are not lost as well."""
+    (folder / "gone").mkdir()
+
+    def without_its_folder(pid):
+        shutil.rmtree(folder / "gone")
+        return pid
+
+    code, message, _ = interrupt(folder, signal.SIGUSR2, without_its_folder, "-o", "i.exr", "--spp", str(SAMPLES),
+                                 "--checkpoint", "gone/i.state")
+    expect(code == 0 and "going on without" in message, f"no folder for USR2: left with {code}: {message[-800:]}")
+    expect((folder / "i.exr").exists() and (folder / "i.exr").read_bytes() == whole, "no folder for USR2: other bits")
 
 
 def main():
@@ -141,6 +171,8 @@ def main():
         if state.exists():
             refusals(folder, state)
         enough_samples(folder)
+        by_what_was_chosen_before(folder)
+        nowhere_to_write(folder, whole)
     return 1 if failures else 0
 
 
