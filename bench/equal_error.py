@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """The hybrid's and Mitsuba 3's time for pictures of equal error: a curve of relMSE over time for each, and their ratio.
 
-usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--trim PERCENT] [--cache FOLDER] [--json FILE]
+usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--particle-spp N] [--trim PERCENT] [--cache FOLDER]
+                      [--json FILE]
 
 Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). The truth is
-Mitsuba's, of many samples; relMSE is trimmed by the worst 0.1 % of pixels (--trim), which in Mitsuba's pictures are fireflies.
-What chance leaves in the truth is taken off every error. Needs what tests/mitsuba_test.py needs, and says so when something is
-missing.
+Mitsuba's, of many samples: of its path tracer, but where all lights are small, caustics on matte surfaces are found by paths so
+seldom that most of their light is missing from the mean and the rest is fireflies; there indirect light is that of its particle
+tracer. relMSE is trimmed by the worst 0.1 % of pixels (--trim), which in Mitsuba's pictures are fireflies. What chance leaves in
+the truth is taken off every error. Needs what tests/mitsuba_test.py needs, and says so when something is missing.
 """
 import argparse
 import json
@@ -78,19 +80,59 @@ def seconds_at(curve, error):
     return points[-1]["seconds"] * points[-1]["relmse"] / error
 
 
-def truth_of(numpy, mitsuba, scene, name, options):
+def mean_of(numpy, mitsuba, scene, integrators, spp, seed):
+    """The first integrator's picture less the others', with the same random numbers."""
+    loaded = [mitsuba.load_dict(integrator) for integrator in integrators]
+    total, parts = 0.0, max(1, spp // SAMPLES_AT_ONCE)
+    for part in range(parts):
+        pictures = [numpy.array(mitsuba.render(scene, integrator=integrator, spp=SAMPLES_AT_ONCE, seed=seed * 100_000 + part))
+                    .astype(numpy.float64)[..., :3] for integrator in loaded]
+        total = total + pictures[0] - sum(pictures[1:])
+    return total / parts
+
+
+def matte_pixels(numpy, mitsuba, description):
+    """Where all that is seen is matte: [height][width]. Seen where only matte shapes glow."""
+    black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+    glowing = {}
+    for key, value in description.items():
+        if not key.startswith("light_"):
+            glowing[key] = value
+        if key.startswith("shape_"):
+            bsdf = value["bsdf"].get("bsdf", value["bsdf"])
+            glowing[key] = value | {"bsdf": black}
+            if bsdf.get("roughness", {}).get("value", 0.0) >= 0.9:
+                glowing[key]["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": 1.0}}
+    scene = mitsuba.load_dict(glowing | {"integrator": {"type": "path", "max_depth": 1}})
+    # Lamps shine to the front alone; faces that are seen from behind are not matte here, and get their truth by paths.
+    return numpy.array(mitsuba.render(scene, spp=SAMPLES_AT_ONCE)).min(-1) == 1.0
+
+
+def particles_truth(numpy, mitsuba, scene, options, seed):
+    """Direct light, which no chance is left in but that of the pixel's area, and indirect light that starts at the lights: of
+    both, the particle tracer's share of direct light is taken off with the very particles."""
+    direct = mean_of(numpy, mitsuba, scene, [{"type": "path", "max_depth": 2}], options.truth_spp // 8, seed)
+    particles = [{"type": "ptracer", "max_depth": depth, "rr_depth": 100} for depth in (peer.DEPTH, 2)]
+    return direct + mean_of(numpy, mitsuba, scene, particles, options.particle_spp // 2, seed)
+
+
+def truth_of(numpy, mitsuba, scene, description, name, options):
     """The mean of many samples, and what chance leaves of its relMSE."""
-    stored = options.cache and pathlib.Path(options.cache) / f"{name}-{options.size}-{options.truth_spp}-{options.trim}.npz"
+    ambient = peer.SCENES[name][1]
+    samples = f"{options.truth_spp}" if ambient else f"{options.truth_spp}+{options.particle_spp}"
+    stored = options.cache and pathlib.Path(options.cache) / f"{name}-{options.size}-{samples}.npz"
     if stored and stored.exists():
-        loaded = numpy.load(stored)
-        return loaded["truth"], float(loaded["noise"])
-    halves = [render_mitsuba(numpy, mitsuba, scene, options.truth_spp // 2, seed)[0] for seed in (101, 102)]
-    truth = (halves[0] + halves[1]) / 2.0
-    noise = relmse(numpy, halves[0], halves[1], options.trim) / 4.0
+        halves = list(numpy.load(stored)["halves"])
+    else:
+        halves = [render_mitsuba(numpy, mitsuba, scene, options.truth_spp // 2, seed)[0] for seed in (101, 102)]
+        if not ambient and options.particle_spp > 0:
+            matte = matte_pixels(numpy, mitsuba, description)[..., None]
+            halves = [numpy.where(matte, particles_truth(numpy, mitsuba, scene, options, seed), half)
+                      for seed, half in zip((103, 104), halves)]
     if stored:
         stored.parent.mkdir(parents=True, exist_ok=True)
-        numpy.savez(stored, truth=truth, noise=noise)
-    return truth, noise
+        numpy.savez(stored, halves=halves)
+    return sum(halves) / 2.0, relmse(numpy, halves[0], halves[1], options.trim) / 4.0
 
 
 def main():
@@ -99,6 +141,7 @@ def main():
     parser.add_argument("--scenes", default="pbr-spheres,two-monkeys")
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--truth-spp", type=int, default=8192)
+    parser.add_argument("--particle-spp", type=int, default=131072, help="of the particle tracer, where lights are small; 0: none")
     parser.add_argument("--trim", type=float, default=0.1, help="percent of the pixels, the worst, that do not count")
     parser.add_argument("--ways", default=",".join(WAYS))
     parser.add_argument("--cache", help="a folder for the truths, which take minutes")
@@ -113,7 +156,7 @@ def main():
             file, ambient = peer.SCENES[name]
             description, notes = peer.to_mitsuba(gltf2mi, mitsuba, numpy, name, scenes / file, folder, options.size)
             scene = mitsuba.load_dict(description)
-            truth, noise = truth_of(numpy, mitsuba, scene, name, options)
+            truth, noise = truth_of(numpy, mitsuba, scene, description, name, options)
 
             def error(picture, truth=truth, noise=noise):
                 return max(relmse(numpy, picture, truth, options.trim) - noise, 0.1 * noise)
