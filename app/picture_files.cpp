@@ -108,10 +108,14 @@ std::vector<ExrLayer> CollectedPicture::exr_layers() const {
 
 void CollectedPicture::write(const std::string& scene_name) const {
   const trace::Span span("write picture");
+  if (!files_.picture.empty()) write_picture(scene_name);
+  // What goes with a picture is not to cost it.
   if (!files_.raw.empty()) {
     write_file_atomically(files_.raw, std::as_bytes(join_blocks(*frame_.keys, blocks_, 0).pixels()));
   }
-  if (files_.picture.empty()) return;
+}
+
+void CollectedPicture::write_picture(const std::string& scene_name) const {
   if (files_.is_png()) {
     write_png(files_.picture,
               enlarged() ? to_display(radiance(), threads_, files_.exposure) : join_blocks(display_, blocks_, 0));

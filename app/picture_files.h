@@ -37,6 +37,7 @@ class CollectedPicture {
   [[nodiscard]] Image<Rgb> radiance() const;
 
  private:
+  void write_picture(const std::string& scene_name) const;
   [[nodiscard]] std::vector<ExrLayer> exr_layers() const;
   void collect_radiance(Session& session, Frame& frame) const;
   [[nodiscard]] bool enlarged() const { return blocks_.views.front().screen != size_; }

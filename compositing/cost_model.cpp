@@ -98,12 +98,12 @@ class Probe {
   }
 
   void look_at_hosts(Costs& costs, double bytes) {
-    const auto meeting = comm_.share(1);
-    std::vector<int> hosts = hosts_of(comm_, *meeting);
-    std::ranges::sort(hosts);
-    costs.hosts = static_cast<int>(std::unique(hosts.begin(), hosts.end()) - hosts.begin());
-    costs.meet = seconds([&] { meeting->meet(); });
     try {
+      const auto meeting = comm_.share(1);
+      std::vector<int> hosts = hosts_of(comm_, *meeting);
+      std::ranges::sort(hosts);
+      costs.hosts = static_cast<int>(std::unique(hosts.begin(), hosts.end()) - hosts.begin());
+      costs.meet = seconds([&] { meeting->meet(); });
       TileLayer<Key> mine(layer_.layout(), comm_.share(TileLayer<Key>::bytes_for(layer_.layout())));
       const double ranks_here = static_cast<double>(comm_.size()) / costs.hosts;
       costs.read_byte = std::max(0.0, merging_in_place(mine) - costs.meet) / (bytes * ranks_here);

@@ -306,6 +306,20 @@ TEST(Hybrid, ADecalCloseToTheFloor) {
   expect_the_same_light_behind(std::move(scene), 0.5);
 }
 
+TEST(Hybrid, APaneOfOneMeshWhoseFacesLieCloseTogether) {
+  Scene scene = room(test::matte({0.8F, 0.8F, 0.2F}), true);
+  scene.instances.pop_back();
+  const auto material = static_cast<std::uint32_t>(scene.materials.size() - 1);
+  Mesh pane = quad({-0.9F, -0.8F, 0.9F}, {1.8F, 0, 0}, {0, 0, -1.8F}, material);
+  const Mesh below = quad({-0.9F, -0.805F, 0.9F}, {0, 0, -1.8F}, {1.8F, 0, 0}, material);
+  pane.positions.insert(pane.positions.end(), below.positions.begin(), below.positions.end());
+  pane.uvs[0].insert(pane.uvs[0].end(), below.uvs[0].begin(), below.uvs[0].end());
+  for (const glm::uvec3& corners : below.triangles) pane.triangles.push_back(corners + glm::uvec3(4));
+  place(scene, add_mesh(scene, pane));
+  finish_scene(scene);
+  expect_the_same_light_behind(std::move(scene), 0.5);
+}
+
 TEST(Hybrid, AVeil) {
   Material veil = test::matte({0.8F, 0.8F, 0.2F});
   veil.alpha_mode = AlphaMode::Mask;  // cast_keys has no coverage: a mask that covers all, but by way of coverage

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/check.h"
+#include "rt/mesh_parts.h"
 #include "rt/ray_scene.h"
 #include "rt/texture.h"
 
@@ -74,7 +75,10 @@ glm::dvec2 onto_triangle(double u, double v) {
 
 Surfaces::Surfaces(const Scene& scene, const RaySpace& space) : scene_(scene), space_(space) {
   std::vector<double> mesh_reach(scene.meshes.size(), 0.0);
+  parts_.resize(scene.meshes.size());
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const Mesh& mesh = scene.meshes[i];
+    if (scene.materials[mesh.material].alpha_mode == AlphaMode::Blend) parts_[i] = parts_of(mesh);
     for (const glm::vec3& p : scene.meshes[i].positions)
       mesh_reach[i] = std::max(mesh_reach[i], largest(glm::dvec3(p)));
   }
@@ -153,6 +157,14 @@ void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
   }
 }
 
+/// Neighbours differ: instances that stand 1 to 126 apart, and a mesh's first 127 parts.
+std::uint8_t Surfaces::layer_of(const WorldTriangle& triangle, bool inside) const {
+  const auto& parts = parts_[scene_.instances[triangle.instance].mesh];
+  if (parts.empty()) return 0;
+  const std::uint64_t number = std::uint64_t{triangle.instance} * 31 + parts[triangle.index];
+  return static_cast<std::uint8_t>(2 * (1 + number % 127) + (inside ? 1 : 0));
+}
+
 SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,
                             const glm::dvec3& direction) const {
   // Moeller and Trumbore 1997, relative to the ray's origin.
@@ -199,9 +211,7 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   }
   point.surface = triangle.surface;
   point.material = mesh.material;
-  if (scene_.materials[mesh.material].alpha_mode == AlphaMode::Blend) {
-    point.layer = static_cast<std::uint8_t>(1 + triangle.instance % 255);
-  }
+  point.layer = layer_of(triangle, point.inside);
   if (scene_.materials[mesh.material].normal_texture.present()) add_tangents(triangle, weight, point);
   return point;
 }

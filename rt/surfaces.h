@@ -46,8 +46,8 @@ struct SurfacePoint {
   glm::dvec3 bitangent{0.0};
   std::uint32_t surface = 0xFFFFFFFFU;
   std::uint32_t material = 0;
-  /// 0; of materials that cover in part one of 255 by the instance: photons of one layer don't light another, however
-  /// close they lie.
+  /// 0; of materials that cover in part a number for the side of this part of this instance, which few others have:
+  /// photons of one layer don't light another, however close they lie.
   std::uint8_t layer = 0;
   bool inside = false;  ///< the viewer is behind the face, by its winding; mirroring instances swap it
 
@@ -85,6 +85,7 @@ class Surfaces {
   /// Barycentric coordinates of a triangle's corners.
   using Weights = std::array<double, 3>;
 
+  [[nodiscard]] std::uint8_t layer_of(const WorldTriangle& triangle, bool inside) const;
   void add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const;
 
   struct Placed {
@@ -98,6 +99,7 @@ class Surfaces {
   const Scene& scene_;
   RaySpace space_;
   std::vector<Placed> placed_;
+  std::vector<std::vector<std::uint32_t>> parts_;  ///< [mesh][triangle]; empty but for those that cover in part
 };
 
 }  // namespace hpr
