@@ -7,9 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "cluster/forwarding_communicator.h"
 #include "cluster/local_communicator.h"
 #include "cluster/simulated_communicator.h"
 #include "compositing/synthetic.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {
@@ -91,6 +93,25 @@ TEST(Auto, LooksAgainAsTheLoadChanges) {
   });
   EXPECT_EQ(chosen[1], chosen[0]) << "looks cost messages, so not every frame has one";
   EXPECT_NE(chosen[39], chosen[0]);
+}
+
+/// A host without room for any memory that ranks share.
+class NoRoomToShare final : public ForwardingCommunicator {
+ public:
+  using ForwardingCommunicator::ForwardingCommunicator;
+  [[nodiscard]] std::shared_ptr<PeerMemory> share(std::size_t /*bytes*/) override {
+    throw Error(ExitCode::Limit, "no room");
+  }
+};
+
+TEST(Auto, SendsMessagesWhereThereIsNoRoomToShareMemory) {
+  run_local_ranks(3, [&](Communicator& comm) {
+    NoRoomToShare alone(comm);
+    Auto strategy;
+    TileLayer<Key> layer = synthetic_layer(SyntheticKind::Dense, comm.rank(), {256, 128}, 1);
+    (void)strategy.composite(alone, layer, all_tiles(layer.layout()));
+    EXPECT_NE(strategy.chosen(), "shared-memory");
+  });
 }
 
 }  // namespace
