@@ -306,6 +306,37 @@ TEST(Hybrid, ADecalCloseToTheFloor) {
   expect_the_same_light_behind(std::move(scene), 0.5);
 }
 
+/// A black sheet that covers half, and close behind it, or at its very place, a wall that glows. `sheet_first`: of the
+/// two the sheet has the lower ids.
+Scene veiled_glow(double gap, bool sheet_first) {
+  Scene scene;
+  Material sheet = test::matte(glm::vec3(0.0F));
+  sheet.alpha_mode = AlphaMode::Blend;
+  sheet.base_color.a = 0.5F;
+  const std::uint32_t veil = add_material(scene, sheet);
+  const std::uint32_t glow = add_material(scene, test::glowing(glm::vec3(1.0F)));
+  const auto wall = [&](double z, std::uint32_t material) {
+    place(scene, add_mesh(scene, quad({-2, -2, static_cast<float>(z)}, {4, 0, 0}, {0, 4, 0}, material)));
+  };
+  if (sheet_first) wall(gap, veil);
+  wall(0.0, glow);
+  if (!sheet_first) wall(gap, veil);
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Hybrid, NothingIsSkippedBehindASheetThatLiesOnIt) {
+  for (const double gap : {0.0, 1e-7, 1e-6, 1e-3}) {
+    for (const bool sheet_first : {false, true}) {
+      if (gap < 1e-6 && !sheet_first) continue;  // at one distance the wall, being first, hides the sheet
+      const Scene scene = veiled_glow(gap, sheet_first);
+      const View view = test::view_from({0, 0, 2}, {0, 0, 0}, {16, 16}, scene, 0.5);
+      const glm::dvec3 reference = mean_of(scene, view, {.reference = true}, 64);
+      EXPECT_NEAR(reference.g, 0.5, 0.02) << gap << ' ' << sheet_first;  // 4 sigma: 0.0156
+    }
+  }
+}
+
 TEST(Hybrid, APaneOfOneMeshWhoseFacesLieCloseTogether) {
   Scene scene = room(test::matte({0.8F, 0.8F, 0.2F}), true);
   scene.instances.pop_back();

@@ -104,6 +104,10 @@ double coverage_of(const Material& material, double alpha) {
   return 1.0;
 }
 
+bool has_coverage(const Scene& scene) {
+  return std::ranges::any_of(scene.materials, [](const Material& m) { return m.alpha_mode != AlphaMode::Opaque; });
+}
+
 double evaluate_alpha(const Scene& scene, const Material& material, const std::array<glm::vec2, 2>& uv,
                       double color_alpha) {
   if (material.alpha_mode == AlphaMode::Opaque) return 1.0;

@@ -34,6 +34,9 @@ struct MaterialPoint {
 /// What of a surface with this alpha is there, as the material's mode has it.
 [[nodiscard]] double coverage_of(const Material& material, double alpha);
 
+/// Whether some material lets rays pass by its alpha.
+[[nodiscard]] bool has_coverage(const Scene& scene);
+
 /// Coverage alone, for rays that may pass: cheaper than evaluate_material. `uv` and `color_alpha` of the place.
 [[nodiscard]] double evaluate_alpha(const Scene& scene, const Material& material, const std::array<glm::vec2, 2>& uv,
                                     double color_alpha);

@@ -20,10 +20,6 @@ namespace {
 /// Paths that go together. Enough to fill packets for some bounces, few enough to stay in the second-level cache.
 constexpr int kRowsAtOnce = 16;
 
-bool has_coverage(const Scene& scene) {
-  return std::ranges::any_of(scene.materials, [](const Material& m) { return m.alpha_mode != AlphaMode::Opaque; });
-}
-
 /// The path of one pixel, at the eye, which lies in `media`. The near plane cuts as it does in rasterised pictures.
 Path path_from_eye(const View& view, const Media& media, const PathSettings& settings, int x, int y,
                    const SampleNumber& number) {

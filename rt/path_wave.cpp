@@ -108,15 +108,22 @@ void PathWave::run() {
   }
 }
 
+void PathWave::find_hits() {
+  hits_.resize(batch_.size());
+  counts_.invalid +=
+      shared_.has_coverage ? shared_.rays.closest(batch_, met_, hits_) : shared_.rays.closest(batch_, hits_);
+}
+
 void PathWave::trace_paths() {
   batch_.clear();
+  met_.clear();
   for (const auto& paths : paths_) {
     for (const Path& path : paths) {
       batch_.push(shared_.space.from_world(path.origin), path.direction, path.reach * shared_.space.scale);
+      if (shared_.has_coverage) met_.push_back(path.last);
     }
   }
-  hits_.resize(batch_.size());
-  counts_.invalid += shared_.rays.closest(batch_, hits_);
+  find_hits();
   shared_.surfaces.prefetch(hits_);
   counts_.primary += paths_[0].size();
   counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
@@ -125,12 +132,13 @@ void PathWave::trace_paths() {
   std::size_t ray = 0;
   for (std::size_t kind = 0; kind < kKinds; ++kind) {
     for (Path& path : paths_[kind]) {
-      const std::uint32_t surface = hits_[ray++];
+      const std::uint32_t surface = hits_[ray];
       if (surface == kNoSurface) {
         miss(path);
       } else {
-        arrive(path, kind, surface);
+        arrive(path, kind, shared_.has_coverage ? met_[ray] : Passed{surface});
       }
+      ++ray;
     }
   }
 }
@@ -152,17 +160,15 @@ void PathWave::miss(const Path& path) {
   radiance_[path.pixel] += path.throughput * light * weight;
 }
 
-void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
-  shared_.surfaces.load(surface, triangle_);
+void PathWave::arrive(Path& path, std::size_t kind, const Passed& met) {
+  shared_.surfaces.load(met.surface, triangle_);
   const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
-  path.travelled += glm::distance(path.origin, point.position);
   const Material& look = shared_.scene.materials[point.material];
   if (look.alpha_mode != AlphaMode::Opaque) {
     const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
     if (passes_by_chance(coverage, path.sampler)) {
-      const glm::dvec3 origin = ray_origin(point, path.direction);
-      const double gained = glm::dot(origin - path.origin, path.direction);
-      path.origin = origin;
+      const double gained = met.distance - path.last.distance;
+      path.last = met;
       if (passes_on(path.passed, coverage, gained)) {
         next_[kind].push_back(path);
       } else {
@@ -172,14 +178,15 @@ void PathWave::arrive(Path& path, std::size_t kind, std::uint32_t surface) {
     }
   }
   const MaterialPoint material = evaluate_material(shared_.scene, point);
-  path.throughput *= path.segments == 1 ? left_after(path.media.here, path.travelled)
-                                        : left_at(path.media, point, material, path.travelled);
+  const double metres = path.travelled + glm::distance(path.origin, point.position);
+  path.throughput *=
+      path.segments == 1 ? left_after(path.media.here, metres) : left_at(path.media, point, material, metres);
   if (material.unlit) {
     // A colour to be looked at, not light: seen, mirrored and seen through glass, as the passes show it.
     radiance_[path.pixel] += path.throughput * path.followed * material.emission;
     return;
   }
-  if (material.emission != glm::dvec3(0.0)) add_emission(path, point, surface, material.emission);
+  if (material.emission != glm::dvec3(0.0)) add_emission(path, point, met.surface, material.emission);
   if (path.segments >= shared_.settings.max_depth) {
     ++counts_.too_long;
     return;
@@ -231,6 +238,7 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
   path.from_normal = bsdf.light_normal();
   path.travelled = 0.0;
   path.passed = 0;
+  path.last = {};
   ++path.segments;
   next_[kind_of(lobe)].push_back(path);
 }
@@ -286,8 +294,10 @@ bool PathWave::survives(Path& path) {
 void PathWave::trace_shadows() {
   while (!shadows_.empty()) {
     batch_.clear();
+    met_.clear();
     for (const ShadowRay& ray : shadows_) {
       batch_.push(shared_.space.from_world(ray.origin), ray.direction, ray.reach * shared_.space.scale);
+      if (shared_.has_coverage) met_.push_back(ray.last);
     }
     counts_.shadow += shadows_.size();
     if (shared_.has_coverage) {
@@ -304,8 +314,7 @@ void PathWave::trace_shadows() {
 }
 
 void PathWave::pass_covers() {
-  hits_.resize(batch_.size());
-  counts_.invalid += shared_.rays.closest(batch_, hits_);
+  find_hits();
   std::size_t left = 0;
   for (std::size_t i = 0; i < shadows_.size(); ++i) {
     ShadowRay ray = shadows_[i];
@@ -319,10 +328,8 @@ void PathWave::pass_covers() {
     const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
     ray.radiance *= 1.0 - coverage;
     if (!(largest(ray.radiance) > 0.0)) continue;
-    const glm::dvec3 origin = ray_origin(point, ray.direction);
-    const double gained = glm::dot(origin - ray.origin, ray.direction);
-    ray.reach = std::max(ray.reach - gained, 0.0);
-    ray.origin = origin;
+    const double gained = met_[i].distance - ray.last.distance;
+    ray.last = met_[i];
     if (passes_on(ray.passed, coverage, gained)) {
       shadows_[left++] = ray;
     } else {

@@ -8,6 +8,7 @@
 #include "rt/bsdf.h"
 #include "rt/medium.h"
 #include "rt/path_tracer.h"
+#include "rt/ray_scene.h"
 #include "rt/surfaces.h"
 
 namespace hpr {
@@ -33,13 +34,14 @@ struct Path {
   glm::dvec3 from_normal{0.0};
   double pdf = 0.0;        ///< of the direction it was sent in, per solid angle; 0: the only one
   double squeeze = 1.0;    ///< the part of throughput that is radiance squeezed by refraction, not energy lost
-  double travelled = 0.0;  ///< metres since then, if it passed surfaces by chance
+  double travelled = 0.0;  ///< metres before its origin: from the eye to the near plane
   double reach = 0.0;      ///< metres
   Media media;             ///< that the ray goes through
   Sampler sampler;
   std::uint32_t pixel = 0;
   int segments = 1;  ///< including the one ahead
   int passed = 0;    ///< surfaces since the last scattering, by chance
+  Passed last;       ///< of those
 };
 
 /// Light on its way to a path's surface, if nothing stands between.
@@ -50,6 +52,7 @@ struct ShadowRay {
   glm::dvec3 radiance{0.0};  ///< what reaches the pixel
   std::uint32_t pixel = 0;
   int passed = 0;  ///< surfaces, by their coverage
+  Passed last;     ///< of those
 };
 
 /// The paths of some pixels, all in step: each step traces the rays of every path sorted by the lobe that sent them,
@@ -73,7 +76,9 @@ class PathWave {
   static std::size_t kind_of(Lobe lobe) { return 1 + static_cast<std::size_t>(lobe); }
 
   void trace_paths();
-  void arrive(Path& path, std::size_t kind, std::uint32_t surface);
+  void arrive(Path& path, std::size_t kind, const Passed& met);
+  /// Of the batch's rays. Where some materials let rays pass, met_ says what each has passed, and then what it met.
+  void find_hits();
   void miss(const Path& path);
   void add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface, const glm::dvec3& emission);
   void scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material);
@@ -92,6 +97,7 @@ class PathWave {
   PathCounts counts_;
   RayBatch batch_;
   std::vector<std::uint32_t> hits_;
+  std::vector<Passed> met_;  ///< by the same rays; only where some materials let rays pass
   std::vector<std::uint8_t> blocked_;
   WorldTriangle triangle_;
 };

@@ -80,17 +80,17 @@ PhotonRange share_of_rank(const PhotonRange& all, int rank, int ranks) {
 
 struct PhotonTracer::Flight {
   Sampler sampler;
-  glm::dvec3 place{0.0};   ///< world: where it was scattered last, or passed a surface
+  glm::dvec3 place{0.0};   ///< world: where it was scattered last
   glm::dvec3 origin{0.0};  ///< ray space: off that surface
   glm::dvec3 direction{0.0};
   glm::dvec3 flux{0.0};
   Media media;             ///< that it flies through
-  double travelled = 0.0;  ///< metres from where it was scattered last to `place`
   glm::dvec3 center{0.0};  ///< of its light, and how far that reaches (PhotonStart)
   double range = 0.0;
   std::uint32_t photon = 0;  ///< of the block
   int bounces = 0;
   int passed = 0;        ///< surfaces since then that do not cover all
+  Passed last;           ///< of those
   bool followed = true;  ///< has met followed lobes only
 };
 
@@ -106,6 +106,7 @@ struct PhotonTracer::Block {
   std::vector<Kept> kept;
   RayBatch batch;
   std::vector<std::uint32_t> hits;
+  std::vector<Passed> met;  ///< by the same flights
   WorldTriangle triangle;
   TracedPhotons traced;
 
@@ -174,12 +175,15 @@ void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double 
 /// One generation: all flights to the next surface, and on.
 void PhotonTracer::move(Block& block) const {
   block.batch.clear();
+  block.met.clear();
   for (const Flight& flight : block.flights) {
+    block.met.push_back(flight.last);
     block.batch.push(flight.origin, flight.direction, std::numeric_limits<double>::infinity());
   }
   block.hits.resize(block.flights.size());
   block.traced.counts.rays += block.flights.size();
-  block.traced.counts.invalid += rays_.closest(block.batch, block.hits);
+  block.traced.counts.invalid +=
+      has_coverage_ ? rays_.closest(block.batch, block.met, block.hits) : rays_.closest(block.batch, block.hits);
   surfaces_.prefetch(block.hits);
   block.next.clear();
   for (std::size_t i = 0; i < block.flights.size(); ++i) {
@@ -187,7 +191,7 @@ void PhotonTracer::move(Block& block) const {
     Flight& flight = block.flights[i];
     surfaces_.load(block.hits[i], block.triangle);
     const SurfacePoint surface = surfaces_.meet(block.triangle, flight.place, flight.direction);
-    if (arrive(flight, surface, block)) block.next.push_back(flight);
+    if (arrive(flight, surface, block.met[i], block)) block.next.push_back(flight);
   }
   std::swap(block.flights, block.next);
 }
@@ -205,10 +209,10 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
 }
 
 /// Keeps the photon if it is wanted here and sends it on; false when it ends.
-bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& block) const {
+bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const {
   const MaterialPoint material = evaluate_material(scene_, surface);
-  flight.travelled += glm::distance(surface.position, flight.place);
-  glm::dvec3 flux = flight.flux * left_at(flight.media, surface, material, flight.travelled);
+  const double metres = glm::distance(surface.position, flight.place);
+  glm::dvec3 flux = flight.flux * left_at(flight.media, surface, material, metres);
   if (flight.bounces == 0) flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
   const Bsdf bsdf(material, surface, Carried::Flux);
   // Whoever gathers counts as much of the surface as there is: all that falls on it is kept, passing or not.
@@ -217,9 +221,8 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, Block& bl
     keep(flight, flux, surface, block);
   }
   if (passes_by_chance(material.alpha, flight.sampler)) {
-    const double gained = glm::dot(surface.position - flight.place, flight.direction);
-    flight.place = surface.position;
-    flight.origin = space_.from_world(ray_origin(surface, flight.direction));
+    const double gained = met.distance - flight.last.distance;
+    flight.last = met;
     if (passes_on(flight.passed, material.alpha, gained)) return true;
     ++block.traced.counts.cut;
     return false;
@@ -258,8 +261,8 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   flight.media = media_towards(flight.media, surface, material, sample->direction);
   flight.direction = sample->direction;
   flight.place = surface.position;
-  flight.travelled = 0.0;
   flight.passed = 0;
+  flight.last = {};
   flight.origin = space_.from_world(ray_origin(surface, flight.direction));
   ++flight.bounces;
   return true;

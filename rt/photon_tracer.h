@@ -77,7 +77,8 @@ class PhotonTracer {
         space_(space),
         rays_(rays),
         source_(std::move(source)),
-        settings_(settings) {}
+        settings_(settings),
+        has_coverage_(has_coverage(scene)) {}
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
   /// take successive ranges: the photons of all passes together are spread evenly.
@@ -89,7 +90,7 @@ class PhotonTracer {
 
   void start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const;
   void move(Block& block) const;
-  [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, Block& block) const;
+  [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const;
   void keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const;
   [[nodiscard]] bool scatter(Flight& flight, const SurfacePoint& surface, const MaterialPoint& material,
                              const Bsdf& bsdf) const;
@@ -100,6 +101,7 @@ class PhotonTracer {
   const RayScene& rays_;
   PhotonSource source_;
   PhotonSettings settings_;
+  bool has_coverage_;
 };
 
 /// Collective: every rank's photons on every rank, in order of rank. The counts stay this rank's own.

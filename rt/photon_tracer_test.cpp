@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <mutex>
+#include <optional>
 
 #include "cluster/local_communicator.h"
 #include "rt/photon_test_tools.h"
@@ -110,6 +111,26 @@ TEST(PhotonTracerTest, ALightsRangeEndsTheFirstLegOfItsPhotons) {
   ASSERT_EQ(some.size(), everywhere.size());  // what was scattered goes on as far as it likes
   const double left = 1.0 - 0.8 * 0.8 * 0.8 * 0.8;
   for (std::size_t i = 0; i < some.size(); ++i) EXPECT_NEAR(some[i].flux[0], left * everywhere[i].flux[0], 1e-6);
+}
+
+TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {
+  // What the floor sends back to the walls of all that falls on it, in watts.
+  const auto sent_back = [](std::optional<float> gap) {
+    Scene scene;
+    const std::uint32_t white = test::add_material(scene, test::matte(glm::vec3(1.0F)));
+    Material black = test::matte(glm::vec3(0.0F));
+    black.alpha_mode = AlphaMode::Blend;
+    black.base_color.a = 0.5F;
+    const std::uint32_t veil = test::add_material(scene, black);
+    if (gap) test::place(scene, test::add_mesh(scene, test::quad({-1, -1 + *gap, -1}, {0, 0, 2}, {2, 0, 0}, veil)));
+    test::add_room(scene, white);
+    return flux_of(PhotonRoom(std::move(scene)).trace(downwards(0.5), 4000, {.max_bounces = 1}).global).g;
+  };
+  const double all = sent_back(std::nullopt);
+  ASSERT_GT(all, 0.5);
+  // What leaves the floor starts beyond a decal so close, and meets one that lies higher.
+  for (const float gap : {0.0F, 1e-7F, 1e-6F}) EXPECT_NEAR(sent_back(gap) / all, 0.5, 0.03) << gap;
+  EXPECT_NEAR(sent_back(1e-3F) / all, 0.25, 0.03);
 }
 
 TEST(PhotonTracerTest, NoPhotonsOneNoLightAndAnEmptySceneAreFine) {

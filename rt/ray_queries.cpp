@@ -21,7 +21,21 @@ struct Closest {
   const RayGeometry* geometries;
   std::array<float, kWidth> distance;
   std::array<std::uint32_t, kWidth> surface;
+  std::array<std::uint32_t, kWidth> geometry;
+  const Passed* passed;  ///< by lane; null: none has passed anything
 };
+
+/// Two triangles that share an edge put a ray's distance to it at most this far apart, relative to it.
+constexpr float kSameEdge = 8 * std::numeric_limits<float>::epsilon();
+
+/// Whether the ray has that behind it already.
+bool was_met(const Passed& passed, std::uint32_t surface, std::uint32_t geometry, float distance) {
+  if (passed.surface == kNoSurface) return false;
+  if (geometry == passed.geometry) {
+    return surface == passed.surface || distance <= passed.distance * (1.0F + kSameEdge);
+  }
+  return distance < passed.distance || (distance == passed.distance && surface < passed.surface);
+}
 
 /// Robust traversal offers candidates at the distance already found as well; of those the lowest surface id stays.
 void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
@@ -30,16 +44,18 @@ void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
     if (arguments->valid[i] != -1) continue;
     const unsigned int lane = RTCRayN_id(arguments->ray, arguments->N, i);
     const unsigned int outer = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
-    const unsigned int instance =
+    const unsigned int geometry =
         outer != RTC_INVALID_GEOMETRY_ID ? outer : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const std::uint32_t surface =
-        closest.geometries[instance].first_surface + RTCHitN_primID(arguments->hit, arguments->N, i);
+        closest.geometries[geometry].first_surface + RTCHitN_primID(arguments->hit, arguments->N, i);
     const float distance = RTCRayN_tfar(arguments->ray, arguments->N, i);
-    if (distance == closest.distance[lane] && surface >= closest.surface[lane]) {
+    const bool later = distance == closest.distance[lane] && surface >= closest.surface[lane];
+    if (later || (closest.passed != nullptr && was_met(closest.passed[lane], surface, geometry, distance))) {
       arguments->valid[i] = 0;
     } else {
       closest.distance[lane] = distance;
       closest.surface[lane] = surface;
+      closest.geometry[lane] = geometry;
     }
   }
 }
@@ -126,6 +142,17 @@ std::uint64_t RayScene::occluded(const RayBatch& rays, std::span<std::uint8_t> b
 }
 
 std::uint64_t RayScene::closest(const RayBatch& rays, std::span<std::uint32_t> surfaces, Coherence coherence) const {
+  return find_closest(rays, nullptr, surfaces, coherence);
+}
+
+std::uint64_t RayScene::closest(const RayBatch& rays, std::span<Passed> passed,
+                                std::span<std::uint32_t> surfaces) const {
+  HPR_CHECK(passed.size() == rays.size());
+  return find_closest(rays, passed.data(), surfaces, Coherence::Low);
+}
+
+std::uint64_t RayScene::find_closest(const RayBatch& rays, Passed* passed, std::span<std::uint32_t> surfaces,
+                                     Coherence coherence) const {
   HPR_CHECK(surfaces.size() == rays.size());
   Closest closest;
   embree::start(closest.context, coherence == Coherence::High ? embree::Rays::Coherent : embree::Rays::Incoherent);
@@ -143,8 +170,17 @@ std::uint64_t RayScene::closest(const RayBatch& rays, std::span<std::uint32_t> s
     }
     closest.distance.fill(std::numeric_limits<float>::quiet_NaN());
     closest.surface.fill(kNoSurface);
+    closest.passed = passed != nullptr ? passed + first : nullptr;
+    if (passed != nullptr) {
+      // The filter decides; this only spares it most of what lies before.
+      for (std::size_t i = 0; i < count; ++i) packet.ray.tnear[i] = passed[first + i].distance * (1.0F - kSameEdge);
+    }
     embree::intersect(valid.data(), embree(), closest.context, &keep_lowest_surface, packet);
     std::copy_n(closest.surface.begin(), count, surfaces.begin() + static_cast<std::ptrdiff_t>(first));
+    if (passed == nullptr) continue;
+    for (std::size_t i = 0; i < count; ++i) {
+      passed[first + i] = {closest.surface[i], closest.geometry[i], closest.distance[i]};
+    }
   }
   return invalid;
 }

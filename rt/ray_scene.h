@@ -54,6 +54,16 @@ class RayBatch {
 /// Whether rays that share a packet go the same way; Embree is quicker when told so rightly. No answer depends on it.
 enum class Coherence { Low, High };
 
+/// What a ray has met and passed, if it is sent once more from where it began: it then meets what comes next by
+/// distance, and by id where distances are equal. So nothing is skipped, however close surfaces lie.
+///
+/// Triangles of one geometry that are met at one distance, but for rounding, are met once: they share the edge there.
+struct Passed {
+  std::uint32_t surface = kNoSurface;  ///< none yet
+  std::uint32_t geometry = 0;          ///< of RayScene::geometries
+  float distance = 0.0F;               ///< ray space
+};
+
 /// What one geometry of Embree's scene shows: a run of triangles of an instance, counted by primitive id.
 struct RayGeometry {
   std::uint32_t instance = 0;
@@ -82,6 +92,9 @@ class RayScene {
   /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
   [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces,
                                       Coherence coherence = Coherence::Low) const;
+  /// The same for rays that may have passed surfaces: passed[i] says which, and is set to what ray i meets now.
+  [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<Passed> passed,
+                                      std::span<std::uint32_t> surfaces) const;
 
   /// Triangles left out because their world positions are beyond what float holds.
   [[nodiscard]] std::uint64_t skipped_triangles() const;
@@ -93,6 +106,9 @@ class RayScene {
   [[nodiscard]] const RaySpace& space() const { return space_; }
 
  private:
+  std::uint64_t find_closest(const RayBatch& rays, Passed* passed, std::span<std::uint32_t> surfaces,
+                             Coherence coherence) const;
+
   struct Embree;
   RaySpace space_;
   std::unique_ptr<Embree> embree_;

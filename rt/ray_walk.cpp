@@ -24,25 +24,22 @@ double RayWalk::coverage_of(const SurfacePoint& point) const {
   return evaluate_alpha(scene_, scene_.materials[point.material], point.uv, point.color.a);
 }
 
-double RayWalk::go_beyond(RayRequest& ray, const SurfacePoint& point) {
-  const glm::dvec3 origin = ray_origin(point, ray.direction);
-  const double gained = glm::dot(origin - ray.origin, ray.direction);
-  if (std::isfinite(ray.reach)) ray.reach = std::max(0.0, ray.reach - gained);
-  ray.origin = origin;
-  return gained;
-}
-
-void RayWalk::visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, const Visit& visit) const {
+void RayWalk::visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch, const Visit& visit) const {
   if (holed_ == nullptr) return;
   scratch.waiting.resize(rays.size());
   std::iota(scratch.waiting.begin(), scratch.waiting.end(), 0U);
   scratch.passed.assign(rays.size(), 0);
+  scratch.last.assign(rays.size(), Passed{});
   WorldTriangle triangle;
   while (!scratch.waiting.empty()) {
     scratch.batch.clear();
-    for (const std::uint32_t ray : scratch.waiting) push(rays[ray], scratch.batch);
+    scratch.met.clear();
+    for (const std::uint32_t ray : scratch.waiting) {
+      push(rays[ray], scratch.batch);
+      scratch.met.push_back(scratch.last[ray]);
+    }
     scratch.surfaces.resize(scratch.waiting.size());
-    (void)holed_->closest(scratch.batch, scratch.surfaces);
+    (void)holed_->closest(scratch.batch, scratch.met, scratch.surfaces);
     std::size_t left = 0;
     for (std::size_t i = 0; i < scratch.waiting.size(); ++i) {
       if (scratch.surfaces[i] == kNoSurface) continue;
@@ -51,7 +48,9 @@ void RayWalk::visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, cons
       const SurfacePoint point = surfaces_.meet(triangle, rays[ray].origin, rays[ray].direction);
       const double coverage = coverage_of(point);
       if (!visit(ray, point, coverage)) continue;
-      if (passes_on(scratch.passed[ray], coverage, go_beyond(rays[ray], point))) {
+      const double gained = scratch.met[i].distance - scratch.last[ray].distance;
+      scratch.last[ray] = scratch.met[i];
+      if (passes_on(scratch.passed[ray], coverage, gained)) {
         scratch.waiting[left++] = ray;
       } else {
         ++scratch.cut;

@@ -42,8 +42,10 @@ struct WalkScratch {
   std::vector<std::uint8_t> blocked;
   std::vector<std::uint32_t> waiting;
   std::vector<RayRequest> rest;
-  std::vector<int> passed;  ///< per ray, see passes_on
-  std::uint64_t cut = 0;    ///< rays that ended among too many surfaces; who reads it sets it back
+  std::vector<int> passed;   ///< per ray, see passes_on
+  std::vector<Passed> last;  ///< per ray: what it passed
+  std::vector<Passed> met;   ///< per waiting ray
+  std::uint64_t cut = 0;     ///< rays that ended among too many surfaces; who reads it sets it back
 };
 
 /// Rays through a scene some of whose surfaces cover only part of what is behind them (alpha MASK and BLEND): such a
@@ -66,9 +68,8 @@ class RayWalk {
 
   /// What visit_holed calls: ray i meets a surface that covers so much; returns whether the ray goes on.
   using Visit = std::function<bool(std::size_t ray, const SurfacePoint& point, double coverage)>;
-  /// Calls `visit` for every surface of partial coverage along each ray, nearest first, while it passes_on. `rays` are
-  /// used up.
-  void visit_holed(std::span<RayRequest> rays, WalkScratch& scratch, const Visit& visit) const;
+  /// Calls `visit` for every surface of partial coverage along each ray, nearest first, while it passes_on.
+  void visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch, const Visit& visit) const;
 
   /// Metres: the largest coordinate of a place as rays see it, which says what rounding it costs.
   [[nodiscard]] double size_of(const glm::dvec3& place) const;
@@ -77,8 +78,6 @@ class RayWalk {
 
  private:
   [[nodiscard]] double coverage_of(const SurfacePoint& point) const;
-  /// Moves the ray's origin behind a surface it met. Returns the metres gained.
-  static double go_beyond(RayRequest& ray, const SurfacePoint& point);
   void push(const RayRequest& ray, RayBatch& batch) const;
 
   const Scene& scene_;
