@@ -252,6 +252,14 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   if (code == 127) {
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
+  // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails. Who collects was told something.
+  const bool no_verdict = options.captured_stdout != nullptr ? options.captured_stdout->empty() : !options.checks;
+  if (code == static_cast<int>(ExitCode::CheckFailed) && no_verdict) {
+    throw Error(
+        ExitCode::Io, fmt::format("MPI could not start {} ranks", ranks),
+        "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "
+        "or use --ranks 1");
+  }
   return code;
 }
 

@@ -28,6 +28,7 @@ struct JobOptions {
   std::map<std::string, std::string> environment = {};  ///< added to this process's own
   StandardInput input = StandardInput::None;
   Interrupts interrupts = Interrupts::End;
+  bool checks = false;  ///< its ranks may leave with ExitCode::CheckFailed
 };
 
 /// Whether somebody types what this process reads on standard input, at a terminal of its own or its launcher's.
@@ -44,7 +45,7 @@ struct JobOptions {
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
 /// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
 /// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks. Throws Error: Io when
-/// mpiexec cannot be started, Lost when a rank or mpiexec itself was killed.
+/// mpiexec or MPI cannot be started, Lost when a rank or mpiexec itself was killed.
 int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 
 /// The first executable file of this name on the PATH.

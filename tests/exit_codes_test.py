@@ -213,6 +213,10 @@ def main():
 
     expect_error("no graphics", ["render", "gen:gallery", "-o", "a.png", *SMALL, "--backend", "egl"], [5],
                  environment={"LIBGL_DRIVERS_PATH": "/none", "GBM_BACKENDS_PATH": "/none", "EGL_PLATFORM": "surfaceless"})
+    for case, arguments in (("render", ["render", "gen:gallery", "-o", "a.png", *SMALL]), ("compare", dense),
+                            ("wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none"])):
+        expect_error(f"ranks that cannot talk, {case}", [*arguments, "--ranks", "2"], [4], ["TMPDIR"],
+                     environment={"OMPI_MCA_btl": "none-such"})
     full_disk()
 
     with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
