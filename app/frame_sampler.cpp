@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "app/signals.h"
@@ -122,10 +123,13 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   if (checkpoint.resume) load(checkpoint);
   const double before = so_far_.seconds;
   const Stopwatch watch;
+  std::optional<Stopwatch> written;
   while (!reached(sampling_, so_far_)) {
     add_sample(views);
     // Without a checkpoint a request is for whoever draws frame after frame.
-    const Request request = checkpoint.path.empty() ? Request::None : take_request();
+    Request request = checkpoint.path.empty() ? Request::None : take_request();
+    // One signal reaches the ranks of a job one by one, maybe in different samples.
+    if (request == Request::Write && written && written->ms() < 1000.0) request = Request::None;
     const Word word = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
     so_far_.samples = film_.samples();
     so_far_.seconds = word.seconds;
@@ -136,6 +140,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     if (word.request == Request::None || reached(sampling_, so_far_)) continue;
     progress.end();
     if (tries_to_write(checkpoint) && word.request == Request::Stop) return false;
+    written.emplace();
   }
   if (checkpoint.at_end && homes_) write(checkpoint);
   finish();

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -39,6 +40,11 @@ constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
 constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
 /// Tells the ranks of a job, whose stderr is a pipe, that their launcher's is a terminal.
 constexpr const char* kTerminalVariable = "HPR_TERMINAL";
+/// Tells rank 0 to say on its standard output, before all else, that the ranks have started.
+constexpr const char* kStartVariable = "HPR_SAY_START";
+constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
+/// Seconds after which signals are passed on without that: where ranks run elsewhere, the variable may not reach them.
+constexpr unsigned kLongestStart = 30;
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
@@ -56,6 +62,7 @@ constexpr const char* kTerminalVariable = "HPR_TERMINAL";
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
   if (typed) ::setenv(kTypedInput, "1", 1);
+  ::setenv(kStartVariable, "1", 1);
   ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
@@ -67,11 +74,38 @@ constexpr const char* kTerminalVariable = "HPR_TERMINAL";
 std::atomic<pid_t> launched = 0;
 std::atomic<bool> stops = false;  ///< Interrupts::Stop
 std::atomic<int> interrupted_by = 0;
-std::atomic<bool> ends = false;  ///< nothing more is to be said
-std::atomic<int> early = 0;      ///< a signal that came before there was anybody to pass it to
+std::atomic<bool> ends = false;     ///< nothing more is to be said
+std::atomic<int> early = 0;         ///< a signal that came before there was anybody to pass it to
+std::atomic<bool> started = false;  ///< the ranks; before, mpiexec loses requests, or ranks die of them
+
+bool is_request(int signal) {
+  return signal == SIGUSR1 || signal == SIGUSR2;
+}
+
+/// Of two signals that wait, the one that asks for more stays.
+int weight_of(int signal) {
+  return signal == 0 ? 0 : signal == SIGUSR2 ? 1 : signal == SIGUSR1 ? 2 : 3;
+}
+
+void pass_on_early() {
+  const int signal = early.exchange(0);
+  const pid_t to = launched.load();
+  if (signal == 0) return;
+  if (to > 0 && (started.load() || !is_request(signal))) {
+    ::kill(to, signal);
+  } else {
+    early.store(signal);
+  }
+}
+
+void note_start() {
+  started.store(true);
+  pass_on_early();
+}
 
 extern "C" void pass_on(int signal) {
   const int error = errno;
+  if (signal == SIGALRM) note_start();
   if (signal == SIGINT || signal == SIGTERM || signal == SIGHUP) {
     const bool again = interrupted_by.exchange(signal) != 0;
     ends.store(again || !stops.load());
@@ -81,12 +115,11 @@ extern "C" void pass_on(int signal) {
       signal = again ? SIGKILL : SIGTERM;
     }
   }
-  const pid_t to = launched.load();
-  if (to > 0) {
-    ::kill(to, signal);
-  } else {
+  if (signal != SIGALRM && weight_of(signal) >= weight_of(early.load())) {
     early.store(signal);
+    if (is_request(signal) && !started.load()) ::alarm(kLongestStart);
   }
+  pass_on_early();
   errno = error;
 }
 
@@ -95,9 +128,10 @@ extern "C" void pass_on(int signal) {
 class PassedSignals {
  public:
   explicit PassedSignals(const JobOptions& options)
-      : count_(options.input == StandardInput::None ? kSignals.size() : 2) {
+      : count_(options.input == StandardInput::None ? kSignals.size() : 3) {
     launched.store(0);
     early.store(0);
+    started.store(false);
     interrupted_by.store(0);
     ends.store(false);
     stops.store(options.interrupts == Interrupts::Stop);
@@ -110,6 +144,7 @@ class PassedSignals {
     }
   }
   ~PassedSignals() {
+    ::alarm(0);
     for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
     // As if it had not been caught.
     if (const int signal = interrupted_by.load(); signal != 0 && !stops.load()) ::raise(signal);
@@ -119,13 +154,13 @@ class PassedSignals {
 
   static void to(pid_t child) {
     launched.store(child);
-    if (const int signal = early.exchange(0); signal != 0) ::kill(child, signal);
+    pass_on_early();
   }
   /// The child was waited for: its number may soon be another process's.
   static void to_nobody() { launched.store(0); }
 
  private:
-  static constexpr std::array kSignals{SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
+  static constexpr std::array kSignals{SIGALRM, SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
   std::size_t count_;  ///< of them, from the front
   std::array<struct sigaction, kSignals.size()> before_{};
 };
@@ -142,16 +177,40 @@ bool write_all(int file, std::string_view text) {
   return true;
 }
 
+/// Takes the mark of the start from the front of what a job says.
+class StartMark {
+ public:
+  /// What of `text`, the next piece of that, is not the mark. Meaningful until the next call.
+  std::string_view take(std::string_view text) {
+    if (looked_) return text;
+    front_.append(text);
+    const std::size_t length = std::min(front_.size(), kStartMark.size());
+    const bool like = front_.compare(0, length, kStartMark, 0, length) == 0;
+    if (like && length < kStartMark.size()) return {};
+    looked_ = true;
+    seen_ = like;
+    note_start();
+    return std::string_view(front_).substr(like ? length : 0);
+  }
+
+  [[nodiscard]] bool seen() const { return seen_; }
+
+ private:
+  std::string front_;
+  bool looked_ = false;
+  bool seen_ = false;
+};
+
 /// Collects what the job says on its standard output in `collected`, or says it here as it comes: mpiexec does not
 /// tell when nobody can take it. Returns the errno that ended that, and the job; 0: all was said.
-int hear_out(int pipe, std::string* collected, pid_t child) {
+int hear_out(int pipe, std::string* collected, pid_t child, StartMark& mark) {
   int failed = 0;
   std::array<char, 65536> buffer{};
   while (true) {
     const ssize_t got = ::read(pipe, buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return failed;
-    const std::string_view text(buffer.data(), static_cast<std::size_t>(got));
+    const std::string_view text = mark.take({buffer.data(), static_cast<std::size_t>(got)});
     if (collected != nullptr) {
       collected->append(text);
     } else if (failed == 0 && !write_all(STDOUT_FILENO, text)) {
@@ -188,6 +247,13 @@ bool inside_mpi_job() {
     if (std::getenv(name) != nullptr) return true;
   }
   return false;
+}
+
+void tell_launcher() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
+  if (std::getenv(kStartVariable) == nullptr) return;
+  std::fwrite(kStartMark.data(), 1, kStartMark.size(), stdout);
+  std::fflush(stdout);
 }
 
 std::string program_path() {
@@ -229,7 +295,8 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   PassedSignals::to(child);
 
   ::close(pipe[1]);
-  const int unsaid = hear_out(pipe[0], options.captured_stdout, child);
+  StartMark mark;
+  const int unsaid = hear_out(pipe[0], options.captured_stdout, child, mark);
   ::close(pipe[0]);
   int status = 0;
   while (::waitpid(child, &status, 0) < 0) {
@@ -252,9 +319,8 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   if (code == 127) {
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
-  // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails. Who collects was told something.
-  const bool no_verdict = options.captured_stdout != nullptr ? options.captured_stdout->empty() : !options.checks;
-  if (code == static_cast<int>(ExitCode::CheckFailed) && no_verdict) {
+  // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
+  if (code == static_cast<int>(ExitCode::CheckFailed) && !mark.seen()) {
     throw Error(
         ExitCode::Io, fmt::format("MPI could not start {} ranks", ranks),
         "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "

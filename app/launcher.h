@@ -28,13 +28,16 @@ struct JobOptions {
   std::map<std::string, std::string> environment = {};  ///< added to this process's own
   StandardInput input = StandardInput::None;
   Interrupts interrupts = Interrupts::End;
-  bool checks = false;  ///< its ranks may leave with ExitCode::CheckFailed
 };
 
 /// Whether somebody types what this process reads on standard input, at a terminal of its own or its launcher's.
 [[nodiscard]] bool input_is_typed();
 /// Whether somebody looks on at a terminal: what is drawn on stderr may be drawn over.
 [[nodiscard]] bool stderr_is_terminal();
+
+/// Of rank 0, when all ranks of its job have started: tells a launcher of this program that they take SIGUSR1 and
+/// SIGUSR2 now, if they ever do.
+void tell_launcher();
 
 /// True when this process was started by mpirun, mpiexec or srun as one rank of a job.
 [[nodiscard]] bool inside_mpi_job();
@@ -44,7 +47,8 @@ struct JobOptions {
 
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
 /// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
-/// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks. Throws Error: Io when
+/// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks,
+/// once these have started. Throws Error: Io when
 /// mpiexec or MPI cannot be started, Lost when a rank or mpiexec itself was killed.
 int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 

@@ -119,6 +119,19 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
   return {ExitCode::Usage, fmt::format("{}: {}", command, error.what()), help};
 }
 
+/// An unset variable of a script is no wish to leave an option away.
+void refuse_empty_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_positional() || option->count() == 0 || option->get_expected_min() == 0) continue;
+    for (const std::string& value : option->results()) {
+      if (!value.empty()) continue;
+      throw Error(ExitCode::Usage, fmt::format("{} has an empty value", option->get_name()),
+                  "give it one, or leave the option out");
+    }
+  }
+  for (const CLI::App* child : app.get_subcommands()) refuse_empty_values(*child);
+}
+
 ExitCode run(const std::vector<std::string>& words) {
   Globals globals;
   globals.args = words;
@@ -166,6 +179,7 @@ ExitCode run(const std::vector<std::string>& words) {
   } catch (const CLI::ParseError& error) {
     throw usage_error(app, parsed, error);
   }
+  refuse_empty_values(app);
   const bool listens = launched_rank() != 0 && globals.verbosity < 2;  // rank 0 speaks
   if (globals.verbosity < 0 && globals.progress == "auto") globals.progress = "none";
   log::configure(globals.verbosity < 0 || listens ? log::Level::Error

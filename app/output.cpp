@@ -156,7 +156,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
       {"ms", stats.ms},
       {"samples", stats.samples},
       {"samples_in_all", stats.samples_in_all},
-      {"ms_per_sample", stats.ms / std::max(stats.samples, 1)},
+      {"ms_per_sample", stats.samples > 0 ? nlohmann::ordered_json(stats.ms / stats.samples) : nullptr},
       {"estimated_relmse", stats.relmse ? nlohmann::ordered_json(*stats.relmse) : nlohmann::ordered_json(nullptr)},
       {"plan", stats.plan},
       {"passes", passes},
@@ -188,6 +188,17 @@ void check_distinct(std::span<const std::string> paths, const std::string& trace
     if (path.empty() || named.insert(error ? plain : place).second) continue;
     throw Error(ExitCode::Usage, fmt::format("'{}' is named for two results", printable(path)),
                 "give each its own name");
+  }
+}
+
+void check_spared(std::span<const std::string> inputs, std::span<const std::string> results) {
+  for (const std::string& input : inputs) {
+    for (const std::string& result : results) {
+      std::error_code error;
+      if (input.empty() || result.empty() || !std::filesystem::equivalent(input, result, error) || error) continue;
+      throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result)),
+                  "give the result another name");
+    }
   }
 }
 

@@ -130,7 +130,11 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     lines.push_back(
         fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
   }
-  if (!gives_light(session.scene())) lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
+  if (!gives_light(session.scene())) {
+    lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
+  } else if (!session.requirements().indirect.needed && !session.requirements().shadow.needed) {
+    lines.emplace_back("light: none (what the scene has of lights is black)");
+  }
   if (!plan.rays.half_resolution.empty()) {
     lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
   }

@@ -70,6 +70,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
   try {
     MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
     limit.reset();
+    if (rank == 0) tell_launcher();
     if (globals.ranks > 0 && globals.ranks != comm.size()) {
       throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
                   "leave --ranks out under mpirun or srun: the launcher sets the number");

@@ -57,7 +57,10 @@ class RenderCommand final : public Command {
     if (!sampling.sums()) checkpoint_.clear();
     if (!inside_mpi_job()) {
       check_outputs(globals);
-      for (const std::string& option : options_.without_use()) log::warning("--reference has no use for {}", option);
+      for (const std::string& option : options_.without_use()) {
+        log::warning("{} has no use for {}", options_.reference ? "--reference" : "--passes " + options_.passes,
+                     option);
+      }
     }
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
@@ -98,6 +101,7 @@ class RenderCommand final : public Command {
     const std::string beside = files_.is_png() ? files_.aov_file() : "";
     const std::vector<std::string> results{files_.picture, files_.raw, options_.stats, beside, checkpoint_};
     check_distinct(results, globals.trace);
+    check_spared(std::vector{source_, options_.environment}, results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
     }

@@ -111,7 +111,7 @@ void RenderOptions::declare_frame(CLI::App& app) {
   wire.declare(app);
   app.add_option("--distribute", distribute, "sort-first, sort-last, hybrid or auto")->capture_default_str();
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 1 << 20));
   app.add_option("--strategy", strategy, "how layers are composited: a strategy's name or auto")->capture_default_str();
   app.add_option("--shading", shading, "deferred: light once after compositing; local: each rank before it")
       ->capture_default_str();
@@ -232,7 +232,14 @@ Sampling RenderOptions::sampling() const {
 
 std::vector<std::string> RenderOptions::without_use() const {
   std::vector<std::string> names;
-  if (!reference) return names;
+  if (!reference) {
+    const std::vector<std::string> named = split_list(passes);
+    const bool may_send = passes == "auto" || passes == "all" || std::ranges::find(named, "photon") != named.end();
+    if (!may_send && photons.value_or(0) > 0) names.emplace_back("--photons");
+    if (!may_send && photon_radius > 0.0) names.emplace_back("--photon-radius");
+    if (!may_send && indirect.value_or(false)) names.emplace_back("--indirect");
+    return names;
+  }
   if (passes != "auto") names.emplace_back("--passes");
   if (photons) names.emplace_back("--photons");
   if (photon_radius > 0.0) names.emplace_back("--photon-radius");
@@ -245,6 +252,10 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   FrameSettings settings;
   if (!std::isfinite(fov_degrees) || !std::isfinite(exposure) || !std::isfinite(glossy_cutoff.value_or(0.0))) {
     throw Error(ExitCode::Usage, "--fov, --exposure and --glossy-cutoff take finite numbers", "write e.g. --fov 45");
+  }
+  for (const auto* const point : {&eye, &at, &up}) {
+    if (std::ranges::all_of(*point, [](double value) { return std::abs(value) <= 1e18; })) continue;
+    throw Error(ExitCode::Usage, "--eye, --at and --up take finite numbers up to 1e18", "write e.g. --eye 0,1.7,5");
   }
   if (distribute != "auto") settings.distribution = parse_distribution(distribute);
   settings.groups = groups;
@@ -262,14 +273,20 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);
   settings.rays.light_samples = light_samples.value_or(defaults.light_samples);
   settings.rays.glossy_cutoff = glossy_cutoff.value_or(defaults.glossy_cutoff);
-  settings.rays.photons = photons.value_or(defaults.photons);
-  settings.photons_fit_frame = !photons;
   const bool names_photons = std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
   settings.rays.global_photons = indirect.value_or(defaults.global_photons || names_photons);
-  if (photons == std::uint32_t{0} && names_photons) {
-    throw Error(ExitCode::Usage, "--passes names photon, and --photons 0 sends none",
+  const bool asks_for_photons = names_photons || indirect.value_or(false);
+  if (photons == std::uint32_t{0} && asks_for_photons) {
+    throw Error(ExitCode::Usage,
+                fmt::format("{}, and --photons 0 sends none",
+                            names_photons ? "--passes names photon" : "--indirect is the light of photons"),
                 "leave one of them out, or send some");
   }
+  // A quality without photons sends those of the next if it must.
+  const bool must_send = asks_for_photons || settings.rays.all_passes;
+  const std::uint32_t usual = defaults.photons == 0 && must_send ? find_quality("good").photons : defaults.photons;
+  settings.rays.photons = photons.value_or(usual);
+  settings.photons_fit_frame = !photons;
   settings.rays.reference = reference;
   settings.rays.build = ray_build.build();
   settings.depth_format = wire.depths();

@@ -100,11 +100,10 @@ class TradeoffCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     check_options(globals);
     watch_requests();
-    const auto body = [&](Communicator& comm) {
+    return run_ranks(globals, [&](Communicator& comm) {
       Session session(comm, globals, [&] { return options_.load(scene_, globals); });
       return sweep(session, globals);
-    };
-    return run_ranks(globals, body, {.checks = true});
+    });
   }
 
  private:

@@ -182,6 +182,7 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
                                    assembled_file(run).string()};
   if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
   check_distinct(results, globals.trace);
+  check_spared(std::vector{run.wall, run.scene, run.options.environment}, results);
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),

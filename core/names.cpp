@@ -73,9 +73,12 @@ std::optional<std::string> nearest_name(std::string_view name, std::span<const s
 }
 
 std::string unknown_name_hint(std::string_view name, std::span<const std::string> choices) {
+  constexpr std::size_t kMost = 40;
   const auto nearest = nearest_name(name, choices);
-  return fmt::format("{}choices: {}", nearest ? fmt::format("did you mean '{}'? ", *nearest) : "",
-                     fmt::join(choices, ", "));
+  const auto shown = choices.first(std::min(choices.size(), kMost));
+  return fmt::format("{}choices: {}{}", nearest ? fmt::format("did you mean '{}'? ", *nearest) : "",
+                     fmt::join(shown, ", "),
+                     choices.size() > kMost ? fmt::format(" and {} more", choices.size() - kMost) : "");
 }
 
 std::string printable(std::string_view text, std::size_t limit) {

@@ -80,6 +80,14 @@ void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool 
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
 }
 
+TEST(Hybrid, AHeadlightShowsWhatIsLookedAtAndIsScatteredNoFurther) {
+  for (const Material& thing : {test::mirror(0.9F), test::clear_glass(1.5F, 0.0F)}) {
+    Scene scene = room(thing, false);
+    for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
+    expect_the_same_light(scene);
+  }
+}
+
 TEST(Hybrid, AMatteBall) {
   expect_the_same_light(room(test::matte({0.3F, 0.4F, 0.6F}), false));
 }

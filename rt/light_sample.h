@@ -28,6 +28,7 @@ struct PhotonStart {
   glm::dvec3 center{0.0};               ///< of a light with a range, world
   double range = 0.0;                   ///< metres from there at which its light ends, see range_window; 0: nowhere
   Media media = {};                     ///< what it starts in
+  bool endless = false;                 ///< it comes from without the scene: any origin before that would do
 };
 
 }  // namespace hpr

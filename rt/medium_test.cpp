@@ -108,6 +108,40 @@ TEST(Medium, PhotonsOfTheSunAreAbsorbedOnTheirWay) {
   EXPECT_NEAR(seen_from(5.0, scene, settings, false, 16).g, 0.25, 0.01);
 }
 
+/// A white floor at z = -1 under what stands between it and the sun, looked at from below that.
+double sunlit_floor(Scene scene) {
+  place(scene, add_mesh(scene, quad({-1.5F, -1.5F, -1}, {3, 0, 0}, {0, 3, 0}, add_material(scene, test::matte()))));
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.intensity = glm::vec3(std::numbers::pi_v<float>);
+  scene.lights.push_back(sun);
+  finish_scene(scene);
+  const RaySettings settings{.max_depth = 32, .photons = 20'000, .photon_radius = 0.2};
+  return seen_from(-0.5, scene, settings, false, 16).g;
+}
+
+TEST(Medium, FromWithoutTheSceneToTheInsideOfAWallNothingIsAbsorbed) {
+  const auto below_a_pane = [](bool with_far_thing) {
+    Scene scene;
+    const std::uint32_t absorber = add_absorber(scene, glm::vec3(0.25F));
+    place(scene, add_mesh(scene, quad({-1.5F, -1.5F, 0}, {0, 3, 0}, {3, 0, 0}, absorber)));  // it faces the floor
+    if (with_far_thing) {
+      place(scene, add_mesh(scene, quad({0, 0, 9}, {0.01F, 0, 0}, {0, 0.01F, 0}, add_material(scene, test::matte()))));
+    }
+    return sunlit_floor(std::move(scene));
+  };
+  EXPECT_NEAR(below_a_pane(false), 1.0, 0.04);
+  EXPECT_NEAR(below_a_pane(true), 1.0, 0.04);
+
+  // Half of the light passes each wall by: what passes the upper alone has come to the lower from without the scene.
+  Scene scene;
+  const std::uint32_t dark = add_absorber(scene, glm::vec3(1e-4F));
+  scene.materials[dark].alpha_mode = AlphaMode::Blend;
+  scene.materials[dark].base_color.a = 0.5F;
+  add_box(scene, {-1.5F, -1.5F, 0}, {1.5F, 1.5F, 1}, dark);
+  EXPECT_NEAR(sunlit_floor(std::move(scene)), 0.5, 0.02);
+}
+
 TEST(Medium, AnEyeOutsideSeesTheBackOfAWallUndimmed) {
   Scene scene;
   place(scene, add_mesh(scene, quad({-5, -5, 0}, {0, 10, 0}, {10, 0, 0}, add_absorber(scene, glm::vec3(0.5F)))));

@@ -257,7 +257,8 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);
   glm::dvec3 radiance = path.throughput * scattered.value * light->weight * weight;
   if (!light->casts_shadows) {
-    radiance_[path.pixel] += radiance;
+    // The headlight shows what is looked at, as the passes have it: seen, mirrored and seen through glass.
+    radiance_[path.pixel] += path.followed * radiance;
     return;
   }
   radiance *= left_of_light(path.media, point, material, light->to_light, light->distance);

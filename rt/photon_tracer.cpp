@@ -92,6 +92,7 @@ struct PhotonTracer::Flight {
   int passed = 0;        ///< surfaces since then that do not cover all
   Passed last;           ///< of those
   bool followed = true;  ///< has met followed lobes only
+  bool endless = false;  ///< still comes from without the scene
 };
 
 /// Photons under way together and what they left.
@@ -160,6 +161,7 @@ void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double 
     flight.media = begin->media;
     flight.center = begin->center;
     flight.range = begin->range;
+    flight.endless = begin->endless;
     glm::dvec3 origin = begin->origin;
     if (begin->surface != kNoSurface) {
       surfaces_.load(begin->surface, block.triangle);
@@ -212,7 +214,8 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
 bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const {
   const MaterialPoint material = evaluate_material(scene_, surface);
   const double metres = glm::distance(surface.position, flight.place);
-  glm::dvec3 flux = flight.flux * left_at(flight.media, surface, material, metres);
+  // As to lights: nothing is taken from endless ways.
+  glm::dvec3 flux = flight.endless ? flight.flux : flight.flux * left_at(flight.media, surface, material, metres);
   if (flight.bounces == 0) flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
   const Bsdf bsdf(material, surface, Carried::Flux);
   // Whoever gathers counts as much of the surface as there is: all that falls on it is kept, passing or not.
@@ -263,6 +266,7 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   flight.place = surface.position;
   flight.passed = 0;
   flight.last = {};
+  flight.endless = false;
   flight.origin = space_.from_world(ray_origin(surface, flight.direction));
   ++flight.bounces;
   return true;

@@ -163,6 +163,7 @@ PhotonStart emit_from_outside(const LitSphere& lit, const glm::dvec3& direction,
   start.origin = lit.center + warp::basis_about(direction) * glm::dvec3(across, -lit.radius);
   start.direction = direction;
   start.flux = flux;
+  start.endless = true;
   return start;
 }
 

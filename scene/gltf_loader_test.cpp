@@ -232,6 +232,25 @@ TEST(GltfLoader, MorphTargetsMoveVerticesByTheNodesWeights) {
   EXPECT_EQ(load(document.json).meshes[0].positions[0], glm::vec3(0, 0, 2));
 }
 
+TEST(GltfLoader, MorphTargetsMoveColoursAndTextureCoordinatesToo) {
+  auto document = triangle();
+  auto& attributes = document.primitive()["attributes"];
+  attributes["TEXCOORD_1"] = document.add_vec2({0, 0, 1, 0, 0, 1});
+  attributes["COLOR_0"] = document.add_vec3({1, 0, 0, 1, 0, 0, 1, 0, 0});
+  const int shift = document.add_vec2({0.5F, 2, 0, 0, 0, 0});
+  const int green = document.add_vec3({-1, 1, 0, 0, 0, 5, 0, 0, 0});
+  document.primitive()["targets"] = {{{"TEXCOORD_1", shift}, {"COLOR_0", green}, {"JOINTS_0", shift}}};
+  document.json["meshes"][0]["weights"] = {1};
+  const Scene scene = load(document.json);
+  EXPECT_EQ(scene.meshes[0].uvs[1][0], glm::vec2(0.5F, 2));
+  EXPECT_EQ(scene.meshes[0].uvs[1][1], glm::vec2(1, 0));
+  EXPECT_EQ(scene.meshes[0].colors[0], glm::vec4(0, 1, 0, 1));
+  EXPECT_EQ(scene.meshes[0].colors[1], glm::vec4(1, 0, 1, 1)) << "brought into 0 to 1";
+  EXPECT_TRUE(test::warns_of(scene, "JOINTS_0")) << "no attribute that targets move";
+  document.primitive()["targets"] = {{{"TEXCOORD_1", green}}};
+  EXPECT_THROW((void)load(document.json), Error);
+}
+
 TEST(GltfLoader, SkinsPutVerticesWhereTheirJointsAre) {
   auto document = triangle();
   document.primitive()["attributes"]["JOINTS_0"] =

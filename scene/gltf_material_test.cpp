@@ -174,6 +174,25 @@ TEST(GltfMaterial, TangentsAreKeptMadeUnitOrLeftOut) {
   expect_refused(wrong.json, "TANGENT");
 }
 
+TEST(GltfMaterial, SpecularGlossinessAloneIsTakenAsADielectric) {
+  auto document = triangle();
+  const nlohmann::json glossy{{"diffuseFactor", {1, 0.5, 0, 0.75}}, {"glossinessFactor", 0.25}};
+  document.json["materials"] = {{{"extensions", {{"KHR_materials_pbrSpecularGlossiness", glossy}}}}};
+  document.json["extensionsUsed"] = {"KHR_materials_pbrSpecularGlossiness"};
+  document.json["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
+  document.primitive()["material"] = 0;
+  const Scene scene = load(document.json);
+  EXPECT_EQ(scene.materials[0].base_color, glm::vec4(1, 0.5F, 0, 0.75F));
+  EXPECT_EQ(scene.materials[0].metallic, 0.0F);
+  EXPECT_EQ(scene.materials[0].roughness, 0.75F);
+  EXPECT_TRUE(test::warns_of(scene, "dielectric"));
+  document.json["materials"][0]["pbrMetallicRoughness"] = {{"metallicFactor", 1}};
+  EXPECT_EQ(load(document.json).materials[0].metallic, 1.0F) << "the stand-in of the file's own";
+  document.json["materials"][0].erase("pbrMetallicRoughness");
+  document.json["materials"][0]["extensions"]["KHR_materials_pbrSpecularGlossiness"]["diffuseFactor"] = "red";
+  expect_refused(document.json, "baseColorFactor");
+}
+
 TEST(GltfMaterial, TangentsMoveWithMorphTargetsAndJoints) {
   auto document = with_floats("TANGENT", "VEC4", {1, 0, 0, -1, 1, 0, 0, -1, 1, 0, 0, -1});
   document.primitive()["targets"] = {{{"TANGENT", document.add_vec3({-1, 1, 0, 0, 0, 0, 0, 0, 0})}}};

@@ -44,6 +44,8 @@ class PrimitiveBuilder {
     }
     mesh.triangles = read_triangles(mesh.positions.size());
     morph(mesh, pose.weights);
+    tame_uvs(mesh);
+    tame_colors(mesh);
     if (!pose.joints.empty()) skin(mesh, pose.joints);
     if (mesh.normals.empty()) {
       make_flat(mesh);
@@ -110,6 +112,11 @@ class PrimitiveBuilder {
       if (found == primitive_.attributes.end()) continue;
       mesh.uvs[set] = data_.vec2s(found->second);
       note_not_finite(mesh.uvs[set], name);
+    }
+  }
+
+  void tame_uvs(Mesh& mesh) const {
+    for (const auto& [name, set] : {std::pair{"TEXCOORD_0", 0U}, std::pair{"TEXCOORD_1", 1U}}) {
       // Samplers turn coordinates into integers; 1e6 repeats of a texture are already below what a float resolves.
       constexpr float kFarthest = 1e6F;
       bool odd = false;
@@ -135,6 +142,9 @@ class PrimitiveBuilder {
       for (const glm::vec3& color : opaque) mesh.colors.emplace_back(color, 1.0F);
     }
     note_not_finite(mesh.colors, "COLOR_0");
+  }
+
+  void tame_colors(Mesh& mesh) const {
     bool odd = false;
     for (glm::vec4& color : mesh.colors) {
       for (int c = 0; c < 4; ++c) {
@@ -172,21 +182,29 @@ class PrimitiveBuilder {
     bool moved = false;
     for (std::size_t t = 0; t < count; ++t) {
       if (weights[t] == 0.0) continue;
-      const auto add = [&](const char* name, auto& to) {
-        const auto found = primitive_.targets[t].find(name);
-        if (found == primitive_.targets[t].end() || to.empty()) return;
-        const Vectors deltas = data_.vec3s(found->second);
+      const auto add = [&](const auto& deltas, auto& to) {
+        using Delta = typename std::remove_cvref_t<decltype(deltas)>::value_type;
         for (std::size_t i = 0; i < to.size(); ++i) {
-          // Targets of tangents leave their sign alone.
-          for (int axis = 0; axis < 3; ++axis) {
+          for (int axis = 0; axis < Delta::length(); ++axis) {
             to[i][axis] = static_cast<float>(double{to[i][axis]} + weights[t] * double{deltas[i][axis]});
           }
         }
-        moved = true;
       };
-      add("POSITION", mesh.positions);
-      add("NORMAL", mesh.normals);
-      add("TANGENT", mesh.tangents);
+      for (const auto& [name, index] : primitive_.targets[t]) {
+        // Targets of tangents leave their sign alone.
+        if (name == "POSITION") add(data_.vec3s(index), mesh.positions);
+        if (name == "NORMAL") add(data_.vec3s(index), mesh.normals);
+        if (name == "TANGENT") add(data_.vec3s(index), mesh.tangents);
+        if (name == "TEXCOORD_0") add(data_.vec2s(index), mesh.uvs[0]);
+        if (name == "TEXCOORD_1") add(data_.vec2s(index), mesh.uvs[1]);
+        if (name != "COLOR_0") continue;
+        if (data_.accessor(index).type == TINYGLTF_TYPE_VEC4) {
+          add(data_.vec4s(index), mesh.colors);
+        } else {
+          add(data_.vec3s(index), mesh.colors);
+        }
+      }
+      moved = true;
     }
     if (moved) check_positions(mesh.positions);
   }

@@ -98,7 +98,10 @@ class PrimitiveCheck {
 
   void check_target(const std::string& name, int index, const std::string& where) const {
     check_count(index, where);
-    if (name == "POSITION" || name == "NORMAL" || name == "TANGENT") check_vector(index, where);
+    if (name == "POSITION" || name == "NORMAL" || name == "TANGENT") return check_vector(index, where);
+    if (name == "TEXCOORD_0" || name == "TEXCOORD_1") return data_.require_type(index, {TINYGLTF_TYPE_VEC2}, where);
+    if (name == "COLOR_0") return data_.require_type(index, {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, where);
+    if (!name.starts_with('_')) warn(where, "is not read");
   }
 
   void check_indices() const {

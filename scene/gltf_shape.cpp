@@ -240,9 +240,24 @@ void check_material_extensions(const GltfItem& extensions) {
   (void)extensions.object("KHR_materials_unlit");
 }
 
+/// A material of specular colour and glossiness alone is taken as a dielectric of its diffuse colour and glossiness.
+void stand_in_for_glossiness(const GltfItem& material) {
+  const auto extensions = material.object("extensions");
+  const auto glossy = extensions ? extensions->object("KHR_materials_pbrSpecularGlossiness") : std::nullopt;
+  if (!glossy || material.has("pbrMetallicRoughness")) return;
+  const double glossiness = glossy->clamped("glossinessFactor", 0.0, 1.0).value_or(1.0);
+  nlohmann::json stand_in{{"metallicFactor", 0.0}, {"roughnessFactor", 1.0 - glossiness}};
+  if (glossy->has("diffuseFactor")) stand_in["baseColorFactor"] = glossy->value()["diffuseFactor"];
+  if (glossy->has("diffuseTexture")) stand_in["baseColorTexture"] = glossy->value()["diffuseTexture"];
+  material.warn("extensions.KHR_materials_pbrSpecularGlossiness",
+                "taken as a dielectric of its diffuse colour and glossinessFactor");
+  material.value()["pbrMetallicRoughness"] = std::move(stand_in);
+}
+
 void check_materials(const GltfItem& root) {
   root.each("materials", kOptional, [](const GltfItem& material) {
     material.text("name");
+    stand_in_for_glossiness(material);
     if (const auto pbr = material.object("pbrMetallicRoughness")) {
       pbr->numbers("baseColorFactor", 4, 0.0, 1.0);
       pbr->clamped("metallicFactor", 0.0, 1.0);

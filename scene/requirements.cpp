@@ -4,20 +4,36 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <glm/geometric.hpp>
 
 namespace hpr {
 namespace {
+
+/// Whether all that is placed so has no area.
+bool flattens(const glm::dmat4& to_world) {
+  const glm::dmat3 linear(to_world);
+  for (int i = 0; i < 3; ++i) {
+    if (glm::cross(linear[i], linear[(i + 1) % 3]) != glm::dvec3(0.0)) return false;
+  }
+  return true;
+}
+
+/// Whether nothing of a surface is there: textures and vertices make alpha no larger.
+bool covers_nothing(const Material& material) {
+  return (material.alpha_mode == AlphaMode::Mask && material.base_color.a < material.alpha_cutoff) ||
+         (material.alpha_mode == AlphaMode::Blend && !(material.base_color.a > 0.0F));
+}
 
 /// Which materials a triangle of the scene really shows.
 std::vector<const Material*> visible_materials(const Scene& scene) {
   std::vector<std::uint8_t> used(scene.materials.size(), 0);
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
-    if (!mesh.triangles.empty()) used[mesh.material] = 1;
+    if (!mesh.triangles.empty() && !flattens(instance.to_world)) used[mesh.material] = 1;
   }
   std::vector<const Material*> materials;
   for (std::size_t i = 0; i < used.size(); ++i) {
-    if (used[i] != 0) materials.push_back(&scene.materials[i]);
+    if (used[i] != 0 && !covers_nothing(scene.materials[i])) materials.push_back(&scene.materials[i]);
   }
   return materials;
 }
@@ -97,7 +113,7 @@ bool emits(const Scene& scene, const Material& material) {
 }
 
 bool gives_light(const Scene& scene) {
-  if (!scene.lights.empty() || shines(scene.environment)) return true;
+  if (!scene.lights.empty() || (scene.environment && scene.environment->scale > 0.0)) return true;
   return std::ranges::any_of(visible_materials(scene),
                              [&](const Material* material) { return emits(scene, *material); });
 }
@@ -115,7 +131,7 @@ Requirements requirements_of(const Scene& scene) {
 
   Requirements needs;
   if (materials.empty()) {
-    const Requirement nothing{false, "the scene has no triangles"};
+    const Requirement nothing{false, "no triangle of the scene can be seen"};
     return {nothing, nothing, nothing, nothing, nothing, nothing, 1.0F};
   }
   needs.shadow = lights > 0 ? Requirement{true, counted(lights, "light casts shadows", "lights cast shadows")}

@@ -27,8 +27,8 @@ struct Requirements {
 /// Whether a material sends out light anywhere: a textured one does where a texel isn't black.
 [[nodiscard]] bool emits(const Scene& scene, const Material& material);
 
-/// Whether the scene has any light of its own: punctual lights, visible surfaces that emit, an environment that isn't
-/// black. A scene without gets a headlight.
+/// Whether the scene has any light of its own: punctual lights, visible surfaces that emit, an environment; one that is
+/// black too, as that asks for darkness. A scene without gets a headlight.
 [[nodiscard]] bool gives_light(const Scene& scene);
 
 /// A surface mirrors visibly below this roughness; above it the reflection pass leaves it alone.

@@ -60,6 +60,34 @@ TEST(Requirements, EmittingSurfacesAndTheEnvironmentAreLights) {
   EXPECT_TRUE(gives_light(scene));
 }
 
+TEST(Requirements, AnEnvironmentThatIsBlackAsksForDarkness) {
+  Scene scene = scene_of(rough(1.0F));
+  EXPECT_FALSE(gives_light(scene));
+  scene.environment = Environment{Image<Rgb>({1, 1}, {0, 0, 0})};
+  EXPECT_TRUE(gives_light(scene));
+  EXPECT_FALSE(requirements_of(scene).shadow.needed);
+}
+
+TEST(Requirements, WhatIsNotThereNeedsNothing) {
+  Material glowing = rough(0.0F);
+  glowing.emissive = glm::vec3(1.0F);
+  for (const AlphaMode mode : {AlphaMode::Mask, AlphaMode::Blend}) {
+    Scene scene = scene_of(glowing);
+    scene.materials[0].alpha_mode = mode;
+    scene.materials[0].alpha_cutoff = 0.5F;
+    scene.materials[0].base_color.a = 0.5F;
+    EXPECT_TRUE(gives_light(scene));
+    scene.materials[0].base_color.a = 0.0F;
+    EXPECT_FALSE(gives_light(scene));
+    EXPECT_FALSE(requirements_of(scene).reflection.needed);
+  }
+  Scene scene = scene_of(glowing);
+  scene.instances[0].to_world = glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1);
+  EXPECT_TRUE(gives_light(scene)) << "flat, but with an area";
+  scene.instances[0].to_world[1] = {0, 0, 0, 0};
+  EXPECT_FALSE(gives_light(scene)) << "a line";
+}
+
 TEST(Requirements, ReflectionsNeedAMaterialBelowTheMirrorRoughness) {
   EXPECT_TRUE(requirements_of(scene_of(rough(0.0F))).reflection.needed);
   EXPECT_TRUE(requirements_of(scene_of(rough(0.29F))).reflection.needed);
@@ -139,7 +167,7 @@ TEST(Requirements, AnEmptySceneNeedsNothingAndSaysWhy) {
   const Requirements needs = requirements_of(scene);
   for (const Requirement& one : {needs.shadow, needs.reflection, needs.refraction, needs.photon}) {
     EXPECT_FALSE(one.needed);
-    EXPECT_EQ(one.why, "the scene has no triangles");
+    EXPECT_EQ(one.why, "no triangle of the scene can be seen");
   }
 }
 

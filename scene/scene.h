@@ -130,6 +130,7 @@ struct Environment {
 struct PerspectiveLens {
   double vertical_fov_radians = 0.8;
   double near_distance = 0.0;  ///< metres; 0: chosen by the renderer. The far plane is at infinity.
+  double at_distance = 0.0;    ///< metres to what is looked at, which a near plane that is chosen spares; 0: unknown
 };
 struct OrthographicLens {
   double half_width = 1.0;  ///< metres

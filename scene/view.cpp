@@ -11,10 +11,13 @@
 namespace hpr {
 namespace {
 
-double near_plane(double wanted, const Bounds& bounds) {
-  if (wanted > 0.0) return wanted;
+double near_plane(const PerspectiveLens& lens, const Bounds& bounds) {
+  if (lens.near_distance > 0.0) return lens.near_distance;
   const double extent = glm::length(bounds.high - bounds.low);
-  return extent > 0.0 && std::isfinite(extent) ? 1e-4 * extent : 0.01;
+  const double small = extent > 0.0 && std::isfinite(extent) ? 1e-4 * extent : 0.01;
+  // A sky dome is no reason to cut away what stands close by.
+  const double close = 0.01 * lens.at_distance;
+  return close > 0.0 ? std::min(small, close) : small;
 }
 
 /// What (x, y) of the view looks through, on the plane its edges are on.
@@ -91,7 +94,7 @@ View make_view(const Camera& camera, Size size, const Bounds& bounds) {
   double half_height = 1.0;
   if (const auto* const lens = std::get_if<PerspectiveLens>(&camera.lens)) {
     half_height = std::tan(0.5 * lens->vertical_fov_radians);
-    view.near_distance = near_plane(lens->near_distance, bounds);
+    view.near_distance = near_plane(*lens, bounds);
   } else {
     const auto& box = std::get<OrthographicLens>(camera.lens);
     half_height = std::max(box.half_height, box.half_width / aspect);
@@ -119,7 +122,7 @@ Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up
   camera.axes[2] = glm::normalize(back);
   camera.axes[0] = glm::normalize(right);
   camera.axes[1] = glm::cross(camera.axes[2], camera.axes[0]);
-  camera.lens = PerspectiveLens{.vertical_fov_radians = vertical_fov_radians, .near_distance = 0.0};
+  camera.lens = PerspectiveLens{.vertical_fov_radians = vertical_fov_radians, .at_distance = glm::length(back)};
   return camera;
 }
 
@@ -142,6 +145,7 @@ Camera framing_camera(const Bounds& bounds) {
     distance = std::max({distance, at.z + std::abs(at.y) / slope, at.z + std::abs(at.x) / (slope * kNarrowest)});
   }
   camera.eye = center + from * (distance > 0.0 ? distance : 1.0);
+  std::get<PerspectiveLens>(camera.lens).at_distance = 0.0;  // the whole scene, which is in the bounds
   camera.name = "framing";
   return camera;
 }

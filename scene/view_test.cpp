@@ -154,6 +154,9 @@ TEST(View, TheNearPlaneFollowsTheSceneUnlessTheCameraSaysSo) {
   Camera camera = look_at({0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 1.0);
   EXPECT_DOUBLE_EQ(make_view(camera, {8, 8}, {{0, 0, 0}, {3, 4, 0}}).near_distance, 5e-4);
   EXPECT_GT(make_view(camera, {8, 8}, {}).near_distance, 0.0);
+  EXPECT_DOUBLE_EQ(make_view(camera, {8, 8}, {{0, 0, 0}, {3e5, 4e5, 0}}).near_distance, 0.05) << "under a sky dome";
+  camera = framing_camera({{0, 0, 0}, {3, 4, 0}});
+  EXPECT_DOUBLE_EQ(make_view(camera, {8, 8}, {{0, 0, 0}, {3, 4, 0}}).near_distance, 5e-4);
   camera.lens = PerspectiveLens{1.0, 0.25};
   EXPECT_EQ(make_view(camera, {8, 8}, {{0, 0, 0}, {3, 4, 0}}).near_distance, 0.25);
 }

@@ -90,6 +90,22 @@ def write_and_go_on(folder, whole):
     return state
 
 
+def as_soon_as_mpi_starts(folder):
+    """mpiexec has no ear for signals yet, and ranks would die of them: they wait until all have started."""
+    for wanted, code, name in ((signal.SIGUSR1, 75, "USR1"), (signal.SIGUSR2, 0, "USR2")):
+        process = subprocess.Popen([HPR, *ARGUMENTS, "-o", "j.exr", "--spp", str(SAMPLES), "--ranks", "2"], cwd=folder,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while process.poll() is None and not processes.children_of(process.pid):
+            pass
+        process.send_signal(wanted)
+        said, message = process.communicate(timeout=300)
+        expect(process.returncode == code, f"{name} at once: left with {process.returncode} instead of {code}: {message[-800:]}")
+        expect(message.count("samples are in") == 1, f"{name} at once: not one checkpoint: {message[-800:]}")
+        expect("started" not in said, f"{name} at once: {said!r} on standard output")
+        for file in ("j.exr", "j.exr.checkpoint"):
+            (folder / file).unlink(missing_ok=True)
+
+
 def refusals(folder, state):
     resume = ["--resume", "--checkpoint", state.name, "-o", "c.exr"]
     scene, size = ["gen:gallery"], ["--size", "96x64"]
@@ -170,6 +186,7 @@ def main():
         state = write_and_go_on(folder, whole)
         if state.exists():
             refusals(folder, state)
+        as_soon_as_mpi_starts(folder)
         enough_samples(folder)
         by_what_was_chosen_before(folder)
         nowhere_to_write(folder, whole)

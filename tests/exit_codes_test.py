@@ -163,7 +163,9 @@ def main():
     expect_error("negative seed", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--seed", "-1"], [2], ["-1"])
     expect_error("two results in one file", [*dense, "--ranks", "1", "-o", "k.png", "--raw", "./k.png"], [2], ["two results"])
     expect_error("a scene's file of another kind", ["scene", "make", "cornell", "-o", "c.gltf"], [2], [".glb"])
-    expect_error("an empty list of passes", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--passes", ""], [2], ["none"])
+    expect_error("an empty list of passes", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--passes", ","], [2], ["none"])
+    for option in ("--environment", "--stats", "--aov", "--checkpoint", "--raw", "--passes", "--trace"):
+        expect_error(f"an empty {option}", ["render", "gen:cornell", "-o", "a.png", *SMALL, option, ""], [2], [option])
     expect_error("tiles that do not fit", ["bench", "rays", "gen:cornell", "--side", "127"], [2], ["--side 64"])
     expect_error("options of displays elsewhere", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--codec", "raw"],
                  [2], ["--display remote"])
@@ -190,6 +192,15 @@ def main():
                  ["wall", "run", "2x1@16x16", "none.glb", "-o", "a/b", "--ranks", "2"], [4], ["none.glb"])
     expect_error("missing wall", ["wall", "check", "none.toml"], [4], ["none.toml"])
     expect_error("missing folder", ["render", "gen:gallery", "-o", "none/a.png", *SMALL], [4], ["none"])
+    expect_error("a scene that would be replaced", ["render", "a.gltf", "-o", "a.png", *SMALL, "--stats", "a.gltf", "--force"], [2],
+                 ["a.gltf"], prepare=writer("a.gltf", "precious"))
+    expect_error("an environment that would be replaced",
+                 ["render", "gen:cornell", "-o", "./a.png", *SMALL, "--environment", "a.png", "--force"], [2], ["a.png"],
+                 prepare=writer("a.png", "precious"))
+    expect_error("an eye nowhere", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--eye", "1e300,0,0", "--at", "0,0,0"], [2],
+                 ["finite"])
+    expect_error("indirect light without photons", ["render", "gen:cornell", "-o", "a.png", *SMALL, "--indirect", "--photons", "0"],
+                 [2], ["--indirect"])
     expect_error("existing picture", ["render", "gen:gallery", "-o", "a.png", *SMALL], [4], ["--force"],
                  prepare=writer("a.png", "precious"))
 
