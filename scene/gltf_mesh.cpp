@@ -182,31 +182,30 @@ class PrimitiveBuilder {
     bool moved = false;
     for (std::size_t t = 0; t < count; ++t) {
       if (weights[t] == 0.0) continue;
-      const auto add = [&](const auto& deltas, auto& to) {
-        using Delta = typename std::remove_cvref_t<decltype(deltas)>::value_type;
-        for (std::size_t i = 0; i < to.size(); ++i) {
-          for (int axis = 0; axis < Delta::length(); ++axis) {
-            to[i][axis] = static_cast<float>(double{to[i][axis]} + weights[t] * double{deltas[i][axis]});
-          }
-        }
-      };
-      for (const auto& [name, index] : primitive_.targets[t]) {
-        // Targets of tangents leave their sign alone.
-        if (name == "POSITION") add(data_.vec3s(index), mesh.positions);
-        if (name == "NORMAL") add(data_.vec3s(index), mesh.normals);
-        if (name == "TANGENT") add(data_.vec3s(index), mesh.tangents);
-        if (name == "TEXCOORD_0") add(data_.vec2s(index), mesh.uvs[0]);
-        if (name == "TEXCOORD_1") add(data_.vec2s(index), mesh.uvs[1]);
-        if (name != "COLOR_0") continue;
-        if (data_.accessor(index).type == TINYGLTF_TYPE_VEC4) {
-          add(data_.vec4s(index), mesh.colors);
-        } else {
-          add(data_.vec3s(index), mesh.colors);
-        }
-      }
+      for (const auto& [name, index] : primitive_.targets[t]) move(mesh, name, index, weights[t]);
       moved = true;
     }
     if (moved) check_positions(mesh.positions);
+  }
+
+  void move(Mesh& mesh, const std::string& name, int index, double weight) const {
+    const auto add = [&](const auto& deltas, auto& to) {
+      using Delta = typename std::remove_cvref_t<decltype(deltas)>::value_type;
+      for (std::size_t i = 0; i < to.size(); ++i) {
+        for (int axis = 0; axis < Delta::length(); ++axis) {
+          to[i][axis] = static_cast<float>(double{to[i][axis]} + weight * double{deltas[i][axis]});
+        }
+      }
+    };
+    // Targets of tangents leave their sign alone.
+    if (name == "POSITION") add(data_.vec3s(index), mesh.positions);
+    if (name == "NORMAL") add(data_.vec3s(index), mesh.normals);
+    if (name == "TANGENT") add(data_.vec3s(index), mesh.tangents);
+    if (name == "TEXCOORD_0") add(data_.vec2s(index), mesh.uvs[0]);
+    if (name == "TEXCOORD_1") add(data_.vec2s(index), mesh.uvs[1]);
+    if (name != "COLOR_0") return;
+    if (data_.accessor(index).type == TINYGLTF_TYPE_VEC4) return add(data_.vec4s(index), mesh.colors);
+    add(data_.vec3s(index), mesh.colors);
   }
 
   void skin(Mesh& mesh, const std::vector<glm::dmat4>& joints) const {
