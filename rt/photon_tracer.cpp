@@ -1,7 +1,10 @@
 #include "rt/photon_tracer.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
@@ -9,6 +12,7 @@
 #include <utility>
 
 #include "cluster/collectives.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "rt/denormals.h"
 #include "rt/photon_gather.h"
@@ -120,10 +124,40 @@ struct PhotonTracer::Block {
   }
 };
 
+namespace {
+
+/// Photons that this machine's memory holds in all the places they take while maps are made of them.
+std::uint64_t most_in_memory() {
+  constexpr std::uint64_t kBytes = 128;
+  return static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) /
+         kBytes;
+}
+
+/// Counts what the threads of a rank keep: memory that is promised and not there ends programs without a word.
+class KeptPhotons {
+ public:
+  /// Every rank gets the photons of all: this one's are a share of them.
+  KeptPhotons(std::uint64_t most, const PhotonRange& range, std::uint64_t pass_photons)
+      : most_(static_cast<double>(most) * static_cast<double>(range.count) / static_cast<double>(pass_photons)) {}
+
+  void add(std::uint64_t count) {
+    if (static_cast<double>(kept_.fetch_add(count) + count) <= most_) return;
+    throw Error(ExitCode::Limit, "the photons of one sample take more memory than this machine has",
+                "send fewer in a sample, and take more samples: --photons, --spp");
+  }
+
+ private:
+  double most_;
+  std::atomic<std::uint64_t> kept_{0};
+};
+
+}  // namespace
+
 TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const {
   const std::uint64_t stream = photon_stream(key);
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
+  KeptPhotons kept(settings_.most_kept > 0 ? settings_.most_kept : most_in_memory(), range, pass_photons);
   parallel_for(settings_.threads, count, [&](std::size_t i) {
     const DenormalsAsZero mode;
     Block block;
@@ -132,6 +166,7 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
           1.0 / static_cast<double>(pass_photons), block);
     while (!block.flights.empty()) move(block);
     block.sort();
+    kept.add(block.traced.caustic.size() + block.traced.global.size());
     traced[i] = std::move(block.traced);
   });
   TracedPhotons all;

@@ -24,6 +24,7 @@ struct PhotonSettings {
   bool caustics_only = false;   ///< photons end where they would cease to be caustic ones
   int max_bounces = 1024;       ///< roulette ends paths long before, but for scenes that absorb less than 1 %
   int threads = 1;
+  std::uint64_t most_kept = 0;  ///< in a pass, on all ranks; 0: what this machine's memory holds
 };
 
 struct PhotonCounts {
@@ -81,7 +82,8 @@ class PhotonTracer {
         has_coverage_(has_coverage(scene)) {}
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
-  /// take successive ranges: the photons of all passes together are spread evenly.
+  /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are
+  /// kept than may be.
   [[nodiscard]] TracedPhotons trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const;
 
  private:

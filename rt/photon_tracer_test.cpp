@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "cluster/local_communicator.h"
+#include "core/error.h"
 #include "rt/photon_test_tools.h"
 
 namespace hpr {
@@ -111,6 +112,25 @@ TEST(PhotonTracerTest, ALightsRangeEndsTheFirstLegOfItsPhotons) {
   ASSERT_EQ(some.size(), everywhere.size());  // what was scattered goes on as far as it likes
   const double left = 1.0 - 0.8 * 0.8 * 0.8 * 0.8;
   for (std::size_t i = 0; i < some.size(); ++i) EXPECT_NEAR(some[i].flux[0], left * everywhere[i].flux[0], 1e-6);
+}
+
+TEST(PhotonTracerTest, MorePhotonsThanMayBeKeptAreAnError) {
+  const PhotonRoom room = matte_room(0.5F);
+  const PhotonTracer all = room.tracer(test::glowing_room());
+  const std::uint64_t kept = all.trace({}, {0, 5000}, 5000).global.size();
+  const PhotonTracer some = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept});
+  EXPECT_EQ(some.trace({}, {0, 5000}, 5000).global.size(), kept);
+  for (const int ranks : {1, 2}) {
+    // Of two ranks each keeps about half, and gets the other half.
+    const std::uint64_t count = 5000U / static_cast<unsigned>(ranks);
+    const PhotonTracer few = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept * 3 / 4});
+    try {
+      (void)few.trace({}, {0, count}, 5000);
+      FAIL() << ranks;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::Limit);
+    }
+  }
 }
 
 TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {
