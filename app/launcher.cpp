@@ -116,8 +116,7 @@ extern "C" void pass_on(int signal) {
     }
   }
   if (signal != SIGALRM && weight_of(signal) >= weight_of(early.load())) {
-    early.store(signal);
-    if (is_request(signal) && !started.load()) ::alarm(kLongestStart);
+    if (early.exchange(signal) == 0 && is_request(signal) && !started.load()) ::alarm(kLongestStart);
   }
   pass_on_early();
   errno = error;
@@ -144,8 +143,9 @@ class PassedSignals {
     }
   }
   ~PassedSignals() {
-    ::alarm(0);
-    for (std::size_t i = 0; i < count_; ++i) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
+    for (std::size_t i = count_; i-- > 1;) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
+    ::alarm(0);  // no handler sets it any more
+    ::sigaction(kSignals.front(), &before_.front(), nullptr);
     // As if it had not been caught.
     if (const int signal = interrupted_by.load(); signal != 0 && !stops.load()) ::raise(signal);
   }
@@ -188,17 +188,16 @@ class StartMark {
     const bool like = front_.compare(0, length, kStartMark, 0, length) == 0;
     if (like && length < kStartMark.size()) return {};
     looked_ = true;
-    seen_ = like;
     note_start();
     return std::string_view(front_).substr(like ? length : 0);
   }
 
-  [[nodiscard]] bool seen() const { return seen_; }
+  /// Whether the job has said anything. Where ranks run elsewhere that may be all there is to go by.
+  [[nodiscard]] bool heard() const { return looked_; }
 
  private:
   std::string front_;
   bool looked_ = false;
-  bool seen_ = false;
 };
 
 /// Collects what the job says on its standard output in `collected`, or says it here as it comes: mpiexec does not
@@ -320,7 +319,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
   // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
-  if (code == static_cast<int>(ExitCode::CheckFailed) && !mark.seen()) {
+  if (code == static_cast<int>(ExitCode::CheckFailed) && !mark.heard() && interrupted_by.load() == 0) {
     throw Error(
         ExitCode::Io, fmt::format("MPI could not start {} ranks", ranks),
         "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "

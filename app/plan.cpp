@@ -132,7 +132,8 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   }
   if (!gives_light(session.scene())) {
     lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
-  } else if (!session.requirements().indirect.needed && !session.requirements().shadow.needed) {
+  } else if (session.scene().triangles > 0 && !session.requirements().indirect.needed &&
+             !session.requirements().shadow.needed) {
     lines.emplace_back("light: none (what the scene has of lights is black)");
   }
   if (!plan.rays.half_resolution.empty()) {

@@ -25,14 +25,15 @@ struct Closest {
   const Passed* passed;  ///< by lane; null: none has passed anything
 };
 
-/// Two triangles that share an edge put a ray's distance to it at most this far apart, relative to it.
+/// Two triangles that share an edge put a ray's distance to it at most about this far apart, relative to the larger of
+/// it and the scene, whose size is about 1 in ray space.
 constexpr float kSameEdge = 8 * std::numeric_limits<float>::epsilon();
 
 /// Whether the ray has that behind it already.
 bool was_met(const Passed& passed, std::uint32_t surface, std::uint32_t geometry, float distance) {
   if (passed.surface == kNoSurface) return false;
   if (geometry == passed.geometry) {
-    return surface == passed.surface || distance <= passed.distance * (1.0F + kSameEdge);
+    return surface == passed.surface || distance <= passed.distance + kSameEdge * std::max(passed.distance, 1.0F);
   }
   return distance < passed.distance || (distance == passed.distance && surface < passed.surface);
 }

@@ -167,6 +167,7 @@ void add_spd_light(Scene& scene, const glm::dvec3& position, double irradiance) 
 void add_camera(Scene& scene, std::string name, const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up,
                 double vertical_fov_degrees) {
   Camera camera = look_at(eye, at, up, vertical_fov_degrees * (std::numbers::pi / 180.0));
+  std::get<PerspectiveLens>(camera.lens).at_distance = 0.0;  // as of cameras of files
   camera.name = std::move(name);
   scene.cameras.push_back(std::move(camera));
 }

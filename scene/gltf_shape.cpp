@@ -245,12 +245,13 @@ void stand_in_for_glossiness(const GltfItem& material) {
   const auto extensions = material.object("extensions");
   const auto glossy = extensions ? extensions->object("KHR_materials_pbrSpecularGlossiness") : std::nullopt;
   if (!glossy || material.has("pbrMetallicRoughness")) return;
-  const double glossiness = glossy->clamped("glossinessFactor", 0.0, 1.0).value_or(1.0);
+  double glossiness = glossy->clamped("glossinessFactor", 0.0, 1.0).value_or(1.0);
+  if (glossy->has("specularGlossinessTexture")) glossiness *= 0.5;  // its alpha is seldom all white
   nlohmann::json stand_in{{"metallicFactor", 0.0}, {"roughnessFactor", 1.0 - glossiness}};
   if (glossy->has("diffuseFactor")) stand_in["baseColorFactor"] = glossy->value()["diffuseFactor"];
   if (glossy->has("diffuseTexture")) stand_in["baseColorTexture"] = glossy->value()["diffuseTexture"];
   material.warn("extensions.KHR_materials_pbrSpecularGlossiness",
-                "taken as a dielectric of its diffuse colour and glossinessFactor");
+                "taken as a dielectric of its diffuse colour and glossinessFactor, halved where a texture says more");
   material.value()["pbrMetallicRoughness"] = std::move(stand_in);
 }
 
