@@ -136,6 +136,8 @@ class PassedSignals {
     stops.store(options.interrupts == Interrupts::Stop);
     struct sigaction action {};
     action.sa_handler = pass_on;
+    // One at a time: two that meet in the handler would lose one of them.
+    for (const int signal : kSignals) ::sigaddset(&action.sa_mask, signal);
     for (std::size_t i = 0; i < count_; ++i) {
       ::sigaction(kSignals.at(i), nullptr, &before_.at(i));
       // What nohup, or a shell for its background, has us ignore stays ignored.

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -13,6 +15,7 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/parallel.h"
+#include "scene/scene_files.h"
 #include "walls/budget_json.h"
 
 namespace hpr {
@@ -192,12 +195,21 @@ void check_distinct(std::span<const std::string> paths, const std::string& trace
 }
 
 void check_spared(std::span<const std::string> inputs, std::span<const std::string> results) {
+  std::vector<std::string> replaced;
+  std::ranges::copy_if(results, std::back_inserter(replaced), [](const std::string& result) {
+    std::error_code error;
+    return !result.empty() && std::filesystem::exists(result, error);
+  });
+  if (replaced.empty()) return;  // spares reading scenes twice
   for (const std::string& input : inputs) {
-    for (const std::string& result : results) {
-      std::error_code error;
-      if (input.empty() || result.empty() || !std::filesystem::equivalent(input, result, error) || error) continue;
-      throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result)),
-                  "give the result another name");
+    if (input.empty()) continue;
+    for (const std::filesystem::path& file : files_of_scene(input)) {
+      for (const std::string& result : replaced) {
+        std::error_code error;
+        if (!std::filesystem::equivalent(file, result, error) || error) continue;
+        throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result)),
+                    "give the result another name");
+      }
     }
   }
 }

@@ -100,8 +100,9 @@ def write_gltf(last_index):
     return prepare
 
 
-def writer(name, text):
-    return lambda folder: (folder / name).write_text(text)
+def writer(*files):
+    """Writes files into a folder: a name, its text, a name, ..."""
+    return lambda folder: [(folder / name).write_text(text) for name, text in zip(files[::2], files[1::2])]
 
 
 TWICE = """hpr_wall = 1
@@ -194,6 +195,9 @@ def main():
     expect_error("missing folder", ["render", "gen:gallery", "-o", "none/a.png", *SMALL], [4], ["none"])
     expect_error("a scene that would be replaced", ["render", "a.gltf", "-o", "a.png", *SMALL, "--stats", "a.gltf", "--force"], [2],
                  ["a.gltf"], prepare=writer("a.gltf", "precious"))
+    named = '{"asset": {"version": "2.0"}, "images": [{"uri": "a.png"}]}'
+    expect_error("a scene's picture that would be replaced", ["render", "b.gltf", "-o", "a.png", *SMALL, "--force"], [2],
+                 ["a.png"], prepare=writer("a.png", "precious", "b.gltf", named))
     expect_error("an environment that would be replaced",
                  ["render", "gen:cornell", "-o", "./a.png", *SMALL, "--environment", "a.png", "--force"], [2], ["a.png"],
                  prepare=writer("a.png", "precious"))

@@ -1,0 +1,46 @@
+#include "scene/scene_files.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "scene/gltf_scan.h"
+#include "scene/gltf_uri.h"
+#include "scene/load_scene.h"
+
+namespace hpr {
+namespace {
+
+/// The file a buffer or picture says it lies in, if any.
+void add_named(const nlohmann::json& item, const std::filesystem::path& folder,
+               std::vector<std::filesystem::path>& files) {
+  const auto uri = item.is_object() ? item.find("uri") : item.end();
+  if (uri == item.end() || !uri->is_string() || is_data_uri(uri->get_ref<const std::string&>())) return;
+  try {
+    files.push_back(folder / jailed_path(uri->get_ref<const std::string&>(), ""));
+  } catch (const Error&) {  // load_scene tells
+  }
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> files_of_scene(const std::string& source) {
+  if (source.starts_with("gen:")) return {};
+  const std::filesystem::path path = source;
+  std::vector<std::filesystem::path> files{path};
+  try {
+    const SceneLimits limits;
+    const std::vector<std::byte> bytes = read_file(path, limits.file_bytes);
+    GltfContext context(source, limits);
+    const nlohmann::json root = nlohmann::json::parse(scan_gltf(bytes, context).json, nullptr, false);
+    if (!root.is_object()) return files;
+    for (const char* const list : {"buffers", "images"}) {
+      if (!root.contains(list) || !root[list].is_array()) continue;
+      for (const nlohmann::json& item : root[list]) add_named(item, path.parent_path(), files);
+    }
+  } catch (const Error&) {  // load_scene tells
+  }
+  return files;
+}
+
+}  // namespace hpr
