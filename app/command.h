@@ -66,6 +66,7 @@ class Command {
 struct HostShare {
   std::string host;
   int local_rank = 0;  ///< among the ranks of this host
+  int ranks = 1;       ///< of this host
   int threads = 1;
 };
 

@@ -1,6 +1,9 @@
 #include "app/demo_command.h"
 
+#include <array>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
 #include "app/wall_run.h"
 
@@ -8,6 +11,13 @@ namespace hpr {
 namespace {
 
 constexpr const char* kPicture = "hpr-demo.png";
+
+bool holds_png(const char* path) {
+  constexpr std::string_view kSignature = "\x89PNG\r\n\x1A\n";
+  std::array<char, kSignature.size()> begin{};
+  std::ifstream(path, std::ios::binary).read(begin.data(), begin.size());
+  return std::string_view(begin.data(), begin.size()) == kSignature;
+}
 
 class DemoCommand final : public Command {
  public:
@@ -40,7 +50,7 @@ class DemoCommand final : public Command {
     run.options.half_resolution = "shadow,photon";
     // The demo's own picture may be made again and again; a name the user chose is guarded as everywhere.
     Globals own = globals;
-    own.force = globals.force || output_ == kPicture;
+    own.force = globals.force || (output_ == kPicture && holds_png(kPicture));
     return run_wall(run, own);
   }
 

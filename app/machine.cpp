@@ -1,7 +1,11 @@
 #include "app/machine.h"
 
+#include <sched.h>
+#include <unistd.h>
+
 #include <fstream>
 
+#include "app/launcher.h"
 #include "cluster/mpi_communicator.h"
 #include "core/parallel.h"
 
@@ -20,8 +24,21 @@ std::string cpu_model() {
 
 }  // namespace
 
+int job_cores() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  if (::sched_getaffinity(0, sizeof(cores), &cores) != 0) return usable_cores();
+  if (inside_mpi_job()) {
+    // Who started this rank is bound to nothing less than the job.
+    cpu_set_t launcher;
+    CPU_ZERO(&launcher);
+    if (::sched_getaffinity(::getppid(), sizeof(launcher), &launcher) == 0) CPU_OR(&cores, &cores, &launcher);
+  }
+  return CPU_COUNT(&cores);
+}
+
 Machine this_machine() {
-  return {cpu_model(), usable_cores(), mpi_version()};
+  return {cpu_model(), job_cores(), mpi_version()};
 }
 
 }  // namespace hpr

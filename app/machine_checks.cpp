@@ -19,6 +19,7 @@
 
 #include "app/doctor.h"
 #include "app/launcher.h"
+#include "app/machine.h"
 #include "core/error.h"
 #include "core/names.h"
 #include "core/parallel.h"
@@ -52,7 +53,7 @@ std::string proc_value(const char* path, std::string_view key) {
 
 Finding check_cpu() {
   const std::string model = proc_value("/proc/cpuinfo", "model name");
-  const int cores = usable_cores();
+  const int cores = job_cores();
   const bool avx2 = __builtin_cpu_supports("avx2") != 0;
   const char* const isa = __builtin_cpu_supports("avx512f") != 0 ? "AVX-512" : avx2 ? "AVX2" : "SSE";
   std::string detail =

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "app/command.h"
+#include "app/host_name.h"
 #include "app/knobs.h"
 #include "app/launcher.h"
 #include "app/report_error.h"
@@ -220,8 +221,9 @@ int main(int argc, char** argv) {
     return static_cast<int>(code);
   } catch (const hpr::Error& error) {
     // What every rank of a job finds before MPI starts is said once: rank 0's exit ends the others while they wait.
-    if (hpr::launched_rank() != 0) std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    hpr::print_error(error, hpr::launched_rank() == 0 ? "" : fmt::format("rank {}: ", hpr::launched_rank()));
+    if (hpr::launched_rank() != 0) std::this_thread::sleep_for(std::chrono::seconds(2));
+    hpr::print_error(
+        error, hpr::launched_rank() == 0 ? "" : fmt::format("rank {} on {}: ", hpr::launched_rank(), hpr::host_name()));
     return static_cast<int>(error.code());
   } catch (const std::system_error& error) {  // how fmt reports a failed print
     hpr::print_error({hpr::ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});

@@ -104,16 +104,16 @@ HostShare host_share(Communicator& comm, const Globals& globals) {
   const std::string mine = host_name();
   HostShare share;
   share.host = mine;
-  int ranks_here = 0;
+  share.ranks = 0;
   const std::vector<std::string> hosts = all_gather_texts(comm, mine);
   for (int rank = 0; rank < comm.size(); ++rank) {
     if (hosts[static_cast<std::size_t>(rank)] != mine) continue;
     if (rank < comm.rank()) ++share.local_rank;
-    ++ranks_here;
+    ++share.ranks;
   }
   // A launcher may already have given this rank cores of its own; else the ranks of a host share all of them.
   const int online = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  share.threads = globals.threads > 0 ? globals.threads : std::clamp(online / ranks_here, 1, usable_cores());
+  share.threads = globals.threads > 0 ? globals.threads : std::clamp(online / share.ranks, 1, usable_cores());
   return share;
 }
 

@@ -137,6 +137,7 @@ Lighter& Session::lighter(const RaySettings& settings) {
     const trace::Span span("prepare light");
     RaySettings own = settings;
     own.threads = share_.threads;
+    own.host_ranks = share_.ranks;
     lighter_ = std::make_unique<Lighter>(scene_, own, requirements_,
                                          [this]() -> const RayScene& { return ray_scene(ray_build_); });
     ray_settings_ = settings;

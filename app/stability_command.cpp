@@ -9,7 +9,9 @@
 
 #include "app/progress.h"
 #include "app/stability/stability.h"
+#include "core/error.h"
 #include "core/file.h"
+#include "core/log.h"
 #include "core/names.h"
 
 namespace hpr {
@@ -68,11 +70,29 @@ class StabilityCommand final : public Command {
     return some;
   }
 
+  /// A case that ends in an error breaks, and keeps nobody from the findings of the others.
+  static std::vector<StabilityFinding> findings_of(const StabilityCase& one, const Globals& globals) {
+    try {
+      return one.measure(globals);
+    } catch (const Error& error) {
+      if (error.code() == ExitCode::NoDevice) throw;
+      log::error("{}: {}", one.name, error.what());
+      return {{.name = fmt::format("{}/ended", one.name),
+               .parameter = error.what(),
+               .limit = 0.0,
+               .measured = 1.0,
+               .unit = "errors",
+               .bound = Bound::AtMost,
+               .breaks_at = std::nullopt,
+               .why = "every case can be measured to its end"}};
+    }
+  }
+
   static std::vector<StabilityFinding> measure(const std::vector<StabilityCase>& cases, const Globals& globals) {
     Progress progress(globals.progress, "case", cases.size());
     std::vector<StabilityFinding> findings;
     for (const StabilityCase& one : cases) {
-      const std::vector<StabilityFinding> found = one.measure(globals);
+      const std::vector<StabilityFinding> found = findings_of(one, globals);
       findings.insert(findings.end(), found.begin(), found.end());
       progress.step(std::string(one.name));
     }

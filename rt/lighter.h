@@ -45,6 +45,7 @@ struct RaySettings {
   bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
   std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;
+  int host_ranks = 1;  ///< that share this one's memory
 
   bool operator==(const RaySettings&) const = default;
 };

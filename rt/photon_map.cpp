@@ -58,14 +58,15 @@ std::uint32_t pack_facing(const glm::dvec3& normal, std::uint8_t layer) {
   return to_bits<12>(at.x) | (to_bits<12>(at.y) << 12U) | (std::uint32_t{layer} << 24U);
 }
 
-PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius) : space_(space) {
+PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius, double flux_unit)
+    : space_(space) {
   if (!(radius > 0.0) || !std::isfinite(radius) || photons.empty()) return;
   if (photons.size() > kMost) {
     throw Error(ExitCode::Limit, "more than 2^29 photons in one map", "send fewer photons in a pass: --photons");
   }
   const double scaled = std::max(radius * space.scale, kLeastRadius);
   radius_ = scaled / space.scale;
-  density_ = 2.0 / (std::numbers::pi * radius_ * radius_);
+  density_ = 2.0 / (std::numbers::pi * radius_ * radius_) * flux_unit;
   radius2_ = scaled * scaled;
   inverse_radius2_ = 1.0 / radius2_;
   flatness_ = kFlatness * scaled + 2.0 * kFloatStep;  // what float positions may stray from their plane

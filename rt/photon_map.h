@@ -40,7 +40,7 @@ struct Photon {
   std::array<float, 3> position{};  ///< ray space
   std::uint32_t facing = 0;         ///< packed: the geometric normal on the side it arrived on, and SurfacePoint::layer
   std::uint32_t direction = 0;      ///< packed: towards where it came from
-  std::array<float, 3> flux{};      ///< W
+  std::array<float, 3> flux{};      ///< in PhotonSettings::flux_unit
 
   bool operator==(const Photon&) const = default;
 };
@@ -58,8 +58,8 @@ class PhotonMap {
   PhotonMap() = default;
 
   /// `radius` in metres; not positive, not a number or infinite: the map stays empty. Photons whose position or flux is
-  /// not finite are left out. Throws Error (Limit) past 2^29 photons.
-  PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius);
+  /// not finite are left out. `flux_unit`: that of their flux, W. Throws Error (Limit) past 2^29 photons.
+  PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius, double flux_unit = 1.0);
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double radius() const { return radius_; }
@@ -73,7 +73,7 @@ class PhotonMap {
   /// the rim, so that what lies there matters little and pictures are continuous.
   void find(const glm::dvec3& place, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const;
 
-  /// 1/m^2: times this, the sum of weights and fluxes is an irradiance.
+  /// W/m^2 per flux unit: times this, the sum of weights and fluxes is an irradiance.
   [[nodiscard]] double density() const { return density_; }
 
   /// By FoundPhotons::index.
@@ -129,7 +129,7 @@ class PhotonMap {
   RaySpace space_;
   std::size_t size_ = 0;
   double radius_ = 0.0;
-  double density_ = 0.0;  ///< kernel's factor, 1/m^2
+  double density_ = 0.0;  ///< kernel's factor, W/m^2 per flux unit
   // In ray space:
   double radius2_ = 0.0;
   double inverse_radius2_ = 0.0;

@@ -1,5 +1,6 @@
 #include "rt/photon_maps.h"
 
+#include <cmath>
 #include <utility>
 
 #include "core/parallel.h"
@@ -7,11 +8,19 @@
 namespace hpr {
 namespace {
 
-PhotonSettings tracer_settings(const RaySettings& settings) {
+/// The power of two below what a photon carries in the mean, so that no scene's light leaves the range of floats.
+double flux_unit_of(const LightSet& lights, const RaySettings& settings) {
+  const double each = lights.power() / settings.photons;
+  return each > 0.0 && std::isfinite(each) ? std::ldexp(1.0, std::ilogb(each)) : 1.0;
+}
+
+PhotonSettings tracer_settings(const RaySettings& settings, double flux_unit) {
   PhotonSettings own;
   own.glossy_cutoff = settings.glossy_cutoff;
   own.caustics_only = !settings.global_photons;
   own.threads = settings.threads;
+  own.host_ranks = settings.host_ranks;
+  own.flux_unit = flux_unit;
   return own;
 }
 
@@ -21,12 +30,13 @@ PhotonSender::PhotonSender(const Scene& scene, const Surfaces& surfaces, const R
                            const LightSet& lights, const RaySettings& settings)
     : space_(space),
       settings_(settings),
+      flux_unit_(flux_unit_of(lights, settings)),
       tracer_(
           scene, surfaces, space, rays,
           [&lights](double choice, const glm::dvec2& place, const glm::dvec2& direction) {
             return lights.emit(choice, place, direction);
           },
-          tracer_settings(settings)) {}
+          tracer_settings(settings, flux_unit_)) {}
 
 TracedPhotons PhotonSender::trace(const SampleNumber& number, Communicator* comm) {
   const std::uint64_t each = settings_.photons;
@@ -57,7 +67,8 @@ const PhotonMaps& PhotonSender::send(const SampleNumber& number, Communicator* c
   parallel_for(settings_.threads, 2, [&](std::size_t which) {
     const std::vector<Photon>& photons = which == 0 ? traced.caustic : traced.global;
     PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;
-    map = PhotonMap(photons, space_, progressive_radius(which == 0 ? caustic_radius_ : global_radius_, number.sample));
+    const double first = which == 0 ? caustic_radius_ : global_radius_;
+    map = PhotonMap(photons, space_, progressive_radius(first, number.sample), flux_unit_);
   });
   sent_ = number;
   return maps_;

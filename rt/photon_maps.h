@@ -42,6 +42,7 @@ class PhotonSender {
 
   RaySpace space_;
   RaySettings settings_;
+  double flux_unit_;
   PhotonTracer tracer_;
   std::optional<SampleNumber> sent_;
   double caustic_radius_ = 0.0;  ///< metres, of a frame's first sample; 0: not chosen yet

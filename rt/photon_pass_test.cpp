@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "cluster/local_communicator.h"
 #include "rt/lighter.h"
@@ -14,14 +15,14 @@ using test::add_mesh;
 using test::place;
 using test::quad;
 
-/// A closed box of one grey that emits: light is the same everywhere inside.
-Scene furnace(float albedo, float emission) {
+/// A closed box of one grey that emits, two of `size` a side: light is the same everywhere inside.
+Scene furnace(float albedo, float emission, float size = 1.0F) {
   Scene scene;
   Material wall = test::matte(glm::vec3(albedo));
   wall.emissive = glm::vec3(emission);
   add_material(scene, wall);
   const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b) {
-    place(scene, add_mesh(scene, quad(corner, a, b, 0)));
+    place(scene, add_mesh(scene, quad(size * corner, size * a, size * b, 0)));
   };
   side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0});
   side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0});
@@ -66,6 +67,27 @@ TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
       EXPECT_TRUE(std::ranges::equal(lit.tile(0), alone.tile(0)));
     });
   }
+}
+
+TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
+  const RaySettings settings{.photons = 5'000, .global_photons = true};
+  const auto picture = [&](int strength, int size) {
+    const double scale = std::ldexp(1.0, size);
+    const Scene scene = furnace(0.5F, std::ldexp(1.0F, strength), static_cast<float>(scale));
+    const View view = test::view_from({0, 0, 0.5 * scale}, {0.1 * scale, 0.2 * scale, -scale}, {8, 8}, scene, 0.5);
+    const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+    TileLayer<Rgb> lit(keys.layout());
+    Lighter lighter(scene, settings);
+    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit});
+    std::vector<float> green;
+    for (const Rgb& color : lit.tile(0)) green.push_back(std::ldexp(color.g, -strength));
+    return green;
+  };
+  const std::vector<float> one = picture(0, 0);
+  EXPECT_GT(one.front(), 1.5F);
+  // Photons of 2^-130 W and of 2^140 W, where floats reach from 2^-126 to 2^127.
+  EXPECT_EQ(picture(-110, -5), one);
+  EXPECT_EQ(picture(100, 25), one);
 }
 
 TEST(PhotonPass, SendsNothingWhereNobodyAsksAndNoCausticsWhereNothingBundlesLight) {

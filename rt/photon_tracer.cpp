@@ -126,11 +126,11 @@ struct PhotonTracer::Block {
 
 namespace {
 
-/// Photons that this machine's memory holds in all the places they take while maps are made of them.
-std::uint64_t most_in_memory() {
+/// Photons that a share of this machine's memory holds in all the places they take while maps are made of them.
+std::uint64_t most_in_memory(int sharers) {
   constexpr std::uint64_t kBytes = 128;
   return static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) /
-         kBytes;
+         (kBytes * static_cast<std::uint64_t>(sharers));
 }
 
 /// Counts what the threads of a rank keep: memory that is promised and not there ends programs without a word.
@@ -157,7 +157,8 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
   const std::uint64_t stream = photon_stream(key);
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
-  KeptPhotons kept(settings_.most_kept > 0 ? settings_.most_kept : most_in_memory(), range, pass_photons);
+  KeptPhotons kept(settings_.most_kept > 0 ? settings_.most_kept : most_in_memory(settings_.host_ranks), range,
+                   pass_photons);
   parallel_for(settings_.threads, count, [&](std::size_t i) {
     const DenormalsAsZero mode;
     Block block;
@@ -238,7 +239,7 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
   Photon photon;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     photon.position[axis] = static_cast<float>(at[static_cast<int>(axis)]);
-    photon.flux[axis] = static_cast<float>(flux[static_cast<int>(axis)]);
+    photon.flux[axis] = static_cast<float>(flux[static_cast<int>(axis)] / settings_.flux_unit);
   }
   photon.facing = pack_facing(surface.geometric_normal, surface.layer);
   photon.direction = pack_direction(surface.to_viewer);

@@ -24,7 +24,9 @@ struct PhotonSettings {
   bool caustics_only = false;   ///< photons end where they would cease to be caustic ones
   int max_bounces = 1024;       ///< roulette ends paths long before, but for scenes that absorb less than 1 %
   int threads = 1;
-  std::uint64_t most_kept = 0;  ///< in a pass, on all ranks; 0: what this machine's memory holds
+  double flux_unit = 1.0;       ///< W, a power of two: kept fluxes are floats and reach from 2^-126 to 2^127 of it
+  std::uint64_t most_kept = 0;  ///< in a pass, on all ranks; 0: what this rank's share of the memory holds
+  int host_ranks = 1;           ///< that share this machine's memory, each with all photons
 };
 
 struct PhotonCounts {

@@ -131,6 +131,9 @@ TEST(PhotonTracerTest, MorePhotonsThanMayBeKeptAreAnError) {
       EXPECT_EQ(error.code(), ExitCode::Limit);
     }
   }
+  // So many ranks leave none of them the memory for a thousand.
+  const PhotonTracer crowded = room.tracer(test::glowing_room(), {.threads = 2, .host_ranks = 1 << 30});
+  EXPECT_THROW((void)crowded.trace({}, {0, 5000}, 5000), Error);
 }
 
 TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {

@@ -18,11 +18,14 @@ constexpr std::array<std::string_view, 9> kSupported{
     "KHR_materials_ior",       "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_materials_volume",    "KHR_mesh_quantization",      "KHR_texture_transform"};
 
+/// Taken, where it stands alone, as something that is drawn; check_shape tells.
+constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
+
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
 constexpr std::array<std::string_view, 10> kLooks{
     "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion", "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_dispersion", "KHR_materials_iridescence", kStandsIn,
     "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_variants",
     "KHR_xmp_json_ld"};
 
@@ -42,6 +45,18 @@ std::set<std::string> names_in(const GltfItem& root, const char* key) {
     if (!names.insert(name).second) root.warn(key, fmt::format("names {} twice", printable(name)));
   }
   return names;
+}
+
+/// Of materials: what changes their look and is neither drawn nor declared, and so not told of yet.
+void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& used) {
+  root.each("materials", Presence::Optional, [&](const GltfItem& material) {
+    const auto extensions = material.object("extensions");
+    if (!extensions) return;
+    for (const auto& [name, value] : extensions->value().items()) {
+      if (used.contains(name) || contains(kSupported, name) || name == kStandsIn) continue;
+      material.warn("extensions", fmt::format("{} is ignored", printable(name)));
+    }
+  });
 }
 
 }  // namespace
@@ -71,6 +86,7 @@ void check_extensions(nlohmann::json& document, GltfContext& context) {
     if (required.contains(name) || contains(kSupported, name)) continue;
     root.warn("extensionsUsed", fmt::format("{} is ignored", printable(name)));
   }
+  warn_of_undeclared(root, used);
 }
 
 }  // namespace hpr

@@ -112,6 +112,16 @@ TEST(GltfRefusal, UnknownRequiredExtensionsAreNamed) {
   expect_refused(document.json, "XYZ_unheard_of");
 }
 
+TEST(GltfRefusal, MaterialsTellOfExtensionsThatAreNotDrawnDeclaredOrNot) {
+  auto document = triangle();
+  document.json["materials"] = {{{"extensions", {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}}}}}};
+  EXPECT_TRUE(test::warns_of(test::load(document.json), "materials[0].extensions: KHR_materials_sheen"));
+  document.json["materials"] = {{{"extensions", {{"KHR_materials_ior", {{"ior", 1.4}}}}}}};
+  EXPECT_TRUE(test::load(document.json).warnings.empty());
+  document.json["extensionsUsed"] = {"KHR_materials_ior"};
+  EXPECT_TRUE(test::load(document.json).warnings.empty());
+}
+
 TEST(GltfRefusal, CompressedMeshesAreRefusedWithTheToolThatUnpacksThem) {
   for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}) {
     auto document = triangle();

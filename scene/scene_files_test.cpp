@@ -14,8 +14,7 @@ TEST(SceneFiles, OfADocumentAreItsOwnItsBuffersAndItsPictures) {
   const auto scene = folder.write("a.gltf", R"({"asset": {"version": "2.0"},
       "buffers": [{"uri": "sub/b%20c.bin"}, {"uri": "data:;base64,Zg=="}, {"byteLength": 1}],
       "images": [{"uri": "d.png"}, {"uri": "../out.png"}, {"uri": 7}, 8, {"bufferView": 0}]})");
-  EXPECT_EQ(files_of_scene(scene.string()),
-            (Files{scene, folder.path() / "sub/b c.bin", folder.path() / "d.png"}));
+  EXPECT_EQ(files_of_scene(scene.string()), (Files{scene, folder.path() / "sub/b c.bin", folder.path() / "d.png"}));
 }
 
 TEST(SceneFiles, WhatCannotBeReadIsJustItself) {
