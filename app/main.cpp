@@ -44,8 +44,7 @@ void declare_globals(CLI::App& app, Globals& globals) {
             ->check(CLI::Range(1, 1024)));
   group(app.add_option("--seed", globals.seed, "of everything random")->check(whole_number)->capture_default_str());
   group(app.add_option("--backend", globals.backend, "OpenGL by: auto, egl, osmesa")->capture_default_str());
-  group(
-      app.add_option("--device", globals.device, "EGL device (default: by local rank)")->check(CLI::NonNegativeNumber));
+  group(app.add_option("--device", globals.device, "EGL device (default: by local rank)")->check(CLI::Range(0, 1023)));
   group(app.add_option("--progress", globals.progress, "auto, bar, line or none")
             ->check(CLI::IsMember({"auto", "bar", "line", "none"}))
             ->capture_default_str());

@@ -87,8 +87,21 @@ class WallCommand final : public Command {
     return sub;
   }
 
+  /// With --json, what cannot be read at all is a finding too.
+  [[nodiscard]] WallReading read() const {
+    try {
+      return read_wall(wall_, overrides_);
+    } catch (const Error& error) {
+      WallFinding finding;
+      finding.what = error.what();
+      finding.hint = error.hint();
+      if (json_) fmt::print("{}", check_json({wall_, {{}, {finding}}}));
+      throw;
+    }
+  }
+
   [[nodiscard]] ExitCode check() const {
-    const WallCheck check{wall_, read_wall(wall_, overrides_)};
+    const WallCheck check{wall_, read()};
     if (json_) {
       fmt::print("{}", check_json(check));
     } else {

@@ -195,6 +195,7 @@ Distribution parse_distribution(std::string_view name) {
     if (name == name_of(choice)) return choice;
     choices.emplace_back(name_of(choice));
   }
+  choices.emplace_back("auto");  // none of them: where one is asked for, it leaves the choice to the plan
   throw Error(ExitCode::Usage, fmt::format("unknown distribution '{}'", name), unknown_name_hint(name, choices));
 }
 

@@ -64,6 +64,18 @@ def expect_error(case, arguments, codes, mentions=(), environment=None, prepare=
                 complain(case, result, f"does not say {word!r}")
 
 
+def expect_finding(arguments, code, mention):
+    """A wall that cannot be read at all is a finding of its check."""
+    case = " ".join(arguments)
+    with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+        result = run(arguments, scratch)
+    if result.returncode != code:
+        complain(case, result, f"left with {result.returncode} instead of {code}")
+    document = json.loads(result.stdout or "{}")
+    if document.get("ok") is not False or mention not in document["findings"][0]["what"]:
+        complain(case, result, f"no finding about {mention}")
+
+
 def expect_success(case, arguments, prefix):
     with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
         result = run(arguments, scratch)
@@ -192,6 +204,8 @@ def main():
     expect_error("missing scene, wall's folder made, two ranks",
                  ["wall", "run", "2x1@16x16", "none.glb", "-o", "a/b", "--ranks", "2"], [4], ["none.glb"])
     expect_error("missing wall", ["wall", "check", "none.toml"], [4], ["none.toml"])
+    expect_finding(["wall", "check", "none.toml", "--json"], 4, "none.toml")
+    expect_finding(["wall", "check", "0x2", "--json"], 3, "0x2")
     expect_error("missing folder", ["render", "gen:gallery", "-o", "none/a.png", *SMALL], [4], ["none"])
     expect_error("a scene that would be replaced", ["render", "a.gltf", "-o", "a.png", *SMALL, "--stats", "a.gltf", "--force"], [2],
                  ["a.gltf"], prepare=writer("a.gltf", "precious"))
