@@ -137,7 +137,7 @@ class CompareCommand final : public Command {
     }
     const std::vector<std::string> results{csv_, html_, picture_, raw_};
     check_distinct(results, globals.trace);
-    check_spared(std::span(&scene_, 1), results);
+    check_spared(scene_, globals.scene_limits(), {}, results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }

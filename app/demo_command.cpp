@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string_view>
+#include <system_error>
 
 #include "app/wall_run.h"
 
@@ -50,7 +51,9 @@ class DemoCommand final : public Command {
     run.options.half_resolution = "shadow,photon";
     // The demo's own picture may be made again and again; a name the user chose is guarded as everywhere.
     Globals own = globals;
-    own.force = globals.force || (output_ == kPicture && holds_png(kPicture));
+    std::error_code error;
+    own.force =
+        globals.force || (output_ == kPicture && (!std::filesystem::exists(kPicture, error) || holds_png(kPicture)));
     return run_wall(run, own);
   }
 

@@ -94,7 +94,9 @@ void pass_on_early() {
   if (to > 0 && (started.load() || !is_request(signal))) {
     ::kill(to, signal);
   } else {
-    early.store(signal);
+    int waiting = 0;  // another may have come meanwhile
+    while (weight_of(waiting) < weight_of(signal) && !early.compare_exchange_weak(waiting, signal)) {
+    }
   }
 }
 

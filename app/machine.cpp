@@ -29,7 +29,7 @@ int job_cores() {
   CPU_ZERO(&cores);
   if (::sched_getaffinity(0, sizeof(cores), &cores) != 0) return usable_cores();
   if (inside_mpi_job()) {
-    // Who started this rank is bound to nothing less than the job.
+    // Whoever started this rank is mostly free to use what the whole job may; a script between may not be.
     cpu_set_t launcher;
     CPU_ZERO(&launcher);
     if (::sched_getaffinity(::getppid(), sizeof(launcher), &launcher) == 0) CPU_OR(&cores, &cores, &launcher);

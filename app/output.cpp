@@ -194,22 +194,22 @@ void check_distinct(std::span<const std::string> paths, const std::string& trace
   }
 }
 
-void check_spared(std::span<const std::string> inputs, std::span<const std::string> results) {
+void check_spared(const std::string& scene, const SceneLimits& limits, std::span<const std::string> inputs,
+                  std::span<const std::string> results) {
   std::vector<std::string> replaced;
   std::ranges::copy_if(results, std::back_inserter(replaced), [](const std::string& result) {
     std::error_code error;
     return !result.empty() && std::filesystem::exists(result, error);
   });
-  if (replaced.empty()) return;  // spares reading scenes twice
-  for (const std::string& input : inputs) {
-    if (input.empty()) continue;
-    for (const std::filesystem::path& file : files_of_scene(input)) {
-      for (const std::string& result : replaced) {
-        std::error_code error;
-        if (!std::filesystem::equivalent(file, result, error) || error) continue;
-        throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result)),
-                    "give the result another name");
-      }
+  if (replaced.empty()) return;  // spares reading the scene twice
+  std::vector<std::filesystem::path> files = files_of_scene(scene, limits);
+  files.insert(files.end(), inputs.begin(), inputs.end());
+  for (const std::filesystem::path& file : files) {
+    for (const std::string& result : replaced) {
+      std::error_code error;
+      if (file.empty() || !std::filesystem::equivalent(file, result, error) || error) continue;
+      throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result)),
+                  "give the result another name");
     }
   }
 }

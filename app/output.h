@@ -91,8 +91,8 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats);
 /// Throws Error (Usage) when two of these paths of results, or one and `trace`, are one file. Empty ones are none.
 void check_distinct(std::span<const std::string> paths, const std::string& trace);
 
-/// Throws Error (Usage) where a result would take the place of a file that is read: an input, or a buffer or picture of
-/// one that is a scene.
-void check_spared(std::span<const std::string> inputs, std::span<const std::string> results);
+/// Throws Error (Usage) where a result would take the place of a file that is read: one of the scene's, or of `inputs`.
+void check_spared(const std::string& scene, const SceneLimits& limits, std::span<const std::string> inputs,
+                  std::span<const std::string> results);
 
 }  // namespace hpr

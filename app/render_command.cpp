@@ -101,7 +101,7 @@ class RenderCommand final : public Command {
     const std::string beside = files_.is_png() ? files_.aov_file() : "";
     const std::vector<std::string> results{files_.picture, files_.raw, options_.stats, beside, checkpoint_};
     check_distinct(results, globals.trace);
-    check_spared(std::vector{source_, options_.environment}, results);
+    check_spared(source_, globals.scene_limits(), std::span(&options_.environment, 1), results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
     }

@@ -257,7 +257,8 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
     if (std::ranges::all_of(*point, [](double value) { return std::abs(value) <= 1e18; })) continue;
     throw Error(ExitCode::Usage, "--eye, --at and --up take finite numbers up to 1e18", "write e.g. --eye 0,1.7,5");
   }
-  if (distribute != "auto") settings.distribution = parse_distribution(distribute);
+  const std::string unsaid = "auto";
+  if (distribute != unsaid) settings.distribution = parse_distribution(distribute, std::span(&unsaid, 1));
   settings.groups = groups;
   if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
   settings.primary = parse_primary(primary);
@@ -267,7 +268,14 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   }
   settings.rays.auto_passes = passes == "auto";
   settings.rays.all_passes = passes == "all";
-  if (passes != "auto" && passes != "none" && passes != "all") settings.rays.passes = split_list(passes);
+  if (passes != "auto" && passes != "none" && passes != "all") {
+    settings.rays.passes = split_list(passes);
+    for (const std::string& name : settings.rays.passes) {
+      if (name != "auto" && name != "none" && name != "all") continue;
+      throw Error(ExitCode::Usage, fmt::format("--passes: '{}' goes with no other word", name),
+                  "leave it or the others out");
+    }
+  }
   const Quality& defaults = find_quality(quality);
   settings.rays.seed = seed;
   settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);

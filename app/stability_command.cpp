@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <new>
 #include <nlohmann/json.hpp>
 
 #include "app/progress.h"
@@ -72,19 +73,24 @@ class StabilityCommand final : public Command {
 
   /// A case that ends in an error breaks, and keeps nobody from the findings of the others.
   static std::vector<StabilityFinding> findings_of(const StabilityCase& one, const Globals& globals) {
-    try {
-      return one.measure(globals);
-    } catch (const Error& error) {
-      if (error.code() == ExitCode::NoDevice) throw;
-      log::error("{}: {}", one.name, error.what());
+    const auto ended = [&](const std::string& why) -> std::vector<StabilityFinding> {
+      log::error("{}: {}", one.name, why);
       return {{.name = fmt::format("{}/ended", one.name),
-               .parameter = error.what(),
+               .parameter = why,
                .limit = 0.0,
                .measured = 1.0,
                .unit = "errors",
                .bound = Bound::AtMost,
                .breaks_at = std::nullopt,
                .why = "every case can be measured to its end"}};
+    };
+    try {
+      return one.measure(globals);
+    } catch (const Error& error) {
+      if (error.code() == ExitCode::NoDevice) throw;  // without graphics hardly a case can be measured
+      return ended(fmt::format("{} ({})", error.what(), error.hint()));
+    } catch (const std::bad_alloc&) {
+      return ended("out of memory");
     }
   }
 

@@ -128,7 +128,7 @@ class TradeoffCommand final : public Command {
     how_.metrics = metrics_;
     const std::vector<std::string> results{csv_, html_};
     check_distinct(results, globals.trace);
-    check_spared(std::vector{scene_, options_.environment}, results);
+    check_spared(scene_, globals.scene_limits(), std::vector{options_.environment, how_.reference}, results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }

@@ -94,6 +94,7 @@ class WallCommand final : public Command {
     } catch (const Error& error) {
       WallFinding finding;
       finding.what = error.what();
+      finding.line = error.line();
       finding.hint = error.hint();
       if (json_) fmt::print("{}", check_json({wall_, {{}, {finding}}}));
       throw;

@@ -28,6 +28,7 @@
 #include "core/stopwatch.h"
 #include "image/image_io.h"
 #include "walls/assemble.h"
+#include "walls/displays/file_display.h"
 #include "walls/geometry.h"
 #include "walls/link/sender.h"
 #include "walls/manifest.h"
@@ -182,7 +183,10 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
                                    assembled_file(run).string()};
   if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
   check_distinct(results, globals.trace);
-  check_spared(std::vector{run.wall, run.scene, run.options.environment}, results);
+  if (run.writes_files()) {
+    for (const auto& file : files_of_display(wall, run.display.output)) results.push_back(file.string());
+  }
+  check_spared(run.scene, globals.scene_limits(), std::vector{run.wall, run.options.environment}, results);
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),

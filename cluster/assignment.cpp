@@ -189,13 +189,13 @@ std::string_view name_of(Distribution distribution) {
   return "";
 }
 
-Distribution parse_distribution(std::string_view name) {
+Distribution parse_distribution(std::string_view name, std::span<const std::string> further) {
   std::vector<std::string> choices;
   for (const Distribution choice : kDistributions) {
     if (name == name_of(choice)) return choice;
     choices.emplace_back(name_of(choice));
   }
-  choices.emplace_back("auto");  // none of them: where one is asked for, it leaves the choice to the plan
+  choices.insert(choices.end(), further.begin(), further.end());
   throw Error(ExitCode::Usage, fmt::format("unknown distribution '{}'", name), unknown_name_hint(name, choices));
 }
 

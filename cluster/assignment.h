@@ -17,7 +17,8 @@ enum class Distribution {
   Hybrid,     ///< groups of ranks own tiles (sort-first), ranks of a group share the objects (sort-last)
 };
 [[nodiscard]] std::string_view name_of(Distribution distribution);
-[[nodiscard]] Distribution parse_distribution(std::string_view name);  ///< Throws Error (Usage) with the choices.
+/// Throws Error (Usage) with the choices and `further` ones that the caller has.
+[[nodiscard]] Distribution parse_distribution(std::string_view name, std::span<const std::string> further = {});
 
 /// A rectangle of one screen, its edges on tile borders or the screen's edge.
 struct ScreenRect {

@@ -45,7 +45,7 @@ struct RaySettings {
   bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
   std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;
-  int host_ranks = 1;  ///< that share this one's memory
+  int host_ranks = 1;  ///< ranks of this host: they share its memory
 
   bool operator==(const RaySettings&) const = default;
 };

@@ -27,10 +27,8 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
   const std::vector<std::string> names = all_pass_names();
   for (const std::string& wanted : settings.passes) {
     if (std::ranges::find(names, wanted) == names.end()) {
-      std::vector<std::string> words{"auto", "all", "none"};  // stand for several, where passes are asked for
-      words.insert(words.end(), names.begin(), names.end());
       throw Error(ExitCode::Usage, "no ray pass is called '" + printable(wanted) + "'",
-                  unknown_name_hint(wanted, words));
+                  unknown_name_hint(wanted, names));
     }
   }
   std::vector<PassPlan> plan;

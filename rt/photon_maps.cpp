@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "cluster/collectives.h"
 #include "core/parallel.h"
 
 namespace hpr {
@@ -38,10 +39,20 @@ PhotonSender::PhotonSender(const Scene& scene, const Surfaces& surfaces, const R
           },
           tracer_settings(settings, flux_unit_)) {}
 
+/// The power of lights is a sum of sines and cosines, which other machines may round otherwise.
+void PhotonSender::agree_on_unit(Communicator& comm) {
+  if (std::exchange(agreed_, true)) return;
+  flux_unit_ = all_gather_value(comm, flux_unit_).front();
+  tracer_.set_flux_unit(flux_unit_);
+}
+
 TracedPhotons PhotonSender::trace(const SampleNumber& number, Communicator* comm) {
   const std::uint64_t each = settings_.photons;
   PhotonRange range{each * number.sample, each};
-  if (comm != nullptr) range = share_of_rank(range, comm->rank(), comm->size());
+  if (comm != nullptr) {
+    agree_on_unit(*comm);
+    range = share_of_rank(range, comm->rank(), comm->size());
+  }
   TracedPhotons traced = tracer_.trace({settings_.seed, number.frame}, range, each);
   counts_ += traced.counts;
   if (comm != nullptr) share_photons(*comm, traced);

@@ -85,7 +85,7 @@ TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
   };
   const std::vector<float> one = picture(0, 0);
   EXPECT_GT(one.front(), 1.5F);
-  // Photons of 2^-130 W and of 2^140 W, where floats reach from 2^-126 to 2^127.
+  // In watts most of these photons would lie outside of what floats reach, 2^-126 to 2^127.
   EXPECT_EQ(picture(-110, -5), one);
   EXPECT_EQ(picture(100, 25), one);
 }

@@ -12,7 +12,7 @@ namespace hpr {
 /// The light of a photon of a map.
 struct PhotonLight {
   std::uint32_t direction = 0;  ///< packed: towards where it came from
-  std::array<float, 3> flux{};  ///< W
+  std::array<float, 3> flux{};  ///< in the map's unit
 };
 static_assert(sizeof(PhotonLight) == 16);
 

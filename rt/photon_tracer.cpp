@@ -143,7 +143,7 @@ class KeptPhotons {
   void add(std::uint64_t count) {
     if (static_cast<double>(kept_.fetch_add(count) + count) <= most_) return;
     throw Error(ExitCode::Limit, "the photons of one sample take more memory than this machine has",
-                "send fewer in a sample, and take more samples: --photons, --spp");
+                "send fewer in a sample and take more samples (--photons, --spp), or run fewer ranks on a host");
   }
 
  private:

@@ -26,7 +26,7 @@ struct PhotonSettings {
   int threads = 1;
   double flux_unit = 1.0;       ///< W, a power of two: kept fluxes are floats and reach from 2^-126 to 2^127 of it
   std::uint64_t most_kept = 0;  ///< in a pass, on all ranks; 0: what this rank's share of the memory holds
-  int host_ranks = 1;           ///< that share this machine's memory, each with all photons
+  int host_ranks = 1;           ///< ranks of this host: each keeps all photons in its memory
 };
 
 struct PhotonCounts {
@@ -82,6 +82,9 @@ class PhotonTracer {
         source_(std::move(source)),
         settings_(settings),
         has_coverage_(has_coverage(scene)) {}
+
+  /// From here on, see PhotonSettings.
+  void set_flux_unit(double watts) { settings_.flux_unit = watts; }
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
   /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are

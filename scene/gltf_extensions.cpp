@@ -48,13 +48,13 @@ std::set<std::string> names_in(const GltfItem& root, const char* key) {
 }
 
 /// Of materials: what changes their look and is neither drawn nor declared, and so not told of yet.
-void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& used) {
+void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& declared) {
   root.each("materials", Presence::Optional, [&](const GltfItem& material) {
     const auto extensions = material.object("extensions");
     if (!extensions) return;
     for (const auto& [name, value] : extensions->value().items()) {
-      if (used.contains(name) || contains(kSupported, name) || name == kStandsIn) continue;
-      material.warn("extensions", fmt::format("{} is ignored", printable(name)));
+      if (declared.contains(name) || contains(kSupported, name) || name == kStandsIn) continue;
+      root.warn("materials", fmt::format("{} is ignored", printable(name)));  // once, however many have it
     }
   });
 }
@@ -86,7 +86,9 @@ void check_extensions(nlohmann::json& document, GltfContext& context) {
     if (required.contains(name) || contains(kSupported, name)) continue;
     root.warn("extensionsUsed", fmt::format("{} is ignored", printable(name)));
   }
-  warn_of_undeclared(root, used);
+  std::set<std::string> declared = used;
+  declared.insert(required.begin(), required.end());
+  warn_of_undeclared(root, declared);
 }
 
 }  // namespace hpr

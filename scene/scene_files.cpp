@@ -1,12 +1,13 @@
 #include "scene/scene_files.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "scene/gltf_scan.h"
 #include "scene/gltf_uri.h"
-#include "scene/load_scene.h"
 
 namespace hpr {
 namespace {
@@ -24,15 +25,17 @@ void add_named(const nlohmann::json& item, const std::filesystem::path& folder,
 
 }  // namespace
 
-std::vector<std::filesystem::path> files_of_scene(const std::string& source) {
+std::vector<std::filesystem::path> files_of_scene(const std::string& source, const SceneLimits& limits) {
   if (source.starts_with("gen:")) return {};
   const std::filesystem::path path = source;
   std::vector<std::filesystem::path> files{path};
   try {
-    const SceneLimits limits;
-    const std::vector<std::byte> bytes = read_file(path, limits.file_bytes);
     GltfContext context(source, limits);
-    const nlohmann::json root = nlohmann::json::parse(scan_gltf(bytes, context).json, nullptr, false);
+    const std::vector<std::byte> bytes = read_file(path, std::min(limits.file_bytes, limits.memory_bytes));
+    context.charge(bytes.size(), "the file");
+    const std::string_view text = scan_gltf(bytes, context).json;
+    context.check_room(std::uint64_t{text.size()} * 16, "the JSON text");  // as load_gltf has it
+    const nlohmann::json root = nlohmann::json::parse(text, nullptr, false);
     if (!root.is_object()) return files;
     for (const char* const list : {"buffers", "images"}) {
       if (!root.contains(list) || !root[list].is_array()) continue;

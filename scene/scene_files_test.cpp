@@ -26,6 +26,18 @@ TEST(SceneFiles, WhatCannotBeReadIsJustItself) {
   EXPECT_EQ(files_of_scene("none.glb"), Files{"none.glb"});
 }
 
+TEST(SceneFiles, WhatIsBeyondTheLimitsIsJustItself) {
+  const test::TemporaryFolder folder;
+  const auto scene = folder.write("a.gltf", R"({"images": [{"uri": "d.png"}]})");
+  EXPECT_EQ(files_of_scene(scene.string()).size(), 2U);
+  SceneLimits small;
+  small.file_bytes = 20;
+  EXPECT_EQ(files_of_scene(scene.string(), small), Files{scene});
+  small = {};
+  small.memory_bytes = 100;
+  EXPECT_EQ(files_of_scene(scene.string(), small), Files{scene});
+}
+
 TEST(SceneFiles, OfAGeneratedSceneThereAreNone) {
   EXPECT_TRUE(files_of_scene("gen:cornell").empty());
 }

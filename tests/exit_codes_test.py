@@ -212,6 +212,11 @@ def main():
     named = '{"asset": {"version": "2.0"}, "images": [{"uri": "a.png"}]}'
     expect_error("a scene's picture that would be replaced", ["render", "b.gltf", "-o", "a.png", *SMALL, "--force"], [2],
                  ["a.png"], prepare=writer("a.png", "precious", "b.gltf", named))
+    expect_error("a scene's picture that a wall would replace", ["wall", "run", "1x1@16x16", "b.gltf", "-o", ".", "--force"],
+                 [2], ["wall-r0c0.png"],
+                 prepare=writer("wall-r0c0.png", "precious", "b.gltf", named.replace("a.png", "wall-r0c0.png")))
+    expect_error("a demo's name that holds something else", ["demo", "--wall", "1x1@16x16"], [4], ["--force"],
+                 prepare=writer("hpr-demo.png", "precious"))
     expect_error("an environment that would be replaced",
                  ["render", "gen:cornell", "-o", "./a.png", *SMALL, "--environment", "a.png", "--force"], [2], ["a.png"],
                  prepare=writer("a.png", "precious"))

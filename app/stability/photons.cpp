@@ -120,10 +120,10 @@ StabilityFinding power(int threads) {
 }
 
 StabilityFinding faint(int threads) {
-  StabilityFinding kept =
-      finding("photons/faint", "a photon's flux from 1 down to 1e-37 W", kFloatRounding + 16.0 * kDoubleRounding,
-              "relative", "above 2^-126 W a float rounds by 2^-24 of itself");
-  kept.curve.x = "flux of a photon, W";
+  StabilityFinding kept = finding("photons/faint", "a photon's flux from 1 down to 1e-37 of its unit",
+                                  kFloatRounding + 16.0 * kDoubleRounding, "relative",
+                                  "above 2^-126 of its unit a float rounds by 2^-24 of itself");
+  kept.curve.x = "flux of a photon, in its unit";
   const auto lost = [&](double flux) { return power_lost(flux * static_cast<double>(kSlice), 0, kSlice, threads); };
   for (const double flux : {1e-37, 1e-30, 1e-20, 1e-10, 1.0}) {
     kept.curve.points.emplace_back(flux, lost(flux));

@@ -40,16 +40,21 @@ void refuse_kept_frames(const std::filesystem::path& folder) {
   }
 }
 
+template <typename Shown>
+std::string file_of(const Shown& shown) {
+  return shown.id + ".png";
+}
+
+std::string panel_file_of(const WallScreen& screen) {
+  return screen.id + ".panel.png";
+}
+
 class FileDisplay final : public Display {
  public:
   FileDisplay(const Wall& wall, const DisplayOptions& options)
       : wall_(wall), folder_(options.folder.empty() ? "." : options.folder), keeps_frames_(options.keep_frames) {
     make_folder(folder_);
-    for (const WallScreen& screen : wall.screens) {
-      check_writable(folder_ / file_of(screen), options.overwrite);
-      check_writable(folder_ / panel_file_of(screen), options.overwrite);
-    }
-    for (const WallMonitor& monitor : wall.monitors) check_writable(folder_ / file_of(monitor), options.overwrite);
+    for (const auto& file : files_of_display(wall, folder_)) check_writable(file, options.overwrite);
   }
 
   [[nodiscard]] std::string_view name() const override { return "file"; }
@@ -84,13 +89,6 @@ class FileDisplay final : public Display {
   [[nodiscard]] std::vector<ScreenCost> costs() const override { return costs_; }
 
  private:
-  template <typename Shown>
-  [[nodiscard]] static std::string file_of(const Shown& shown) {
-    return shown.id + ".png";
-  }
-
-  [[nodiscard]] static std::string panel_file_of(const WallScreen& screen) { return screen.id + ".panel.png"; }
-
   const Wall& wall_;
   std::filesystem::path folder_;
   bool keeps_frames_;
@@ -99,6 +97,16 @@ class FileDisplay final : public Display {
 };
 
 }  // namespace
+
+std::vector<std::filesystem::path> files_of_display(const Wall& wall, const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const WallScreen& screen : wall.screens) {
+    files.push_back(folder / file_of(screen));
+    files.push_back(folder / panel_file_of(screen));
+  }
+  for (const WallMonitor& monitor : wall.monitors) files.push_back(folder / file_of(monitor));
+  return files;
+}
 
 std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options) {
   return std::make_unique<FileDisplay>(wall, options);
