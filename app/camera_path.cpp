@@ -109,7 +109,7 @@ CameraKey CameraPath::at_frame(std::size_t index, std::size_t frames) const {
 
 CameraPath parse_camera_path(std::string_view text, const std::string& name) {
   std::vector<CameraKey> keys;
-  std::istringstream lines{std::string(text)};
+  std::istringstream lines{std::string(without_mark(text))};
   int number_of_line = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number_of_line;
@@ -139,6 +139,17 @@ CameraPath parse_camera_path(std::string_view text, const std::string& name) {
 CameraPath load_camera_path(const std::filesystem::path& file) {
   const auto bytes = read_file(file, kLargestFile);
   return parse_camera_path({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, printable(file.string()));
+}
+
+void check_frames(const CameraPath& path, std::size_t frames, const std::string& name) {
+  for (std::size_t i = 0; i < frames; ++i) {
+    try {
+      (void)camera_of(path.at_frame(i, frames));
+    } catch (const Error& error) {
+      throw Error(ExitCode::BadInput, fmt::format("{}: frame {} of {}: {}", printable(name), i, frames, error.what()),
+                  "the path passes through what it looks at: add a key that leads around it");
+    }
+  }
 }
 
 Camera camera_of(const CameraKey& key) {

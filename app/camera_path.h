@@ -39,6 +39,10 @@ class CameraPath {
 /// Throws Error: Io too.
 [[nodiscard]] CameraPath load_camera_path(const std::filesystem::path& file);
 
+/// Throws Error (BadInput) where the camera of one of `frames` frames has no direction: between keys a path may pass
+/// through what it looks at.
+void check_frames(const CameraPath& path, std::size_t frames, const std::string& name);
+
 /// Throws Error (Usage) where the key has no direction.
 [[nodiscard]] Camera camera_of(const CameraKey& key);
 

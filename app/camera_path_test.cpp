@@ -69,5 +69,26 @@ TEST(CameraPath, NamesTheLineThatIsWrong) {
   EXPECT_THROW((void)parse_camera_path("# nothing\n\n", "empty"), Error);
 }
 
+TEST(CameraPath, MayBeginWithAByteOrderMark) {
+  EXPECT_EQ(parse_camera_path("\xEF\xBB\xBF"
+                              "eye 0,0,1 at 0,0,0\n",
+                              "walk")
+                .keys()
+                .size(),
+            1U);
+}
+
+TEST(CameraPath, ThroughItsTargetIsFoundBeforeAnyFrameIsDrawn) {
+  const CameraPath path = parse_camera_path("eye 0,1,4 at 0,1,0\neye 0,1,-4 at 0,1,0\n", "walk");
+  EXPECT_NO_THROW(check_frames(path, 2, "walk"));
+  try {
+    check_frames(path, 3, "walk");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::BadInput);
+    EXPECT_NE(std::string(error.what()).find("walk: frame 1 of 3"), std::string::npos) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace hpr

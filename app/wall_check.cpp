@@ -37,10 +37,11 @@ Figures figures_of(const Wall& wall) {
   for (const WallNode& node : wall.nodes) hosts.insert(node.host);
   figures.hosts = std::max<std::size_t>(hosts.size(), 1);
   double lit = 0.0;
-  for (const WallScreen& screen : wall.screens) {
+  const std::vector<bool> repeated = repeated_places(wall);
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    const WallScreen& screen = wall.screens[i];
     figures.visible_pixels += screen.pixels.area();
-    // Two eyes' screens lie in one place.
-    lit += (screen.eye == Eye::Both ? 1.0 : 0.5) * screen_width(screen) * screen_height(screen);
+    if (!repeated[i]) lit += screen_width(screen) * screen_height(screen);  // else it is the other eye's
   }
   const WallExtent extent = wall_extent(wall);
   figures.flat = extent.flat;

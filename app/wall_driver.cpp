@@ -181,11 +181,13 @@ void WallDriver::resume(std::vector<std::string>& frames) {
   if (before.wall_hash != manifest_.wall_hash) other = "another wall";
   if (before.scene_hash != manifest_.scene_hash) other = "another scene";
   if (before.seed != manifest_.seed) other = fmt::format("seed {}", before.seed);
-  if (before.stopped_of && *before.stopped_of != asked) other = fmt::format("{} frames", *before.stopped_of);
+  const int of = before.stopped_of.value_or(static_cast<int>(before.frames.size()));
+  if (of != asked) other = fmt::format("{} frames", of);
   if (!other.empty()) {
     throw Error(ExitCode::BadInput, fmt::format("'{}' is of a run with {}", run_.manifest().string(), other),
                 "go on with the same command line, or begin anew with --force in place of --resume");
   }
+  check_frames(before, wall_.screens, run_.manifest().string());
   log::info("going on after {} of {} frames", before.frames.size(), asked);
   frames = std::move(before.frames);
   manifest_.restarts = std::move(before.restarts);

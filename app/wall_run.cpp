@@ -223,7 +223,7 @@ void check_path(const WallRun& run) {
   if (run.open_ended()) {
     throw Error(ExitCode::Usage, "--path needs to know how many frames it takes", "add --frames N");
   }
-  (void)load_camera_path(run.path);
+  check_frames(load_camera_path(run.path), static_cast<std::size_t>(run.frames.value_or(1)), run.path);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 
 #include "core/check.h"
 #include "core/error.h"
+#include "core/names.h"
 
 namespace hpr {
 namespace {
@@ -35,7 +36,7 @@ class Descriptor {
 
 [[noreturn]] void fail(std::string_view doing, const std::filesystem::path& path, int error) {
   const std::string reason = std::generic_category().message(error);
-  throw Error(ExitCode::Io, fmt::format("{} '{}': {}", doing, path.string(), reason),
+  throw Error(ExitCode::Io, fmt::format("{} '{}': {}", doing, printable(path.string(), 300), reason),
               error == ENOSPC || error == EDQUOT
                   ? "free some space or write elsewhere with -o; nothing partial was left"
                   : "check the path and its permissions");
@@ -108,6 +109,12 @@ int create_unnamed(const std::filesystem::path& folder) {
 }
 
 }  // namespace
+
+std::string_view without_mark(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  return text;
+}
 
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
   // O_NONBLOCK so that opening a FIFO returns at once and can be refused.

@@ -14,6 +14,9 @@ namespace hpr {
 /// directory), Limit when it is larger than `limit_bytes`.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes);
 
+/// `text` less the byte order mark that some editors and spreadsheets put before UTF-8.
+[[nodiscard]] std::string_view without_mark(std::string_view text);
+
 /// A file that is written piece by piece: `path` is either complete or untouched, also when the disk fills or the
 /// process dies. A symbolic link stays, what it points at is replaced.
 class AtomicFile {

@@ -122,6 +122,7 @@ def stops_and_goes_on(folder):
         expect("--resume goes on" in wall.told(), f"the log does not tell how to go on: {wall.told()}")
         command = [HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(wall.out), "--quality", "draft", "--resume"]
         for options, words in ((["--frames", "201"], "200 frames"), (["--frames", "200", "--seed", "2"], "seed 1"),
+                               (["--frames", "200", "--scale", "0.5"], "record 0"),
                                (["--frames", "200", "--set", "test.gap_rgba=[1,2,3,255]"], "another wall")):
             refused = subprocess.run([*command, *options], capture_output=True, text=True, timeout=60, check=False)
             expect(refused.returncode == 3 and words in refused.stderr, f"{options}: {refused.returncode}, {refused.stderr}")
@@ -132,6 +133,8 @@ def stops_and_goes_on(folder):
         expect(rest.returncode == 0 and f"going on after {done} of 200" in rest.stderr, f"{rest.returncode}, {rest.stderr}")
         expect([hashes(frame) for frame in wall.manifest()["frames"]] == expected, f"{ranks} ranks: two parts differ from the whole")
         expect("stopped" not in wall.manifest(), "it is called stopped still")
+        shorter = subprocess.run([*command, "--frames", "100"], capture_output=True, text=True, timeout=60, check=False)
+        expect(shorter.returncode == 3 and "200 frames" in shorter.stderr, f"of a whole run: {shorter.returncode}, {shorter.stderr}")
     nothing = Wall(folder, "from-nothing", 1, 3, "--resume")
     nothing.leave()
     expect(len(nothing.manifest()["frames"]) == 3, "--resume without a manifest begins with the first frame")

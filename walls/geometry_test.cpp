@@ -292,6 +292,17 @@ TEST(WallSeamsTest, CountsWhatWholePixelsWouldLose) {
   EXPECT_NEAR(large.accumulated_error_px, 1.4286, 1e-4);
   EXPECT_NEAR(wall_seams(load_wall("3x2")).largest_error_px, 0.0, 1e-9);
   EXPECT_EQ(wall_seams(load_wall(example("cave-4.toml"))).count, 0);
+  // Passive stereo has each screen twice, in one place.
+  Wall passive = load_wall("3x2");
+  const int seams = wall_seams(passive).count;
+  for (WallScreen& screen : passive.screens) screen.eye = Eye::Left;
+  const std::vector<WallScreen> left = passive.screens;
+  for (WallScreen screen : left) {
+    screen.eye = Eye::Right;
+    passive.screens.push_back(screen);
+  }
+  EXPECT_EQ(wall_seams(passive).count, seams);
+  EXPECT_GE(wall_seams(passive).narrowest_m, 0.0);
 }
 
 TEST(WallPlanes, GroupScreensByPlaneFromLeftToRight) {

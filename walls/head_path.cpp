@@ -184,6 +184,7 @@ HeadPose HeadPath::at(double seconds) const {
 HeadPath parse_head_path(std::string_view text, HeadPathFormat format, const std::string& name) {
   if (format == HeadPathFormat::Toml) return parse_toml_path(text, name);
   Collector collector(name);
+  text = without_mark(text);
   bool first = true;
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');

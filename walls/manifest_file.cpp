@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
 
@@ -52,7 +53,32 @@ std::vector<std::string> objects_in(const Json& document, const std::string& key
   return objects;
 }
 
+bool is_hash(const Json& value) {
+  if (!value.is_string()) return false;
+  const auto& text = value.get_ref<const std::string&>();
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+bool tells_of(const Json& record, const WallScreen& screen) {
+  return record.is_object() && record.value("id", Json()) == screen.id &&
+         record.value("width", Json()) == screen.pixels.width &&
+         record.value("height", Json()) == screen.pixels.height && is_hash(record.value("xxh64", Json()));
+}
+
 }  // namespace
+
+void check_frames(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name) {
+  for (std::size_t i = 0; i < file.frames.size(); ++i) {
+    const Json frame = Json::parse(file.frames[i]);
+    const Json told = frame.value("screens", Json());
+    const bool numbered = frame.value("frame", Json()) == i;
+    if (numbered && told.is_array() && std::ranges::equal(told, screens, tells_of)) continue;
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: its record {} is not frame {} of this wall's screens at their sizes",
+                            printable(name, 200), i, i),
+                "go on with the same command line, or begin anew with --force in place of --resume");
+  }
+}
 
 ManifestFile parse_manifest(std::string_view text, const std::string& name) {
   const Json document = parse(text, name);

@@ -2,9 +2,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "walls/wall.h"
 
 namespace hpr {
 
@@ -20,6 +23,9 @@ struct ManifestFile {
 
 /// Reads what to_json(RunManifest) writes; `name` stands in errors. Throws Error (BadInput) for anything else.
 [[nodiscard]] ManifestFile parse_manifest(std::string_view text, const std::string& name);
+
+/// Throws Error (BadInput) unless the frames are 0, 1, ... of these screens, in their order.
+void check_frames(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name);
 
 /// The same of a file, up to 1 GiB. Throws Error (Io) too.
 [[nodiscard]] ManifestFile load_manifest(const std::string& path);

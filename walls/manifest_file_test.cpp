@@ -37,6 +37,31 @@ TEST(ManifestFile, ReadsWhatIsWritten) {
   EXPECT_EQ(to_json(again), to_json(run));
 }
 
+TEST(ManifestFile, TellsWhetherItsFramesAreThoseOfAWall) {
+  WallScreen screen;
+  screen.id = "a";
+  screen.pixels = {2, 1};
+  const auto check = [&](const RunManifest& run) {
+    check_frames(parse_manifest(to_json(run), "m"), {&screen, 1}, "m");
+  };
+  EXPECT_NO_THROW(check(manifest()));
+  RunManifest other = manifest();
+  other.frames[1].frame = 2;
+  EXPECT_THROW(check(other), Error);
+  other = manifest();
+  other.frames[0].screens[0].size = {2, 2};
+  EXPECT_THROW(check(other), Error);
+  other = manifest();
+  other.frames[0].screens.clear();
+  EXPECT_THROW(check(other), Error);
+  other = manifest();
+  other.frames[1].screens[0].id = "b";
+  EXPECT_THROW(check(other), Error);
+  std::string text = to_json(manifest());
+  text.replace(text.find("\"xxh64\": \"") + 10, 2, "zz");
+  EXPECT_THROW(check_frames(parse_manifest(text, "m"), {&screen, 1}, "m"), Error);
+}
+
 TEST(ManifestFile, RefusesWhatIsNone) {
   const std::string sound = to_json(manifest());
   const auto with = [&](const std::string& from, const std::string& to) {

@@ -26,7 +26,9 @@ Image<Rgba8> marked(Size size) {
 
 Wall parsed(const std::string& text) {
   const WallReading reading = parse_wall(text, "t.toml");
-  for (const WallFinding& finding : reading.findings) ADD_FAILURE() << finding.what;
+  for (const WallFinding& finding : reading.findings) {
+    if (finding.error) ADD_FAILURE() << finding.what;
+  }
   return reading.wall;
 }
 

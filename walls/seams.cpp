@@ -45,7 +45,10 @@ WallSeams wall_seams(const Wall& wall) {
   if (!extent.flat) return seams;
   const glm::dmat3 inside = glm::transpose(extent.axes);
   std::vector<Box> boxes;
-  for (const WallScreen& screen : wall.screens) {
+  const std::vector<bool> repeated = repeated_places(wall);
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    if (repeated[i]) continue;  // the other eye's
+    const WallScreen& screen = wall.screens[i];
     const glm::dvec3 a = inside * (screen.lower_left - extent.center);
     const glm::dvec3 b = inside * (screen.lower_right + screen.upper_left - screen.lower_left - extent.center);
     boxes.push_back({glm::min(a, b), glm::max(a, b), pixel_pitch(screen)});

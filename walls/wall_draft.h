@@ -115,6 +115,9 @@ void link_viewers(WallDraft& draft, Findings& findings);
 /// Of linked viewers: what they see of the points of position maps.
 void check_position_maps(const WallDraft& draft, Findings& findings);
 
+/// Warns about viewers who stand behind what they look at.
+void warn_about_viewers(const WallDraft& draft, Findings& findings);
+
 /// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
 void warn_about_neighbours(const WallDraft& draft, Findings& findings);
 

@@ -150,7 +150,10 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
     link_viewers(draft, findings);
     check_position_maps(draft, findings);
   }
-  if (!findings.any_errors()) warn_about_neighbours(draft, findings);
+  if (!findings.any_errors()) {
+    warn_about_viewers(draft, findings);
+    warn_about_neighbours(draft, findings);
+  }
 
   const bool sound = !findings.any_errors();
   reading.findings = findings.take();

@@ -22,10 +22,10 @@ std::string model_text(int line = 0, const std::string& edit = {}) {
       /*  7 */ "tracker = { type = \"udp\", port = 5005, lost = { after_ms = 100, then = \"rest\" } }",
       /*  8 */ "ipd_m = 0.063",
       /*  9 */ "eye_offset_m = [0, 0.02, -0.08]",
-      /* 10 */ "position_m = [0, 1.7, 0]",
+      /* 10 */ "position_m = [0, 1.7, 2]",
       /* 11 */ "[[viewers]]",
       /* 12 */ "id = \"guest\"",
-      /* 13 */ "position_m = [1, 1.7, 0]",
+      /* 13 */ "position_m = [1, 1.7, 11]",
       /* 14 */ "near_m = 0.05",
       /* 15 */ "[[surfaces]]",
       /* 16 */ "id = \"arc\"",
@@ -243,6 +243,14 @@ TEST(WallModel, WhatCannotLookRightIsAWarning) {
   EXPECT_EQ(warnings_of(two(", edge_blend_m = 0.1", "pixels = [160, 90], " + over)),
             "t.toml:5:1: screen \"b\" overlaps \"a\" by 100 mm and does not fade its edge as that one does\n");
   EXPECT_EQ(warnings_of(two("", "pixels = [160, 90], " + over)), "");
+  EXPECT_EQ(warnings_of(two(", edge_blend_m = 0.1", "pixels = [160, 90], " + beside)),
+            "t.toml:4:1: screen \"a\" fades its edges and overlaps no screen of its plane\n");
+  EXPECT_EQ(warnings_of(two(", edge_blend_m = \"auto\"", "pixels = [160, 90], " + beside)), "");
+  const auto seen_from_z = [&](const std::string& z) {
+    return warnings_of(two("", "pixels = [160, 90], " + beside) + "[[viewers]]\nposition_m = [1.6, 0.45, " + z + "]\n");
+  };
+  EXPECT_EQ(seen_from_z("1"), "");
+  EXPECT_EQ(seen_from_z("-1"), "t.toml:7:1: viewer stands behind screen \"a\"\n");
 }
 
 TEST(WallModel, RecordedPathsAreLookedForBesideTheWallFile) {

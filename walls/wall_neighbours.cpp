@@ -50,6 +50,15 @@ void compare_blends(const DraftScreen& a, const DraftScreen& b, double overlap, 
                "add edge_blend_m = \"auto\" to both");
 }
 
+/// A width is taken at its word, whatever lies there; that may be nothing.
+void look_for_overlap(const DraftScreen& draft, bool overlaps, NeighbourWarnings& warnings) {
+  const EdgeBlend& blend = draft.screen.blend;
+  if (overlaps || blend.automatic || !blend.any()) return;
+  warnings.add(draft.place, "alone",
+               fmt::format("screen \"{}\" fades its edges and overlaps no screen of its plane", draft.screen.id),
+               "right where something else shines there; else use edge_blend_m = \"auto\", which fades overlaps alone");
+}
+
 }  // namespace
 
 void warn_about_neighbours(const WallDraft& draft, Findings& findings) {
@@ -57,15 +66,22 @@ void warn_about_neighbours(const WallDraft& draft, Findings& findings) {
   std::vector<WallScreen> screens;
   for (const DraftScreen& screen : draft.screens) screens.push_back(screen.screen);
   NeighbourWarnings warnings(findings);
+  std::vector<bool> overlaps(screens.size(), false);
   for (const auto& [i, j] : close_pairs(screens, kReach)) {
     const auto box = seen_from(screens[j], screens[i]);
-    if (!box) continue;
+    if (!box) {
+      overlaps[i] = overlaps[j] = true;  // maybe: walls bend from one to the other
+      continue;
+    }
     const double size = std::min(screen_width(screens[i]), screen_height(screens[i]));
     const double shared = shared_metres(*box, screens[i]);
     if (shared < -kReach * size) continue;
     compare_pixels(draft.screens[i], draft.screens[j], warnings);
-    if (shared > 1e-6 * size) compare_blends(draft.screens[i], draft.screens[j], shared, warnings);
+    if (!(shared > 1e-6 * size)) continue;
+    compare_blends(draft.screens[i], draft.screens[j], shared, warnings);
+    overlaps[i] = overlaps[j] = true;
   }
+  for (std::size_t i = 0; i < screens.size(); ++i) look_for_overlap(draft.screens[i], overlaps[i], warnings);
 }
 
 }  // namespace hpr

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <set>
 
 #include "core/names.h"
+#include "walls/geometry.h"
 #include "walls/wall_draft.h"
 
 namespace hpr {
@@ -133,6 +135,27 @@ void link_viewers(WallDraft& draft, Findings& findings) {
   link_surfaces(draft, findings);
   check_stereo(draft, findings);
   check_monitors(draft, findings);
+}
+
+void warn_about_viewers(const WallDraft& draft, Findings& findings) {
+  for (std::size_t i = 0; i < draft.viewers.size(); ++i) {
+    const WallViewer& viewer = draft.viewers[i].viewer;
+    if (!viewer.given) continue;
+    for (const DraftScreen& one : draft.screens) {
+      const WallScreen& screen = one.screen;
+      if (screen.viewer != i || screen.warp.points) continue;
+      const double before = glm::dot(viewer.position - screen_center(screen), screen_axes(screen)[2]);
+      if (before > 0.0) continue;
+      findings.warning(
+          draft.viewers[i].place,
+          fmt::format("viewer {}stands behind screen \"{}\"",
+                      viewer.id.empty() ? "" : fmt::format("\"{}\" ", viewer.id), screen.id),
+          fmt::format("its picture is made for an eye {:g} m before it; see the sign of position_m, and the "
+                      "order of the screen's corners",
+                      viewer.clamp_distance_m));
+      break;
+    }
+  }
 }
 
 }  // namespace hpr

@@ -14,6 +14,7 @@
 
 #include "core/check.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/names.h"
 
 namespace hpr {
@@ -242,10 +243,8 @@ class ObjReader {
 }  // namespace
 
 WarpMesh parse_warp_csv(std::string_view text, const std::string& name) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write it
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   CsvReader reader(name);
-  each_line(text, [&](std::string_view line, int number) { reader.add(line, number); });
+  each_line(without_mark(text), [&](std::string_view line, int number) { reader.add(line, number); });
   return reader.take();
 }
 
