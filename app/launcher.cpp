@@ -252,9 +252,13 @@ bool inside_mpi_job() {
   return false;
 }
 
-void tell_launcher() {
+bool launched_by_hpr() {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
-  if (std::getenv(kStartVariable) == nullptr) return;
+  return std::getenv(kStartVariable) != nullptr;
+}
+
+void tell_launcher() {
+  if (!launched_by_hpr()) return;
   std::fwrite(kStartMark.data(), 1, kStartMark.size(), stdout);
   std::fflush(stdout);
 }

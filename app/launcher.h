@@ -42,6 +42,9 @@ void tell_launcher();
 /// True when this process was started by mpirun, mpiexec or srun as one rank of a job.
 [[nodiscard]] bool inside_mpi_job();
 
+/// True when that was done by run_mpiexec, in a process that waits for this one.
+[[nodiscard]] bool launched_by_hpr();
+
 /// This process's rank as its launcher wrote it into the environment: known before MPI starts. 0 outside a job.
 [[nodiscard]] int launched_rank();
 

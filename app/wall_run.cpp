@@ -261,11 +261,18 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   const std::string folder = run.writes_files() ? run.display.output : "";
   const EmptyFolders tidy(folder);
   run.open_ended() ? watch_interrupts() : watch_requests();
-  if (!inside_mpi_job()) check_outputs(run, wall, globals);
+  std::optional<FolderLock> lock;
+  const auto claim_outputs = [&](const WallRun& chosen) {
+    check_outputs(chosen, wall, globals);  // makes the folder
+    if (!chosen.writes_files() || launched_by_hpr()) return;
+    lock.emplace(chosen.display.output);
+    check_outputs(chosen, wall, globals);  // another run may have ended meanwhile
+  };
+  if (!inside_mpi_job()) claim_outputs(run);
   const auto body = [&](Communicator& comm) {
     const EmptyFolders tidy_in_job(folder);  // a rank that fails leaves run_ranks only to end the job
     const WallRun agreed = with_display_of_root(run, comm);
-    if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(agreed, wall, globals); });
+    if (inside_mpi_job()) check_on_root(comm, [&] { claim_outputs(agreed); });
     Session session(comm, globals, [&] { return run.options.load(run.scene, globals); });
     return drive(agreed, wall, settings, globals, session);
   };

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -212,6 +213,19 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
                 "create the folder first");
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
+}
+
+FolderLock::FolderLock(const std::filesystem::path& folder)
+    : folder_(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (folder_ < 0) fail("cannot open", folder, errno);
+  if (::flock(folder_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  ::close(folder_);
+  throw Error(ExitCode::Io, fmt::format("another run writes into '{}'", printable(folder.string(), 300)),
+              "wait for it, or name another folder with -o");
+}
+
+FolderLock::~FolderLock() {
+  ::close(folder_);
 }
 
 EmptyFolders::EmptyFolders(const std::filesystem::path& folder) {

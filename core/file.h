@@ -52,6 +52,20 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 /// writable: asked before long work.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
+/// Keeps other processes from writing their results into a folder, as long as they ask for it in the same way. Where
+/// the file system knows no locks it keeps nobody.
+class FolderLock {
+ public:
+  /// Throws Error (Io) when another process holds it, or there is no such folder.
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int folder_;
+};
+
 /// Tidies up after a run that ends before it wrote anything: when this goes, those folders on the way to and including
 /// `folder` that were missing when it came, and are empty, are removed.
 class EmptyFolders {

@@ -219,6 +219,17 @@ TEST_F(FileTest, FoldersMadeAndLeftEmptyAreRemoved) {
   EXPECT_TRUE(fs::exists(path("mine")));
 }
 
+TEST_F(FileTest, AFolderIsHeldByOneAtATime) {
+  fs::create_directory(path("results"));
+  {
+    const FolderLock first(path("results"));
+    EXPECT_EQ(code_of([&] { const FolderLock second(path("results")); }), ExitCode::Io);
+    const FolderLock other(path("."));
+  }
+  EXPECT_NO_THROW(const FolderLock again(path("results")));
+  EXPECT_EQ(code_of([&] { const FolderLock none(path("none")); }), ExitCode::Io);
+}
+
 TEST_F(FileTest, AFolderThatForbidsWritingIsRefusedBeforeTheWork) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   fs::create_directory(path("closed"));

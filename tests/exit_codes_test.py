@@ -7,6 +7,7 @@ Each failure must give its exit code and one error of up to three lines, `hpr: e
 hint, and leave no file behind, partial or whole. Prints what was wrong and leaves with 1.
 """
 
+import fcntl
 import json
 import os
 import pathlib
@@ -109,6 +110,15 @@ def write_gltf(last_index):
         document, binary = gltf(last_index)
         (folder / "triangle.gltf").write_text(json.dumps(document))
         (folder / "triangle.bin").write_bytes(binary)
+    return prepare
+
+
+def locker(name):
+    """Makes a folder that another run writes into."""
+    def prepare(folder):
+        (folder / name).mkdir()
+        held = os.open(folder / name, os.O_RDONLY)
+        fcntl.flock(held, fcntl.LOCK_EX)
     return prepare
 
 
@@ -215,6 +225,10 @@ def main():
     expect_error("a scene's picture that a wall would replace", ["wall", "run", "1x1@16x16", "b.gltf", "-o", ".", "--force"],
                  [2], ["wall-r0c0.png"],
                  prepare=writer("wall-r0c0.png", "precious", "b.gltf", named.replace("a.png", "wall-r0c0.png")))
+    for ranks in ("1", "2"):
+        expect_error(f"a folder another run writes into, {ranks} ranks",
+                     ["wall", "run", "1x1@16x16", "gen:cornell", "-o", "out", "--force", "--ranks", ranks], [4], ["another run"],
+                     prepare=locker("out"))
     expect_error("a demo's name that holds something else", ["demo", "--wall", "1x1@16x16"], [4], ["--force"],
                  prepare=writer("hpr-demo.png", "precious"))
     expect_error("an environment that would be replaced",
