@@ -141,13 +141,15 @@ CameraPath load_camera_path(const std::filesystem::path& file) {
   return parse_camera_path({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, printable(file.string()));
 }
 
-void check_frames(const CameraPath& path, std::size_t frames, const std::string& name) {
+void check_directions(const CameraPath& path, std::size_t frames, const std::string& name) {
   for (std::size_t i = 0; i < frames; ++i) {
     try {
       (void)camera_of(path.at_frame(i, frames));
     } catch (const Error& error) {
-      throw Error(ExitCode::BadInput, fmt::format("{}: frame {} of {}: {}", printable(name), i, frames, error.what()),
-                  "the path passes through what it looks at: add a key that leads around it");
+      throw Error(ExitCode::BadInput,
+                  fmt::format("{}: frame {} of {}: {}", printable(name), i + 1, frames, error.what()),
+                  "the path passes through what it looks at, or past it along `up`: add a key that leads around it, or "
+                  "another up");
     }
   }
 }

@@ -40,8 +40,8 @@ class CameraPath {
 [[nodiscard]] CameraPath load_camera_path(const std::filesystem::path& file);
 
 /// Throws Error (BadInput) where the camera of one of `frames` frames has no direction: between keys a path may pass
-/// through what it looks at.
-void check_frames(const CameraPath& path, std::size_t frames, const std::string& name);
+/// through what it looks at, or straight above it.
+void check_directions(const CameraPath& path, std::size_t frames, const std::string& name);
 
 /// Throws Error (Usage) where the key has no direction.
 [[nodiscard]] Camera camera_of(const CameraKey& key);

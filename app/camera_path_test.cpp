@@ -80,13 +80,13 @@ TEST(CameraPath, MayBeginWithAByteOrderMark) {
 
 TEST(CameraPath, ThroughItsTargetIsFoundBeforeAnyFrameIsDrawn) {
   const CameraPath path = parse_camera_path("eye 0,1,4 at 0,1,0\neye 0,1,-4 at 0,1,0\n", "walk");
-  EXPECT_NO_THROW(check_frames(path, 2, "walk"));
+  EXPECT_NO_THROW(check_directions(path, 2, "walk"));
   try {
-    check_frames(path, 3, "walk");
+    check_directions(path, 3, "walk");
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::BadInput);
-    EXPECT_NE(std::string(error.what()).find("walk: frame 1 of 3"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("walk: frame 2 of 3"), std::string::npos) << error.what();
   }
 }
 

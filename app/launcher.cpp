@@ -254,7 +254,7 @@ bool inside_mpi_job() {
 
 bool launched_by_hpr() {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
-  return std::getenv(kStartVariable) != nullptr;
+  return inside_mpi_job() && std::getenv(kStartVariable) != nullptr;
 }
 
 void tell_launcher() {

@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "cluster/collectives.h"
 #include "core/error.h"
@@ -196,21 +198,24 @@ void check_distinct(std::span<const std::string> paths, const std::string& trace
 
 void check_spared(const std::string& scene, const SceneLimits& limits, std::span<const std::string> inputs,
                   std::span<const std::string> results) {
-  std::vector<std::string> replaced;
-  std::ranges::copy_if(results, std::back_inserter(replaced), [](const std::string& result) {
-    std::error_code error;
-    return !result.empty() && std::filesystem::exists(result, error);
-  });
+  const auto identity = [](const std::filesystem::path& path) -> std::optional<std::pair<dev_t, ino_t>> {
+    struct stat info {};
+    if (path.empty() || ::stat(path.c_str(), &info) != 0) return std::nullopt;
+    return std::pair(info.st_dev, info.st_ino);
+  };
+  std::map<std::pair<dev_t, ino_t>, std::string> replaced;
+  for (const std::string& result : results) {
+    if (const auto file = identity(result)) replaced.emplace(*file, result);
+  }
   if (replaced.empty()) return;  // spares reading the scene twice
   std::vector<std::filesystem::path> files = files_of_scene(scene, limits);
   files.insert(files.end(), inputs.begin(), inputs.end());
-  for (const std::filesystem::path& file : files) {
-    for (const std::string& result : replaced) {
-      std::error_code error;
-      if (file.empty() || !std::filesystem::equivalent(file, result, error) || error) continue;
-      throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result)),
-                  "give the result another name");
-    }
+  for (const std::filesystem::path& path : files) {
+    const auto file = identity(path);
+    const auto result = file ? replaced.find(*file) : replaced.end();
+    if (result == replaced.end()) continue;
+    throw Error(ExitCode::Usage, fmt::format("'{}' is read, and would be replaced", printable(result->second)),
+                "give the result another name");
   }
 }
 

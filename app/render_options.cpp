@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
+#include <iterator>
 
 #include "app/output.h"
 #include "app/quality.h"
@@ -77,6 +78,31 @@ void note_not_finite(const std::string& name, Scene& scene) {
   scene.warnings.push_back(fmt::format("{}: {} values are no finite numbers, the first in pixel {},{}; replaced", name,
                                        environment.not_finite, environment.first_not_finite % width,
                                        environment.first_not_finite / width));
+}
+
+/// Throws Error (Usage) for what is no list of passes.
+void choose_passes(const std::string& passes, RaySettings& rays) {
+  const std::vector<std::string> named = split_list(passes);
+  if (named.empty()) {
+    throw Error(ExitCode::Usage, "--passes names none", "write auto, all, none, or a list such as shadow,reflection");
+  }
+  const std::vector<std::string> words{"auto", "all", "none"};
+  const bool one_word = named.size() == 1 && std::ranges::find(words, named.front()) != words.end();
+  rays.auto_passes = one_word && named.front() == "auto";
+  rays.all_passes = one_word && named.front() == "all";
+  if (one_word) return;
+  std::vector<std::string> choices = words;
+  std::ranges::copy(all_pass_names(), std::back_inserter(choices));
+  for (const std::string& name : named) {
+    if (std::ranges::find(words, name) != words.end()) {
+      throw Error(ExitCode::Usage, fmt::format("--passes: '{}' goes with no other word", name),
+                  "leave it or the others out");
+    }
+    if (std::ranges::find(choices, name) != choices.end()) continue;
+    throw Error(ExitCode::Usage, fmt::format("no ray pass is called '{}'", printable(name)),
+                unknown_name_hint(name, choices));
+  }
+  rays.passes = named;
 }
 
 }  // namespace
@@ -263,19 +289,7 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
   settings.primary = parse_primary(primary);
   settings.shading = parse_shading(shading);
-  if (split_list(passes).empty()) {
-    throw Error(ExitCode::Usage, "--passes names none", "write auto, all, none, or a list such as shadow,reflection");
-  }
-  settings.rays.auto_passes = passes == "auto";
-  settings.rays.all_passes = passes == "all";
-  if (passes != "auto" && passes != "none" && passes != "all") {
-    settings.rays.passes = split_list(passes);
-    for (const std::string& name : settings.rays.passes) {
-      if (name != "auto" && name != "none" && name != "all") continue;
-      throw Error(ExitCode::Usage, fmt::format("--passes: '{}' goes with no other word", name),
-                  "leave it or the others out");
-    }
-  }
+  choose_passes(passes, settings.rays);
   const Quality& defaults = find_quality(quality);
   settings.rays.seed = seed;
   settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);

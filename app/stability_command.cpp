@@ -88,7 +88,7 @@ class StabilityCommand final : public Command {
       return one.measure(globals);
     } catch (const Error& error) {
       if (error.code() == ExitCode::NoDevice) throw;  // without graphics hardly a case can be measured
-      return ended(fmt::format("{} ({})", error.what(), error.hint()));
+      return ended(error.hint().empty() ? error.what() : fmt::format("{} ({})", error.what(), error.hint()));
     } catch (const std::bad_alloc&) {
       return ended("out of memory");
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <set>
@@ -36,13 +37,13 @@ Figures figures_of(const Wall& wall) {
   std::set<std::string> hosts;
   for (const WallNode& node : wall.nodes) hosts.insert(node.host);
   figures.hosts = std::max<std::size_t>(hosts.size(), 1);
-  double lit = 0.0;
-  const std::vector<bool> repeated = repeated_places(wall);
-  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
-    const WallScreen& screen = wall.screens[i];
+  std::map<Eye, double> areas;
+  for (const WallScreen& screen : wall.screens) {
     figures.visible_pixels += screen.pixels.area();
-    if (!repeated[i]) lit += screen_width(screen) * screen_height(screen);  // else it is the other eye's
+    areas[screen.eye] += screen_width(screen) * screen_height(screen);
   }
+  // Two eyes' screens lie in one place.
+  const double lit = areas[Eye::Both] + std::max(areas[Eye::Left], areas[Eye::Right]);
   const WallExtent extent = wall_extent(wall);
   figures.flat = extent.flat;
   figures.width_px = extent.width / finest_pitch(wall);

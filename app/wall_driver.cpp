@@ -18,6 +18,7 @@
 #include "cluster/texts.h"
 #include "core/hash.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/stopwatch.h"
 #include "core/trace.h"
 #include "walls/geometry.h"
@@ -184,10 +185,11 @@ void WallDriver::resume(std::vector<std::string>& frames) {
   const int of = before.stopped_of.value_or(static_cast<int>(before.frames.size()));
   if (of != asked) other = fmt::format("{} frames", of);
   if (!other.empty()) {
-    throw Error(ExitCode::BadInput, fmt::format("'{}' is of a run with {}", run_.manifest().string(), other),
+    throw Error(ExitCode::BadInput,
+                fmt::format("'{}' is of a run with {}", printable(run_.manifest().string(), 200), other),
                 "go on with the same command line, or begin anew with --force in place of --resume");
   }
-  check_frames(before, wall_.screens, run_.manifest().string());
+  check_records(before, wall_.screens, run_.manifest().string());
   log::info("going on after {} of {} frames", before.frames.size(), asked);
   frames = std::move(before.frames);
   manifest_.restarts = std::move(before.restarts);

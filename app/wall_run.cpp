@@ -118,7 +118,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   }
   prepare(session, driver.plan());
   const int frames = run.open_ended() ? 0 : run.frames.value_or(1);
-  bool stopped = false;
+  bool ended_early = false;  // before its last frame
   {
     const std::string mode = speaks && globals.verbosity >= 0 ? globals.progress : "none";
     const Sampling sampling = sampling_of(run);
@@ -133,11 +133,12 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
       status.add(watch.ms(), driver.manifest().frames.back(), [&] { return driver.states(); });
       const bool last = !run.open_ended() && frame + 1 >= frames;
       if (last || wait_for_work(run, driver)) continue;
-      stopped = driver.interrupted() && !run.open_ended();
+      ended_early = !run.open_ended();
       break;
     }
   }
-  if (stopped) driver.note_stop(frames);
+  if (ended_early) driver.note_stop(frames);
+  const bool stopped = ended_early && driver.interrupted();
   const bool seen = driver.finish();
   RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
   stats.relmse = driver.relmse();
@@ -173,6 +174,19 @@ void check_remote(const WallRun& run, const Wall& wall, const Globals& globals) 
   check_writable(run.manifest(), globals.force);
 }
 
+/// Beside the scene's.
+std::vector<std::string> files_read(const WallRun& run, const Wall& wall) {
+  std::vector<std::string> files{run.wall, run.path, run.options.environment};
+  const std::filesystem::path folder = std::filesystem::path(run.wall).parent_path();
+  for (const WallScreen& screen : wall.screens) {
+    for (const WarpFile* const file : {&screen.warp.mesh, &screen.warp.blend, &screen.warp.black}) {
+      if (!file->path.empty()) files.push_back((folder / file->path).string());
+    }
+  }
+  for (const WallViewer& viewer : wall.viewers) files.push_back(viewer.tracker.file);
+  return files;
+}
+
 void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals) {
   const DisplayOptions display = run.display.options(globals);
   if (run.display.frames_on_stdout() && run.options.explain) {
@@ -182,11 +196,11 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   std::vector<std::string> results{run.picture, run.options.stats, run.manifest().string(),
                                    assembled_file(run).string()};
   if (run.display.kind().stream && run.display.output != "-") results.push_back(run.display.output);
-  check_distinct(results, globals.trace);
   if (run.writes_files()) {
     for (const auto& file : files_of_display(wall, run.display.output)) results.push_back(file.string());
   }
-  check_spared(run.scene, globals.scene_limits(), std::vector{run.wall, run.options.environment}, results);
+  check_distinct(results, globals.trace);
+  check_spared(run.scene, globals.scene_limits(), files_read(run, wall), results);
   if (!run.picture.empty()) {
     if (!run.picture.ends_with(".png")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),
@@ -223,7 +237,7 @@ void check_path(const WallRun& run) {
   if (run.open_ended()) {
     throw Error(ExitCode::Usage, "--path needs to know how many frames it takes", "add --frames N");
   }
-  check_frames(load_camera_path(run.path), static_cast<std::size_t>(run.frames.value_or(1)), run.path);
+  check_directions(load_camera_path(run.path), static_cast<std::size_t>(run.frames.value_or(1)), run.path);
 }
 
 }  // namespace
@@ -263,10 +277,12 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   run.open_ended() ? watch_interrupts() : watch_requests();
   std::optional<FolderLock> lock;
   const auto claim_outputs = [&](const WallRun& chosen) {
-    check_outputs(chosen, wall, globals);  // makes the folder
-    if (!chosen.writes_files() || launched_by_hpr()) return;
-    lock.emplace(chosen.display.output);
-    check_outputs(chosen, wall, globals);  // another run may have ended meanwhile
+    std::error_code error;
+    if (chosen.writes_files() && !launched_by_hpr()) {
+      std::filesystem::create_directories(chosen.display.output, error);
+      if (!error) lock.emplace(chosen.display.output);  // else it is told of below
+    }
+    check_outputs(chosen, wall, globals);
   };
   if (!inside_mpi_job()) claim_outputs(run);
   const auto body = [&](Communicator& comm) {

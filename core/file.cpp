@@ -205,11 +205,13 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
   const std::filesystem::path folder = folder_of(target_of(path));
   std::error_code error;
   if (!overwrite && std::filesystem::exists(path, error)) {
-    throw Error(ExitCode::Io, fmt::format("'{}' exists", path.string()),
+    throw Error(ExitCode::Io, fmt::format("'{}' exists", printable(path.string(), 300)),
                 "choose another name or overwrite it with --force");
   }
   if (!std::filesystem::is_directory(folder, error)) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': there is no folder '{}'", path.string(), folder.string()),
+    throw Error(ExitCode::Io,
+                fmt::format("cannot write '{}': there is no folder '{}'", printable(path.string(), 300),
+                            printable(folder.string(), 300)),
                 "create the folder first");
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
@@ -217,6 +219,7 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
 
 FolderLock::FolderLock(const std::filesystem::path& folder)
     : folder_(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (folder_ < 0 && errno == EACCES) return;  // it may still be written to
   if (folder_ < 0) fail("cannot open", folder, errno);
   if (::flock(folder_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   ::close(folder_);
@@ -225,7 +228,7 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
 }
 
 FolderLock::~FolderLock() {
-  ::close(folder_);
+  if (folder_ >= 0) ::close(folder_);
 }
 
 EmptyFolders::EmptyFolders(const std::filesystem::path& folder) {

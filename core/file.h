@@ -52,8 +52,8 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 /// writable: asked before long work.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
-/// Keeps other processes from writing their results into a folder, as long as they ask for it in the same way. Where
-/// the file system knows no locks it keeps nobody.
+/// Keeps other processes of this host from writing their results into a folder, if they ask for it in the same way.
+/// Where it cannot be locked it keeps nobody.
 class FolderLock {
  public:
   /// Throws Error (Io) when another process holds it, or there is no such folder.

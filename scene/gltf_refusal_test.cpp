@@ -115,7 +115,9 @@ TEST(GltfRefusal, UnknownRequiredExtensionsAreNamed) {
 TEST(GltfRefusal, MaterialsTellOfExtensionsThatAreNotDrawnDeclaredOrNot) {
   auto document = triangle();
   document.json["materials"] = {{{"extensions", {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}}}}}};
+  document.json["materials"].push_back(document.json["materials"][0]);
   EXPECT_TRUE(test::warns_of(test::load(document.json), "materials: KHR_materials_sheen"));
+  EXPECT_EQ(test::load(document.json).warnings.size(), 1U) << "once for all materials";
   document.json["materials"] = {{{"extensions", {{"KHR_materials_ior", {{"ior", 1.4}}}}}}};
   EXPECT_TRUE(test::load(document.json).warnings.empty());
   document.json["extensionsUsed"] = {"KHR_materials_ior"};

@@ -77,8 +77,10 @@ def expect_finding(arguments, code, mention):
         complain(case, result, f"no finding about {mention}")
 
 
-def expect_success(case, arguments, prefix):
+def expect_success(case, arguments, prefix, prepare=None):
     with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+        if prepare:
+            prepare(pathlib.Path(scratch))
         result = run(arguments, scratch)
     if result.returncode != 0:
         complain(case, result, f"left with {result.returncode}")
@@ -119,6 +121,13 @@ def locker(name):
         (folder / name).mkdir()
         held = os.open(folder / name, os.O_RDONLY)
         fcntl.flock(held, fcntl.LOCK_EX)
+    return prepare
+
+
+def folder_with(name, file):
+    def prepare(folder):
+        (folder / name).mkdir()
+        (folder / name / file).write_text("old")
     return prepare
 
 
@@ -165,6 +174,8 @@ def full_disk():
 
 
 def main():
+    expect_success("a demo whose picture was taken away", ["demo", "--wall", "1x1@16x16"], "hpr-demo.png",
+                   prepare=folder_with("hpr-demo-screens", "wall-r0c0.png"))
     expect_success("help", ["--help"], "render")
     expect_success("help command", ["help"], "render")
     expect_success("help of render", ["render", "--help"], "--size")
@@ -229,6 +240,9 @@ def main():
         expect_error(f"a folder another run writes into, {ranks} ranks",
                      ["wall", "run", "1x1@16x16", "gen:cornell", "-o", "out", "--force", "--ranks", ranks], [4], ["another run"],
                      prepare=locker("out"))
+    expect_error("a path that a wall would replace",
+                 ["wall", "run", "1x1@16x16", "gen:cornell", "-o", ".", "--frames", "2", "--path", "wall-r0c0.png", "--force"], [2],
+                 ["wall-r0c0.png"], prepare=writer("wall-r0c0.png", "eye 0,1,4 at 0,1,0\n"))
     expect_error("a demo's name that holds something else", ["demo", "--wall", "1x1@16x16"], [4], ["--force"],
                  prepare=writer("hpr-demo.png", "precious"))
     expect_error("an environment that would be replaced",

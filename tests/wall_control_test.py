@@ -95,6 +95,7 @@ def told_and_stopped(folder):
         wall.say("stop")
         wall.leave()
         frames = wall.manifest()["frames"]
+        expect(wall.manifest().get("stopped") == {"frames": len(frames), "of": 100000}, "the manifest does not tell of wall stop")
         expect(hashes(frames[0]) != hashes(frames[-1]), "the camera moved, the picture did not")
         out = folder / f"direct-{ranks}"
         direct = subprocess.run([HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(out), "--quality", "draft", "--passes",

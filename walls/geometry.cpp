@@ -90,21 +90,6 @@ glm::dvec3 screen_center(const WallScreen& screen) {
   return 0.5 * (screen.lower_right + screen.upper_left);
 }
 
-bool in_one_place(const WallScreen& a, const WallScreen& b) {
-  const double near_enough = 1e-6 * screen_width(a);
-  return glm::distance(a.lower_left, b.lower_left) < near_enough &&
-         glm::distance(a.lower_right, b.lower_right) < near_enough &&
-         glm::distance(a.upper_left, b.upper_left) < near_enough;
-}
-
-std::vector<bool> repeated_places(const Wall& wall) {
-  std::vector<bool> repeated(wall.screens.size(), false);
-  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
-    for (std::size_t j = 0; j < i && !repeated[i]; ++j) repeated[i] = in_one_place(wall.screens[j], wall.screens[i]);
-  }
-  return repeated;
-}
-
 double pixel_pitch(const WallScreen& screen) {
   return screen_width(screen) / screen.pixels.width;
 }

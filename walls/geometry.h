@@ -85,11 +85,6 @@ struct WallSeams {
 };
 [[nodiscard]] WallSeams wall_seams(const Wall& wall);
 
-/// Whether both fill the same rectangle, as two eyes' screens may, to 1e-6 of its width.
-[[nodiscard]] bool in_one_place(const WallScreen& a, const WallScreen& b);
-/// Per screen whether an earlier one fills its rectangle.
-[[nodiscard]] std::vector<bool> repeated_places(const Wall& wall);
-
 /// Metres per pixel along the screen's width.
 [[nodiscard]] double pixel_pitch(const WallScreen& screen);
 

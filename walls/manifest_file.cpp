@@ -67,7 +67,7 @@ bool tells_of(const Json& record, const WallScreen& screen) {
 
 }  // namespace
 
-void check_frames(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name) {
+void check_records(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name) {
   for (std::size_t i = 0; i < file.frames.size(); ++i) {
     const Json frame = Json::parse(file.frames[i]);
     const Json told = frame.value("screens", Json());

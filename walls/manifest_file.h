@@ -25,7 +25,7 @@ struct ManifestFile {
 [[nodiscard]] ManifestFile parse_manifest(std::string_view text, const std::string& name);
 
 /// Throws Error (BadInput) unless the frames are 0, 1, ... of these screens, in their order.
-void check_frames(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name);
+void check_records(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name);
 
 /// The same of a file, up to 1 GiB. Throws Error (Io) too.
 [[nodiscard]] ManifestFile load_manifest(const std::string& path);

@@ -42,7 +42,7 @@ TEST(ManifestFile, TellsWhetherItsFramesAreThoseOfAWall) {
   screen.id = "a";
   screen.pixels = {2, 1};
   const auto check = [&](const RunManifest& run) {
-    check_frames(parse_manifest(to_json(run), "m"), {&screen, 1}, "m");
+    check_records(parse_manifest(to_json(run), "m"), {&screen, 1}, "m");
   };
   EXPECT_NO_THROW(check(manifest()));
   RunManifest other = manifest();
@@ -59,7 +59,7 @@ TEST(ManifestFile, TellsWhetherItsFramesAreThoseOfAWall) {
   EXPECT_THROW(check(other), Error);
   std::string text = to_json(manifest());
   text.replace(text.find("\"xxh64\": \"") + 10, 2, "zz");
-  EXPECT_THROW(check_frames(parse_manifest(text, "m"), {&screen, 1}, "m"), Error);
+  EXPECT_THROW(check_records(parse_manifest(text, "m"), {&screen, 1}, "m"), Error);
 }
 
 TEST(ManifestFile, RefusesWhatIsNone) {

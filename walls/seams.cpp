@@ -45,10 +45,9 @@ WallSeams wall_seams(const Wall& wall) {
   if (!extent.flat) return seams;
   const glm::dmat3 inside = glm::transpose(extent.axes);
   std::vector<Box> boxes;
-  const std::vector<bool> repeated = repeated_places(wall);
-  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
-    if (repeated[i]) continue;  // the other eye's
-    const WallScreen& screen = wall.screens[i];
+  const bool has_left = std::ranges::any_of(wall.screens, [](const WallScreen& s) { return s.eye == Eye::Left; });
+  for (const WallScreen& screen : wall.screens) {
+    if (has_left && screen.eye == Eye::Right) continue;  // where the left eye's are
     const glm::dvec3 a = inside * (screen.lower_left - extent.center);
     const glm::dvec3 b = inside * (screen.lower_right + screen.upper_left - screen.lower_left - extent.center);
     boxes.push_back({glm::min(a, b), glm::max(a, b), pixel_pitch(screen)});

@@ -54,9 +54,10 @@ void compare_blends(const DraftScreen& a, const DraftScreen& b, double overlap, 
 void look_for_overlap(const DraftScreen& draft, bool overlaps, NeighbourWarnings& warnings) {
   const EdgeBlend& blend = draft.screen.blend;
   if (overlaps || blend.automatic || !blend.any()) return;
-  warnings.add(draft.place, "alone",
-               fmt::format("screen \"{}\" fades its edges and overlaps no screen of its plane", draft.screen.id),
-               "right where something else shines there; else use edge_blend_m = \"auto\", which fades overlaps alone");
+  warnings.add(
+      draft.place, "alone",
+      fmt::format("screen \"{}\" fades its edges and overlaps no screen of its plane", draft.screen.id),
+      "This is right where something else shines there; else use edge_blend_m = \"auto\", which fades overlaps alone");
 }
 
 }  // namespace
@@ -70,7 +71,9 @@ void warn_about_neighbours(const WallDraft& draft, Findings& findings) {
   for (const auto& [i, j] : close_pairs(screens, kReach)) {
     const auto box = seen_from(screens[j], screens[i]);
     if (!box) {
-      overlaps[i] = overlaps[j] = true;  // maybe: walls bend from one to the other
+      // Where a wall bends from one to the other they may.
+      const bool seen_together = screens[i].eye == screens[j].eye && screens[i].viewer == screens[j].viewer;
+      if (seen_together) overlaps[i] = overlaps[j] = true;
       continue;
     }
     const double size = std::min(screen_width(screens[i]), screen_height(screens[i]));

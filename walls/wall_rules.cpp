@@ -7,7 +7,6 @@
 #include <set>
 
 #include "core/names.h"
-#include "walls/geometry.h"
 #include "walls/stereo.h"
 #include "walls/wall_draft.h"
 #include "walls/wall_file.h"
@@ -237,7 +236,11 @@ class Linker {
         const DraftScreen& b = draft_.screens[i];
         if (!a.has_corners || !b.has_corners || a.screen.id == b.screen.id) continue;
         if (for_other_eyes(a.screen, b.screen) || a.screen.warp.points || b.screen.warp.points) continue;
-        if (!in_one_place(a.screen, b.screen)) continue;
+        const double near_enough = 1e-6 * screen_width(a.screen);
+        const bool same = glm::distance(a.screen.lower_left, b.screen.lower_left) < near_enough &&
+                          glm::distance(a.screen.lower_right, b.screen.lower_right) < near_enough &&
+                          glm::distance(a.screen.upper_left, b.screen.upper_left) < near_enough;
+        if (!same) continue;
         findings_.error(
             b.place,
             fmt::format(R"(tile driven twice: screens "{}" and "{}" are the same rectangle)", a.screen.id, b.screen.id),

@@ -144,7 +144,8 @@ void warn_about_viewers(const WallDraft& draft, Findings& findings) {
     for (const DraftScreen& one : draft.screens) {
       const WallScreen& screen = one.screen;
       if (screen.viewer != i || screen.warp.points) continue;
-      const double before = glm::dot(viewer.position - screen_center(screen), screen_axes(screen)[2]);
+      const double before =
+          glm::dot(viewer.position + viewer.eye_offset - screen_center(screen), screen_axes(screen)[2]);
       if (before > 0.0) continue;
       findings.warning(
           draft.viewers[i].place,

@@ -250,7 +250,7 @@ WarpMesh parse_warp_csv(std::string_view text, const std::string& name) {
 
 WarpMesh parse_warp_obj(std::string_view text, const std::string& name) {
   ObjReader reader(name);
-  each_line(text, [&](std::string_view line, int number) { reader.add(line, number); });
+  each_line(without_mark(text), [&](std::string_view line, int number) { reader.add(line, number); });
   return reader.take();
 }
 
