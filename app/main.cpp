@@ -221,8 +221,7 @@ int main(int argc, char** argv) {
   } catch (const hpr::Error& error) {
     // What every rank of a job finds before MPI starts is said once: rank 0's exit ends the others while they wait.
     if (hpr::launched_rank() != 0) std::this_thread::sleep_for(std::chrono::seconds(2));
-    hpr::print_error(
-        error, hpr::launched_rank() == 0 ? "" : fmt::format("rank {} on {}: ", hpr::launched_rank(), hpr::host_name()));
+    hpr::print_error(error, hpr::said_by(hpr::launched_rank()));
     return static_cast<int>(error.code());
   } catch (const std::system_error& error) {  // how fmt reports a failed print
     hpr::print_error({hpr::ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});

@@ -30,7 +30,7 @@ namespace {
 /// that an error all ranks agreed on is printed once.
 [[noreturn]] void abort_job(int rank, const Error& error) {
   if (rank != 0) std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  print_error(error, rank == 0 ? "" : fmt::format("rank {} on {}: ", rank, host_name()));
+  print_error(error, said_by(rank));
   std::fflush(nullptr);
   MPI_Abort(MPI_COMM_WORLD, static_cast<int>(error.code()));
   std::abort();  // MPI_Abort does not return
@@ -76,8 +76,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
                   "leave --ranks out under mpirun or srun: the launcher sets the number");
     }
     if (rank != 0) {
-      log::configure(globals.verbosity >= 2 ? log::Level::Debug : log::Level::Error,
-                     fmt::format("rank {} on {}: ", rank, host_name()));
+      log::configure(globals.verbosity >= 2 ? log::Level::Debug : log::Level::Error, said_by(rank));
     }
     for (const ExitCode vote : all_gather_value(comm, body(comm))) code = std::max(code, vote);
   } catch (const Error& error) {
@@ -98,6 +97,10 @@ std::string host_name() {
   std::array<char, 256> name{};
   ::gethostname(name.data(), name.size() - 1);
   return name.data();
+}
+
+std::string said_by(int rank) {
+  return rank == 0 ? "" : fmt::format("rank {} on {}: ", rank, host_name());
 }
 
 HostShare host_share(Communicator& comm, const Globals& globals) {

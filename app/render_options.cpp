@@ -329,7 +329,6 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
                 "use --shading deferred");
   }
   settle_economies(settings);
-  (void)plan_passes({}, settings.rays);  // unknown pass names are found before the scene is loaded
   return settings;
 }
 

@@ -277,8 +277,8 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   run.open_ended() ? watch_interrupts() : watch_requests();
   std::optional<FolderLock> lock;
   const auto claim_outputs = [&](const WallRun& chosen) {
-    std::error_code error;
     if (chosen.writes_files() && !launched_by_hpr()) {
+      std::error_code error;
       std::filesystem::create_directories(chosen.display.output, error);
       if (!error) lock.emplace(chosen.display.output);  // else it is told of below
     }

@@ -1,5 +1,8 @@
 #include "rt/photon_maps.h"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -15,13 +18,21 @@ double flux_unit_of(const LightSet& lights, const RaySettings& settings) {
   return each > 0.0 && std::isfinite(each) ? std::ldexp(1.0, std::ilogb(each)) : 1.0;
 }
 
-PhotonSettings tracer_settings(const RaySettings& settings, double flux_unit) {
+/// Photons that a rank's share of this machine's memory holds in all the places they take while maps are made of them.
+std::uint64_t most_in_memory(const RaySettings& settings) {
+  constexpr std::uint64_t kBytes = 128;
+  const auto bytes =
+      static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  return bytes / (kBytes * static_cast<std::uint64_t>(settings.host_ranks));
+}
+
+PhotonSettings tracer_settings(const RaySettings& settings, const LightSet& lights) {
   PhotonSettings own;
   own.glossy_cutoff = settings.glossy_cutoff;
   own.caustics_only = !settings.global_photons;
   own.threads = settings.threads;
-  own.host_ranks = settings.host_ranks;
-  own.flux_unit = flux_unit;
+  own.flux_unit = flux_unit_of(lights, settings);
+  own.most_kept = std::max<std::uint64_t>(most_in_memory(settings), 1);
   return own;
 }
 
@@ -31,26 +42,27 @@ PhotonSender::PhotonSender(const Scene& scene, const Surfaces& surfaces, const R
                            const LightSet& lights, const RaySettings& settings)
     : space_(space),
       settings_(settings),
-      flux_unit_(flux_unit_of(lights, settings)),
       tracer_(
           scene, surfaces, space, rays,
           [&lights](double choice, const glm::dvec2& place, const glm::dvec2& direction) {
             return lights.emit(choice, place, direction);
           },
-          tracer_settings(settings, flux_unit_)) {}
+          tracer_settings(settings, lights)) {}
 
-/// The power of lights is a sum of sines and cosines, which other machines may round otherwise.
-void PhotonSender::agree_on_unit(Communicator& comm) {
-  if (std::exchange(agreed_, true)) return;
-  flux_unit_ = all_gather_value(comm, flux_unit_).front();
-  tracer_.set_flux_unit(flux_unit_);
+void PhotonSender::settle(Communicator& comm) {
+  if (std::exchange(settled_, true)) return;
+  // The power of lights is a sum of sines and cosines, which other machines may round otherwise.
+  tracer_.set_flux_unit(all_gather_value(comm, tracer_.settings().flux_unit).front());
+  // Every rank gets the photons of all; its own are a share of them.
+  const auto ranks = static_cast<std::uint64_t>(comm.size());
+  tracer_.set_most_kept(std::max<std::uint64_t>(tracer_.settings().most_kept / ranks, 1));
 }
 
 TracedPhotons PhotonSender::trace(const SampleNumber& number, Communicator* comm) {
   const std::uint64_t each = settings_.photons;
   PhotonRange range{each * number.sample, each};
   if (comm != nullptr) {
-    agree_on_unit(*comm);
+    settle(*comm);
     range = share_of_rank(range, comm->rank(), comm->size());
   }
   TracedPhotons traced = tracer_.trace({settings_.seed, number.frame}, range, each);
@@ -79,7 +91,7 @@ const PhotonMaps& PhotonSender::send(const SampleNumber& number, Communicator* c
     const std::vector<Photon>& photons = which == 0 ? traced.caustic : traced.global;
     PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;
     const double first = which == 0 ? caustic_radius_ : global_radius_;
-    map = PhotonMap(photons, space_, progressive_radius(first, number.sample), flux_unit_);
+    map = PhotonMap(photons, space_, progressive_radius(first, number.sample), tracer_.settings().flux_unit);
   });
   sent_ = number;
   return maps_;

@@ -37,14 +37,13 @@ class PhotonSender {
   [[nodiscard]] PhotonCounts take_counts();
 
  private:
-  void agree_on_unit(Communicator& comm);
+  void settle(Communicator& comm);
   [[nodiscard]] TracedPhotons trace(const SampleNumber& number, Communicator* comm);
   void choose_radii(const TracedPhotons& first);
 
   RaySpace space_;
   RaySettings settings_;
-  double flux_unit_;
-  bool agreed_ = false;  ///< on the unit, by all ranks
+  bool settled_ = false;  ///< what depends on the other ranks
   PhotonTracer tracer_;
   std::optional<SampleNumber> sent_;
   double caustic_radius_ = 0.0;  ///< metres, of a frame's first sample; 0: not chosen yet

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <vector>
 
 #include "cluster/local_communicator.h"
+#include "core/error.h"
 #include "rt/lighter.h"
+#include "rt/photon_maps.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -66,6 +69,46 @@ TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
       EXPECT_LT(lighter.counts().photon, one.counts().photon);
       EXPECT_TRUE(std::ranges::equal(lit.tile(0), alone.tile(0)));
     });
+  }
+}
+
+TEST(PhotonPass, RanksOfAHostShareItsMemory) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {4, 4}, scene, 0.5);
+  RaySettings settings{.photons = 5'000, .global_photons = true};
+  const auto lights = [&] {
+    try {
+      (void)test::light(scene, view, settings);
+      return ExitCode::Done;
+    } catch (const Error& error) {
+      return error.code();
+    }
+  };
+  EXPECT_EQ(lights(), ExitCode::Done);
+  settings.host_ranks = 1 << 30;  // so many leave none of them the memory for a thousand
+  EXPECT_EQ(lights(), ExitCode::Limit);
+}
+
+TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const RaySpace space(scene.bounds);
+  const Surfaces surfaces(scene, space);
+  const RayScene rays(scene, space, 1);
+  const LightSet lights(scene);
+  RaySettings settings{.photons = 40'000, .global_photons = true};
+  PhotonSender whole(scene, surfaces, space, rays, lights, settings);
+  const auto kept = static_cast<double>(whole.send({}, nullptr).global.size());
+  // As much memory as holds three quarters of them: all ranks get all.
+  const double memory = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  settings.host_ranks = static_cast<int>(memory / (128.0 * 0.75 * kept));
+  for (const int ranks : {1, 2}) {
+    EXPECT_THROW(run_local_ranks(ranks,
+                                 [&](Communicator& comm) {
+                                   PhotonSender sender(scene, surfaces, space, rays, lights, settings);
+                                   (void)sender.send({}, &comm);
+                                 }),
+                 Error)
+        << ranks;
   }
 }
 

@@ -1,7 +1,5 @@
 #include "rt/photon_tracer.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -126,28 +124,20 @@ struct PhotonTracer::Block {
 
 namespace {
 
-/// Photons that a share of this machine's memory holds in all the places they take while maps are made of them.
-std::uint64_t most_in_memory(int sharers) {
-  constexpr std::uint64_t kBytes = 128;
-  return static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) /
-         (kBytes * static_cast<std::uint64_t>(sharers));
-}
-
 /// Counts what the threads of a rank keep: memory that is promised and not there ends programs without a word.
 class KeptPhotons {
  public:
-  /// Every rank gets the photons of all: this one's are a share of them.
-  KeptPhotons(std::uint64_t most, const PhotonRange& range, std::uint64_t pass_photons)
-      : most_(static_cast<double>(most) * static_cast<double>(range.count) / static_cast<double>(pass_photons)) {}
+  /// 0: any number.
+  explicit KeptPhotons(std::uint64_t most) : most_(most) {}
 
   void add(std::uint64_t count) {
-    if (static_cast<double>(kept_.fetch_add(count) + count) <= most_) return;
+    if (kept_.fetch_add(count) + count <= most_ || most_ == 0) return;
     throw Error(ExitCode::Limit, "the photons of one sample take more memory than this machine has",
                 "send fewer in a sample and take more samples (--photons, --spp), or run fewer ranks on a host");
   }
 
  private:
-  double most_;
+  std::uint64_t most_;
   std::atomic<std::uint64_t> kept_{0};
 };
 
@@ -157,8 +147,7 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
   const std::uint64_t stream = photon_stream(key);
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
-  KeptPhotons kept(settings_.most_kept > 0 ? settings_.most_kept : most_in_memory(settings_.host_ranks), range,
-                   pass_photons);
+  KeptPhotons kept(settings_.most_kept);
   parallel_for(settings_.threads, count, [&](std::size_t i) {
     const DenormalsAsZero mode;
     Block block;

@@ -25,8 +25,7 @@ struct PhotonSettings {
   int max_bounces = 1024;       ///< roulette ends paths long before, but for scenes that absorb less than 1 %
   int threads = 1;
   double flux_unit = 1.0;       ///< W, a power of two: kept fluxes are floats and reach from 2^-126 to 2^127 of it
-  std::uint64_t most_kept = 0;  ///< in a pass, on all ranks; 0: what this rank's share of the memory holds
-  int host_ranks = 1;           ///< ranks of this host: each keeps all photons in its memory
+  std::uint64_t most_kept = 0;  ///< by one call of trace(); 0: any number
 };
 
 struct PhotonCounts {
@@ -83,8 +82,10 @@ class PhotonTracer {
         settings_(settings),
         has_coverage_(has_coverage(scene)) {}
 
-  /// From here on, see PhotonSettings.
+  [[nodiscard]] const PhotonSettings& settings() const { return settings_; }
+  /// Of the next trace().
   void set_flux_unit(double watts) { settings_.flux_unit = watts; }
+  void set_most_kept(std::uint64_t photons) { settings_.most_kept = photons; }
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
   /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are

@@ -120,20 +120,13 @@ TEST(PhotonTracerTest, MorePhotonsThanMayBeKeptAreAnError) {
   const std::uint64_t kept = all.trace({}, {0, 5000}, 5000).global.size();
   const PhotonTracer some = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept});
   EXPECT_EQ(some.trace({}, {0, 5000}, 5000).global.size(), kept);
-  for (const int ranks : {1, 2}) {
-    // Of two ranks each keeps about half, and gets the other half.
-    const std::uint64_t count = 5000U / static_cast<unsigned>(ranks);
-    const PhotonTracer few = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept * 3 / 4});
-    try {
-      (void)few.trace({}, {0, count}, 5000);
-      FAIL() << ranks;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::Limit);
-    }
+  const PhotonTracer few = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept * 3 / 4});
+  try {
+    (void)few.trace({}, {0, 5000}, 5000);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Limit);
   }
-  // So many ranks leave none of them the memory for a thousand.
-  const PhotonTracer crowded = room.tracer(test::glowing_room(), {.threads = 2, .host_ranks = 1 << 30});
-  EXPECT_THROW((void)crowded.trace({}, {0, 5000}, 5000), Error);
 }
 
 TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {

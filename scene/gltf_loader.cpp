@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/file.h"
 #include "core/names.h"
 #include "scene/gltf_buffers.h"
 #include "scene/gltf_data.h"
@@ -220,17 +219,13 @@ void check_skins(const GltfData& data) {
 
 Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
   GltfContext context(path.string(), limits);
-  const std::vector<std::byte> file = read_file(path, std::min(limits.file_bytes, limits.memory_bytes));
-  context.charge(file.size(), "the file");
-  const GltfParts parts = scan_gltf(file, context);
-  // A parsed document takes up to some twenty times its text, and is held twice for a moment.
-  context.check_room(std::uint64_t{parts.json.size()} * 16, "the JSON text");
-  nlohmann::json root = parse_json(parts.json, context);
+  const GltfFile file = open_gltf(path, context);
+  nlohmann::json root = parse_json(file.parts.json, context);
   if (!root.is_object()) context.fail("", "this is no glTF: the JSON is not an object");
   check_extensions(root, context);
   check_shape(root, context);
 
-  GltfBuffers buffers(path.parent_path(), parts);
+  GltfBuffers buffers(path.parent_path(), file.parts);
   buffers.load(root, context);
   const nlohmann::json images = root.contains("images") ? std::move(root["images"]) : nlohmann::json();
   const tinygltf::Model model = parse_model(std::move(root), context);

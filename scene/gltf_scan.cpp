@@ -9,6 +9,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "core/file.h"
 #include "core/names.h"
 
 namespace hpr {
@@ -193,11 +194,9 @@ GltfParts scan_gltf(std::span<const std::byte> file, GltfContext& context) {
   const bool binary = file.size() >= kMagic.size() && std::memcmp(file.data(), kMagic.data(), kMagic.size()) == 0;
   GltfParts parts = binary ? split_glb(file, context) : GltfParts{as_text(file), {}, false};
 
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (parts.json.starts_with(kByteOrderMark)) {
-    context.warn("", "the text starts with a byte order mark");
-    parts.json.remove_prefix(kByteOrderMark.size());
-  }
+  const std::string_view text = without_mark(parts.json);
+  if (text.size() < parts.json.size()) context.warn("", "the text starts with a byte order mark");
+  parts.json = text;
   const std::size_t first = parts.json.find_first_not_of(" \t\r\n");
   if (first == std::string_view::npos || parts.json[first] != '{') {
     context.fail("", "this is no glTF: it starts neither with \"glTF\" nor with a JSON object",
@@ -205,6 +204,16 @@ GltfParts scan_gltf(std::span<const std::byte> file, GltfContext& context) {
   }
   scan_json(parts.json, context);
   return parts;
+}
+
+GltfFile open_gltf(const std::filesystem::path& path, GltfContext& context) {
+  const SceneLimits& limits = context.limits();
+  GltfFile file{read_file(path, std::min(limits.file_bytes, limits.memory_bytes)), {}};
+  context.charge(file.bytes.size(), "the file");
+  file.parts = scan_gltf(file.bytes, context);
+  // A parsed document takes up to some twenty times its text, and is held twice for a moment.
+  context.check_room(std::uint64_t{file.parts.json.size()} * 16, "the JSON text");
+  return file;
 }
 
 }  // namespace hpr

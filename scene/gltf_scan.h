@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "scene/gltf_context.h"
 
@@ -22,6 +24,14 @@ inline constexpr int kGltfJsonDepth = 64;
 /// Tells text from binary glTF by the first bytes, checks the container (magic, version, lengths, order and bounds of
 /// chunks) and then the text. Throws Error (BadInput).
 [[nodiscard]] GltfParts scan_gltf(std::span<const std::byte> file, GltfContext& context);
+
+/// A file's bytes and its parts, which may be parsed.
+struct GltfFile {
+  std::vector<std::byte> bytes;
+  GltfParts parts;
+};
+/// Reads and scans a file, within the context's limits. Throws Error (Io, BadInput, Limit).
+[[nodiscard]] GltfFile open_gltf(const std::filesystem::path& path, GltfContext& context);
 
 /// What has to hold before a recursive parser may see the text: valid UTF-8, nesting up to kGltfJsonDepth. Keys that
 /// stand twice in one object are warned of: readers disagree on which one counts (here: the last).

@@ -1,11 +1,8 @@
 #include "scene/scene_files.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "core/error.h"
-#include "core/file.h"
 #include "scene/gltf_scan.h"
 #include "scene/gltf_uri.h"
 
@@ -31,11 +28,8 @@ std::vector<std::filesystem::path> files_of_scene(const std::string& source, con
   std::vector<std::filesystem::path> files{path};
   try {
     GltfContext context(source, limits);
-    const std::vector<std::byte> bytes = read_file(path, std::min(limits.file_bytes, limits.memory_bytes));
-    context.charge(bytes.size(), "the file");
-    const std::string_view text = scan_gltf(bytes, context).json;
-    context.check_room(std::uint64_t{text.size()} * 16, "the JSON text");  // as load_gltf has it
-    const nlohmann::json root = nlohmann::json::parse(text, nullptr, false);
+    const GltfFile file = open_gltf(path, context);
+    const nlohmann::json root = nlohmann::json::parse(file.parts.json, nullptr, false);
     if (!root.is_object()) return files;
     for (const char* const list : {"buffers", "images"}) {
       if (!root.contains(list) || !root[list].is_array()) continue;

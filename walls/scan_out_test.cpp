@@ -27,7 +27,7 @@ Image<Rgba8> marked(Size size) {
 Wall parsed(const std::string& text) {
   const WallReading reading = parse_wall(text, "t.toml");
   for (const WallFinding& finding : reading.findings) {
-    if (finding.error) ADD_FAILURE() << finding.what;
+    if (finding.error || !finding.what.ends_with("overlaps no screen of its plane")) ADD_FAILURE() << finding.what;
   }
   return reading.wall;
 }

@@ -94,7 +94,6 @@ double power_lost(double power, std::uint64_t first, std::uint64_t all, int thre
   PhotonSettings once;
   once.max_bounces = 1;  // a white wall scatters everything; the photon is kept where it arrives next, and ends
   once.threads = threads;
-  once.most_kept = std::numeric_limits<std::uint64_t>::max();  // only a slice of the pass is sent
   const TracedPhotons traced = room.trace({first, kSlice}, all, once);
   double sum = 0.0;
   for (const Photon& photon : traced.global) sum += static_cast<double>(photon.flux[0]);
