@@ -51,8 +51,9 @@ Scene ray_bench_scene(std::uint64_t triangles) {
   floor.triangles = {{0, 1, 2}, {0, 2, 3}};
   scene.instances = {{0, glm::dmat4(1.0), 0}, {2, glm::dmat4(1.0), 0}};
   for (int i = 0; i < kColumns * kRows; ++i) {
+    const int row = i / kColumns;
     const double x = 0.7 * (i % kColumns - 0.5 * (kColumns - 1));
-    const double z = 1.5 - 0.8 * (i / kColumns);
+    const double z = 1.5 - 0.8 * row;
     const glm::dmat4 placed = glm::translate(glm::dmat4(1.0), {x, -1.0, z});
     scene.instances.push_back({1, glm::scale(glm::rotate(placed, 0.5 * i, {0.6, 0.8, 0.0}), glm::dvec3(0.2)), 0});
   }

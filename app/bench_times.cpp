@@ -1,8 +1,7 @@
 #include "app/bench_times.h"
 
-#include <time.h>
-
 #include <algorithm>
+#include <ctime>
 
 namespace hpr {
 

@@ -29,7 +29,7 @@ std::filesystem::path chosen_folder() {
 }  // namespace
 
 std::filesystem::path cache_folder() {
-  const std::filesystem::path folder = chosen_folder();
+  std::filesystem::path folder = chosen_folder();
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) {

@@ -42,6 +42,10 @@ struct Contestant {
   std::uint64_t differing_pixels = 0;  ///< rank 0: of the worst frame
   Image<Key> frame;                    ///< rank 0: the last one
   TileLayer<Key> own_layer;            ///< what it starts from where that is not the layer of all strategies
+
+  [[nodiscard]] const TileLayer<Key>& start(const TileLayer<Key>& of_all) const {
+    return own_layer.tiles() > 0 ? own_layer : of_all;
+  }
 };
 
 /// Collective. On rank 0 the largest key per pixel over all ranks' layers, from whole layers merged one after the other
@@ -90,18 +94,11 @@ std::string frame_hash(const Image<Key>& frame, bool colors) {
   return hex16(xxh64(std::as_bytes(picture.pixels())));
 }
 
-}  // namespace
-
-CompareResult compare_strategies(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
-  HPR_CHECK(!settings.strategies.empty() && settings.frames > 0 && settings.warmup >= 0);
-  if (settings.operation != CompareOperator::Nearest) return compare_blenders(comm, input, settings);
-  const TileLayer<Key> pristine = input.layer(comm);
-  const std::vector<std::size_t> tiles = all_tiles(pristine.layout());
-  const std::vector<Key> expected = serial_maximum(comm, pristine);
-  const bool is_root = comm.rank() == 0;
-
+/// Collective.
+std::vector<Contestant> line_up(Communicator& comm, const CompareInput& input, std::span<const std::string> names) {
   std::vector<Contestant> contestants;
-  for (const std::string& name : settings.strategies) {
+  contestants.reserve(names.size());
+  for (const std::string& name : names) {
     Contestant& contestant = contestants.emplace_back();
     contestant.comm = std::make_unique<CountingCommunicator>(comm);
     if (name == kSortFirst) {
@@ -112,6 +109,33 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
       contestant.compositor = make_compositor(name);
     }
   }
+  return contestants;
+}
+
+/// Rank 0's: all but what the frames took and who took part.
+CompareRun outcome_of(const Contestant& contestant, const Costs& costs, const Load& load, bool colors) {
+  CompareRun run;
+  run.strategy = contestant.compositor->name();
+  run.differing_pixels = contestant.differing_pixels;
+  if (const auto prediction = contestant.compositor->predict(costs, load)) {
+    run.predicted_ms = prediction->collected(costs, load) * 1e3;
+  }
+  if (contestant.compositor->chosen() != run.strategy) run.chosen = contestant.compositor->chosen();
+  run.frame_xxh64 = frame_hash(contestant.frame, colors);
+  return run;
+}
+
+}  // namespace
+
+CompareResult compare_strategies(Communicator& comm, const CompareInput& input, const CompareSettings& settings) {
+  HPR_CHECK(!settings.strategies.empty() && settings.frames > 0 && settings.warmup >= 0);
+  if (settings.operation != CompareOperator::Nearest) return compare_blenders(comm, input, settings);
+  const TileLayer<Key> pristine = input.layer(comm);
+  const std::vector<std::size_t> tiles = all_tiles(pristine.layout());
+  const std::vector<Key> expected = serial_maximum(comm, pristine);
+  const bool is_root = comm.rank() == 0;
+
+  std::vector<Contestant> contestants = line_up(comm, input, settings.strategies);
   const bool in_place = std::ranges::any_of(
       contestants, [](const Contestant& contestant) { return contestant.compositor->merges_in_place(); });
   WorkingLayers<Key> layers(comm, pristine.layout(), in_place);
@@ -124,7 +148,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
     for (Contestant& contestant : contestants) {
       Compositor& compositor = *contestant.compositor;
       TileLayer<Key>& layer = layers.of(compositor.merges_in_place());
-      copy_tiles(contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine, layer, tiles);
+      copy_tiles(contestant.start(pristine), layer, tiles);
       const Sample sample =
           measure_frame(*contestant.comm, assembler, layer, layers.peers(), [&](std::span<const int> shown_by) {
             return compositor.composite(*contestant.comm, layer, tiles, shown_by);
@@ -138,19 +162,11 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
   for (Contestant& contestant : contestants) {
     const auto samples = gather_samples(comm, contestant.samples);
     if (!is_root) continue;
-    CompareRun run;
-    run.strategy = contestant.compositor->name();
+    CompareRun& run = result.runs.emplace_back(outcome_of(contestant, costs, load, input.colors));
     run.ranks = comm.size();
     run.transport = comm.transport();
     run.frames = settings.frames;
     summarize(samples, run);
-    run.differing_pixels = contestant.differing_pixels;
-    if (const auto prediction = contestant.compositor->predict(costs, load)) {
-      run.predicted_ms = prediction->collected(costs, load) * 1e3;
-    }
-    if (contestant.compositor->chosen() != run.strategy) run.chosen = contestant.compositor->chosen();
-    run.frame_xxh64 = frame_hash(contestant.frame, input.colors);
-    result.runs.push_back(std::move(run));
   }
   if (is_root) result.frame = std::move(contestants.front().frame);
   return result;

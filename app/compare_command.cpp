@@ -173,22 +173,25 @@ class CompareCommand final : public Command {
     return inside_mpi_job() ? std::vector<int>{} : std::vector<int>{2, 4};
   }
 
-  [[nodiscard]] std::vector<std::string> strategies_for(int ranks) const {
+  [[nodiscard]] std::vector<std::string> all_strategies_for(int ranks) const {
     std::vector<std::string> names;
-    if (strategies_ == "all") {
-      const auto add_fitting = [&](const auto& strategies) {
-        for (const auto& strategy : strategies) {
-          if (strategy->fits(ranks)) names.emplace_back(strategy->name());
-        }
-      };
-      if (operation() == CompareOperator::Nearest) {
-        add_fitting(all_compositors());
-        if (!scene_.empty()) names.emplace_back(kSortFirst);
-      } else {
-        add_fitting(all_blenders<RgbaPremultiplied>());
+    const auto add_fitting = [&](const auto& strategies) {
+      for (const auto& strategy : strategies) {
+        if (strategy->fits(ranks)) names.emplace_back(strategy->name());
       }
-      return names;
+    };
+    if (operation() == CompareOperator::Nearest) {
+      add_fitting(all_compositors());
+      if (!scene_.empty()) names.emplace_back(kSortFirst);
+    } else {
+      add_fitting(all_blenders<RgbaPremultiplied>());
     }
+    return names;
+  }
+
+  [[nodiscard]] std::vector<std::string> strategies_for(int ranks) const {
+    if (strategies_ == "all") return all_strategies_for(ranks);
+    std::vector<std::string> names;
     for (const std::string& name : split_strategies(strategies_)) {
       if (name == kSortFirst && operation() == CompareOperator::Nearest) {
         if (scene_.empty()) {

@@ -102,6 +102,7 @@ class DisplayCommand final : public Command {
     const std::vector<WallHost> hosts = wall_hosts(wall);
     if (hosts.size() == 1) return hosts.front().host;
     std::vector<std::string> names;
+    names.reserve(hosts.size());
     for (const WallHost& host : hosts) names.push_back(host.host);
     throw Error(ExitCode::Usage, fmt::format("the wall has {} hosts", hosts.size()),
                 fmt::format("name one with --host: {}", fmt::join(names, ", ")));

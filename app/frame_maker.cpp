@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "app/economies.h"
 #include "app/resolution.h"
@@ -24,10 +25,14 @@ bool same_look(const View& a, const View& b) {
 
 }  // namespace
 
-FrameMaker::FrameMaker(Session& session, const FrameSettings& settings, const Sampling& sampling,
+FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling& sampling,
                        std::span<const View> screens, std::optional<double> target_ms,
                        const std::optional<SampleGoal>& resting)
-    : session_(session), settings_(settings), sampling_(sampling), resting_(sampling), target_ms_(target_ms) {
+    : session_(session),
+      settings_(std::move(settings)),
+      sampling_(sampling),
+      resting_(sampling),
+      target_ms_(target_ms) {
   if (resting) resting_.goal = *resting;
   plan_for({}, screens);
   if (!target_ms_) return;

@@ -19,7 +19,7 @@ class FrameMaker {
  public:
   /// Collective. `screens`: as first seen; sizes stay. `target_ms` of a frame; none: all are made as the settings say.
   /// `resting`: what a picture is refined to while the eye rests; none: as `sampling`.
-  FrameMaker(Session& session, const FrameSettings& settings, const Sampling& sampling, std::span<const View> screens,
+  FrameMaker(Session& session, FrameSettings settings, const Sampling& sampling, std::span<const View> screens,
              std::optional<double> target_ms, const std::optional<SampleGoal>& resting = {});
 
   /// Collective. Valid until the next one; made in blocks(). `progress` is told of samples.

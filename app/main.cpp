@@ -8,7 +8,9 @@
 #include <charconv>
 #include <csignal>
 #include <cstdio>
+#include <memory>
 #include <new>
+#include <optional>
 #include <system_error>
 #include <thread>
 
@@ -132,21 +134,8 @@ void refuse_empty_values(const CLI::App& app) {
   for (const CLI::App* child : app.get_subcommands()) refuse_empty_values(*child);
 }
 
-ExitCode run(const std::vector<std::string>& words) {
-  Globals globals;
-  globals.args = words;
-  CLI::App app("Hybrid sort-first/sort-last rasteriser plus ray tracer for tiled displays", "hpr");
-  app.set_version_flag("--version", fmt::format("hpr {} ({})", kVersion, kCommit));
-  app.require_subcommand(1);
-  app.fallthrough();
-  declare_globals(app, globals);
-  const auto commands = all_commands();
-  for (const auto& command : commands) {
-    CLI::App* const sub = app.add_subcommand(std::string(command->name()), std::string(command->summary()));
-    sub->fallthrough();
-    command->declare(*sub);
-  }
-
+/// What needs no command; none: the words name one.
+std::optional<ExitCode> answer_alone(const CLI::App& app, const std::vector<std::string>& words) {
   if (words.empty()) {
     fmt::print("{}", app.help());
     return ExitCode::Usage;
@@ -159,6 +148,12 @@ ExitCode run(const std::vector<std::string>& words) {
     fmt::print("{}", knobs_markdown());
     return ExitCode::Done;
   }
+  return std::nullopt;
+}
+
+/// False where the words ask for help or the version, which it tells. Throws Error (Usage).
+bool parse(CLI::App& app, const std::vector<std::string>& words,
+           const std::vector<std::unique_ptr<Command>>& commands) {
   // `hpr help` and `hpr help COMMAND` are other ways to write --help.
   const bool asks_for_help = words.front() == "help";
   std::vector<std::string> parsed(words.begin() + (asks_for_help ? 1 : 0), words.end());
@@ -175,17 +170,41 @@ ExitCode run(const std::vector<std::string>& words) {
     app.parse(reversed);
   } catch (const CLI::Success& done) {  // --help, --version
     if (launched_rank() == 0) app.exit(done);
-    return ExitCode::Done;
+    return false;
   } catch (const CLI::ParseError& error) {
     throw usage_error(app, parsed, error);
   }
   refuse_empty_values(app);
+  return true;
+}
+
+void configure_log(Globals& globals) {
   const bool listens = launched_rank() != 0 && globals.verbosity < 2;  // rank 0 speaks
   if (globals.verbosity < 0 && globals.progress == "auto") globals.progress = "none";
   log::configure(globals.verbosity < 0 || listens ? log::Level::Error
                  : globals.verbosity == 0         ? log::Level::Info
                                                   : log::Level::Debug,
                  "");
+}
+
+ExitCode run(const std::vector<std::string>& words) {
+  Globals globals;
+  globals.args = words;
+  CLI::App app("Hybrid sort-first/sort-last rasteriser plus ray tracer for tiled displays", "hpr");
+  app.set_version_flag("--version", fmt::format("hpr {} ({})", kVersion, kCommit));
+  app.require_subcommand(1);
+  app.fallthrough();
+  declare_globals(app, globals);
+  const auto commands = all_commands();
+  for (const auto& command : commands) {
+    CLI::App* const sub = app.add_subcommand(std::string(command->name()), std::string(command->summary()));
+    sub->fallthrough();
+    command->declare(*sub);
+  }
+
+  if (const auto answered = answer_alone(app, words)) return *answered;
+  if (!parse(app, words, commands)) return ExitCode::Done;
+  configure_log(globals);
   (void)globals.scene_limits();  // malformed sizes and durations are found before any work
   (void)globals.hang_limit();
   for (const auto& command : commands) {

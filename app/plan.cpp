@@ -78,12 +78,60 @@ void check_fits(const std::string& strategy, int ranks) {
               "choose other factors or another strategy, or another number of ranks (--ranks, --groups)");
 }
 
+/// Who draws what, and how it comes together.
+void explain_distribution(FramePlan& plan, const FrameSettings& settings, const Choice& choice, int ranks) {
+  auto& lines = plan.explained;
+  lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
+                              ranks == 1 ? "" : "s", choice.why));
+  const char* const why =
+      settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
+  lines.push_back(plan.mine.group.size() > 1
+                      ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
+                      : fmt::format("composite: off (one rank covers each tile)"));
+  if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
+}
+
+/// What lights the pixels, and how many of them.
+void explain_light(Session& session, const FrameSettings& settings, FramePlan& plan) {
+  auto& lines = plan.explained;
+  if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
+  lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
+                              plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
+                                                                : "each rank lights all it drew, before compositing"));
+  if (settings.resolution_scale != 1.0) {
+    lines.push_back(
+        fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
+  }
+  if (!gives_light(session.scene())) {
+    lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
+  } else if (session.scene().triangles > 0 && !session.requirements().indirect.needed &&
+             !session.requirements().shadow.needed) {
+    lines.emplace_back("light: none (what the scene has of lights is black)");
+  }
+  if (!plan.rays.half_resolution.empty()) {
+    lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
+  }
+}
+
+void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan& plan) {
+  auto& lines = plan.explained;
+  lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
+  if (!pass.runs || pass.name != "photon") return;
+  lines.push_back(
+      fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
+                  settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));
+  if (plan.rays.photon_radius > 0.0) {
+    lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
+  }
+}
+
 }  // namespace
 
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
   const int ranks = session.comm().size();
   FramePlan plan;
   std::vector<Size> sizes;
+  sizes.reserve(views.size());
   for (const View& view : views) sizes.push_back(view.size());
   plan.layout = FrameLayout(sizes);
 
@@ -110,46 +158,13 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });
   }
 
-  auto& lines = plan.explained;
-  lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
-                              ranks == 1 ? "" : "s", choice.why));
-  const char* const why =
-      settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
-  lines.push_back(plan.mine.group.size() > 1
-                      ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
-                      : fmt::format("composite: off (one rank covers each tile)"));
-  if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
+  explain_distribution(plan, settings, choice, ranks);
   const char* const asked = plan.primary == Primary::Raster ? "unless asked for rays or a choice" : "as asked";
   const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
-  lines.push_back(fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
-  if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
-  lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
-                              plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
-                                                                : "each rank lights all it drew, before compositing"));
-  if (settings.resolution_scale != 1.0) {
-    lines.push_back(
-        fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
-  }
-  if (!gives_light(session.scene())) {
-    lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
-  } else if (session.scene().triangles > 0 && !session.requirements().indirect.needed &&
-             !session.requirements().shadow.needed) {
-    lines.emplace_back("light: none (what the scene has of lights is black)");
-  }
-  if (!plan.rays.half_resolution.empty()) {
-    lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
-  }
-  for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
-    lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
-    if (pass.runs && pass.name == "photon") {
-      lines.push_back(
-          fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
-                      settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));
-      if (plan.rays.photon_radius > 0.0) {
-        lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
-      }
-    }
-  }
+  plan.explained.push_back(
+      fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
+  explain_light(session, settings, plan);
+  for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   return plan;
 }
 

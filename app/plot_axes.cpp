@@ -27,17 +27,22 @@ LogScale LogScale::of(std::vector<double> values, double from, double to) {
   return {least / room, most * room, from, to};
 }
 
+std::vector<double> LogScale::close_ticks() const {
+  std::vector<double> close;
+  const int last = static_cast<int>(std::floor(least_ + span_));
+  for (int power = static_cast<int>(std::floor(least_)); power <= last; ++power) {
+    for (int tenths = 10; tenths < 100; tenths += tenths < 50 ? 5 : 10) {
+      const double value = 0.1 * tenths * std::pow(10.0, power);
+      if (std::log10(value) >= least_ && std::log10(value) <= least_ + span_) close.push_back(value);
+    }
+  }
+  return close;
+}
+
 std::vector<double> LogScale::ticks() const {
   constexpr double kNarrow = 0.8;  // of a power of ten: every digit counts, and halves of the smaller ones
   if (span_ < kNarrow) {
-    std::vector<double> close;
-    for (int power = static_cast<int>(std::floor(least_)); power <= static_cast<int>(std::floor(least_ + span_));
-         ++power) {
-      for (int tenths = 10; tenths < 100; tenths += tenths < 50 ? 5 : 10) {
-        const double value = 0.1 * tenths * std::pow(10.0, power);
-        if (std::log10(value) >= least_ && std::log10(value) <= least_ + span_) close.push_back(value);
-      }
-    }
+    std::vector<double> close = close_ticks();
     if (close.size() > 1) return close;
   }
   constexpr double kMostPowers = 12.0;

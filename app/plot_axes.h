@@ -36,6 +36,9 @@ class LogScale {
   [[nodiscard]] std::vector<double> ticks() const;
 
  private:
+  /// For narrow spans: every digit of each power of ten, and halves of the smaller ones.
+  [[nodiscard]] std::vector<double> close_ticks() const;
+
   double least_;
   double span_;
   double from_;

@@ -116,6 +116,11 @@ class RenderCommand final : public Command {
     return all_gather_value(comm, primary).front();
   }
 
+  void print_plan(const FramePlan& plan) const {
+    for (const std::string& line : plan.explained) fmt::print("{}\n", line);
+    if (files_.colors != ColorFormat::Float32) fmt::print("{}\n", files_.explain_colors());
+  }
+
   ExitCode draw(Session& session, const Globals& globals, const FrameSettings& settings, const Sampling& sampling,
                 Size size) {
     const View view = make_view(options_.choose_camera(session.scene()), size, session.scene().bounds);
@@ -125,10 +130,7 @@ class RenderCommand final : public Command {
     FramePlan plan = plan_frame(session, chosen, blocks.views);
     plan.lit = !files_.picture.empty() || !options_.stats.empty();
     const bool speaks = session.comm().rank() == 0;
-    if (options_.explain && speaks) {
-      for (const std::string& line : plan.explained) fmt::print("{}\n", line);
-      if (files_.colors != ColorFormat::Float32) fmt::print("{}\n", files_.explain_colors());
-    }
+    if (options_.explain && speaks) print_plan(plan);
     if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty()) return ExitCode::Done;
 
     prepare(session, plan);

@@ -274,8 +274,8 @@ std::vector<std::string> RenderOptions::without_use() const {
   return names;
 }
 
-FrameSettings RenderOptions::settings(std::uint64_t seed) const {
-  FrameSettings settings;
+/// No infinities, no points beyond what squares in double precision.
+void RenderOptions::check_numbers() const {
   if (!std::isfinite(fov_degrees) || !std::isfinite(exposure) || !std::isfinite(glossy_cutoff.value_or(0.0))) {
     throw Error(ExitCode::Usage, "--fov, --exposure and --glossy-cutoff take finite numbers", "write e.g. --fov 45");
   }
@@ -283,20 +283,11 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
     if (std::ranges::all_of(*point, [](double value) { return std::abs(value) <= 1e18; })) continue;
     throw Error(ExitCode::Usage, "--eye, --at and --up take finite numbers up to 1e18", "write e.g. --eye 0,1.7,5");
   }
-  const std::string unsaid = "auto";
-  if (distribute != unsaid) settings.distribution = parse_distribution(distribute, std::span(&unsaid, 1));
-  settings.groups = groups;
-  if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
-  settings.primary = parse_primary(primary);
-  settings.shading = parse_shading(shading);
-  choose_passes(passes, settings.rays);
-  const Quality& defaults = find_quality(quality);
-  settings.rays.seed = seed;
-  settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);
-  settings.rays.light_samples = light_samples.value_or(defaults.light_samples);
-  settings.rays.glossy_cutoff = glossy_cutoff.value_or(defaults.glossy_cutoff);
-  const bool names_photons = std::ranges::find(settings.rays.passes, "photon") != settings.rays.passes.end();
-  settings.rays.global_photons = indirect.value_or(defaults.global_photons || names_photons);
+}
+
+void RenderOptions::settle_photons(const Quality& defaults, RaySettings& rays) const {
+  const bool names_photons = std::ranges::find(rays.passes, "photon") != rays.passes.end();
+  rays.global_photons = indirect.value_or(defaults.global_photons || names_photons);
   const bool asks_for_photons = names_photons || indirect.value_or(false);
   if (photons == std::uint32_t{0} && asks_for_photons) {
     throw Error(ExitCode::Usage,
@@ -305,15 +296,13 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
                 "leave one of them out, or send some");
   }
   // A quality without photons sends those of the next if it must.
-  const bool must_send = asks_for_photons || settings.rays.all_passes;
+  const bool must_send = asks_for_photons || rays.all_passes;
   const std::uint32_t usual = defaults.photons == 0 && must_send ? find_quality("good").photons : defaults.photons;
-  settings.rays.photons = photons.value_or(usual);
-  settings.photons_fit_frame = !photons;
-  settings.rays.reference = reference;
-  settings.rays.build = ray_build.build();
-  settings.depth_format = wire.depths();
-  settings.rays.terminator_fix = !no_terminator_fix;
-  settings.aovs = parse_aovs(aov);
+  rays.photons = photons.value_or(usual);
+}
+
+/// What of `settings` goes together.
+void RenderOptions::check_combination(const FrameSettings& settings) const {
   if (settings.depth_format != DepthFormat::Float32 && settings.primary != Primary::Raster) {
     throw Error(ExitCode::Usage, "--depth-format rounds depths before OpenGL compares them; rays compare their own",
                 "use it with --primary raster");
@@ -328,6 +317,31 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
     throw Error(ExitCode::Usage, "--aov needs surfaces, which --shading local replaces by colours",
                 "use --shading deferred");
   }
+}
+
+FrameSettings RenderOptions::settings(std::uint64_t seed) const {
+  check_numbers();
+  FrameSettings settings;
+  const std::string unsaid = "auto";
+  if (distribute != unsaid) settings.distribution = parse_distribution(distribute, std::span(&unsaid, 1));
+  settings.groups = groups;
+  if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
+  settings.primary = parse_primary(primary);
+  settings.shading = parse_shading(shading);
+  choose_passes(passes, settings.rays);
+  const Quality& defaults = find_quality(quality);
+  settings.rays.seed = seed;
+  settings.rays.max_depth = max_depth.value_or(reference ? kReferenceDepth : defaults.max_depth);
+  settings.rays.light_samples = light_samples.value_or(defaults.light_samples);
+  settings.rays.glossy_cutoff = glossy_cutoff.value_or(defaults.glossy_cutoff);
+  settle_photons(defaults, settings.rays);
+  settings.photons_fit_frame = !photons;
+  settings.rays.reference = reference;
+  settings.rays.build = ray_build.build();
+  settings.depth_format = wire.depths();
+  settings.rays.terminator_fix = !no_terminator_fix;
+  settings.aovs = parse_aovs(aov);
+  check_combination(settings);
   settle_economies(settings);
   return settings;
 }

@@ -8,6 +8,7 @@
 
 #include "app/accuracy_options.h"
 #include "app/frame.h"
+#include "app/quality.h"
 #include "app/samples.h"
 #include "scene/view.h"
 
@@ -69,6 +70,9 @@ struct RenderOptions {
  private:
   void declare_light(CLI::App& app);
   void declare_economies(CLI::App& app);
+  void check_numbers() const;
+  void check_combination(const FrameSettings& settings) const;
+  void settle_photons(const Quality& defaults, RaySettings& rays) const;
   void settle_economies(FrameSettings& settings) const;
 };
 

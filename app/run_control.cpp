@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <utility>
 
 #include "app/console/forgivable.h"
 #include "app/console/hearing.h"
@@ -89,8 +90,9 @@ RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& 
       options_(options),
       apply_(std::move(apply)),
       remember_(std::move(remember)) {
-  table_.add({"status", "", "what the wall shows and how long it takes, as JSON",
-              [this, status](Words) { return session_.comm().rank() == 0 ? status() : std::string(); }});
+  table_.add(
+      {"status", "", "what the wall shows and how long it takes, as JSON",
+       [this, status = std::move(status)](Words) { return session_.comm().rank() == 0 ? status() : std::string(); }});
   table_.add({"stop", "", "end the run after this frame", [this](Words) {
                 stops_ = true;
                 return std::string();

@@ -6,9 +6,9 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <utility>
 
 #include "app/launcher.h"
@@ -29,7 +29,7 @@ RunJournal::RunJournal() {
   std::string name = (std::filesystem::temp_directory_path() / "hpr-run-XXXXXX").string();
   file_ = ::mkostemp(name.data(), O_CLOEXEC);
   if (file_ < 0) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", name, std::strerror(errno)),
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", name, std::generic_category().message(errno)),
                 "name a folder for temporary files in TMPDIR");
   }
   ::unlink(name.c_str());

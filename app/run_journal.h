@@ -21,6 +21,8 @@ class RunJournal {
   [[nodiscard]] static std::optional<RunJournal> of_supervisor();
   ~RunJournal();
   RunJournal(RunJournal&& other) noexcept;
+  RunJournal(const RunJournal&) = delete;
+  RunJournal& operator=(const RunJournal&) = delete;
   RunJournal& operator=(RunJournal&&) = delete;
 
   /// A frame is drawn and shown.

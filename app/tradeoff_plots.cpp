@@ -65,17 +65,34 @@ void draw_line(SvgDrawing& drawing, const std::vector<Dot>& dots, const Stroke& 
   if (dots.size() > 1) drawing.polyline(points, stroke);
 }
 
+/// Points that can be drawn have a time and an error, neither of them 0.
+bool can_be_drawn(const TradeoffPoint& point, const std::string& metric) {
+  const double error = badness(metric, point.error.of(metric));
+  return std::isfinite(error) && error > 0.0 && point.median_ms() > 0.0;
+}
+
+/// One line of points, and its name where there is room; `look`: its place among all.
+void draw_series(SvgDrawing& drawing, const std::vector<Dot>& dots, const std::string& name, std::size_t look) {
+  const SeriesLook& style = series_look(look);
+  draw_line(drawing, dots, {style.color, 1.6, style.dashes});
+  for (const Dot& dot : dots) {
+    drawing.circle(dot.at, 4.4, dot.pareto ? style.color : "#ffffff", {style.color, 1.5});
+    drawing.text({dot.at.x + 6, dot.at.y - 5}, fmt::format("{}", dot.number), Anchor::Start, 10);
+  }
+  const double height = kTop + 12 + 18.0 * static_cast<double>(look);
+  if (name.empty() || height > kBottom) return;
+  drawing.line({kRight + 14, height - 4}, {kRight + 40, height - 4}, {style.color, 1.6, style.dashes});
+  drawing.text({kRight + 46, height}, name);
+}
+
 }  // namespace
 
 std::string plot_error_over_time(const TradeoffReport& report, const std::string& metric) {
   std::vector<double> times;
   std::vector<double> errors;
   const auto error_of = [&](const TradeoffPoint& point) { return badness(metric, point.error.of(metric)); };
-  const auto drawn = [&](const TradeoffPoint& point) {
-    return std::isfinite(error_of(point)) && error_of(point) > 0.0 && point.median_ms() > 0.0;
-  };
   for (const TradeoffPoint& point : report.points) {
-    if (!drawn(point)) continue;
+    if (!can_be_drawn(point, metric)) continue;
     times.push_back(point.median_ms());
     errors.push_back(error_of(point));
   }
@@ -91,7 +108,7 @@ std::string plot_error_over_time(const TradeoffReport& report, const std::string
   std::vector<Dot> front;
   for (std::size_t i = 0; i < report.points.size(); ++i) {
     const TradeoffPoint& point = report.points[i];
-    if (!drawn(point)) continue;
+    if (!can_be_drawn(point, metric)) continue;
     const KnobValues line = line_of(point);
     if (std::ranges::find(order, line) == order.end()) order.push_back(line);
     const Dot dot{i + 1, {x.at(point.median_ms()), y.at(error_of(point))}, point.pareto};
@@ -100,19 +117,7 @@ std::string plot_error_over_time(const TradeoffReport& report, const std::string
   }
   std::ranges::sort(front, {}, [](const Dot& dot) { return dot.at.x; });
   if (metric == report.metrics.front()) draw_line(drawing, front, kFront);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const std::vector<Dot>& dots = lines.at(order[i]);
-    draw_line(drawing, dots, {series_look(i).color, 1.6, series_look(i).dashes});
-    for (const Dot& dot : dots) {
-      drawing.circle(dot.at, 4.4, dot.pareto ? series_look(i).color : "#ffffff", {series_look(i).color, 1.5});
-      drawing.text({dot.at.x + 6, dot.at.y - 5}, fmt::format("{}", dot.number), Anchor::Start, 10);
-    }
-    const double height = kTop + 12 + 18.0 * static_cast<double>(i);
-    if (order[i].empty() || height > kBottom) continue;
-    drawing.line({kRight + 14, height - 4}, {kRight + 40, height - 4},
-                 {series_look(i).color, 1.6, series_look(i).dashes});
-    drawing.text({kRight + 46, height}, describe(order[i]));
-  }
+  for (std::size_t i = 0; i < order.size(); ++i) draw_series(drawing, lines.at(order[i]), describe(order[i]), i);
   return drawing.str();
 }
 

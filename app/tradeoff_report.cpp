@@ -97,6 +97,34 @@ std::string csv_field(const std::string& text) {
   return quoted + "\"";
 }
 
+/// The signed error of the mean, in per cent of the reference's.
+std::string mean_text(const TradeoffReference& reference, const TradeoffPoint& point) {
+  if (!(reference.mean > 0.0)) return "-";
+  const double percent = 100.0 / reference.mean;
+  std::string mean = fmt::format("{:+.2f}", percent * point.error.mean);
+  if (!std::isfinite(point.error.mean_error)) return mean;
+  return fmt::format("{} +- {:.2f}", mean, percent * point.error.mean_error);
+}
+
+using TableRows = std::vector<std::vector<std::string>>;
+
+/// Names of the columns first.
+TableRows table_rows(const TradeoffReport& report) {
+  TableRows rows(1);
+  std::ranges::copy(report.knobs, std::back_inserter(rows.front()));
+  rows.front().emplace_back("ms");
+  std::ranges::copy(report.metrics, std::back_inserter(rows.front()));
+  rows.front().emplace_back("mean in %");
+  for (const TradeoffPoint& point : report.points) {
+    auto& row = rows.emplace_back();
+    for (const auto& [knob, value] : point.knobs) row.push_back(value);
+    row.push_back(fmt::format("{:.1f}", point.median_ms()));
+    for (const std::string& metric : report.metrics) row.push_back(metric_text(metric, point.error));
+    row.push_back(mean_text(report.reference, point));
+  }
+  return rows;
+}
+
 }  // namespace
 
 std::string describe(const KnobValues& knobs) {
@@ -139,23 +167,7 @@ std::string answer(const TradeoffReport& report) {
 }
 
 std::string tradeoff_table(const TradeoffReport& report) {
-  std::vector<std::vector<std::string>> rows(1);
-  for (const std::string& knob : report.knobs) rows.front().push_back(knob);
-  rows.front().emplace_back("ms");
-  for (const std::string& metric : report.metrics) rows.front().push_back(metric);
-  rows.front().emplace_back("mean in %");
-  for (const TradeoffPoint& point : report.points) {
-    auto& row = rows.emplace_back();
-    for (const auto& [knob, value] : point.knobs) row.push_back(value);
-    row.push_back(fmt::format("{:.1f}", point.median_ms()));
-    for (const std::string& metric : report.metrics) row.push_back(metric_text(metric, point.error));
-    const double percent = 100.0 / report.reference.mean;
-    const std::string mean = fmt::format("{:+.2f}", percent * point.error.mean);
-    row.push_back(!(report.reference.mean > 0.0) ? "-"
-                  : std::isfinite(point.error.mean_error)
-                      ? fmt::format("{} +- {:.2f}", mean, percent * point.error.mean_error)
-                      : mean);
-  }
+  const TableRows rows = table_rows(report);
   std::string text = fmt::format("{} at {}x{} against {}{}\n", report.scene, report.size.width, report.size.height,
                                  report.reference.how,
                                  report.reference.spp > 0 ? fmt::format(", {} samples", report.reference.spp) : "");

@@ -379,7 +379,8 @@ std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
   // Of the latest frames displays have not said anything yet.
   const auto awaited = static_cast<std::uint64_t>(run_.remote.in_flight) + 1;
-  if (!remote_ || last < first_frame_ + awaited) return std::vector(owners_.size(), ScreenState::Fresh);
+  std::vector<ScreenState> unheard(owners_.size(), ScreenState::Fresh);
+  if (!remote_ || last < first_frame_ + awaited) return unheard;
   return remote_->outcome(last - awaited).screens;
 }
 

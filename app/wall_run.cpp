@@ -55,6 +55,7 @@ void report_budget(const RunManifest& manifest) {
   std::ranges::sort(ms);
   const auto within = [&](std::size_t percent) { return ms[(percent * ms.size() + 99) / 100 - 1]; };  // nearest rank
   std::vector<std::string> words;
+  words.reserve(given_up.size());
   for (const auto& [what, frames] : given_up) words.push_back(fmt::format("{} in {}", what, frames));
   log::info("{} frames: half took up to {:.1f} ms, 95 % up to {:.1f} ms, target {:.1f} ms; given up: {}", ms.size(),
             within(50), within(95), manifest.frames.back().budget->target_ms,
@@ -102,41 +103,63 @@ bool wait_for_work(const WallRun& run, WallDriver& driver) {
   }
 }
 
-ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
-               Session& session) {
-  const bool speaks = session.comm().rank() == 0;
-  const auto hashes = all_gather_value(session.comm(), wall.hash);
+/// Collective. Throws Error (BadInput) where hosts hold different wall files.
+void check_same_wall(Communicator& comm, const Wall& wall, const std::string& file) {
+  const auto hashes = all_gather_value(comm, wall.hash);
   for (std::size_t rank = 0; rank < hashes.size(); ++rank) {
     if (hashes[rank] != hashes[0]) {
-      throw Error(ExitCode::BadInput, fmt::format("rank {} read another '{}' than rank 0", rank, run.wall),
+      throw Error(ExitCode::BadInput, fmt::format("rank {} read another '{}' than rank 0", rank, file),
                   "give every host the same wall file");
     }
   }
-  WallDriver driver(run, wall, settings, globals, session);
-  if (run.options.explain && speaks) {
-    for (const std::string& line : driver.explained()) fmt::print("{}\n", line);
+}
+
+/// Collective. Draws until the last of `frames`, where the run is not open-ended, or until somebody ends it; whether it
+/// was ended before its last frame. `mode`: how progress is shown.
+bool draw_frames(const WallRun& run, WallDriver& driver, int frames, const std::string& mode) {
+  const Sampling sampling = sampling_of(run);
+  // A terminal has room for one bar: that of the samples, where there are several.
+  const bool tells_samples = sampling.sums() && (mode != "auto" || stderr_is_terminal());
+  WallStatus status(tells_samples ? "none" : mode, driver.first_frame(), static_cast<std::size_t>(frames));
+  for (int frame = static_cast<int>(driver.first_frame()); frame < frames || run.open_ended(); ++frame) {
+    Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}: sample", frame + 1),
+                     sampling.goal.samples.value_or(0));
+    const Stopwatch watch;
+    driver.draw(static_cast<std::uint64_t>(frame), samples);
+    status.add(watch.ms(), driver.manifest().frames.back(), [&] { return driver.states(); });
+    const bool last = !run.open_ended() && frame + 1 >= frames;
+    if (!last && !wait_for_work(run, driver)) return !run.open_ended();
   }
+  return false;
+}
+
+/// What a run says at its end: what was done, if asked, and where its result is. `stopped_of`: the frames it was to
+/// draw, where it did not.
+void print_end(const WallRun& run, const WallDriver& driver, std::optional<int> stopped_of, const RunStats& stats,
+               const Wall& wall, const Scene& scene) {
+  if (stopped_of)
+    log::info("stopped after frame {} of {}{}", driver.manifest().frames.back().frame + 1, *stopped_of,
+              run.manifest().empty() ? "" : "; --resume goes on");
+  if (run.summary) print_summary(stats, wall, scene);
+  if (!run.picture.empty()) {
+    fmt::print("{}\n", run.picture);
+  } else if (run.writes_files()) {
+    fmt::print("{}\n", assembled_file(run).string());
+  } else if (!run.manifest().empty()) {
+    fmt::print("{}\n", run.manifest().string());
+  }
+}
+
+ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
+               Session& session) {
+  const bool speaks = session.comm().rank() == 0;
+  check_same_wall(session.comm(), wall, run.wall);
+  WallDriver driver(run, wall, settings, globals, session);
+  if (run.options.explain && speaks) fmt::print("{}\n", fmt::join(driver.explained(), "\n"));
   prepare(session, driver.plan());
   const int frames = run.open_ended() ? 0 : run.frames.value_or(1);
-  bool ended_early = false;  // before its last frame
-  {
-    const std::string mode = speaks && globals.verbosity >= 0 ? globals.progress : "none";
-    const Sampling sampling = sampling_of(run);
-    // A terminal has room for one bar: that of the samples, where there are several.
-    const bool tells_samples = sampling.sums() && (mode != "auto" || stderr_is_terminal());
-    WallStatus status(tells_samples ? "none" : mode, driver.first_frame(), static_cast<std::size_t>(frames));
-    for (int frame = static_cast<int>(driver.first_frame()); frame < frames || run.open_ended(); ++frame) {
-      Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}: sample", frame + 1),
-                       sampling.goal.samples.value_or(0));
-      const Stopwatch watch;
-      driver.draw(static_cast<std::uint64_t>(frame), samples);
-      status.add(watch.ms(), driver.manifest().frames.back(), [&] { return driver.states(); });
-      const bool last = !run.open_ended() && frame + 1 >= frames;
-      if (last || wait_for_work(run, driver)) continue;
-      ended_early = !run.open_ended();
-      break;
-    }
-  }
+  const bool ended_early =
+      draw_frames(run, driver, frames, speaks && globals.verbosity >= 0 ? globals.progress : "none");
   if (ended_early) driver.note_stop(frames);
   const bool stopped = ended_early && driver.interrupted();
   const bool seen = driver.finish();
@@ -151,17 +174,8 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   });
   if (!seen) return ExitCode::Lost;
   const ExitCode code = stopped && !run.manifest().empty() ? ExitCode::Stopped : verdict(stats, run.options.strict);
-  if (!speaks) return code;
-  if (stopped)
-    log::info("stopped after frame {} of {}{}", driver.manifest().frames.back().frame + 1, frames,
-              run.manifest().empty() ? "" : "; --resume goes on");
-  if (run.summary) print_summary(stats, wall, session.scene());
-  if (!run.picture.empty()) {
-    fmt::print("{}\n", run.picture);
-  } else if (run.writes_files()) {
-    fmt::print("{}\n", assembled_file(run).string());
-  } else if (!run.manifest().empty()) {
-    fmt::print("{}\n", run.manifest().string());
+  if (speaks) {
+    print_end(run, driver, stopped ? std::optional(frames) : std::nullopt, stats, wall, session.scene());
   }
   return code;
 }
@@ -240,21 +254,15 @@ void check_path(const WallRun& run) {
   check_directions(load_camera_path(run.path), static_cast<std::size_t>(run.frames.value_or(1)), run.path);
 }
 
-}  // namespace
-
-ExitCode run_wall(const WallRun& run, const Globals& given) {
-  Globals globals = given;
-  // What stands there is what the job that was lost had written.
-  if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
-  globals.force |= run.resume;
+void check_resume(const WallRun& run) {
   if (run.resume && (run.open_ended() || run.manifest().empty())) {
     throw Error(ExitCode::Usage, "--resume needs to know how many frames it goes on to, and which run with",
                 "use it with --frames N, --display file or remote, and -o DIR");
   }
-  const bool starts_job = globals.ranks > 1 && !inside_mpi_job();  // whose rank 0 tells of the same findings
-  Wall wall = load_wall(run.wall, run.overrides, !starts_job);
-  if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
-  const FrameSettings settings = run.options.settings(globals.seed);
+}
+
+/// What the options say beside the wall and the scene, before either is drawn. Throws Error.
+void check_options(const WallRun& run, const FrameSettings& settings) {
   if (!settings.aovs.empty()) {
     throw Error(ExitCode::Usage, "a wall has no AOVs", "use --aov with render");
   }
@@ -270,6 +278,21 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   }
   (void)run.options.wire.colors();
   (void)run.options.sampling();  // malformed numbers are found before any work
+}
+
+}  // namespace
+
+ExitCode run_wall(const WallRun& run, const Globals& given) {
+  Globals globals = given;
+  // What stands there is what the job that was lost had written.
+  if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
+  globals.force |= run.resume;
+  check_resume(run);
+  const bool starts_job = globals.ranks > 1 && !inside_mpi_job();  // whose rank 0 tells of the same findings
+  Wall wall = load_wall(run.wall, run.overrides, !starts_job);
+  if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
+  const FrameSettings settings = run.options.settings(globals.seed);
+  check_options(run, settings);
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals);
   const std::string folder = run.writes_files() ? run.display.output : "";

@@ -79,7 +79,7 @@ std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<con
     comm.exchange({&out, 1}, {&from, 1},
                   [&](int /*from*/, std::span<const std::byte> arrived) { take_parts(arrived, count, known); });
   }
-  std::ranges::rotate(known, known.end() - static_cast<std::ptrdiff_t>(rank));
+  std::rotate(known.begin(), known.end() - static_cast<std::ptrdiff_t>(rank), known.end());
   return known;
 }
 

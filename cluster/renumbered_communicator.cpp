@@ -53,10 +53,12 @@ void RenumberedCommunicator::exchange(std::span<const Outgoing> out, std::span<c
 
 std::unique_ptr<Communicator> RenumberedCommunicator::subset(std::span<const int> members) {
   std::vector<int> ranks;
+  ranks.reserve(members.size());
   for (const int number : members) ranks.push_back(rank_of(number));
   std::vector<int> ascending = ranks;
   std::ranges::sort(ascending);
   std::vector<int> numbers;
+  numbers.reserve(ranks.size());
   for (const int rank : ranks) {
     numbers.push_back(static_cast<int>(std::ranges::find(ascending, rank) - ascending.begin()));
   }

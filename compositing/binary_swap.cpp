@@ -14,7 +14,8 @@ class Fold {
   [[nodiscard]] int members() const { return members_; }
   /// The factors of the rounds.
   [[nodiscard]] std::vector<int> twos() const {
-    return std::vector<int>(static_cast<std::size_t>(rounds_of(members_)), 2);
+    std::vector<int> factors(static_cast<std::size_t>(rounds_of(members_)), 2);
+    return factors;
   }
   [[nodiscard]] bool paired(int rank) const { return rank < 2 * pairs_; }
   [[nodiscard]] int member_of(int rank) const { return paired(rank) ? rank / 2 : rank - pairs_; }

@@ -53,13 +53,14 @@ std::vector<int> RadixK::factors_for(int ranks) {
     for (; ranks % prime == 0; ranks /= prime) primes.push_back(prime);
   }
   // First fit, the largest primes first.
+  std::ranges::reverse(primes);
   std::vector<int> factors;
-  for (auto prime = primes.rbegin(); prime != primes.rend(); ++prime) {
-    const auto room = std::ranges::find_if(factors, [&](int factor) { return factor * *prime <= kLargestGroup; });
+  for (const int prime : primes) {
+    const auto room = std::ranges::find_if(factors, [&](int factor) { return factor * prime <= kLargestGroup; });
     if (room == factors.end()) {
-      factors.push_back(*prime);
+      factors.push_back(prime);
     } else {
-      *room *= *prime;
+      *room *= prime;
     }
   }
   std::ranges::sort(factors, std::greater<>());

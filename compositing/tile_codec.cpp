@@ -79,6 +79,25 @@ void check_masks(const TileHead& head, std::size_t pixel_bytes) {
   }
 }
 
+/// How many pixels of each tile travel packed, or all of it; masks of those that do, of tiles that hold any.
+template <typename Pixel>
+std::vector<std::uint16_t> choose_packed(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                                         std::vector<TileMask>& masks) {
+  std::vector<std::uint16_t> drawn(tiles.size(), TileHead::kInactive);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (!layer.active(tiles[i])) continue;
+    const auto tile = layer.tile(tiles[i]).template first<kTilePixels>();
+    drawn[i] = kWholeTile;
+    if (looks_full(tile)) continue;
+    TileMask mask;
+    const std::size_t pixels = find_drawn(tile, mask);
+    if (pixels > kMostPackedPixels) continue;
+    drawn[i] = static_cast<std::uint16_t>(pixels);
+    if (pixels > 0) masks.push_back(mask);
+  }
+  return drawn;
+}
+
 }  // namespace
 
 std::vector<Body> bodies_of(std::span<const std::uint16_t> drawn, std::span<const std::size_t> tiles) {
@@ -119,19 +138,8 @@ void TileMessage::add_head(std::span<const std::uint16_t> drawn, DepthFormat dep
 
 template <typename Pixel>
 void TileMessage::add_packed(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
-  std::vector<std::uint16_t> drawn(tiles.size(), TileHead::kInactive);
   std::vector<TileMask> masks;
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (!layer.active(tiles[i])) continue;
-    const auto tile = layer.tile(tiles[i]).template first<kTilePixels>();
-    drawn[i] = kWholeTile;
-    if (looks_full(tile)) continue;
-    TileMask mask;
-    const std::size_t pixels = find_drawn(tile, mask);
-    if (pixels > kMostPackedPixels) continue;
-    drawn[i] = static_cast<std::uint16_t>(pixels);
-    if (pixels > 0) masks.push_back(mask);
-  }
+  const std::vector<std::uint16_t> drawn = choose_packed(layer, tiles, masks);
   constexpr bool kHasDepth = std::is_same_v<Pixel, Key>;
   const DepthFormat depths = kHasDepth ? layer.depth_format() : DepthFormat::Float32;
   const std::size_t pixel_bytes = depths == DepthFormat::Float32 ? sizeof(Pixel) : sent_bytes(depths);
@@ -170,7 +178,7 @@ void TileMessage::add_narrow_bodies(const TileLayer<Key>& layer, std::span<const
     const std::size_t count = body.end - body.first;
     const std::span<std::byte> room = narrow_.extend(count * tile_bytes);
     narrow_keys(layer.run({tiles[body.first], count}), layer.depth_format(), room.data());
-    bodies_.push_back(room);
+    bodies_.emplace_back(room);
   }
 }
 

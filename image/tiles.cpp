@@ -21,7 +21,7 @@ void ask_for_huge_pages(void* memory, std::size_t bytes) {
   const std::uintptr_t first = (start + kHugePage - 1) / kHugePage * kHugePage;
   const std::uintptr_t end = (start + bytes) / kHugePage * kHugePage;
   // Where the system has none left, or never gives any, small ones do.
-  if (end > first) (void)::madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
+  if (end > first) (void)::madvise(static_cast<std::byte*>(memory) + (first - start), end - first, MADV_HUGEPAGE);
 }
 
 bool shared_by_all(PeerMemory& memory, int ranks) {

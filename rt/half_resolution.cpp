@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <span>
 #include <string_view>
 
 #include "core/check.h"
@@ -62,6 +63,7 @@ constexpr std::array<Shareable, 5> kShareable{{
 
 std::vector<std::string> half_resolution_passes() {
   std::vector<std::string> names;
+  names.reserve(kShareable.size());
   for (const Shareable& each : kShareable) names.emplace_back(each.name);
   return names;
 }
@@ -147,42 +149,47 @@ void SharedLight::choose(std::vector<PathPoint>& points, int first_row) {
   }
   for (PathPoint& point : points) {
     const std::uint16_t lender = lender_of_[block_of(point.pixel)];
-    if (lender == kNobody || lends(point) || !sees_one(point)) continue;
-    const Seen seen = look_at(point);
-    if (!alike(lenders_[lender], seen)) continue;
-    borrowers_.push_back(seen);
-    point.borrows = shared_;
-    if (point.borrows_light(Component::Reflection)) point.follows[static_cast<std::size_t>(Lobe::Reflection)] = 0.0F;
-    if (point.borrows_light(Component::Refraction)) {
-      point.follows[static_cast<std::size_t>(Lobe::Transmission)] = 0.0F;
+    if (lender != kNobody && !lends(point) && sees_one(point)) borrow(lenders_[lender], point);
+  }
+}
+
+void SharedLight::borrow(const Seen& lender, PathPoint& point) {
+  const Seen seen = look_at(point);
+  if (!alike(lender, seen)) return;
+  borrowers_.push_back(seen);
+  point.borrows = shared_;
+  if (point.borrows_light(Component::Reflection)) point.follows[static_cast<std::size_t>(Lobe::Reflection)] = 0.0F;
+  if (point.borrows_light(Component::Refraction)) point.follows[static_cast<std::size_t>(Lobe::Transmission)] = 0.0F;
+}
+
+SharedLight::Lenders SharedLight::lenders_about(const Seen& borrower) const {
+  // Lenders stand on a lattice two pixels wide: a borrower lies on one of its lines, or half way between two.
+  const int x = static_cast<int>(borrower.pixel % kTileSide) - lender_x_;
+  const int y = static_cast<int>(borrower.pixel / kTileSide) - lender_y_;
+  const int left = x >= 0 ? x / kBlockSide : -1;
+  const int above = y >= 0 ? y / kBlockSide : -1;
+  Lenders found;
+  for (int row = above; row <= above + y - above * kBlockSide; ++row) {
+    for (int column = left; column <= left + x - left * kBlockSide; ++column) {
+      if (row < 0 || column < 0 || row >= kBlocksPerRow || column >= kBlocksPerRow) continue;
+      const std::uint16_t lender =
+          lender_of_[static_cast<std::size_t>(row) * kBlocksPerRow + static_cast<std::size_t>(column)];
+      if (lender != kNobody && alike(lenders_[lender], borrower)) found.at.at(found.count++) = &lenders_[lender];
     }
   }
+  return found;
 }
 
 void SharedLight::spread(TileWork& tile) const {
   for (const Seen& borrower : borrowers_) {
-    // Lenders stand on a lattice two pixels wide: a borrower lies on one of its lines, or half way between two.
-    const int x = static_cast<int>(borrower.pixel % kTileSide) - lender_x_;
-    const int y = static_cast<int>(borrower.pixel / kTileSide) - lender_y_;
-    const int left = x >= 0 ? x / kBlockSide : -1;
-    const int above = y >= 0 ? y / kBlockSide : -1;
-    std::array<const Seen*, 4> about{};
-    std::size_t count = 0;
-    for (int row = above; row <= above + y - above * kBlockSide; ++row) {
-      for (int column = left; column <= left + x - left * kBlockSide; ++column) {
-        if (row < 0 || column < 0 || row >= kBlocksPerRow || column >= kBlocksPerRow) continue;
-        const std::uint16_t lender =
-            lender_of_[static_cast<std::size_t>(row) * kBlocksPerRow + static_cast<std::size_t>(column)];
-        if (lender != kNobody && alike(lenders_[lender], borrower)) about.at(count++) = &lenders_[lender];
-      }
-    }
+    const Lenders about = lenders_about(borrower);
     for (std::size_t part = 0; part < kComponents; ++part) {
       if (((shared_ >> part) & 1U) == 0) continue;
       glm::dvec3 sum(0.0);
-      for (std::size_t i = 0; i < count; ++i) {
-        sum += made_up_for(borrower.weights[part], about[i]->weights[part]) * tile.components[part][about[i]->pixel];
+      for (const Seen* const lender : std::span(about.at).first(about.count)) {
+        sum += made_up_for(borrower.weights[part], lender->weights[part]) * tile.components[part][lender->pixel];
       }
-      tile.add(borrower.pixel, static_cast<Component>(part), sum / static_cast<double>(count));
+      tile.add(borrower.pixel, static_cast<Component>(part), sum / static_cast<double>(about.count));
     }
   }
 }

@@ -47,8 +47,16 @@ class SharedLight {
   };
   static constexpr std::uint16_t kNobody = 0xFFFF;
 
+  /// Lenders next to a borrower that see the like.
+  struct Lenders {
+    std::array<const Seen*, 4> at{};
+    std::size_t count = 0;
+  };
+
   [[nodiscard]] Seen look_at(const PathPoint& point) const;
   [[nodiscard]] bool alike(const Seen& lender, const Seen& borrower) const;
+  void borrow(const Seen& lender, PathPoint& point);
+  [[nodiscard]] Lenders lenders_about(const Seen& borrower) const;
 
   std::uint8_t shared_ = 0;
   double glossy_cutoff_ = 0.0;

@@ -1,9 +1,9 @@
 // No include guard of the usual kind: this is compiled once per instruction set.
-#if defined(HPR_RT_PACKED_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef HPR_RT_PACKED_LANES_INL_H_
-#undef HPR_RT_PACKED_LANES_INL_H_
+#if defined(HPR_RT_PACKED_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef HPR_RT_PACKED_LANES_INL_H
+#undef HPR_RT_PACKED_LANES_INL_H
 #else
-#define HPR_RT_PACKED_LANES_INL_H_
+#define HPR_RT_PACKED_LANES_INL_H
 #endif
 
 #include <hwy/highway.h>

@@ -11,6 +11,7 @@ struct ScreenPixel {
   std::int32_t y = 0;
   std::int32_t x = 0;
 
+  // NOLINTNEXTLINE(modernize-use-nullptr): the check takes the 0 that orderings are compared with for a pointer
   auto operator<=>(const ScreenPixel&) const = default;
 };
 /// None: behind all others.

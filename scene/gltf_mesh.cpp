@@ -214,7 +214,7 @@ class PrimitiveBuilder {
     if (indices == primitive_.attributes.end() || weights == primitive_.attributes.end()) {
       data_.context().warn(where_, "has a skin, but not JOINTS_0 and WEIGHTS_0; drawn by its first joint");
       const std::vector<std::uint32_t> first(mesh.positions.size() * 4, 0);
-      return bend(mesh, joints, first, Weights(mesh.positions.size(), glm::vec4(1.0F, 0.0F, 0.0F, 0.0F)));
+      return bend(mesh, joints, first, std::vector(mesh.positions.size(), glm::vec4(1.0F, 0.0F, 0.0F, 0.0F)));
     }
     if (primitive_.attributes.contains("JOINTS_1")) {
       data_.context().warn(where_, "joints past the fourth of a vertex are ignored");
@@ -222,30 +222,35 @@ class PrimitiveBuilder {
     bend(mesh, joints, data_.integers(indices->second), data_.vec4s(weights->second));
   }
 
-  using Weights = std::vector<glm::vec4>;
+  /// What a vertex's joints do to it; sets `odd` where its weights are of no use.
+  [[nodiscard]] glm::dmat4 blend_of(std::size_t vertex, const std::vector<glm::dmat4>& joints,
+                                    const std::vector<std::uint32_t>& indices, const glm::vec4& weights,
+                                    bool& odd) const {
+    glm::dmat4 blend(0.0);
+    double sum = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      const std::uint32_t joint = indices[4 * vertex + static_cast<std::size_t>(k)];
+      const double weight = weights[k];
+      if (!(weight > 0.0) || !std::isfinite(weight)) {
+        odd = odd || weight != 0.0;
+        continue;
+      }
+      if (joint >= joints.size()) {
+        data_.context().fail(where_ + ".attributes.JOINTS_0",
+                             fmt::format("vertex {} names joint {} of {}", vertex, joint, joints.size()));
+      }
+      blend += weight * joints[joint];
+      sum += weight;
+    }
+    odd = odd || sum == 0.0;
+    return sum > 0.0 ? blend / sum : joints[0];
+  }
 
   void bend(Mesh& mesh, const std::vector<glm::dmat4>& joints, const std::vector<std::uint32_t>& indices,
-            const Weights& weights) const {
+            const std::vector<glm::vec4>& weights) const {
     bool odd = false;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      glm::dmat4 blend(0.0);
-      double sum = 0.0;
-      for (int k = 0; k < 4; ++k) {
-        const std::uint32_t joint = indices[4 * i + static_cast<std::size_t>(k)];
-        const double weight = weights[i][k];
-        if (!(weight > 0.0) || !std::isfinite(weight)) {
-          odd = odd || weight != 0.0;
-          continue;
-        }
-        if (joint >= joints.size()) {
-          data_.context().fail(where_ + ".attributes.JOINTS_0",
-                               fmt::format("vertex {} names joint {} of {}", i, joint, joints.size()));
-        }
-        blend += weight * joints[joint];
-        sum += weight;
-      }
-      odd = odd || sum == 0.0;
-      blend = sum > 0.0 ? blend / sum : joints[0];
+      const glm::dmat4 blend = blend_of(i, joints, indices, weights[i], odd);
       mesh.positions[i] = glm::vec3(blend * glm::dvec4(mesh.positions[i], 1.0));
       if (!mesh.normals.empty()) {
         // The inverse transpose but for its scale, which also exists for singular matrices.
@@ -262,6 +267,15 @@ class PrimitiveBuilder {
     }
     if (odd) data_.context().warn(where_ + ".attributes.WEIGHTS_0", "some vertices have no usable weights");
     check_positions(mesh.positions);
+  }
+
+  /// Of a triangle without area: any.
+  [[nodiscard]] static glm::vec3 flat_normal(const Mesh& mesh, const glm::uvec3& triangle) {
+    const glm::dvec3 v0(mesh.positions[triangle.x]);
+    const glm::dvec3 cross =
+        glm::cross(glm::dvec3(mesh.positions[triangle.y]) - v0, glm::dvec3(mesh.positions[triangle.z]) - v0);
+    const double length = glm::length(cross);
+    return length > 0.0 && std::isfinite(length) ? glm::vec3(cross / length) : glm::vec3(0.0F, 0.0F, 1.0F);
   }
 
   /// One face, one normal: every triangle gets vertices of its own.
@@ -281,12 +295,7 @@ class PrimitiveBuilder {
       if (!mesh.uvs[set].empty()) flat.uvs[set].reserve(corners);
     }
     for (glm::uvec3& triangle : mesh.triangles) {
-      const glm::dvec3 v0(mesh.positions[triangle.x]);
-      const glm::dvec3 cross =
-          glm::cross(glm::dvec3(mesh.positions[triangle.y]) - v0, glm::dvec3(mesh.positions[triangle.z]) - v0);
-      const double length = glm::length(cross);
-      const glm::vec3 normal =
-          length > 0.0 && std::isfinite(length) ? glm::vec3(cross / length) : glm::vec3(0.0F, 0.0F, 1.0F);
+      const glm::vec3 normal = flat_normal(mesh, triangle);
       const auto first = static_cast<std::uint32_t>(flat.positions.size());
       for (int corner = 0; corner < 3; ++corner) {
         flat.positions.push_back(mesh.positions[triangle[corner]]);

@@ -56,10 +56,11 @@ struct Faces {
   std::vector<glm::uvec3> triangles;
 };
 
-Faces icosahedron() {
-  const double phi = 0.5 * (1.0 + std::sqrt(5.0));
-  // The twelve points (0, +-1, +-phi) and their cyclic shifts, point 4 * axis + 2 * (long side < 0) + (short side < 0).
+/// The twelve points (0, +-1, +-phi) and their cyclic shifts, of length 1: point 4 * axis + 2 * (long side < 0) +
+/// (short side < 0).
+std::vector<glm::dvec3> icosahedron_points(double phi) {
   std::vector<glm::dvec3> points;
+  points.reserve(12);
   for (int axis = 0; axis < 3; ++axis) {
     for (int sign = 0; sign < 4; ++sign) {
       glm::dvec3 p(0.0);
@@ -68,6 +69,12 @@ Faces icosahedron() {
       points.push_back(glm::normalize(p));
     }
   }
+  return points;
+}
+
+Faces icosahedron() {
+  const double phi = 0.5 * (1.0 + std::sqrt(5.0));
+  std::vector<glm::dvec3> points = icosahedron_points(phi);
   // Neighbours are 2 apart before normalisation, everything else at least 3.2: three mutual neighbours are a face.
   std::vector<glm::uvec3> triangles;
   const double reach = 2.5 / std::sqrt(1.0 + phi * phi);

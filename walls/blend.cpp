@@ -60,26 +60,27 @@ BlendWeights::BlendWeights(const Wall& wall, std::size_t screen) {
   height_ = screen_height(mine);
   pixels_ = mine.pixels;
   if (!mine.blend.any()) return;
-  const auto add = [&](const WallScreen& other, const PlanarBox& box) {
-    const Fades fades = fades_of(wall, other);
-    Area area{box.low, box.high, {}, {}, other.blend.gamma};
-    for (std::size_t axis = 0; axis < 2; ++axis) {  // of the other screen
-      const std::size_t here = box.swapped ? 1 - axis : axis;
-      const bool with = box.along[axis] > 0;
-      area.fade_low[here] = fades[2 * axis + (with ? 0 : 1)];
-      area.fade_high[here] = fades[2 * axis + (with ? 1 : 0)];
-    }
-    trivial_ = trivial_ && std::ranges::max(fades) <= 0.0;
-    areas_.push_back(area);
-  };
-  add(mine, {{0.0, 0.0}, {width_, height_}, false, {1, 1}});
+  add(wall, mine, {{0.0, 0.0}, {width_, height_}, false, {1, 1}});
   for (const auto* screens : {&wall.screens, &wall.elsewhere}) {
     for (const WallScreen& other : *screens) {
       if (&other == &mine || !other.blend.any()) continue;
       const auto box = seen_from(other, mine);
-      if (box && overlaps(*box, mine)) add(other, *box);
+      if (box && overlaps(*box, mine)) add(wall, other, *box);
     }
   }
+}
+
+void BlendWeights::add(const Wall& wall, const WallScreen& screen, const PlanarBox& box) {
+  const Fades fades = fades_of(wall, screen);
+  Area area{box.low, box.high, {}, {}, screen.blend.gamma};
+  for (std::size_t axis = 0; axis < 2; ++axis) {  // of that screen
+    const std::size_t here = box.swapped ? 1 - axis : axis;
+    const bool with = box.along[axis] > 0;
+    area.fade_low[here] = fades[2 * axis + (with ? 0 : 1)];
+    area.fade_high[here] = fades[2 * axis + (with ? 1 : 0)];
+  }
+  trivial_ = trivial_ && std::ranges::max(fades) <= 0.0;
+  areas_.push_back(area);
 }
 
 double BlendWeights::ramp(const Area& area, double u, double v) {

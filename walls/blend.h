@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "walls/planar.h"
 #include "walls/wall.h"
 
 namespace hpr {
@@ -35,6 +36,8 @@ class BlendWeights {
     double gamma = 1.0;
   };
 
+  /// A screen whose rectangle is `box` in the plane of the one asked for.
+  void add(const Wall& wall, const WallScreen& screen, const PlanarBox& box);
   [[nodiscard]] static double ramp(const Area& area, double u, double v);
 
   double width_ = 0.0;

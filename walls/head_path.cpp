@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "core/check.h"
 #include "core/error.h"
@@ -96,7 +97,7 @@ std::optional<std::vector<double>> toml_row(const TomlValue& table) {
 /// Collects samples and refuses what is none.
 class Collector {
  public:
-  explicit Collector(const std::string& name) : name_(name) {}
+  explicit Collector(std::string name) : name_(std::move(name)) {}
 
   void add(const std::optional<std::vector<double>>& row, int line, std::string_view text) {
     HeadSample sample;

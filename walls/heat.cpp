@@ -119,6 +119,7 @@ double WallHeat::largest() const {
 const std::vector<std::string>& heat_names() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
+    all.reserve(std::size(kMeasures));
     for (const Measure& measure : kMeasures) all.emplace_back(measure.name);
     return all;
   }();

@@ -90,9 +90,23 @@ double tick_mm(double pixels_per_mm) {
   return 1000.0;
 }
 
+constexpr int kLong = 10;
+
+/// One tick of a ruler at the top edge (`across`) or the left one; `at`: pixels from its beginning.
+void draw_tick(Canvas& canvas, bool across, double at, int number, double unit, double step) {
+  const double length = number % kLong == 0 ? 3.0 * unit : number % (kLong / 2) == 0 ? 2.0 * unit : unit;
+  across ? canvas.fill({at, 0.0}, {1.0, std::round(length)}, kWhite)
+         : canvas.fill({0.0, at}, {std::round(length), 1.0}, kWhite);
+  if (number % kLong != 0) return;
+  const std::string text = fmt::format("{:g}", number * step);
+  const double height = std::max(5.0, 1.6 * unit);
+  canvas.text(across ? glm::dvec2(at, 3.0 * unit + 0.7 * height)
+                     : glm::dvec2(3.0 * unit + 0.4 * height * static_cast<double>(text.size()), at),
+              text, height, kWhite);
+}
+
 /// Along the top edge from the left and the left edge from the top; every tenth tick is long and numbered.
 void draw_rulers(Canvas& canvas, const WallScreen& screen) {
-  constexpr int kLong = 10;
   const glm::dvec2 size(screen.pixels.width, screen.pixels.height);
   const double metres = screen_width(screen);
   const double pixels_per_mm = size.x / (1000.0 * metres);
@@ -102,16 +116,7 @@ void draw_rulers(Canvas& canvas, const WallScreen& screen) {
   for (const bool across : {true, false}) {
     const double length_mm = 1000.0 * (across ? metres : screen_height(screen));
     for (int i = 1; i * step < length_mm; ++i) {
-      const double at = std::round(i * step * (across ? pixels_per_mm : size.y / length_mm));
-      const double tick = i % kLong == 0 ? 3.0 * unit : i % (kLong / 2) == 0 ? 2.0 * unit : unit;
-      across ? canvas.fill({at, 0.0}, {1.0, std::round(tick)}, kWhite)
-             : canvas.fill({0.0, at}, {std::round(tick), 1.0}, kWhite);
-      if (i % kLong != 0) continue;
-      const std::string number = fmt::format("{:g}", i * step);
-      const double height = std::max(5.0, 1.6 * unit);
-      canvas.text(across ? glm::dvec2(at, 3.0 * unit + 0.7 * height)
-                         : glm::dvec2(3.0 * unit + 0.4 * height * static_cast<double>(number.size()), at),
-                  number, height, kWhite);
+      draw_tick(canvas, across, std::round(i * step * (across ? pixels_per_mm : size.y / length_mm)), i, unit, step);
     }
   }
 }

@@ -151,8 +151,8 @@ std::vector<std::string> lines_of(const Plan& plan, std::size_t index) {
       owner_of(plan.wall, screen)};
   if (!screen.window.empty()) lines.push_back("window " + screen.window);
   if (screen.rotate != 0) lines.push_back(fmt::format("turned {} degrees", screen.rotate));
-  if (screen.mirror != Mirror::None) lines.push_back("mirrored");
-  if (screen.eye != Eye::Both) lines.push_back(screen.eye == Eye::Left ? "left eye" : "right eye");
+  if (screen.mirror != Mirror::None) lines.emplace_back("mirrored");
+  if (screen.eye != Eye::Both) lines.emplace_back(screen.eye == Eye::Left ? "left eye" : "right eye");
   return lines;
 }
 

@@ -7,9 +7,9 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
-#include <cstring>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "core/error.h"
@@ -59,7 +59,7 @@ class Socket {
     at.sin_port = htons(static_cast<std::uint16_t>(port));
     const bool known = ::inet_pton(AF_INET, address.c_str(), &at.sin_addr) == 1;
     if (handle_ < 0 || !known || ::bind(handle_, reinterpret_cast<const sockaddr*>(&at), sizeof(at)) != 0) {
-      const std::string why = known ? std::strerror(errno) : "no numeric address";
+      const std::string why = known ? std::generic_category().message(errno) : "no numeric address";
       close();
       throw Error(ExitCode::Io, fmt::format("cannot listen to a tracker at {}:{}: {}", printable(address), port, why),
                   "give an address of this host, 0.0.0.0 for all of them, and a free port");

@@ -244,7 +244,7 @@ class Linker {
         findings_.error(
             b.place,
             fmt::format(R"(tile driven twice: screens "{}" and "{}" are the same rectangle)", a.screen.id, b.screen.id),
-            "remove one, or give one eye = \"left\" and the other eye = \"right\"");
+            R"(remove one, or give one eye = "left" and the other eye = "right")");
       }
     }
   }

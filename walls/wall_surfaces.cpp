@@ -65,6 +65,15 @@ std::optional<double> read_curve(TableReader& reader, const WallGrid& grid, bool
   return std::nullopt;
 }
 
+/// How the tiles of a grid stand and show, all alike.
+WallScreen read_tiles_look(TableReader& reader, Findings& findings) {
+  const bool turned_twice = reader.has("rotate") && reader.has("panel_rotate");
+  if (turned_twice) reader.error("panel_rotate", "stands beside rotate", "they mean the same: remove one");
+  WallScreen look;
+  read_look(reader, reader.has("panel_rotate") ? "panel_rotate" : "rotate", look, findings);
+  return look;
+}
+
 void read_grid(const TomlValue& table, const std::string& surface, WallDraft& draft, Findings& findings) {
   TableReader reader(table, "grid", findings);
   WallGrid grid;
@@ -82,10 +91,7 @@ void read_grid(const TomlValue& table, const std::string& surface, WallDraft& dr
   }
   const std::vector<double> gap = reader.reals("gap_m", 2, kMetresLimit).value_or(std::vector<double>{0.0, 0.0});
   grid.center = reader.point("centre_m").value_or(glm::dvec3(0.0));
-  const bool turned_twice = reader.has("rotate") && reader.has("panel_rotate");
-  if (turned_twice) reader.error("panel_rotate", "stands beside rotate", "they mean the same: remove one");
-  WallScreen look;
-  read_look(reader, reader.has("panel_rotate") ? "panel_rotate" : "rotate", look, findings);
+  const WallScreen look = read_tiles_look(reader, findings);
   const auto windows = reader.texts("windows");
   const std::int64_t asked = std::int64_t{columns.value_or(1)} * rows.value_or(1);
   const bool fits = asked + static_cast<std::int64_t>(draft.screens.size()) <= kMostScreens;
@@ -205,6 +211,16 @@ void read_screens(TableReader& surface, const std::string& surface_id, const std
   }
 }
 
+/// Pixels of the screens from `first` on that are no squares. A grid's tiles are alike: one warning does.
+void warn_about_pixel_shapes(const WallDraft& draft, std::size_t first, bool of_grid, Findings& findings) {
+  const std::size_t end = of_grid ? std::min(first + 1, draft.screens.size()) : draft.screens.size();
+  for (std::size_t i = first; i < end; ++i) {
+    // Where a mesh says where the light falls, corners only say so about.
+    const bool measured = !draft.screens[i].screen.warp.mesh.path.empty();
+    if (draft.screens[i].has_corners && !measured) warn_about_pixel_shape(draft.screens[i], findings);
+  }
+}
+
 }  // namespace
 
 void read_surfaces(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings) {
@@ -231,14 +247,7 @@ void read_surfaces(TableReader& document, const std::filesystem::path& folder, W
     }
     reader.ignore({"mpcdi"});
     reader.finish();
-    // A grid's tiles are alike: one warning does.
-    bool warned = false;
-    for (std::size_t i = before; i < draft.screens.size() && !(has_grid && warned); ++i) {
-      // Where a mesh says where the light falls, corners only say so about.
-      const bool measured = !draft.screens[i].screen.warp.mesh.path.empty();
-      if (draft.screens[i].has_corners && !measured) warn_about_pixel_shape(draft.screens[i], findings);
-      warned = true;
-    }
+    warn_about_pixel_shapes(draft, before, has_grid, findings);
   }
   if (document.has("surfaces") && draft.screens.empty() && !findings.any_errors()) {
     document.error("surfaces", "hold no screen", "add a grid or screens");

@@ -109,7 +109,7 @@ std::string tables_of_hosts(const WallTemplate& wall, Size pixels) {
   int beside = 0;
   for (std::size_t screen = 0; screen < owners.size(); ++screen) {
     beside = screen > 0 && owners[screen] == owners[screen - 1] ? beside + 1 : 0;
-    text += fmt::format("  {{ id = \"{}\", node = {}, display = \":0\"", window_id(wall, screen),
+    text += fmt::format(R"(  {{ id = "{}", node = {}, display = ":0")", window_id(wall, screen),
                         toml_quote(wall.hosts[owners[screen]]));
     // Beyond the largest X screen nobody can say where it stands.
     const std::int64_t x = std::int64_t{beside} * pixels.width;
@@ -127,7 +127,8 @@ std::string windows_of_grid(const WallTemplate& wall) {
   for (int row = 0; row < wall.rows; ++row) {
     text += "  ";
     for (int column = 0; column < wall.columns; ++column) {
-      const auto screen = static_cast<std::size_t>(row * wall.columns + column);
+      const int place = row * wall.columns + column;
+      const auto screen = static_cast<std::size_t>(place);
       text += fmt::format("\"{}\",{}", window_id(wall, screen), column + 1 < wall.columns ? " " : "\n");
     }
   }

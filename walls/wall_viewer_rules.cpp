@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "core/names.h"
 #include "walls/geometry.h"
@@ -33,6 +36,22 @@ void check_viewers(WallDraft& draft, Findings& findings) {
   }
 }
 
+/// The index of the viewer a surface names; none, and a finding, where nobody is called so.
+std::optional<std::size_t> find_viewer(const WallDraft& draft, const DraftSurface& surface, Findings& findings) {
+  const auto viewer =
+      std::ranges::find(draft.viewers, surface.viewer, [](const DraftViewer& v) { return v.viewer.id; });
+  if (viewer != draft.viewers.end()) return static_cast<std::size_t>(viewer - draft.viewers.begin());
+  std::vector<std::string> ids;
+  for (const DraftViewer& v : draft.viewers) {
+    if (!v.viewer.id.empty()) ids.push_back(v.viewer.id);
+  }
+  findings.error(
+      surface.viewer_place,
+      fmt::format(R"(surface "{}" is seen by viewer "{}", who does not exist)", surface.id, printable(surface.viewer)),
+      ids.empty() ? "the wall has no viewer with an id" : unknown_name_hint(surface.viewer, ids));
+  return std::nullopt;
+}
+
 void link_surfaces(WallDraft& draft, Findings& findings) {
   std::set<std::string> watched;
   std::set<std::string> seen;
@@ -41,23 +60,11 @@ void link_surfaces(WallDraft& draft, Findings& findings) {
       findings.error(surface.place, fmt::format("there are two surfaces \"{}\"", surface.id), "give each its own id");
     }
     if (surface.viewer.empty()) continue;
-    const auto viewer =
-        std::ranges::find(draft.viewers, surface.viewer, [](const DraftViewer& v) { return v.viewer.id; });
-    if (viewer == draft.viewers.end()) {
-      std::vector<std::string> ids;
-      for (const DraftViewer& v : draft.viewers) {
-        if (!v.viewer.id.empty()) ids.push_back(v.viewer.id);
-      }
-      findings.error(surface.viewer_place,
-                     fmt::format(R"(surface "{}" is seen by viewer "{}", who does not exist)", surface.id,
-                                 printable(surface.viewer)),
-                     ids.empty() ? "the wall has no viewer with an id" : unknown_name_hint(surface.viewer, ids));
-      continue;
-    }
+    const auto viewer = find_viewer(draft, surface, findings);
+    if (!viewer) continue;
     watched.insert(surface.viewer);
     for (DraftScreen& screen : draft.screens) {
-      if (screen.screen.surface != surface.id) continue;
-      screen.screen.viewer = static_cast<std::size_t>(viewer - draft.viewers.begin());
+      if (screen.screen.surface == surface.id) screen.screen.viewer = *viewer;
     }
   }
   for (std::size_t i = 1; i < draft.viewers.size(); ++i) {
@@ -74,7 +81,7 @@ void check_stereo(const WallDraft& draft, Findings& findings) {
   const bool any_for_both = std::ranges::any_of(draft.screens, two_pictures);
   if (draft.stereo == StereoMode::Passive && any_for_both) {
     findings.warning(draft.stereo_place, "stereo is passive, and screens without an eye show one picture for both",
-                     "add eye = \"left\" or eye = \"right\" to each screen, or choose another mode");
+                     R"(add eye = "left" or eye = "right" to each screen, or choose another mode)");
   }
   if (draft.stereo != StereoMode::Passive && !any_for_both && !draft.screens.empty()) {
     findings.warning(draft.stereo_place, "all screens are for one eye, so the stereo mode changes nothing",

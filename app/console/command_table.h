@@ -24,6 +24,7 @@ struct SessionCommand {
 class CommandTable {
  public:
   CommandTable();
+  ~CommandTable() = default;
   CommandTable(const CommandTable&) = delete;
   CommandTable& operator=(const CommandTable&) = delete;
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <utility>
+
 #include "app/picture_files.h"
 #include "app/progress.h"
 #include "app/resolution.h"
@@ -15,10 +17,10 @@
 
 namespace hpr {
 
-Console::Console(Session& session, const Globals& globals, const RenderOptions& options, Size size)
+Console::Console(Session& session, const Globals& globals, RenderOptions options, Size size)
     : session_(session),
       globals_(globals),
-      options_(options),
+      options_(std::move(options)),
       size_(size),
       controls_(session, globals, options_, table_) {
   table_.add({"size", "WxH", "pixels of the picture", [this](Words words) { return set_size(words); }});

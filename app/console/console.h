@@ -14,7 +14,7 @@ namespace hpr {
 class Console {
  public:
   /// All outlive this.
-  Console(Session& session, const Globals& globals, const RenderOptions& options, Size size);
+  Console(Session& session, const Globals& globals, RenderOptions options, Size size);
 
   /// Collective. What the line has to tell. Throws Error where nothing was done: the session stays as it was.
   [[nodiscard]] std::string run(const std::string& line) { return table_.run(line); }
@@ -38,7 +38,7 @@ class Console {
   std::string set_size(Words words);
   std::string render();
   std::string save(Words words);
-  std::string write_stats_of(Words words) const;
+  [[nodiscard]] std::string write_stats_of(Words words) const;
   std::string explain();
   [[nodiscard]] const Picture& picture() const;
   [[nodiscard]] View view() const;

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <optional>
+#include <utility>
 
 #include "app/console/console.h"
 #include "app/console/forgivable.h"
@@ -66,29 +67,53 @@ class ConsoleCommand final : public Command {
     agree_on_failure(comm, [&] {
       if (speaks) source.emplace(LineSource::Options{true, listen_});
     });
-    const bool typed = speaks && input_is_typed();
     if (speaks) tell_where(*source);
     ExitCode worst = ExitCode::Done;
     while (!console.quits()) {
-      if (typed) fmt::print("> ");
-      if (speaks) std::fflush(stdout);
-      std::optional<InputLine> line;
-      Heard heard;
-      while (!heard.line && !heard.ended) heard = hear_line(comm, source ? &*source : nullptr, kHeartbeat, line);
-      if (heard.ended) break;
-      const bool scripted = all_gather_value(comm, speaks && !typed && line->from == STDIN_FILENO ? 1 : 0)[0] == 1;
-      try {
-        const std::string told = console.run(*heard.line);
-        if (speaks) source->answer(*line, answer_of(told, *line));
-      } catch (const Error& error) {
-        if (!is_forgivable(error) || (console.drawing() && comm.size() > 1)) throw;
-        if (scripted && !keeps_going_ && speaks) throw in_line(error, *line);
-        if (scripted && !keeps_going_) throw;
-        worst = std::max(worst, scripted ? error.code() : ExitCode::Done);
-        if (speaks) refuse_line(*source, *line, error);
-      }
+      const std::optional<Line> line = next_line(comm, source ? &*source : nullptr);
+      if (!line) break;
+      const ExitCode code = obey(comm, console, *line);
+      if (line->scripted) worst = std::max(worst, code);
     }
     return worst;
+  }
+
+  /// A line as all ranks heard it.
+  struct Line {
+    std::string text;
+    bool scripted = false;         ///< by a file or a pipe
+    LineSource* source = nullptr;  ///< rank 0's; null: nobody is answered here
+    InputLine from;                ///< rank 0's
+  };
+
+  /// Collective. None: no line can come any more. `source`: null on ranks other than 0.
+  [[nodiscard]] static std::optional<Line> next_line(Communicator& comm, LineSource* source) {
+    const bool typed = source != nullptr && input_is_typed();
+    if (typed) fmt::print("> ");
+    if (source != nullptr) std::fflush(stdout);
+    std::optional<InputLine> from;
+    Heard heard;
+    while (!heard.line && !heard.ended) heard = hear_line(comm, source, kHeartbeat, from);
+    if (heard.ended) return std::nullopt;
+    const bool scripted = source != nullptr && !typed && from->from == STDIN_FILENO;
+    return Line{std::move(*heard.line), all_gather_value(comm, scripted ? 1 : 0)[0] == 1, source,
+                std::move(from).value_or(InputLine{})};
+  }
+
+  /// Collective. Runs a line and answers it; what it failed with, where the session goes on all the same.
+  ExitCode obey(Communicator& comm, Console& console, const Line& line) const {
+    try {
+      const std::string told = console.run(line.text);
+      if (line.source != nullptr) line.source->answer(line.from, answer_of(told, line.from));
+      return ExitCode::Done;
+    } catch (const Error& error) {
+      if (!is_forgivable(error) || (console.drawing() && comm.size() > 1)) throw;
+      const bool ends = line.scripted && !keeps_going_;
+      if (ends && line.source != nullptr) throw in_line(error, line.from);
+      if (ends) throw;
+      if (line.source != nullptr) refuse_line(*line.source, line.from, error);
+      return error.code();
+    }
   }
 
   static void tell_where(const LineSource& source) {

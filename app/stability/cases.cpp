@@ -6,7 +6,7 @@ namespace hpr {
 
 std::span<const StabilityCase> all_stability_cases() {
   using namespace stability;
-  static const std::array kCases{
+  static const std::array cases{
       // Geometry, rasterisation and frames.
       StabilityCase{"depth-order", "pairs of close surfaces from 1 mm to 10 000 km: the nearer one is seen",
                     depth_order},
@@ -37,7 +37,7 @@ std::span<const StabilityCase> all_stability_cases() {
       StabilityCase{"materials", "roughness and index at their ends: no energy is made, nothing jumps", materials},
       StabilityCase{"not-finite", "NaN and infinities in files and sums: refused or counted, never shown", not_finite},
   };
-  return kCases;
+  return cases;
 }
 
 }  // namespace hpr

@@ -111,6 +111,7 @@ std::vector<TileLayer<Key>> draw_shares(Drawer& drawer, const Quads& quads, cons
     shares[backwards ? shares.size() - 1 - rank : rank].push_back(quads.surfaces[i]);
   }
   std::vector<TileLayer<Key>> layers;
+  layers.reserve(shares.size());
   for (const auto& share : shares) layers.push_back(drawer.draw(quads.scene, view, share));
   return layers;
 }

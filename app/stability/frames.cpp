@@ -79,6 +79,35 @@ StabilityFinding layout_arithmetic() {
   return finding;
 }
 
+/// Any key, another one for every rank and pixel.
+Key far_key(int rank, std::size_t tile, std::size_t pixel) {
+  return mix_bits((tile * kTilePixels + pixel) * 2 + static_cast<std::size_t>(rank));
+}
+
+/// Keys of the tiles two ranks composite that are not the larger one of theirs. Tiles nobody came to own: a whole
+/// tile's.
+double wrong_composites(const FrameLayout& layout, const std::vector<std::size_t>& tiles, const std::string& strategy) {
+  std::size_t owned = 0;
+  std::size_t wrong = 0;
+  std::mutex mutex;
+  run_local_ranks(2, [&](Communicator& comm) {
+    TileLayer<Key> layer(layout);
+    for (const std::size_t tile : tiles) {
+      for (std::size_t i = 0; i < kTilePixels; ++i) layer.tile(tile)[i] = far_key(comm.rank(), tile, i);
+      layer.set_active(tile);
+    }
+    const Composited mine = make_compositor(strategy)->composite(comm, layer, tiles);
+    const std::lock_guard lock(mutex);
+    owned += mine.tiles.size();
+    for (const std::size_t tile : mine.tiles) {
+      for (std::size_t i = 0; i < kTilePixels; ++i) {
+        wrong += layer.tile(tile)[i] == std::max(far_key(0, tile, i), far_key(1, tile, i)) ? 0U : 1U;
+      }
+    }
+  });
+  return static_cast<double>(owned == tiles.size() ? wrong : wrong + kTilePixels);
+}
+
 /// Two ranks composite a few tiles of a frame of 2^32 bytes, the last ones among them; the others stay untouched
 /// memory.
 StabilityFinding composited_far_out() {
@@ -86,9 +115,6 @@ StabilityFinding composited_far_out() {
   std::vector<std::size_t> tiles;
   for (const std::size_t share : {0U, 1U, 31U, 32U, 33U, 63U}) tiles.push_back(layout.tiles() / 64 * share);
   tiles.push_back(layout.tiles() - 1);
-  const auto key_of = [](int rank, std::size_t tile, std::size_t pixel) {
-    return mix_bits((tile * kTilePixels + pixel) * 2 + static_cast<std::size_t>(rank));
-  };
   StabilityFinding finding;
   finding.name = "frames/composited";
   finding.parameter =
@@ -98,27 +124,9 @@ StabilityFinding composited_far_out() {
   finding.why = "Tiles are found by 64-bit offsets.";
   for (const auto& each : all_compositors()) {
     // Those that merge in shared memory would touch as much of it as the layers are large.
-    if (!each->fits(2) || each->merges_in_place()) continue;
-    const std::string strategy(each->name());
-    std::size_t owned = 0;
-    std::mutex mutex;
-    run_local_ranks(2, [&](Communicator& comm) {
-      TileLayer<Key> layer(layout);
-      for (const std::size_t tile : tiles) {
-        for (std::size_t i = 0; i < kTilePixels; ++i) layer.tile(tile)[i] = key_of(comm.rank(), tile, i);
-        layer.set_active(tile);
-      }
-      const Composited mine = make_compositor(strategy)->composite(comm, layer, tiles);
-      const std::lock_guard lock(mutex);
-      owned += mine.tiles.size();
-      for (const std::size_t tile : mine.tiles) {
-        for (std::size_t i = 0; i < kTilePixels; ++i) {
-          const bool right = layer.tile(tile)[i] == std::max(key_of(0, tile, i), key_of(1, tile, i));
-          finding.measured += right ? 0.0 : 1.0;
-        }
-      }
-    });
-    if (owned != tiles.size()) finding.measured += static_cast<double>(kTilePixels);
+    if (each->fits(2) && !each->merges_in_place()) {
+      finding.measured += wrong_composites(layout, tiles, std::string(each->name()));
+    }
   }
   return finding;
 }

@@ -25,7 +25,7 @@ Bsdf bsdf_at(const MaterialPoint& material, double polar, Carried carried) {
   SurfacePoint point;
   point.to_viewer = {std::sin(polar), 0.0, std::cos(polar)};
   point.geometric_normal = point.shading_normal = {0.0, 0.0, 1.0};
-  return Bsdf(material, point, carried);
+  return {material, point, carried};
 }
 
 /// What of a furnace's light samples of all lobes, each chosen by nobody, give back together in the mean.

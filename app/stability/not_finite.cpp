@@ -70,7 +70,7 @@ std::string write_triangle(const Scratch& scratch, const std::string& attribute,
       {{"bufferView", 2}, {"componentType", 5126}, {"type", width == 2 ? "VEC2" : "VEC3"}, {"count", 3}});
   if (position) json["accessors"][2].update({{"min", {0, 0, 0}}, {"max", {1, 1, 0}}});
   json["meshes"][0]["primitives"][0]["attributes"][attribute] = 2;
-  const std::string path = scratch.file("triangle.gltf").string();
+  std::string path = scratch.file("triangle.gltf").string();
   std::ofstream(path) << json.dump();
   return path;
 }
@@ -173,7 +173,7 @@ std::vector<StabilityFinding> overflow() {
       finding("not-finite/first-pixel", "past that, the first pixel named by 1, 2 and 3 threads", 0.0,
               "answers that differ or are wrong", "the smallest in order of rows, whoever meets it");
   const RayCounts one = glare(3.4e38, 1);
-  if (one.not_finite != 130 * 70 || one.first_not_finite != ScreenPixel{0, 200, 300}) ++named.measured;
+  if (one.not_finite != std::uint64_t{130} * 70 || one.first_not_finite != ScreenPixel{0, 200, 300}) ++named.measured;
   for (const int threads : {2, 3}) named.measured += glare(3.4e38, threads) == one ? 0.0 : 1.0;
   return {bright, named};
 }

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -132,10 +132,12 @@ StabilityFinding faint(int threads) {
   return kept;
 }
 
+/// By their bits: 0 and -0 are two.
 std::size_t differing(const std::vector<Photon>& a, const std::vector<Photon>& b) {
+  using Bits = std::array<std::byte, sizeof(Photon)>;
   std::size_t count = std::max(a.size(), b.size()) - std::min(a.size(), b.size());
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
-    count += std::memcmp(&a[i], &b[i], sizeof(Photon)) == 0 ? 0U : 1U;
+    count += std::bit_cast<Bits>(a[i]) == std::bit_cast<Bits>(b[i]) ? 0U : 1U;
   return count;
 }
 
@@ -207,7 +209,7 @@ StabilityFinding longest_sum(std::uint64_t seed) {
     ExactSum exact;
     for (std::size_t i = 0; i < count; ++i) exact.add(photons[i].flux[0]);
     const long double density = 2.0L / (std::numbers::pi_v<long double> * 0.25L);
-    const double error = static_cast<double>(std::abs(found.r / (density * exact.sum) - 1.0L));
+    const auto error = static_cast<double>(std::abs(found.r / (density * exact.sum) - 1.0L));
     sum.measured = worse(sum.measured, error);
     sum.curve.points.emplace_back(static_cast<double>(count), error);
     sum.curve.expected.emplace_back(static_cast<double>(count), (static_cast<double>(count) + 4.0) * kDoubleRounding);

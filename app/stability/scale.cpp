@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstddef>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -24,10 +26,11 @@ Picture scaled_picture(const Globals& globals, ScaleScene scale, double factor) 
 
 /// Pixels of which a bit differs, of key or colour.
 std::size_t differing_bits(const Picture& a, const Picture& b) {
+  using Bits = std::array<std::byte, sizeof(Rgb)>;
   std::size_t found = 0;
   for (std::size_t i = 0; i < a.keys.pixels().size(); ++i) {
     const bool same = a.keys.pixels()[i] == b.keys.pixels()[i] &&
-                      std::memcmp(&a.radiance.pixels()[i], &b.radiance.pixels()[i], sizeof(Rgb)) == 0;
+                      std::bit_cast<Bits>(a.radiance.pixels()[i]) == std::bit_cast<Bits>(b.radiance.pixels()[i]);
     found += same ? 0U : 1U;
   }
   return found;

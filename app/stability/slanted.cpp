@@ -66,7 +66,7 @@ std::vector<StabilityFinding> slanted_planes(const Globals& globals) {
   finding.why = "Depth is interpolated in floats from corner to corner, so it rounds as the largest depth does.";
   finding.curve.x = "distance, m";
   for (std::size_t row = lost.size(); row-- > 0;) {
-    const double z = kRows / 2 / (static_cast<double>(row) + 0.5);
+    const double z = 0.5 * kRows / (static_cast<double>(row) + 0.5);
     finding.measured = std::max(finding.measured, lost[row] * kNearEdge / z);
     finding.curve.points.emplace_back(z, lost[row] * kNearEdge / z);
   }

@@ -28,15 +28,18 @@ class StepTable {
   explicit StepTable(int error) {
     for (int difference = 0; difference < 256; ++difference) {
       const int steps = (difference + error) / (2 * error + 1);
-      steps_[static_cast<std::size_t>(255 + difference)] = static_cast<std::uint8_t>(steps);
-      steps_[static_cast<std::size_t>(255 - difference)] = static_cast<std::uint8_t>(-steps);
+      steps_[index(difference)] = static_cast<std::uint8_t>(steps);
+      steps_[index(-difference)] = static_cast<std::uint8_t>(-steps);
     }
   }
-  [[nodiscard]] std::uint8_t operator()(int difference) const {
-    return steps_[static_cast<std::size_t>(255 + difference)];
-  }
+  [[nodiscard]] std::uint8_t operator()(int difference) const { return steps_[index(difference)]; }
 
  private:
+  [[nodiscard]] static std::size_t index(int difference) {
+    const int place = 255 + difference;
+    return static_cast<std::size_t>(place);
+  }
+
   std::array<std::uint8_t, 511> steps_{};
 };
 

@@ -127,7 +127,9 @@ class WebServer::Implementation {
   class Place {
    public:
     explicit Place(int& taken) : taken_(&taken) { ++*taken_; }
+    Place(const Place&) = delete;
     Place(Place&& other) noexcept : taken_(std::exchange(other.taken_, nullptr)) {}
+    Place& operator=(const Place&) = delete;
     Place& operator=(Place&&) = delete;
     ~Place() {
       if (taken_ != nullptr) --*taken_;

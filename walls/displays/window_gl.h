@@ -1,6 +1,6 @@
 #pragma once
 
-#define GLFW_INCLUDE_NONE
+#define GLFW_INCLUDE_NONE  // NOLINT(readability-identifier-naming): GLFW's own
 #include <GL/glcorearb.h>
 #include <GLFW/glfw3.h>
 

@@ -65,7 +65,8 @@ void add_grid(const ForeignGrid& grid, const std::vector<ForeignTile>& tiles, Im
       for (int px = 0; px < grid.panels.width; ++px) {
         const int column = tile.column * grid.panels.width + px;
         const int row = tile.row * grid.panels.height + py;
-        WallScreen& screen = screens[static_cast<std::size_t>(row * metres.columns + column)];
+        const int place = row * metres.columns + column;
+        WallScreen& screen = screens[static_cast<std::size_t>(place)];
         const int x = px * (grid.panel.width + grid.gap_x_pixels);
         const int y = py * (grid.panel.height + grid.gap_y_pixels);
         screen.window = window.id;

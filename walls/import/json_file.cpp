@@ -23,9 +23,9 @@ JsonFile::JsonFile(std::string_view text, std::string name) : name_(std::move(na
 }
 
 const JsonFile::Json& JsonFile::array(const Json& object, const std::string& path, const char* key) const {
-  static const Json kNone = Json::array();
+  static const Json none = Json::array();
   const auto found = object.find(key);
-  if (found == object.end()) return kNone;
+  if (found == object.end()) return none;
   if (!found->is_array()) fail(path + "/" + key, "it is no list", "write [ ... ]");
   return *found;
 }

@@ -27,7 +27,7 @@ class JsonFile {
   [[nodiscard]] double real(const Json& object, const std::string& path, const char* key, double low, double high,
                             std::optional<double> otherwise = std::nullopt) const;
   /// `value`, or an error where it is no object.
-  const Json& object(const Json& value, const std::string& path) const;
+  [[nodiscard]] const Json& object(const Json& value, const std::string& path) const;
 
   [[noreturn]] void fail(const std::string& path, std::string_view what, std::string hint) const;
 

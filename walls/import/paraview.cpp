@@ -132,7 +132,7 @@ WallScreen read_screen(const XmlFile& file, const Machine& machine) {
   const auto upper_right = file.point(element, "UpperRight");
   if (!lower_left || !lower_right || (!upper_left && !upper_right)) {
     file.fail(element, "the machine has no LowerLeft, LowerRight and UpperRight",
-              "give it corners, or the Process its <Option Name=\"tile-dimensions-x\" Value=\"...\"/>");
+              R"(give it corners, or the Process its <Option Name="tile-dimensions-x" Value="..."/>)");
   }
   WallScreen screen;
   screen.surface = "cave";
@@ -195,7 +195,7 @@ ImportedWall import_paraview(std::string_view text, const std::string& name, con
     import_corners(file, machines, settings, imported);
   } else {
     file.fail(process, "it tells of no machine and no tile",
-              "add what pvserver was told: <Option Name=\"tile-dimensions-x\" Value=\"3\"/>");
+              R"(add what pvserver was told: <Option Name="tile-dimensions-x" Value="3"/>)");
   }
   return imported;
 }

@@ -39,7 +39,7 @@ class TideReader {
 
   void read_surface(const Json& surface) {
     const std::string path = fmt::format("/surfaces/{}", grids_.size());
-    file_.object(surface, path);
+    (void)file_.object(surface, path);
     ForeignGrid grid;
     if (!grids_.empty()) grid.surface = fmt::format("surface{}", grids_.size());
     grid.columns = count(surface, path, "numScreensX", "screenCountX");
@@ -71,7 +71,7 @@ class TideReader {
   }
 
   void read_process(const Json& process, const std::string& path) {
-    file_.object(process, path);
+    (void)file_.object(process, path);
     const std::string node = node_of_host(imported_.wall, file_.text(process, path, "host", "localhost"));
     const Json& screens = file_.array(process, path, "screens");
     for (std::size_t i = 0; i < screens.size(); ++i) {
@@ -80,7 +80,7 @@ class TideReader {
   }
 
   void read_screen(const Json& screen, const std::string& path, const std::string& node) {
-    file_.object(screen, path);
+    (void)file_.object(screen, path);
     const int surface = file_.integer(screen, path, "surface", 0, static_cast<int>(grids_.size()) - 1, 0);
     const ForeignGrid& grid = grids_[static_cast<std::size_t>(surface)];
     if (file_.text(screen, path, "stereo", "mono") == "right") {

@@ -35,9 +35,9 @@ ClientLink::Change ClientLink::step(double now, const std::function<void(const P
   }
 }
 
-ClientLink::Change ClientLink::advance(double now, const std::function<void(const Packet&)>& arrived) {
+bool ClientLink::connect(double now) {
   if (state_ == State::Down) {
-    if (now < due_) return Change::None;
+    if (now < due_) return false;
     connection_ = std::make_unique<Connection>(start_connecting(address_));
     state_ = State::Connecting;
     due_ = now + kHandshakeLimit;
@@ -45,10 +45,15 @@ ClientLink::Change ClientLink::advance(double now, const std::function<void(cons
   if (state_ != State::Up && now >= due_) throw LinkError("no answer");
   if (state_ == State::Connecting) {
     pollfd connecting{connection_->socket().descriptor(), POLLOUT, 0};
-    if (::poll(&connecting, 1, 0) <= 0) return Change::None;
+    if (::poll(&connecting, 1, 0) <= 0) return false;
     finish_connecting(connection_->socket(), address_.tcp);
     state_ = State::AwaitGreeting;
   }
+  return true;
+}
+
+ClientLink::Change ClientLink::advance(double now, const std::function<void(const Packet&)>& arrived) {
+  if (!connect(now)) return Change::None;
   // What arrived before the other end went counts: it may say why.
   try {
     connection_->receive();

@@ -44,6 +44,8 @@ class ClientLink {
  private:
   enum class State : std::uint8_t { Down, Connecting, AwaitGreeting, AwaitReply, Up };
 
+  /// Goes on connecting; whether the connection stands.
+  [[nodiscard]] bool connect(double now);
   [[nodiscard]] Change advance(double now, const std::function<void(const Packet&)>& arrived);
   void answer(const Greeting& greeting);
   void judge(const Reply& reply);

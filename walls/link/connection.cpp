@@ -12,7 +12,7 @@
 namespace hpr {
 namespace {
 
-constexpr std::size_t kChunk = 256 * 1024;
+constexpr std::size_t kChunk = std::size_t{256} << 10U;
 /// Of one call, so that one link cannot keep the others waiting.
 constexpr std::size_t kMostReceived = 16 * kChunk;
 

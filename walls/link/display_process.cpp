@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -52,13 +53,13 @@ Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& words) {
   return result;
 }
 
-DisplayProcess::DisplayProcess(const Wall& wall, const std::string& host, Display& display, FrameReceiver& receiver,
-                               const ProcessSettings& settings)
+DisplayProcess::DisplayProcess(const Wall& wall, std::string host, Display& display, FrameReceiver& receiver,
+                               ProcessSettings settings)
     : wall_(wall),
-      host_(host),
+      host_(std::move(host)),
       display_(display),
       receiver_(receiver),
-      settings_(settings),
+      settings_(std::move(settings)),
       screens_(wall.screens.size()) {
   if (settings_.folder.empty()) return;
   write_status();
@@ -78,11 +79,11 @@ DisplayProcess::DisplayProcess(const Wall& wall, const std::string& host, Displa
 
 DisplayProcess::~DisplayProcess() {
   if (!writer_.joinable()) return;
-  writer_.request_stop();
-  writer_.join();
   try {
+    writer_.request_stop();
+    writer_.join();
     write_status();
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     log::warning("{}", error.what());
   }
 }

@@ -38,8 +38,8 @@ struct ProcessSettings {
 class DisplayProcess {
  public:
   /// `wall`: only this host's screens. All outlive this.
-  DisplayProcess(const Wall& wall, const std::string& host, Display& display, FrameReceiver& receiver,
-                 const ProcessSettings& settings);
+  DisplayProcess(const Wall& wall, std::string host, Display& display, FrameReceiver& receiver,
+                 ProcessSettings settings);
   ~DisplayProcess();
   DisplayProcess(const DisplayProcess&) = delete;
   DisplayProcess& operator=(const DisplayProcess&) = delete;

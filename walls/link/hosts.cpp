@@ -47,6 +47,7 @@ WallHost find_host(const Wall& wall, const std::string& name) {
     if (host != hosts.end()) return *host;
   }
   std::vector<std::string> choices;
+  choices.reserve(hosts.size());
   for (const WallHost& host : hosts) choices.push_back(host.host);
   throw Error(ExitCode::Usage, fmt::format("the wall has no screens on host '{}'", printable(name)),
               unknown_name_hint(name, choices));

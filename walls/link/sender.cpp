@@ -97,8 +97,9 @@ void WallSender::wait_for_displays(std::chrono::duration<double> limit) {
   }
 }
 
-void WallSender::show(const WallFrame& frame) {
-  std::vector<std::pair<std::size_t, LinkMessage>> packets;
+std::vector<WallSender::ScreenPacket> WallSender::encode_all(const WallFrame& frame) {
+  std::vector<ScreenPacket> packets;
+  packets.reserve(frame.screens.size());
   costs_.clear();
   restart_broken_streams();
   for (const ScreenPicture& picture : frame.screens) {
@@ -110,26 +111,32 @@ void WallSender::show(const WallFrame& frame) {
         static_cast<std::size_t>(std::ranges::find(link->screens, picture.screen) - link->screens.begin());
     PacketHeader header{PacketType::Frame, link->numbers[place], frame.number, now_since_1970(), 0, 0};
     const std::vector<std::byte> encoded = encode(picture.screen, picture.image);
-    packets.emplace_back(picture.screen,
-                         std::make_shared<const std::vector<std::byte>>(encode_packet(header, encoded)));
+    packets.push_back({picture.screen, std::make_shared<const std::vector<std::byte>>(encode_packet(header, encoded))});
     costs_.push_back({picture.screen, watch.ms(), encoded.size()});
   }
-  std::unique_lock lock(mutex_);
-  for (FrameLink& link : frames_) {
-    link.current.clear();
-    for (const std::size_t screen : link.screens) {
-      const auto packet = std::ranges::find(packets, screen, [](const auto& entry) { return entry.first; });
-      HPR_CHECK(packet != packets.end());
-      link.current.push_back(packet->second);
-    }
-    if (settings_.codec_settings.deltas) {
-      for (std::size_t i = 0; i < link.screens.size(); ++i) {
-        link.pictures[i] = std::ranges::find(frame.screens, link.screens[i], &ScreenPicture::screen)->image;
-      }
-    }
-    link.sent = false;
-    hand_over(link);
+  return packets;
+}
+
+void WallSender::post(FrameLink& link, const WallFrame& frame, std::span<const ScreenPacket> packets) {
+  link.current.clear();
+  for (const std::size_t screen : link.screens) {
+    const auto packet = std::ranges::find(packets, screen, &ScreenPacket::screen);
+    HPR_CHECK(packet != packets.end());
+    link.current.push_back(packet->message);
   }
+  if (settings_.codec_settings.deltas) {
+    for (std::size_t i = 0; i < link.screens.size(); ++i) {
+      link.pictures[i] = std::ranges::find(frame.screens, link.screens[i], &ScreenPicture::screen)->image;
+    }
+  }
+  link.sent = false;
+  hand_over(link);
+}
+
+void WallSender::show(const WallFrame& frame) {
+  const std::vector<ScreenPacket> packets = encode_all(frame);
+  std::unique_lock lock(mutex_);
+  for (FrameLink& link : frames_) post(link, frame, packets);
   if (swaps_.empty()) {
     raise_alarm(alarm_);
     return;

@@ -78,6 +78,11 @@ class WallSender {
     std::vector<Image<Rgba8>> pictures{};    ///< with deltas, of `current`: to be sent whole where it builds on nothing
     std::vector<bool> whole{};               ///< with deltas, per screen: what comes next may build on nothing
   };
+  /// What a screen's picture is sent as.
+  struct ScreenPacket {
+    std::size_t screen = 0;
+    LinkMessage message;
+  };
   /// Rank 0's agreement with a display.
   struct SwapLink {
     ClientLink link;
@@ -97,6 +102,8 @@ class WallSender {
   /// With deltas: streams whose display may not have seen their last picture begin anew.
   void restart_broken_streams();
   [[nodiscard]] std::vector<std::byte> encode(std::size_t screen, const Image<Rgba8>& picture);
+  [[nodiscard]] std::vector<ScreenPacket> encode_all(const WallFrame& frame);
+  void post(FrameLink& link, const WallFrame& frame, std::span<const ScreenPacket> packets);
   /// With deltas: `current` of this screen in place of what builds on an earlier picture.
   void make_whole(FrameLink& link, std::size_t place) const;
   /// Queues the latest frame unless the connection still has its hands full.

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "core/error.h"
 #include "walls/link/bytes.h"
@@ -116,7 +117,7 @@ Listener::~Listener() {
 }
 
 Listener::Listener(Listener&& other) noexcept
-    : socket_(std::move(other.socket_)), tcp_(other.tcp_), address_(other.address_) {}
+    : socket_(std::move(other.socket_)), tcp_(other.tcp_), address_(std::move(other.address_)) {}
 
 std::optional<Socket> Listener::accept() const {
   Socket made(::accept4(socket_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));

@@ -15,11 +15,13 @@ class Socket {
   Socket() = default;
   explicit Socket(int descriptor) : descriptor_(descriptor) {}
   ~Socket();
+  Socket(const Socket&) = delete;
   Socket(Socket&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   Socket& operator=(Socket&& other) noexcept {
     std::swap(descriptor_, other.descriptor_);
     return *this;
   }
+  Socket& operator=(const Socket&) = delete;
 
   /// -1: none.
   [[nodiscard]] int descriptor() const { return descriptor_; }
@@ -41,7 +43,9 @@ class Listener {
   /// when others may change what is in its folder.
   explicit Listener(const LinkAddress& address);
   ~Listener();
+  Listener(const Listener&) = delete;
   Listener(Listener&& other) noexcept;
+  Listener& operator=(const Listener&) = delete;
   Listener& operator=(Listener&&) = delete;
 
   [[nodiscard]] int descriptor() const { return socket_.descriptor(); }

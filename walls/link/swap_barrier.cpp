@@ -15,8 +15,9 @@ constexpr double kWorthALine = 1.0;
 
 }  // namespace
 
-SwapBarrier::SwapBarrier(std::vector<std::size_t> display_of, std::size_t displays, double timeout_s)
+SwapBarrier::SwapBarrier(const std::vector<std::size_t>& display_of, std::size_t displays, double timeout_s)
     : displays_(displays), timeout_s_(timeout_s) {
+  screens_.reserve(display_of.size());
   for (const std::size_t display : display_of) {
     HPR_CHECK(display < displays);
     screens_.push_back({display, {}});

@@ -38,7 +38,7 @@ struct SwapOutcome {
 class SwapBarrier {
  public:
   /// `display_of`: per screen. All displays are gone until they connect.
-  SwapBarrier(std::vector<std::size_t> display_of, std::size_t displays, double timeout_s);
+  SwapBarrier(const std::vector<std::size_t>& display_of, std::size_t displays, double timeout_s);
 
   void connected(std::size_t display, double now);
   void gone(std::size_t display, double now);
