@@ -44,6 +44,13 @@ bool is_left_over(const std::filesystem::path& path) {
   }
 }
 
+/// A run that begins has a socket for an instant before it listens, and refuses as one that was killed does.
+bool is_young(const std::filesystem::path& path) {
+  constexpr std::chrono::seconds kToBegin{10};
+  std::error_code gone;
+  return std::filesystem::last_write_time(path, gone) + kToBegin > std::filesystem::file_time_type::clock::now();
+}
+
 /// Throws Error (Io).
 Socket call(const RunningWall& wall, const std::string& line) {
   int code = 0;
@@ -156,7 +163,7 @@ std::vector<RunningWall> running_walls() {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
     if (is_left_over(entry.path())) {
-      std::filesystem::remove(entry.path(), ignored);
+      if (!is_young(entry.path())) std::filesystem::remove(entry.path(), ignored);
       continue;
     }
     walls.push_back({name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size()), entry.path()});

@@ -63,7 +63,11 @@ void RunJournal::add_frame(const std::string& record) {
 
 void RunJournal::add_restart(const std::string& why) {
   const nlohmann::ordered_json record{{"frame", read().frames.size()}, {"why", why}};
-  append(fmt::format("\n{}{}\n", kRestart, record.dump()));
+  keep_restart(record.dump());
+}
+
+void RunJournal::keep_restart(const std::string& record) {
+  append(fmt::format("\n{}{}\n", kRestart, record));
 }
 
 void RunJournal::add_command(const std::string& line) {

@@ -30,6 +30,8 @@ class RunJournal {
   /// The run was told this, and it changed something.
   void add_command(const std::string& line);
   void add_restart(const std::string& why);
+  /// As Entries has them.
+  void keep_restart(const std::string& record);
   /// The run came to its end, whatever its exit code.
   void add_end();
 

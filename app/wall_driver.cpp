@@ -194,7 +194,9 @@ void WallDriver::resume(std::vector<std::string>& frames) {
   frames = std::move(before.frames);
   manifest_.restarts = std::move(before.restarts);
   // A job that is lost from here on starts again from all that was done.
-  if (journal_) std::ranges::for_each(frames, [&](const std::string& frame) { journal_->add_frame(frame); });
+  if (!journal_) return;
+  for (const std::string& frame : frames) journal_->add_frame(frame);
+  for (const std::string& restart : manifest_.restarts) journal_->keep_restart(restart);
 }
 
 bool WallDriver::obey() {

@@ -114,16 +114,17 @@ double LightCluster::importance(const glm::dvec3& place, const glm::dvec3& norma
   double cosine = 1.0;
   if (distance > radius) {
     // Every angle may be less by that under which the lights are seen.
-    const glm::dvec3 to_lights = way / distance;
-    const Angle seen{std::sqrt((distance - radius) / distance * (1.0 + radius / distance)), radius / distance};
-    const double off_axis = -glm::dot(axis, to_lights);
+    const double near = 1.0 / distance;
+    const double sine = radius * near;
+    const Angle seen{std::sqrt((distance - radius) * near * (1.0 + sine)), sine};
+    const double off_axis = -glm::dot(axis, way) * near;
     const Angle from_axis = angle_of_cosine(two_sided ? std::abs(off_axis) : off_axis);
     const Angle leaving = difference(difference(from_axis, {cos_spread, sin_spread}), seen);
     if (leaving.cosine <= cos_emission) return 0.0;
     // Rounding at grazing angles must not shut out a light.
     cosine = std::max(leaving.cosine, 1e-3);
     if (normal != glm::dvec3(0.0)) {
-      const Angle arriving = difference(angle_of_cosine(glm::dot(normal, to_lights)), seen);
+      const Angle arriving = difference(angle_of_cosine(glm::dot(normal, way) * near), seen);
       if (!(arriving.cosine > 0.0)) return 0.0;
       cosine *= arriving.cosine;
     }

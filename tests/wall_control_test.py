@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -24,7 +25,7 @@ class Wall:
     def __init__(self, folder, name, ranks, frames, *options):
         self.out = folder / name
         self.runtime = folder / f"{name}-runtime"
-        self.runtime.mkdir(mode=0o700)
+        self.runtime.mkdir(mode=0o700, exist_ok=True)
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.runtime)}
         self.log = open(folder / f"{name}.log", "w+", encoding="utf-8")
         self.job = subprocess.Popen([HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(self.out), "--ranks",
@@ -160,14 +161,43 @@ def survives_a_lost_rank(folder):
         expect(len(restarts) == 1 and 3 <= restarts[0]["frame"] < 150, f"{how.name}: restarts {restarts}")
         expect([hashes(frame) for frame in manifest["frames"]] == expected, f"{how.name}: other frames than those of a whole run")
         expect("starting it again from frame" in wall.told(), "the log does not tell of the restart")
+    first = Wall(folder, "halves", 2, 150)
+    first.wait_for_frame(3)
+    os.kill(first.ranks()[-1], signal.SIGKILL)
+    first.wait_for_frame(6)
+    first.job.send_signal(signal.SIGUSR1)
+    first.leave(75)
+    begun = len(first.manifest()["frames"])
+    second = Wall(folder, "halves", 2, 150, "--resume")
+    second.wait_for_frame(begun + 1)
+    os.kill(second.ranks()[-1], signal.SIGKILL)
+    second.leave()
+    manifest = second.manifest()
+    expect([hashes(frame) for frame in manifest["frames"]] == expected, "lost, stopped, resumed and lost again: other frames")
+    restarts = [restart["frame"] for restart in manifest.get("restarts", [])]
+    expect(len(restarts) == 2 and restarts[0] < begun < restarts[1], f"restarts before and after frame {begun}: {restarts}")
     wall = Wall(folder, "given-up", 2, 100000, "--restarts", "0")
     wall.wait_for_frame(3)
     os.kill(wall.ranks()[0], signal.SIGKILL)
     wall.leave(7)
 
 
+def keeps_the_socket_of_a_run_that_begins(folder):
+    (folder / "hpr").mkdir(mode=0o700)
+    path = folder / "hpr" / "wall-1.sock"
+    with socket.socket(socket.AF_UNIX) as bound:
+        bound.bind(str(path))  # and does not listen: not yet, or never again
+        for seconds_old, there in ((0, True), (3600, False)):
+            os.utime(path, (time.time() - seconds_old,) * 2)
+            status = subprocess.run([HPR, "wall", "status"], env={**os.environ, "XDG_RUNTIME_DIR": str(folder)},
+                                    capture_output=True, text=True, timeout=60, check=False)
+            expect(status.returncode == 7, f"nobody listens, and status leaves with {status.returncode}")
+            expect(path.exists() == there, f"a socket of {seconds_old} s that refuses is {'there' if path.exists() else 'gone'}")
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-ctl-") as scratch:
+        keeps_the_socket_of_a_run_that_begins(pathlib.Path(scratch))
         told_and_stopped(pathlib.Path(scratch))
         stops_and_goes_on(pathlib.Path(scratch))
         survives_a_lost_rank(pathlib.Path(scratch))
