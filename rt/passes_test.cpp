@@ -44,11 +44,15 @@ TEST(Passes, FollowWhatTheGlossyCutoffSays) {
   Material metal = test::mirror(0.5F);
   for (const float roughness : {0.2F, 0.5F}) {
     metal.roughness = roughness;
-    const Scene scene = scene_with(metal, 1);
+    Scene scene = scene_with(metal, 1);
+    test::add_material(scene, test::matte());  // to show caustics
+    test::place(scene, test::add_mesh(scene, test::quad({0, 0, -1}, {1, 0, 0}, {0, 1, 0}, 1)));
+    finish_scene(scene);
     for (const double cutoff : {0.0, 0.1, 0.3, 1.0}) {
       const RaySettings settings{.glossy_cutoff = cutoff, .photons = 1000};
       EXPECT_EQ(runs(scene, settings, "reflection"), roughness < cutoff) << roughness << ' ' << cutoff;
       EXPECT_EQ(runs(scene, settings, "photon"), roughness < cutoff) << roughness << ' ' << cutoff;
+      EXPECT_FALSE(runs(scene_with(metal, 1), settings, "photon")) << "a metal is followed or bundles nothing";
     }
   }
   metal.roughness = 0.0F;

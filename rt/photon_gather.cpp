@@ -17,6 +17,10 @@ bool follows_reflections(const Requirements& scene, double glossy_cutoff) {
   return scene.least_roughness < std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
 }
 
+bool may_take_photons(const Requirements& scene, double glossy_cutoff) {
+  return scene.ambient_occlusion.needed || scene.most_roughness >= std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
+}
+
 bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {
   return std::ranges::any_of(kLobes,
                              [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); });

@@ -23,6 +23,9 @@ namespace hpr {
 /// Whether the eye's paths follow reflections of anything in the scene, as far as its least roughness tells.
 [[nodiscard]] bool follows_reflections(const Requirements& scene, double glossy_cutoff);
 
+/// Whether light that photons bring may show on anything in the scene, as far as its materials tell.
+[[nodiscard]] bool may_take_photons(const Requirements& scene, double glossy_cutoff);
+
 /// Whether some lobe is not.
 [[nodiscard]] bool takes_photons(const Bsdf& bsdf, double glossy_cutoff);
 

@@ -14,6 +14,9 @@ class PhotonPass final : public Pass {
     const bool bundled =
         scene.shadow.needed && (scene.refraction.needed || follows_reflections(scene, settings.glossy_cutoff));
     if (settings.global_photons && !bundled) return scene.indirect;
+    if (bundled && !may_take_photons(scene, settings.glossy_cutoff)) {
+      return {false, "no material is matte, or as rough as the glossy cutoff, to show caustics"};
+    }
     if (bundled == scene.photon.needed) return scene.photon;
     return {bundled, bundled ? "lights reach materials smoother than the glossy cutoff, which bundle it into caustics"
                              : "no light is bundled by materials smoother than the glossy cutoff"};

@@ -24,9 +24,7 @@ using embree::kWidth;
 constexpr int kPacketWidth = 4;
 constexpr int kPacketHeight = static_cast<int>(kWidth) / kPacketWidth;
 
-/// Candidates whose distances, in ray space, differ by less are compared by their exact depths. Twice what the distance
-/// of a hit may be wrong by; then the hit with the largest key is never passed over: any other one that Embree finds at
-/// distance t, with the larger exact one, lies less than this before it.
+/// Twice what the distance of a hit, in ray space, may be wrong by.
 constexpr float kSlack = 1.0F / 1024.0F;
 
 /// Rays need not start farther than this from the middle of ray space, of which the scene fills [-2, 2]^3 at most.
@@ -40,6 +38,10 @@ struct Search {
   std::span<const RayGeometry> geometries;
   const View* view;
   bool through = false;  ///< look at every surface along the rays: none hides another
+  /// Candidates whose distances, in ray space, differ by less are compared by their exact depths. Twice the largest
+  /// step of a key's depth more than kSlack; then the hit with the largest key is never passed over: any other one that
+  /// Embree finds at distance t, with the larger exact one, lies less than this before it.
+  float slack = kSlack;
   std::uint64_t weighed = 0;
 
   std::array<Ray, kWidth> ray;         ///< world
@@ -55,6 +57,13 @@ struct Search {
   std::array<std::uint32_t, kWidth> primitive{};
   std::array<Key, kWidth> key{};  ///< kNoKey: not reckoned yet
 };
+
+/// How far apart, in ray space, two surfaces of the scene may lie at most along a ray and have the same depth in keys.
+double largest_depth_step(const View& view, const RaySpace& space) {
+  constexpr double kHalfUlp = 0x1p-24;  // of depths up to 1
+  if (view.orthographic) return kHalfUlp * (view.far_distance - view.near_distance) * space.scale;
+  return 2.0 * kHalfUlp * (glm::length(space.from_world(view.eye)) + kAround);
+}
 
 /// Barycentric coordinates moved onto the triangle; its middle where they are undefined.
 glm::dvec2 onto_triangle(double u, double v) {
@@ -121,7 +130,7 @@ bool weigh(Search& search, std::size_t lane, const RayGeometry& geometry, std::u
   return distance < before;
 }
 
-/// Embree offers candidates in any order; those at most kSlack behind the nearest are still of interest.
+/// Embree offers candidates in any order; those at most a slack behind the nearest are still of interest.
 void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
   auto& search = *reinterpret_cast<Search*>(arguments->context);
   for (unsigned int i = 0; i < arguments->N; ++i) {
@@ -134,8 +143,8 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
     float& limit = RTCRayN_tfar(arguments->ray, arguments->N, i);
     const float distance = limit;
     const float gap = search.found[lane] ? distance - search.distance[lane] : -std::numeric_limits<float>::infinity();
-    bool nearest = gap < -kSlack;
-    if (search.through || distance < search.weigh_below[lane] || std::abs(gap) <= kSlack) {
+    bool nearest = gap < -search.slack;
+    if (search.through || distance < search.weigh_below[lane] || std::abs(gap) <= search.slack) {
       nearest = weigh(search, lane, geometry, primitive, distance);
     } else if (nearest) {
       search.found[lane] = true;
@@ -146,7 +155,7 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
       __builtin_prefetch(&corners_of(search, lane));
     }
     if (nearest && !search.through) {
-      limit = std::min(distance + kSlack, search.reach[lane]);
+      limit = std::min(distance + search.slack, search.reach[lane]);
     } else {
       arguments->valid[i] = 0;
     }
@@ -170,6 +179,7 @@ class TileTracer {
     search_.geometries = rays.geometries();
     search_.view = &view;
     stand_at(rays.space().from_world(view.eye));
+    search_.slack = static_cast<float>(kSlack + 2.0 * largest_depth_step(view, rays.space()));
     for (std::size_t i = 0; i < kWidth; ++i) {
       embree_.ray.tnear[i] = 0.0F;
       embree_.ray.time[i] = 0.0F;

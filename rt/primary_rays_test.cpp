@@ -103,22 +103,28 @@ TEST(PrimaryRays, SeeWhatASearchThroughAllTrianglesSees) {
   EXPECT_EQ(drawn.stats.invalid, 0U);
 }
 
+/// The same from so many ranks' shares of the scene, `run` surfaces at a time, cut without regard for meshes and
+/// instances.
+Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t shares, std::uint32_t run) {
+  TileLayer<Key> layer(FrameLayout({view.size()}));
+  for (std::uint32_t share = 0; share < shares; ++share) {
+    std::vector<SurfaceRange> ranges;
+    for (std::uint32_t first = run * share; first < scene.triangles; first += run * shares) {
+      ranges.push_back({first, std::min(first + run, scene.triangles)});
+    }
+    std::ranges::reverse(ranges);
+    const RayScene rays(scene, RaySpace(scene.bounds), 1, ranges);
+    PrimaryRays(scene, rays, 1).draw(view, 0, std::array{whole(view)}, layer);
+  }
+  return to_image(layer, 0);
+}
+
 TEST(PrimaryRays, SharesOfTheSceneMergeIntoTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = front_view(scene);
   const Image<Key> expected = draw(scene, view).keys;
   for (const std::uint32_t shares : {2U, 3U, 5U, 12U}) {
-    TileLayer<Key> layer(FrameLayout({view.size()}));
-    for (std::uint32_t share = 0; share < shares; ++share) {
-      std::vector<SurfaceRange> ranges;  // cut without regard for meshes and instances
-      for (std::uint32_t first = 93 * share; first < scene.triangles; first += 93 * shares) {
-        ranges.push_back({first, std::min(first + 93, scene.triangles)});
-      }
-      std::ranges::reverse(ranges);
-      const RayScene rays(scene, RaySpace(scene.bounds), 1, ranges);
-      PrimaryRays(scene, rays, 1).draw(view, 0, std::array{whole(view)}, layer);
-    }
-    EXPECT_TRUE(expected == to_image(layer, 0)) << shares << " shares";
+    EXPECT_TRUE(expected == draw_shares(scene, view, shares, 93)) << shares << " shares";
   }
 }
 
@@ -205,6 +211,29 @@ TEST(PrimaryRays, SurfacesApartByLessThanAFloatStepAreToldApart) {
   EXPECT_GT(front, 1000U);
   EXPECT_EQ(front, covered(drawn.keys));
   EXPECT_GT(drawn.stats.weighed, 0U);
+}
+
+TEST(PrimaryRays, SurfacesWithinAStepOfTheKeysDepthAreToldApartByTheirNumbers) {
+  // From afar, and where an orthographic view's planes lie far apart, steps of depth are coarser than distances.
+  Scene scene;
+  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0.005}, {2, 0, 0}, {0, 2, 0}, 0)));
+  finish_scene(scene);
+  View far = test::view_from({0, 0, 1e5}, {0, 0, 0}, {40, 30}, scene, 1e-5);
+  far.near_distance = 0.1;
+  View flat = test::view_from({0, 0, 3}, {0, 0, 0}, {40, 30}, scene);
+  flat.orthographic = true;
+  flat.far_distance = 1e6;
+  View farther = far;
+  farther.eye.z = 1e9;
+  farther.left = farther.bottom = -5e-10;
+  farther.right = farther.top = 5e-10;
+  for (const View& view : {far, flat, farther}) {
+    const Image<Key> whole = draw(scene, view).keys;
+    EXPECT_EQ(covered(whole), view.size().area());
+    for (const Key key : whole.pixels()) EXPECT_LT(key_surface(key), 2U) << "of equals the first is seen";
+    for (const std::uint32_t shares : {2U, 4U}) EXPECT_TRUE(whole == draw_shares(scene, view, shares, 1)) << shares;
+  }
 }
 
 TEST(PrimaryRays, WhatLiesBeforeTheNearPlaneIsLookedThrough) {

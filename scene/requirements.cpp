@@ -70,20 +70,35 @@ bool is_black(const Material& material) {
   return material.base_color.r <= 0.0F && material.base_color.g <= 0.0F && material.base_color.b <= 0.0F;
 }
 
-/// Whether a material has a diffuse part.
-bool is_matte(const Scene& scene, const Material& material) {
+/// Whether some of a material is no metal, and takes in light that it may give back.
+bool takes_in(const Scene& scene, const Material& material) {
   return !material.unlit && !is_black(material) && least_metallic(scene, material) < 1.0F;
 }
 
-/// Whether it has that, or a specular part too rough to be followed. A dielectric's reflects whatever its colour.
+/// Whether it has a diffuse part.
+bool is_matte(const Scene& scene, const Material& material) {
+  return takes_in(scene, material) && (material.transmission < 1.0F || material.transmission_texture.present());
+}
+
+/// Whether it has a specular part: a metal reflects its colour, a dielectric light of all colours, by its index alone.
+bool reflects(const Scene& scene, const Material& material) {
+  if (material.unlit) return false;
+  return (!is_black(material) && material.metallic > 0.0F) ||
+         (least_metallic(scene, material) < 1.0F && material.ior != 1.0F);
+}
+
+/// Whether it is matte, or has a specular part too rough to be followed.
 bool scatters(const Scene& scene, const Material& material) {
-  if (is_matte(scene, material)) return true;
-  const bool reflects = !is_black(material) || (least_metallic(scene, material) < 1.0F && material.ior != 1.0F);
-  return !material.unlit && reflects && material.roughness >= kMirrorRoughness;
+  return is_matte(scene, material) || (reflects(scene, material) && material.roughness >= kMirrorRoughness);
 }
 
 bool mirrors(const Scene& scene, const Material& material) {
-  return !material.unlit && least_roughness(scene, material) < kMirrorRoughness;
+  return reflects(scene, material) && least_roughness(scene, material) < kMirrorRoughness;
+}
+
+/// An index of 0 stands for a wall that reflects all.
+bool transmits(const Scene& scene, const Material& material) {
+  return takes_in(scene, material) && material.transmission > 0.0F && material.ior > 0.0F;
 }
 
 bool casts_shadows(const Light& light) {
@@ -126,29 +141,34 @@ Requirements requirements_of(const Scene& scene) {
         std::ranges::count_if(materials, [&](const Material* material) { return is(scene, *material); }));
   };
   const std::size_t smooth = count(mirrors);
-  const std::size_t clear =
-      count([](const Scene&, const Material& material) { return !material.unlit && material.transmission > 0.0F; });
+  const std::size_t clear = count(transmits);
+  const std::size_t rough = count(scatters);
+  const std::size_t matte = count(is_matte);
+  const std::size_t lit =
+      materials.size() - count([](const Scene&, const Material& material) { return material.unlit; });
 
   Requirements needs;
   if (materials.empty()) {
     const Requirement nothing{false, "no triangle of the scene can be seen"};
-    return {nothing, nothing, nothing, nothing, nothing, nothing, 1.0F};
+    return {nothing, nothing, nothing, nothing, nothing, nothing};
   }
-  needs.shadow = lights > 0 ? Requirement{true, counted(lights, "light casts shadows", "lights cast shadows")}
-                            : Requirement{false, "no light casts shadows"};
+  needs.shadow = lights == 0 ? Requirement{false, "no light casts shadows"}
+                 : lit == 0  ? Requirement{false, "no material takes light"}
+                             : Requirement{true, counted(lights, "light casts shadows", "lights cast shadows")};
   needs.reflection = smooth > 0 ? Requirement{true, counted(smooth, "material mirrors", "materials mirror")}
                                 : Requirement{false, "no material is smooth enough to mirror"};
   needs.refraction = clear > 0
                          ? Requirement{true, counted(clear, "material transmits light", "materials transmit light")}
                          : Requirement{false, "no material transmits light"};
-  needs.photon = lights > 0 && smooth + clear > 0
-                     ? Requirement{true, "lights reach smooth or clear materials, which bundle it into caustics"}
-                     : Requirement{false, "no light can be bundled into caustics"};
-  const std::size_t rough = count(scatters);
-  const std::size_t matte = count(is_matte);
+  const bool bundled = lights > 0 && smooth + clear > 0;
+  needs.photon = !bundled ? Requirement{false, "no light can be bundled into caustics"}
+                 : rough == 0
+                     ? Requirement{false, "no material is matte or rough enough to show caustics"}
+                     : Requirement{true, "lights reach smooth or clear materials, which bundle it into caustics"};
   for (const Material* material : materials) {
-    if (material->unlit) continue;
+    if (!reflects(scene, *material)) continue;
     needs.least_roughness = std::min(needs.least_roughness, least_roughness(scene, *material));
+    needs.most_roughness = std::max(needs.most_roughness, material->roughness);
   }
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}

@@ -19,7 +19,8 @@ struct Requirements {
   Requirement photon;             ///< caustics: light that smooth surfaces bundle
   Requirement indirect;           ///< light that rough surfaces scatter on to others
   Requirement ambient_occlusion;  ///< a cheap stand-in for that
-  float least_roughness = 1.0F;   ///< of any visible lit material, anywhere
+  float least_roughness = 1.0F;   ///< of any visible lit material that reflects, anywhere
+  float most_roughness = 0.0F;    ///< likewise
 };
 
 [[nodiscard]] Requirements requirements_of(const Scene& scene);

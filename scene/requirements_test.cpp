@@ -108,6 +108,7 @@ TEST(Requirements, MaterialsNoTriangleShowsDoNotCount) {
   Scene scene = scene_of(rough(1.0F));
   scene.materials.push_back(rough(0.0F));
   scene.materials.back().transmission = 1.0F;
+  scene.materials.back().metallic = 0.0F;
   EXPECT_FALSE(requirements_of(scene).reflection.needed);
   EXPECT_FALSE(requirements_of(scene).refraction.needed);
   scene.meshes[0].material = 1;
@@ -116,9 +117,47 @@ TEST(Requirements, MaterialsNoTriangleShowsDoNotCount) {
 }
 
 TEST(Requirements, CausticsNeedBothALightAndASurfaceThatBundles) {
-  EXPECT_FALSE(requirements_of(scene_of(rough(0.0F))).photon.needed);
+  Material glossy = rough(0.0F);
+  glossy.metallic = 0.0F;
+  EXPECT_FALSE(requirements_of(scene_of(glossy)).photon.needed);
   EXPECT_FALSE(requirements_of(scene_of(rough(1.0F), {Light{}})).photon.needed);
-  EXPECT_TRUE(requirements_of(scene_of(rough(0.0F), {Light{}})).photon.needed);
+  EXPECT_TRUE(requirements_of(scene_of(glossy, {Light{}})).photon.needed);
+}
+
+TEST(Requirements, CausticsNeedASurfaceToFallOn) {
+  Material metal = rough(0.0F);
+  metal.metallic = 1.0F;
+  EXPECT_TRUE(requirements_of(scene_of(metal, {Light{}})).reflection.needed);
+  EXPECT_FALSE(requirements_of(scene_of(metal, {Light{}})).photon.needed) << "mirrors alone";
+  Material glass = rough(0.0F);
+  glass.metallic = 0.0F;
+  glass.transmission = 1.0F;
+  EXPECT_TRUE(requirements_of(scene_of(glass, {Light{}})).refraction.needed);
+  EXPECT_FALSE(requirements_of(scene_of(glass, {Light{}})).photon.needed) << "glass alone";
+  glass.transmission = 0.9F;
+  EXPECT_TRUE(requirements_of(scene_of(glass, {Light{}})).photon.needed) << "a tenth of it is matte";
+}
+
+TEST(Requirements, WhatAMaterialIsMadeOfDecidesWhatItMirrorsAndTransmits) {
+  Material invisible = rough(0.0F);
+  invisible.metallic = 0.0F;
+  invisible.ior = 1.0F;
+  EXPECT_FALSE(requirements_of(scene_of(invisible, {Light{}})).reflection.needed) << "no boundary, no reflection";
+  EXPECT_EQ(requirements_of(scene_of(invisible, {Light{}})).least_roughness, 1.0F);
+  Material clear = rough(0.0F);
+  clear.metallic = 0.0F;
+  clear.transmission = 1.0F;
+  EXPECT_TRUE(requirements_of(scene_of(clear, {Light{}})).refraction.needed);
+  Material metal = clear;
+  metal.metallic = 1.0F;
+  Material black = clear;
+  black.base_color = {0.0F, 0.0F, 0.0F, 1.0F};
+  Material wall = clear;
+  wall.ior = 0.0F;
+  for (const Material& opaque : {metal, black, wall}) {
+    EXPECT_FALSE(requirements_of(scene_of(opaque, {Light{}})).refraction.needed);
+    EXPECT_TRUE(requirements_of(scene_of(opaque, {Light{}})).reflection.needed);
+  }
 }
 
 TEST(Requirements, RoughPlasticScattersWhateverItsColour) {
@@ -154,6 +193,7 @@ TEST(Requirements, UnlitMaterialsAndDarkLightsAskForNothing) {
   const Requirements needs = requirements_of(scene_of(poster, {Light{}}));
   EXPECT_FALSE(needs.reflection.needed);
   EXPECT_FALSE(needs.photon.needed);
+  EXPECT_FALSE(needs.shadow.needed) << "nothing takes light";
   EXPECT_EQ(needs.least_roughness, 1.0F);
   Light dark;
   dark.intensity = glm::vec3(0.0F);

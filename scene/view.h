@@ -62,7 +62,7 @@ struct Ray {
 
 /// A camera's view on a screen of `size` pixels. The vertical angle is kept, the horizontal one follows from the
 /// aspect; an orthographic camera shows at least its width and its height. near_distance is the camera's, or 1e-4 of
-/// the scene's extent.
+/// the scene's extent; an orthographic camera's planes are moved towards `bounds`, where those hold anything.
 [[nodiscard]] View make_view(const Camera& camera, Size size, const Bounds& bounds);
 
 /// A camera that sees all of `bounds` from the front, a little above and to the right, on screens at least as wide as

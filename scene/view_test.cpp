@@ -219,5 +219,28 @@ TEST(MakeView, AnOrthographicCameraShowsItsBoxInPicturesOfAnyShape) {
   }
 }
 
+TEST(MakeView, AnOrthographicCamerasPrecisionIsKeptForTheScene) {
+  const Bounds bounds{glm::dvec3(-1.0), glm::dvec3(1.0)};
+  Camera camera;
+  camera.eye = {0.0, 0.0, 5.0};
+  for (const double far : {100.0, 1e5, 1e9, 1e30}) {
+    camera.lens = OrthographicLens{2.0, 2.0, 0.1, far};
+    const View view = make_view(camera, {8, 8}, bounds);
+    EXPECT_LT(view.near_distance, 4.0);
+    EXPECT_GT(view.near_distance, 3.9);
+    EXPECT_GT(view.far_distance, 6.0);
+    EXPECT_LT(view.far_distance, 6.1);
+    EXPECT_NE(static_cast<float>(reversed_depth(view, 5.0)), static_cast<float>(reversed_depth(view, 5.0 - 1e-6)));
+  }
+  // Planes that cut the scene stay where they are, and so do those that leave nothing of it.
+  camera.lens = OrthographicLens{2.0, 2.0, 4.5, 5.5};
+  EXPECT_EQ(make_view(camera, {8, 8}, bounds).near_distance, 4.5);
+  EXPECT_EQ(make_view(camera, {8, 8}, bounds).far_distance, 5.5);
+  camera.lens = OrthographicLens{2.0, 2.0, 10.0, 20.0};
+  EXPECT_EQ(make_view(camera, {8, 8}, bounds).near_distance, 10.0);
+  EXPECT_EQ(make_view(camera, {8, 8}, bounds).far_distance, 20.0);
+  EXPECT_EQ(make_view(camera, {8, 8}, {}).near_distance, 10.0);
+}
+
 }  // namespace
 }  // namespace hpr
