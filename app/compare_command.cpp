@@ -15,13 +15,12 @@
 #include "app/compare_threads.h"
 #include "app/launcher.h"
 #include "app/output.h"
-#include "app/simulate_option.h"
+#include "app/shell_line.h"
 #include "app/trace_file.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/plugin.h"
 #include "compositing/synthetic.h"
 #include "core/file.h"
-#include "core/names.h"
 #include "core/units.h"
 #include "image/image_io.h"
 
@@ -62,6 +61,8 @@ class CompareCommand final : public Command {
   [[nodiscard]] CompareInput make_input(const Globals& globals) const {
     const Size screen = parse_size(options_.size, "--size", kLargestSide);
     const Size grid = parse_size(options_.tiles, "--tiles", kMostScreensASide);
+    check_size(screen, globals);
+    check_size({screen.width * grid.width, screen.height * grid.height}, globals);
     if (options_.scene.empty() == options_.synthetic.empty()) {
       throw Error(ExitCode::Usage,
                   options_.scene.empty() ? "nothing to composite" : "a scene and --synthetic exclude each other",
@@ -70,7 +71,8 @@ class CompareCommand final : public Command {
     }
     if (!options_.scene.empty()) return scene_input_(options_.scene, screen, grid, globals);
     if (globals.seed > std::numeric_limits<std::uint32_t>::max()) {
-      throw Error(ExitCode::Usage, fmt::format("--seed: synthetic layers take 32 bits, {} has more", globals.seed));
+      throw Error(ExitCode::Usage, fmt::format("--seed: synthetic layers take 32 bits, {} has more", globals.seed),
+                  fmt::format("take one from 0 to {}", std::numeric_limits<std::uint32_t>::max()));
     }
     const SyntheticKind kind = parse_synthetic_kind(options_.synthetic);
     const auto seed = static_cast<std::uint32_t>(globals.seed);
@@ -147,10 +149,10 @@ class CompareCommand final : public Command {
     const std::uint64_t layer = grid_layout(input.screen, input.grid).tiles() * kTilePixels * pixel;
     const std::uint64_t needed = layer * (3 * static_cast<std::uint64_t>(ranks) + 3);
     if (needed <= limit) return;
-    throw Error(
-        ExitCode::Limit,
-        fmt::format("{} ranks need about {} MiB of memory, {} MiB may be used", ranks, needed >> 20U, limit >> 20U),
-        "take fewer ranks, fewer screens or smaller ones");
+    throw Error(ExitCode::Limit,
+                fmt::format("{} ranks need about {} of memory, {} may be used", ranks, format_bytes(needed),
+                            format_bytes(limit)),
+                "take fewer ranks, fewer screens or smaller ones");
   }
 
   /// What a job needs to run `ranks` of the rank counts; `last`: it also writes the frame.
@@ -164,9 +166,6 @@ class CompareCommand final : public Command {
     if (last && !options_.picture.empty()) add("-o", options_.picture);
     if (last && !options_.raw.empty()) add("--raw", options_.raw);
     if (last && !globals.trace.empty()) add("--trace", globals.trace);
-    add("--backend", globals.backend);
-    if (globals.device >= 0) add("--device", std::to_string(globals.device));
-    if (globals.threads > 0) add("--threads", std::to_string(globals.threads));
     if (!globals.limit_mem.empty()) add("--limit-mem", globals.limit_mem);
     if (!globals.limit_image.empty()) add("--limit-image", globals.limit_image);
     if (!globals.hang_timeout.empty()) add("--hang-timeout", globals.hang_timeout);
@@ -201,8 +200,11 @@ class CompareCommand final : public Command {
     for (const CompareRun& run : result.runs) {
       if (counts.empty() || counts.back() != run.ranks) counts.push_back(run.ranks);
     }
-    report.command = fmt::format("hpr {}", fmt::join(options_.words(globals), " "));
-    if (options_.simulate.empty()) report.command += fmt::format(" --ranks {}", fmt::join(counts, ","));
+    std::vector<std::string> words = options_.words(globals);
+    if (options_.simulate.empty()) {
+      words.insert(words.end(), {"--ranks", fmt::format("{}", fmt::join(counts, ","))});
+    }
+    report.command = "hpr " + shell_line(words);
     report.runs = std::move(result.runs);
     write_frame(result, input);
     if (!options_.csv.empty()) write_file_atomically(options_.csv, compare_csv(report));

@@ -30,6 +30,13 @@ std::vector<std::string> split(std::string_view list) {
   }
 }
 
+template <typename Strategies>
+std::vector<std::string> names_of(const Strategies& strategies) {
+  std::vector<std::string> names;
+  for (const auto& strategy : strategies) names.emplace_back(strategy->name());
+  return names;
+}
+
 }  // namespace
 
 std::vector<std::string> split_strategies(std::string_view list) {
@@ -52,7 +59,8 @@ Size parse_size(const std::string& text, const std::string& option, int most) {
                 fmt::format("write it like {} 3x2", option));
   }
   if (extent->first > most || extent->second > most) {
-    throw Error(ExitCode::Limit, fmt::format("{}: {} is more than {} a side", option, printable(text), most));
+    throw Error(ExitCode::Limit, fmt::format("{}: {} is more than {} a side", option, printable(text), most),
+                fmt::format("the most is {} {}x{}", option, most, most));
   }
   return {extent->first, extent->second};
 }
@@ -121,7 +129,7 @@ void CompareOptions::settle() {
 
 void CompareOptions::check_files(const Globals& globals) const {
   if (!picture.empty() && !picture.ends_with(".png")) {
-    throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture)));
+    throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture)), "name a .png file");
   }
   const std::vector<std::string> results{csv, html, picture, raw};
   check_distinct(results, globals.trace);
@@ -185,12 +193,8 @@ std::vector<std::string> CompareOptions::strategies_for(int count) const {
   if (strategies == "all") return all_strategies_for(count);
   std::vector<std::string> names;
   for (const std::string& name : split_strategies(strategies)) {
-    if (name == kSortFirst && operation() == CompareOperator::Nearest) {
-      if (scene.empty()) {
-        throw Error(ExitCode::Usage, "sort-first draws a scene, and there is none",
-                    "name a scene instead of --synthetic");
-      }
-    } else if (!fits(name, count)) {
+    check_strategy(name);
+    if (name != kSortFirst && !fits(name, count)) {
       throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, count),
                   "leave it out, or choose another number with --ranks");
     }
@@ -199,7 +203,29 @@ std::vector<std::string> CompareOptions::strategies_for(int count) const {
   return names;
 }
 
-/// Throws Error (Usage) when no strategy of that name can do what is asked for.
+void CompareOptions::check_strategy(const std::string& name) const {
+  if (name == "all") {
+    throw Error(ExitCode::Usage, fmt::format("--strategies {}: 'all' stands alone", printable(strategies)),
+                "write --strategies all, or leave it out of the list");
+  }
+  const bool nearest = operation() == CompareOperator::Nearest;
+  if (name == kSortFirst) {
+    if (!nearest) {
+      throw Error(ExitCode::Usage, fmt::format("sort-first does not go with --operator {}", operator_name),
+                  "leave it out, or take --operator nearest");
+    }
+    if (!scene.empty()) return;
+    throw Error(ExitCode::Usage, "sort-first draws a scene, and there is none", "name a scene instead of --synthetic");
+  }
+  std::vector<std::string> compositors = names_of(all_compositors());
+  if (name.starts_with("radix-k:") || std::ranges::find(compositors, name) != compositors.end()) return;
+  std::vector<std::string> choices = nearest ? std::move(compositors) : names_of(all_blenders<RgbaPremultiplied>());
+  if (nearest && !scene.empty()) choices.emplace_back(kSortFirst);
+  choices.emplace_back("all");
+  throw Error(ExitCode::Usage, fmt::format("no compositing strategy is named '{}'", printable(name)),
+              unknown_name_hint(printable(name), choices));
+}
+
 bool CompareOptions::fits(const std::string& name, int count) const {
   if (operation() == CompareOperator::Nearest) return make_compositor(name)->fits(count);
   return make_blender<RgbaPremultiplied>(name)->fits(count);
@@ -223,6 +249,9 @@ std::vector<std::string> CompareOptions::words(const Globals& globals) const {
     arguments.insert(arguments.end(), {"--simulate", simulate});
   }
   arguments.insert(arguments.end(), {"--seed", std::to_string(globals.seed)});
+  if (globals.backend != "auto") arguments.insert(arguments.end(), {"--backend", globals.backend});
+  if (globals.device >= 0) arguments.insert(arguments.end(), {"--device", std::to_string(globals.device)});
+  if (globals.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(globals.threads)});
   return arguments;
 }
 

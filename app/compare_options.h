@@ -52,7 +52,7 @@ struct CompareOptions {
   /// Empty inside an MPI job unless --ranks is given.
   [[nodiscard]] std::vector<int> rank_counts() const;
   [[nodiscard]] CompareSettings settings_for(int count) const;
-  /// The words after `hpr` that decide the result, without the number of ranks.
+  /// The words after `hpr` that decide the result and on what it is measured, without the number of ranks.
   [[nodiscard]] std::vector<std::string> words(const Globals& globals) const;
 
  private:
@@ -60,6 +60,8 @@ struct CompareOptions {
   void check_operator() const;
   [[nodiscard]] std::vector<std::string> all_strategies_for(int count) const;
   [[nodiscard]] std::vector<std::string> strategies_for(int count) const;
+  /// Throws Error (Usage) when no strategy of that name can do what is asked for, whatever the number of ranks.
+  void check_strategy(const std::string& name) const;
   [[nodiscard]] bool fits(const std::string& name, int count) const;
 
   CLI::Option* frames_option_ = nullptr;

@@ -66,6 +66,14 @@ std::string grid_name(Size grid) {
   return fmt::format("{}x{}", grid.width, grid.height);
 }
 
+/// A field as RFC 4180 has it: in quotes where it holds what separates fields.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 /// "1.4" megabytes.
 double megabytes(std::uint64_t bytes) {
   return static_cast<double>(bytes) / 1e6;
@@ -121,14 +129,14 @@ std::string compare_csv(const CompareReport& report) {
   std::string text =
       "strategy,ranks,transport,frames,ms_min,ms_median,ms_p95,ms_max,ms_composite_median,ms_collect_median,bytes_"
       "total,"
-      "bytes_max_rank,messages_total,imbalance,differing_pixels,frame_xxh64,predicted_ms,max_error\n";
+      "bytes_max_rank,messages_total,imbalance,differing_pixels,frame_xxh64,predicted_ms,max_error,chosen\n";
   for (const CompareRun& run : report.runs) {
-    text += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{:.4f},{},{},{},{}\n",
-                        run.strategy, run.ranks, run.transport, run.frames, run.ms.min, run.ms.median, run.ms.p95,
-                        run.ms.max, run.ms_composite, run.ms_collect, run.bytes_total, run.bytes_max_rank,
+    text += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{:.4f},{},{},{},{},{}\n",
+                        csv_field(run.strategy), run.ranks, run.transport, run.frames, run.ms.min, run.ms.median,
+                        run.ms.p95, run.ms.max, run.ms_composite, run.ms_collect, run.bytes_total, run.bytes_max_rank,
                         run.messages_total, run.imbalance, run.differing_pixels, run.frame_xxh64,
                         run.predicted_ms ? fmt::format("{:.6f}", *run.predicted_ms) : "",
-                        run.max_error ? fmt::format("{:.6g}", *run.max_error) : "");
+                        run.max_error ? fmt::format("{:.6g}", *run.max_error) : "", csv_field(run.chosen));
   }
   return text;
 }

@@ -29,7 +29,7 @@ struct CompareReport {
 [[nodiscard]] std::string compare_table(const CompareReport& report);
 /// Schema hpr.compare/1.
 [[nodiscard]] std::string compare_json(const CompareReport& report);
-/// One line per run under a line of column names.
+/// One line per run under a line of column names (RFC 4180, but for its line ends).
 [[nodiscard]] std::string compare_csv(const CompareReport& report);
 
 /// Runs as one JSON document on one line, and back: how an MPI job hands its runs to the process that started it.

@@ -298,7 +298,19 @@ TEST(CompareReport, CsvHasOneFieldPerColumn) {
   const std::string head = csv.substr(0, csv.find('\n'));
   const std::string row = csv.substr(csv.find('\n') + 1);
   EXPECT_EQ(std::ranges::count(head, ','), std::ranges::count(row, ','));
+  EXPECT_TRUE(head.ends_with(",chosen"));
   EXPECT_TRUE(row.starts_with("tree,5,mpi,7,1.000000,2.000000,"));
+  EXPECT_TRUE(row.ends_with(",\n"));
+}
+
+TEST(CompareReport, CsvQuotesWhatHoldsCommasOrQuotes) {
+  CompareReport report = example_report();
+  report.runs.front().strategy = "radix-k:2,2";
+  report.runs.front().chosen = R"(a "plugin")";
+  const std::string csv = compare_csv(report);
+  const std::string row = csv.substr(csv.find('\n') + 1);
+  EXPECT_TRUE(row.starts_with(R"("radix-k:2,2",5,mpi,7,)")) << row;
+  EXPECT_TRUE(row.ends_with(",\"a \"\"plugin\"\"\"\n")) << row;
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "core/units.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -54,6 +56,17 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
   const auto bytes = with_unit(text, kUnits);
   if (!bytes || *bytes > 9e18) return std::nullopt;
   return static_cast<std::uint64_t>(*bytes);
+}
+
+std::string format_bytes(std::uint64_t bytes) {
+  constexpr std::array<std::string_view, 7> kUnits{"B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"};
+  auto value = static_cast<double>(bytes);
+  std::size_t unit = 0;
+  while (std::round(value * 10.0) >= 10240.0) {  // as it will be written
+    value /= 1024.0;
+    ++unit;
+  }
+  return fmt::format("{:g} {}", std::round(value * 10.0) / 10.0, kUnits.at(unit));
 }
 
 std::optional<std::chrono::nanoseconds> parse_duration(std::string_view text) {

@@ -26,6 +26,17 @@ TEST(Units, BytesRefuseWhatIsNoSize) {
   }
 }
 
+TEST(Units, BytesAreWrittenInAFittingUnitAndReadBack) {
+  EXPECT_EQ(format_bytes(0), "0 B");
+  EXPECT_EQ(format_bytes(1023), "1023 B");
+  EXPECT_EQ(format_bytes(1024), "1 KiB");
+  EXPECT_EQ(format_bytes(294912), "288 KiB");
+  EXPECT_EQ(format_bytes((1U << 20U) - 1), "1 MiB");
+  EXPECT_EQ(format_bytes(std::uint64_t{3} << 29U), "1.5 GiB");
+  EXPECT_EQ(format_bytes(UINT64_MAX), "16 EiB");
+  EXPECT_EQ(parse_bytes(format_bytes(std::uint64_t{5} << 39U)), std::uint64_t{5} << 39U);
+}
+
 TEST(Units, DurationsTakeUnitsAndBareSeconds) {
   EXPECT_EQ(parse_duration("2us"), nanoseconds(2000));
   EXPECT_EQ(parse_duration("33ms"), nanoseconds(33'000'000));

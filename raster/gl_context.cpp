@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -24,21 +25,24 @@ std::vector<std::string> all_gl_backends() {
   return {"egl", "osmesa"};
 }
 
+void check_gl_backend(const std::string& backend) {
+  std::vector<std::string> choices{"auto"};
+  std::ranges::copy(all_gl_backends(), std::back_inserter(choices));
+  if (std::ranges::find(choices, backend) != choices.end()) return;
+  throw Error(ExitCode::Usage, fmt::format("unknown backend '{}'", printable(backend)),
+              unknown_name_hint(backend, choices));
+}
+
 std::unique_ptr<GlContext> make_gl_context(const GlOptions& options) {
-  const std::vector<std::string> backends = all_gl_backends();
-  if (options.backend != "auto" && std::ranges::find(backends, options.backend) == backends.end()) {
-    std::vector<std::string> choices = backends;
-    choices.insert(choices.begin(), "auto");
-    throw Error(ExitCode::Usage, fmt::format("unknown backend '{}'", printable(options.backend)),
-                unknown_name_hint(options.backend, choices));
-  }
+  check_gl_backend(options.backend);
   // llvmpipe reads it when its screen is made, which is with the first context.
   // NOLINTNEXTLINE(concurrency-mt-unsafe): contexts are made before a process starts threads that read the environment
   if (options.threads > 0) setenv("LP_NUM_THREADS", std::to_string(options.threads).c_str(), 1);
 
   if (options.backend != "auto") return make_one(options.backend, options);
+  if (options.device >= 0) return make_one("egl", options);  // the only one with devices
   std::string failures;
-  for (const std::string& backend : backends) {
+  for (const std::string& backend : all_gl_backends()) {
     try {
       std::unique_ptr<GlContext> context = make_one(backend, options);
       if (!failures.empty()) log::warning("drawing by {} ({}), because {}", backend, context->description(), failures);

@@ -40,8 +40,11 @@ struct GlOptions {
 /// In the order "auto" tries them.
 [[nodiscard]] std::vector<std::string> all_gl_backends();
 
-/// A context, current on this thread. "auto" takes the first backend that works and logs what it passed over. Throws
-/// Error: NoDevice, with every attempt and its reason; Usage for an unknown backend.
+/// Throws Error (Usage), with the choices, unless `backend` is "auto" or one of all_gl_backends().
+void check_gl_backend(const std::string& backend);
+
+/// A context, current on this thread. "auto" takes the first backend that works and logs what it passed over; with a
+/// device, EGL. Throws Error: NoDevice, with every attempt and its reason; Usage for an unknown backend.
 [[nodiscard]] std::unique_ptr<GlContext> make_gl_context(const GlOptions& options);
 
 }  // namespace hpr
