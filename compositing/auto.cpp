@@ -30,7 +30,7 @@ std::string Auto::best(const Costs& costs, const Load& load, bool collects, bool
 
 std::optional<Prediction> Auto::predict(const Costs& costs, const Load& load) const {
   // As it chooses: without looking at costs where all ranks share memory.
-  const bool all_in_place = costs.hosts == 1 && costs.read_byte > 0.0;
+  const bool all_in_place = costs.hosts == 1 && costs.read_byte.has_value();
   const std::string name = all_in_place ? "shared-memory" : best(costs, load, true, true);
   return make_compositor(name)->predict(costs, load);
 }

@@ -52,6 +52,20 @@ double seconds(const Compositor& compositor, const Costs& costs, const Load& loa
   return collects ? prediction->collected(costs, load) : prediction->composite;
 }
 
+TEST(Auto, SharedMemoryIsReckonedWithHoweverQuickItIs) {
+  // Where a meeting takes as long as a meeting and a merge, nothing is left for the merge.
+  Costs costs = machines().front();
+  costs.read_byte = 0.0;
+  const Load load = load_of(costs.ranks, 0.5);
+  const auto prediction = make_compositor("shared-memory")->predict(costs, load);
+  ASSERT_TRUE(prediction);
+  EXPECT_EQ(prediction->composite, 2.0 * costs.meet);
+  EXPECT_EQ(seconds(*make_compositor("auto"), costs, load, true),
+            seconds(*make_compositor("shared-memory"), costs, load, true));
+  costs.read_byte.reset();
+  EXPECT_FALSE(make_compositor("shared-memory")->predict(costs, load));
+}
+
 TEST(Auto, TakesWhatPredictsTheLeast) {
   std::vector<std::string> taken;
   for (const Costs& costs : machines()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include "cluster/communicator.h"
@@ -22,8 +23,9 @@ struct Costs {
   double collect_byte = 0.0;  ///< a byte sent to and received by one rank, not merged
   double packing_byte = 0.0;  ///< what a byte of packed tiles takes more than one of whole tiles
   double reduce_byte = 0.0;   ///< of the communicator's own reduction, per byte of the frame
-  double read_byte = 0.0;     ///< a byte merged in place by the ranks of a host together; 0 where memory is not shared
   double meet = 0.0;          ///< a meeting of the ranks of a host
+  /// A byte merged in place by the ranks of a host together; none where memory is not shared.
+  std::optional<double> read_byte = {};
 
   /// The same for layers of which a part is packed.
   [[nodiscard]] Costs with_packed(double share) const;

@@ -298,8 +298,8 @@ Composited SharedMemory::composite(Communicator& comm, TileLayer<Key>& layer, st
 }
 
 std::optional<Prediction> SharedMemory::predict(const Costs& costs, const Load& load) const {
-  if (costs.read_byte <= 0.0) return std::nullopt;
-  const double per_host = load.drawn_tiles / costs.hosts * costs.read_byte;
+  if (!costs.read_byte) return std::nullopt;
+  const double per_host = load.drawn_tiles / costs.hosts * *costs.read_byte;
   double seconds = 2.0 * costs.meet + per_host;
   if (costs.hosts == 1) return Prediction{seconds, false};
   const int columns = std::max(1, load.ranks / costs.hosts);
