@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "app/diff_values.h"
 #include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -17,56 +19,12 @@
 namespace hpr {
 namespace {
 
-/// The values of `picture` with its channels in the order of `channels`.
-std::vector<float> in_order(const FloatImage& picture, const std::vector<std::string>& channels) {
-  std::vector<std::size_t> from;
-  from.reserve(channels.size());
-  for (const std::string& channel : channels) {
-    from.push_back(static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin()));
-  }
-  std::vector<float> values;
-  values.reserve(picture.values.size());
-  for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
-    for (const std::size_t channel : from) values.push_back(picture.values[pixel * channels.size() + channel]);
-  }
-  return values;
-}
-
-float distance_of(float a, float b) {
-  if (a == b || (std::isnan(a) && std::isnan(b))) return 0.0F;
-  const float distance = std::abs(a - b);
-  return std::isnan(distance) ? std::numeric_limits<float>::infinity() : distance;
-}
-
 bool within(std::size_t beyond, std::size_t pixels, double percent) {
   return 100.0 * static_cast<double>(beyond) <= percent * static_cast<double>(pixels);
 }
 
 double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
-}
-
-/// Whether `picture` has all channels of `other` but its alpha.
-bool lacks_alpha(const FloatImage& picture, const FloatImage& other) {
-  std::vector<std::string> with = picture.channels;
-  with.emplace_back("A");
-  return std::ranges::find(picture.channels, "A") == picture.channels.end() &&
-         std::ranges::is_permutation(with, other.channels);
-}
-
-/// The picture with an alpha of 1.
-FloatImage opaque(const FloatImage& picture) {
-  FloatImage result = picture;
-  const std::size_t channels = picture.channels.size();
-  result.channels.emplace_back("A");
-  result.values.clear();
-  result.values.reserve(picture.size.area() * (channels + 1));
-  for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
-    const auto from = picture.values.begin() + static_cast<std::ptrdiff_t>(pixel * channels);
-    result.values.insert(result.values.end(), from, from + static_cast<std::ptrdiff_t>(channels));
-    result.values.push_back(1.0F);
-  }
-  return result;
 }
 
 std::vector<Key> read_keys(const std::filesystem::path& path) {
@@ -80,15 +38,6 @@ std::vector<Key> read_keys(const std::filesystem::path& path) {
   std::vector<Key> keys(bytes.size() / sizeof(Key));
   std::memcpy(keys.data(), bytes.data(), bytes.size());
   return keys;
-}
-
-[[noreturn]] void throw_other_kind(const std::string& a, const std::string& b) {
-  throw Error(ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a, b),
-              "compare keys with keys, linear EXR with EXR, and sRGB PNG or JPEG with one another");
-}
-
-std::string describe(const FloatImage& picture) {
-  return fmt::format("{}x{} {}", picture.size.width, picture.size.height, fmt::join(picture.channels, ","));
 }
 
 std::size_t worst_x(const DiffReport& report) {
@@ -151,6 +100,12 @@ std::string picture_value(const DiffReport& report, const std::string& metric) {
 
 }  // namespace
 
+bool is_keys(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension == ".keys";
+}
+
 Rgba8 heat_color(double share) {
   constexpr std::array<std::array<double, 3>, 6> kStops{
       {{0, 0, 0}, {52, 18, 108}, {133, 26, 110}, {208, 65, 62}, {247, 148, 34}, {252, 250, 192}}};
@@ -178,37 +133,28 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
                          const DiffTolerance& tolerance, std::span<const std::string> metrics, int threads) {
   if (lacks_alpha(a, b)) return diff_pictures(opaque(a), name_a, b, name_b, tolerance, metrics, threads);
   if (lacks_alpha(b, a)) return diff_pictures(a, name_a, opaque(b), name_b, tolerance, metrics, threads);
-  std::vector<std::string> sorted_a = a.channels;
-  std::vector<std::string> sorted_b = b.channels;
-  std::ranges::sort(sorted_a);
-  std::ranges::sort(sorted_b);
-  if (a.size != b.size || sorted_a != sorted_b) {
-    throw Error(ExitCode::BadInput, fmt::format("{} is {}, {} is {}", name_a, describe(a), name_b, describe(b)),
-                "only pictures of the same size and channels can be compared");
-  }
-  if (a.linear != b.linear) throw_other_kind(name_a, name_b);
+  check_comparable(a, name_a, b, name_b);
   DiffReport report;
   report.size = a.size;
   report.channels = a.channels;
   const std::size_t channels = a.channels.size();
   if (asks_for_colors(metrics)) report.colors = compare_colors(a, b, metrics, threads);
-  const std::vector<float> other = in_order(b, a.channels);
-  report.difference = compare_values(other, a.values, channels);
-  if (const std::vector<float> colors = colors_of(a); !colors.empty()) {
-    const Difference seen = compare_values(colors_of(b), colors, 3);
+  const std::vector<double> differences = picture_differences(b, a);
+  report.difference = summarize_differences(differences, channels);
+  if (const auto places = color_places(a)) {
+    const Difference seen = summarize_differences(only(differences, channels, *places), places->size());
     report.difference.rmse = seen.rmse;
     report.difference.psnr = seen.psnr;
     report.difference.mean = seen.mean;
     report.difference.mean_error = seen.mean_error;
   }
   report.largest.reserve(report.difference.pixels);
-  for (std::size_t pixel = 0; pixel < report.difference.pixels; ++pixel) {
-    float largest = 0.0F;
-    for (std::size_t i = pixel * channels; i < (pixel + 1) * channels; ++i) {
-      largest = std::max(largest, distance_of(a.values[i], other[i]));
-    }
+  for (std::size_t first = 0; first < differences.size(); first += channels) {
+    double largest = 0.0;
+    for (const double value : std::span(differences).subspan(first, channels))
+      largest = std::max(largest, std::abs(value));
     report.largest.push_back(largest);
-    if (static_cast<double>(largest) > tolerance.value) ++report.beyond;
+    if (largest > tolerance.value) ++report.beyond;
   }
   report.passed = within(report.beyond, report.difference.pixels, tolerance.percent);
   return report;
@@ -223,8 +169,8 @@ DiffReport diff_keys(std::span<const Key> a, std::span<const Key> b, double perc
     if (a[i] == b[i]) continue;
     ++report.difference.differing;
     if (static_cast<std::uint32_t>(a[i]) != static_cast<std::uint32_t>(b[i])) ++report.other_surface;
-    const auto depth = static_cast<double>(distance_of(key_depth(a[i]), key_depth(b[i])));
-    report.difference.max = std::max(report.difference.max, depth);
+    const double depth = difference_of(key_depth(a[i]), key_depth(b[i]));
+    report.difference.max = std::max(report.difference.max, std::abs(depth));
   }
   report.beyond = report.difference.differing;
   report.passed = within(report.beyond, a.size(), percent);
@@ -233,10 +179,8 @@ DiffReport diff_keys(std::span<const Key> a, std::span<const Key> b, double perc
 
 DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::path& b, const DiffTolerance& tolerance,
                       const ImageLimits& limits, std::span<const std::string> metrics, int threads) {
-  const bool keys = a.extension() == ".keys";
-  if (keys != (b.extension() == ".keys") || (a.extension() == ".exr") != (b.extension() == ".exr")) {
-    throw_other_kind(a.string(), b.string());
-  }
+  const bool keys = is_keys(a);
+  if (keys != is_keys(b)) throw_other_kind(a.string(), b.string());
   if (!keys) {
     return diff_pictures(read_image(a, limits), a.string(), read_image(b, limits), b.string(), tolerance, metrics,
                          threads);
@@ -257,19 +201,18 @@ DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::pat
 
 Image<Rgba8> heat_map(const DiffReport& report) {
   HPR_CHECK(!report.keys);
-  float top = 0.0F;
-  for (const float value : report.largest) {
+  double top = 0.0;
+  for (const double value : report.largest) {
     if (std::isfinite(value)) top = std::max(top, value);
   }
   Image<Rgba8> image(report.size);
   for (std::size_t i = 0; i < report.largest.size(); ++i) {
-    const float value = report.largest[i];
+    const double value = report.largest[i];
     // Even the least difference is seen: colours start a fifth up the ramp.
     constexpr double kLeast = 0.2;
-    image.pixels()[i] = value == 0.0F ? Rgba8{0, 0, 0, 255}
-                        : !std::isfinite(value)
-                            ? Rgba8{0, 255, 255, 255}
-                            : heat_color(kLeast + (1.0 - kLeast) * static_cast<double>(value / top));
+    image.pixels()[i] = value == 0.0            ? Rgba8{0, 0, 0, 255}
+                        : !std::isfinite(value) ? Rgba8{0, 255, 255, 255}
+                                                : heat_color(kLeast + (1.0 - kLeast) * (value / top));
   }
   return image;
 }

@@ -30,7 +30,7 @@ struct DiffReport {
   std::size_t other_surface = 0;      ///< of keys: pixels that show another surface
   std::size_t beyond = 0;             ///< pixels with a value past the tolerance
   bool passed = true;
-  std::vector<float> largest;  ///< of pictures, per pixel: its largest absolute difference; infinite where one is NaN
+  std::vector<double> largest;  ///< of pictures, per pixel: its largest absolute difference; infinite where one is NaN
 };
 
 /// The metrics by name: rmse, psnr, max, differing, mean, relmse, ssim, flip.
@@ -41,9 +41,10 @@ struct DiffReport {
 /// From black for 0 to pale yellow for 1, in equal steps of lightness.
 [[nodiscard]] Rgba8 heat_color(double share);
 
-/// Compares `b` with `a` value by value, channels by name, and colours as far as `metrics` asks for them. Where only
-/// one has alpha, the other's is 1. rmse, psnr and mean are of colours where there are any. Throws Error (BadInput),
-/// naming both, when sizes or channels differ, or one is linear and the other is not.
+/// Compares `b` with `a` value by value (integers by their bits, levels of 8 and 16 bits as such), channels by name,
+/// and colours as far as `metrics` asks for them. Where only one has alpha, the other's is 1. rmse, psnr and mean are
+/// of colours where there are any. Throws Error (BadInput), naming both, when sizes or channels differ, or one is
+/// linear and the other is not.
 [[nodiscard]] DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const FloatImage& b,
                                        const std::string& name_b, const DiffTolerance& tolerance,
                                        std::span<const std::string> metrics = diff_metrics(), int threads = 1);
@@ -51,7 +52,10 @@ struct DiffReport {
 /// Compares two equally long lists of keys; every differing key is past the tolerance.
 [[nodiscard]] DiffReport diff_keys(std::span<const Key> a, std::span<const Key> b, double percent);
 
-/// The same for files, by their extension: .keys (a uint64 per pixel, little-endian) or a picture. Throws Error (Io,
+/// Whether a file is one of keys, by its extension: .keys, in letters of any size.
+[[nodiscard]] bool is_keys(const std::filesystem::path& file);
+
+/// The same for files: of keys (a uint64 per pixel, little-endian) or pictures. Throws Error (Io,
 /// BadInput, Limit, and Usage for a tolerance of values between keys).
 [[nodiscard]] DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::path& b,
                                     const DiffTolerance& tolerance, const ImageLimits& limits,

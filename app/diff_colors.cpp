@@ -21,18 +21,24 @@ std::size_t not_finite_pixels(std::span<const float> a, std::span<const float> b
 
 }  // namespace
 
-std::vector<float> colors_of(const FloatImage& picture) {
+std::optional<std::array<std::size_t, 3>> color_places(const FloatImage& picture) {
   const auto place = [&](const char* channel) {
     return static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin());
   };
-  const std::size_t channels = picture.channels.size();
-  std::array<std::size_t, 3> from{place("R"), place("G"), place("B")};
-  if (std::ranges::count(from, channels) != 0) from.fill(place("Y"));
-  if (from[0] == channels) return {};
+  const std::size_t none = picture.channels.size();
+  std::array<std::size_t, 3> places{place("R"), place("G"), place("B")};
+  if (std::ranges::count(places, none) != 0) places.fill(place("Y"));
+  if (places[0] == none) return std::nullopt;
+  return places;
+}
+
+std::vector<float> colors_of(const FloatImage& picture) {
+  const auto places = color_places(picture);
+  if (!places) return {};
   std::vector<float> colors;
-  colors.reserve(picture.size.area() * 3);
+  colors.reserve(picture.size.area() * places->size());
   for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
-    for (const std::size_t channel : from) colors.push_back(picture.values[pixel * channels + channel]);
+    for (const std::size_t place : *places) colors.push_back(picture.values[pixel * picture.channels.size() + place]);
   }
   return colors;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -20,6 +21,10 @@ struct ColorErrors {
   double ssim = std::numeric_limits<double>::quiet_NaN();
   double flip = std::numeric_limits<double>::quiet_NaN();
 };
+
+/// Where R, G and B stand among the channels; three times Y's place in their stead. None for pictures that have
+/// neither.
+[[nodiscard]] std::optional<std::array<std::size_t, 3>> color_places(const FloatImage& picture);
 
 /// [height][width][3]: channels R, G and B, or three times Y. Empty for pictures that have neither.
 [[nodiscard]] std::vector<float> colors_of(const FloatImage& picture);

@@ -53,7 +53,7 @@ class DiffCommand final : public Command {
                     unknown_name_hint(metric, diff_metrics()));
       }
     }
-    const bool keys = std::filesystem::path(a_).extension() == ".keys";
+    const bool keys = is_keys(a_);
     for (const std::string& metric : metrics_) {
       if (!keys || metric == "max" || metric == "differing") continue;
       throw Error(ExitCode::Usage, fmt::format("--metric {} is of pictures; keys have max and differing", metric),

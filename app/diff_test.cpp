@@ -263,6 +263,47 @@ TEST(Diff, ColorsAreThoseOfRgbOrGreyAndNothingElse) {
   EXPECT_EQ(diff(a, b).colors->flip, 0.0);
 }
 
+TEST_F(DiffFiles, LevelsDifferByWholeSteps) {
+  for (int level = 0; level < 255; ++level) {
+    const auto low = static_cast<std::uint8_t>(level);
+    write_png(path("a.png"), Image<Rgba8>({1, 1}, {low, low, low, 255}));
+    write_png(path("b.png"), Image<Rgba8>({1, 1}, Rgba8{static_cast<std::uint8_t>(level + 1), low, low, 255}));
+    const DiffReport report = diff_files(path("a.png"), path("b.png"), {1.0 / 255.0, 0.0}, {});
+    EXPECT_EQ(report.difference.max, 1.0 / 255.0) << level;
+    EXPECT_TRUE(report.passed) << level;
+  }
+}
+
+TEST_F(DiffFiles, IntegersAreComparedByTheirBits) {
+  const auto write = [&](const char* name, std::vector<ExrLayer> layers) {
+    write_file_atomically(path(name), encode_exr(Image<Rgb>({1, 1}), {}, layers));
+    return path(name);
+  };
+  const auto a = write("a.exr", {{{"id.X"}, {}, {0x01000000U}}});
+  const auto b = write("b.exr", {{{"id.X"}, {}, {0x01000001U}}});  // the same float
+  EXPECT_TRUE(diff_files(a, a, {}, {}).passed);
+  const DiffReport report = diff_files(a, b, {0.5, 0.0}, {});
+  EXPECT_FALSE(report.passed);
+  EXPECT_EQ(report.difference.max, 1.0);
+  EXPECT_EQ(report.difference.rmse, 0.0) << "of colours";
+  EXPECT_EQ(code_of(a, write("c.exr", {{{"id.X"}, {1.0F}}})), ExitCode::BadInput);
+}
+
+TEST(Diff, FarValuesAreTakenApartInDoublePrecision) {
+  const FloatImage a = picture({3e38F, 0, 0});
+  const FloatImage b = picture({-3e38F, 0, 0});
+  EXPECT_TRUE(diff(a, b, {1e39, 0.0}).passed);
+  EXPECT_FALSE(diff(a, b, {5e38, 0.0}).passed);
+  EXPECT_EQ(heat_map(diff(a, b)).at(0, 0), heat_color(1.0));
+}
+
+TEST_F(DiffFiles, ExtensionsMayBeOfCapitals) {
+  write_image(path("a.exr"), Image<Rgb>({2, 1}, {1, 2, 3}));
+  std::filesystem::copy_file(path("a.exr"), path("B.EXR"));
+  EXPECT_TRUE(diff_files(path("a.exr"), path("B.EXR"), {}, {}).passed);
+  EXPECT_TRUE(diff_files(keys_file("a.keys", {1, 2}), keys_file("B.KEYS", {1, 2}), {}, {}).keys);
+}
+
 TEST_F(DiffFiles, KeysAreComparedOneByOne) {
   const auto a = keys_file("a.keys", {make_key(0.5F, 7), make_key(0.5F, 8), kNoKey, kNoKey});
   const auto b = keys_file("b.keys", {make_key(0.5F, 7), make_key(0.25F, 8), make_key(0.125F, 1), kNoKey});
@@ -293,7 +334,7 @@ TEST_F(DiffFiles, PicturesAreReadFromPngAndExr) {
   write_png(path("b.png"), Image<Rgba8>({2, 1}, {10, 20, 31, 255}));
   const DiffReport report = diff_files(path("a.png"), path("b.png"), {}, {});
   EXPECT_EQ(report.difference.differing, 2U);
-  EXPECT_NEAR(report.difference.max, 1.0 / 255.0, 1e-6);
+  EXPECT_EQ(report.difference.max, 1.0 / 255.0);
   write_image(path("a.exr"), Image<Rgb>({2, 1}, {1, 2, 3}));
   EXPECT_TRUE(diff_files(path("a.exr"), path("a.exr"), {}, {}).passed);
   EXPECT_EQ(code_of(path("a.png"), path("a.exr")), ExitCode::BadInput) << "sRGB against linear";

@@ -59,6 +59,11 @@ void check_limits(const OIIO::ImageSpec& spec, const std::string& name, const Im
   }
 }
 
+std::uint32_t levels_of(const OIIO::ImageSpec& spec) {
+  if (spec.format == OIIO::TypeDesc::UINT8) return 0xFF;
+  return spec.format == OIIO::TypeDesc::UINT16 ? 0xFFFF : 0;
+}
+
 /// An opened picture whose size was checked before a pixel is allocated.
 class Input {
  public:
@@ -182,22 +187,18 @@ class OiioCodec final : public ImageCodec {
   [[nodiscard]] FloatImage decode_float(std::span<const std::byte> bytes, const std::string& name,
                                         const ImageLimits& limits) const override {
     Input input(bytes, name, limits, true);
-    return {{input.spec().width, input.spec().height},
-            input.spec().channelnames,
-            input.values<float>(OIIO::TypeDesc::FLOAT),
-            input.linear()};
-  }
-
-  [[nodiscard]] std::vector<std::uint32_t> decode_integers(std::span<const std::byte> bytes, const std::string& name,
-                                                           const std::string& channel,
-                                                           const ImageLimits& limits) const override {
-    Input input(bytes, name, limits, true);
-    const int index = input.spec().channelindex(channel);
-    if (index < 0 || input.spec().channelformat(index) != OIIO::TypeDesc::UINT) {
-      throw Error(ExitCode::BadInput, fmt::format("{}: there is no integer channel '{}'", name, channel),
-                  "name one the file has");
+    const OIIO::ImageSpec& spec = input.spec();
+    FloatImage image{{spec.width, spec.height},
+                     spec.channelnames,
+                     input.values<float>(OIIO::TypeDesc::FLOAT),
+                     input.linear(),
+                     levels_of(spec),
+                     {}};
+    for (int i = 0; i < spec.nchannels; ++i) {
+      if (spec.channelformat(i) != OIIO::TypeDesc::UINT) continue;
+      image.integers[spec.channel_name(i)] = input.channel<std::uint32_t>(i, OIIO::TypeDesc::UINT);
     }
-    return input.channel<std::uint32_t>(index, OIIO::TypeDesc::UINT);
+    return image;
   }
 };
 

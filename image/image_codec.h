@@ -21,9 +21,6 @@ class ImageCodec {
                                             const ImageLimits& limits) const = 0;
   [[nodiscard]] virtual FloatImage decode_float(std::span<const std::byte> bytes, const std::string& name,
                                                 const ImageLimits& limits) const = 0;
-  [[nodiscard]] virtual std::vector<std::uint32_t> decode_integers(std::span<const std::byte> bytes,
-                                                                   const std::string& name, const std::string& channel,
-                                                                   const ImageLimits& limits) const = 0;
 };
 
 }  // namespace hpr

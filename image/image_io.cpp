@@ -68,11 +68,6 @@ FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limi
   return codec().decode_float(read_file(path, kLargestFile), path.string(), limits);
 }
 
-std::vector<std::uint32_t> read_integers(const std::filesystem::path& path, const std::string& channel,
-                                         const ImageLimits& limits) {
-  return codec().decode_integers(read_file(path, kLargestFile), path.string(), channel, limits);
-}
-
 void write_image(const std::filesystem::path& path, const Image<Rgb>& image,
                  const std::map<std::string, std::string>& attributes) {
   const std::string extension = path.extension().string();

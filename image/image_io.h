@@ -25,7 +25,10 @@ struct FloatImage {
   Size size;
   std::vector<std::string> channels;
   std::vector<float> values;
-  bool linear = false;  ///< radiance, not display values
+  bool linear = false;       ///< radiance, not display values
+  std::uint32_t levels = 0;  ///< values are whole multiples of 1 / levels; 0: any numbers
+  /// Channels stored as unsigned integers, [height][width], bit by bit; `values` has them as shares of 2^32 - 1.
+  std::map<std::string, std::vector<std::uint32_t>> integers = {};
 };
 
 /// One more channel set of an EXR file, e.g. depth or surface ids; floats survive bit by bit.
@@ -51,11 +54,6 @@ struct ExrLayer {
 
 /// Reads a PNG, JPEG, EXR or Radiance (.hdr) file. Throws Error (Io, BadInput, Limit).
 [[nodiscard]] FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits);
-
-/// One unsigned integer channel of an EXR file, [height][width], bit by bit; read_image gives such channels as shares
-/// of 2^32 - 1. Throws Error as read_image does, and BadInput when there is no such channel.
-[[nodiscard]] std::vector<std::uint32_t> read_integers(const std::filesystem::path& path, const std::string& channel,
-                                                       const ImageLimits& limits);
 
 /// Writes `image` atomically as PNG (through to_srgb) or EXR, by the extension of `path`; throws Error (Usage) for
 /// others.

@@ -11,12 +11,6 @@
 namespace hpr {
 namespace {
 
-/// a - b; infinite where only one of both is NaN, 0 where both are.
-double difference_of(double a, double b) {
-  if (a == b || (std::isnan(a) && std::isnan(b))) return 0.0;
-  return std::isnan(a) || std::isnan(b) ? std::numeric_limits<double>::infinity() : a - b;
-}
-
 /// Welford's recurrence: sums of squares would lose the spread of small values around a large mean.
 class Spread {
  public:
@@ -37,18 +31,22 @@ class Spread {
 
 }  // namespace
 
-Difference compare_values(std::span<const float> image, std::span<const float> reference, std::size_t channels) {
-  HPR_CHECK(channels > 0 && image.size() == reference.size() && image.size() % channels == 0);
+double difference_of(double a, double b) {
+  if (a == b || (std::isnan(a) && std::isnan(b))) return 0.0;
+  return std::isnan(a) || std::isnan(b) ? std::numeric_limits<double>::infinity() : a - b;
+}
+
+Difference summarize_differences(std::span<const double> differences, std::size_t channels) {
+  HPR_CHECK(channels > 0 && differences.size() % channels == 0);
   Difference result;
-  result.pixels = image.size() / channels;
+  result.pixels = differences.size() / channels;
   double squares = 0.0;
   double sum = 0.0;
   Spread of_pixels;
   for (std::size_t pixel = 0; pixel < result.pixels; ++pixel) {
     double largest = 0.0;
     double pixel_sum = 0.0;
-    for (std::size_t i = pixel * channels; i < (pixel + 1) * channels; ++i) {
-      const double difference = difference_of(image[i], reference[i]);
+    for (const double difference : differences.subspan(pixel * channels, channels)) {
       squares += difference * difference;
       pixel_sum += difference;
       largest = std::max(largest, std::abs(difference));
@@ -61,12 +59,19 @@ Difference compare_values(std::span<const float> image, std::span<const float> r
     sum += pixel_sum;
     of_pixels.add(pixel_sum / static_cast<double>(channels));
   }
-  const double values = std::max<double>(1.0, static_cast<double>(image.size()));
+  const double values = std::max<double>(1.0, static_cast<double>(differences.size()));
   result.rmse = std::sqrt(squares / values);
   result.mean = sum / values;
   result.mean_error = of_pixels.error_of_mean();
   result.psnr = result.rmse > 0.0 ? -20.0 * std::log10(result.rmse) : std::numeric_limits<double>::infinity();
   return result;
+}
+
+Difference compare_values(std::span<const float> image, std::span<const float> reference, std::size_t channels) {
+  HPR_CHECK(image.size() == reference.size());
+  std::vector<double> differences(image.size());
+  std::ranges::transform(image, reference, differences.begin(), difference_of);
+  return summarize_differences(differences, channels);
 }
 
 RelativeError relative_error(std::span<const float> image, std::span<const float> reference, std::size_t channels) {

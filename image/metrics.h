@@ -18,6 +18,12 @@ struct Difference {
   std::size_t differing = 0;  ///< pixels with any value whose bits differ by more than -0 against 0
 };
 
+/// a - b; infinite where only one of both is NaN, 0 where both are.
+[[nodiscard]] double difference_of(double a, double b);
+
+/// The same from the differences themselves, image - reference: `channels` values per pixel, by difference_of.
+[[nodiscard]] Difference summarize_differences(std::span<const double> differences, std::size_t channels);
+
 /// `channels` values per pixel.
 [[nodiscard]] Difference compare_values(std::span<const float> image, std::span<const float> reference,
                                         std::size_t channels);
