@@ -69,7 +69,7 @@ class CompareCommand final : public Command {
                   scene_input_ ? "name a scene, or --synthetic dense|half|sparse|scatter|checker"
                                : "add --synthetic dense|half|sparse|scatter|checker");
     }
-    if (!options_.scene.empty()) return scene_input_(options_.scene, screen, grid, globals);
+    if (!options_.scene.empty()) return scene_input_(options_.scene, screen, grid, options_.local_shading(), globals);
     if (globals.seed > std::numeric_limits<std::uint32_t>::max()) {
       throw Error(ExitCode::Usage, fmt::format("--seed: synthetic layers take 32 bits, {} has more", globals.seed),
                   fmt::format("take one from 0 to {}", std::numeric_limits<std::uint32_t>::max()));

@@ -9,9 +9,10 @@
 
 namespace hpr {
 
-/// What `hpr compare SCENE` composites, for a wall of `grid` screens of `screen` pixels: made by whoever can draw.
-using SceneInput =
-    std::function<CompareInput(const std::string& scene, Size screen, Size grid, const Globals& globals)>;
+/// What `hpr compare SCENE` composites, for a wall of `grid` screens of `screen` pixels: made by whoever can draw. With
+/// `local_shading` its keys carry colours.
+using SceneInput = std::function<CompareInput(const std::string& scene, Size screen, Size grid, bool local_shading,
+                                              const Globals& globals)>;
 
 /// `hpr compare`. Without `scene_input` it knows synthetic layers only and declares no SCENE.
 [[nodiscard]] std::unique_ptr<Command> make_compare_command(SceneInput scene_input = nullptr);

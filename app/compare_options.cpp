@@ -81,7 +81,13 @@ std::vector<int> parse_ranks(const std::string& list) {
 }
 
 void CompareOptions::declare(CLI::App& app, bool draws_scenes) {
-  if (draws_scenes) app.add_option("scene", scene, "a scene to draw the layers from")->type_name("SCENE");
+  if (draws_scenes) {
+    app.add_option("scene", scene, "a scene to draw the layers from")->type_name("SCENE");
+    app.add_option("--shading", shading,
+                   "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
+        ->type_name("NAME")
+        ->capture_default_str();
+  }
   app.add_option("--synthetic", synthetic, "made-up layers: dense, half, sparse, scatter or checker")
       ->type_name("KIND");
   app.add_option("--size", size, "pixels of one screen")->type_name("WxH")->capture_default_str();
@@ -120,6 +126,7 @@ void CompareOptions::settle() {
   if (!simulate.empty() && frames_option_->count() == 0) frames = warmup = 1;  // simulated frames are all alike
   check_transport();
   check_operator();
+  check_shading();
   for (const int count : rank_counts()) (void)strategies_for(count);
   if (inside_mpi_job() && transport != "mpi") {
     throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
@@ -164,6 +171,18 @@ void CompareOptions::check_operator() const {
   }
   if (operation() != CompareOperator::Nearest && !raw.empty()) {
     throw Error(ExitCode::Usage, "--raw writes keys, and translucent layers have none", "take -o FILE.png");
+  }
+}
+
+void CompareOptions::check_shading() const {
+  const std::vector<std::string> shadings{"deferred", "local"};
+  if (std::ranges::find(shadings, shading) == shadings.end()) {
+    throw Error(ExitCode::Usage, fmt::format("unknown shading '{}'", printable(shading)),
+                unknown_name_hint(printable(shading), shadings));
+  }
+  if (local_shading() && scene.empty()) {
+    throw Error(ExitCode::Usage, "--shading local lights a scene, and there is none",
+                "leave it out: synthetic layers are colours already");
   }
 }
 
@@ -241,6 +260,7 @@ std::vector<std::string> CompareOptions::words(const Globals& globals) const {
   if (!synthetic.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic});
   if (!plugin.empty()) arguments.insert(arguments.end(), {"--plugin", plugin});
   arguments.insert(arguments.end(), {"--size", size, "--tiles", tiles, "--strategies", strategies});
+  if (local_shading()) arguments.insert(arguments.end(), {"--shading", shading});
   if (operation() != CompareOperator::Nearest) arguments.insert(arguments.end(), {"--operator", operator_name});
   arguments.insert(arguments.end(), {"--frames", std::to_string(frames), "--warmup", std::to_string(warmup)});
   if (simulate.empty()) {

@@ -28,6 +28,7 @@ struct CompareOptions {
   std::string size = "1920x1080";
   std::string tiles = "1x1";
   std::string ranks;
+  std::string shading = "deferred";
   std::string operator_name = "nearest";
   std::string strategies = "all";
   std::string plugin;
@@ -48,6 +49,7 @@ struct CompareOptions {
   void check_files(const Globals& globals) const;
 
   [[nodiscard]] bool on_threads() const { return transport == "threads" || !simulate.empty(); }
+  [[nodiscard]] bool local_shading() const { return shading == "local"; }
   [[nodiscard]] CompareOperator operation() const;
   /// Empty inside an MPI job unless --ranks is given.
   [[nodiscard]] std::vector<int> rank_counts() const;
@@ -58,6 +60,7 @@ struct CompareOptions {
  private:
   void check_transport() const;
   void check_operator() const;
+  void check_shading() const;
   [[nodiscard]] std::vector<std::string> all_strategies_for(int count) const;
   [[nodiscard]] std::vector<std::string> strategies_for(int count) const;
   /// Throws Error (Usage) when no strategy of that name can do what is asked for, whatever the number of ranks.

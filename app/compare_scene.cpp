@@ -12,33 +12,33 @@ namespace {
 
 /// Collective: this rank's share of a frame, drawn.
 DrawnTiles draw_share(Communicator& comm, const std::string& scene, const Wall& wall, const Globals& globals,
-                      Distribution distribution) {
+                      FrameSettings settings) {
   Session session(comm, globals, [&] { return load_scene(scene, globals.scene_limits()); });
   const std::vector<View> views =
       wall_views(wall, RenderOptions{}.choose_camera(session.scene()), session.scene().bounds);
-  FrameSettings settings;
-  settings.distribution = distribution;
-  const FramePlan plan = plan_frame(session, settings, views);
+  FramePlan plan = plan_frame(session, settings, views);
+  plan.lit = false;
   TileLayer<Key> layer(plan.layout);
-  rasterize(session, plan, views, layer);
+  (void)draw_layer(session, plan, views, layer);
   return {std::move(layer), plan.tiles};
 }
 
 }  // namespace
 
-CompareInput scene_layers(const std::string& scene, Size screen, Size grid, const Globals& globals) {
+CompareInput scene_layers(const std::string& scene, Size screen, Size grid, bool local_shading,
+                          const Globals& globals) {
   const Wall wall = load_wall(fmt::format("{}x{}@{}x{}", grid.width, grid.height, screen.width, screen.height));
   CompareInput input;
   input.name = scene;
   input.screen = screen;
   input.grid = grid;
-  input.colors = false;
-  input.layer = [=](Communicator& comm) {
-    return draw_share(comm, scene, wall, globals, Distribution::SortLast).layer;
-  };
-  input.sort_first = [=](Communicator& comm) {
-    return draw_share(comm, scene, wall, globals, Distribution::SortFirst);
-  };
+  input.colors = local_shading;
+  FrameSettings settings = RenderOptions{}.settings(globals.seed);
+  settings.shading = local_shading ? Shading::Local : Shading::Deferred;
+  settings.distribution = Distribution::SortLast;
+  input.layer = [=](Communicator& comm) { return draw_share(comm, scene, wall, globals, settings).layer; };
+  settings.distribution = Distribution::SortFirst;
+  input.sort_first = [=](Communicator& comm) { return draw_share(comm, scene, wall, globals, settings); };
   return input;
 }
 

@@ -13,6 +13,10 @@ namespace hpr {
 
 namespace {
 
+bool spends_light(const FramePlan& plan) {
+  return plan.lit || plan.shading == Shading::Local;
+}
+
 /// The rectangles of a screen this rank's group covers.
 std::vector<Rect> parts_of(const FramePlan& plan, std::size_t screen) {
   std::vector<Rect> parts;
@@ -32,7 +36,7 @@ void prepare(Session& session, const FramePlan& plan) {
       (void)session.rasterizer(plan.mine.objects);
     }
   }
-  if (plan.lit || plan.shading == Shading::Local) (void)session.lighter(plan.rays);
+  if (spends_light(plan)) (void)session.lighter(plan.rays);
   if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
 }
 
@@ -117,13 +121,10 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   return *this;
 }
 
-Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
-                 const FrameSample& sample) {
-  const trace::Span span("sample", "number", sample.number.sample);
+FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+                      const SampleNumber& number) {
   FrameTimes taken;
-  Stopwatch watch;
-  TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
-  keys.set_depth_format(plan.depth_format);
+  const Stopwatch watch;
   if (plan.primary == Primary::Rays) {
     taken.primary = trace_primary(session, plan, views, keys);
   } else {
@@ -131,17 +132,25 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   }
   taken.primary_ms = watch.ms();
 
-  const bool lights = plan.lit || plan.shading == Shading::Local;
-  if (lights) {
+  if (spends_light(plan)) {
     const trace::Span photons("photons");
-    session.lighter(plan.rays).send_photons(session.comm(), sample.number);
+    session.lighter(plan.rays).send_photons(session.comm(), number);
   }
   if (plan.shading == Shading::Local) {
     const trace::Span shading("light");
-    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
+    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, number);
   }
+  return taken;
+}
 
-  watch.restart();
+Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
+                 const FrameSample& sample) {
+  const trace::Span span("sample", "number", sample.number.sample);
+  TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
+  keys.set_depth_format(plan.depth_format);
+  FrameTimes taken = draw_layer(session, plan, views, keys, sample.number);
+
+  const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
   if (sample.homes != nullptr) bring_home(session, plan, *sample.homes, frame);
   taken.composite_ms = watch.ms();
@@ -153,7 +162,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
     session.lighter(plan.rays).light(views, keys, frame.owned, frame.aovs.output(frame.radiance), sample.number);
     mark_rank(session, frame);
   }
-  if (lights) {
+  if (spends_light(plan)) {
     taken.passes = session.lighter(plan.rays).times();
     taken.rays = session.lighter(plan.rays).counts();
   }

@@ -92,6 +92,11 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
                               TileLayer<Key>& keys);
 
+/// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
+/// lit if shading is local. Returns what that took.
+FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+                      const SampleNumber& number = {});
+
 /// Which frame of several that are one picture's samples.
 struct FrameSample {
   SampleNumber number;

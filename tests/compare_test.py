@@ -47,6 +47,8 @@ def refused(folder):
     expect_error(folder, [*SYNTHETIC, *SMALL, "--strategies", "tre"], 2, "did you mean 'tree'", "all")
     expect_error(folder, [*SCENE, *SMALL, "--strategies", "sort-frist"], 2, "did you mean 'sort-first'", ", all")
     expect_error(folder, [*SCENE, *SMALL, "--operator", "over8", "--strategies", "tre"], 2, "did you mean 'tree'")
+    expect_error(folder, [*SCENE, *SMALL, "--shading", "locl"], 2, "did you mean 'local'")
+    expect_error(folder, [*SYNTHETIC, *SMALL, "--shading", "local"], 2, "leave it out")
     expect_error(folder, ["doctor", "--backend", "foo"], 2, "'foo'")
     expect_error(folder, ["render", "gen:cornell", *SMALL, "-o", "a.png", "--device", "99"], 5, "no EGL device 99",
                  "EGL lists", "devices")
@@ -88,8 +90,30 @@ def table(folder):
     expect([bool(row["chosen"]) for row in rows] == [False, True, False], f"only auto chooses: {rows}")
 
 
+def local_shading(folder):
+    """Colours that ranks have lit themselves: the picture that render makes of them, whoever merges it."""
+    picture, given = folder / "compared.png", ["--size", "160x120", "--shading", "local"]
+    result = run(folder, "compare", "gen:cornell", *given, "--ranks", "3", "--frames", "1", "--warmup", "0", "--json",
+                 "-o", picture.name)
+    expect(result.returncode == 0, f"left with {result.returncode}: {result.stderr}")
+    made = json.loads(result.stdout)
+    expect({row["frame_xxh64"] for row in made["runs"]} == {made["runs"][0]["frame_xxh64"]}, "frames differ")
+    expect("sort-first" in [row["strategy"] for row in made["runs"]], "sort-first is missing")
+    expect("--shading local" in made["command"], made["command"])
+    drawn = run(folder, "render", "gen:cornell", *given, "--spp", "1", "-o", "rendered.png")
+    expect(drawn.returncode == 0, f"left with {drawn.returncode}: {drawn.stderr}")
+    diff = run(folder, "diff", "rendered.png", picture.name, "--json")
+    expect(json.loads(diff.stdout)["rmse"] == 0, f"render makes other colours: {diff.stdout}")
+    hashes = set()
+    for ranks, threads in (("1", "1"), ("2", "2")):
+        again = run(folder, "compare", "gen:cornell", *given, "--ranks", ranks, "--threads", threads, "--transport",
+                    "threads", "--strategies", "tree", "--frames", "1", "--warmup", "0", "--json")
+        hashes |= {row["frame_xxh64"] for row in json.loads(again.stdout)["runs"]}
+    expect(hashes == {made["runs"][0]["frame_xxh64"]}, "other ranks, other colours")
+
+
 def main():
-    for case in (refused, commands, table):
+    for case in (refused, commands, table, local_shading):
         with tempfile.TemporaryDirectory(prefix="hpr-compare-") as scratch:
             case(pathlib.Path(scratch))
     print(f"{len(failures)} failed" if failures else "compare refuses and reports as it should")
