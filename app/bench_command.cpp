@@ -12,6 +12,7 @@
 #include "app/bench_net.h"
 #include "app/bench_raster.h"
 #include "app/bench_rays.h"
+#include "app/bench_scale_command.h"
 #include "app/bench_scene.h"
 #include "app/launcher.h"
 #include "app/machine.h"
@@ -52,17 +53,20 @@ class BenchCommand final : public Command {
     codec_->add_option("--frames", codec_frames_, "of each sequence that deltas are measured on")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
-    for (CLI::App* const bench : {raster, net_, rays_, codec_}) {
+    scale_ = app.add_subcommand("scale", "the same frames by more and more ranks and cores, in the shape of table 6.1");
+    scale_bench_.declare(*scale_);
+    for (CLI::App* const bench : {raster, net_, rays_, codec_, scale_}) {
       bench->add_flag("--json", json_, "one JSON document");
       bench->fallthrough();
     }
   }
 
-  [[nodiscard]] bool collective() const override { return net_->parsed(); }
+  [[nodiscard]] bool collective() const override { return net_->parsed() || scale_->parsed(); }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     if (rays_->parsed()) return run_rays(globals);
     if (codec_->parsed()) return run_codec(globals);
+    if (scale_->parsed()) return scale_bench_.run(globals, json_);
     return net_->parsed() ? run_net(globals) : run_raster(globals);
   }
 
@@ -138,6 +142,8 @@ class BenchCommand final : public Command {
   CLI::App* net_ = nullptr;
   CLI::App* rays_ = nullptr;
   CLI::App* codec_ = nullptr;
+  CLI::App* scale_ = nullptr;
+  ScaleBench scale_bench_;
   std::vector<std::string> codec_scenes_{"gen:gallery", "gen:cornell"};
   std::string codec_size_ = "1280x720";
   int codec_frames_ = 4;

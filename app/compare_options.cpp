@@ -20,16 +20,6 @@ namespace {
 
 constexpr int kMostRanks = 4096;
 
-std::vector<std::string> split(std::string_view list) {
-  std::vector<std::string> items;
-  while (true) {
-    const auto comma = list.find(',');
-    items.emplace_back(list.substr(0, comma));
-    if (comma == std::string_view::npos) return items;
-    list.remove_prefix(comma + 1);
-  }
-}
-
 template <typename Strategies>
 std::vector<std::string> names_of(const Strategies& strategies) {
   std::vector<std::string> names;
@@ -39,9 +29,19 @@ std::vector<std::string> names_of(const Strategies& strategies) {
 
 }  // namespace
 
+std::vector<std::string> split_commas(std::string_view list) {
+  std::vector<std::string> items;
+  while (true) {
+    const auto comma = list.find(',');
+    items.emplace_back(list.substr(0, comma));
+    if (comma == std::string_view::npos) return items;
+    list.remove_prefix(comma + 1);
+  }
+}
+
 std::vector<std::string> split_strategies(std::string_view list) {
   std::vector<std::string> names;
-  for (const std::string& item : split(list)) {
+  for (const std::string& item : split_commas(list)) {
     const bool is_number = !item.empty() && item.find_first_not_of("0123456789") == std::string::npos;
     if (is_number && !names.empty()) {
       names.back() += "," + item;
@@ -65,19 +65,19 @@ Size parse_size(const std::string& text, const std::string& option, int most) {
   return {extent->first, extent->second};
 }
 
-std::vector<int> parse_ranks(const std::string& list) {
-  std::vector<int> ranks;
-  for (const std::string& item : split(list)) {
+std::vector<int> parse_counts(const std::string& list, const std::string& option) {
+  std::vector<int> counts;
+  for (const std::string& item : split_commas(list)) {
     int value = 0;
     const auto [end, failure] = std::from_chars(item.data(), item.data() + item.size(), value);
     if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMostRanks) {
       throw Error(ExitCode::Usage,
-                  fmt::format("--ranks: '{}' is not a number of ranks from 1 to {}", printable(item), kMostRanks),
-                  "write it like --ranks 1,2,4,8");
+                  fmt::format("{}: '{}' is not a number from 1 to {}", option, printable(item), kMostRanks),
+                  fmt::format("write it like {} 1,2,4,8", option));
     }
-    ranks.push_back(value);
+    counts.push_back(value);
   }
-  return ranks;
+  return counts;
 }
 
 void CompareOptions::declare(CLI::App& app, bool draws_scenes) {
@@ -188,7 +188,7 @@ void CompareOptions::check_shading() const {
 
 std::vector<int> CompareOptions::rank_counts() const {
   if (!simulate.empty()) return {parse_simulation(simulate).ranks};
-  if (!ranks.empty()) return parse_ranks(ranks);
+  if (!ranks.empty()) return parse_counts(ranks, "--ranks");
   return inside_mpi_job() ? std::vector<int>{} : std::vector<int>{2, 4};
 }
 

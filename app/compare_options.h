@@ -18,8 +18,11 @@ namespace hpr {
 /// "3x2"; throws Error (Limit) past `most` a side.
 [[nodiscard]] Size parse_size(const std::string& text, const std::string& option, int most);
 
-/// "1,2,4,8".
-[[nodiscard]] std::vector<int> parse_ranks(const std::string& list);
+/// The words between commas.
+[[nodiscard]] std::vector<std::string> split_commas(std::string_view list);
+
+/// "1,2,4,8": numbers from 1 to the most ranks there may be.
+[[nodiscard]] std::vector<int> parse_counts(const std::string& list, const std::string& option);
 
 /// What the user said, and what follows from it alone.
 struct CompareOptions {
