@@ -126,7 +126,9 @@ class CompareCommand final : public Command {
       } else {
         std::string output;
         const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()),
-                                     {.captured_stdout = &output, .environment = {{kHandOverVariable, "1"}}});
+                                     {.captured_stdout = &output,
+                                      .environment = {{kHandOverVariable, "1"}},
+                                      .hang_limit = globals.hang_limit()});
         // Its ranks have said on stderr what went wrong.
         if (code != static_cast<int>(ExitCode::Done) && code != static_cast<int>(ExitCode::CheckFailed)) {
           return static_cast<ExitCode>(code);

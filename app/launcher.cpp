@@ -2,12 +2,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -17,7 +18,10 @@
 #include <system_error>
 #include <utility>
 
+#include "app/passed_signals.h"
+#include "app/process_tree.h"
 #include "core/error.h"
+#include "core/log.h"
 
 namespace hpr {
 namespace {
@@ -40,11 +44,17 @@ constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
 constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
 /// Tells the ranks of a job, whose stderr is a pipe, that their launcher's is a terminal.
 constexpr const char* kTerminalVariable = "HPR_TERMINAL";
-/// Tells rank 0 to say on its standard output, before all else, that the ranks have started.
-constexpr const char* kStartVariable = "HPR_SAY_START";
+/// Tells rank 0 to say on its standard output, before all else, that the ranks have started. Open MPI takes variables
+/// of this prefix to other hosts.
+constexpr const char* kStartVariable = "OMPI_HPR_SAY_START";
 constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
-/// Seconds after which signals are passed on without that: where ranks run elsewhere, the variable may not reach them.
-constexpr unsigned kLongestStart = 30;
+
+/// What starting processes may take beside what its ranks may take to start MPI, which they time themselves.
+constexpr std::chrono::seconds kStartGrace{10};
+/// Between these a job may take as long as its ranks wait for each other to end once it was told to. Open MPI gives
+/// ranks a second.
+constexpr std::chrono::seconds kLeastEnd{2};
+constexpr std::chrono::seconds kLongestEnd{10};
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
@@ -70,111 +80,12 @@ constexpr unsigned kLongestStart = 30;
   ::_exit(127);
 }
 
-// The handler reaches nothing but globals.
-std::atomic<pid_t> launched = 0;
-std::atomic<bool> stops = false;  ///< Interrupts::Stop
-std::atomic<int> interrupted_by = 0;
-std::atomic<bool> ends = false;     ///< nothing more is to be said
-std::atomic<int> early = 0;         ///< a signal that came before there was anybody to pass it to
-std::atomic<bool> started = false;  ///< the ranks; before, mpiexec loses requests, or ranks die of them
-
-bool is_request(int signal) {
-  return signal == SIGUSR1 || signal == SIGUSR2;
-}
-
-/// Of two signals that wait, the one that asks for more stays.
-int weight_of(int signal) {
-  return signal == 0 ? 0 : signal == SIGUSR2 ? 1 : signal == SIGUSR1 ? 2 : 3;
-}
-
-void pass_on_early() {
-  const int signal = early.exchange(0);
-  const pid_t to = launched.load();
-  if (signal == 0) return;
-  if (to > 0 && (started.load() || !is_request(signal))) {
-    ::kill(to, signal);
-  } else {
-    int waiting = 0;  // another may have come meanwhile
-    while (weight_of(waiting) < weight_of(signal) && !early.compare_exchange_weak(waiting, signal)) {
-    }
-  }
-}
-
-void note_start() {
-  started.store(true);
-  pass_on_early();
-}
-
-extern "C" void pass_on(int signal) {
-  const int error = errno;
-  if (signal == SIGALRM) note_start();
-  if (signal == SIGINT || signal == SIGTERM || signal == SIGHUP) {
-    const bool again = interrupted_by.exchange(signal) != 0;
-    ends.store(again || !stops.load());
-    if (stops.load()) {
-      signal = again ? SIGTERM : SIGUSR1;
-    } else {
-      signal = again ? SIGKILL : SIGTERM;
-    }
-  }
-  if (signal != SIGALRM && weight_of(signal) >= weight_of(early.load())) {
-    if (early.exchange(signal) == 0 && is_request(signal) && !started.load()) ::alarm(kLongestStart);
-  }
-  pass_on_early();
-  errno = error;
-}
-
-/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks, and so does what interrupts a
-/// job in a process group of its own: this process leaves when its ranks have. A second interrupt is not waited for.
-class PassedSignals {
- public:
-  explicit PassedSignals(const JobOptions& options)
-      : count_(options.input == StandardInput::None ? kSignals.size() : 3) {
-    launched.store(0);
-    early.store(0);
-    started.store(false);
-    interrupted_by.store(0);
-    ends.store(false);
-    stops.store(options.interrupts == Interrupts::Stop);
-    struct sigaction action {};
-    action.sa_handler = pass_on;
-    // One at a time: two that meet in the handler would lose one of them.
-    for (const int signal : kSignals) ::sigaddset(&action.sa_mask, signal);
-    for (std::size_t i = 0; i < count_; ++i) {
-      ::sigaction(kSignals.at(i), nullptr, &before_.at(i));
-      // What nohup, or a shell for its background, has us ignore stays ignored.
-      if (before_.at(i).sa_handler != SIG_IGN) ::sigaction(kSignals.at(i), &action, nullptr);
-    }
-  }
-  ~PassedSignals() {
-    for (std::size_t i = count_; i-- > 1;) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
-    ::alarm(0);  // no handler sets it any more
-    ::sigaction(kSignals.front(), &before_.front(), nullptr);
-    // As if it had not been caught.
-    if (const int signal = interrupted_by.load(); signal != 0 && !stops.load()) ::raise(signal);
-  }
-  PassedSignals(const PassedSignals&) = delete;
-  PassedSignals& operator=(const PassedSignals&) = delete;
-
-  static void to(pid_t child) {
-    launched.store(child);
-    pass_on_early();
-  }
-  /// The child was waited for: its number may soon be another process's.
-  static void to_nobody() { launched.store(0); }
-
- private:
-  static constexpr std::array kSignals{SIGALRM, SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
-  std::size_t count_;  ///< of them, from the front
-  std::array<struct sigaction, kSignals.size()> before_{};
-};
-
 /// False with errno. A reader that stands still keeps nobody who wants to end this.
 bool write_all(int file, std::string_view text) {
   while (!text.empty()) {
     errno = EINTR;
-    const ssize_t written = ends.load() ? -1 : ::write(file, text.data(), text.size());
-    if (written < 0 && errno == EINTR && !ends.load()) continue;
+    const ssize_t written = PassedSignals::ends() ? -1 : ::write(file, text.data(), text.size());
+    if (written < 0 && errno == EINTR && !PassedSignals::ends()) continue;
     if (written < 0) return false;
     text.remove_prefix(static_cast<std::size_t>(written));
   }
@@ -192,7 +103,7 @@ class StartMark {
     const bool like = front_.compare(0, length, kStartMark, 0, length) == 0;
     if (like && length < kStartMark.size()) return {};
     looked_ = true;
-    note_start();
+    PassedSignals::note_start();
     return std::string_view(front_).substr(like ? length : 0);
   }
 
@@ -204,24 +115,94 @@ class StartMark {
   bool looked_ = false;
 };
 
-/// Collects what the job says on its standard output in `collected`, or says it here as it comes: mpiexec does not
-/// tell when nobody can take it. Returns the errno that ended that, and the job; 0: all was said.
-int hear_out(int pipe, std::string* collected, pid_t child, StartMark& mark) {
-  int failed = 0;
-  std::array<char, 65536> buffer{};
-  while (true) {
-    const ssize_t got = ::read(pipe, buffer.data(), buffer.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return failed;
-    const std::string_view text = mark.take({buffer.data(), static_cast<std::size_t>(got)});
-    if (collected != nullptr) {
-      collected->append(text);
-    } else if (failed == 0 && !write_all(STDOUT_FILENO, text)) {
-      failed = errno;
-      if (!ends.load()) ::kill(child, SIGTERM);  // else it was told already, and twice is without mercy
+/// A job from its start to its end. What it says on its standard output is collected, or said here as it comes: mpiexec
+/// does not tell when nobody can take it. No wait for mpiexec is without a limit.
+class RunningJob {
+ public:
+  RunningJob(pid_t child, int output, const JobOptions& options)
+      : child_(child),
+        output_(output),
+        collected_(options.captured_stdout),
+        start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kLongestWait) + kStartGrace),
+        end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kLeastEnd, kLongestEnd)) {}
+
+  /// Waits for its end; its status as waitpid tells it.
+  int follow() {
+    while (true) {
+      const bool heard = hear();
+      keep_limits();
+      if (heard && !killed_) continue;
+      int status = 0;
+      const pid_t ended = ::waitpid(child_, &status, WNOHANG);
+      if (ended < 0 && errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
+      if (ended != child_) continue;
+      if (output_ >= 0) ::close(output_);  // somebody it left behind holds the other end
+      return status;
     }
   }
-}
+
+  [[nodiscard]] bool heard() const { return mark_.heard(); }
+  /// The errno that kept what it said from being said, and ended it; 0: all was said.
+  [[nodiscard]] int unsaid() const { return unsaid_; }
+  /// Its ranks had not started in time, and it was ended.
+  [[nodiscard]] bool late() const { return late_; }
+  /// It did not end in time when it was told to.
+  [[nodiscard]] bool killed() const { return killed_; }
+  [[nodiscard]] std::chrono::duration<double> start_limit() const { return start_limit_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// False when it says nothing just now, or nothing more.
+  bool hear() {
+    constexpr int kBetweenLooks_ms = 200;
+    constexpr int kToTheEnd_ms = 5;
+    pollfd waiting{.fd = output_, .events = POLLIN, .revents = 0};  // one below 0 is passed over
+    if (::poll(&waiting, 1, output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms) <= 0) return false;
+    std::array<char, 65536> buffer{};
+    const ssize_t got = ::read(output_, buffer.data(), buffer.size());
+    if (got < 0 && errno == EINTR) return true;
+    if (got <= 0) {
+      ::close(std::exchange(output_, -1));
+      return false;
+    }
+    const std::string_view text = mark_.take({buffer.data(), static_cast<std::size_t>(got)});
+    if (collected_ != nullptr) {
+      collected_->append(text);
+    } else if (unsaid_ == 0 && !write_all(STDOUT_FILENO, text)) {
+      unsaid_ = errno;
+      if (!PassedSignals::ends()) ::kill(child_, SIGTERM);  // else it was told already, and twice is without mercy
+    }
+    return true;
+  }
+
+  void keep_limits() {
+    const Clock::time_point now = Clock::now();
+    if (!told_ && (PassedSignals::ends() || unsaid_ != 0)) told_ = now;
+    if (!told_ && !mark_.heard() && now - begin_ > start_limit_) {
+      late_ = true;
+      told_ = now;
+      ::kill(child_, SIGTERM);
+    }
+    if (!told_ || killed_ || now - *told_ <= end_limit_) return;
+    log::warning("mpiexec has not ended {:g} s after it was told to, and is killed",
+                 std::chrono::duration<double>(end_limit_).count());
+    kill_with_descendants(child_);
+    killed_ = true;
+  }
+
+  pid_t child_;
+  int output_;
+  std::string* collected_;
+  std::chrono::nanoseconds start_limit_;
+  std::chrono::nanoseconds end_limit_;
+  StartMark mark_;
+  Clock::time_point begin_ = Clock::now();
+  std::optional<Clock::time_point> told_;  ///< to end
+  int unsaid_ = 0;
+  bool late_ = false;
+  bool killed_ = false;
+};
 
 }  // namespace
 
@@ -302,19 +283,21 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   PassedSignals::to(child);
 
   ::close(pipe[1]);
-  StartMark mark;
-  const int unsaid = hear_out(pipe[0], options.captured_stdout, child, mark);
-  ::close(pipe[0]);
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
-  }
+  RunningJob job(child, pipe[0], options);
+  const int status = job.follow();
   PassedSignals::to_nobody();
-  if (unsaid != 0) {
+  if (job.unsaid() != 0) {
     throw Error(ExitCode::Io,
-                fmt::format("cannot write to standard output: {}", std::generic_category().message(unsaid)),
+                fmt::format("cannot write to standard output: {}", std::generic_category().message(job.unsaid())),
                 "free some space, or see who closed the pipe");
   }
+  if (job.late()) {
+    throw Error(
+        ExitCode::Io, fmt::format("mpiexec has not started {} ranks in {:g} s", ranks, job.start_limit().count()),
+        "its own words, if any, stand above; see that TMPDIR may be written and has space, and that no limit of "
+        "file sizes (ulimit -f) is in its way; raise --hang-timeout if it only needs longer; or use --ranks 1");
+  }
+  if (job.killed()) return 128 + PassedSignals::interrupted_by();
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
@@ -327,7 +310,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
   // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
-  if (code == static_cast<int>(ExitCode::CheckFailed) && !mark.heard() && interrupted_by.load() == 0) {
+  if (code == static_cast<int>(ExitCode::CheckFailed) && !job.heard() && PassedSignals::interrupted_by() == 0) {
     throw Error(
         ExitCode::Io, fmt::format("MPI could not start {} ranks", ranks),
         "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "

@@ -124,7 +124,11 @@ ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communic
                    const JobOptions& options) {
   const auto body = [&](Communicator& comm) { return traced(comm, globals, untraced); };
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
-  if (globals.ranks > 1) return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
+  if (globals.ranks > 1) {
+    JobOptions limited = options;
+    limited.hang_limit = globals.hang_limit();
+    return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, limited));
+  }
   ExitCode code = ExitCode::Done;
   run_local_ranks(
       1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());

@@ -105,7 +105,8 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
   // The launcher's own words, which name the rank and its host, are wanted here.
   const JobOptions options{
       .environment = {{RunJournal::kVariable, journal.path().string()}, {"OMPI_MCA_orte_execute_quiet", "0"}},
-      .interrupts = interrupts};
+      .interrupts = interrupts,
+      .hang_limit = globals.hang_limit()};
   std::optional<std::size_t> ended_at;
   for (int restart = 0;; ++restart) {
     std::optional<Error> lost;

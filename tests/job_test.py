@@ -93,6 +93,56 @@ def ignored(folder):
     expect(stuck.returncode == -signal.SIGTERM, f"a run whose reader stands still left with {stuck.returncode} when told to end")
 
 
+def stubborn(folder):
+    """A mpiexec that neither starts ranks nor ends when it is told to: an environment that finds it, and a file with the
+    numbers of its processes, one in a group of its own as ranks are."""
+    script = folder / "stubborn" / "mpiexec"
+    script.parent.mkdir(exist_ok=True)
+    script.write_text(f"#!/bin/sh\ntrap '' TERM INT\nsetsid sleep 300 &\necho $$ $! > {folder}/stubborn/pids\n"
+                      "while :; do sleep 1; done\n")
+    script.chmod(0o755)
+    return {**os.environ, "PATH": f"{script.parent}:{os.environ['PATH']}"}, script.parent / "pids"
+
+
+def runs(pid):
+    try:
+        state = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"  # who reaps an orphan is not ours to say
+
+
+def expect_gone(case, pids):
+    left = [pid for pid in map(int, pids.read_text().split()) if runs(pid)]
+    expect(not left, f"{case}: processes {left} are left")
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    pids.unlink()
+
+
+def limits_of_a_stubborn_mpiexec(folder):
+    environment, pids = stubborn(folder)
+    for case, number, limit in (("ranks that never start", None, "1s"), ("SIGTERM", signal.SIGTERM, "2s"),
+                                ("SIGINT", signal.SIGINT, "2s")):
+        with open(folder / "said", "w+", encoding="utf-8") as said:
+            run = subprocess.Popen([HPR, "render", "gen:cornell", "-o", "stubborn.png", "--size", "32x24", "--passes", "none",
+                                    "--ranks", "2", "--hang-timeout", limit], cwd=folder, env=environment, stderr=said)
+            while run.poll() is None and not (pids.exists() and pids.read_text()):
+                time.sleep(0.02)
+            if number:
+                run.send_signal(number)
+            try:
+                run.wait(timeout=9 if number else 30)
+            except subprocess.TimeoutExpired:
+                run.kill()
+                run.wait()
+            said.seek(0)
+            message = said.read()
+        expect(run.returncode == (-number if number else 4), f"{case}: left with {run.returncode}: {message}")
+        expect(bool(number) or ("has not started 2 ranks" in message and "--hang-timeout" in message), f"{case}: says {message}")
+        expect_gone(case, pids)
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-job-") as scratch:
         folder = pathlib.Path(scratch)
@@ -101,6 +151,7 @@ def main():
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
         ignored(folder)
+        limits_of_a_stubborn_mpiexec(folder)
         interrupted(folder, 2, signal.SIGINT, False)
         interrupted(folder, 2, signal.SIGINT, True)
     return 1 if failures else 0
