@@ -118,6 +118,11 @@ void RenderOptions::declare(CLI::App& app) {
   app.add_option("--stats", stats, "write what the frame took as JSON")->type_name("FILE.json");
 }
 
+void RenderOptions::declare_wall(CLI::App& app) {
+  declare(app);
+  app.get_option("--aov")->group("");
+}
+
 void RenderOptions::declare_frame(CLI::App& app) {
   const auto point = [&](const char* name, std::vector<double>& value, const char* text) {
     return app.add_option(name, value, text)->delimiter(',')->expected(3)->type_name("X,Y,Z");

@@ -20,7 +20,7 @@ class ViewCommand final : public Command {
     app.add_option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
         ->check(CLI::Range(1, 1'000'000));
     declare_target_ms(app, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
-    run_.options.declare(app);
+    run_.options.declare_wall(app);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {

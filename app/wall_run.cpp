@@ -347,7 +347,7 @@ class WallRunCommand final : public Command {
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
     run_.remote.declare(app);
-    run_.options.declare(app);
+    run_.options.declare_wall(app);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override { return run_wall(run_, globals); }
