@@ -38,9 +38,7 @@ class Descriptor {
 [[noreturn]] void fail(std::string_view doing, const std::filesystem::path& path, int error) {
   const std::string reason = std::generic_category().message(error);
   throw Error(ExitCode::Io, fmt::format("{} '{}': {}", doing, printable(path.string(), 300), reason),
-              error == ENOSPC || error == EDQUOT
-                  ? "free some space or write elsewhere with -o; nothing partial was left"
-                  : "check the path and its permissions");
+              file_error_hint(error));
 }
 
 void write_all(int file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
@@ -110,6 +108,13 @@ int create_unnamed(const std::filesystem::path& folder) {
 }
 
 }  // namespace
+
+std::string file_error_hint(int error) {
+  if (error == ENOSPC || error == EDQUOT) return "free some space or write elsewhere with -o; nothing partial was left";
+  if (error == EFBIG)
+    return "raise the limit of file sizes (ulimit -f), or write elsewhere with -o; nothing partial was left";
+  return "check the path and its permissions";
+}
 
 std::string_view without_mark(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";

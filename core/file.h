@@ -14,6 +14,9 @@ namespace hpr {
 /// directory), Limit when it is larger than `limit_bytes`.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes);
 
+/// What to do where a file cannot be read or written, by its errno.
+[[nodiscard]] std::string file_error_hint(int error);
+
 /// `text` less the byte order mark that some editors and spreadsheets put before UTF-8.
 [[nodiscard]] std::string_view without_mark(std::string_view text);
 

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
 
@@ -75,7 +76,8 @@ int open_fifo(const std::filesystem::path& path, std::chrono::milliseconds time_
     const int file = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
     if (file >= 0) return file;
     if (errno != ENXIO && errno != EINTR) {
-      throw Error(ExitCode::Io, fmt::format("cannot write to the FIFO '{}': {}", path.string(), reason(errno)));
+      throw Error(ExitCode::Io, fmt::format("cannot write to the FIFO '{}': {}", path.string(), reason(errno)),
+                  file_error_hint(errno));
     }
     if (watch.ms() > static_cast<double>(time_limit.count())) {
       throw Error(ExitCode::Io, fmt::format("nobody reads the FIFO '{}'", path.string()),
@@ -152,7 +154,7 @@ void Sink::fail(int error) {
     throw Error(ExitCode::Io, fmt::format("{} stopped reading frames", name_),
                 "see what it said; it ended before the run did");
   }
-  throw Error(ExitCode::Io, fmt::format("cannot write to {}: {}", name_, reason(error)));
+  throw Error(ExitCode::Io, fmt::format("cannot write to {}: {}", name_, reason(error)), file_error_hint(error));
 }
 
 void Sink::wait_until_writable() const {
@@ -203,7 +205,7 @@ void Sink::finish() {
                 "let it leave at the end of its input, or raise --pipe-timeout");
   }
   if (WIFSIGNALED(status)) {
-    throw Error(ExitCode::Io, fmt::format("{} was ended by signal {}", name_, WTERMSIG(status)));
+    throw Error(ExitCode::Io, fmt::format("{} was ended by signal {}", name_, WTERMSIG(status)), "see what it said");
   }
   if (WEXITSTATUS(status) != 0) {
     throw Error(ExitCode::Io, fmt::format("{} left with {}", name_, WEXITSTATUS(status)), "see what it said");
