@@ -11,6 +11,7 @@ import fcntl
 import json
 import os
 import pathlib
+import resource
 import struct
 import subprocess
 import sys
@@ -20,9 +21,9 @@ HPR = os.path.abspath(sys.argv[1])
 failures = []
 
 
-def run(arguments, folder, environment=None):
+def run(arguments, folder, environment=None, limit=None):
     return subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False,
-                          env={**os.environ, **(environment or {})})
+                          env={**os.environ, **(environment or {})}, preexec_fn=limit)
 
 
 def complain(case, result, message):
@@ -41,14 +42,14 @@ def error_lines(text):
     return found
 
 
-def expect_error(case, arguments, codes, mentions=(), environment=None, prepare=None, folder=None):
+def expect_error(case, arguments, codes, mentions=(), environment=None, prepare=None, folder=None, limit=None):
     """Runs hpr in a fresh folder (or `folder`) and expects one of `codes`, an orderly message and no new file."""
     with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
         where = pathlib.Path(folder or scratch)
         if prepare:
             prepare(where)
         before = sorted(p.name for p in where.rglob("*"))
-        result = run(arguments, where, environment)
+        result = run(arguments, where, environment, limit)
         after = sorted(p.name for p in where.rglob("*"))
     lines = [line for line in result.stderr.splitlines() if line.startswith("hpr: error:")]
     if result.returncode not in codes:
@@ -167,10 +168,21 @@ def full_disk():
             print("full disk: not tried, it needs the right to mount")
             return
         try:
+            wall = ["wall", "run", "2x1@64x48", "gen:cornell", "--passes", "none", "--display", "pipe", "-o"]
+            expect_error("full disk, frames", [*wall, f"{folder}/a.y4m"], [4], ["space", "hint"], folder=folder)
             expect_error("full disk", ["render", "gen:gallery", "--size", "320x256", "-o", f"{folder}/a.exr"], [4],
                          ["space"], folder=folder)
         finally:
             subprocess.run(["umount", folder], check=False)
+
+
+def limited_files():
+    """A limit of file sizes is no full disk, and no matter of permissions."""
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+    for arguments in (["render", "gen:gallery", "--size", "320x256", "-o", "a.png"],
+                      ["wall", "run", "2x1@64x48", "gen:cornell", "--passes", "none", "--display", "pipe", "-o", "a.y4m"]):
+        expect_error(f"limited files, {arguments[0]}", arguments, [4], ["ulimit -f"], limit=limit)
 
 
 def main():
@@ -203,6 +215,13 @@ def main():
     expect_error("tiles that do not fit", ["bench", "rays", "gen:cornell", "--side", "127"], [2], ["--side 64"])
     expect_error("options of displays elsewhere", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--codec", "raw"],
                  [2], ["--display remote"])
+    for override in ("=3", "name=", "surfaces.0"):
+        expect_error(f"--set {override}", ["wall", "check", "2x2", "--set", override], [2], [f"--set {override}", "hint"])
+    for wall in ("0x2", "2x2@0x3"):
+        expect_error(f"wall {wall}", ["wall", "check", wall], [2], [wall, "hint"])
+    expect_error("AOVs of a wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--aov", "id"], [2], ["AOVs"])
+    if "--aov" in run(["wall", "run", "--help"], ".").stdout:
+        failures.append("the help of wall run names --aov, which walls refuse")
     expect_error("a --set nobody acts on", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--set",
                                             "render.strategy=tree"], [3], ["render"])
     expect_error("no factors", [*dense, "--ranks", "4", "--strategies", "tree,radix-k:2,x"], [2], ["x"])
@@ -226,7 +245,7 @@ def main():
                  ["wall", "run", "2x1@16x16", "none.glb", "-o", "a/b", "--ranks", "2"], [4], ["none.glb"])
     expect_error("missing wall", ["wall", "check", "none.toml"], [4], ["none.toml"])
     expect_finding(["wall", "check", "none.toml", "--json"], 4, "none.toml")
-    expect_finding(["wall", "check", "0x2", "--json"], 3, "0x2")
+    expect_finding(["wall", "check", "0x2", "--json"], 2, "0x2")
     expect_error("missing folder", ["render", "gen:gallery", "-o", "none/a.png", *SMALL], [4], ["none"])
     expect_error("a scene that would be replaced", ["render", "a.gltf", "-o", "a.png", *SMALL, "--stats", "a.gltf", "--force"], [2],
                  ["a.gltf"], prepare=writer("a.gltf", "precious"))
@@ -280,6 +299,7 @@ def main():
         expect_error(f"ranks that cannot talk, {case}", [*arguments, "--ranks", "2"], [4], ["TMPDIR"],
                      environment={"OMPI_MCA_btl": "none-such"})
     full_disk()
+    limited_files()
 
     with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
         result = run(["render", "gen:gallery", "-o", "a.png", *SMALL], scratch)

@@ -23,13 +23,22 @@ std::string_view line_of(std::string_view text, int line) {
 
 }  // namespace
 
+/// What an expansion has wrong comes of the overrides, and all of them may have a part in it.
+std::string Findings::where(TextPlace place) const {
+  const std::string wall = kind_ == WallText::Expansion ? fmt::format("{} with ", printable(name_)) : "";
+  if (place.option > 0) {
+    return fmt::format("{}--set {}: ", wall, printable(overrides_.at(static_cast<std::size_t>(place.option - 1))));
+  }
+  if (kind_ == WallText::Expansion && !overrides_.empty()) {
+    return fmt::format("{}--set {}: ", wall, printable(fmt::format("{}", fmt::join(overrides_, " --set ")), 200));
+  }
+  return place.line > 0 ? fmt::format("{}:{}:{}: ", name_, place.line, place.column) : fmt::format("{}: ", name_);
+}
+
 void Findings::add(bool error, TextPlace place, std::string_view what, std::string hint) {
   constexpr std::size_t kLineLimit = 200;
-  std::string where = fmt::format("{}: ", name_);
-  if (place.line > 0) where = fmt::format("{}:{}:{}: ", name_, place.line, place.column);
-  if (place.option > 0) {
-    where = fmt::format("--set {}: ", printable(overrides_.at(static_cast<std::size_t>(place.option - 1))));
-  }
+  const std::string where = this->where(place);
+  if (kind_ == WallText::Expansion) place.line = place.column = 0;
   const std::string line = place.line > 0 ? printable(line_of(text_, place.line), kLineLimit) : std::string();
   findings_.push_back({error, place, where + std::string(what), line, std::move(hint)});
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,12 +19,19 @@ struct WallFinding {
   std::string hint;
 };
 
+/// Where the text of a wall comes from.
+enum class WallText : std::uint8_t {
+  File,
+  Expansion,  ///< of a shorthand: nobody has seen its lines
+};
+
 /// Collects findings about one text.
 class Findings {
  public:
   /// `overrides` are named where a place is in one of them.
-  Findings(std::string name, std::string_view text, std::vector<std::string> overrides = {})
-      : name_(std::move(name)), text_(text), overrides_(std::move(overrides)) {}
+  Findings(std::string name, std::string_view text, std::vector<std::string> overrides = {},
+           WallText kind = WallText::File)
+      : name_(std::move(name)), text_(text), overrides_(std::move(overrides)), kind_(kind) {}
 
   void error(TextPlace place, std::string_view what, std::string hint) { add(true, place, what, std::move(hint)); }
   void warning(TextPlace place, std::string_view what, std::string hint) { add(false, place, what, std::move(hint)); }
@@ -36,10 +44,12 @@ class Findings {
 
  private:
   void add(bool error, TextPlace place, std::string_view what, std::string hint);
+  [[nodiscard]] std::string where(TextPlace place) const;
 
   std::string name_;
   std::string_view text_;
   std::vector<std::string> overrides_;
+  WallText kind_;
   std::vector<WallFinding> findings_;
   TextPlace first_ignored_;
   std::vector<std::string> ignored_;

@@ -121,8 +121,9 @@ void finish_wall(Wall& wall) {
   wall.hash = xxh64(std::as_bytes(std::span(text)));
 }
 
-WallReading parse_wall(std::string_view text, const std::string& name, const std::vector<std::string>& overrides) {
-  Findings findings(name, text, overrides);
+WallReading parse_wall(std::string_view text, const std::string& name, const std::vector<std::string>& overrides,
+                       WallText kind) {
+  Findings findings(name, text, overrides, kind);
   WallReading reading;
   auto parsed = parse_toml(text);
   if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
@@ -178,12 +179,12 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
   if (!grid_size || !pixels) return std::nullopt;
   const auto [columns, rows] = *grid_size;
   if (columns < 1 || rows < 1 || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
-    throw Error(ExitCode::BadInput, fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
+    throw Error(ExitCode::Usage, fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
                 fmt::format("columns times rows must be from 1 to {}", kMostScreens));
   }
   const Size size{pixels->first, pixels->second};
   if (size.width < 1 || size.height < 1 || size.width > kMostScreenSide || size.height > kMostScreenSide) {
-    throw Error(ExitCode::BadInput, fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
+    throw Error(ExitCode::Usage, fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
                 fmt::format("sides must be from 1 to {} pixels", kMostScreenSide));
   }
   WallGrid grid;
@@ -205,7 +206,7 @@ WallReading read_wall(const std::string& spec, const std::vector<std::string>& o
   constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 20;
   if (auto wall = wall_from_shorthand(spec)) {
     if (overrides.empty()) return {std::move(*wall), {}};
-    return parse_wall(expand_wall(*wall), spec, overrides);
+    return parse_wall(expand_wall(*wall), spec, overrides, WallText::Expansion);
   }
   std::error_code error;
   if (!std::filesystem::exists(spec, error)) {

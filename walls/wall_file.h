@@ -23,17 +23,17 @@ struct WallReading {
 };
 
 /// Reads the text of a wall file; `name` stands in findings, and files the wall names are looked for beside it.
-/// `overrides`: see wall_override.h.
+/// `overrides`: see wall_override.h; throws Error (Usage) where one is malformed.
 [[nodiscard]] WallReading parse_wall(std::string_view text, const std::string& name,
-                                     const std::vector<std::string>& overrides = {});
+                                     const std::vector<std::string>& overrides = {}, WallText kind = WallText::File);
 
 /// "6x3", or "6x3@1920x1080": a grid of equal screens (640 x 360 unless told) on whichever hosts there are, 0.36 m
-/// high, gaps of 6 mm, without a viewer. None when `spec` has another form. Throws Error (BadInput) for impossible
+/// high, gaps of 6 mm, without a viewer. None when `spec` has another form. Throws Error (Usage) for impossible
 /// numbers.
 [[nodiscard]] std::optional<Wall> wall_from_shorthand(std::string_view spec);
 
-/// A shorthand or a TOML file, with all its findings. Throws Error: Io when the file cannot be read, BadInput for
-/// an impossible shorthand.
+/// A shorthand or a TOML file, with all its findings. Throws Error: Io when the file cannot be read, Usage for
+/// an impossible shorthand and malformed overrides.
 [[nodiscard]] WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides = {});
 
 /// The same for those who want the wall: logs warnings (unless another process of the run does), throws the first error

@@ -306,11 +306,35 @@ TEST(WallOverrides, ErrorsNameTheOption) {
   EXPECT_EQ(error("viewers.7.ipd_m=1"), "--set viewers.7.ipd_m=1: '7' of the path is beyond the 2 there are\n");
   EXPECT_EQ(error("viewers.first.ipd_m=1"), "--set viewers.first.ipd_m=1: 'first' of the path takes a number\n");
   EXPECT_EQ(error("name.x=1"), "--set name.x=1: 'x' of the path is inside a string\n");
-  EXPECT_EQ(error("stereo.mode"), "--set stereo.mode: the value is neither TOML nor a word\n");
-  EXPECT_EQ(error("stereo.mode=[1"), "--set stereo.mode=[1: the value is neither TOML nor a word\n");
-  EXPECT_EQ(error("stereo.mode=1\nx=2"), "--set stereo.mode=1\\x0ax=2: the value is neither TOML nor a word\n");
-  EXPECT_EQ(error(".mode=1"), "--set .mode=1: a key of the path is empty\n");
-  EXPECT_EQ(error("=1"), "--set =1: a key of the path is empty\n");
+}
+
+TEST(WallOverrides, MalformedOnesAreMisuse) {
+  const auto error = [](const std::string& override) -> std::string {
+    try {
+      return errors_of(model_text(), {override});
+    } catch (const Error& thrown) {
+      EXPECT_EQ(thrown.code(), ExitCode::Usage);
+      EXPECT_NE(thrown.hint(), "");
+      return thrown.what();
+    }
+  };
+  EXPECT_EQ(error("stereo.mode"), "--set stereo.mode: the value is neither TOML nor a word");
+  EXPECT_EQ(error("name="), "--set name=: the value is neither TOML nor a word");
+  EXPECT_EQ(error("stereo.mode=[1"), "--set stereo.mode=[1: the value is neither TOML nor a word");
+  EXPECT_EQ(error("stereo.mode=1\nx=2"), "--set stereo.mode=1\\x0ax=2: the value is neither TOML nor a word");
+  EXPECT_EQ(error(".mode=1"), "--set .mode=1: a key of the path is empty");
+  EXPECT_EQ(error("=1"), "--set =1: a key of the path is empty");
+}
+
+TEST(WallOverrides, ErrorsOfAShorthandNameItAndNoLineOfItsExpansion) {
+  const auto finding = [](const std::string& override) { return read_wall("2x2", {override}).findings.at(0); };
+  const WallFinding skewed = finding("surfaces.0.screens.0.corners_m.ll=[5,5,5]");
+  EXPECT_TRUE(skewed.what.starts_with("2x2 with --set surfaces.0.screens.0.corners_m.ll=[5,5,5]: 'corners_m'"))
+      << skewed.what;
+  EXPECT_EQ(skewed.line, "");
+  EXPECT_EQ(skewed.place.line, 0);
+  const WallFinding grid = finding("surfaces.0.grid.gap_m=[1,2,3]");
+  EXPECT_TRUE(grid.what.starts_with("2x2 with --set surfaces.0.grid.gap_m=[1,2,3]: ")) << grid.what;
 }
 
 }  // namespace

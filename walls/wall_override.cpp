@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/error.h"
 #include "core/names.h"
 
 namespace hpr {
@@ -129,9 +130,10 @@ void apply_overrides(TomlValue& document, std::span<const std::string> overrides
     auto value = equals == std::string_view::npos ? std::nullopt : value_of(text.substr(equals + 1));
     const std::vector<std::string> steps = steps_of(path);
     if (!value || std::ranges::any_of(steps, &std::string::empty)) {
-      findings.error(place, value ? "a key of the path is empty" : "the value is neither TOML nor a word",
-                     std::string(kForm));
-      continue;
+      throw Error(ExitCode::Usage,
+                  fmt::format("--set {}: {}", printable(text),
+                              value ? "a key of the path is empty" : "the value is neither TOML nor a word"),
+                  std::string(kForm));
     }
     Walker walker(document, place, findings);
     if (std::ranges::all_of(steps, [&](const std::string& step) { return walker.step(step); })) {
