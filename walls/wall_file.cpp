@@ -178,13 +178,17 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
   const auto pixels = at == std::string_view::npos ? std::pair(640, 360) : pair_of(spec.substr(at + 1));
   if (!grid_size || !pixels) return std::nullopt;
   const auto [columns, rows] = *grid_size;
-  if (columns < 1 || rows < 1 || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
-    throw Error(ExitCode::Usage, fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
+  const bool none = columns < 1 || rows < 1;
+  if (none || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
+    throw Error(none ? ExitCode::Usage : ExitCode::Limit,
+                fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
                 fmt::format("columns times rows must be from 1 to {}", kMostScreens));
   }
   const Size size{pixels->first, pixels->second};
-  if (size.width < 1 || size.height < 1 || size.width > kMostScreenSide || size.height > kMostScreenSide) {
-    throw Error(ExitCode::Usage, fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
+  const bool empty = size.width < 1 || size.height < 1;
+  if (empty || size.width > kMostScreenSide || size.height > kMostScreenSide) {
+    throw Error(empty ? ExitCode::Usage : ExitCode::Limit,
+                fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
                 fmt::format("sides must be from 1 to {} pixels", kMostScreenSide));
   }
   WallGrid grid;

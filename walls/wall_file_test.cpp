@@ -308,8 +308,17 @@ TEST(WallFile, AShorthandIsAGridWithoutViewer) {
   EXPECT_TRUE(wall.screens[0].window.empty());
   EXPECT_NEAR(wall.screens[1].lower_left.x - wall.screens[0].lower_right.x, 0.006, 1e-15);
   EXPECT_EQ(load_wall("1x1@1x65536").screens[0].pixels, (Size{1, 65536}));
-  for (const char* const bad : {"0x1", "1x0", "4097x1", "65x65", "99999999999999999999x1", "1x1@0x1", "1x1@1x65537"}) {
-    EXPECT_THROW(static_cast<void>(load_wall(bad)), Error) << bad;
+  const auto code_of = [](const char* spec) {
+    try {
+      static_cast<void>(load_wall(spec));
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return ExitCode::Done;
+  };
+  for (const char* const none : {"0x1", "1x0", "1x1@0x1"}) EXPECT_EQ(code_of(none), ExitCode::Usage) << none;
+  for (const char* const many : {"4097x1", "65x65", "99999999999999999999x1", "1x1@1x65537"}) {
+    EXPECT_EQ(code_of(many), ExitCode::Limit) << many;
   }
   for (const char* const other : {"3x", "x2", "3", "3x2@", "3x2@640", "3x2.toml", "-3x2", "3x2@640x360x2"}) {
     EXPECT_FALSE(wall_from_shorthand(other).has_value()) << other;
