@@ -9,6 +9,7 @@
 #include "app/accuracy_options.h"
 #include "app/bench_codec.h"
 #include "app/bench_codec_frames.h"
+#include "app/bench_frame.h"
 #include "app/bench_net.h"
 #include "app/bench_raster.h"
 #include "app/bench_rays.h"
@@ -55,7 +56,10 @@ class BenchCommand final : public Command {
         ->capture_default_str();
     scale_ = app.add_subcommand("scale", "the same frames by more and more ranks and cores, in the shape of table 6.1");
     scale_bench_.declare(*scale_);
-    for (CLI::App* const bench : {raster, net_, rays_, codec_, scale_}) {
+    frame_ =
+        app.add_subcommand("frame", "a whole frame of one rank, step by step, against bare GL, bare Embree and a copy");
+    frame_bench_.declare(*frame_);
+    for (CLI::App* const bench : {raster, net_, rays_, codec_, scale_, frame_}) {
       bench->add_flag("--json", json_, "one JSON document");
       bench->fallthrough();
     }
@@ -66,6 +70,10 @@ class BenchCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     if (rays_->parsed()) return run_rays(globals);
     if (codec_->parsed()) return run_codec(globals);
+    if (frame_->parsed()) {
+      print(frame_bench_.run(globals), this_machine().cpu);
+      return ExitCode::Done;
+    }
     if (scale_->parsed()) return scale_bench_.run(globals, json_);
     return net_->parsed() ? run_net(globals) : run_raster(globals);
   }
@@ -125,16 +133,24 @@ class BenchCommand final : public Command {
       for (const BenchRow& row : rows) width = std::max(width, row.name.size());
       fmt::print("{:<{}} {:>10} {:>10} {:<6} {:>6}\n", "", width, "ours", "floor", "", "ratio");
       for (const BenchRow& row : rows) {
-        fmt::print("{:<{}} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, width, row.ours, row.floor, row.unit,
-                   row.ratio);
+        if (row.floor > 0.0) {
+          fmt::print("{:<{}} {:>10.2f} {:>10.2f} {:<6} {:>6.2f}\n", row.name, width, row.ours, row.floor, row.unit,
+                     row.ratio);
+        } else {
+          fmt::print("{:<{}} {:>10.2f} {:>10} {:<6} {:>6}\n", row.name, width, row.ours, "-", row.unit, "-");
+        }
       }
       return;
     }
     nlohmann::ordered_json json{
         {"schema", "hpr.bench/1"}, {"machine", machine}, {"commit", kCommit}, {"rows", nlohmann::json::array()}};
     for (const BenchRow& row : rows) {
-      json["rows"].push_back(
-          {{"name", row.name}, {"ours", row.ours}, {"floor", row.floor}, {"unit", row.unit}, {"ratio", row.ratio}});
+      const auto known = [&](double value) { return row.floor > 0.0 ? nlohmann::json(value) : nlohmann::json(); };
+      json["rows"].push_back({{"name", row.name},
+                              {"ours", row.ours},
+                              {"floor", known(row.floor)},
+                              {"unit", row.unit},
+                              {"ratio", known(row.ratio)}});
     }
     fmt::print("{}\n", json.dump(2));
   }
@@ -144,6 +160,8 @@ class BenchCommand final : public Command {
   CLI::App* codec_ = nullptr;
   CLI::App* scale_ = nullptr;
   ScaleBench scale_bench_;
+  CLI::App* frame_ = nullptr;
+  FrameBench frame_bench_;
   std::vector<std::string> codec_scenes_{"gen:gallery", "gen:cornell"};
   std::string codec_size_ = "1280x720";
   int codec_frames_ = 4;

@@ -11,9 +11,9 @@ namespace hpr {
 struct BenchRow {
   std::string name;
   double ours = 0.0;
-  double floor = 0.0;
+  double floor = 0.0;  ///< 0: there is none
   std::string unit;
-  double ratio = 0.0;  ///< our speed / the floor's: 1 is equal, more is faster
+  double ratio = 0.0;  ///< our speed / the floor's: 1 is equal, more is faster; 0 without a floor
 };
 
 /// A frame of keys (cull, draw, read back, pack) against the barest GL loop: one glDrawElements of the same mesh into

@@ -220,7 +220,10 @@ std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const Vi
 std::vector<BenchRow> bench_rays(const Scene& scene, int side, const RayBuild& build) {
   const RayScene rays(scene, RaySpace(scene.bounds), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
   const Camera camera = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
-  const View view = make_view(camera, {side, side}, scene.bounds);
+  return bench_rays(scene, rays, make_view(camera, {side, side}, scene.bounds));
+}
+
+std::vector<BenchRow> bench_rays(const Scene& scene, const RayScene& rays, const View& view) {
   const DenormalsAsZero mode;
   std::vector<BenchRow> rows;
   for (const RaySet& set : make_sets(scene, rays, view)) {

@@ -4,7 +4,9 @@
 
 #include "app/bench_raster.h"
 #include "rt/ray_build.h"
+#include "rt/ray_scene.h"
 #include "scene/scene.h"
+#include "scene/view.h"
 
 namespace hpr {
 
@@ -13,5 +15,8 @@ namespace hpr {
 /// Embree scene with the same flags. Primary rays of a picture of `side` x `side` pixels, and from what they meet rays
 /// to the first light, mirrored and diffuse ones. Both sides in turn, stretch by stretch, CPU time, best of five.
 [[nodiscard]] std::vector<BenchRow> bench_rays(const Scene& scene, int side, const RayBuild& build);
+
+/// The same of what `view` sees; its pixels are multiples of four. `rays` are built of all of `scene`.
+[[nodiscard]] std::vector<BenchRow> bench_rays(const Scene& scene, const RayScene& rays, const View& view);
 
 }  // namespace hpr

@@ -166,8 +166,9 @@ ExitCode ScaleBench::run_jobs(const Globals& globals, const ScaleInput& input, b
       const Job& job = sizes[index];
       std::string output;
       const std::string words = fmt::format("{} {} {}", job.threads, frames, quiet ? 1 : 0);
-      const int code =
-          run_mpiexec(job.ranks, globals.args, {.captured_stdout = &output, .environment = {{kJobVariable, words}}});
+      const int code = run_mpiexec(
+          job.ranks, globals.args,
+          {.captured_stdout = &output, .environment = {{kJobVariable, words}}, .hang_limit = globals.hang_limit()});
       // Its ranks have said on stderr what went wrong.
       if (code != static_cast<int>(ExitCode::Done)) return static_cast<ExitCode>(code);
       append_frames(of_size[index], scale_runs_from_json(output));
