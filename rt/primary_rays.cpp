@@ -179,7 +179,8 @@ class TileTracer {
     search_.geometries = rays.geometries();
     search_.view = &view;
     stand_at(rays.space().from_world(view.eye));
-    search_.slack = static_cast<float>(kSlack + 2.0 * largest_depth_step(view, rays.space()));
+    search_.slack = static_cast<float>(
+        std::min<double>(kSlack + 2.0 * largest_depth_step(view, rays.space()), std::numeric_limits<float>::max()));
     for (std::size_t i = 0; i < kWidth; ++i) {
       embree_.ray.tnear[i] = 0.0F;
       embree_.ray.time[i] = 0.0F;

@@ -80,11 +80,11 @@ bool is_matte(const Scene& scene, const Material& material) {
   return takes_in(scene, material) && (material.transmission < 1.0F || material.transmission_texture.present());
 }
 
-/// Whether it has a specular part: a metal reflects its colour, a dielectric light of all colours, by its index alone.
+/// Whether it has a specular part: a metal reflects its colour, at grazing angles all colours; a dielectric those by
+/// its index alone.
 bool reflects(const Scene& scene, const Material& material) {
   if (material.unlit) return false;
-  return (!is_black(material) && material.metallic > 0.0F) ||
-         (least_metallic(scene, material) < 1.0F && material.ior != 1.0F);
+  return material.metallic > 0.0F || (least_metallic(scene, material) < 1.0F && material.ior != 1.0F);
 }
 
 /// Whether it is matte, or has a specular part too rough to be followed.

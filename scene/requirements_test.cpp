@@ -152,6 +152,11 @@ TEST(Requirements, WhatAMaterialIsMadeOfDecidesWhatItMirrorsAndTransmits) {
   metal.metallic = 1.0F;
   Material black = clear;
   black.base_color = {0.0F, 0.0F, 0.0F, 1.0F};
+  Material grazing = metal;
+  grazing.base_color = black.base_color;
+  EXPECT_TRUE(requirements_of(scene_of(grazing, {Light{}})).reflection.needed)
+      << "black metal mirrors at grazing angles";
+  EXPECT_EQ(requirements_of(scene_of(grazing, {Light{}})).least_roughness, 0.0F);
   Material wall = clear;
   wall.ior = 0.0F;
   for (const Material& opaque : {metal, black, wall}) {

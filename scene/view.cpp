@@ -20,22 +20,6 @@ double near_plane(const PerspectiveLens& lens, const Bounds& bounds) {
   return close > 0.0 ? std::min(small, close) : small;
 }
 
-/// Keys spread their precision evenly from an orthographic camera's near plane to its far one: between them only what
-/// holds the scene is kept.
-void tighten(View& view, const Bounds& bounds) {
-  const glm::dvec3 extent = bounds.high - bounds.low;
-  const double diagonal = glm::length(extent);
-  if (!(diagonal > 0.0) || !std::isfinite(diagonal)) return;
-  const double middle = glm::dot(view.eye - 0.5 * (bounds.low + bounds.high), view.axes[2]);
-  const double half = 0.5 * glm::dot(extent, glm::abs(view.axes[2]));
-  const double margin = 1e-3 * diagonal + 1e-6 * std::abs(middle);  // what drawing in single precision may shift
-  const double near = std::max(view.near_distance, middle - half - margin);
-  const double far = std::min(view.far_distance, middle + half + margin);
-  if (!(near < far)) return;
-  view.near_distance = near;
-  view.far_distance = far;
-}
-
 /// What (x, y) of the view looks through, on the plane its edges are on.
 glm::dvec2 looked_through(const View& view, double x, double y) {
   const auto share = [&](const glm::dvec2& jitter) {
@@ -97,6 +81,21 @@ double reversed_depth(const View& view, double distance) {
 double view_distance(const View& view, double depth) {
   if (view.orthographic) return view.far_distance - depth * (view.far_distance - view.near_distance);
   return view.near_distance / depth;
+}
+
+void tighten(View& view, const Bounds& bounds) {
+  if (!view.orthographic) return;
+  const glm::dvec3 extent = bounds.high - bounds.low;
+  const double diagonal = glm::length(extent);
+  if (!(diagonal > 0.0) || !std::isfinite(diagonal)) return;
+  const double middle = glm::dot(view.eye - 0.5 * (bounds.low + bounds.high), view.axes[2]);
+  const double half = 0.5 * glm::dot(extent, glm::abs(view.axes[2]));
+  const double margin = 1e-3 * diagonal + 1e-6 * std::abs(middle);  // what drawing in single precision may shift
+  const double near = std::max(view.near_distance, middle - half - margin);
+  const double far = std::min(view.far_distance, middle + half + margin);
+  if (!(near < far)) return;
+  view.near_distance = near;
+  view.far_distance = far;
 }
 
 View make_view(const Camera& camera, Size size, const Bounds& bounds) {

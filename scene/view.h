@@ -65,6 +65,10 @@ struct Ray {
 /// the scene's extent; an orthographic camera's planes are moved towards `bounds`, where those hold anything.
 [[nodiscard]] View make_view(const Camera& camera, Size size, const Bounds& bounds);
 
+/// Moves an orthographic view's planes up to `bounds`, as far as those hold anything: keys spread their precision
+/// evenly from the near one to the far one. Others stay.
+void tighten(View& view, const Bounds& bounds);
+
 /// A camera that sees all of `bounds` from the front, a little above and to the right, on screens at least as wide as
 /// high: for scenes that have none.
 [[nodiscard]] Camera framing_camera(const Bounds& bounds);

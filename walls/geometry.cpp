@@ -158,6 +158,8 @@ std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, 
   if (const auto* const box = std::get_if<OrthographicLens>(&camera.lens)) {  // in the shape of the wall, all of it
     shared.top = std::max(box->half_height, box->half_width * extent.height / extent.width);
     shared.bottom = -shared.top;
+    shared.near_distance = box->near_distance;  // each screen has its own way to the scene
+    shared.far_distance = box->far_distance;
   }
   std::vector<View> views;
   for (const ScreenEye& picture : screen_eyes(wall)) {
@@ -168,6 +170,7 @@ std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, 
     const glm::dvec3 eye = shared.orthographic ? placement.anchor : eye_position(viewer, head, picture.eye);
     View view = screen_view(shared, screen, placement, eye, viewer.clamp_distance_m);
     if (viewer.near_m > 0.0 && !shared.orthographic) view.near_distance = viewer.near_m;
+    tighten(view, bounds);
     view.screen = picture.pixels;
     view.block = {0, 0, picture.pixels.width, picture.pixels.height};
     view.screen_number = static_cast<std::uint32_t>(views.size());

@@ -215,6 +215,29 @@ TEST(WallGeometry, AnOrthographicCameraCoversItsHalfHeightWithHalfTheWall) {
   EXPECT_NEAR(wide[1].right - wide[0].left, 60.0, 1e-12);
 }
 
+TEST(WallGeometry, AnOrthographicCameraSeesTheWholeSceneOnTurnedScreensToo) {
+  Wall wall = wall_of({screen_at({-1, -1, -2}, {1, -1, -2}, {-1, 1, -2}, {64, 64}),
+                       screen_at({1, -1, -2}, {1, -1, 0}, {1, 1, -2}, {64, 64})},
+                      {0.0, 0.0, 0.0});
+  const Bounds wide{{-9.0, -1.0, -0.5}, {9.0, 1.0, 0.5}};
+  Camera camera = straight();
+  camera.lens = OrthographicLens{4.0, 3.0, 0.01, 100.0};
+  const std::vector<View> views = wall_views(wall, camera, wide);
+  ASSERT_EQ(views.size(), 2U);
+  EXPECT_LT(std::abs(glm::dot(views[0].axes[2], views[1].axes[2])), 1e-12) << "a right angle";
+  for (const View& view : views) {
+    EXPECT_LT(view.far_distance - view.near_distance, 50.0) << "no more than needed";
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 at((corner & 1) != 0 ? wide.high.x : wide.low.x, (corner & 2) != 0 ? wide.high.y : wide.low.y,
+                          (corner & 4) != 0 ? wide.high.z : wide.low.z);
+      const double depth = glm::dot(view.eye - at, view.axes[2]);
+      if (depth < 0.01) continue;  // behind the camera's own plane
+      EXPECT_LE(view.near_distance, depth) << view.screen_number << ", corner " << corner;
+      EXPECT_GE(view.far_distance, depth) << view.screen_number << ", corner " << corner;
+    }
+  }
+}
+
 TEST(WallGeometry, AnEyeInTheScreensPlaneIsHeldAtTheClampDistance) {
   const WallScreen screen = screen_at({-1.0, -1.0, -2.0}, {1.0, -1.0, -2.0}, {-1.0, 1.0, -2.0}, {100, 100});
   for (const double distance : {1e-3, 1e-9, 0.0, -1.0}) {

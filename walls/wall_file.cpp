@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
+#include <limits>
 
 #include "core/file.h"
 #include "core/hash.h"
@@ -68,17 +69,19 @@ void read_version(TableReader& document) {
   document.error("hpr_wall", "is not 1", "this program reads version 1 of wall files: hpr_wall = 1");
 }
 
+/// The largest int for what is larger than that.
 int to_number(std::string_view digits) {
   int number = 0;
   const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-  return result.ec == std::errc() && result.ptr == digits.data() + digits.size() ? number : -1;
+  return result.ec == std::errc() && result.ptr == digits.data() + digits.size() ? number
+                                                                                 : std::numeric_limits<int>::max();
 }
 
 bool all_digits(std::string_view text) {
   return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// The two numbers of "6x3"; -1 for one too large to hold. None when the text is no such pair.
+/// The two numbers of "6x3", as to_number has them. None when the text is no such pair.
 std::optional<std::pair<int, int>> pair_of(std::string_view text) {
   const std::size_t x = text.find('x');
   if (x == std::string_view::npos) return std::nullopt;
