@@ -9,17 +9,20 @@
 #include "app/bench_bare_gl.h"
 #include "app/bench_rays.h"
 #include "app/bench_times.h"
-#include "app/compare_options.h"
 #include "app/frame_sampler.h"
 #include "app/output.h"
 #include "app/resolution.h"
 #include "app/screens.h"
+#include "app/words.h"
 #include "cluster/local_communicator.h"
+#include "core/check.h"
 
 namespace hpr {
 namespace {
 
 constexpr Size kRayPicture{512, 512};
+/// The bare loop has them all in one buffer, instances written out.
+constexpr std::uint32_t kMostBareTriangles = 30'000'000;
 
 /// What one frame took.
 struct Measured {
@@ -114,6 +117,7 @@ class Bench {
     camera_ = options.choose_camera(scene);
     view_ = make_view(camera_, size, scene.bounds);
     blocks_ = cut_blocks(at_resolution(std::span(&view_, 1), settings.resolution_scale));
+    HPR_CHECK(blocks_.views.size() == 1);
     plan_ = plan_frame(session, settings, blocks_.views);
     prepare(session, plan_);
   }
@@ -131,13 +135,12 @@ class Bench {
     }
   }
 
-  /// `bare_keys_ms`: of BareGl.
+  /// `bare_keys_ms`: of BareGl, where keys are not made by rays; 0: it was not measured.
   [[nodiscard]] std::vector<BenchRow> rows(double bare_keys_ms) {
     const auto rates = embree_rates();
     const double samples = frames_.front().times.samples;
-    std::vector<BenchRow> rows{keys_row(plan_.primary == Primary::Rays
-                                            ? static_cast<double>(view_.screen.area()) / rates.at("primary")
-                                            : bare_keys_ms)};
+    std::vector<BenchRow> rows{
+        keys_row(by_rays() ? static_cast<double>(drawn_view().size().area()) / rates.at("primary") : bare_keys_ms)};
     for (const PassTime& pass : frames_.front().times.passes) rows.push_back(pass_row(pass.name, rates));
     rows.push_back(row_of("to the screen", middle(frames_, [](const Measured& frame) { return frame.screen_ms; }),
                           copy_ms(view_.screen.area() * sizeof(Rgba8))));
@@ -150,6 +153,7 @@ class Bench {
   }
 
   [[nodiscard]] const View& drawn_view() const { return blocks_.views.front(); }
+  [[nodiscard]] bool by_rays() const { return plan_.primary == Primary::Rays; }
 
  private:
   using Rates = std::map<std::string, double, std::less<>>;
@@ -166,8 +170,7 @@ class Bench {
   }
 
   [[nodiscard]] BenchRow keys_row(double floor_ms_of_sample) const {
-    const bool by_rays = plan_.primary == Primary::Rays;
-    return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles, by_rays ? " by rays" : ""),
+    return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles, by_rays() ? " by rays" : ""),
                   middle(frames_, [](const Measured& frame) { return frame.times.primary_ms; }),
                   floor_ms_of_sample * frames_.front().times.samples);
   }
@@ -205,15 +208,21 @@ std::vector<BenchRow> FrameBench::run(const Globals& globals) const {
   const Size size = parse_size(size_, "--size", kRasterLimit);
   check_size(size, globals);
   (void)options_.settings(globals.seed);
-  (void)options_.sampling();
+  if (!options_.sampling().goal.samples) {
+    throw Error(ExitCode::Usage, "bench frame draws the same frame again and again: --spp takes a number here",
+                "write e.g. --spp 16");
+  }
+  if (globals.ranks > 1) {
+    throw Error(ExitCode::Usage, "bench frame draws on one rank", "leave --ranks out, or see hpr bench scale");
+  }
   std::vector<BenchRow> rows;
   run_local_ranks(1, [&](Communicator& comm) {
     Session session(comm, globals, [&] { return options_.load(scene_, globals); });
     Bench bench(session, globals, options_, size);
     bench.draw(frames_);
-    const double keys_ms =
-        bare_gl_ms(globals, session.threads(), WorldMesh(session.scene()), bench.drawn_view(), frames_);
-    rows = bench.rows(keys_ms);
+    const bool draws = !bench.by_rays() && session.scene().triangles <= kMostBareTriangles;
+    rows = bench.rows(
+        draws ? bare_gl_ms(globals, session.threads(), WorldMesh(session.scene()), bench.drawn_view(), frames_) : 0.0);
   });
   return rows;
 }

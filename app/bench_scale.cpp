@@ -13,6 +13,7 @@
 #include "app/screen_owners.h"
 #include "app/screens.h"
 #include "app/session.h"
+#include "app/words.h"
 #include "cluster/collectives.h"
 #include "cluster/texts.h"
 #include "core/check.h"
@@ -32,8 +33,7 @@ class WallBench {
   WallBench(Session& session, const ScaleInput& input, Size grid, const std::vector<std::string>& hosts,
             std::uint64_t seed)
       : session_(session), input_(input), sampling_(input.options.sampling()) {
-    const Wall wall =
-        load_wall(fmt::format("{}x{}@{}x{}", grid.width, grid.height, input.size.width, input.size.height));
+    const Wall wall = load_wall(wall_of(grid, input.size));
     const Scene& scene = session.scene();
     const std::vector<View> screens = wall_views(wall, input.options.choose_camera(scene), scene.bounds);
     const FrameSettings settings = input.options.settings(seed);
@@ -155,9 +155,13 @@ std::string scale_runs_to_json(const std::vector<ScaleRun>& runs) {
 }
 
 std::vector<ScaleRun> scale_runs_from_json(std::string_view text) {
-  std::vector<ScaleRun> runs;
-  for (const Json& run : Json::parse(text)) runs.push_back(run_from(run));
-  return runs;
+  try {
+    std::vector<ScaleRun> runs;
+    for (const Json& run : Json::parse(text)) runs.push_back(run_from(run));
+    return runs;
+  } catch (const Json::exception& failure) {
+    throw Error(ExitCode::Internal, fmt::format("an MPI job did not hand over its runs: {}", failure.what()));
+  }
 }
 
 void append_frames(std::vector<ScaleRun>& runs, std::vector<ScaleRun> more) {

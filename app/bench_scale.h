@@ -30,8 +30,10 @@ struct ScaleRun {
   int ranks = 1;
   int threads = 1;  ///< of each rank
   int hosts = 1;
-  std::vector<double> ms;        ///< per frame, from its first triangle to its last tile on a screen
-  std::vector<double> rank_ms;   ///< per rank the median of what it was busy with keys and light, waiting left out
+  std::vector<double> ms;  ///< per frame, from its first triangle to its last tile on a screen
+  /// Per rank the median of what keys and light took it, compositing and the way to the screen left out; of several
+  /// jobs the least. Where photons are sent, that includes waiting for those of the others.
+  std::vector<double> rank_ms;
   std::uint64_t bytes_sent = 0;  ///< of one frame, by all ranks
   std::string frame_xxh64;       ///< of the screen's RGBA8 pixels; of several screens' hashes in their order
 };

@@ -1,6 +1,7 @@
 #include "app/bench_scale_command.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -11,23 +12,24 @@
 #include <random>
 
 #include "app/bench_scale_html.h"
-#include "app/compare_options.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
 #include "app/shell_line.h"
+#include "app/words.h"
 #include "cluster/scene_distribution.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "scene/view.h"
+#include "walls/wall_file.h"
 
 namespace hpr {
 namespace {
 
-/// Set for the jobs that are measured: "THREADS FRAMES QUIET". Rank 0 prints its runs for the process that started it.
-constexpr const char* kJobVariable = "HPR_BENCH_SCALE_JOB";
-constexpr int kLargestSide = 16384;
-constexpr int kMostScreensASide = 256;
+/// Set for the jobs that are measured: "THREADS FRAMES QUIET TRACED". Rank 0 prints its runs for the process that
+/// started it. Open MPI takes variables of this prefix to other hosts.
+constexpr const char* kJobVariable = "OMPI_HPR_BENCH_SCALE_JOB";
 /// Jobs of each size, with a share of the frames each, in an order by chance: what slows the machine down for a while
 /// does not fall on one size alone.
 constexpr int kRounds = 3;
@@ -35,13 +37,16 @@ constexpr int kRounds = 3;
 struct JobOrder {
   int threads = 1;
   int frames = 1;
-  int quiet = 0;
+  int quiet = 0;   ///< what a job before has warned of already
+  int traced = 0;  ///< of several jobs the last one
 };
 
 std::optional<JobOrder> job_order() {
   const char* const text = std::getenv(kJobVariable);  // NOLINT(concurrency-mt-unsafe): nothing sets variables
   JobOrder order;
-  if (text == nullptr || std::sscanf(text, "%d %d %d", &order.threads, &order.frames, &order.quiet) != 3) return {};
+  if (text == nullptr ||
+      std::sscanf(text, "%d %d %d %d", &order.threads, &order.frames, &order.quiet, &order.traced) != 4)
+    return {};
   return order;
 }
 
@@ -75,13 +80,25 @@ void ScaleBench::declare(CLI::App& app) {
   options_.declare_frame(app);
 }
 
-std::vector<ScaleBench::Job> ScaleBench::jobs() const {
+std::vector<int> ScaleBench::ranks_said(const Globals& globals) const {
+  if (!ranks_.empty()) return parse_counts(ranks_, "--ranks");
+  return globals.ranks > 0 ? std::vector{globals.ranks} : std::vector<int>{};
+}
+
+std::vector<int> ScaleBench::threads_said(const Globals& globals) const {
+  if (!threads_.empty()) return parse_counts(threads_, "--threads");
+  return globals.threads > 0 ? std::vector{globals.threads} : std::vector<int>{};
+}
+
+std::vector<ScaleBench::Job> ScaleBench::jobs(const Globals& globals) const {
   const int cores = usable_cores();
-  const std::vector<int> ranks = ranks_.empty() ? doubled_up_to(cores) : parse_counts(ranks_, "--ranks");
-  const std::vector<int> threads = !threads_.empty() ? parse_counts(threads_, "--threads")
-                                   : !ranks_.empty() ? std::vector{1}
-                                                     : doubled_up_to(cores);
-  const bool all_said = !threads_.empty() || !ranks_.empty();
+  const std::vector<int> said_ranks = ranks_said(globals);
+  const std::vector<int> said_threads = threads_said(globals);
+  const bool all_said = !said_threads.empty() || !said_ranks.empty();
+  const std::vector<int> ranks = said_ranks.empty() ? doubled_up_to(cores) : said_ranks;
+  const std::vector<int> threads = !said_threads.empty() ? said_threads
+                                   : !said_ranks.empty() ? std::vector{1}
+                                                         : doubled_up_to(cores);
   std::vector<Job> jobs;
   for (const int thread_count : threads) {
     for (const int rank_count : ranks) {
@@ -92,10 +109,11 @@ std::vector<ScaleBench::Job> ScaleBench::jobs() const {
 }
 
 ScaleInput ScaleBench::make_input(const Globals& globals) const {
-  ScaleInput input{scene_, options_, parse_size(size_, "--size", kLargestSide), {}, warmup_};
+  ScaleInput input{scene_, options_, parse_size(size_, "--size", kRasterLimit), {}, warmup_};
   check_size(input.size, globals);
   for (const std::string& tiles : split_commas(tiles_)) {
     const Size grid = parse_size(tiles, "--tiles", kMostScreensASide);
+    (void)wall_from_shorthand(wall_of(grid, input.size));  // refuses too many screens
     check_size({grid.width * input.size.width, grid.height * input.size.height}, globals);
     input.grids.push_back(grid);
   }
@@ -115,7 +133,7 @@ void ScaleBench::check_files(const Globals& globals) const {
 
 ExitCode ScaleBench::run(const Globals& globals, bool json) const {
   const ScaleInput input = make_input(globals);
-  (void)jobs();  // refuses what is no list
+  (void)jobs(globals);  // refuses what is no list
   if (!job_order()) check_files(globals);
   return inside_mpi_job() ? run_in_job(globals, input, json) : run_jobs(globals, input, json);
 }
@@ -125,17 +143,21 @@ ExitCode ScaleBench::run_in_job(const Globals& globals, const ScaleInput& input,
   Globals job = globals;
   job.ranks = 0;
   if (order) job.threads = order->threads;
+  if (order && order->traced == 0) job.trace.clear();
   if (order && order->quiet != 0 && globals.verbosity == 0) log::configure(log::Level::Error, "");
   return run_ranks(job, [&](Communicator& comm) {
-    if (!order && !ranks_.empty() && parse_counts(ranks_, "--ranks") != std::vector{comm.size()}) {
-      throw Error(ExitCode::Usage, fmt::format("--ranks {} inside an MPI job of {} ranks", ranks_, comm.size()),
+    const std::vector<int> wanted = ranks_said(globals);
+    if (!order && !wanted.empty() && wanted != std::vector{comm.size()}) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("--ranks {} inside an MPI job of {} ranks", fmt::join(wanted, ","), comm.size()),
                   "leave --ranks away, or mpirun");
     }
     std::vector<ScaleRun> runs;
     if (order) {
       runs = measure_scale(comm, job, input, order->frames);
     } else {
-      const std::vector<int> threads = threads_.empty() ? std::vector{0} : parse_counts(threads_, "--threads");
+      std::vector<int> threads = threads_said(globals);
+      if (threads.empty()) threads.push_back(0);  // each rank's share of its host's cores
       for (const int count : threads) {
         job.threads = count;
         std::ranges::move(measure_scale(comm, job, input, frames_), std::back_inserter(runs));
@@ -151,7 +173,7 @@ ExitCode ScaleBench::run_in_job(const Globals& globals, const ScaleInput& input,
 }
 
 ExitCode ScaleBench::run_jobs(const Globals& globals, const ScaleInput& input, bool json) const {
-  const std::vector<Job> sizes = jobs();
+  const std::vector<Job> sizes = jobs(globals);
   const int rounds = std::min(kRounds, frames_);
   std::vector<std::vector<ScaleRun>> of_size(sizes.size());
   std::vector<std::size_t> order(sizes.size());
@@ -165,7 +187,8 @@ ExitCode ScaleBench::run_jobs(const Globals& globals, const ScaleInput& input, b
     for (const std::size_t index : order) {
       const Job& job = sizes[index];
       std::string output;
-      const std::string words = fmt::format("{} {} {}", job.threads, frames, quiet ? 1 : 0);
+      const bool last = round + 1 == rounds && index == order.back();
+      const std::string words = fmt::format("{} {} {:d} {:d}", job.threads, frames, quiet, last);
       const int code = run_mpiexec(
           job.ranks, globals.args,
           {.captured_stdout = &output, .environment = {{kJobVariable, words}}, .hang_limit = globals.hang_limit()});

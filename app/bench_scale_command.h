@@ -25,7 +25,10 @@ class ScaleBench {
 
   [[nodiscard]] ScaleInput make_input(const Globals& globals) const;
   void check_files(const Globals& globals) const;
-  [[nodiscard]] std::vector<Job> jobs() const;
+  /// Empty: nothing was said.
+  [[nodiscard]] std::vector<int> ranks_said(const Globals& globals) const;
+  [[nodiscard]] std::vector<int> threads_said(const Globals& globals) const;
+  [[nodiscard]] std::vector<Job> jobs(const Globals& globals) const;
   [[nodiscard]] ExitCode run_in_job(const Globals& globals, const ScaleInput& input, bool json) const;
   [[nodiscard]] ExitCode run_jobs(const Globals& globals, const ScaleInput& input, bool json) const;
   [[nodiscard]] ExitCode finish(const Globals& globals, const ScaleInput& input, std::vector<ScaleRun> runs,

@@ -10,6 +10,7 @@
 #include "app/html_page.h"
 #include "app/markup.h"
 #include "app/plot_axes.h"
+#include "app/words.h"
 
 namespace hpr {
 namespace {
@@ -28,8 +29,7 @@ struct Series {
 };
 
 std::string name_of(const ScaleRun& run) {
-  return fmt::format("{}x{}, {} core{} a rank", run.grid.width, run.grid.height, run.threads,
-                     run.threads == 1 ? "" : "s");
+  return fmt::format("{}, {} core{} a rank", grid_name(run.grid), run.threads, run.threads == 1 ? "" : "s");
 }
 
 std::vector<Series> series_of(const ScaleReport& report) {
@@ -81,11 +81,11 @@ std::string table(const ScaleReport& report) {
   for (const ScaleRun& run : report.runs) {
     const ScaleFigures figures = figures_of(report, run);
     text += fmt::format(
-        "<tr><th scope=\"row\">{}x{}</th><td>{}</td><td>{}</td><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.2f}</td>"
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.2f}</td>"
         "<td>{:.2f}</td><td>{:.0f} %</td><td>{:.2f}</td><td>{:.2f}</td><td><code>{}</code></td></tr>\n",
-        run.grid.width, run.grid.height, run.threads, run.ranks, run.hosts, figures.median_ms, figures.low_ms,
-        figures.high_ms, figures.speed_up, 100.0 * figures.efficiency, figures.imbalance,
-        static_cast<double>(run.bytes_sent) / 1e6, run.frame_xxh64);
+        grid_name(run.grid), run.threads, run.ranks, run.hosts, figures.median_ms, figures.low_ms, figures.high_ms,
+        figures.speed_up, 100.0 * figures.efficiency, figures.imbalance, static_cast<double>(run.bytes_sent) / 1e6,
+        run.frame_xxh64);
   }
   return text + "</tbody></table></div>\n";
 }

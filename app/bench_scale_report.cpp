@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "app/compare_measure.h"
+#include "app/words.h"
 #include "core/check.h"
 
 namespace hpr {
@@ -18,10 +19,6 @@ using Json = nlohmann::ordered_json;
 
 int cores_of(const ScaleRun& run) {
   return run.ranks * run.threads;
-}
-
-std::string grid_name(Size grid) {
-  return fmt::format("{}x{}", grid.width, grid.height);
 }
 
 /// The run of the same wall with the least cores; of several, that with the fewest ranks.

@@ -17,20 +17,21 @@
 #include "app/output.h"
 #include "app/shell_line.h"
 #include "app/trace_file.h"
+#include "app/words.h"
 #include "cluster/scene_distribution.h"
 #include "compositing/plugin.h"
 #include "compositing/synthetic.h"
 #include "core/file.h"
 #include "core/units.h"
 #include "image/image_io.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {
 
-/// Set for the MPI jobs `hpr compare` starts: rank 0 prints its runs as JSON for the process that started the job.
-constexpr const char* kHandOverVariable = "HPR_COMPARE_HAND_OVER";
-constexpr int kLargestSide = 16384;
-constexpr int kMostScreensASide = 256;
+/// Set for the MPI jobs `hpr compare` starts: rank 0 prints its runs as JSON for the process that started the job. Open
+/// MPI takes variables of this prefix to other hosts.
+constexpr const char* kHandOverVariable = "OMPI_HPR_COMPARE_HAND_OVER";
 
 bool hands_over() {
   return std::getenv(kHandOverVariable) != nullptr;  // NOLINT(concurrency-mt-unsafe): nothing sets variables
@@ -59,7 +60,7 @@ class CompareCommand final : public Command {
 
  private:
   [[nodiscard]] CompareInput make_input(const Globals& globals) const {
-    const Size screen = parse_size(options_.size, "--size", kLargestSide);
+    const Size screen = parse_size(options_.size, "--size", kRasterLimit);
     const Size grid = parse_size(options_.tiles, "--tiles", kMostScreensASide);
     check_size(screen, globals);
     check_size({screen.width * grid.width, screen.height * grid.height}, globals);

@@ -8,6 +8,7 @@
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/simulate_option.h"
+#include "app/words.h"
 #include "compositing/blender.h"
 #include "compositing/compositor.h"
 #include "core/error.h"
@@ -18,8 +19,6 @@
 namespace hpr {
 namespace {
 
-constexpr int kMostRanks = 4096;
-
 template <typename Strategies>
 std::vector<std::string> names_of(const Strategies& strategies) {
   std::vector<std::string> names;
@@ -28,16 +27,6 @@ std::vector<std::string> names_of(const Strategies& strategies) {
 }
 
 }  // namespace
-
-std::vector<std::string> split_commas(std::string_view list) {
-  std::vector<std::string> items;
-  while (true) {
-    const auto comma = list.find(',');
-    items.emplace_back(list.substr(0, comma));
-    if (comma == std::string_view::npos) return items;
-    list.remove_prefix(comma + 1);
-  }
-}
 
 std::vector<std::string> split_strategies(std::string_view list) {
   std::vector<std::string> names;
@@ -50,34 +39,6 @@ std::vector<std::string> split_strategies(std::string_view list) {
     }
   }
   return names;
-}
-
-Size parse_size(const std::string& text, const std::string& option, int most) {
-  const auto extent = parse_extent(text);
-  if (!extent) {
-    throw Error(ExitCode::Usage, fmt::format("{}: '{}' is not two positive integers", option, printable(text)),
-                fmt::format("write it like {} 3x2", option));
-  }
-  if (extent->first > most || extent->second > most) {
-    throw Error(ExitCode::Limit, fmt::format("{}: {} is more than {} a side", option, printable(text), most),
-                fmt::format("the most is {} {}x{}", option, most, most));
-  }
-  return {extent->first, extent->second};
-}
-
-std::vector<int> parse_counts(const std::string& list, const std::string& option) {
-  std::vector<int> counts;
-  for (const std::string& item : split_commas(list)) {
-    int value = 0;
-    const auto [end, failure] = std::from_chars(item.data(), item.data() + item.size(), value);
-    if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMostRanks) {
-      throw Error(ExitCode::Usage,
-                  fmt::format("{}: '{}' is not a number from 1 to {}", option, printable(item), kMostRanks),
-                  fmt::format("write it like {} 1,2,4,8", option));
-    }
-    counts.push_back(value);
-  }
-  return counts;
 }
 
 void CompareOptions::declare(CLI::App& app, bool draws_scenes) {

@@ -15,15 +15,6 @@ namespace hpr {
 /// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".
 [[nodiscard]] std::vector<std::string> split_strategies(std::string_view list);
 
-/// "3x2"; throws Error (Limit) past `most` a side.
-[[nodiscard]] Size parse_size(const std::string& text, const std::string& option, int most);
-
-/// The words between commas.
-[[nodiscard]] std::vector<std::string> split_commas(std::string_view list);
-
-/// "1,2,4,8": numbers from 1 to the most ranks there may be.
-[[nodiscard]] std::vector<int> parse_counts(const std::string& list, const std::string& option);
-
 /// What the user said, and what follows from it alone.
 struct CompareOptions {
   std::string scene;

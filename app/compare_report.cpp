@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "app/words.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -60,18 +61,6 @@ Json to_json(const std::vector<CompareRun>& runs) {
   Json json = Json::array();
   for (const CompareRun& run : runs) json.push_back(to_json(run));
   return json;
-}
-
-std::string grid_name(Size grid) {
-  return fmt::format("{}x{}", grid.width, grid.height);
-}
-
-/// A field as RFC 4180 has it: in quotes where it holds what separates fields.
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
 }
 
 /// "1.4" megabytes.

@@ -1,9 +1,8 @@
 #include "app/compare_scene.h"
 
-#include <fmt/format.h>
-
 #include "app/frame.h"
 #include "app/render_options.h"
+#include "app/words.h"
 #include "walls/geometry.h"
 #include "walls/wall_file.h"
 
@@ -27,7 +26,7 @@ DrawnTiles draw_share(Communicator& comm, const std::string& scene, const Wall& 
 
 CompareInput scene_layers(const std::string& scene, Size screen, Size grid, bool local_shading,
                           const Globals& globals) {
-  const Wall wall = load_wall(fmt::format("{}x{}@{}x{}", grid.width, grid.height, screen.width, screen.height));
+  const Wall wall = load_wall(wall_of(grid, screen));
   CompareInput input;
   input.name = scene;
   input.screen = screen;

@@ -51,6 +51,7 @@ constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
 
 /// What starting processes may take beside what its ranks may take to start MPI, which they time themselves.
 constexpr std::chrono::seconds kStartGrace{10};
+constexpr std::chrono::milliseconds kStartOfRank{500};
 /// Between these a job may take as long as its ranks wait for each other to end once it was told to. Open MPI gives
 /// ranks a second.
 constexpr std::chrono::seconds kLeastEnd{2};
@@ -119,23 +120,26 @@ class StartMark {
 /// does not tell when nobody can take it. No wait for mpiexec is without a limit.
 class RunningJob {
  public:
-  RunningJob(pid_t child, int output, const JobOptions& options)
+  RunningJob(pid_t child, int ranks, int output, const JobOptions& options)
       : child_(child),
         output_(output),
         collected_(options.captured_stdout),
-        start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kLongestWait) + kStartGrace),
+        start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kLongestWait) + kStartGrace +
+                     ranks * kStartOfRank),
         end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kLeastEnd, kLongestEnd)) {}
 
   /// Waits for its end; its status as waitpid tells it.
   int follow() {
     while (true) {
-      const bool heard = hear();
+      const bool heard = hear(output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms);
       keep_limits();
       if (heard && !killed_) continue;
       int status = 0;
       const pid_t ended = ::waitpid(child_, &status, WNOHANG);
       if (ended < 0 && errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
       if (ended != child_) continue;
+      while (hear(0)) {  // what it said last
+      }
       if (output_ >= 0) ::close(output_);  // somebody it left behind holds the other end
       return status;
     }
@@ -152,13 +156,13 @@ class RunningJob {
 
  private:
   using Clock = std::chrono::steady_clock;
+  static constexpr int kBetweenLooks_ms = 200;
+  static constexpr int kToTheEnd_ms = 5;
 
   /// False when it says nothing just now, or nothing more.
-  bool hear() {
-    constexpr int kBetweenLooks_ms = 200;
-    constexpr int kToTheEnd_ms = 5;
+  bool hear(int wait_ms) {
     pollfd waiting{.fd = output_, .events = POLLIN, .revents = 0};  // one below 0 is passed over
-    if (::poll(&waiting, 1, output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms) <= 0) return false;
+    if (::poll(&waiting, 1, wait_ms) <= 0) return false;
     std::array<char, 65536> buffer{};
     const ssize_t got = ::read(output_, buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) return true;
@@ -170,8 +174,10 @@ class RunningJob {
     if (collected_ != nullptr) {
       collected_->append(text);
     } else if (unsaid_ == 0 && !write_all(STDOUT_FILENO, text)) {
-      unsaid_ = errno;
-      if (!PassedSignals::ends()) ::kill(child_, SIGTERM);  // else it was told already, and twice is without mercy
+      const int reason = errno;
+      if (PassedSignals::ends()) return true;  // it was told already, and twice is without mercy
+      unsaid_ = reason;
+      ::kill(child_, SIGTERM);
     }
     return true;
   }
@@ -283,7 +289,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   PassedSignals::to(child);
 
   ::close(pipe[1]);
-  RunningJob job(child, pipe[0], options);
+  RunningJob job(child, ranks, pipe[0], options);
   const int status = job.follow();
   PassedSignals::to_nobody();
   if (job.unsaid() != 0) {

@@ -188,10 +188,11 @@ void configure_log(Globals& globals) {
                  "");
 }
 
-/// Also where nothing will be drawn by it. What shows windows may say so; whatever draws for them refuses it.
-void check_backend(const Globals& globals, const Command& command) {
-  const bool may_show_windows = command.name() == "display" || command.name() == "wall";
-  if (globals.backend != "glfw" || !may_show_windows) check_gl_backend(globals.backend);
+/// Also where nothing will be drawn by it. Windows are GLFW's, whatever draws what they show.
+void settle_backend(Globals& globals, const Command& command) {
+  const bool may_show_windows = command.name() == "display" || command.name() == "view" || command.name() == "wall";
+  if (globals.backend == "glfw" && may_show_windows) globals.backend = "auto";
+  check_gl_backend(globals.backend);
 }
 
 ExitCode run(const std::vector<std::string>& words) {
@@ -216,7 +217,7 @@ ExitCode run(const std::vector<std::string>& words) {
   (void)globals.hang_limit();
   for (const auto& command : commands) {
     if (!app.got_subcommand(std::string(command->name()))) continue;
-    check_backend(globals, *command);
+    settle_backend(globals, *command);
     if (!inside_mpi_job() || (launched_rank() == 0 && !command->collective())) check_trace(globals);
     if (command->collective()) return command->run(globals);
     return launched_rank() == 0 ? traced_alone(globals, [&] { return command->run(globals); }) : ExitCode::Done;

@@ -12,7 +12,6 @@
 #include <set>
 
 #include "app/cache_folder.h"
-#include "app/compare_options.h"
 #include "app/launcher.h"
 #include "app/output.h"
 #include "app/progress.h"
@@ -21,6 +20,7 @@
 #include "app/tradeoff_html.h"
 #include "app/tradeoff_measure.h"
 #include "app/tradeoff_report.h"
+#include "app/words.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "core/file.h"
@@ -28,11 +28,11 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {
 
-constexpr int kLargestSide = 16384;
 constexpr int kCropSide = 128;
 constexpr double kQuickMs = 200.0;
 constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
@@ -108,7 +108,7 @@ class TradeoffCommand final : public Command {
 
  private:
   void check_options(const Globals& globals) {
-    how_.size = parse_size(size_, "--size", kLargestSide);
+    how_.size = parse_size(size_, "--size", kRasterLimit);
     check_size(how_.size, globals);
     std::vector<KnobSweep> sweeps;
     for (const std::string& text : vary_) sweeps.push_back(parse_knob_sweep(text));

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/shell_line.h"
+#include "app/words.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -88,13 +89,6 @@ std::string metric_text(const std::string& metric, const PictureError& error) {
   const double value = error.of(metric);
   if (std::isnan(value)) return "-";
   return metric == "psnr" ? fmt::format("{:.2f}", value) : fmt::format("{:.4g}", value);
-}
-
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char letter : text) quoted += letter == '"' ? std::string("\"\"") : std::string(1, letter);
-  return quoted + "\"";
 }
 
 /// The signed error of the mean, in per cent of the reference's.

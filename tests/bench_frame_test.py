@@ -44,13 +44,17 @@ def keys_alone(folder):
         rows = rows_of(folder, *SMALL, "--passes", "none", "--primary", primary)
         expect(name in rows[0]["name"] and rows[0]["floor"] > 0, f"{primary}: {rows[0]}")
         expect(not any("rays" in row["name"] for row in rows[1:]), f"no pass traces: {rows}")
+    whole, quarter = (rows_of(folder, *SMALL, "--passes", "none", "--primary", "rays", "--resolution-scale", scale)
+                      for scale in ("1", "0.25"))
+    expect(quarter[0]["floor"] < 0.5 * whole[0]["floor"], f"a floor of more rays than there are: {quarter[0]}")
     two = rows_of(folder, *SMALL, "--passes", "none", "--spp", "2")
     expect(two[-1]["name"].endswith("2 samples"), two[-1]["name"])
 
 
 def refused(folder):
     for words, code, hint in ((["--size", "0x3"], 2, "--size"), (["--passes", "shadwo"], 2, "shadow"),
-                              (["--limit-image", "8x8"], 6, "--limit-image")):
+                              (["--limit-image", "8x8"], 6, "--limit-image"), (["--ranks", "2"], 2, "bench scale"),
+                              (["--spp", "until:1s"], 2, "--spp 16")):
         result = run(folder, "bench", "frame", *SMALL, *words)
         expect(result.returncode == code and "hint:" in result.stderr and hint in result.stderr,
                f"{words}: left with {result.returncode}: {result.stderr}")

@@ -37,6 +37,11 @@ def sizes(folder):
         expect(len(list(csv.DictReader(file))) == 4 * len(wanted), "one line per frame")
     xml.etree.ElementTree.parse(folder / "r.html")
 
+    again = run(folder, "--ranks", "2", "bench", "scale", *SMALL, "--reps", "2", "--trace", "t.json", "--json")
+    expect(again.returncode == 0, f"traced: {again.stderr}")
+    expect([row["ranks"] for row in json.loads(again.stdout)["runs"]] == [2], "--ranks before the command")
+    expect(len(json.loads((folder / "t.json").read_text())["traceEvents"]) > 10, "an empty trace")
+
     drawn = run(folder, "wall", "run", "1x1@128x128", "gen:cornell", "--spp", "1", "-o", "wall")
     expect(drawn.returncode == 0, drawn.stderr)
     manifest = json.loads((folder / "wall" / "manifest.json").read_text())
@@ -45,16 +50,16 @@ def sizes(folder):
 
 def inside_a_job(folder):
     mpiexec = shutil.which("mpiexec")
-    result = subprocess.run([mpiexec, "--allow-run-as-root", "--oversubscribe", "-n", "2", HPR, "bench", "scale", *SMALL,
-                             "--reps", "1", "--json"], cwd=folder, capture_output=True, text=True, timeout=120,
+    result = subprocess.run([mpiexec, "--allow-run-as-root", "--oversubscribe", "-n", "2", HPR, "--threads", "1", "bench",
+                             "scale", *SMALL, "--reps", "1", "--json"], cwd=folder, capture_output=True, text=True, timeout=120,
                             check=False)
     expect(result.returncode == 0, result.stderr)
     rows = json.loads(result.stdout)["runs"]
-    expect([row["ranks"] for row in rows] == [2], f"the job's ranks: {rows}")
+    expect([(row["ranks"], row["threads"]) for row in rows] == [(2, 1)], f"the job's ranks: {rows}")
 
 
 def refused(folder):
-    for words, code, hint in ((["--ranks", "0"], 2, "--ranks 1,2"), (["--threads", "1,x"], 2, "--threads 1,2"),
+    for words, code, hint in ((["--tiles", "70x70"], 6, "4096"), (["--ranks", "0"], 2, "--ranks 1,2"), (["--threads", "1,x"], 2, "--threads 1,2"),
                               (["--tiles", "2"], 2, "--tiles 3x2"), (["--limit-image", "64x64"], 6, "--limit-image"),
                               (["--quality", "god"], 2, "good"), (["--csv", "a", "--html", "a"], 2, "")):
         result = run(folder, "bench", "scale", *SMALL, *words)

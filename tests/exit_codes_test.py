@@ -219,6 +219,8 @@ def main():
         expect_error(f"--set {override}", ["wall", "check", "2x2", "--set", override], [2], [f"--set {override}", "hint"])
     for wall in ("0x2", "2x2@0x3"):
         expect_error(f"wall {wall}", ["wall", "check", wall], [2], [wall, "hint"])
+    for wall in ("4097x1", "2x2@65537x1"):
+        expect_error(f"wall {wall}", ["wall", "check", wall], [6], [wall, "hint"])
     expect_error("AOVs of a wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--aov", "id"], [2], ["AOVs"])
     if "--aov" in run(["wall", "run", "--help"], ".").stdout:
         failures.append("the help of wall run names --aov, which walls refuse")
