@@ -22,6 +22,7 @@ namespace {
 template <typename Strategies>
 std::vector<std::string> names_of(const Strategies& strategies) {
   std::vector<std::string> names;
+  names.reserve(strategies.size());
   for (const auto& strategy : strategies) names.emplace_back(strategy->name());
   return names;
 }

@@ -26,7 +26,8 @@ std::size_t place_of(const FloatImage& picture, const std::string& channel) {
 
 /// The level that `value` stands for, of kMostLevels.
 double level_of(float value, std::uint32_t levels) {
-  return std::round(static_cast<double>(value) * levels) * (kMostLevels / levels);
+  const std::uint32_t apart = kMostLevels / levels;
+  return std::round(static_cast<double>(value) * levels) * apart;
 }
 
 /// One channel of `image` - `reference` into every `stride`th value.
