@@ -47,7 +47,7 @@ struct WorldMesh {
 
   explicit WorldMesh(const Scene& scene) {
     for (const Instance& instance : scene.instances) {
-      const Mesh& mesh = scene.meshes[instance.mesh];
+      const Mesh& mesh = scene.mesh_of(instance);
       const auto first = static_cast<std::uint32_t>(positions.size());
       for (const glm::vec3& position : mesh.positions) {
         positions.emplace_back(instance.to_world * glm::dvec4(position, 1.0));

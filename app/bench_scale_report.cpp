@@ -73,8 +73,8 @@ std::vector<std::string> slow_ranks(const ScaleReport& report) {
     for (std::size_t rank = 0; rank < run.rank_ms.size() && run.ranks > 2; ++rank) {
       if (run.rank_ms[rank] <= kSlow * middle) continue;
       sentences.push_back(
-          fmt::format("rank {} of {} was busy for {:.1f} ms of a frame of {}, the middle one for {:.1f}", rank,
-                      run.ranks, run.rank_ms[rank], grid_name(run.grid), middle));
+          fmt::format("rank {} of {} with {} cores was busy for {:.1f} ms of a frame of {}, the middle one for {:.1f}",
+                      rank, run.ranks, run.threads, run.rank_ms[rank], grid_name(run.grid), middle));
     }
   }
   return sentences;
@@ -129,7 +129,7 @@ std::string scale_json(const ScaleReport& report) {
                             {"imbalance", figures.imbalance},
                             {"rank_ms", run.rank_ms},
                             {"bytes_sent", run.bytes_sent},
-                            {"frame_xxh64", run.frame_xxh64}});
+                            {"frame_xxh64", run.frame_xxh64 == kDiffering ? Json() : Json(run.frame_xxh64)}});
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -65,7 +65,7 @@ TEST(BenchScale, RanksThatHoldUpTheOthersAreNamed) {
   EXPECT_TRUE(slow_ranks(report).empty());
   report.runs[0].rank_ms = {5, 5, 9, 5};
   ASSERT_EQ(slow_ranks(report).size(), 1U);
-  EXPECT_TRUE(slow_ranks(report)[0].starts_with("rank 2 of 4 was busy for 9.0 ms of a frame of 1x1"))
+  EXPECT_TRUE(slow_ranks(report)[0].starts_with("rank 2 of 4 with 1 cores was busy for 9.0 ms of a frame of 1x1"))
       << slow_ranks(report)[0];
   EXPECT_EQ(figures_of(report, report.runs[0]).imbalance, 1.5);
   report.runs[1].rank_ms = {1, 9};
@@ -93,6 +93,7 @@ TEST(BenchScale, FramesOfSeveralJobsAreOneRun) {
   other.frame_xxh64 = "0";
   append_frames(runs, {other});
   EXPECT_FALSE(pictures_agree(report_of(runs)));
+  EXPECT_TRUE(nlohmann::json::parse(scale_json(report_of(runs)))["runs"][0]["frame_xxh64"].is_null());
 }
 
 TEST(BenchScale, MoreThreadsThanCoresAreTold) {

@@ -233,7 +233,8 @@ std::string diff_table(const DiffReport& report, std::span<const std::string> me
       if (asks_for(metrics, metric)) row(metric.c_str(), picture_value(report, metric));
     }
   }
-  if (report.beyond != d.differing) row("beyond", fmt::format("{} pixels exceed --fail", report.beyond));
+  if (!report.keys || report.beyond != d.differing)
+    row("beyond", fmt::format("{} pixels exceed --fail", report.beyond));
   row("verdict", d.differing == 0 ? "equal" : report.passed ? "within tolerance" : "different");
   return text;
 }

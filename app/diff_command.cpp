@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "app/diff.h"
@@ -60,7 +61,7 @@ class DiffCommand final : public Command {
                   "compare the rendered pictures");
     }
     if (metrics_.empty()) metrics_ = quick_diff_metrics();
-    if (!(tolerance_.value >= 0.0)) {
+    if (!(tolerance_.value >= 0.0) || std::isinf(tolerance_.value)) {
       throw Error(ExitCode::Usage, "--fail is not a difference", "give a number from 0 on, like --fail 0.004");
     }
     if (!(tolerance_.percent >= 0.0 && tolerance_.percent <= 100.0)) {

@@ -56,6 +56,14 @@ float least_metallic(const Scene& scene, const Material& material) {
   return material.metallic * least_texel(scene, material, &Rgba8::b);
 }
 
+bool transmits_somewhere(const Scene& scene, const Material& material) {
+  if (!(material.transmission > 0.0F)) return false;
+  if (!material.transmission_texture.present()) return true;
+  const auto texture = static_cast<std::size_t>(material.transmission_texture.texture);
+  const auto pixels = scene.textures[texture].image.pixels();
+  return pixels.empty() || std::ranges::any_of(pixels, [](const Rgba8& texel) { return texel.r > 0; });
+}
+
 bool shines(const std::optional<Environment>& environment) {
   return environment && environment->scale > 0.0 &&
          std::ranges::any_of(environment->image.pixels(),
@@ -98,7 +106,7 @@ bool mirrors(const Scene& scene, const Material& material) {
 
 /// An index of 0 stands for a wall that reflects all.
 bool transmits(const Scene& scene, const Material& material) {
-  return takes_in(scene, material) && material.transmission > 0.0F && material.ior > 0.0F;
+  return takes_in(scene, material) && transmits_somewhere(scene, material) && material.ior > 0.0F;
 }
 
 bool casts_shadows(const Light& light) {

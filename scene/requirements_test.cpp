@@ -152,6 +152,13 @@ TEST(Requirements, WhatAMaterialIsMadeOfDecidesWhatItMirrorsAndTransmits) {
   metal.metallic = 1.0F;
   Material black = clear;
   black.base_color = {0.0F, 0.0F, 0.0F, 1.0F};
+  Scene dark = scene_of(clear, {Light{}});
+  dark.textures.emplace_back();
+  dark.textures[0].image = Image<Rgba8>({2, 2}, {0, 255, 255, 255});
+  dark.materials[0].transmission_texture.texture = 0;
+  EXPECT_FALSE(requirements_of(dark).refraction.needed) << "a texture that lets nothing through";
+  dark.textures[0].image.at(1, 0).r = 1;
+  EXPECT_TRUE(requirements_of(dark).refraction.needed);
   Material grazing = metal;
   grazing.base_color = black.base_color;
   EXPECT_TRUE(requirements_of(scene_of(grazing, {Light{}})).reflection.needed)
@@ -174,8 +181,7 @@ TEST(Requirements, RoughPlasticScattersWhateverItsColour) {
   black.ior = 1.0F;
   EXPECT_FALSE(requirements_of(scene_of(black, {Light{}})).indirect.needed);
   black.metallic = 1.0F;
-  black.ior = 1.5F;
-  EXPECT_FALSE(requirements_of(scene_of(black, {Light{}})).indirect.needed);
+  EXPECT_TRUE(requirements_of(scene_of(black, {Light{}})).indirect.needed) << "metals reflect at grazing angles";
 }
 
 TEST(Requirements, ATexelWithoutMetalIsMatte) {

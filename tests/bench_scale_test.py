@@ -17,7 +17,8 @@ import xml.etree.ElementTree
 
 from program import HPR, expect, failures, run
 
-SMALL = ["gen:cornell", "--size", "128x128", "--spp", "1"]
+PLAIN = ["gen:cornell", "--size", "128x128"]
+SMALL = [*PLAIN, "--spp", "1"]
 
 
 def sizes(folder):
@@ -59,10 +60,11 @@ def inside_a_job(folder):
 
 
 def refused(folder):
-    for words, code, hint in ((["--tiles", "70x70"], 6, "4096"), (["--ranks", "0"], 2, "--ranks 1,2"), (["--threads", "1,x"], 2, "--threads 1,2"),
+    for words, code, hint in ((["--tiles", "70x70"], 6, "4096"), (["--spp", "until:1s"], 2, "--spp 16"),
+                              (["--primary", "auto"], 2, "raster"), (["--ranks", "0"], 2, "--ranks 1,2"), (["--threads", "1,x"], 2, "--threads 1,2"),
                               (["--tiles", "2"], 2, "--tiles 3x2"), (["--limit-image", "64x64"], 6, "--limit-image"),
                               (["--quality", "god"], 2, "good"), (["--csv", "a", "--html", "a"], 2, "")):
-        result = run(folder, "bench", "scale", *SMALL, *words)
+        result = run(folder, "bench", "scale", *PLAIN, *words)
         expect(result.returncode == code, f"{words}: left with {result.returncode}: {result.stderr}")
         expect("hint:" in result.stderr and hint in result.stderr, f"{words}: {result.stderr}")
     missing = run(folder, "bench", "scale", "nothing.glb", "--ranks", "1,2")
