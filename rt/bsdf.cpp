@@ -76,30 +76,42 @@ double entering(double index) {
 }  // namespace
 
 Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried carried)
-    : view_(surface.to_viewer),
-      normal_(material.normal),
-      geometric_normal_(surface.geometric_normal),
+    : geometric_normal_(surface.geometric_normal),
       base_color_(material.base_color),
-      normal_view_(glm::dot(normal_, view_)),
       roughness_(material.roughness),
       alpha2_(square(square(material.roughness))),
       metallic_(material.metallic),
       solid_(material.solid),
       exact_(material.transmission > 0.0),
-      all_mirror_(!(material.ior > 0.0)) {
-  scatters_ = !material.unlit && normal_view_ > kEdgeOn && glm::dot(geometric_normal_, view_) > 0.0;
-  normal_view_ = std::min(normal_view_, 1.0);
-  view_smith_ = std::sqrt(alpha2_ + (1.0 - alpha2_) * square(normal_view_));
+      all_mirror_(!(material.ior > 0.0)),
+      unlit_(material.unlit) {
   diffuse_ = (1.0 - metallic_) * (1.0 - material.transmission);
   f0_ = all_mirror_ ? 1.0 : square((material.ior - 1.0) / (material.ior + 1.0));
   reflects_ = material.ior != 1.0;
-  if (!exact_) return;
-  const double let_through = all_mirror_ ? 0.0 : (1.0 - metallic_) * material.transmission;
-  tint_ = let_through * (solid_ ? glm::sqrt(base_color_) : base_color_);
-  if (all_mirror_) return;
-  eta_ = solid_ && surface.inside ? 1.0 / material.ior : material.ior;
-  if (solid_ && carried == Carried::Radiance) squeeze_ = 1.0 / square(eta_);
-  if (diffuse_ > 0.0) view_enters_ = (1.0 - dielectric_fresnel(normal_view_)) / entering(std::max(eta_, 1.0 / eta_));
+  if (exact_ && !all_mirror_) {
+    tint_ = (1.0 - metallic_) * material.transmission * (solid_ ? glm::sqrt(base_color_) : base_color_);
+    eta_ = solid_ && surface.inside ? 1.0 / material.ior : material.ior;
+    if (solid_ && carried == Carried::Radiance) squeeze_ = 1.0 / square(eta_);
+  }
+  look(surface.to_viewer, material.normal);
+}
+
+/// Sets all that depends on the viewer.
+void Bsdf::look(const glm::dvec3& to_viewer, const glm::dvec3& normal) {
+  view_ = to_viewer;
+  normal_ = normal;
+  normal_view_ = glm::dot(normal_, view_);
+  scatters_ = !unlit_ && normal_view_ > kEdgeOn && glm::dot(geometric_normal_, view_) > 0.0;
+  normal_view_ = std::min(normal_view_, 1.0);
+  view_smith_ = std::sqrt(alpha2_ + (1.0 - alpha2_) * square(normal_view_));
+  if (!exact_ || all_mirror_ || !(diffuse_ > 0.0)) return;
+  view_enters_ = (1.0 - dielectric_fresnel(normal_view_)) / entering(std::max(eta_, 1.0 / eta_));
+}
+
+Bsdf Bsdf::seen_from(const glm::dvec3& to_viewer, const glm::dvec3& normal) const {
+  Bsdf other = *this;
+  other.look(to_viewer, normal);
+  return other;
 }
 
 bool Bsdf::same_side(const glm::dvec3& to_light) const {

@@ -77,6 +77,8 @@ class Bsdf {
   Bsdf() = default;
   /// Copies what it needs. The surface's `inside` says that the viewer's side is inside the volume (solid materials).
   Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried carried = Carried::Radiance);
+  /// The same place as somebody else on the viewer's side sees it, by the normal that is shaded with there.
+  [[nodiscard]] Bsdf seen_from(const glm::dvec3& to_viewer, const glm::dvec3& normal) const;
 
   /// f of one lobe in 1/sr. Never negative, never NaN; 0 for lobes of one direction, and where the geometric and the
   /// shading normal do not agree on the side.
@@ -117,6 +119,7 @@ class Bsdf {
     double stretch = 1.0;       ///< |v + eta l|^2 for refraction
   };
 
+  void look(const glm::dvec3& to_viewer, const glm::dvec3& normal);
   [[nodiscard]] bool same_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool other_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }
@@ -151,7 +154,8 @@ class Bsdf {
   bool exact_ = false;       ///< Fresnel's equations in place of Schlick's
   bool reflects_ = true;     ///< has a specular layer at all
   bool all_mirror_ = false;  ///< an index of 0
-  bool scatters_ = true;     ///< neither unlit nor seen edge-on
+  bool unlit_ = false;
+  bool scatters_ = true;  ///< neither unlit nor seen edge-on
 };
 
 }  // namespace hpr

@@ -92,6 +92,22 @@ TEST(Hybrid, AMatteBall) {
   expect_the_same_light(room(test::matte({0.3F, 0.4F, 0.6F}), false));
 }
 
+/// All light comes from a spot of the floor that is not seen.
+TEST(Hybrid, AFloorWhoseNormalsLeanFromIt) {
+  Scene scene = room(test::matte(glm::vec3(0.5F)), false);
+  constexpr std::size_t kFloor = 4;
+  scene.meshes[kFloor].normals.assign(4, glm::normalize(glm::vec3(1.5F, 1.0F, 0.0F)));
+  for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
+  Light& spot = scene.lights.emplace_back();
+  spot.type = LightType::Spot;
+  spot.position = {0.6, 0.9, 0.6};
+  spot.direction = {0.0F, -1.0F, 0.0F};
+  spot.intensity = glm::vec3(20.0F);
+  spot.inner_cone_radians = 0.1F;
+  spot.outer_cone_radians = 0.18F;
+  expect_the_same_light(scene);
+}
+
 TEST(Hybrid, AMirrorBall) {
   expect_the_same_light(room(test::mirror(0.9F), false));
 }

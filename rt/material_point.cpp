@@ -46,6 +46,11 @@ glm::dvec3 absorption_of(const Material& material) {
   return absorption;
 }
 
+glm::dvec3 normal_to_shade_with(const Scene& scene, const SurfacePoint& surface) {
+  const Material& material = scene.materials[surface.material];
+  return material.normal_texture.present() ? mapped_normal(scene, material, surface) : surface.facing_normal();
+}
+
 MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface) {
   const Material& material = scene.materials[surface.material];
   const auto texel = [&](const TextureRef& reference, Encoding encoding) {
@@ -56,7 +61,7 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   if (material.base_color_texture.present()) base *= texel(material.base_color_texture, Encoding::Srgb);
   point.base_color = glm::clamp(glm::dvec3(base), 0.0, 1.0);
   point.alpha = coverage_of(material, base.a);
-  point.normal = material.normal_texture.present() ? mapped_normal(scene, material, surface) : surface.facing_normal();
+  point.normal = normal_to_shade_with(scene, surface);
   if (material.unlit) {
     point.unlit = true;
     point.emission = point.base_color;

@@ -28,6 +28,9 @@ struct MaterialPoint {
 /// The material with its textures read at the surface's coordinates, vertex colours and normal map applied.
 [[nodiscard]] MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface);
 
+/// MaterialPoint::normal alone: as the viewer at surface.to_viewer has it.
+[[nodiscard]] glm::dvec3 normal_to_shade_with(const Scene& scene, const SurfacePoint& surface);
+
 /// 1/m, finite: KHR_materials_volume's, by which `attenuation_distance` metres leave the attenuation colour.
 [[nodiscard]] glm::dvec3 absorption_of(const Material& material);
 

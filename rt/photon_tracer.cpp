@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "rt/denormals.h"
+#include "rt/flux_scatter.h"
 #include "rt/photon_gather.h"
 #include "rt/punctual_light.h"
 #include "rt/ray_walk.h"
@@ -34,16 +35,6 @@ double sum_of(const glm::dvec3& v) {
 /// False for no light at all and for what is not a number.
 bool carries_light(const glm::dvec3& flux) {
   return sum_of(flux) > 0.0 && std::isfinite(sum_of(flux));
-}
-
-/// What a shading normal changes for light that travels away from lights, beside f: Veach, "Robust Monte Carlo Methods
-/// for Light Transport Simulation", 1997, section 5.3.2.
-double adjoint(const SurfacePoint& surface, const glm::dvec3& shading_normal, const glm::dvec3& direction) {
-  const glm::dvec3& geometric = surface.geometric_normal;
-  if (shading_normal == geometric) return 1.0;
-  const glm::dvec3& from = surface.to_viewer;
-  return std::abs(glm::dot(direction, geometric) * glm::dot(from, shading_normal) /
-                  (glm::dot(direction, shading_normal) * glm::dot(from, geometric)));
 }
 
 template <typename Value>
@@ -280,10 +271,11 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   if (chosen == kLobes.size()) return false;
   const bool follows = is_followed(bsdf, kLobes[chosen], settings_.glossy_cutoff);
   if (settings_.caustics_only && !follows) return false;
-  const std::optional<BsdfSample> sample = bsdf.sample(kLobes[chosen], flight.sampler.two());
+  const std::optional<BsdfSample> sample =
+      sample_flux(scene_, {surface, material, bsdf}, kLobes[chosen], flight.sampler);
   if (!sample) return false;
 
-  flight.flux *= sample->weight * (whole / chances[chosen] * adjoint(surface, material.normal, sample->direction));
+  flight.flux *= sample->weight * (whole / chances[chosen]);
   if (!carries_light(flight.flux)) return false;
   flight.followed = flight.followed && follows;
   flight.media = media_towards(flight.media, surface, material, sample->direction);
