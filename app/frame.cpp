@@ -31,7 +31,7 @@ std::vector<Rect> parts_of(const FramePlan& plan, std::size_t screen) {
 void prepare(Session& session, const FramePlan& plan) {
   if (!plan.mine.area.empty()) {
     if (plan.primary == Primary::Rays) {
-      (void)session.primary_rays(plan.mine.objects, plan.rays.build);
+      (void)session.primary_rays(plan.mine.objects, plan.rays);
     } else {
       (void)session.rasterizer(plan.mine.objects);
     }
@@ -51,7 +51,7 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
 
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
                               TileLayer<Key>& keys) {
-  PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays.build);
+  PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
   const trace::Span span("primary rays");
   PrimaryRayStats stats;
   for (std::size_t screen = 0; screen < views.size(); ++screen) {

@@ -22,6 +22,8 @@ struct Choice {
 Choice choose_distribution(const FrameSettings& settings, const Scene& scene, int ranks) {
   if (settings.distribution) return {*settings.distribution, "as asked"};
   if (ranks == 1) return {Distribution::SortFirst, "one rank draws everything"};
+  if (settings.partitioned)
+    return {Distribution::SortLast, "each rank has its own objects, as the data is partitioned"};
   if (scene.triangles <= kManyTriangles) {
     return {
         Distribution::SortFirst,
@@ -95,6 +97,11 @@ void explain_distribution(FramePlan& plan, const FrameSettings& settings, const 
 void explain_light(Session& session, const FrameSettings& settings, FramePlan& plan) {
   auto& lines = plan.explained;
   if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
+  if (plan.rays.part) {
+    lines.emplace_back("data: partitioned (as asked: rays travel to the ranks whose objects they may meet)");
+  } else if (settings.partitioned) {
+    lines.emplace_back("data: whole (one rank has all of it)");
+  }
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));
@@ -147,6 +154,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.aovs = settings.aovs;
   plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
                                plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
+  if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),

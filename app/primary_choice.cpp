@@ -62,7 +62,7 @@ std::string choose_primary(Session& session, FramePlan& plan, std::span<const Vi
     const FramePlan some = sampled(plan, share);
     TileLayer<Key> keys(plan.layout);
     mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
-    (void)session.primary_rays(plan.mine.objects, plan.rays.build);
+    (void)session.primary_rays(plan.mine.objects, plan.rays);
     mine.rays_ms = quickest_ms(keys, [&] { (void)trace_primary(session, some, views, keys); }) / share;
   }
   KeyTimes worst;

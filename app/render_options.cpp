@@ -44,6 +44,14 @@ Shading parse_shading(const std::string& name) {
   throw Error(ExitCode::Usage, fmt::format("unknown shading '{}'", name), unknown_name_hint(name, choices));
 }
 
+/// Whether the ranks share the scene out.
+bool parse_data(const std::string& name) {
+  if (name == "replicated" || name == "partitioned") return name == "partitioned";
+  const std::vector<std::string> choices{"replicated", "partitioned"};
+  throw Error(ExitCode::Usage, fmt::format("scene data is never '{}'", printable(name)),
+              unknown_name_hint(name, choices));
+}
+
 Primary parse_primary(const std::string& name) {
   if (name == "raster") return Primary::Raster;
   if (name == "rays") return Primary::Rays;
@@ -144,6 +152,10 @@ void RenderOptions::declare_frame(CLI::App& app) {
   app.add_option("--groups", groups, "groups of ranks for hybrid (default: about the square root of the ranks)")
       ->check(CLI::Range(1, 1 << 20));
   app.add_option("--strategy", strategy, "how layers are composited: a strategy's name or auto")->capture_default_str();
+  app.add_option("--data", data,
+                 "what rays meet on a rank: replicated, all of the scene, or partitioned, what the rank draws itself, "
+                 "while the rays of the others come to it")
+      ->capture_default_str();
   app.add_option("--shading", shading, "deferred: light once after compositing; local: each rank before it")
       ->capture_default_str();
   app.add_option("--exposure", exposure,
@@ -312,6 +324,12 @@ void RenderOptions::check_combination(const FrameSettings& settings) const {
     throw Error(ExitCode::Usage, "--depth-format rounds depths before OpenGL compares them; rays compare their own",
                 "use it with --primary raster");
   }
+  if (settings.partitioned && settings.distribution.value_or(Distribution::SortLast) != Distribution::SortLast) {
+    throw Error(ExitCode::Usage,
+                fmt::format("--data partitioned gives each rank its own objects, of which --distribute {} draws others",
+                            distribute),
+                "use --distribute sort-last, or leave it out");
+  }
   const bool splits = std::ranges::any_of(
       settings.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
   if (reference && (splits || settings.shading == Shading::Local)) {
@@ -333,6 +351,7 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   if (strategy != "auto") settings.strategy = make_compositor(strategy)->name();
   settings.primary = parse_primary(primary);
   settings.shading = parse_shading(shading);
+  settings.partitioned = parse_data(data);
   choose_passes(passes, settings.rays);
   const Quality& defaults = find_quality(quality);
   settings.rays.seed = seed;

@@ -41,6 +41,7 @@ struct RenderOptions {
   std::string distribute = "auto";
   int groups = 0;
   std::string strategy = "auto";
+  std::string data = "replicated";
   std::string shading = "deferred";
   RayBuildOptions ray_build;
   WireOptions wire;

@@ -60,12 +60,10 @@ void Session::warn_of_scene() const {
 }
 
 void Session::forget_scene() {
-  lighter_.reset();
-  ray_settings_.reset();
-  primary_rays_.reset();
-  traced_share_.reset();
+  forget_rays();
+  part_.reset();
+  travelling_.reset();
   traced_objects_.clear();
-  ray_scene_.reset();
   rasterizer_.reset();
   objects_.clear();
 }
@@ -93,53 +91,73 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
   return *rasterizer_;
 }
 
-void Session::build_rays_by(const RayBuild& build) {
-  if (build == ray_build_) return;
+void Session::forget_rays() {
   lighter_.reset();
   ray_settings_.reset();
   primary_rays_.reset();
   traced_share_.reset();
   ray_scene_.reset();
+}
+
+void Session::build_rays_by(const RayBuild& build) {
+  if (build == ray_build_) return;
+  forget_rays();
   ray_build_ = build;
 }
 
-PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RayBuild& build) {
-  build_rays_by(build);
+void Session::share_rays(const RaySettings& settings) {
+  build_rays_by(settings.build);
+  if (settings.part == part_) return;
+  forget_rays();
+  travelling_.reset();
+  part_ = settings.part;
+  if (part_) travelling_ = std::make_unique<TravellingRays>(comm_, scene_, RaySpace(scene_.bounds), *part_);
+}
+
+std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange> objects) const {
+  const trace::Span span("build ray scene");
+  return std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, objects, ray_build_);
+}
+
+PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings) {
+  share_rays(settings);
   if (!primary_rays_ || !std::ranges::equal(objects, traced_objects_)) {
     primary_rays_.reset();
     traced_share_.reset();  // frees its memory before the next one takes some
     traced_objects_.assign(objects.begin(), objects.end());
-    const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_surfaces(scene_, false);
-    if (!everything) {
-      const trace::Span span("build ray scene");
-      traced_share_ =
-          std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, traced_objects_, build);
-    }
+    const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_part();
+    if (!everything) traced_share_ = build_ray_scene(traced_objects_);
     primary_rays_ =
-        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(build) : *traced_share_, share_.threads);
+        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_share_, share_.threads);
   }
   return *primary_rays_;
+}
+
+/// Of the surfaces that cover what is behind them, those that rays meet at home.
+std::vector<SurfaceRange> Session::covering_part() const {
+  std::vector<SurfaceRange> covering = covering_surfaces(scene_, false);
+  return part_ ? common_ranges(merged_ranges(*part_, scene_.triangles), covering) : covering;
 }
 
 const RayScene& Session::ray_scene(const RayBuild& build) {
   build_rays_by(build);
   if (!ray_scene_) {
-    const trace::Span span("build ray scene");
-    ray_scene_ = std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads,
-                                            covering_surfaces(scene_, false), build);
+    ray_scene_ = build_ray_scene(covering_part());
+    if (travelling_) ray_scene_->share(*travelling_);
   }
   return *ray_scene_;
 }
 
 Lighter& Session::lighter(const RaySettings& settings) {
-  build_rays_by(settings.build);
+  share_rays(settings);
   if (!lighter_ || ray_settings_ != settings) {
     const trace::Span span("prepare light");
+    lighter_.reset();  // its parts of the scene leave before others come
     RaySettings own = settings;
     own.threads = share_.threads;
     own.host_ranks = share_.ranks;
-    lighter_ = std::make_unique<Lighter>(scene_, own, requirements_,
-                                         [this]() -> const RayScene& { return ray_scene(ray_build_); });
+    lighter_ = std::make_unique<Lighter>(
+        scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, travelling_.get());
     ray_settings_ = settings;
   }
   return *lighter_;

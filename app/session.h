@@ -15,6 +15,7 @@
 #include "rt/lighter.h"
 #include "rt/primary_rays.h"
 #include "rt/ray_scene.h"
+#include "rt/travelling_rays.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 
@@ -43,11 +44,14 @@ class Session {
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for.
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
-  /// The primary rays through `objects`; kept until other objects, or another way of building, are asked for.
-  [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RayBuild& build);
+  /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
+  /// scene are asked for. Collective where `settings` have a part, as lighter() is.
+  [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
   /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
   /// asked for. Asking for one built in another way ends it, and the lighter and primary rays that use it.
   [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
+  /// Collective. Makes what travelling rays need, where `settings` have a part.
+  void share_rays(const RaySettings& settings);
   /// The lighter of these settings; kept until others are asked for.
   [[nodiscard]] Lighter& lighter(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
@@ -67,6 +71,9 @@ class Session {
   void forget_scene();
   /// Ends what rays meet where it was built in another way.
   void build_rays_by(const RayBuild& build);
+  void forget_rays();
+  [[nodiscard]] std::vector<SurfaceRange> covering_part() const;
+  [[nodiscard]] std::unique_ptr<RayScene> build_ray_scene(std::span<const SurfaceRange> objects) const;
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
                                             std::span<const int> members);
 
@@ -82,7 +89,9 @@ class Session {
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
-  RayBuild ray_build_;  ///< of all that follows
+  RayBuild ray_build_;                             ///< of all that follows
+  std::optional<std::vector<SurfaceRange>> part_;  ///< of the scene, likewise; see RaySettings
+  std::unique_ptr<TravellingRays> travelling_;     ///< where there is one
   std::unique_ptr<RayScene> ray_scene_;
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_share_;  ///< of primary_rays_; none where ray_scene_ is

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -38,6 +39,12 @@ struct Scratch {
   Wave wave;
   std::vector<double> ms;
 };
+
+/// While rays travel, more threads wait for theirs than there are: of the time that was spent, each step has its share.
+void share_out(double spent_ms, std::vector<double>& ms) {
+  const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
+  for (double& step : ms) step *= sum > 0.0 ? spent_ms / sum : 0.0;
+}
 
 // Where each step's time stands.
 constexpr std::size_t kSurfaceStep = 0;
@@ -84,10 +91,15 @@ struct Lighter::State {
   bool has_told = false;   ///< that rays were cut
   std::vector<PassTime> times;
 
-  State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source);
+  TravellingRays* travelling;
+
+  State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
+        TravellingRays* others);
   void build_rays(const RaySource& source);
+  const RayScene& build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects);
   void build_photons();
   void build_reference();
+  void for_each(std::size_t count, const std::function<void(std::size_t)>& body) const;
   /// What rays meet that decide about coverage themselves.
   const RayScene& whole_scene();
   void trace_reference(std::span<const View> views, std::span<const std::size_t> tiles, const LightOutput& output,
@@ -100,8 +112,15 @@ struct Lighter::State {
   void light_wave(Scratch& scratch) const;
 };
 
-Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source)
-    : scene(lit), settings(std::move(chosen)), space(lit.bounds), surfaces(lit, space), lights(lit), media(lit) {
+Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
+                      TravellingRays* others)
+    : scene(lit),
+      settings(std::move(chosen)),
+      space(lit.bounds),
+      surfaces(lit, space),
+      lights(lit),
+      media(lit),
+      travelling(others) {
   shared = shared_components(settings);
   const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
@@ -117,11 +136,24 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
   if (settings.reference) build_reference();
 }
 
+/// Of `objects` this rank's part.
+const RayScene& Lighter::State::build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects) {
+  if (settings.part) objects = common_ranges(merged_ranges(*settings.part, scene.triangles), objects);
+  made.emplace(scene, space, settings.threads, objects, settings.build);
+  if (travelling != nullptr) made->share(*travelling);
+  return *made;
+}
+
+void Lighter::State::for_each(std::size_t count, const std::function<void(std::size_t)>& body) const {
+  if (opaque != nullptr) {
+    opaque->for_each(settings.threads, count, body);
+  } else {
+    parallel_for(settings.threads, count, body);
+  }
+}
+
 void Lighter::State::build_rays(const RaySource& source) {
-  const auto build = [&](std::optional<RayScene>& made, const std::vector<SurfaceRange>& objects) {
-    return &made.emplace(scene, space, settings.threads, objects, settings.build);
-  };
-  opaque = source ? &source() : build(own_opaque, covering_surfaces(scene, false));
+  opaque = source ? &source() : &build(own_opaque, covering_surfaces(scene, false));
   std::uint64_t skipped = opaque->skipped_triangles();
   if (const auto with_holes = covering_surfaces(scene, true); !with_holes.empty()) {
     (void)build(holed, with_holes);
@@ -149,9 +181,7 @@ void Lighter::State::build_reference() {
 
 const RayScene& Lighter::State::whole_scene() {
   if (!holed) return *opaque;
-  const std::array all{SurfaceRange{0, scene.triangles}};
-  if (!whole) whole.emplace(scene, space, settings.threads, all, settings.build);
-  return *whole;
+  return whole ? *whole : build(whole, {SurfaceRange{0, scene.triangles}});
 }
 
 void Lighter::State::trace_reference(std::span<const View> views, std::span<const std::size_t> tiles,
@@ -280,8 +310,9 @@ void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_
   store(tile, job, index, output);
 }
 
-Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays)
-    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays)) {}
+Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays,
+                 TravellingRays* travelling)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, travelling)) {}
 Lighter::~Lighter() = default;
 Lighter::Lighter(Lighter&&) noexcept = default;
 Lighter& Lighter::operator=(Lighter&&) noexcept = default;
@@ -307,7 +338,8 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
   }
   const PhotonMaps* const photons = state.send_photons(number, nullptr);
   const std::vector<Media> eyes = state.media.of_eyes(views);
-  parallel_for(state.settings.threads, tiles.size(), [&](std::size_t i) {
+  const Stopwatch watch;
+  state.for_each(tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);
     set_active(output, tile);
@@ -319,6 +351,7 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });
+  const double spent_ms = watch.ms() * state.settings.threads;
 
   state.counts = {};
   std::vector<double> ms(kFirstPassStep + state.passes.size(), 0.0);
@@ -327,6 +360,7 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
     state.counts.cut += std::exchange(scratch->work.scratch.cut, 0);
     for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
   }
+  if (state.travelling != nullptr) share_out(spent_ms, ms);
   if (state.photons) {
     const PhotonCounts sent = state.photons->take_counts();
     state.counts.photon = sent.rays;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@
 namespace hpr {
 
 class RayScene;
+class TravellingRays;
 
 /// What decides how light is worked out. The same settings give the same picture on any number of ranks and threads.
 struct RaySettings {
@@ -42,6 +44,8 @@ struct RaySettings {
   /// Passes, by name, whose light of the first surface is worked out for one pixel in four and spread to its
   /// neighbours where they see the like; "shadow" stands for the light of lights.
   std::vector<std::string> half_resolution = {};
+  /// Surfaces that this rank's rays meet at home, as those of the others travel to it; none: all of them.
+  std::optional<std::vector<SurfaceRange>> part = {};
   bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
   std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;
@@ -117,10 +121,13 @@ class Lighter {
   /// a planned pass needs them. They outlive the lighter.
   using RaySource = std::function<const RayScene&()>;
 
-  /// Builds a ray scene of its own if a planned pass needs one and there is no `rays`. The scene must outlive this.
+  /// Builds a ray scene of its own if a planned pass needs one and there is no `rays`. The scene must outlive this, and
+  /// so must `travelling`, by which rays reach what is not in `settings.part`: then light() is collective, and so is
+  /// this.
   /// Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires looks at
   /// every texel once.
-  Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {});
+  Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {},
+          TravellingRays* travelling = nullptr);
   Lighter(const Scene& scene, const RaySettings& settings) : Lighter(scene, settings, requirements_of(scene)) {}
   ~Lighter();
   Lighter(const Lighter&) = delete;

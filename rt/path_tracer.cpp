@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/check.h"
-#include "core/parallel.h"
 #include "core/trace.h"
 #include "rt/denormals.h"
 #include "rt/path_wave.h"
@@ -139,7 +138,7 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
 
   State& state = *state_;
   const std::vector<Media> eyes = state.media.of_eyes(views);
-  parallel_for(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
+  state.shared.rays.for_each(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const trace::Span span("path trace tile", "tile", tile);
     const TilePlace place = layout.place(tile);

@@ -11,7 +11,6 @@
 
 #include "cluster/collectives.h"
 #include "core/error.h"
-#include "core/parallel.h"
 #include "rt/denormals.h"
 #include "rt/flux_scatter.h"
 #include "rt/photon_gather.h"
@@ -139,7 +138,7 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
   KeptPhotons kept(settings_.most_kept);
-  parallel_for(settings_.threads, count, [&](std::size_t i) {
+  rays_.for_each(settings_.threads, count, [&](std::size_t i) {
     const DenormalsAsZero mode;
     Block block;
     const std::uint64_t before = i * kBlockPhotons;

@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "rt/embree_compat.h"
 #include "rt/ray_scene.h"
+#include "rt/travelling_rays.h"
 
 // What a ray scene answers: packet by packet, from RayBatch to Embree and back.
 namespace hpr {
@@ -21,7 +22,7 @@ struct Closest {
   const RayGeometry* geometries;
   std::array<float, kWidth> distance;
   std::array<std::uint32_t, kWidth> surface;
-  std::array<std::uint32_t, kWidth> geometry;
+  std::array<std::uint32_t, kWidth> instance;
   const Passed* passed;  ///< by lane; null: none has passed anything
 };
 
@@ -30,9 +31,9 @@ struct Closest {
 constexpr float kSameEdge = 8 * std::numeric_limits<float>::epsilon();
 
 /// Whether the ray has that behind it already.
-bool was_met(const Passed& passed, std::uint32_t surface, std::uint32_t geometry, float distance) {
+bool was_met(const Passed& passed, std::uint32_t surface, std::uint32_t instance, float distance) {
   if (passed.surface == kNoSurface) return false;
-  if (geometry == passed.geometry) {
+  if (instance == passed.instance) {
     return surface == passed.surface || distance <= passed.distance + kSameEdge * std::max(passed.distance, 1.0F);
   }
   return distance < passed.distance || (distance == passed.distance && surface < passed.surface);
@@ -47,16 +48,16 @@ void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
     const unsigned int outer = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
     const unsigned int geometry =
         outer != RTC_INVALID_GEOMETRY_ID ? outer : RTCHitN_geomID(arguments->hit, arguments->N, i);
-    const std::uint32_t surface =
-        closest.geometries[geometry].first_surface + RTCHitN_primID(arguments->hit, arguments->N, i);
+    const RayGeometry& shown = closest.geometries[geometry];
+    const std::uint32_t surface = shown.first_surface + RTCHitN_primID(arguments->hit, arguments->N, i);
     const float distance = RTCRayN_tfar(arguments->ray, arguments->N, i);
     const bool later = distance == closest.distance[lane] && surface >= closest.surface[lane];
-    if (later || (closest.passed != nullptr && was_met(closest.passed[lane], surface, geometry, distance))) {
+    if (later || (closest.passed != nullptr && was_met(closest.passed[lane], surface, shown.instance, distance))) {
       arguments->valid[i] = 0;
     } else {
       closest.distance[lane] = distance;
       closest.surface[lane] = surface;
-      closest.geometry[lane] = geometry;
+      closest.instance[lane] = shown.instance;
     }
   }
 }
@@ -124,7 +125,21 @@ std::uint64_t load(const Packet& packet, std::size_t count, embree::RayPacket& r
 
 }  // namespace
 
+bool is_bearable(const RayBatch::Ray& ray) {
+  bool directed = false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float part = std::abs(ray.direction[axis]);
+    if (!(std::abs(ray.origin[axis]) < kFarthestRay) || !(part < kFarthestRay)) return false;
+    directed = directed || part > 0.0F;
+  }
+  return directed && ray.reach >= 0.0F;
+}
+
 std::uint64_t RayScene::occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const {
+  return others_ != nullptr ? others_->occluded(part_, rays, blocked) : occluded_here(rays, blocked);
+}
+
+std::uint64_t RayScene::occluded_here(const RayBatch& rays, std::span<std::uint8_t> blocked) const {
   HPR_CHECK(blocked.size() == rays.size());
   embree::Context context;
   embree::start(context, embree::Rays::Incoherent);
@@ -143,11 +158,17 @@ std::uint64_t RayScene::occluded(const RayBatch& rays, std::span<std::uint8_t> b
 }
 
 std::uint64_t RayScene::closest(const RayBatch& rays, std::span<std::uint32_t> surfaces, Coherence coherence) const {
-  return find_closest(rays, nullptr, surfaces, coherence);
+  if (others_ == nullptr) return find_closest(rays, nullptr, surfaces, coherence);
+  return others_->closest(part_, rays, {}, surfaces);
 }
 
 std::uint64_t RayScene::closest(const RayBatch& rays, std::span<Passed> passed,
                                 std::span<std::uint32_t> surfaces) const {
+  return others_ != nullptr ? others_->closest(part_, rays, passed, surfaces) : closest_here(rays, passed, surfaces);
+}
+
+std::uint64_t RayScene::closest_here(const RayBatch& rays, std::span<Passed> passed,
+                                     std::span<std::uint32_t> surfaces) const {
   HPR_CHECK(passed.size() == rays.size());
   return find_closest(rays, passed.data(), surfaces, Coherence::Low);
 }
@@ -180,7 +201,7 @@ std::uint64_t RayScene::find_closest(const RayBatch& rays, Passed* passed, std::
     std::copy_n(closest.surface.begin(), count, surfaces.begin() + static_cast<std::ptrdiff_t>(first));
     if (passed == nullptr) continue;
     for (std::size_t i = 0; i < count; ++i) {
-      passed[first + i] = {closest.surface[i], closest.geometry[i], closest.distance[i]};
+      passed[first + i] = {closest.surface[i], closest.instance[i], closest.distance[i]};
     }
   }
   return invalid;

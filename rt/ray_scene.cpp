@@ -13,8 +13,11 @@
 #include <tuple>
 #include <utility>
 
+#include "core/check.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "rt/embree_compat.h"
+#include "rt/travelling_rays.h"
 #include "scene/surface_ranges.h"
 
 namespace hpr {
@@ -251,7 +254,23 @@ RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::
   embree_->failure.check();
 }
 
-RayScene::~RayScene() = default;
+RayScene::~RayScene() {
+  if (others_ != nullptr) others_->remove(part_);
+}
+
+void RayScene::share(TravellingRays& others) {
+  HPR_CHECK(others_ == nullptr);
+  part_ = others.add(*this);
+  others_ = &others;
+}
+
+void RayScene::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const {
+  if (others_ != nullptr) {
+    others_->for_each(threads, count, body);
+  } else {
+    parallel_for(threads, count, body);
+  }
+}
 
 std::uint64_t RayScene::skipped_triangles() const {
   return embree_->skipped;

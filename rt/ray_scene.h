@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
@@ -23,18 +25,41 @@ inline constexpr float kFarthestRay = 1.8e18F;
 /// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
 class RayBatch {
  public:
+  struct Ray {
+    std::array<float, 3> origin{};
+    std::array<float, 3> direction{};
+    float reach = 0.0F;
+  };
+
   void clear() { size_ = 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
   void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach) {
     const std::size_t lane = size_ % kWidth;
-    if (size_ / kWidth == packets_.size()) packets_.emplace_back();
-    Packet& packet = packets_[size_ / kWidth];
+    Packet& packet = next_packet();
     for (int axis = 0; axis < 3; ++axis) {
       packet.origin[axis][lane] = static_cast<float>(origin[axis]);
       packet.direction[axis][lane] = static_cast<float>(direction[axis]);
     }
     packet.reach[lane] = static_cast<float>(reach);
-    ++size_;
+  }
+  void push(const Ray& ray) {
+    const std::size_t lane = size_ % kWidth;
+    Packet& packet = next_packet();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      packet.origin[axis][lane] = ray.origin[axis];
+      packet.direction[axis][lane] = ray.direction[axis];
+    }
+    packet.reach[lane] = ray.reach;
+  }
+  [[nodiscard]] Ray ray(std::size_t i) const {
+    const Packet& packet = packets_[i / kWidth];
+    Ray ray;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ray.origin[axis] = packet.origin[axis][i % kWidth];
+      ray.direction[axis] = packet.direction[axis][i % kWidth];
+    }
+    ray.reach = packet.reach[i % kWidth];
+    return ray;
   }
 
  private:
@@ -47,9 +72,19 @@ class RayBatch {
     float reach[kWidth];
   };
 
+  /// Counts one more ray, which goes there.
+  Packet& next_packet() {
+    const std::size_t index = size_++ / kWidth;
+    if (index == packets_.size()) packets_.emplace_back();
+    return packets_[index];
+  }
+
   std::size_t size_ = 0;
   std::vector<Packet> packets_;
 };
+
+/// Whether Embree can bear it: finite, with a direction, within kFarthestRay.
+[[nodiscard]] bool is_bearable(const RayBatch::Ray& ray);
 
 /// Whether rays that share a packet go the same way; Embree is quicker when told so rightly. No answer depends on it.
 enum class Coherence { Low, High };
@@ -57,11 +92,11 @@ enum class Coherence { Low, High };
 /// What a ray has met and passed, if it is sent once more from where it began: it then meets what comes next by
 /// distance, and by id where distances are equal. So nothing is skipped, however close surfaces lie.
 ///
-/// Triangles of one geometry that are met at one distance, but for rounding, are met once: they share the edge there.
+/// Triangles of one instance that are met at one distance, but for rounding, are met once: they share the edge there.
 struct Passed {
   std::uint32_t surface = kNoSurface;  ///< none yet
-  std::uint32_t geometry = 0;          ///< of RayScene::geometries
-  float distance = 0.0F;               ///< ray space
+  std::uint32_t instance = 0;
+  float distance = 0.0F;  ///< ray space
 };
 
 /// What one geometry of Embree's scene shows: a run of triangles of an instance, counted by primitive id.
@@ -70,6 +105,8 @@ struct RayGeometry {
   std::uint32_t first_triangle = 0;  ///< of the instance's mesh
   std::uint32_t first_surface = 0;
 };
+
+class TravellingRays;
 
 /// The scene as Embree holds it: meshes used once go in as world triangles, shared ones as instances of a sub-scene.
 ///
@@ -96,6 +133,16 @@ class RayScene {
   [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<Passed> passed,
                                       std::span<std::uint32_t> surfaces) const;
 
+  /// This is one rank's part of a scene of which the others hold the rest: from now on answers are of all of it, and
+  /// may be asked for inside for_each() only. Ranks call it alike, scene by scene. `others` outlives this.
+  void share(TravellingRays& others);
+  /// Calls body(i) for i in [0, count) by `threads` threads, as parallel_for; collective where the scene is shared.
+  void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const;
+  /// Of this rank's part alone.
+  [[nodiscard]] std::uint64_t occluded_here(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+  [[nodiscard]] std::uint64_t closest_here(const RayBatch& rays, std::span<Passed> passed,
+                                           std::span<std::uint32_t> surfaces) const;
+
   /// Triangles left out because their world positions are beyond what float holds.
   [[nodiscard]] std::uint64_t skipped_triangles() const;
 
@@ -110,6 +157,8 @@ class RayScene {
                              Coherence coherence) const;
 
   struct Embree;
+  TravellingRays* others_ = nullptr;  ///< null: this is the whole scene
+  std::uint32_t part_ = 0;            ///< its number there
   RaySpace space_;
   std::unique_ptr<Embree> embree_;
 };

@@ -76,7 +76,7 @@ def covering(runs):
 def digests(way, run, folder):
     """The hashes of one run's keys and picture, or what went wrong."""
     ranks, distribution, strategy, threads, backend = run
-    result = hpr(["render", SCENE, "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", distribution,
+    result = hpr(["render", SCENE, "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", *distribution.split(),
                   "--strategy", strategy, "--threads", threads, "--backend", backend, *WAYS[way], "--raw", "a.keys",
                   "-o", "a.exr", "--force"], folder)
     if result.returncode != 0:
@@ -108,8 +108,9 @@ def main():
         ranks, threads = ("1", "2", "3", "4", "7"), ("1", "2")
         distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
         drawn = list(itertools.product(ranks if FULL else ("1", "2", "3", "7"), distributions, choices_of("--strategy", folder), threads, backends))
-        traced = list(itertools.product(ranks, distributions, ("auto",), threads, backends[:1]))
-        lit = list(itertools.product(ranks, distributions if FULL else ("sort-first", "sort-last"), ("auto",), threads,
+        parts = "sort-last --data partitioned"
+        traced = list(itertools.product(ranks, (*distributions, parts), ("auto",), threads, backends[:1]))
+        lit = list(itertools.product(ranks, (*(distributions if FULL else ("sort-first", "sort-last")), parts), ("auto",), threads,
                                      backends[:1]))
         bad = sum(differing(way, runs if FULL else covering(runs), folder)
                   for way, runs in (("raster", drawn), ("rays", traced), ("all passes", lit)))
