@@ -12,7 +12,6 @@
 #include "cluster/collectives.h"
 #include "core/error.h"
 #include "rt/denormals.h"
-#include "rt/flux_scatter.h"
 #include "rt/photon_gather.h"
 #include "rt/punctual_light.h"
 #include "rt/ray_walk.h"
@@ -247,19 +246,20 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Pas
   }
   flight.flux = flux;
   if (!carries_light(flight.flux)) return false;
-  if (flight.bounces < settings_.max_bounces) return scatter(flight, surface, material, bsdf);
+  if (flight.bounces < settings_.max_bounces) return scatter(flight, {surface, material, bsdf, block.triangle});
   ++block.traced.counts.lost;
   return false;
 }
 
 /// Chooses a lobe by what it makes of the photon's flux, then a direction. After the first bounces the photon ends with
 /// the chance that its light is absorbed.
-bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const MaterialPoint& material,
-                           const Bsdf& bsdf) const {
+bool PhotonTracer::scatter(Flight& flight, const FluxArrival& at) const {
+  const SurfacePoint& surface = at.surface;
+  const FluxScatter scatters(scene_, surfaces_, at);
   std::array<double, kLobes.size()> chances{};
   double total = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
-    chances[i] = sum_of(flight.flux * bsdf.weight(kLobes[i])) / sum_of(flight.flux);
+    chances[i] = sum_of(flight.flux * scatters.weight(kLobes[i])) / sum_of(flight.flux);
     total += chances[i];
   }
   if (!(total > 0.0) || !std::isfinite(total)) return false;
@@ -268,16 +268,15 @@ bool PhotonTracer::scatter(Flight& flight, const SurfacePoint& surface, const Ma
   std::size_t chosen = 0;
   while (chosen < kLobes.size() && left >= chances[chosen]) left -= chances[chosen++];
   if (chosen == kLobes.size()) return false;
-  const bool follows = is_followed(bsdf, kLobes[chosen], settings_.glossy_cutoff);
+  const bool follows = is_followed(at.bsdf, kLobes[chosen], settings_.glossy_cutoff);
   if (settings_.caustics_only && !follows) return false;
-  const std::optional<BsdfSample> sample =
-      sample_flux(scene_, {surface, material, bsdf}, kLobes[chosen], flight.sampler);
+  const std::optional<BsdfSample> sample = scatters.sample(kLobes[chosen], flight.sampler);
   if (!sample) return false;
 
   flight.flux *= sample->weight * (whole / chances[chosen]);
   if (!carries_light(flight.flux)) return false;
   flight.followed = flight.followed && follows;
-  flight.media = media_towards(flight.media, surface, material, sample->direction);
+  flight.media = media_towards(flight.media, surface, at.material, sample->direction);
   flight.direction = sample->direction;
   flight.place = surface.position;
   flight.passed = 0;

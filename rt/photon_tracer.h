@@ -9,6 +9,7 @@
 
 #include "cluster/communicator.h"
 #include "rt/bsdf.h"
+#include "rt/flux_scatter.h"
 #include "rt/light_set.h"
 #include "rt/photon_map.h"
 #include "rt/ray_scene.h"
@@ -100,8 +101,7 @@ class PhotonTracer {
   void move(Block& block) const;
   [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const;
   void keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const;
-  [[nodiscard]] bool scatter(Flight& flight, const SurfacePoint& surface, const MaterialPoint& material,
-                             const Bsdf& bsdf) const;
+  [[nodiscard]] bool scatter(Flight& flight, const FluxArrival& at) const;
 
   const Scene& scene_;
   const Surfaces& surfaces_;
