@@ -234,6 +234,8 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   // So does a file that may not grow further.
   std::signal(SIGXFSZ, SIG_IGN);
+  // What a checkpoint is asked for by is nothing to commands that write none (app/signals.h).
+  for (const int request : {SIGUSR1, SIGUSR2}) std::signal(request, SIG_IGN);
   // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     // What is said on a closed stdout is lost, and that is an error where there is something to say.
