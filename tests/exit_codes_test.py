@@ -300,6 +300,10 @@ def main():
                             ("wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none"])):
         expect_error(f"ranks that cannot talk, {case}", [*arguments, "--ranks", "2"], [4], ["TMPDIR"],
                      environment={"OMPI_MCA_btl": "none-such"})
+    for arguments in (["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none"], ["demo", "--wall", "1x1@16x16"]):
+        expect_error(f"no folder for temporary files, {arguments[0]}", [*arguments, "--ranks", "2"], [4],
+                     ["'/nonexistent/folder', which TMPDIR names", "hint: set TMPDIR"],
+                     environment={"TMPDIR": "/nonexistent/folder"})
     full_disk()
     limited_files()
 
