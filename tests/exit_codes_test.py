@@ -289,6 +289,13 @@ def main():
     expect_error("tile driven twice", ["wall", "check", "wall.toml"], [3], ["wall.toml:6:", "twice"],
                  prepare=writer("wall.toml", TWICE))
 
+    expect_error("files of keys that hold none", ["diff", "a.keys", "b.keys"], [3], ["a.keys", "no keys", "hint"],
+                 prepare=writer("a.keys", "", "b.keys", ""))
+    expect_error("files of keys of another name", ["diff", "a.raw", "b.raw"], [3], ["a.raw", ".keys"],
+                 prepare=writer("a.raw", "eight by", "b.raw", "eight by"))
+    expect_error("a file of keys beside one of another name", ["diff", "a.keys", "b.raw"], [3], ["b.raw", "FILE.keys"],
+                 prepare=writer("a.keys", "eight by", "b.raw", "eight by"))
+
     expect_error("picture past the limit", ["render", "gen:gallery", "-o", "a.png", "--size", "4096x4096", "--limit-image",
                                             "1024x1024"], [6], ["1024"])
     expect_error("scene past the limit", ["render", "triangle.gltf", "-o", "a.png", *SMALL, "--limit-mem", "16B"], [6],
