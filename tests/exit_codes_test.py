@@ -185,6 +185,15 @@ def limited_files():
         expect_error(f"limited files, {arguments[0]}", arguments, [4], ["ulimit -f"], limit=limit)
 
 
+def backgrounds():
+    """What a file cannot hold is told of where it is made."""
+    for name, has_one in (("tetra", True), ("sphereflake", True), ("cornell", False)):
+        with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+            result = run(["scene", "make", name, "-o", "a.glb"], scratch)
+        if result.returncode != 0 or ("background" in result.stderr) != has_one:
+            complain(f"the background of {name}", result, "is not told of as it should")
+
+
 def main():
     expect_success("a demo whose picture was taken away", ["demo", "--wall", "1x1@16x16"], "hpr-demo.png",
                    prepare=folder_with("hpr-demo-screens", "wall-r0c0.png"))
@@ -311,6 +320,7 @@ def main():
         expect_error(f"no folder for temporary files, {arguments[0]}", [*arguments, "--ranks", "2"], [4],
                      ["'/nonexistent/folder', which TMPDIR names", "hint: set TMPDIR"],
                      environment={"TMPDIR": "/nonexistent/folder"})
+    backgrounds()
     full_disk()
     limited_files()
 
