@@ -9,6 +9,7 @@ Prints what was wrong and leaves with 1.
 import json
 import os
 import pathlib
+import pty
 import signal
 import subprocess
 import sys
@@ -68,6 +69,25 @@ def stopped(folder, ranks):
     expect(run.returncode == 75, f"{name}: left with {run.returncode}:\n{said[-1500:]}")
     frames = json.loads((folder / name / "manifest.json").read_text())["frames"]
     expect(len(frames) >= 2, f"{name}: {len(frames)} frames are written down")
+
+
+def colors(folder):
+    """For a terminal somebody looks at: the one mpirun gives rank 0 ends in a file, or anywhere."""
+    alone = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
+    for environment, wanted in ((alone, True), ({**alone, "OMPI_COMM_WORLD_SIZE": "1", "OMPI_COMM_WORLD_RANK": "0"}, False)):
+        ours, theirs = pty.openpty()
+        run = subprocess.Popen([HPR, "doctor"], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=theirs,
+                               stderr=subprocess.DEVNULL)
+        os.close(theirs)
+        said = b""
+        try:
+            while more := os.read(ours, 65536):
+                said += more
+        except OSError:  # how its end is told
+            pass
+        run.wait(timeout=60)
+        os.close(ours)
+        expect((b"\x1b[" in said) == wanted and b"temporary files" in said, f"doctor {'alone' if wanted else 'in a job'}: {said[:400]}")
 
 
 def has_begun(pid):
@@ -180,6 +200,7 @@ def main():
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
         asked_in_vain(folder)
+        colors(folder)
         ignored(folder)
         limits_of_a_stubborn_mpiexec(folder)
         interrupted(folder, 2, signal.SIGINT, False)
