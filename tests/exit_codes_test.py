@@ -202,7 +202,12 @@ def main():
     expect_success("help of render", ["render", "--help"], "--size")
     expect_success("version", ["--version"], "hpr")
 
+    for words in (["help", "help"], ["help", "help", "render"]):
+        expect_success(" ".join(words), words, "--size" if "render" in words else "render")
+
     expect_error("unknown command", ["rendr"], [2], ["render"])
+    expect_error("options and no command", ["-v"], [2], ["needs a command", "hint: choices: demo, render"])
+    expect_error("a command without what it needs, behind an option", ["-v", "diff"], [2], ["A is required", "--help"])
     expect_error("unknown option", ["render", "gen:gallery", "-o", "a.png", "--sizee", "64x48"], [2], ["--size"])
     expect_error("no output named", ["render", "gen:gallery", *SMALL], [2])
     expect_error("size is no size", ["render", "gen:gallery", "-o", "a.png", "--size", "64by48"], [2], ["64by48"])
