@@ -194,6 +194,17 @@ def backgrounds():
             complain(f"the background of {name}", result, "is not told of as it should")
 
 
+def groups():
+    """Of ranks that are not grouped, or are fewer, it is told that they are not as asked."""
+    for ranks, distribution, told in (("2", "sort-last", "--distribute sort-last has no use for --groups"),
+                                      ("2", "hybrid", "--groups 3"), ("1", "hybrid", "--groups 3"), ("3", "hybrid", None)):
+        with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+            result = run(["render", "gen:cornell", "-o", "a.png", *SMALL, "--passes", "none", "--groups", "3", "--distribute",
+                          distribution, "--ranks", ranks], scratch)
+        if result.returncode != 0 or (told or "") not in result.stderr or (told is None) == ("warning" in result.stderr):
+            complain(f"--groups 3 of {ranks} ranks, {distribution}", result, "is not told of as it should")
+
+
 def main():
     expect_success("a demo whose picture was taken away", ["demo", "--wall", "1x1@16x16"], "hpr-demo.png",
                    prepare=folder_with("hpr-demo-screens", "wall-r0c0.png"))
@@ -326,6 +337,7 @@ def main():
                      ["'/nonexistent/folder', which TMPDIR names", "hint: set TMPDIR"],
                      environment={"TMPDIR": "/nonexistent/folder"})
     backgrounds()
+    groups()
     full_disk()
     limited_files()
 
