@@ -71,11 +71,10 @@ void draw_axes(SvgDrawing& drawing, const Field& field, const std::set<int>& cor
 std::string table(const ScaleReport& report) {
   std::string text =
       "<div class=\"wide\"><table>\n<caption>Milliseconds of a frame on the slowest rank, from its first triangle to "
-      "its last tile on a screen. Cores are those of a rank. Speed-up and efficiency are against the least cores of "
-      "the "
-      "same wall; imbalance is the busiest rank by the mean.</caption>\n<thead><tr>";
-  for (const char* name : {"tiles", "cores", "ranks", "hosts", "median", "95 % from", "to", "speed-up", "efficiency",
-                           "imbalance", "MB sent", "frame xxh64"})
+      "its last tile on a screen. Speed-up and efficiency are against the least cores of the same wall; imbalance is "
+      "the busiest rank by the mean.</caption>\n<thead><tr>";
+  for (const char* name : {"tiles", "cores/rank", "ranks", "hosts", "median", "95 % from", "to", "speed-up",
+                           "efficiency", "imbalance", "MB sent", "frame xxh64"})
     text += fmt::format("<th scope=\"col\">{}</th>", name);
   text += "</tr></thead>\n<tbody>\n";
   for (const ScaleRun& run : report.runs) {

@@ -90,11 +90,12 @@ std::string scale_table(const ScaleReport& report) {
   std::string text = fmt::format("{}, screens of {}x{}, seed {}, {} frames each; {}, {} cores, {}\n", report.input,
                                  report.size.width, report.size.height, report.seed, report.runs.front().ms.size(),
                                  report.machine.cpu, report.machine.cores, report.machine.mpi);
-  text += fmt::format("{:<7} {:>5} {:>5} {:>5} {:>9} {:>20} {:>8} {:>10} {:>9} {:>8}  {}\n", "tiles", "cores", "ranks",
-                      "hosts", "ms", "95 % of the median", "speed-up", "efficiency", "imbalance", "MB sent", "frame");
+  text += fmt::format("{:<7} {:>10} {:>5} {:>5} {:>9} {:>20} {:>8} {:>10} {:>9} {:>8}  {}\n", "tiles", "cores/rank",
+                      "ranks", "hosts", "ms", "95 % of the median", "speed-up", "efficiency", "imbalance", "MB sent",
+                      "frame");
   for (const ScaleRun& run : report.runs) {
     const ScaleFigures figures = figures_of(report, run);
-    text += fmt::format("{:<7} {:>5} {:>5} {:>5} {:>9.1f} {:>20} {:>8.2f} {:>8.0f} % {:>9.2f} {:>8.2f}  {}{}\n",
+    text += fmt::format("{:<7} {:>10} {:>5} {:>5} {:>9.1f} {:>20} {:>8.2f} {:>8.0f} % {:>9.2f} {:>8.2f}  {}{}\n",
                         grid_name(run.grid), run.threads, run.ranks, run.hosts, figures.median_ms,
                         fmt::format("{:.1f} .. {:.1f}", figures.low_ms, figures.high_ms), figures.speed_up,
                         100.0 * figures.efficiency, figures.imbalance, static_cast<double>(run.bytes_sent) / 1e6,

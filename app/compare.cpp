@@ -117,9 +117,9 @@ CompareRun outcome_of(const Contestant& contestant, const Costs& costs, const Lo
   CompareRun run;
   run.strategy = contestant.compositor->name();
   run.differing_pixels = contestant.differing_pixels;
-  if (const auto prediction = contestant.compositor->predict(costs, load)) {
-    run.predicted_ms = prediction->collected(costs, load) * 1e3;
-  }
+  // A rank alone sends nothing, and no speeds were measured to predict with.
+  const auto prediction = costs.ranks > 1 ? contestant.compositor->predict(costs, load) : std::nullopt;
+  if (prediction) run.predicted_ms = prediction->collected(costs, load) * 1e3;
   if (contestant.compositor->chosen() != run.strategy) run.chosen = contestant.compositor->chosen();
   run.frame_xxh64 = frame_hash(contestant.frame, colors);
   return run;

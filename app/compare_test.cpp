@@ -91,6 +91,16 @@ TEST(Compare, CountsWhatIsSentInOneFrame) {
   EXPECT_EQ(result.runs.back().bytes_total, 2U * 16 * 32768);
 }
 
+TEST(Compare, PredictsNothingOfARankThatHasNobodyToComposeWith) {
+  for (const int ranks : {1, 2}) {
+    const auto result =
+        compare_on_threads(ranks, synthetic_input(SyntheticKind::Dense, {64, 48}, {1, 1}), kAllStrategies);
+    for (const CompareRun& run : result.runs) {
+      EXPECT_EQ(run.predicted_ms.has_value(), ranks > 1) << run.strategy << " on " << ranks;
+    }
+  }
+}
+
 TEST(Compare, SurfaceKeysAreHashedWhole) {
   CompareInput input = synthetic_input(SyntheticKind::Sparse, {100, 50}, {1, 1});
   input.colors = false;

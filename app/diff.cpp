@@ -30,14 +30,27 @@ double share(std::size_t part, std::size_t whole) {
 std::vector<Key> read_keys(const std::filesystem::path& path) {
   constexpr std::uint64_t kLargestFile = std::uint64_t{32} << 30U;
   const std::vector<std::byte> bytes = read_file(path, kLargestFile);
-  if (bytes.size() % sizeof(Key) != 0) {
+  if (bytes.empty() || bytes.size() % sizeof(Key) != 0) {
     throw Error(ExitCode::BadInput,
-                fmt::format("{}: {} bytes are no whole number of 64-bit keys", path.string(), bytes.size()),
+                bytes.empty()
+                    ? fmt::format("{}: an empty file holds no keys", path.string())
+                    : fmt::format("{}: {} bytes are no whole number of 64-bit keys", path.string(), bytes.size()),
                 "write the file with hpr render --raw FILE.keys");
   }
   std::vector<Key> keys(bytes.size() / sizeof(Key));
   std::memcpy(keys.data(), bytes.data(), bytes.size());
   return keys;
+}
+
+/// A file of keys of another name is taken for a picture.
+FloatImage read_picture(const std::filesystem::path& path, const ImageLimits& limits) {
+  try {
+    return read_image(path, limits);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::BadInput) throw;
+    throw Error(ExitCode::BadInput, error.what(), error.hint() + "; files of keys are known by their name, FILE.keys",
+                error.line());
+  }
 }
 
 std::size_t worst_x(const DiffReport& report) {
@@ -133,6 +146,8 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
                          const DiffTolerance& tolerance, std::span<const std::string> metrics, int threads) {
   if (lacks_alpha(a, b)) return diff_pictures(opaque(a), name_a, b, name_b, tolerance, metrics, threads);
   if (lacks_alpha(b, a)) return diff_pictures(a, name_a, opaque(b), name_b, tolerance, metrics, threads);
+  if (differ_in_levels(a, b))
+    return diff_pictures(on_most_levels(a), name_a, on_most_levels(b), name_b, tolerance, metrics, threads);
   check_comparable(a, name_a, b, name_b);
   DiffReport report;
   report.size = a.size;
@@ -182,8 +197,8 @@ DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::pat
   const bool keys = is_keys(a);
   if (keys != is_keys(b)) throw_other_kind(a.string(), b.string());
   if (!keys) {
-    return diff_pictures(read_image(a, limits), a.string(), read_image(b, limits), b.string(), tolerance, metrics,
-                         threads);
+    const FloatImage picture_a = read_picture(a, limits);
+    return diff_pictures(picture_a, a.string(), read_picture(b, limits), b.string(), tolerance, metrics, threads);
   }
   if (tolerance.value != 0.0) {
     throw Error(ExitCode::Usage, "--fail is for values of pictures; keys are equal or not",

@@ -289,6 +289,24 @@ TEST_F(DiffFiles, IntegersAreComparedByTheirBits) {
   EXPECT_EQ(code_of(a, write("c.exr", {{{"id.X"}, {1.0F}}})), ExitCode::BadInput);
 }
 
+TEST(Diff, LevelsOf8AndOf16BitsThatAreTheSameDifferInNothing) {
+  constexpr int kSide = 16;
+  FloatImage a{{kSide, kSide}, {"R", "G", "B"}, {}, false, 255};
+  FloatImage b{{kSide, kSide}, {"R", "G", "B"}, {}, false, 65535};
+  for (int i = 0; i < 3 * kSide * kSide; ++i) {  // as decoders have them: a last bit apart
+    const int level = i * 37 % 256;
+    a.values.push_back(static_cast<float>(level) * (1.0F / 255.0F));
+    b.values.push_back(static_cast<float>(257 * level) / 65535.0F);
+  }
+  ASSERT_NE(a.values, b.values);
+  const DiffReport report = diff(a, b);
+  EXPECT_EQ(report.difference.differing, 0U);
+  ASSERT_TRUE(report.colors);
+  EXPECT_EQ(report.colors->relative.all, 0.0);
+  EXPECT_EQ(report.colors->flip, 0.0);
+  EXPECT_EQ(report.colors->ssim, 1.0);
+}
+
 TEST(Diff, FarValuesAreTakenApartInDoublePrecision) {
   const FloatImage a = picture({3e38F, 0, 0});
   const FloatImage b = picture({-3e38F, 0, 0});

@@ -76,6 +76,19 @@ FloatImage opaque(const FloatImage& picture) {
   return result;
 }
 
+bool differ_in_levels(const FloatImage& a, const FloatImage& b) {
+  return a.levels > 0 && b.levels > 0 && a.levels != b.levels;
+}
+
+FloatImage on_most_levels(const FloatImage& picture) {
+  FloatImage result = picture;
+  result.levels = kMostLevels;
+  std::ranges::transform(picture.values, result.values.begin(), [&](float value) {
+    return static_cast<float>(level_of(value, picture.levels) / kMostLevels);
+  });
+  return result;
+}
+
 void check_comparable(const FloatImage& a, const std::string& name_a, const FloatImage& b, const std::string& name_b) {
   if (a.size != b.size || !std::ranges::is_permutation(a.channels, b.channels)) {
     throw Error(ExitCode::BadInput, fmt::format("{} is {}, {} is {}", name_a, describe(a), name_b, describe(b)),
@@ -93,8 +106,9 @@ void check_comparable(const FloatImage& a, const std::string& name_a, const Floa
 }
 
 void throw_other_kind(const std::string& a, const std::string& b) {
-  throw Error(ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a, b),
-              "compare keys with keys, linear EXR and Radiance with one another, and sRGB PNG and JPEG likewise");
+  throw Error(
+      ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a, b),
+      "compare keys (FILE.keys) with keys, linear EXR and Radiance with one another, and sRGB PNG and JPEG likewise");
 }
 
 std::vector<double> picture_differences(const FloatImage& image, const FloatImage& reference) {

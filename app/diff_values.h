@@ -17,6 +17,12 @@ namespace hpr {
 /// The picture with an alpha of 1.
 [[nodiscard]] FloatImage opaque(const FloatImage& picture);
 
+/// Whether both are made of levels, 8 bits of them in one and 16 in the other.
+[[nodiscard]] bool differ_in_levels(const FloatImage& a, const FloatImage& b);
+
+/// The picture, of 8 or 16 bits, with values and levels as 16 bits have them.
+[[nodiscard]] FloatImage on_most_levels(const FloatImage& picture);
+
 /// Throws Error (BadInput), naming both, unless sizes, channels and what these hold are the same.
 void check_comparable(const FloatImage& a, const std::string& name_a, const FloatImage& b, const std::string& name_b);
 [[noreturn]] void throw_other_kind(const std::string& a, const std::string& b);

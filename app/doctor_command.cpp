@@ -6,13 +6,16 @@
 #include <cstdlib>
 #include <utility>
 
+#include "app/launcher.h"
+
 namespace hpr {
 namespace {
 
-/// https://no-color.org: any value that is not empty turns colours off.
+/// https://no-color.org: any value that is not empty turns colours off. A job's launcher gives rank 0 a terminal that
+/// nobody looks at.
 bool colors_wanted() {
   const char* const no_color = std::getenv("NO_COLOR");
-  return (no_color == nullptr || *no_color == '\0') && ::isatty(STDOUT_FILENO) == 1;
+  return (no_color == nullptr || *no_color == '\0') && !inside_mpi_job() && ::isatty(STDOUT_FILENO) == 1;
 }
 
 class DoctorCommand final : public Command {

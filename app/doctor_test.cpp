@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
+#include <string>
 
 #include "core/error.h"
 
@@ -77,6 +80,20 @@ TEST(Doctor, MachineChecksEndWithAFindingEachAndARemedyWhereSomethingIsWrong) {
     EXPECT_EQ(finding.remedy.empty(), finding.status == FindingStatus::Ok) << finding.name << ": " << finding.remedy;
   }
   EXPECT_GE(names.size(), 8U);
+}
+
+TEST(Doctor, LooksAtTheFolderWhereTemporaryFilesGo) {
+  const char* const before = std::getenv("TMPDIR");
+  const std::string old = before == nullptr ? "" : before;
+  ::setenv("TMPDIR", "/nonexistent/folder", 1);
+  const std::vector<Check> checks = machine_checks();
+  const auto check = std::ranges::find(checks, "temporary files", &Check::name);
+  ASSERT_NE(check, checks.end());
+  const Finding finding = check->run();
+  ::setenv("TMPDIR", old.c_str(), 1);
+  EXPECT_EQ(finding.status, FindingStatus::Warn);
+  EXPECT_NE(finding.detail.find("/nonexistent/folder"), std::string::npos) << finding.detail;
+  EXPECT_NE(finding.remedy.find("TMPDIR"), std::string::npos) << finding.remedy;
 }
 
 }  // namespace

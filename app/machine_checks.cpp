@@ -24,6 +24,7 @@
 #include "core/names.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "core/temporary.h"
 #include "image/image_io.h"
 #include "rt/embree_compat.h"
 
@@ -117,13 +118,13 @@ Finding check_mpi() {
 }
 
 /// Open MPI keeps the messages of ranks on one host in `folder`.
-Finding check_space(const char* folder, double needed_bytes, const char* remedy) {
+Finding check_space(const std::string& folder, double needed_bytes, const char* remedy) {
   struct statvfs space {};
-  if (::statvfs(folder, &space) != 0)
-    return warn(fmt::format("{}: {}", folder, std::generic_category().message(errno)), remedy);
+  if (::statvfs(folder.c_str(), &space) != 0)
+    return warn(fmt::format("{}: {}", printable(folder), std::generic_category().message(errno)), remedy);
   const double free_bytes = static_cast<double>(space.f_bavail) * static_cast<double>(space.f_frsize);
-  std::string detail = fmt::format("{}: {:.0f} MiB free", folder, free_bytes / kMiB);
-  if (::access(folder, W_OK) != 0) return warn(detail + ", but not writable", remedy);
+  std::string detail = fmt::format("{}: {:.0f} MiB free", printable(folder), free_bytes / kMiB);
+  if (::access(folder.c_str(), W_OK) != 0) return warn(detail + ", but not writable", remedy);
   return free_bytes >= needed_bytes ? ok(std::move(detail)) : warn(std::move(detail), remedy);
 }
 
@@ -172,7 +173,11 @@ std::vector<Check> machine_checks() {
       {"MPI", check_mpi},
       {"shared memory",
        [] { return check_space("/dev/shm", 256.0 * kMiB, "in a container: docker run --shm-size=1g ..."); }},
-      {"temporary files", [] { return check_space("/tmp", 64.0 * kMiB, "free some space, or set TMPDIR"); }},
+      {"temporary files",
+       [] {
+         return check_space(temporary_folder().string(), 64.0 * kMiB,
+                            "free some space, or set TMPDIR to a folder that can be written");
+       }},
       {"host name", check_host_name},
       {"pictures", check_image_module},
       {"stack", check_stack},

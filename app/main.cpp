@@ -67,6 +67,13 @@ std::vector<std::string> names_of(const std::vector<std::unique_ptr<Command>>& c
   return names;
 }
 
+std::vector<std::string> names_of(const std::vector<const CLI::App*>& subcommands) {
+  std::vector<std::string> names;
+  names.reserve(subcommands.size());
+  for (const CLI::App* subcommand : subcommands) names.push_back(subcommand->get_name());
+  return names;
+}
+
 /// The subcommand chain the words name: `app`, or `wall`, or `wall run`, as far as it goes.
 const CLI::App* deepest(const CLI::App* app, const std::vector<std::string>& words) {
   for (const std::string& word : words) {
@@ -108,9 +115,7 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
   }
   const auto subcommands = context->get_subcommands([](const CLI::App*) { return true; });
   if (context != &app && !subcommands.empty() && context->get_require_subcommand_min() > 0) {
-    std::vector<std::string> choices;
-    choices.reserve(subcommands.size());
-    for (const CLI::App* child : subcommands) choices.push_back(child->get_name());
+    const std::vector<std::string> choices = names_of(subcommands);
     const auto word =
         std::ranges::find_if(words.begin() + 1, words.end(), [](const std::string& w) { return !w.starts_with('-'); });
     if (word == words.end())
@@ -118,6 +123,10 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
               fmt::format("choices: {}", fmt::join(choices, ", "))};
     return {ExitCode::Usage, fmt::format("unknown subcommand '{} {}'", command, printable(*word)),
             unknown_name_hint(*word, choices)};
+  }
+  if (app.get_subcommands().empty() && dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    return {ExitCode::Usage, fmt::format("{} needs a command", command),
+            fmt::format("choices: {}", fmt::join(names_of(subcommands), ", "))};
   }
   return {ExitCode::Usage, fmt::format("{}: {}", command, error.what()), help};
 }
@@ -156,8 +165,9 @@ std::optional<ExitCode> answer_alone(const CLI::App& app, const std::vector<std:
 bool parse(CLI::App& app, const std::vector<std::string>& words,
            const std::vector<std::unique_ptr<Command>>& commands) {
   // `hpr help` and `hpr help COMMAND` are other ways to write --help.
-  const bool asks_for_help = words.front() == "help";
-  std::vector<std::string> parsed(words.begin() + (asks_for_help ? 1 : 0), words.end());
+  const auto first = std::ranges::find_if(words, [](const std::string& word) { return word != "help"; });
+  const bool asks_for_help = first != words.begin();
+  std::vector<std::string> parsed(first, words.end());
   if (asks_for_help) parsed.emplace_back("--help");
   if (!parsed.front().starts_with('-')) {
     const auto names = names_of(commands);
@@ -234,6 +244,8 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   // So does a file that may not grow further.
   std::signal(SIGXFSZ, SIG_IGN);
+  // What a checkpoint is asked for by is nothing to commands that write none (app/signals.h).
+  for (const int request : {SIGUSR1, SIGUSR2}) std::signal(request, SIG_IGN);
   // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     // What is said on a closed stdout is lost, and that is an error where there is something to say.

@@ -75,7 +75,7 @@ PassedSignals::PassedSignals(const JobOptions& options)
   for (const int signal : kSignals) ::sigaddset(&action.sa_mask, signal);
   for (std::size_t i = 0; i < count_; ++i) {
     ::sigaction(kSignals.at(i), nullptr, &before_.at(i));
-    // What nohup, or a shell for its background, has us ignore stays ignored.
+    // What nohup, or a shell for its background, has us ignore stays ignored, and so do requests nobody here takes.
     if (before_.at(i).sa_handler != SIG_IGN) ::sigaction(kSignals.at(i), &action, nullptr);
   }
 }

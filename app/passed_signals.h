@@ -10,9 +10,9 @@
 
 namespace hpr {
 
-/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks, and so does what interrupts a
-/// job in a process group of its own: this process leaves when its ranks have. A second interrupt is not waited for.
-/// One at a time: signal handlers reach nothing but globals.
+/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks, unless this process ignores
+/// them, and so does what interrupts a job in a process group of its own: this process leaves when its ranks have. A
+/// second interrupt is not waited for. One at a time: signal handlers reach nothing but globals.
 class PassedSignals {
  public:
   explicit PassedSignals(const JobOptions& options);

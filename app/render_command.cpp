@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -61,6 +62,7 @@ class RenderCommand final : public Command {
         log::warning("{} has no use for {}", options_.reference ? "--reference" : "--passes " + options_.passes,
                      option);
       }
+      warn_of_groups(settings, std::max(1, globals.ranks));
     }
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
@@ -71,6 +73,15 @@ class RenderCommand final : public Command {
   }
 
  private:
+  /// Of any distribution but hybrid, which `auto` may choose, they are none of its business.
+  void warn_of_groups(const FrameSettings& settings, int ranks) const {
+    if (settings.distribution.value_or(Distribution::Hybrid) != Distribution::Hybrid && settings.groups > 0) {
+      log::warning("--distribute {} has no use for --groups", options_.distribute);
+    } else if (settings.groups > ranks) {
+      log::warning("--groups {}: there are no more than {}, of one rank each", settings.groups, ranks);
+    }
+  }
+
   void check_outputs(const Globals& globals) const {
     if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty() && !options_.explain) {
       throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");

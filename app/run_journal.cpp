@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <system_error>
 #include <utility>
 
 #include "app/launcher.h"
@@ -25,29 +24,13 @@ constexpr std::string_view kEnd = "end {}";
 
 }  // namespace
 
-RunJournal::RunJournal() {
-  std::string name = (std::filesystem::temp_directory_path() / "hpr-run-XXXXXX").string();
-  file_ = ::mkostemp(name.data(), O_CLOEXEC);
-  if (file_ < 0) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", name, std::generic_category().message(errno)),
-                "name a folder for temporary files in TMPDIR");
-  }
-  ::unlink(name.c_str());
-  path_ = fmt::format("/proc/{}/fd/{}", ::getpid(), file_);
-}
+RunJournal::RunJournal() : file_(std::in_place), path_(file_->path()) {}
 
 std::optional<RunJournal> RunJournal::of_supervisor() {
   const char* const path = std::getenv(kVariable);  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
   if (path == nullptr) return std::nullopt;
   return RunJournal(std::filesystem::path(path));
 }
-
-RunJournal::~RunJournal() {
-  if (file_ >= 0) ::close(file_);
-}
-
-RunJournal::RunJournal(RunJournal&& other) noexcept
-    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)) {}
 
 void RunJournal::append(const std::string& line) const {
   // One write: a job that is killed leaves whole lines and at most one part of one.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/command.h"
+#include "core/temporary.h"
 
 namespace hpr {
 
@@ -15,15 +16,10 @@ namespace hpr {
 /// again. Written by rank 0 and the supervisor, in turn.
 class RunJournal {
  public:
-  /// The supervisor's: a new file only this user may read, without a name: gone with this process, however it ends.
+  /// The supervisor's: a temporary file, gone with this process, however it ends.
   RunJournal();
   /// A job's: the file the supervisor named in the environment; none where nobody supervises.
   [[nodiscard]] static std::optional<RunJournal> of_supervisor();
-  ~RunJournal();
-  RunJournal(RunJournal&& other) noexcept;
-  RunJournal(const RunJournal&) = delete;
-  RunJournal& operator=(const RunJournal&) = delete;
-  RunJournal& operator=(RunJournal&&) = delete;
 
   /// A frame is drawn and shown.
   void add_frame(const std::string& record);
@@ -52,8 +48,8 @@ class RunJournal {
   explicit RunJournal(std::filesystem::path path) : path_(std::move(path)) {}
   void append(const std::string& line) const;
 
+  std::optional<TemporaryFile> file_;  ///< the supervisor's
   std::filesystem::path path_;
-  int file_ = -1;  ///< the supervisor's
 };
 
 /// As run_ranks; where that starts a job of several ranks, one that loses a rank or stands still is started again, up

@@ -172,6 +172,7 @@ class SceneCommand final : public Command {
     }
     check_writable(output_, globals.force);
     const Scene scene = generate_scene(text);
+    if (scene.background != Rgb{}) log::warning("glTF has no backgrounds; that of gen:{} is left out", text);
     const std::vector<std::byte> file = encode_glb(scene);
     write_file_atomically(output_, file);
     log::info("{}: gen:{}, {} triangles, {} bytes", output_, text, scene.triangles, file.size());

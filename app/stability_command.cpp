@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <iterator>
 #include <new>
 #include <nlohmann/json.hpp>
@@ -91,6 +92,8 @@ class StabilityCommand final : public Command {
       return ended(error.hint().empty() ? error.what() : fmt::format("{} ({})", error.what(), error.hint()));
     } catch (const std::bad_alloc&) {
       return ended("out of memory");
+    } catch (const std::exception& error) {
+      return ended(error.what());
     }
   }
 

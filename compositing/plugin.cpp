@@ -17,7 +17,8 @@ void load_compositor_plugin(const std::filesystem::path& path) {
   // A path without a slash would be looked for where libraries are.
   void* const object = ::dlopen(std::filesystem::absolute(path).c_str(), RTLD_NOW | RTLD_LOCAL);
   if (object == nullptr) {
-    throw Error(ExitCode::BadInput, fmt::format("--plugin: cannot open {}: {}", name, printable(::dlerror(), 400)));
+    throw Error(ExitCode::BadInput, fmt::format("--plugin: cannot open {}: {}", name, printable(::dlerror(), 400)),
+                "name a shared object that was built against this installation");
   }
   void* const symbol = ::dlsym(object, "hpr_compositor_plugin");
   if (symbol == nullptr) {

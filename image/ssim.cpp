@@ -91,7 +91,7 @@ double ssim(std::span<const float> image, std::span<const float> reference, Size
     }
   });
   const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
-  return sum / static_cast<double>(centres.area() * kChannels);
+  return std::min(1.0, sum / static_cast<double>(centres.area() * kChannels));  // rounding may take it past
 }
 
 }  // namespace hpr

@@ -19,6 +19,18 @@ TEST(Ssim, IsOneForEqualPictures) {
   }
 }
 
+TEST(Ssim, IsNeverMoreThanOneByARounding) {
+  const Size size{3, 2};
+  for (int level = 0; level < 256; ++level) {
+    const std::vector<float> even(size.area() * 3, static_cast<float>(level) / 255.0F);
+    std::vector<float> near = even;
+    for (float& value : near) value = std::nextafter(value, 1.0F);
+    EXPECT_LE(ssim(near, even, size, 1), 1.0) << level;
+    near.front() = std::nextafter(near.front(), 1.0F);
+    EXPECT_LE(ssim(near, even, size, 1), 1.0) << level;
+  }
+}
+
 // structural_similarity of scikit-image 0.26.0 with channel_axis=2, gaussian_weights=True, sigma=1.5,
 // use_sample_covariance=False, data_range=1.0, in double precision.
 TEST(Ssim, AgreesWithScikitImage) {

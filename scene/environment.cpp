@@ -52,20 +52,6 @@ std::array<std::size_t, 3> color_channels(const FloatImage& picture, const std::
               "convert it to a picture with red, green and blue");
 }
 
-Environment from_picture(const FloatImage& picture, const std::string& name, bool linear) {
-  const std::array<std::size_t, 3> rgb = color_channels(picture, name);
-  Environment environment{Image<Rgb>(picture.size)};
-  const auto value = [&](std::size_t pixel, std::size_t channel) {
-    const float stored = picture.values[pixel * picture.channels.size() + rgb[channel]];
-    if (!std::isfinite(stored) && environment.not_finite++ == 0) environment.first_not_finite = pixel;
-    if (linear) return cleaned(stored);
-    return srgb_to_linear(static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(stored, 0.0F, 1.0F))));
-  };
-  const std::span<Rgb> pixels = environment.image.pixels();
-  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = {value(i, 0), value(i, 1), value(i, 2)};
-  return environment;
-}
-
 }  // namespace
 
 Environment load_environment(const std::string& text, const ImageLimits& limits) {
@@ -80,12 +66,26 @@ Environment load_environment(const std::string& text, const ImageLimits& limits)
   std::string extension = std::filesystem::path(text).extension().string();
   std::ranges::transform(extension, extension.begin(),
                          [](unsigned char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  const bool linear = extension == ".hdr" || extension == ".exr";
-  if (!linear && extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
+  if (extension != ".hdr" && extension != ".exr" && extension != ".png" && extension != ".jpg" &&
+      extension != ".jpeg") {
     throw Error(ExitCode::Usage, fmt::format("'{}' is no environment", printable(text)),
                 "name a .hdr, .exr, .png or .jpg picture, or give a radiance as R,G,B");
   }
-  return from_picture(read_image(text, limits), printable(text), linear);
+  return environment_of(read_image(text, limits), printable(text));
+}
+
+Environment environment_of(const FloatImage& picture, const std::string& name) {
+  const std::array<std::size_t, 3> rgb = color_channels(picture, name);
+  Environment environment{Image<Rgb>(picture.size)};
+  const auto value = [&](std::size_t pixel, std::size_t channel) {
+    const float stored = picture.values[pixel * picture.channels.size() + rgb[channel]];
+    if (!std::isfinite(stored) && environment.not_finite++ == 0) environment.first_not_finite = pixel;
+    if (picture.linear) return cleaned(stored);
+    return srgb_to_linear(static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(stored, 0.0F, 1.0F))));
+  };
+  const std::span<Rgb> pixels = environment.image.pixels();
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = {value(i, 0), value(i, 1), value(i, 2)};
+  return environment;
 }
 
 }  // namespace hpr

@@ -13,5 +13,7 @@ namespace hpr {
 /// that were not finite are counted.
 /// Throws Error: Usage for a text that is neither; Io, BadInput or Limit for a picture that can't be read.
 [[nodiscard]] Environment load_environment(const std::string& text, const ImageLimits& limits = {});
+/// The same of a picture that was read; errors call it `name`.
+[[nodiscard]] Environment environment_of(const FloatImage& picture, const std::string& name);
 
 }  // namespace hpr

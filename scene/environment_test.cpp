@@ -54,6 +54,13 @@ TEST(Environment, ExrKeepsItsRadianceAndLosesWhatIsNone) {
   EXPECT_EQ(environment.first_not_finite, 5U);
 }
 
+TEST(Environment, PicturesAreWhatTheirFirstBytesSay) {
+  const test::TemporaryFolder folder;
+  const Image<Rgb> image({3, 2}, {0.25F, 1e6F, 1e-6F});
+  const Environment environment = load_environment(folder.write("sky.png", text_of(encode_exr(image, {}))));
+  EXPECT_EQ(environment.image.at(0, 1), (Rgb{0.25F, 1e6F, 1e-6F}));
+}
+
 TEST(Environment, RadianceFilesHaveSharedExponents) {
   const test::TemporaryFolder folder;
   std::string file = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 1\n";

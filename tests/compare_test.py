@@ -49,6 +49,7 @@ def refused(folder):
     expect_error(folder, [*SCENE, *SMALL, "--operator", "over8", "--strategies", "tre"], 2, "did you mean 'tree'")
     expect_error(folder, [*SCENE, *SMALL, "--shading", "locl"], 2, "did you mean 'local'")
     expect_error(folder, [*SYNTHETIC, *SMALL, "--shading", "local"], 2, "leave it out")
+    expect_error(folder, [*SYNTHETIC, *SMALL, "--plugin", __file__], 3, "cannot open", "this installation")
     expect_error(folder, ["doctor", "--backend", "foo"], 2, "'foo'")
     expect_error(folder, ["render", "gen:cornell", *SMALL, "-o", "a.png", "--device", "99"], 5, "no EGL device 99",
                  "EGL lists", "devices")

@@ -185,6 +185,26 @@ def limited_files():
         expect_error(f"limited files, {arguments[0]}", arguments, [4], ["ulimit -f"], limit=limit)
 
 
+def backgrounds():
+    """What a file cannot hold is told of where it is made."""
+    for name, has_one in (("tetra", True), ("sphereflake", True), ("cornell", False)):
+        with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+            result = run(["scene", "make", name, "-o", "a.glb"], scratch)
+        if result.returncode != 0 or ("background" in result.stderr) != has_one:
+            complain(f"the background of {name}", result, "is not told of as it should")
+
+
+def groups():
+    """Of ranks that are not grouped, or are fewer, it is told that they are not as asked."""
+    for ranks, distribution, told in (("2", "sort-last", "--distribute sort-last has no use for --groups"),
+                                      ("2", "hybrid", "--groups 3"), ("1", "hybrid", "--groups 3"), ("3", "hybrid", None)):
+        with tempfile.TemporaryDirectory(prefix="hpr-exit-") as scratch:
+            result = run(["render", "gen:cornell", "-o", "a.png", *SMALL, "--passes", "none", "--groups", "3", "--distribute",
+                          distribution, "--ranks", ranks], scratch)
+        if result.returncode != 0 or (told or "") not in result.stderr or (told is None) == ("warning" in result.stderr):
+            complain(f"--groups 3 of {ranks} ranks, {distribution}", result, "is not told of as it should")
+
+
 def main():
     expect_success("a demo whose picture was taken away", ["demo", "--wall", "1x1@16x16"], "hpr-demo.png",
                    prepare=folder_with("hpr-demo-screens", "wall-r0c0.png"))
@@ -193,7 +213,12 @@ def main():
     expect_success("help of render", ["render", "--help"], "--size")
     expect_success("version", ["--version"], "hpr")
 
+    for words in (["help", "help"], ["help", "help", "render"]):
+        expect_success(" ".join(words), words, "--size" if "render" in words else "render")
+
     expect_error("unknown command", ["rendr"], [2], ["render"])
+    expect_error("options and no command", ["-v"], [2], ["needs a command", "hint: choices: demo, render"])
+    expect_error("a command without what it needs, behind an option", ["-v", "diff"], [2], ["A is required", "--help"])
     expect_error("unknown option", ["render", "gen:gallery", "-o", "a.png", "--sizee", "64x48"], [2], ["--size"])
     expect_error("no output named", ["render", "gen:gallery", *SMALL], [2])
     expect_error("size is no size", ["render", "gen:gallery", "-o", "a.png", "--size", "64by48"], [2], ["64by48"])
@@ -289,6 +314,13 @@ def main():
     expect_error("tile driven twice", ["wall", "check", "wall.toml"], [3], ["wall.toml:6:", "twice"],
                  prepare=writer("wall.toml", TWICE))
 
+    expect_error("files of keys that hold none", ["diff", "a.keys", "b.keys"], [3], ["a.keys", "no keys", "hint"],
+                 prepare=writer("a.keys", "", "b.keys", ""))
+    expect_error("files of keys of another name", ["diff", "a.raw", "b.raw"], [3], ["a.raw", ".keys"],
+                 prepare=writer("a.raw", "eight by", "b.raw", "eight by"))
+    expect_error("a file of keys beside one of another name", ["diff", "a.keys", "b.raw"], [3], ["b.raw", "FILE.keys"],
+                 prepare=writer("a.keys", "eight by", "b.raw", "eight by"))
+
     expect_error("picture past the limit", ["render", "gen:gallery", "-o", "a.png", "--size", "4096x4096", "--limit-image",
                                             "1024x1024"], [6], ["1024"])
     expect_error("scene past the limit", ["render", "triangle.gltf", "-o", "a.png", *SMALL, "--limit-mem", "16B"], [6],
@@ -300,6 +332,12 @@ def main():
                             ("wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none"])):
         expect_error(f"ranks that cannot talk, {case}", [*arguments, "--ranks", "2"], [4], ["TMPDIR"],
                      environment={"OMPI_MCA_btl": "none-such"})
+    for arguments in (["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none"], ["demo", "--wall", "1x1@16x16"]):
+        expect_error(f"no folder for temporary files, {arguments[0]}", [*arguments, "--ranks", "2"], [4],
+                     ["'/nonexistent/folder', which TMPDIR names", "hint: set TMPDIR"],
+                     environment={"TMPDIR": "/nonexistent/folder"})
+    backgrounds()
+    groups()
     full_disk()
     limited_files()
 

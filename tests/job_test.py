@@ -9,12 +9,14 @@ Prints what was wrong and leaves with 1.
 import json
 import os
 import pathlib
+import pty
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 
+from processes import ranks_of
 from program import HPR, expect, failures
 
 WALL = ["wall", "run", "2x1@64x48", "gen:cornell", "--quality", "draft", "--passes", "none", "--frames", "100000"]
@@ -67,6 +69,53 @@ def stopped(folder, ranks):
     expect(run.returncode == 75, f"{name}: left with {run.returncode}:\n{said[-1500:]}")
     frames = json.loads((folder / name / "manifest.json").read_text())["frames"]
     expect(len(frames) >= 2, f"{name}: {len(frames)} frames are written down")
+
+
+def colors(folder):
+    """For a terminal somebody looks at: the one mpirun gives rank 0 ends in a file, or anywhere."""
+    alone = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
+    for environment, wanted in ((alone, True), ({**alone, "OMPI_COMM_WORLD_SIZE": "1", "OMPI_COMM_WORLD_RANK": "0"}, False)):
+        ours, theirs = pty.openpty()
+        run = subprocess.Popen([HPR, "doctor"], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=theirs,
+                               stderr=subprocess.DEVNULL)
+        os.close(theirs)
+        said = b""
+        try:
+            while more := os.read(ours, 65536):
+                said += more
+        except OSError:  # how its end is told
+            pass
+        run.wait(timeout=60)
+        os.close(ours)
+        expect((b"\x1b[" in said) == wanted and b"temporary files" in said, f"doctor {'alone' if wanted else 'in a job'}: {said[:400]}")
+
+
+def has_begun(pid):
+    """Whether a process is past its start: it has threads of its own."""
+    try:
+        return len(list(pathlib.Path(f"/proc/{pid}/task").iterdir())) > 1
+    except OSError:
+        return False
+
+
+def asked_in_vain(folder):
+    """SIGUSR1 and SIGUSR2 are nothing to commands without a checkpoint, nor to their ranks."""
+    for ranks in (1, 2):
+        where = ["--ranks", "2"] if ranks > 1 else ["--transport", "threads"]
+        run = subprocess.Popen([HPR, "compare", "--synthetic", "dense", "--size", "640x480", "--strategies", "serial", "--frames",
+                                "400", *where], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        asked, until = [], time.monotonic() + 60
+        while run.poll() is None and time.monotonic() < until and not asked:
+            time.sleep(0.02)
+            processes = ranks_of(run.pid) if ranks > 1 else [run.pid]
+            if len(processes) == ranks and all(map(has_begun, processes)):
+                asked = [run.pid, *processes]
+        for process in asked:
+            for number in (signal.SIGUSR1, signal.SIGUSR2):
+                os.kill(process, number)
+        said = run.communicate(timeout=60)[1].decode()
+        expect(asked, f"{ranks} ranks: were not seen to begin")
+        expect(run.returncode == 0, f"{ranks} ranks: asked in vain, left with {run.returncode}:\n{said[-1500:]}")
 
 
 def ignored(folder):
@@ -150,6 +199,8 @@ def main():
             output_nobody_takes(folder, ranks)
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
+        asked_in_vain(folder)
+        colors(folder)
         ignored(folder)
         limits_of_a_stubborn_mpiexec(folder)
         interrupted(folder, 2, signal.SIGINT, False)

@@ -7,10 +7,13 @@ usage: stability_test.py HPR [--full]
 
 import json
 import math
+import os
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import xml.etree.ElementTree as ElementTree
 
 HPR = str(pathlib.Path(sys.argv[1]).resolve())
@@ -27,9 +30,9 @@ def expect(condition, message):
         print(f"failed: {message}")
 
 
-def run(folder, *arguments, timeout=60):
+def run(folder, *arguments, timeout=60, environment=None):
     return subprocess.run([HPR, "stability", *arguments], cwd=folder, capture_output=True, text=True, timeout=timeout,
-                          check=False)
+                          check=False, env={**os.environ, **(environment or {})})
 
 
 def check_json(text, code):
@@ -82,10 +85,32 @@ def check_options(folder):
     return names - SLOW
 
 
+def check_temporary_files(folder):
+    """Where there is no place for them the cases that need one break, and say why; a run that is ended leaves none."""
+    nowhere = run(folder, "--case", "nodes,not-finite", "--json", environment={"TMPDIR": "/nonexistent/folder"})
+    expect(nowhere.returncode == 1, f"no TMPDIR: exit code {nowhere.returncode}: {nowhere.stderr}")
+    ended = {case["name"]: case["parameter"] for case in json.loads(nowhere.stdout or '{"cases": []}')["cases"]}
+    expect(sorted(ended) == ["nodes/ended", "not-finite/ended"], f"no TMPDIR: {ended}")
+    expect(all("TMPDIR" in why and "/nonexistent/folder" in why for why in ended.values()), f"no TMPDIR: {ended}")
+    scratch = folder / "scratch"
+    scratch.mkdir()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        process = subprocess.Popen([HPR, "stability", "--case", "not-finite"], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL, env={**os.environ, "TMPDIR": str(scratch)})
+        until = time.monotonic() + 0.5
+        while time.monotonic() < until and not any(scratch.iterdir()):
+            time.sleep(0.001)
+        process.send_signal(number)
+        process.wait(timeout=30)
+        left = [path.name for path in scratch.iterdir()]
+        expect(not left, f"signal {number} leaves {left}")
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         quick = check_options(folder)
+        check_temporary_files(folder)
         chosen = [] if FULL else ["--case", ",".join(sorted(quick))]
         done = run(folder, *chosen, "--json", "--html", "page.html", timeout=900 if FULL else 60)
         if done.returncode == 5:

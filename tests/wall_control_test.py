@@ -182,6 +182,18 @@ def survives_a_lost_rank(folder):
     wall.leave(7)
 
 
+def takes_its_socket_along(folder):
+    """A run that a signal ends leaves no socket, of one rank or of several."""
+    for ranks, number in ((1, signal.SIGTERM), (1, signal.SIGINT), (2, signal.SIGTERM), (2, signal.SIGINT)):
+        wall = Wall(folder, f"ended-{ranks}-{int(number)}", ranks, 100000)
+        wall.wait_for_frame(1)
+        expect(list(wall.runtime.glob("hpr/*.sock")), "a run has no socket")
+        wall.job.send_signal(number)
+        wall.leave(-number)
+        left = list(wall.runtime.glob("hpr/*.sock"))
+        expect(not left, f"signal {number} leaves {left} of {ranks} ranks")
+
+
 def keeps_the_socket_of_a_run_that_begins(folder):
     (folder / "hpr").mkdir(mode=0o700)
     path = folder / "hpr" / "wall-1.sock"
@@ -199,6 +211,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="hpr-ctl-") as scratch:
         keeps_the_socket_of_a_run_that_begins(pathlib.Path(scratch))
         told_and_stopped(pathlib.Path(scratch))
+        takes_its_socket_along(pathlib.Path(scratch))
         stops_and_goes_on(pathlib.Path(scratch))
         survives_a_lost_rank(pathlib.Path(scratch))
     return 1 if failures else 0

@@ -1,46 +1,18 @@
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "app/stability/cases.h"
-#include "core/file.h"
+#include "core/temporary.h"
 #include "scene/load_scene.h"
 
 namespace hpr::stability {
 namespace {
 
 using Json = nlohmann::json;
-
-/// A folder for one file, removed with it.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "hpr-stability-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw Error(ExitCode::Io,
-                  fmt::format("cannot make a folder in {}", std::filesystem::temp_directory_path().string()));
-    }
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  [[nodiscard]] std::filesystem::path file(const char* name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// The placement of one triangle below a chain of nodes, as the loader composes it.
 glm::dmat4 placed_below(Json nodes) {
@@ -62,9 +34,9 @@ glm::dmat4 placed_below(Json nodes) {
                          {"type", "VEC3"},
                          {"min", {0, 0, 0}},
                          {"max", {1, 1, 0}}}}}};
-  const ScratchFolder folder;
-  write_file_atomically(folder.file("chain.gltf"), document.dump());
-  return load_scene(folder.file("chain.gltf").string()).instances.at(0).to_world;
+  const TemporaryFile file;
+  std::ofstream(file.path()) << document.dump();
+  return load_scene(file.path().string()).instances.at(0).to_world;
 }
 
 double farthest_from_identity(const glm::dmat4& matrix) {

@@ -2,17 +2,18 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "app/stability/cases.h"
 #include "app/stability/light_tools.h"
+#include "core/base64.h"
 #include "core/error.h"
-#include "core/file.h"
+#include "core/temporary.h"
 #include "image/image_codec.h"
 #include "image/image_io.h"
 #include "scene/environment.h"
@@ -27,29 +28,8 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 constexpr std::array kBad{kNan, kInfinite, -kInfinite};
 
-/// A folder of its own that goes with this.
-class Scratch {
- public:
-  Scratch() {
-    std::string name = (std::filesystem::temp_directory_path() / "hpr-stability-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw Error(ExitCode::Io, "cannot make a folder for files to try: " + name);
-    folder_ = name;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-
-  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
-
- private:
-  std::filesystem::path folder_;
-};
-
 /// A glTF file of one triangle, three floats a vertex and attribute; `bad` stands in the attribute's second vertex.
-std::string write_triangle(const Scratch& scratch, const std::string& attribute, float bad) {
+std::string write_triangle(const TemporaryFile& file, const std::string& attribute, float bad) {
   std::vector<float> values{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 1};
   const bool position = attribute == "POSITION";
   const std::size_t width = attribute == "TEXCOORD_0" ? 2 : 3;
@@ -57,30 +37,28 @@ std::string write_triangle(const Scratch& scratch, const std::string& attribute,
   own.resize(3 * width);
   own[width] = bad;
   values.insert(values.end(), own.begin(), own.end());
-  std::ofstream(scratch.file("triangle.bin"), std::ios::binary)
-      .write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(float)));
   nlohmann::json json = nlohmann::json::parse(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
     "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1}}]}],
     "accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]},
                  {"bufferView":1,"componentType":5126,"type":"VEC3","count":3}],
     "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":36}]})");
-  json["buffers"] = {{{"uri", "triangle.bin"}, {"byteLength", values.size() * sizeof(float)}}};
+  json["buffers"] = {{{"uri", "data:application/octet-stream;base64," + base64(std::as_bytes(std::span(values)))},
+                      {"byteLength", values.size() * sizeof(float)}}};
   json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 72}, {"byteLength", own.size() * sizeof(float)}});
   json["accessors"].push_back(
       {{"bufferView", 2}, {"componentType", 5126}, {"type", width == 2 ? "VEC2" : "VEC3"}, {"count", 3}});
   if (position) json["accessors"][2].update({{"min", {0, 0, 0}}, {"max", {1, 1, 0}}});
   json["meshes"][0]["primitives"][0]["attributes"][attribute] = 2;
-  std::string path = scratch.file("triangle.gltf").string();
-  std::ofstream(path) << json.dump();
-  return path;
+  std::ofstream(file.path()) << json.dump();
+  return file.path().string();
 }
 
-StabilityFinding geometry(const Scratch& scratch) {
+StabilityFinding geometry(const TemporaryFile& file) {
   StabilityFinding let_in = finding("not-finite/geometry", "NaN and infinities in a glTF file's positions", 0.0,
                                     "files drawn", "nothing can stand in for a place");
   for (const float bad : kBad) {
     try {
-      (void)load_scene(write_triangle(scratch, "POSITION", bad), {});
+      (void)load_scene(write_triangle(file, "POSITION", bad), {});
       ++let_in.measured;
     } catch (const Error& error) {
       if (error.code() != ExitCode::BadInput) ++let_in.measured;
@@ -89,13 +67,13 @@ StabilityFinding geometry(const Scratch& scratch) {
   return let_in;
 }
 
-StabilityFinding attributes(const Scratch& scratch, int threads) {
+StabilityFinding attributes(const TemporaryFile& file, int threads) {
   StabilityFinding odd =
       finding("not-finite/attributes", "the same in normals, texture coordinates and vertex colours", 0.0,
               "files miscounted, pixels without finite radiance", "each is counted, its vertex named, and replaced");
   for (const char* const attribute : {"NORMAL", "TEXCOORD_0", "COLOR_0"}) {
     for (const float bad : kBad) {
-      const Scene scene = load_scene(write_triangle(scratch, attribute, bad), {});
+      const Scene scene = load_scene(write_triangle(file, attribute, bad), {});
       const bool named = std::ranges::any_of(scene.warnings, [&](const std::string& text) {
         return text.find(attribute) != std::string::npos && text.find("vertex 1") != std::string::npos;
       });
@@ -109,7 +87,7 @@ StabilityFinding attributes(const Scratch& scratch, int threads) {
   return odd;
 }
 
-StabilityFinding environment(const Scratch& scratch, int threads) {
+StabilityFinding environment(const TemporaryFile& file, int threads) {
   StabilityFinding odd =
       finding("not-finite/environment", "every seventh value of an EXR environment, 48 of 336", 0.0,
               "values miscounted, pixels without finite radiance", "NaN becomes 0, infinity the largest half float");
@@ -121,11 +99,12 @@ StabilityFinding environment(const Scratch& scratch, int threads) {
       if (number++ % 7 == 3) *channel = kBad.at(planted++ % kBad.size());
     }
   }
-  const std::filesystem::path path = scratch.file("sky.exr");
-  write_file_atomically(path, encode_exr(image, {}));
+  const std::vector<std::byte> sky = encode_exr(image, {});
+  std::ofstream(file.path(), std::ios::binary)
+      .write(reinterpret_cast<const char*>(sky.data()), static_cast<std::streamsize>(sky.size()));
   Scene scene;
   add_placed(scene, parallelogram({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), mirror(0.9F), glm::dmat4(1.0));
-  scene.environment = load_environment(path.string());
+  scene.environment = environment_of(read_image(file.path(), {}), "sky");
   finish_scene(scene);
   odd.measured = std::abs(static_cast<double>(scene.environment->not_finite) - static_cast<double>(planted));
   odd.measured += scene.environment->first_not_finite == 1 ? 0.0 : 1.0;
@@ -182,8 +161,8 @@ std::vector<StabilityFinding> overflow() {
 
 std::vector<StabilityFinding> not_finite(const Globals& globals) {
   const int threads = threads_of(globals);
-  const Scratch scratch;
-  std::vector<StabilityFinding> all{geometry(scratch), attributes(scratch, threads), environment(scratch, threads)};
+  const TemporaryFile file;
+  std::vector<StabilityFinding> all{geometry(file), attributes(file, threads), environment(file, threads)};
   for (StabilityFinding& one : overflow()) all.push_back(std::move(one));
   return all;
 }

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "walls/link/bytes.h"
+#include "walls/link/socket_files.h"
 
 namespace hpr {
 namespace {
@@ -101,7 +102,10 @@ Listener::Listener(const LinkAddress& address) : tcp_(address.tcp), address_(add
   if ((!tcp_ && ::chmod(address.text.c_str(), 0600) != 0) || ::listen(socket_.descriptor(), kBacklog) != 0) {
     throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, words(errno)));
   }
-  if (!tcp_) return;
+  if (!tcp_) {
+    remove_when_ended(address.text);
+    return;
+  }
   sockaddr_storage taken{};
   socklen_t size = sizeof taken;
   if (::getsockname(socket_.descriptor(), reinterpret_cast<sockaddr*>(&taken), &size) != 0) {
@@ -113,7 +117,9 @@ Listener::Listener(const LinkAddress& address) : tcp_(address.tcp), address_(add
 }
 
 Listener::~Listener() {
-  if (socket_ && !tcp_) ::unlink(address_.c_str());
+  if (!socket_ || tcp_) return;
+  ::unlink(address_.c_str());
+  forget_removal(address_);
 }
 
 Listener::Listener(Listener&& other) noexcept
