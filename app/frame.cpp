@@ -73,19 +73,25 @@ std::vector<std::size_t> composite(Session& session, const FramePlan& plan, Tile
   return compositor.composite(session.group(plan.mine.group), keys, plan.tiles).tiles;
 }
 
-/// The colours of keys that already carry them.
-void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, Rgb background,
-                   TileLayer<Rgb>& radiance) {
+/// The colours of keys that already carry them; none where there is no key.
+void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance) {
   for (const std::size_t tile : tiles) {
     const auto from = keys.tile(tile);
     const auto to = radiance.tile(tile);
     for (std::size_t i = 0; i < from.size(); ++i) {
       const Rgba8 color = from_word(key_rgba(from[i]));
-      to[i] = from[i] == kNoKey ? background
-                                : Rgb{srgb_to_linear(color.r), srgb_to_linear(color.g), srgb_to_linear(color.b)};
+      if (from[i] != kNoKey) to[i] = {srgb_to_linear(color.r), srgb_to_linear(color.g), srgb_to_linear(color.b)};
     }
     radiance.set_active(tile);
   }
+}
+
+/// What the last call of light() took.
+void add_light(const Lighter& lighter, FrameTimes& taken) {
+  FrameTimes light;
+  light.passes = lighter.times();
+  light.rays = lighter.counts();
+  taken += light;
 }
 
 /// Moves keys to where their tiles' sums are.
@@ -139,6 +145,7 @@ FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const V
   if (plan.shading == Shading::Local) {
     const trace::Span shading("light");
     shade_local(session.lighter(plan.rays), views, keys, plan.tiles, number);
+    add_light(session.lighter(plan.rays), taken);
   }
   return taken;
 }
@@ -156,15 +163,17 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   taken.composite_ms = watch.ms();
 
   if (plan.shading == Shading::Local) {
-    unpack_colors(keys, frame.owned, session.scene().background, frame.radiance);
+    const trace::Span light("light");
+    Lighter& lighter = session.lighter(plan.rays);
+    unpack_colors(keys, frame.owned, frame.radiance);
+    light_empty(lighter, views, keys, frame.owned, frame.radiance, sample.number);
+    add_light(lighter, taken);
   } else if (plan.lit) {
     const trace::Span light("light");
-    session.lighter(plan.rays).light(views, keys, frame.owned, frame.aovs.output(frame.radiance), sample.number);
+    Lighter& lighter = session.lighter(plan.rays);
+    lighter.light(views, keys, frame.owned, frame.aovs.output(frame.radiance), sample.number);
     mark_rank(session, frame);
-  }
-  if (spends_light(plan)) {
-    taken.passes = session.lighter(plan.rays).times();
-    taken.rays = session.lighter(plan.rays).counts();
+    add_light(lighter, taken);
   }
   taken.samples = 1;
   if (times != nullptr) *times = taken;

@@ -165,8 +165,8 @@ class RenderCommand final : public Command {
       if (!options_.stats.empty()) write_stats(options_.stats, stats);
     });
     if (speaks) {
-      log::info("{} triangles, {}x{} pixels, {} ranks: {:.1f} ms{}", session.scene().triangles, size.width, size.height,
-                stats.ranks, stats.ms,
+      log::info("{} triangles, {}x{} pixels, {} rank{}: {:.1f} ms{}", session.scene().triangles, size.width,
+                size.height, stats.ranks, stats.ranks == 1 ? "" : "s", stats.ms,
                 sampling.sums() ? fmt::format(", {} samples", sampler.reached_so_far().samples) : "");
     }
     return verdict(stats, options_.strict);

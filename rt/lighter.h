@@ -164,4 +164,10 @@ class Lighter {
 void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
                  std::span<const std::size_t> tiles, const SampleNumber& number = {});
 
+/// The pixels that shade_local leaves without a colour, once no rank has a key for them: of `tiles`, those of `keys`
+/// without one get the radiance that is there in `radiance` (background, environment, surfaces that cover in part); the
+/// others keep theirs. Collective where light() is.
+void light_empty(Lighter& lighter, std::span<const View> views, const TileLayer<Key>& keys,
+                 std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number = {});
+
 }  // namespace hpr

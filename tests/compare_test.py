@@ -105,6 +105,12 @@ def local_shading(folder):
     expect(drawn.returncode == 0, f"left with {drawn.returncode}: {drawn.stderr}")
     diff = run(folder, "diff", "rendered.png", picture.name, "--json")
     expect(json.loads(diff.stdout)["rmse"] == 0, f"render makes other colours: {diff.stdout}")
+    sky = ["gen:tetra", *given[:2], "--environment", "0.2,0.5,0.8", "--spp", "1"]
+    for name, *options in (("local.png", *given[2:], "--ranks", "3", "--distribute", "sort-last"), ("deferred.png",)):
+        drawn = run(folder, "render", *sky, *options, "-o", name)
+        expect(drawn.returncode == 0, f"left with {drawn.returncode}: {drawn.stderr}")
+    diff = json.loads(run(folder, "diff", "local.png", "deferred.png", "--json").stdout)
+    expect(diff["rmse"] < 0.5 / 255, f"local light under a sky is another: {diff}")
     hashes = set()
     for ranks, threads in (("1", "1"), ("2", "2")):
         again = run(folder, "compare", "gen:cornell", *given, "--ranks", ranks, "--threads", threads, "--transport",
