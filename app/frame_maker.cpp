@@ -27,12 +27,13 @@ bool same_look(const View& a, const View& b) {
 
 FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling& sampling,
                        std::span<const View> screens, std::optional<double> target_ms,
-                       const std::optional<SampleGoal>& resting)
+                       const std::optional<SampleGoal>& resting, bool keeps_keys)
     : session_(session),
       settings_(std::move(settings)),
       sampling_(sampling),
       resting_(sampling),
-      target_ms_(target_ms) {
+      target_ms_(target_ms),
+      keeps_keys_(keeps_keys) {
   if (resting) resting_.goal = *resting;
   plan_for({}, screens);
   if (!target_ms_) return;
@@ -107,7 +108,7 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
     const auto least = static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
     if (samples < least) sampling.filter.reset();
   }
-  sampler_.emplace(session_, plan_, sampling, number, false);
+  sampler_.emplace(session_, plan_, sampling, number, keeps_keys_);
   (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
   times_ = sampler_->times();
   relmse_ = sampler_->reached_so_far().relmse;

@@ -18,12 +18,15 @@ namespace hpr {
 class FrameMaker {
  public:
   /// Collective. `screens`: as first seen; sizes stay. `target_ms` of a frame; none: all are made as the settings say.
-  /// `resting`: what a picture is refined to while the eye rests; none: as `sampling`.
+  /// `resting`: what a picture is refined to while the eye rests; none: as `sampling`. `keeps_keys`: without a target,
+  /// frames have the keys of their first sample.
   FrameMaker(Session& session, FrameSettings settings, const Sampling& sampling, std::span<const View> screens,
-             std::optional<double> target_ms, const std::optional<SampleGoal>& resting = {});
+             std::optional<double> target_ms, const std::optional<SampleGoal>& resting = {}, bool keeps_keys = false);
 
   /// Collective. Valid until the next one; made in blocks(). `progress` is told of samples.
   [[nodiscard]] Frame& make(std::span<const View> screens, std::uint64_t number, Progress& progress);
+  /// The last one.
+  [[nodiscard]] Frame& frame() { return sampler_->frame(); }
   /// Collective. What the slowest rank took for the last frame, the same on all ranks.
   void took(double slowest_ms);
 
@@ -54,6 +57,7 @@ class FrameMaker {
   Sampling sampling_;
   Sampling resting_;
   std::optional<double> target_ms_;
+  bool keeps_keys_;
   std::vector<std::string> economies_;
   std::optional<FrameBudget> budget_;
   Effort effort_;  ///< that plan_ is for

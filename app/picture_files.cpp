@@ -91,16 +91,30 @@ void CollectedPicture::collect_radiance(Session& session, Frame& frame) const {
   }
 }
 
-std::vector<ExrLayer> CollectedPicture::exr_layers() const {
-  const View& screen = blocks_.views.front();  // its blocks have one lens
+void check_raw(const RenderOptions& options) {
+  if (options.shading == "local") {
+    throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
+                "use --shading deferred");
+  }
+  if (options.resolution_scale != 1.0) {
+    throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
+                "draw a smaller picture with --size");
+  }
+}
+
+std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,
+                                 std::span<const Aov> aovs) {
+  // All blocks of a screen have one lens.
+  const auto block = std::ranges::find(blocks.screen_of, screen) - blocks.screen_of.begin();
+  const View& view = blocks.views.at(static_cast<std::size_t>(block));
   std::vector<ExrLayer> layers;
-  for (const Aov aov : files_.aovs) {
+  for (const Aov aov : aovs) {
     if (needs_keys(aov)) {
-      layers.push_back(to_exr(aov, join_blocks(*frame_.keys, blocks_, 0), screen));
+      layers.push_back(to_exr(aov, join_blocks(*frame.keys, blocks, screen), view));
     } else if (has_rgb(aov)) {
-      layers.push_back(to_exr(aov, join_blocks(frame_.aovs.rgb.at(aov), blocks_, 0)));
+      layers.push_back(to_exr(aov, join_blocks(frame.aovs.rgb.at(aov), blocks, screen)));
     } else {
-      layers.push_back(to_exr(aov, join_blocks(frame_.aovs.single.at(aov), blocks_, 0)));
+      layers.push_back(to_exr(aov, join_blocks(frame.aovs.single.at(aov), blocks, screen)));
     }
   }
   return layers;
@@ -122,7 +136,7 @@ void CollectedPicture::write_picture(const std::string& scene_name) const {
   }
   if (files_.is_png() && files_.aovs.empty()) return;
   const std::string exr = files_.is_png() ? files_.aov_file() : files_.picture;
-  const std::vector<ExrLayer> layers = exr_layers();
+  const std::vector<ExrLayer> layers = exr_layers(frame_, blocks_, 0, files_.aovs);
   write_file_atomically(exr, encode_exr(radiance(), {{"hpr:scene", scene_name}}, layers));
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
 #include "app/frame.h"
 #include "app/output.h"
+#include "app/render_options.h"
 #include "image/color_format.h"
 
 namespace hpr {
@@ -24,6 +26,13 @@ struct PictureFiles {
   [[nodiscard]] std::string explain_colors() const;
 };
 
+/// Throws Error (Usage) where `options` leave no surface for every pixel of a file of keys.
+void check_raw(const RenderOptions& options);
+
+/// On the rank that has all of `frame`: the layers of the pixels of `screen`.
+[[nodiscard]] std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,
+                                               std::span<const Aov> aovs);
+
 /// A frame of one screen on its way to its files.
 class CollectedPicture {
  public:
@@ -38,7 +47,6 @@ class CollectedPicture {
 
  private:
   void write_picture(const std::string& scene_name) const;
-  [[nodiscard]] std::vector<ExrLayer> exr_layers() const;
   void collect_radiance(Session& session, Frame& frame) const;
   [[nodiscard]] bool enlarged() const { return blocks_.views.front().screen != size_; }
 

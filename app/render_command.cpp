@@ -90,14 +90,7 @@ class RenderCommand final : public Command {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", files_.picture),
                   "name a .png or .exr file");
     }
-    if (!files_.raw.empty() && options_.shading == "local") {
-      throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
-                  "use --shading deferred");
-    }
-    if (!files_.raw.empty() && options_.resolution_scale != 1.0) {
-      throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
-                  "draw a smaller picture with --size");
-    }
+    if (!files_.raw.empty()) check_raw(options_);
     if (files_.picture.ends_with(".exr") && options_.shading == "local") {
       log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those",
                    files_.picture);

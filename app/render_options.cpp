@@ -119,16 +119,12 @@ void RenderOptions::declare(CLI::App& app) {
   declare_frame(app);
   app.add_flag("--reference", reference, "path tracing in place of the passes: slow, and the ground truth");
   app.add_option("--aov", aov,
-                 "layers of the .exr, or of FILE.aov.exr beside a .png: a list of depth, id, normal, albedo, direct, "
+                 "layers of the .exr, of FILE.aov.exr beside a .png, or of a wall (SCREEN.aov.exr): a list of depth, "
+                 "id, normal, albedo, direct, "
                  "shadow, reflection, refraction, ambient-occlusion, photon, rank, cost")
       ->type_name("LIST");
   app.add_flag("--explain", explain, "print the plan of the frame and why");
   app.add_option("--stats", stats, "write what the frame took as JSON")->type_name("FILE.json");
-}
-
-void RenderOptions::declare_wall(CLI::App& app) {
-  declare(app);
-  app.get_option("--aov")->group("");
 }
 
 void RenderOptions::declare_frame(CLI::App& app) {

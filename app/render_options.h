@@ -51,8 +51,6 @@ struct RenderOptions {
   double exposure = 0.0;  ///< stops, of display colours only
 
   void declare(CLI::App& app);
-  /// The same for walls, whose help says nothing of --aov: they refuse it.
-  void declare_wall(CLI::App& app);
   /// All but what a command that draws many frames says in its own way: --reference, --aov, --explain and --stats.
   void declare_frame(CLI::App& app);
 

@@ -20,7 +20,8 @@ class ViewCommand final : public Command {
     app.add_option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
         ->check(CLI::Range(1, 1'000'000));
     declare_target_ms(app, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
-    run_.options.declare_wall(app);
+    run_.options.declare(app);
+    app.get_option("--aov")->group("");  // it writes no files, and refuses it
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {

@@ -91,7 +91,7 @@ WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings
           }),
       hosts_(all_gather_texts(session.comm(), session.host())),
       owners_(owners_of(wall, hosts_, run.display.remote())) {
-  control_.keep("aov", "a wall shows pictures alone");
+  control_.keep("aov", "its files are named before a wall starts");
   if (path_) control_.keep("camera", "it follows --path");
   if (run.display.kind().whole_wall) std::ranges::fill(owners_, 0);
   start_frames(settings, run);
@@ -119,7 +119,8 @@ void WallDriver::start_frames(const FrameSettings& settings, const WallRun& run)
   curved_.emplace(views, used.primary == Primary::Rays);
   for (const Size& size : curved_->sizes()) check_size(size, globals_);
   showing_ = {curved_->sizes(), picture_owners(wall_, owners_), run.options.exposure};
-  frames_.emplace(session_, used, sampling_of(run), curved_->drawn(views), target_of(run), resting_of(run));
+  frames_.emplace(session_, used, sampling_of(run), curved_->drawn(views), target_of(run), resting_of(run),
+                  !run.raw.empty());
 }
 
 std::vector<std::string> WallDriver::explained() const {

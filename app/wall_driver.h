@@ -40,6 +40,8 @@ class WallDriver {
   WallDriver& operator=(const WallDriver&) = delete;
 
   [[nodiscard]] const FramePlan& plan() const { return frames_->plan(); }
+  /// The last frame's screens are the pictures of screen_eyes().
+  [[nodiscard]] FrameMaker& frames() { return *frames_; }
   /// One line per decision, with its reason.
   [[nodiscard]] std::vector<std::string> explained() const;
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }

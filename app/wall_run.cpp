@@ -18,6 +18,7 @@
 #include "app/run_journal.h"
 #include "app/signals.h"
 #include "app/wall_driver.h"
+#include "app/wall_layers.h"
 #include "app/wall_status.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
@@ -167,6 +168,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   stats.relmse = driver.relmse();
   stats.budget = driver.manifest().frames.back().budget;
   if (speaks && stats.budget) report_budget(driver.manifest());
+  write_layers(WallLayers(run, wall, settings), settings.aovs, driver, session);
   std::vector<Image<Rgba8>> pictures;
   if (run.writes_files() || !run.picture.empty()) pictures = driver.collect_pictures();
   agree_on_failure(session.comm(), [&] {
@@ -201,7 +203,7 @@ std::vector<std::string> files_read(const WallRun& run, const Wall& wall) {
   return files;
 }
 
-void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals) {
+void check_outputs(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals) {
   const DisplayOptions display = run.display.options(globals);
   if (run.display.frames_on_stdout() && run.options.explain) {
     throw Error(ExitCode::Usage, "--explain writes to standard output, where the frames go",
@@ -213,6 +215,8 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   if (run.writes_files()) {
     for (const auto& file : files_of_display(wall, run.display.output)) results.push_back(file.string());
   }
+  const std::vector<std::string> layers = WallLayers(run, wall, settings).all();
+  results.insert(results.end(), layers.begin(), layers.end());
   check_distinct(results, globals.trace);
   check_spared(run.scene, globals.scene_limits(), files_read(run, wall), results);
   if (!run.picture.empty()) {
@@ -230,6 +234,7 @@ void check_outputs(const WallRun& run, const Wall& wall, const Globals& globals)
   } else {
     run.remote.refuse();
   }
+  for (const std::string& file : layers) check_writable(file, globals.force);
   if (run.writes_files()) {
     check_writable(assembled_file(run), globals.force);
     check_writable(run.manifest(), globals.force);
@@ -262,10 +267,7 @@ void check_resume(const WallRun& run) {
 }
 
 /// What the options say beside the wall and the scene, before either is drawn. Throws Error.
-void check_options(const WallRun& run, const FrameSettings& settings) {
-  if (!settings.aovs.empty()) {
-    throw Error(ExitCode::Usage, "a wall has no AOVs", "use --aov with render");
-  }
+void check_options(const WallRun& run) {
   if (!run.path.empty()) check_path(run);
   for (const auto& target : {run.target_ms, run.target_error}) {
     if (target && !std::isfinite(*target)) {
@@ -292,7 +294,7 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   Wall wall = load_wall(run.wall, run.overrides, !starts_job);
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
   const FrameSettings settings = run.options.settings(globals.seed);
-  check_options(run, settings);
+  check_options(run);
   for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
   for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals);
   const std::string folder = run.writes_files() ? run.display.output : "";
@@ -305,7 +307,7 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
       std::filesystem::create_directories(chosen.display.output, error);
       if (!error) lock.emplace(chosen.display.output);  // else it is told of below
     }
-    check_outputs(chosen, wall, globals);
+    check_outputs(chosen, wall, settings, globals);
   };
   if (!inside_mpi_job()) claim_outputs(run);
   const auto body = [&](Communicator& comm) {
@@ -347,7 +349,9 @@ class WallRunCommand final : public Command {
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
     run_.remote.declare(app);
-    run_.options.declare_wall(app);
+    run_.options.declare(app);
+    app.add_option("--raw", run_.raw, "keys of the last frame: FILE, or FILE-SCREEN of each of several screens")
+        ->type_name("FILE");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override { return run_wall(run_, globals); }

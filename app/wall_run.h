@@ -20,6 +20,7 @@ struct WallRun {
   std::string wall;
   std::vector<std::string> overrides;  ///< of the wall file, PATH=VALUE
   DisplayFlags display;
+  std::string raw;                     ///< keys of the last frame; see WallLayers
   std::string picture;                 ///< the assembled wall goes here too; empty: only into the folder
   double scale = 1.0;                  ///< of the screens' pixels
   std::optional<int> frames;           ///< none: one, or until a viewer ends the run

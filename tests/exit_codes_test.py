@@ -246,9 +246,11 @@ def main():
         expect_error(f"wall {wall}", ["wall", "check", wall], [2], [wall, "hint"])
     for wall in ("4097x1", "2x2@65537x1"):
         expect_error(f"wall {wall}", ["wall", "check", wall], [6], [wall, "hint"])
-    expect_error("AOVs of a wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--aov", "id"], [2], ["AOVs"])
-    if "--aov" in run(["wall", "run", "--help"], ".").stdout:
-        failures.append("the help of wall run names --aov, which walls refuse")
+    expect_error("AOVs of a wall", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--aov", "id"], [2],
+                 ["--display file"])
+    expect_error("AOVs of a view", ["view", "gen:cornell", "--web", "--aov", "id"], [2], ["--display file"])
+    if "--aov" in run(["view", "--help"], ".").stdout:
+        failures.append("the help of view names --aov, which it refuses")
     expect_error("a --set nobody acts on", ["wall", "run", "2x1@16x16", "gen:cornell", "--display", "none", "--set",
                                             "render.strategy=tree"], [3], ["render"])
     expect_error("no factors", [*dense, "--ranks", "4", "--strategies", "tree,radix-k:2,x"], [2], ["x"])
