@@ -95,6 +95,7 @@ PassRays rays_of(std::string_view pass, const RayCounts& counts) {
   if (pass == "refraction") return {counts.refraction, "mirror"};
   if (pass == "ambient-occlusion") return {counts.ambient_occlusion, "diffuse"};
   if (pass == "photon") return {counts.photon, "diffuse"};
+  if (pass == "gather") return {counts.gather, "diffuse"};
   return {};
 }
 

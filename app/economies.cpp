@@ -24,7 +24,7 @@ std::vector<std::string> economies_of(const FrameSettings& settings, std::span<c
     return std::ranges::any_of(passes, [&](const PassPlan& pass) { return pass.runs && pass.name == name; });
   };
   if (settings.shading == Shading::Deferred) names.emplace_back(kHalfResolution);
-  if (runs("photon")) names.emplace_back(kNoPhotons);
+  if (runs("photon") || runs("gather")) names.emplace_back(kNoPhotons);
   const bool costly = settings.rays.glossy_cutoff > kCheapCutoff || settings.rays.max_depth > kCheapDepth;
   if (costly && (runs("reflection") || runs("refraction"))) names.emplace_back(kLessGlossy);
   return names;
@@ -38,7 +38,8 @@ FrameSettings economize(FrameSettings settings, std::span<const std::string> eco
     } else if (name == kNoPhotons) {
       rays.photons = 0;
       rays.global_photons = false;
-      if (std::erase(rays.passes, "photon") > 0 && rays.passes.empty()) rays.auto_passes = false;
+      const std::size_t given_up = std::erase(rays.passes, "photon") + std::erase(rays.passes, "gather");
+      if (given_up > 0 && rays.passes.empty()) rays.auto_passes = false;
     } else {
       HPR_CHECK(name == kLessGlossy);
       rays.glossy_cutoff = std::min(rays.glossy_cutoff, kCheapCutoff);

@@ -1,5 +1,7 @@
 #include "app/frame.h"
 
+#include <algorithm>
+
 #include "core/stopwatch.h"
 #include "core/trace.h"
 
@@ -178,6 +180,69 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   taken.samples = 1;
   if (times != nullptr) *times = taken;
   return frame;
+}
+
+std::size_t most_in_round(Session& session, const FramePlan& plan) {
+  if (session.comm().size() > 1 && plan.distribution != Distribution::SortFirst) return 1;
+  if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
+  if (session.lighter(plan.rays).lights_one_by_one()) return 1;
+  // Keys and colours of a round are in memory together.
+  constexpr std::size_t kPixels = std::size_t{1} << 24U;
+  std::size_t pixels = 0;
+  for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) pixels += plan.layout.size(screen).area();
+  return std::clamp(kPixels / std::max<std::size_t>(pixels, 1), std::size_t{1}, PrimaryRays::kMostLooks / 2);
+}
+
+namespace {
+
+/// The keys of a round's samples, one layer each.
+FrameTimes draw_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                      std::span<TileLayer<Key>> keys) {
+  FrameTimes taken;
+  const Stopwatch watch;
+  if (plan.primary == Primary::Rays) {
+    PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
+    const trace::Span span("primary rays");
+    std::vector<TileLayer<Key>*> layers;
+    for (TileLayer<Key>& layer : keys) layers.push_back(&layer);
+    for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
+      const std::vector<Rect> parts = parts_of(plan, screen);
+      if (parts.empty()) continue;
+      std::vector<View> views;
+      for (const FrameLook& look : looks) views.push_back(look.views[screen]);
+      rays.draw(views, screen, parts, layers);
+      taken.primary += rays.stats();
+    }
+  } else {
+    for (std::size_t i = 0; i < looks.size(); ++i) rasterize(session, plan, looks[i].views, keys[i]);
+  }
+  taken.primary_ms = watch.ms();
+  return taken;
+}
+
+}  // namespace
+
+std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                              FrameTimes& times) {
+  const trace::Span span("round", "samples", looks.size());
+  const std::span<TileLayer<Key>> keys = session.round_keys(plan.layout, looks.size());
+  for (TileLayer<Key>& layer : keys) layer.set_depth_format(plan.depth_format);
+  times = draw_round(session, plan, looks, keys);
+  std::vector<Frame> frames;
+  std::vector<LitSample> samples;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, {}});
+    if (looks[i].sample.homes != nullptr) bring_home(session, plan, *looks[i].sample.homes, frames.back());
+  }
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, looks[i].sample.number});
+  }
+  const trace::Span light("light");
+  Lighter& lighter = session.lighter(plan.rays);
+  lighter.light(samples, frames.front().owned);
+  add_light(lighter, times);
+  times.samples = static_cast<int>(looks.size());
+  return frames;
 }
 
 }  // namespace hpr

@@ -104,6 +104,20 @@ struct FrameSample {
   std::optional<TileHomes>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
 };
 
+/// One of several samples that are drawn together.
+struct FrameLook {
+  std::vector<View> views;  ///< those of the samples differ by their jitter only
+  FrameSample sample;
+};
+
+/// How many samples of a plan may be drawn together: 1 where they are composited, or each asks for light of its own.
+[[nodiscard]] std::size_t most_in_round(Session& session, const FramePlan& plan);
+
+/// Collective: several samples step by step together, to the bit what make_frame gives one by one. What rays and lights
+/// look up for one sample is at hand for the next. At least one and at most most_in_round().
+[[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                                            FrameTimes& times);
+
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
 [[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,
                                FrameTimes* times = nullptr, const FrameSample& sample = {});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "app/signals.h"
@@ -97,21 +98,68 @@ bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
   return true;
 }
 
+FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
+  const FilterSample through = look_through(sampling_, {plan_.rays.seed, number_}, number);
+  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_}};
+  for (View& view : look.views) view.jitter = through.offset;
+  weight = through.weight;
+  return look;
+}
+
+void FrameSampler::scatter() {
+  if (std::exchange(scattered_, true)) return;
+  film_.each_layer([&](auto& layer) {
+    if (layer.tiles() > 0) homes_->scatter(session_.comm(), layer);
+  });
+}
+
 void FrameSampler::add_sample(std::span<const View> views) {
-  const FilterSample look = look_through(sampling_, {plan_.rays.seed, number_}, film_.samples());
-  std::vector<View> jittered(views.begin(), views.end());
-  for (View& view : jittered) view.jitter = look.offset;
+  double weight = 1.0;
+  const FrameLook seen = look(views, film_.samples(), weight);
   FrameTimes taken;
-  const Frame frame = make_frame(session_, plan_, jittered, &taken, {{number_, film_.samples()}, &homes_});
-  if (!scattered_) {
-    film_.each_layer([&](auto& layer) {
-      if (layer.tiles() > 0) homes_->scatter(session_.comm(), layer);
-    });
-    scattered_ = true;
-  }
-  film_.add({frame.radiance, frame.aovs, *frame.keys}, look.weight, homes_->mine(), session_.threads());
+  const Frame frame = make_frame(session_, plan_, seen.views, &taken, seen.sample);
+  scatter();
+  film_.add({frame.radiance, frame.aovs, *frame.keys}, weight, homes_->mine(), session_.threads());
   times_ += taken;
   frame_.keys = frame.keys;
+}
+
+void FrameSampler::add_round(std::span<const View> views, std::uint32_t count) {
+  std::vector<FrameLook> looks;
+  std::vector<double> weights(count);
+  for (std::uint32_t i = 0; i < count; ++i) looks.push_back(look(views, film_.samples() + i, weights[i]));
+  FrameTimes taken;
+  const std::vector<Frame> frames = make_round(session_, plan_, looks, taken);
+  scatter();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Frame& frame = frames[i];
+    film_.add({frame.radiance, frame.aovs, *frame.keys}, weights[i], homes_->mine(), session_.threads());
+  }
+  times_ += taken;
+  frame_.keys = frames.back().keys;
+}
+
+/// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be
+/// reached; no longer than somebody who sends a signal or looks at a clock would wait.
+std::uint32_t FrameSampler::size_of_round() {
+  constexpr double kSeconds = 2.0;
+  const std::uint32_t done = so_far_.samples;
+  double most = static_cast<double>(most_in_round(session_, plan_));
+  if (sampling_.goal.samples) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
+  if (done > 0) {
+    const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
+    most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
+  } else {
+    most = 1.0;
+  }
+  const auto limit = static_cast<std::uint32_t>(std::max(most, 1.0));
+  std::uint32_t last = limit;
+  for (std::uint32_t count = limit; count > 0; --count) {
+    if (!is_milestone(done + count)) continue;
+    last = count;
+    if (!sampling_.goal.relmse) break;
+  }
+  return last;
 }
 
 bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
@@ -125,7 +173,11 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   const Stopwatch watch;
   std::optional<Stopwatch> written;
   while (!reached(sampling_, so_far_)) {
-    add_sample(views);
+    if (const std::uint32_t count = size_of_round(); count > 1) {
+      add_round(views, count);
+    } else {
+      add_sample(views);
+    }
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.

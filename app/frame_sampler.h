@@ -39,6 +39,12 @@ class FrameSampler {
   /// Tells whether it could.
   bool tries_to_write(const CheckpointSettings& checkpoint);
   void add_sample(std::span<const View> views);
+  void add_round(std::span<const View> views, std::uint32_t count);
+  /// How many samples to draw together.
+  [[nodiscard]] std::uint32_t size_of_round();
+  /// After the first sample drawn since a checkpoint was read: sums go to where their tiles are lit.
+  void scatter();
+  [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);
   void finish();
 
   Session& session_;

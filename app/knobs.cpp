@@ -16,9 +16,11 @@ constexpr std::array kKnobs{
     Knob{"quality", "draft, good, best", "all of the below that are not given", "all of the below that are not given"},
     Knob{"spp", "1, 2, 3 ...; until:60s; until:relmse=1e-3", "time in proportion",
          "noise: its squared error falls as 1 / spp, faster where it is only edges"},
-    Knob{"passes", "auto, all, none, or a list of shadow, reflection, refraction, photon, ambient-occlusion",
+    Knob{"passes", "auto, all, none, or a list of shadow, reflection, refraction, photon, gather, ambient-occlusion",
          "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},
-    Knob{"indirect", "false, true", "photons wherever light meets rough surfaces, and a gather at every point",
+    Knob{"indirect", "false, true",
+         "photons wherever light meets rough surfaces, and a gather at every point; under an even sky a ray at every "
+         "point instead",
          "false: light that rough surfaces scatter on to others: a quarter of what a closed room shows"},
     Knob{"photons", "0 to 1000000000 a sample", "time in proportion, past the frame's pixels without use",
          "fewer photons gather from further away: caustics and indirect light blur; 0 leaves them out"},

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "app/frame.h"
+#include "app/open_sky.h"
 #include "app/primary_choice.h"
 #include "cluster/scene_distribution.h"
 #include "scene/surface_ranges.h"
@@ -120,6 +121,20 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
   }
 }
 
+/// Whether rays or photons are to bring indirect light, where the scene leaves the choice.
+void choose_indirect(Session& session, FramePlan& plan, std::span<const View> views) {
+  RaySettings wanted = plan.rays;
+  wanted.gather = true;
+  if (wanted.reference || !session.requirements().indirect.needed || !gathers_by_rays(session.requirements(), wanted)) {
+    return;
+  }
+  const std::optional<double> open = open_sky(session, plan.rays, views);
+  if (!open) return;
+  plan.rays.gather = *open >= kOpenSky;
+  plan.explained.push_back(fmt::format("indirect light: by {} ({:.0f} % of what is seen lies open to the even sky)",
+                                       plan.rays.gather ? "rays" : "photons", 100.0 * *open));
+}
+
 void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan& plan) {
   auto& lines = plan.explained;
   lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
@@ -172,6 +187,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
   explain_light(session, settings, plan);
+  choose_indirect(session, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   return plan;
 }

@@ -197,6 +197,14 @@ TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& stra
   return keys_;
 }
 
+std::span<TileLayer<Key>> Session::round_keys(const FrameLayout& layout, std::size_t count) {
+  if (!round_keys_.empty() && round_keys_.front().layout() != layout) round_keys_.clear();
+  while (round_keys_.size() < count) round_keys_.emplace_back(layout);
+  const std::span<TileLayer<Key>> layers = std::span(round_keys_).first(count);
+  for (TileLayer<Key>& layer : layers) layer.clear();
+  return layers;
+}
+
 TileLayer<Key> Session::shared_layer(const FrameLayout& layout, const std::string& strategy,
                                      std::span<const int> members) {
   try {

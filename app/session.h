@@ -63,6 +63,8 @@ class Session {
   /// ranks of one host see the layers of their group's members; collective over the group.
   [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout, const std::string& strategy,
                                      std::span<const int> members);
+  /// As many cleared layers that are not composited, reused likewise.
+  [[nodiscard]] std::span<TileLayer<Key>> round_keys(const FrameLayout& layout, std::size_t count);
 
  private:
   void compare_rasterizers();
@@ -103,6 +105,7 @@ class Session {
   std::unique_ptr<Compositor> compositor_;
   Assembler assembler_;
   TileLayer<Key> keys_;
+  std::vector<TileLayer<Key>> round_keys_;
   bool keys_shared_ = false;       ///< whether they were meant to be
   std::vector<int> keys_members_;  ///< the group `keys_` was made for
 };

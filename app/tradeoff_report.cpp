@@ -80,7 +80,8 @@ Json point_json(const TradeoffPoint& point, std::size_t width) {
             {"reflection", point.rays.reflection},
             {"refraction", point.rays.refraction},
             {"ambient-occlusion", point.rays.ambient_occlusion},
-            {"photon", point.rays.photon}}},
+            {"photon", point.rays.photon},
+            {"gather", point.rays.gather}}},
           {"not_finite", point.rays.not_finite},
           {"bytes_sent", point.bytes_sent}};
 }
@@ -282,6 +283,7 @@ std::vector<TradeoffPoint> decode_points(const std::string& text, const std::str
       point.rays.refraction = rays.at("refraction");
       point.rays.ambient_occlusion = rays.at("ambient-occlusion");
       point.rays.photon = rays.at("photon");
+      point.rays.gather = rays.value("gather", std::uint64_t{0});
       point.rays.not_finite = from.at("not_finite");
       point.bytes_sent = from.at("bytes_sent");
       point.samples = from.at("samples");

@@ -17,7 +17,9 @@ class AmbientOcclusionPass final : public Pass {
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
     return scene.ambient_occlusion;
   }
-  [[nodiscard]] bool runs_by_default(const RaySettings& /*settings*/) const override { return false; }
+  [[nodiscard]] bool runs_by_default(const Requirements& /*scene*/, const RaySettings& /*settings*/) const override {
+    return false;
+  }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
     const int count = tile.settings.occlusion_rays;

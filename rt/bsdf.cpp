@@ -26,23 +26,23 @@ double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
 }
 
-/// A normal of GGX facets of roughness `alpha` that `view` sees, both around z: Heitz 2018, section 3. The facets are
-/// stretched into a hemisphere, whose visible half is a disc of which a part is squeezed.
-glm::dvec3 visible_normal(const glm::dvec3& view, double alpha, const glm::dvec2& u) {
+/// The share of a view's cosine that the sphere of directions is cut below, so that few facets that it shows mirror it
+/// into the surface: Eto and Tokuyoshi, "Bounded VNDF Sampling for Smith-GGX Reflections", 2023, equation 5.
+double mirrored_bound(double normal_view, double alpha2) {
+  const double reach2 = square(1.0 + std::sqrt(std::max(0.0, 1.0 - square(normal_view))));
+  return (1.0 - alpha2) * reach2 / (reach2 + alpha2 * square(normal_view));
+}
+
+/// A normal of GGX facets of roughness `alpha` that `view` sees, both around z: Dupuy and Benyoub, "Sampling Visible
+/// GGX Normals with Spherical Caps", 2023. The view, stretched with the facets, is half of the normal and a direction
+/// of the sphere's cap, of which `bound` is the depth in its own cosines.
+glm::dvec3 visible_normal(const glm::dvec3& view, double alpha, double bound, const glm::dvec2& u) {
   const glm::dvec3 stretched = glm::normalize(glm::dvec3(alpha * view.x, alpha * view.y, view.z));
-  const glm::dmat3 frame = warp::basis_about(stretched);
-  // The disc's second axis is to lie in the plane of incidence, where the squeeze happens.
-  const double across = std::sqrt(square(stretched.x) + square(stretched.y));
-  const glm::dvec3 first = across > 0.0 ? glm::dvec3(-stretched.y, stretched.x, 0.0) / across : frame[0];
-  const glm::dvec3 second = glm::cross(stretched, first);
-  const double radius = std::sqrt(u.x);
-  const double angle = 2.0 * std::numbers::pi * u.y;
-  const double x = radius * std::cos(angle);
-  const double share = 0.5 * (1.0 + stretched.z);
-  const double y = (1.0 - share) * std::sqrt(std::max(0.0, 1.0 - x * x)) + share * radius * std::sin(angle);
-  const double z = std::sqrt(std::max(0.0, 1.0 - x * x - y * y));
-  const glm::dvec3 on_sphere = x * first + y * second + z * stretched;
-  const glm::dvec3 normal(alpha * on_sphere.x, alpha * on_sphere.y, std::max(0.0, on_sphere.z));
+  const double depth = bound * stretched.z;
+  const double z = 1.0 - u.x * (1.0 + depth);
+  const glm::dvec2 across = std::sqrt(std::max(0.0, 1.0 - z * z)) * warp::on_circle(u.y);
+  const glm::dvec3 sum(across.x + stretched.x, across.y + stretched.y, z + stretched.z);
+  const glm::dvec3 normal(alpha * sum.x, alpha * sum.y, std::max(0.0, sum.z));
   const double length = glm::length(normal);
   return length > 0.0 ? normal / length : glm::dvec3(0.0, 0.0, 1.0);
 }
@@ -104,6 +104,7 @@ void Bsdf::look(const glm::dvec3& to_viewer, const glm::dvec3& normal) {
   scatters_ = !unlit_ && normal_view_ > kEdgeOn && glm::dot(geometric_normal_, view_) > 0.0;
   normal_view_ = std::min(normal_view_, 1.0);
   view_smith_ = std::sqrt(alpha2_ + (1.0 - alpha2_) * square(normal_view_));
+  if (scatters_) bounded_view_ = mirrored_bound(normal_view_, alpha2_) * normal_view_;
   if (!exact_ || all_mirror_ || !(diffuse_ > 0.0)) return;
   view_enters_ = (1.0 - dielectric_fresnel(normal_view_)) / entering(std::max(eta_, 1.0 / eta_));
 }
@@ -234,9 +235,14 @@ glm::dvec3 Bsdf::value(Lobe lobe, const glm::dvec3& to_light) const {
   return result;
 }
 
+/// The integral that sampled normals are normalised by, times 2: of all that are visible, or of the bounded ones.
+double Bsdf::sampled_normals(Lobe lobe) const {
+  return 2.0 * ((lobe == Lobe::Reflection ? bounded_view_ : normal_view_) + view_smith_);
+}
+
 double Bsdf::facet_pdf(Lobe lobe, const Facet& facet) const {
   // The density of visible normals, G1 D v.h / n.v, with the Jacobian of the reflection, 1 / (4 v.h).
-  const double pdf = facet.distribution / (2.0 * (normal_view_ + view_smith_));
+  const double pdf = facet.distribution / sampled_normals(lobe);
   if (lobe == Lobe::Reflection || !refracts()) return pdf;
   return pdf * 4.0 * facet.view_half * facet.light_half * square(eta_) / facet.stretch;
 }
@@ -274,7 +280,7 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
   const double facets = distribution(sum / length);
   const double common = facets * shadowing(glm::dot(normal_, to_light));
   all.value[kReflection] = common * fresnel(0.5 * length, dielectric);
-  if (present(Lobe::Reflection)) all.pdf[kReflection] = facets / (2.0 * (normal_view_ + view_smith_));
+  if (present(Lobe::Reflection)) all.pdf[kReflection] = facets / sampled_normals(Lobe::Reflection);
   return all;
 }
 
@@ -327,7 +333,8 @@ std::optional<BsdfSample> Bsdf::sample_diffuse(const glm::dvec2& u) const {
 
 std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) const {
   const glm::dmat3 frame = warp::basis_about(normal_);
-  const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), u);
+  const double bound = lobe == Lobe::Reflection ? bounded_view_ / normal_view_ : 1.0;
+  const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), bound, u);
   const double view_half = glm::dot(view_, half);
   const glm::dvec3 mirrored = 2.0 * view_half * half - view_;
   BsdfSample sample;
@@ -347,7 +354,7 @@ std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) con
   sample.pdf = facet_pdf(lobe, *at);
   if (!(sample.pdf > 0.0) || !std::isfinite(sample.pdf)) return std::nullopt;
   // f cos / pdf is Fresnel's term times G2 / G1, in a form that holds at grazing angles.
-  const double kept = 2.0 * (normal_view_ + view_smith_) * at->normal_light * shadowing(at->normal_light);
+  const double kept = sampled_normals(lobe) * at->normal_light * shadowing(at->normal_light);
   sample.weight = lobe == Lobe::Reflection
                       ? kept * fresnel(at->view_half, dielectric_fresnel(at->view_half))
                       : (kept * (1.0 - dielectric_fresnel(at->view_half)) * (refracts() ? squeeze_ : 1.0)) * tint_;

@@ -93,7 +93,9 @@ class Bsdf {
   [[nodiscard]] Scattering scattering(const glm::dvec3& to_light) const;
   /// None when the lobe is absent or the sample fails (below the surface). Lobes of one direction ignore `u` and do not
   /// fail for being below the surface: there a smooth normal's mirror image or refracted direction is put back on its
-  /// side. GGX by visible normals (Heitz, "Sampling the GGX Distribution of Visible Normals", 2018).
+  /// side. GGX by visible normals (Heitz, "Sampling the GGX Distribution of Visible Normals", 2018), for reflection
+  /// less those that mirror into the surface (Eto and Tokuyoshi, "Bounded VNDF Sampling for Smith-GGX Reflections",
+  /// 2023).
   [[nodiscard]] std::optional<BsdfSample> sample(Lobe lobe, const glm::dvec2& u) const;
   /// Whether the surface has the lobe at all.
   [[nodiscard]] bool present(Lobe lobe) const;
@@ -129,6 +131,7 @@ class Bsdf {
   [[nodiscard]] double distribution(const glm::dvec3& half) const;
   [[nodiscard]] double shadowing(double normal_light) const;
   [[nodiscard]] std::optional<Facet> facet(Lobe lobe, const glm::dvec3& to_light) const;
+  [[nodiscard]] double sampled_normals(Lobe lobe) const;
   [[nodiscard]] double facet_pdf(Lobe lobe, const Facet& facet) const;
   [[nodiscard]] std::optional<glm::dvec3> refracted(const glm::dvec3& normal) const;
   [[nodiscard]] std::optional<BsdfSample> sample_diffuse(const glm::dvec2& u) const;
@@ -141,7 +144,8 @@ class Bsdf {
   glm::dvec3 base_color_{0.0};
   glm::dvec3 tint_{0.0};  ///< of light let through, metal and share of transmission included
   double normal_view_ = 0.0;
-  double view_smith_ = 1.0;  ///< sqrt(alpha^2 + (1 - alpha^2) (n.v)^2)
+  double bounded_view_ = 0.0;  ///< the same, bounded as sampled facets are that mirror
+  double view_smith_ = 1.0;    ///< sqrt(alpha^2 + (1 - alpha^2) (n.v)^2)
   double roughness_ = 1.0;
   double alpha2_ = 1.0;
   double metallic_ = 0.0;

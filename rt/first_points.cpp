@@ -4,13 +4,14 @@
 #include <array>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 #include <span>
 
 namespace hpr {
 namespace {
 
 Sampler sampler_of(const TileWork& tile, const TileJob& job, int x, int y) {
-  const View& view = *tile.view;
+  const View& view = *job.view;
   return {pixel_stream({tile.settings.seed, job.number.frame}, view.screen_number, view.block.x0 + job.place.x0 + x,
                        view.block.y0 + job.place.y0 + y),
           job.number.sample};
@@ -18,47 +19,54 @@ Sampler sampler_of(const TileWork& tile, const TileJob& job, int x, int y) {
 
 PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, const SurfacePoint& surface,
                       double share) {
-  const View& view = *tile.view;
+  const View& view = *job.view;
   PathPoint point;
   point.surface = surface;
   point.share = share;
   point.media = tile.eye_media;
   point.throughput = share * left_after(point.media.here, glm::distance(view.eye, surface.position));
   point.sampler = sampler_of(tile, job, x, y);
-  point.pixel = static_cast<std::uint32_t>(y * kTileSide + x);
-  finish_point(tile, point);
+  point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
+  prefetch_material(tile.scene, point.surface);
   return point;
 }
 
-/// See find_first_points.
+/// See find_first_points. Points are finished once all are found: by then the memory has what materials read.
 class FirstPoints {
  public:
   FirstPoints(TileWork& tile, const TileJob& job, const RowRange& rows, std::vector<PathPoint>& points)
       : tile_(tile), job_(job), rows_(rows), points_(points) {}
 
   void find() {
+    const std::size_t before = points_.size();
+    find_surfaces();
+    for (PathPoint& point : std::span(points_).subspan(before)) finish_point(tile_, point);
+  }
+
+ private:
+  void find_surfaces() {
     if (tile_.rays != nullptr && tile_.rays->has_holes()) look_through_holes();
-    WorldTriangle triangle;
+    const std::optional<glm::dvec3> even = tile_.lights.even_environment();
+    prefetch(rows_.first);
     for (int y = rows_.first; y < rows_.end; ++y) {
-      prefetch(y);
+      if (y + 1 < rows_.end) prefetch(y + 1);
       for (int x = 0; x < job_.place.width(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         const double share = left_.empty() ? 1.0 : left_[pixel];
         if (!(share > 0.0)) continue;
-        const Ray ray = ray_of(x, y);
         if (job_.keys[pixel] == kNoKey) {
-          tile_.add(static_cast<std::uint32_t>(pixel), Component::Direct,
-                    share * tile_.lights.environment(glm::normalize(ray.direction)));
+          const glm::dvec3 light = even ? *even : tile_.lights.environment(glm::normalize(ray_of(x, y).direction));
+          tile_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, share * light);
           continue;
         }
-        tile_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
+        const Ray ray = ray_of(x, y);
+        const WorldTriangle& triangle = tile_.triangles.load(tile_.surfaces, key_surface(job_.keys[pixel]));
         points_.push_back(
             first_point(tile_, job_, x, y, tile_.surfaces.meet(triangle, ray.origin, ray.direction), share));
       }
     }
   }
 
- private:
   void prefetch(int y) const {
     std::array<std::uint32_t, kTileSide> ids;
     const std::span<const Key> row = job_.keys.subspan(static_cast<std::size_t>(y) * kTileSide, kTileSide);
@@ -67,7 +75,7 @@ class FirstPoints {
   }
 
   [[nodiscard]] Ray ray_of(int x, int y) const {
-    return view_ray(*tile_.view, job_.place.x0 + x + 0.5, job_.place.y0 + y + 0.5);
+    return view_ray(*job_.view, job_.place.x0 + x + 0.5, job_.place.y0 + y + 0.5);
   }
 
   /// Rays go from the near plane to the surface the key names: what they meet covers a share of what lies behind.
@@ -80,7 +88,7 @@ class FirstPoints {
         const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
         const Ray ray = ray_of(x, y);
         RayRequest request;
-        request.origin = ray.origin + ray.direction * tile_.view->near_distance;
+        request.origin = ray.origin + ray.direction * job_.view->near_distance;
         request.direction = glm::normalize(ray.direction);
         request.reach = std::numeric_limits<double>::infinity();
         if (job_.keys[pixel] != kNoKey) {
@@ -90,7 +98,7 @@ class FirstPoints {
         }
         request.owner = pixel;
         tile_.requests.push_back(request);
-        tile_.charge_ray(pixel);
+        tile_.charge_ray(job_.first_pixel + pixel);
       }
     }
     tile_.counts.primary += tile_.requests.size();

@@ -9,11 +9,13 @@
 
 namespace hpr {
 
-/// A tile, where it lies and what it becomes.
+/// One sample of a tile: where it lies, who looks and what is seen.
 struct TileJob {
   Rect place;
   SampleNumber number;
   std::span<const Key> keys;
+  const View* view = nullptr;
+  std::uint32_t first_pixel = 0;  ///< of TileWork's: those of other samples come before
 };
 
 /// Rows of a tile, from its own first one.

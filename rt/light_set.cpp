@@ -50,8 +50,9 @@ LitSphere sphere_about(const Bounds& bounds) {
 
 }  // namespace
 
-LightSet::LightSet(const Scene& scene)
-    : lit_(sphere_about(scene.bounds)),
+LightSet::LightSet(const Scene& scene, EvenSky even_sky)
+    : even_sky_(even_sky),
+      lit_(sphere_about(scene.bounds)),
       background_(scene.background.r, scene.background.g, scene.background.b),
       triangles_(scene) {
   if (gives_light(scene)) {
@@ -104,7 +105,8 @@ LightSet::Choices LightSet::make_choices(bool punctual) const {
   }
   choices.tree = LightTree(standing);
   const double around = environment_ ? kPi * mean_of(environment_->mean()) : 0.0;
-  if (around > 0.0) add_outside(environment_number(), around);
+  const bool left_out = even_sky_ == EvenSky::LeftToRays && environment_ && environment_->is_even();
+  if (around > 0.0 && !left_out) add_outside(environment_number(), around);
   return choices;
 }
 
@@ -244,6 +246,11 @@ double LightSet::surface_pdf_any(const glm::dvec3& place, const glm::dvec3& norm
 
 glm::dvec3 LightSet::environment(const glm::dvec3& direction) const {
   return environment_ ? environment_->look(direction).radiance : background_;
+}
+
+std::optional<glm::dvec3> LightSet::even_environment() const {
+  if (!environment_) return background_;
+  return environment_->is_even() ? std::optional(environment_->mean()) : std::nullopt;
 }
 
 double LightSet::environment_pdf_one(const glm::dvec3& place, const glm::dvec3& normal,

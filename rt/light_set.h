@@ -17,6 +17,9 @@
 
 namespace hpr {
 
+/// Whether sampling lights finds an environment of one radiance, or that is left to rays of all directions.
+enum class EvenSky : std::uint8_t { Sampled, LeftToRays };
+
 /// All that gives light in a scene: punctual lights (KHR_lights_punctual), spheres (lights with a radius), triangles
 /// that emit (from both sides, as they are shown), and the environment. Knows nothing of visibility.
 ///
@@ -27,7 +30,7 @@ class LightSet {
  public:
   /// The scene must outlive this. A scene that gives no light (gives_light) gets a headlight. Lights without any
   /// intensity are left out. O(n log n) for n lights.
-  explicit LightSet(const Scene& scene);
+  explicit LightSet(const Scene& scene, EvenSky even_sky = EvenSky::Sampled);
 
   /// Lights that are few enough to be asked one by one at every point, punctual and sphere lights; past
   /// `kMostListed` none is listed and all are sampled.
@@ -60,6 +63,8 @@ class LightSet {
 
   /// Radiance from outside the scene along `direction`: the environment, or the background where there is none.
   [[nodiscard]] glm::dvec3 environment(const glm::dvec3& direction) const;
+  /// The same where it does not depend on the direction.
+  [[nodiscard]] std::optional<glm::dvec3> even_environment() const;
   [[nodiscard]] double environment_pdf_one(const glm::dvec3& place, const glm::dvec3& normal,
                                            const glm::dvec3& direction) const;
   [[nodiscard]] double environment_pdf_any(const glm::dvec3& place, const glm::dvec3& normal,
@@ -110,6 +115,7 @@ class LightSet {
   [[nodiscard]] double environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
                                        const glm::dvec3& direction) const;
 
+  EvenSky even_sky_;
   LitSphere lit_;
   glm::dvec3 background_{0.0};
   std::vector<Light> punctual_;

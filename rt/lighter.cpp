@@ -58,6 +58,7 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
   shadow += other.shadow;
   reflection += other.reflection;
   refraction += other.refraction;
+  gather += other.gather;
   ambient_occlusion += other.ambient_occlusion;
   photon += other.photon;
   invalid += other.invalid;
@@ -77,6 +78,7 @@ struct Lighter::State {
   std::vector<std::unique_ptr<Pass>> passes;  ///< those that run
   std::uint8_t shared = 0;                    ///< components, see SharedLight
   std::array<bool, kLobes.size()> followed_lobes{};
+  bool gathers = false;
   std::optional<RayScene> own_opaque;
   const RayScene* opaque = nullptr;
   std::optional<RayScene> holed;
@@ -107,7 +109,8 @@ struct Lighter::State {
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   void tell_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
-  void light_tile(Scratch& scratch, const TileJob& job, std::size_t index, const LightOutput& output) const;
+  void light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+                  std::span<const LitSample> samples) const;
   void light_waiting(Scratch& scratch) const;
   void light_wave(Scratch& scratch) const;
 };
@@ -118,7 +121,8 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
       settings(std::move(chosen)),
       space(lit.bounds),
       surfaces(lit, space),
-      lights(lit),
+      lights(lit,
+             !settings.reference && gathers_by_rays(requirements, settings) ? EvenSky::LeftToRays : EvenSky::Sampled),
       media(lit),
       travelling(others) {
   shared = shared_components(settings);
@@ -129,6 +133,7 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
     if (!plan[i].runs) continue;
     needs_rays = needs_rays || all[i]->needs_rays();
     if (const Lobe* lobe = all[i]->follows()) followed_lobes[static_cast<std::size_t>(*lobe)] = true;
+    gathers = gathers || all[i]->follows_the_rest();
     passes.push_back(std::move(all[i]));
   }
   if (needs_rays) build_rays(source);
@@ -229,7 +234,8 @@ std::unique_ptr<Scratch> Lighter::State::take_scratch() {
                                             .rays = rays ? &*rays : nullptr,
                                             .lights = lights,
                                             .settings = settings,
-                                            .followed_lobes = followed_lobes},
+                                            .followed_lobes = followed_lobes,
+                                            .gathers = gathers},
                                    kFirstPassStep + passes.size());
 }
 
@@ -278,36 +284,43 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
   }
 }
 
-void Lighter::State::light_tile(Scratch& scratch, const TileJob& job, std::size_t index,
-                                const LightOutput& output) const {
+/// Some rows of one sample after those of another: what one sample has looked up the next one finds at hand.
+void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+                                std::span<const LitSample> samples) const {
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
   TileWork& tile = scratch.work;
+  const LightOutput& wanted = samples.front().output;  // all want the same
   tile.wants_components =
-      shared != 0 || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
-  tile.wants_cost = output.cost != nullptr;
-  tile.radiance.assign(kTilePixels, glm::dvec3(0.0));
+      shared != 0 || std::ranges::any_of(wanted.components, [](const auto* layer) { return layer != nullptr; });
+  tile.wants_cost = wanted.cost != nullptr;
+  const std::size_t pixels = jobs.size() * kTilePixels;
+  tile.radiance.assign(pixels, glm::dvec3(0.0));
   if (tile.wants_components) {
-    for (auto& part : tile.components) part.assign(kTilePixels, glm::dvec3(0.0));
+    for (auto& part : tile.components) part.assign(pixels, glm::dvec3(0.0));
   }
-  if (tile.wants_cost) tile.cost.assign(kTilePixels, 0.0F);
+  if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
 
-  for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
-    if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
+  for (const LitSample& sample : samples) {
+    for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
+      if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
+    }
   }
-  if (shared != 0) scratch.shared.start(shared, tile, job);
-  const int height = job.place.height();
+  if (shared != 0) scratch.shared.start(shared, tile, jobs.front());
+  const int height = jobs.front().place.height();
   for (int row = 0; row < height; row += kRowsAtOnce) {
-    const Stopwatch watch;
-    find_first_points(tile, job, {row, std::min(row + kRowsAtOnce, height)}, scratch.waiting[0]);
-    add_first_surfaces(scratch.waiting[0], index, output);
-    if (shared != 0) scratch.shared.choose(scratch.waiting[0], row);
-    scratch.ms[kSurfaceStep] += watch.ms();
-    light_waiting(scratch);
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      const Stopwatch watch;
+      find_first_points(tile, jobs[i], {row, std::min(row + kRowsAtOnce, height)}, scratch.waiting[0]);
+      add_first_surfaces(scratch.waiting[0], index, samples[i].output);
+      if (shared != 0) scratch.shared.choose(scratch.waiting[0], row);
+      scratch.ms[kSurfaceStep] += watch.ms();
+      light_waiting(scratch);
+    }
   }
   if (shared != 0) scratch.shared.spread(tile);
-  store(tile, job, index, output);
+  for (std::size_t i = 0; i < jobs.size(); ++i) store(tile, jobs[i], index, samples[i].output);
 }
 
 Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays,
@@ -324,30 +337,48 @@ const std::vector<PassTime>& Lighter::times() const {
   return state_->times;
 }
 
+bool Lighter::lights_one_by_one() const {
+  return state_->reference || state_->photons || state_->shared != 0;
+}
+
 void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
                     const LightOutput& output, const SampleNumber& number) {
-  const FrameLayout& layout = keys.layout();
-  HPR_CHECK(views.size() == layout.screens());
-  for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
+  const LitSample only{views, &keys, output, number};
+  light(std::span(&only, 1), tiles);
+}
+
+void Lighter::light(std::span<const LitSample> samples, std::span<const std::size_t> tiles) {
+  HPR_CHECK(samples.size() == 1 || (!samples.empty() && !lights_one_by_one()));
+  const LitSample& first = samples.front();
+  const FrameLayout& layout = first.keys->layout();
+  for (const LitSample& sample : samples) {
+    HPR_CHECK(sample.keys->layout() == layout && sample.views.size() == layout.screens());
+    for (std::size_t i = 0; i < sample.views.size(); ++i) HPR_CHECK(sample.views[i].size() == layout.size(i));
+  }
 
   State& state = *state_;
   if (state.reference) {
-    state.trace_reference(views, tiles, output, number);
+    state.trace_reference(first.views, tiles, first.output, first.number);
     state.tell_of_cut_rays();
     return;
   }
-  const PhotonMaps* const photons = state.send_photons(number, nullptr);
-  const std::vector<Media> eyes = state.media.of_eyes(views);
+  const PhotonMaps* const photons = state.send_photons(first.number, nullptr);
+  const std::vector<Media> eyes = state.media.of_eyes(first.views);
   const Stopwatch watch;
   state.for_each(tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);
-    set_active(output, tile);
+    std::vector<TileJob> jobs;
+    for (const LitSample& sample : samples) {
+      set_active(sample.output, tile);
+      jobs.push_back({place.pixels, sample.number, sample.keys->tile(tile), &sample.views[place.screen],
+                      static_cast<std::uint32_t>(jobs.size() * kTilePixels)});
+    }
     std::unique_ptr<Scratch> scratch = state.take_scratch();
-    scratch->work.view = &views[place.screen];
+    scratch->work.view = &first.views[place.screen];
     scratch->work.eye_media = eyes[place.screen];
     scratch->work.photons = photons;
-    state.light_tile(*scratch, {place.pixels, number, keys.tile(tile)}, tile, output);
+    state.light_tile(*scratch, jobs, tile, samples);
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });

@@ -51,6 +51,17 @@ glm::dvec3 normal_to_shade_with(const Scene& scene, const SurfacePoint& surface)
   return material.normal_texture.present() ? mapped_normal(scene, material, surface) : surface.facing_normal();
 }
 
+void prefetch_material(const Scene& scene, const SurfacePoint& surface) {
+  const Material& material = scene.materials[surface.material];
+  for (const TextureRef* const reference :
+       {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture,
+        &material.emissive_texture, &material.occlusion_texture, &material.transmission_texture}) {
+    if (!reference->present()) continue;
+    const glm::vec2& set = surface.uv[std::min<std::size_t>(reference->uv_set, surface.uv.size() - 1)];
+    prefetch_texture(scene.textures[static_cast<std::size_t>(reference->texture)], transformed_uv(*reference, set));
+  }
+}
+
 MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface) {
   const Material& material = scene.materials[surface.material];
   const auto texel = [&](const TextureRef& reference, Encoding encoding) {

@@ -26,6 +26,9 @@ struct MaterialPoint {
 };
 
 /// The material with its textures read at the surface's coordinates, vertex colours and normal map applied.
+/// Asks the memory for the texels evaluate_material will read there.
+void prefetch_material(const Scene& scene, const SurfacePoint& surface);
+
 [[nodiscard]] MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface);
 
 /// MaterialPoint::normal alone: as the viewer at surface.to_viewer has it.

@@ -34,7 +34,7 @@ struct PathPoint {
   std::array<bool, kLobes.size()> may_follow{};  ///< whether one might have
   Sampler sampler;
   double share = 1.0;                       ///< of the pixel that the first surface of the path covers
-  std::uint32_t pixel = 0;                  ///< of the tile
+  std::uint32_t pixel = 0;                  ///< of TileWork's
   std::uint16_t depth = 0;                  ///< bounces from the eye
   Component component = Component::Direct;  ///< where its light counts
   std::uint8_t borrows = 0;                 ///< a bit per component that comes from neighbours, see SharedLight
@@ -58,6 +58,14 @@ struct Wave {
   std::vector<DirectSample> samples;  ///< light by light, inside a light in the order of points
 };
 
+/// A ray on its way from a point to the next.
+struct Following {
+  const PathPoint* from = nullptr;
+  glm::dvec3 throughput{0.0};
+  double pdf = 0.0;
+  Sampler sampler;
+};
+
 struct PhotonMaps;
 
 /// What passes need and write while one thread lights one tile.
@@ -68,19 +76,24 @@ struct TileWork {
   const LightSet& lights;
   const RaySettings& settings;
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
+  bool gathers = false;                              ///< whether one runs that follows all the others
   const PhotonMaps* photons = nullptr;               ///< null when none were sent
-  const View* view = nullptr;                        ///< of the tile at hand
+  const View* view = nullptr;                        ///< of the tile at hand, of whatever sample: the eye's place
   Media eye_media = {};                              ///< what the eye of that view lies in
   bool wants_components = false;
   bool wants_cost = false;
 
-  std::vector<glm::dvec3> radiance = {};                             ///< per pixel of the tile, summed in a fixed order
+  /// Per pixel of the tile, sample after sample, summed in a fixed order.
+  std::vector<glm::dvec3> radiance = {};
   std::array<std::vector<glm::dvec3>, kComponents> components = {};  ///< likewise, when wanted
   std::vector<float> cost = {};                                      ///< rays per pixel, when wanted
   RayCounts counts = {};
   WalkScratch scratch = {};
   std::vector<RayRequest> requests = {};
+  std::vector<Following> following = {};
+  std::vector<std::uint32_t> hits = {};
   FoundPhotons found_photons = {};
+  RecentTriangles triangles = {};
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
@@ -104,12 +117,17 @@ class Pass {
   [[nodiscard]] virtual Requirement requirement(const Requirements& scene, const RaySettings& settings) const = 0;
 
   /// Whether it runs where the scene requires it and nobody names it.
-  [[nodiscard]] virtual bool runs_by_default(const RaySettings& /*settings*/) const { return true; }
+  [[nodiscard]] virtual bool runs_by_default(const Requirements& /*scene*/, const RaySettings& /*settings*/) const {
+    return true;
+  }
 
   [[nodiscard]] virtual bool needs_rays() const { return true; }
 
   /// The lobe of a surface whose light this pass brings by following it; none for other passes.
   [[nodiscard]] virtual const Lobe* follows() const { return nullptr; }
+
+  /// Whether it follows all lobes that no other pass could.
+  [[nodiscard]] virtual bool follows_the_rest() const { return false; }
 
   /// Whether it needs TileWork::photons.
   [[nodiscard]] virtual bool gathers_photons() const { return false; }
@@ -129,6 +147,7 @@ class Pass {
 [[nodiscard]] std::unique_ptr<Pass> make_refraction_pass();
 [[nodiscard]] std::unique_ptr<Pass> make_ambient_occlusion_pass();
 [[nodiscard]] std::unique_ptr<Pass> make_photon_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_gather_pass();
 
 /// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
 /// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
@@ -148,7 +167,9 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 /// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
 void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
 
-/// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach.
+/// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach. `component` is
+/// Photon for the pass that follows the rest: where sky it meets is light that sampling lights does not find, that
+/// counts as direct light, and what hides it as shadow.
 void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
                  std::vector<PathPoint>& next);
 

@@ -13,6 +13,7 @@ std::vector<std::unique_ptr<Pass>> make_all_passes() {
   passes.push_back(make_refraction_pass());
   passes.push_back(make_ambient_occlusion_pass());
   passes.push_back(make_photon_pass());
+  passes.push_back(make_gather_pass());
 
   return passes;
 }
@@ -31,17 +32,24 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
                   unknown_name_hint(wanted, names));
     }
   }
+  const auto names_pass = [&](const char* name) {
+    return std::ranges::find(settings.passes, name) != settings.passes.end();
+  };
+  if (names_pass("gather") && names_pass("photon")) {
+    throw Error(ExitCode::Usage, "the passes gather and photon bring the same light", "name one of them");
+  }
   std::vector<PassPlan> plan;
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());
     const Requirement requirement = pass->requirement(scene, settings);
     const bool named = std::ranges::find(settings.passes, name) != settings.passes.end();
-    const bool wanted = named || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(settings));
+    const bool wanted =
+        named || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(scene, settings));
     if (settings.reference) {
       plan.push_back({name, false, "the reference traces whole paths instead"});
       continue;
     }
-    if (settings.all_passes && pass->runs_by_default(settings)) {
+    if (settings.all_passes && pass->runs_by_default(scene, settings)) {
       plan.push_back({name, true, requirement.needed ? requirement.why : "as asked, although " + requirement.why});
       continue;
     }

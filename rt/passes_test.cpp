@@ -59,6 +59,36 @@ TEST(Passes, FollowWhatTheGlossyCutoffSays) {
   EXPECT_TRUE(runs(scene_with(metal, 1), {.glossy_cutoff = 0.0}, "reflection")) << "a mirror is followed anyhow";
 }
 
+TEST(Passes, RaysGatherIndirectLightWhereAnEvenSkyIsAllThereIs) {
+  Scene scene = scene_with(test::matte(), 0);
+  scene.lights.clear();
+  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
+  const RaySettings best{.photons = 1000, .global_photons = true, .gather = true};
+  EXPECT_TRUE(runs(scene, best, "gather"));
+  EXPECT_FALSE(runs(scene, best, "photon"));
+  EXPECT_FALSE(runs(scene, best, "shadow")) << "no light is left to be sampled";
+  RaySettings all = best;
+  all.all_passes = true;
+  EXPECT_TRUE(runs(scene, all, "gather"));
+  EXPECT_FALSE(runs(scene, all, "photon")) << "light would count twice";
+  for (const RaySettings& other :
+       {RaySettings{.photons = 1000, .gather = true}, RaySettings{.photons = 1000, .global_photons = true},
+        RaySettings{.passes = {"photon"}, .photons = 1000, .global_photons = true, .gather = true},
+        RaySettings{.photons = 1000, .global_photons = true, .gather = true, .half_resolution = {"photon"}}}) {
+    EXPECT_FALSE(runs(scene, other, "gather"));
+  }
+  EXPECT_TRUE(runs(scene, {.passes = {"gather"}}, "gather"));
+  scene.lights.emplace_back();
+  EXPECT_FALSE(runs(scene, best, "gather")) << "rays do not meet a point";
+  EXPECT_TRUE(runs(scene, best, "photon"));
+  EXPECT_TRUE(runs(scene, best, "shadow"));
+  EXPECT_TRUE(runs(scene, {.passes = {"gather"}}, "gather")) << "as asked";
+  scene.lights.clear();
+  scene.environment = Environment{Image<Rgb>({8, 4}, {0.5F, 0.6F, 0.9F})};
+  EXPECT_FALSE(runs(scene, best, "gather")) << "a picture may hold a sun";
+  EXPECT_THROW((void)plan_passes(requirements_of(scene), {.passes = {"gather", "photon"}}), Error);
+}
+
 TEST(Passes, SayWhy) {
   for (const PassPlan& plan : plan_passes(requirements_of(scene_with(test::matte(), 2)), {}))
     EXPECT_FALSE(plan.why.empty());

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <span>
 
 #include "rt/direct_light.h"
 #include "rt/pass.h"
@@ -18,15 +19,45 @@ double brightness(const glm::dvec3& color) {
   return std::max({color.r, color.g, color.b});
 }
 
-/// A ray on its way to the next point.
-struct Following {
-  const PathPoint* from = nullptr;
-  glm::dvec3 direction{0.0};
-  glm::dvec3 throughput{0.0};
-  double pdf = 0.0;
-  Media media;
-  Sampler sampler;
-};
+/// Paths that may go on for ever are ended by roulette from here on, by what is left of their throughput.
+constexpr int kRouletteDepth = 3;
+
+/// Where all lobes are followed: each from what the eye sees, and then one of them by chance, in proportion to the
+/// light it scatters.
+void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
+  std::array<double, kLobes.size()> bright{};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    const bool by_others = is_followed(point.bsdf, kLobes[i], tile.settings.glossy_cutoff);
+    if (by_others && !tile.followed_lobes[i]) continue;
+    sum += bright[i] = brightness(point.throughput * point.bsdf.weight(kLobes[i]));
+    point.may_follow[i] = bright[i] > 0.0;
+  }
+  if (!(sum > 0.0)) return;
+  if (point.depth == 0) {
+    for (std::size_t i = 0; i < kLobes.size(); ++i) point.follows[i] = point.may_follow[i] ? 1.0F : 0.0F;
+    return;
+  }
+  const double chance = point.depth < kRouletteDepth ? 1.0 : std::min(sum, 1.0);
+  double u = point.sampler.one() / chance;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    if (!point.may_follow[i]) continue;
+    const double share = bright[i] / sum;
+    if (u < share) {
+      point.follows[i] = static_cast<float>(1.0 / (share * chance));
+      return;
+    }
+    u -= share;
+  }
+}
+
+/// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
+glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction) {
+  const PathPoint& from = *ray.from;
+  const double light_pdf =
+      ray.pdf > 0.0 ? tile.lights.environment_pdf_one(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
+  return share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(direction);
+}
 
 }  // namespace
 
@@ -39,6 +70,10 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
   if (metres > 0.0) point.throughput *= left_at(point.media, point.surface, point.material, metres);
   point.bsdf = Bsdf(point.material, point.surface);
   if (point.depth >= tile.settings.max_depth) return;
+  if (tile.gathers) {
+    choose_among_all_lobes(tile, point);
+    return;
+  }
   std::array<double, kLobes.size()> bright{};
   for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
     const auto i = static_cast<std::size_t>(lobe);
@@ -59,52 +94,64 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
 
 void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
                  std::vector<PathPoint>& next) {
-  std::vector<Following> rays;
+  std::vector<Following>& rays = tile.following;
+  rays.clear();
+  tile.requests.clear();
+  const bool gathers = component == Component::Photon;
   for (const PathPoint& point : wave.points) {
     const double factor = point.follows[static_cast<std::size_t>(lobe)];
     if (factor == 0.0) continue;
+    if (tile.gathers && is_followed(point.bsdf, lobe, tile.settings.glossy_cutoff) == gathers) continue;
     Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
     const auto sample = point.bsdf.sample(lobe, sampler.two());
     if (!sample) continue;
     glm::dvec3 throughput = factor * point.throughput * sample->weight;
     throughput *= survival(brightness(throughput), sampler);
     if (throughput == glm::dvec3(0.0)) continue;
-    rays.push_back({&point, sample->direction, throughput, sample->pdf,
-                    media_towards(point.media, point.surface, point.material, sample->direction), sampler});
+    rays.push_back({&point, throughput, sample->pdf, sampler});
+    tile.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
+                             std::numeric_limits<double>::infinity(), nullptr, 0});
+    tile.charge_ray(point.pixel);
   }
-  tile.requests.clear();
-  for (Following& ray : rays) {
-    tile.requests.push_back({ray_origin(ray.from->surface, ray.direction), ray.direction,
-                             std::numeric_limits<double>::infinity(), &ray.sampler, 0});
-    tile.charge_ray(ray.from->pixel);
-  }
-  std::vector<std::optional<SurfacePoint>> hits(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) tile.requests[i].sampler = &rays[i].sampler;
+  tile.hits.resize(rays.size());
   counter += rays.size();
-  tile.counts.invalid += tile.rays->closest(tile.requests, hits, tile.scratch);
+  tile.counts.invalid += tile.rays->closest(tile.requests, tile.hits, tile.scratch);
 
+  const std::size_t before = next.size();
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Following& ray = rays[i];
-    const glm::dvec3& place = ray.from->surface.position;
-    const Component part = component_after(*ray.from, component);
-    if (!hits[i]) {
-      const double light_pdf =
-          ray.pdf > 0.0 ? tile.lights.environment_pdf_one(place, ray.from->bsdf.light_normal(), ray.direction) : 0.0;
-      tile.add(ray.from->pixel, part,
-               share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(ray.direction));
-      continue;
+    const RayRequest& request = tile.requests[i];
+    const PathPoint& from = *ray.from;
+    const Component part = component_after(from, component);
+    const bool leaves = tile.hits[i] == kNoSurface;
+    const bool shows_sky = gathers && from.depth == 0;
+    if (leaves || (shows_sky && tile.wants_components)) {
+      const glm::dvec3 sky = sky_along(tile, ray, request.direction);
+      if (leaves) {
+        tile.add(from.pixel, shows_sky ? Component::Direct : part, sky);
+        continue;
+      }
+      tile.components[static_cast<std::size_t>(Component::Direct)][from.pixel] += sky;
+      tile.components[static_cast<std::size_t>(Component::Shadow)][from.pixel] -= sky;
     }
+    const WorldTriangle& triangle = tile.triangles.load(tile.surfaces, tile.hits[i]);
     PathPoint& reached = next.emplace_back();
-    reached.surface = *hits[i];
+    reached.surface = tile.surfaces.meet(triangle, request.origin, request.direction);
     reached.throughput = ray.throughput;
-    reached.media = ray.media;
-    reached.seen_from = place;
-    reached.seen_normal = ray.from->bsdf.light_normal();
+    reached.media = media_towards(from.media, from.surface, from.material, request.direction);
+    reached.seen_from = from.surface.position;
+    reached.seen_normal = from.bsdf.light_normal();
     reached.seen_pdf = ray.pdf;
     reached.sampler = ray.sampler;
-    reached.pixel = ray.from->pixel;
-    reached.depth = static_cast<std::uint16_t>(ray.from->depth + 1);
+    reached.pixel = from.pixel;
+    reached.depth = static_cast<std::uint16_t>(from.depth + 1);
     reached.component = part;
-    finish_point(tile, reached, glm::distance(reached.surface.position, place));
+    prefetch_material(tile.scene, reached.surface);
+  }
+  // By now the memory has what materials read.
+  for (PathPoint& reached : std::span(next).subspan(before)) {
+    finish_point(tile, reached, glm::distance(reached.surface.position, reached.seen_from));
   }
 }
 

@@ -11,6 +11,7 @@ class PhotonPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "photon"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    if (gathers_by_rays(scene, settings)) return {false, "rays gather what surfaces scatter on to others"};
     const bool bundled =
         scene.shadow.needed && (scene.refraction.needed || follows_reflections(scene, settings.glossy_cutoff));
     if (settings.global_photons && !bundled) return scene.indirect;
@@ -21,7 +22,9 @@ class PhotonPass final : public Pass {
     return {bundled, bundled ? "lights reach materials smoother than the glossy cutoff, which bundle it into caustics"
                              : "no light is bundled by materials smoother than the glossy cutoff"};
   }
-  [[nodiscard]] bool runs_by_default(const RaySettings& settings) const override { return settings.photons > 0; }
+  [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
+    return settings.photons > 0 && !gathers_by_rays(scene, settings);
+  }
   [[nodiscard]] bool gathers_photons() const override { return true; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {

@@ -14,7 +14,7 @@
 #include "core/trace.h"
 #include "rt/denormals.h"
 #include "rt/embree_compat.h"
-#include "rt/occupied_tiles.h"
+#include "rt/occupied_pixels.h"
 
 namespace hpr {
 namespace {
@@ -162,9 +162,10 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
   }
 }
 
-/// Where a packet's pixels go: lane i to keys[pixel[i]] of a tile.
+/// Where a packet's pixels go: lane i to keys[pixel[i]] of a tile, as its look sees it.
 struct Packet {
   std::size_t count = 0;
+  std::array<std::size_t, kWidth> look{};
   std::array<std::uint32_t, kWidth> pixel{};
   std::array<double, kWidth> x{};  ///< of the view
   std::array<double, kWidth> y{};
@@ -173,7 +174,9 @@ struct Packet {
 /// One thread's work on a tile.
 class TileTracer {
  public:
-  TileTracer(const Scene& scene, const RayScene& rays, const View& view) : rays_(rays) {
+  /// Of `looks`, which differ by their jitter only.
+  TileTracer(const Scene& scene, const RayScene& rays, std::span<const View> looks) : rays_(rays), looks_(looks) {
+    const View& view = looks.front();
     embree::start(search_.context, embree::Rays::Coherent);
     search_.scene = &scene;
     search_.geometries = rays.geometries();
@@ -190,26 +193,37 @@ class TileTracer {
     }
   }
 
-  /// Merges the keys of `pixels`, which lie in the tile at (x0, y0). Returns whether any surface is seen.
-  bool trace(const Rect& pixels, int x0, int y0, std::span<Key> keys) {
-    bool any = false;
+  /// Merges the keys of those of `pixels`, in the tile at (x0, y0), that are set in its `mask`; keys[i] are of look i.
+  /// All looks through a pixel lie together: they meet about the same.
+  void trace(const Rect& pixels, int x0, int y0, std::span<const std::uint8_t> mask,
+             std::span<const std::span<Key>> keys) {
+    Packet packet;
     for (int y = pixels.y0; y < pixels.y1; y = (y / kPacketHeight + 1) * kPacketHeight) {
       for (int x = pixels.x0; x < pixels.x1; x = (x / kPacketWidth + 1) * kPacketWidth) {
         const Rect square{x, y, std::min(pixels.x1, (x / kPacketWidth + 1) * kPacketWidth),
                           std::min(pixels.y1, (y / kPacketHeight + 1) * kPacketHeight)};
-        Packet packet;
         for (int row = square.y0; row < square.y1; ++row) {
           for (int column = square.x0; column < square.x1; ++column) {
-            packet.pixel[packet.count] = static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0);
-            packet.x[packet.count] = column + 0.5;
-            packet.y[packet.count++] = row + 0.5;
+            const auto pixel = static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0);
+            if (mask[pixel] == 0) continue;
+            for (std::size_t look = 0; look < looks_.size(); ++look) {
+              packet.look[packet.count] = look;
+              packet.pixel[packet.count] = pixel;
+              packet.x[packet.count] = column + 0.5;
+              packet.y[packet.count++] = row + 0.5;
+              if (packet.count < kWidth) continue;
+              trace(packet, keys);
+              packet.count = 0;
+            }
           }
         }
-        any = trace(packet, keys) || any;
       }
     }
-    return any;
+    if (packet.count > 0) trace(packet, keys);
   }
+
+  /// A bit per look in which any surface is seen.
+  [[nodiscard]] std::uint64_t seen() const { return seen_; }
 
   [[nodiscard]] PrimaryRayStats stats() const {
     PrimaryRayStats stats = stats_;
@@ -218,9 +232,11 @@ class TileTracer {
   }
 
  private:
-  bool trace(const Packet& packet, std::span<Key> keys) {
+  void trace(const Packet& packet, std::span<const std::span<Key>> keys) {
     stats_.rays += packet.count;
-    for (std::size_t i = 0; i < packet.count; ++i) aim(i, view_ray(*search_.view, packet.x[i], packet.y[i]));
+    for (std::size_t i = 0; i < packet.count; ++i) {
+      aim(i, view_ray(looks_[packet.look[i]], packet.x[i], packet.y[i]));
+    }
     for (std::size_t i = packet.count; i < kWidth; ++i) leave_out(i);
     search_.through = false;
     intersect();
@@ -230,14 +246,12 @@ class TileTracer {
       search_.through = true;
       intersect();
     }
-    bool any = false;
     for (std::size_t i = 0; i < packet.count; ++i) {
       if (!search_.found[i]) continue;
-      Key& key = keys[packet.pixel[i]];
+      Key& key = keys[packet.look[i]][packet.pixel[i]];
       key = std::max(key, search_.key[i]);
-      any = true;
+      seen_ |= std::uint64_t{1} << packet.look[i];
     }
-    return any;
   }
 
   /// Where rays come from, in ray space.
@@ -336,6 +350,8 @@ class TileTracer {
   }
 
   const RayScene& rays_;
+  std::span<const View> looks_;
+  std::uint64_t seen_ = 0;
   glm::dvec3 eye_{0.0};
   double outside_ = 0.0;  ///< how far the eye lies outside of what the scene can fill
   Search search_{};
@@ -347,30 +363,42 @@ class TileTracer {
 }  // namespace
 
 PrimaryRays::PrimaryRays(const Scene& scene, const RayScene& rays, int threads)
-    : scene_(scene), rays_(rays), threads_(threads), boxes_(mesh_boxes(scene)) {}
+    : scene_(scene), rays_(rays), threads_(threads), boxes_(scene) {}
 
 void PrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
-  const FrameLayout& layout = layer.layout();
+  TileLayer<Key>* const only = &layer;
+  draw(std::span(&view, 1), screen, parts, std::span(&only, 1));
+}
+
+void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
+                       std::span<TileLayer<Key>* const> layers) {
+  HPR_CHECK(!looks.empty() && looks.size() <= kMostLooks && looks.size() == layers.size());
+  const View& view = looks.front();
+  const FrameLayout& layout = layers.front()->layout();
   HPR_CHECK(screen < layout.screens() && layout.size(screen) == view.size());
   HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
   stats_ = {};
   if (rays_.geometries().empty()) return;
   const TileRun run = layout.tiles_of(screen);
-  const std::vector<std::uint8_t> occupied = occupied_tiles(scene_, rays_, boxes_, view, layout, screen);
+  const OccupiedPixels occupied(scene_, rays_, boxes_, looks, layout, screen);
   std::mutex mutex;
   parallel_for(threads_, run.count, [&](std::size_t i) {
-    if (occupied[i] == 0) return;
     const std::size_t tile = run.first + i;
-    const trace::Span span("trace tile", "tile", tile);
     const Rect place = layout.place(tile).pixels;
+    std::array<std::uint8_t, kTilePixels> mask;
+    if (!occupied.mark(tile, place, mask)) return;
+    const trace::Span span("trace tile", "tile", tile);
     const DenormalsAsZero mode;
-    TileTracer tracer(scene_, rays_, view);
-    bool any = false;
+    std::array<std::span<Key>, kMostLooks> keys;
+    std::ranges::transform(layers, keys.begin(), [&](TileLayer<Key>* layer) { return layer->tile(tile); });
+    TileTracer tracer(scene_, rays_, looks);
     for (const Rect& part : parts) {
       const Rect pixels = intersection(part, place);
-      if (!pixels.empty()) any = tracer.trace(pixels, place.x0, place.y0, layer.tile(tile)) || any;
+      if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(looks.size()));
     }
-    if (any) layer.set_active(tile);
+    for (std::size_t look = 0; look < looks.size(); ++look) {
+      if ((tracer.seen() >> look & 1U) != 0) layers[look]->set_active(tile);
+    }
     const std::lock_guard lock(mutex);
     stats_ += tracer.stats();
   });

@@ -7,6 +7,7 @@
 
 #include "image/key.h"
 #include "image/tiles.h"
+#include "rt/occupied_pixels.h"
 #include "rt/ray_scene.h"
 #include "scene/scene.h"
 #include "scene/view.h"
@@ -15,7 +16,7 @@ namespace hpr {
 
 /// Of the last draw().
 struct PrimaryRayStats {
-  std::uint64_t rays = 0;      ///< none go through tiles where no instance's box is seen
+  std::uint64_t rays = 0;      ///< none go through pixels where no box about triangles is seen
   std::uint64_t invalid = 0;   ///< of those, rays Embree could not bear: they missed
   std::uint64_t weighed = 0;   ///< depths reckoned in double because two candidates, or the near plane, were close
   std::uint64_t retraced = 0;  ///< rays traced again through everything, as their first candidate was no hit
@@ -47,6 +48,11 @@ class PrimaryRays {
   /// Merges (maximum) the keys of `parts` of the layer's `screen` into `layer`; tiles become active where something is
   /// seen. `view` is as large as that screen; parts are in its pixels and may reach past it.
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
+  /// The same for several views that differ by their jitter only, kMostLooks at most, together: rays through one pixel
+  /// are quicker in one another's company. Keys of looks[i] go to layers[i]; they are those each draw() would make.
+  void draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
+            std::span<TileLayer<Key>* const> layers);
+  static constexpr std::size_t kMostLooks = 16;
 
   [[nodiscard]] const PrimaryRayStats& stats() const { return stats_; }
 
@@ -54,7 +60,7 @@ class PrimaryRays {
   const Scene& scene_;
   const RayScene& rays_;
   int threads_;
-  std::vector<Bounds> boxes_;  ///< per mesh, in its own coordinates
+  MeshBoxes boxes_;
   PrimaryRayStats stats_;
 };
 

@@ -147,6 +147,49 @@ TEST(PrimaryRays, PartsThreadsAndRepetitionChangeNothing) {
   EXPECT_EQ(layer.active_tiles(), layer.layout().tiles_of(1).count);
 }
 
+/// Spheres and a few splinters with much of nothing between them.
+Scene floating_scene() {
+  Scene scene;
+  Mesh splinters = soup(40);
+  for (glm::vec3& position : splinters.positions) position = 0.3F * position + glm::vec3(0.5F, -1.0F, 0.3F);
+  test::place(scene, test::add_mesh(scene, splinters));
+  const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.3, 24, 0));
+  for (const double x : {-1.2, -0.4, 0.6, 1.2}) {
+    const glm::dmat4 there = glm::translate(glm::dmat4(1.0), {x, 0.3 * x, 0.5});
+    test::place(scene, shared, glm::scale(glm::rotate(there, x, glm::dvec3(0.6, 0.8, 0.0)), {x, 1.0, 0.4}));
+  }
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(PrimaryRays, LooksTogetherSeeWhatEachSeesAloneAndMissesNothing) {
+  const Scene scene = floating_scene();
+  const RayScene rays(scene, RaySpace(scene.bounds), 2);
+  PrimaryRays primary(scene, rays, 2);
+  std::vector<View> looks(11, front_view(scene));
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    looks[i].jitter = {0.9 * std::sin(5.0 * static_cast<double>(i)), 1.7 * std::cos(3.0 * static_cast<double>(i))};
+  }
+  const FrameLayout layout({looks.front().size()});
+  std::vector<TileLayer<Key>> layers;
+  for (std::size_t i = 0; i < looks.size(); ++i) layers.emplace_back(layout);
+  std::vector<TileLayer<Key>*> together;
+  for (TileLayer<Key>& layer : layers) together.push_back(&layer);
+  const Rect all = whole(looks.front());
+  primary.draw(looks, 0, std::span(&all, 1), together);
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    TileLayer<Key> alone(layout);
+    primary.draw(looks[i], 0, std::span(&all, 1), alone);
+    EXPECT_TRUE(to_image(alone, 0) == to_image(layers[i], 0)) << "look " << i;
+    if (i < 2) {
+      EXPECT_LT(disagreement(scene, looks[i], to_image(alone, 0)), 2e-4) << "look " << i;
+    }
+    EXPECT_LT(primary.stats().rays, all.area() / 2) << "background is left out";
+    EXPECT_GT(covered(to_image(alone, 0)), all.area() / 20);
+    EXPECT_EQ(alone.active_tiles(), layers[i].active_tiles());
+  }
+}
+
 TEST(PrimaryRays, APartHoldsNoKeyOutsideOfIt) {
   const Scene scene = mixed_scene();
   const View view = front_view(scene);

@@ -60,31 +60,26 @@ void RayWalk::visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch
   }
 }
 
-std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::optional<SurfacePoint>> hits,
+std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
                                WalkScratch& scratch) const {
   HPR_CHECK(hits.size() == rays.size());
   scratch.batch.clear();
   for (const RayRequest& ray : rays) push(ray, scratch.batch);
-  scratch.surfaces.resize(rays.size());
-  const std::uint64_t invalid = opaque_.closest(scratch.batch, scratch.surfaces);
-  surfaces_.prefetch(scratch.surfaces);
-  WorldTriangle triangle;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    hits[i].reset();
-    if (scratch.surfaces[i] == kNoSurface) continue;
-    surfaces_.load(scratch.surfaces[i], triangle);
-    hits[i] = surfaces_.meet(triangle, rays[i].origin, rays[i].direction);
-  }
+  const std::uint64_t invalid = opaque_.closest(scratch.batch, hits);
+  surfaces_.prefetch(hits);
   if (holed_ == nullptr) return invalid;
+  WorldTriangle triangle;
   scratch.rest.assign(rays.begin(), rays.end());
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (!hits[i]) continue;
+    if (hits[i] == kNoSurface) continue;
     RayRequest& ray = scratch.rest[i];
-    ray.reach = std::min(ray.reach, glm::dot(hits[i]->position - ray.origin, ray.direction));
+    surfaces_.load(hits[i], triangle);
+    const SurfacePoint point = surfaces_.meet(triangle, ray.origin, ray.direction);
+    ray.reach = std::min(ray.reach, glm::dot(point.position - ray.origin, ray.direction));
   }
   visit_holed(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint& point, double coverage) {
     if (passes_by_chance(coverage, *rays[i].sampler)) return true;
-    hits[i] = point;
+    hits[i] = point.surface;
     return false;
   });
   return invalid;

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -58,9 +57,9 @@ class RayWalk {
           const RayScene* holed)
       : scene_(scene), surfaces_(surfaces), space_(space), opaque_(opaque), holed_(holed) {}
 
-  /// hits[i] is where ray i meets a surface first; none where it leaves the scene. Returns how many rays were invalid.
-  std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::optional<SurfacePoint>> hits,
-                        WalkScratch& scratch) const;
+  /// hits[i] is the surface ray i meets first; kNoSurface where it leaves the scene. Returns how many rays were
+  /// invalid.
+  std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, WalkScratch& scratch) const;
 
   /// passed[i] is the share of light that gets through to the end of ray i: 0 behind anything opaque. Returns how many
   /// rays were invalid.

@@ -12,7 +12,10 @@ namespace {
 class ShadowPass final : public Pass {
  public:
   [[nodiscard]] std::string_view name() const override { return "shadow"; }
-  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    if (scene.even_sky && gathers_by_rays(scene, settings)) {
+      return {false, "rays that gather light find an even sky, and what hides it"};
+    }
     return scene.shadow;
   }
 

@@ -152,6 +152,9 @@ void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
       for (int corner = 0; corner < 3; ++corner) {
         __builtin_prefetch(&meshes[i]->positions[(*corners[i])[corner]]);
         __builtin_prefetch(&meshes[i]->normals[(*corners[i])[corner]]);
+        for (const auto& uvs : meshes[i]->uvs) {
+          if (!uvs.empty()) __builtin_prefetch(&uvs[(*corners[i])[corner]]);
+        }
       }
     }
   }

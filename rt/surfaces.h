@@ -102,4 +102,18 @@ class Surfaces {
   std::vector<std::vector<std::uint32_t>> parts_;  ///< [mesh][triangle]; empty but for those that cover in part
 };
 
+/// The triangles met last: neighbouring pixels, and the samples of a pixel, meet the same ones again.
+class RecentTriangles {
+ public:
+  [[nodiscard]] const WorldTriangle& load(const Surfaces& surfaces, std::uint32_t id) {
+    WorldTriangle& place = triangles_[id % kPlaces];
+    surfaces.load(id, place);
+    return place;
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 512;
+  std::vector<WorldTriangle> triangles_ = std::vector<WorldTriangle>(kPlaces);
+};
+
 }  // namespace hpr

@@ -14,6 +14,9 @@ enum class Encoding { Linear, Srgb };
 /// White where the image is empty.
 [[nodiscard]] glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 uv);
 
+/// Asks the memory for the texels sample_texture will read.
+void prefetch_texture(const Texture& texture, glm::dvec2 uv);
+
 /// KHR_texture_transform.
 [[nodiscard]] glm::dvec2 transformed_uv(const TextureRef& reference, const glm::vec2& uv);
 

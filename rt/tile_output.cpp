@@ -30,31 +30,32 @@ void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOut
     return pixels;
   };
   const auto colors = start(output.radiance);
+  const std::size_t first = job.first_pixel;
   each([&](std::size_t i) {
-    const Rgb color = to_rgb(tile.radiance[i]);
+    const Rgb color = to_rgb(tile.radiance[first + i]);
     if (is_finite(color)) {
       colors[i] = color;
     } else {
       ++tile.counts.not_finite;
-      const Rect& block = tile.view->block;
+      const Rect& block = job.view->block;
       const auto x = static_cast<int>(i % kTileSide);
       const auto y = static_cast<int>(i / kTileSide);
       tile.counts.first_not_finite =
           std::min(tile.counts.first_not_finite,
-                   ScreenPixel{tile.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
+                   ScreenPixel{job.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
     }
   });
   for (std::size_t part = 0; part < kComponents; ++part) {
     if (output.components.at(part) == nullptr) continue;
     const auto pixels = start(output.components.at(part));
     each([&](std::size_t i) {
-      const Rgb color = to_rgb(tile.components[part][i]);
-      if (is_finite(color) && is_finite(to_rgb(tile.radiance[i]))) pixels[i] = color;
+      const Rgb color = to_rgb(tile.components[part][first + i]);
+      if (is_finite(color) && is_finite(to_rgb(tile.radiance[first + i]))) pixels[i] = color;
     });
   }
   if (output.cost != nullptr) {
     const auto pixels = start(output.cost);
-    each([&](std::size_t i) { pixels[i] = tile.cost[i]; });
+    each([&](std::size_t i) { pixels[i] = tile.cost[first + i]; });
   }
 }
 
@@ -65,7 +66,7 @@ void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t index,
     for (const PathPoint& point : points) {
       const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
       const Rgb part = to_rgb(point.share * value);
-      Rgb& sum = pixels[point.pixel];
+      Rgb& sum = pixels[point.pixel % kTilePixels];
       sum = {sum.r + part.r, sum.g + part.g, sum.b + part.b};
     }
   }

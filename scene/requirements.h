@@ -21,6 +21,7 @@ struct Requirements {
   Requirement ambient_occlusion;  ///< a cheap stand-in for that
   float least_roughness = 1.0F;   ///< of any visible lit material that reflects, anywhere
   float most_roughness = 0.0F;    ///< likewise
+  bool even_sky = false;          ///< whether all light comes from an environment of one radiance
 };
 
 [[nodiscard]] Requirements requirements_of(const Scene& scene);
