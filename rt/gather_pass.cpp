@@ -30,8 +30,8 @@ class GatherPass final : public Pass {
 
 bool gathers_by_rays(const Requirements& scene, const RaySettings& settings) {
   if (std::ranges::find(settings.passes, "gather") != settings.passes.end()) return true;
-  return settings.passes.empty() && (settings.auto_passes || settings.all_passes) && settings.global_photons && settings.gather &&
-         scene.even_sky && settings.half_resolution.empty();
+  return settings.passes.empty() && (settings.auto_passes || settings.all_passes) && settings.global_photons &&
+         settings.gather && scene.even_sky && settings.half_resolution.empty();
 }
 
 std::unique_ptr<Pass> make_gather_pass() {
