@@ -190,7 +190,7 @@ std::size_t most_in_round(Session& session, const FramePlan& plan) {
   constexpr std::size_t kPixels = std::size_t{1} << 24U;
   std::size_t pixels = 0;
   for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) pixels += plan.layout.size(screen).area();
-  return std::clamp(kPixels / std::max<std::size_t>(pixels, 1), std::size_t{1}, PrimaryRays::kMostLooks / 2);
+  return std::clamp(kPixels / std::max<std::size_t>(pixels, 1), std::size_t{1}, PrimaryRays::kMostLooks);
 }
 
 namespace {

@@ -39,6 +39,12 @@ std::string describe(const SampleGoal& goal, const SampleProgress& so_far) {
   return text;
 }
 
+std::size_t pixels_of(const FrameLayout& layout) {
+  std::size_t pixels = 0;
+  for (std::size_t screen = 0; screen < layout.screens(); ++screen) pixels += layout.size(screen).area();
+  return pixels;
+}
+
 }  // namespace
 
 FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame,
@@ -143,13 +149,14 @@ void FrameSampler::add_round(std::span<const View> views, std::uint32_t count) {
 /// reached; no longer than somebody who sends a signal or looks at a clock would wait.
 std::uint32_t FrameSampler::size_of_round() {
   constexpr double kSeconds = 2.0;
+  constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a sample surely takes no longer
   const std::uint32_t done = so_far_.samples;
   double most = static_cast<double>(most_in_round(session_, plan_));
   if (sampling_.goal.samples) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
   if (done > 0) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
     most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
-  } else {
+  } else if (const std::size_t pixels = pixels_of(plan_.layout); pixels > kQuickPixels) {
     most = 1.0;
   }
   const auto limit = static_cast<std::uint32_t>(std::max(most, 1.0));

@@ -71,7 +71,7 @@ void check_sampling(const Sampling& sampling) {
 FilterSample look_through(const Sampling& sampling, const RandomKey& random, std::uint32_t number) {
   if (!sampling.sums()) return {};
   Sampler sampler(pixel_stream(random, kNoScreen, 0, 0), number);
-  return sample_filter(sampling.filter.value_or(PixelFilter::Box), sampler.two());
+  return sample_filter(sampling.filter.value_or(PixelFilter::Box), sampler.two_of_pixel());
 }
 
 bool is_milestone(std::uint32_t samples) {

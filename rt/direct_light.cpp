@@ -45,7 +45,7 @@ void DirectLight::sample_listed() {
     for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
       PathPoint& point = wave_.points[i];
       if (point.borrows_light(Component::Direct)) continue;
-      const glm::dvec2 u = fixed ? glm::dvec2(0.0) : point.sampler.two();
+      const glm::dvec2 u = fixed ? glm::dvec2(0.0) : next_two(point.sampler, point.depth);
       add(i, tile_.lights.sample_listed(light_, point.surface.position, *tile_.view, u));
     }
   }
@@ -56,7 +56,7 @@ void DirectLight::sample_others() {
     PathPoint& point = wave_.points[i];
     if (point.borrows_light(Component::Direct)) continue;
     const double choice = point.sampler.one();
-    const glm::dvec2 u = point.sampler.two();
+    const glm::dvec2 u = round_ == 0 ? next_two(point.sampler, point.depth) : point.sampler.two();
     auto light = tile_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *tile_.view, choice, u);
     if (!light) continue;
     light->weight /= tile_.settings.light_samples;

@@ -160,6 +160,11 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
   return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
 }
 
+/// What decides at the first surface is spread evenly together with the places in the pixel.
+[[nodiscard]] inline glm::dvec2 next_two(Sampler& sampler, int depth) {
+  return depth == 0 ? sampler.two_with_pixel() : sampler.two();
+}
+
 /// The component that light from a followed lobe of `point` counts in.
 [[nodiscard]] Component component_after(const PathPoint& point, Component first);
 

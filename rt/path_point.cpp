@@ -103,7 +103,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     if (factor == 0.0) continue;
     if (tile.gathers && is_followed(point.bsdf, lobe, tile.settings.glossy_cutoff) == gathers) continue;
     Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
-    const auto sample = point.bsdf.sample(lobe, sampler.two());
+    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
     if (!sample) continue;
     glm::dvec3 throughput = factor * point.throughput * sample->weight;
     throughput *= survival(brightness(throughput), sampler);

@@ -26,7 +26,7 @@ Path path_from_eye(const View& view, const Media& media, const PathSettings& set
   path.sampler =
       Sampler(pixel_stream({settings.seed, number.frame}, view.screen_number, view.block.x0 + x, view.block.y0 + y),
               number.sample);
-  const glm::dvec2 place = settings.spread_in_pixel ? path.sampler.two() : glm::dvec2(0.5);
+  const glm::dvec2 place = settings.spread_in_pixel ? path.sampler.two_of_pixel() : glm::dvec2(0.5);
   const Ray ray = view_ray(view, x + place.x, y + place.y);
   path.origin = ray.origin + view.near_distance * ray.direction;
   path.direction = glm::normalize(ray.direction);

@@ -1,5 +1,9 @@
 #include "rt/sampler.h"
 
+#include <array>
+#include <bit>
+#include <cstddef>
+
 namespace hpr {
 namespace {
 
@@ -39,6 +43,37 @@ std::uint32_t sobol_second_reversed(std::uint32_t index) {
   return index ^ (index >> 16U);
 }
 
+/// A dimension's generator matrix, its bits reversed: column k says which bits of the number bit k of the index flips.
+using ReversedMatrix = std::array<std::uint32_t, 32>;
+
+/// Of the primitive polynomial of `degree` with the inner coefficients `inner`, and its first direction numbers.
+constexpr ReversedMatrix matrix_of(unsigned int degree, std::uint32_t inner, std::array<std::uint32_t, 3> first) {
+  std::array<std::uint32_t, 32> m{};
+  ReversedMatrix columns{};
+  for (unsigned int k = 0; k < 32; ++k) {
+    if (k < degree) {
+      m.at(k) = first.at(k);
+    } else {
+      m.at(k) = m.at(k - degree) ^ (m.at(k - degree) << degree);
+      for (unsigned int i = 1; i < degree; ++i) {
+        if ((inner >> (degree - 1 - i) & 1U) != 0) m.at(k) ^= m.at(k - i) << i;
+      }
+    }
+    // Bit j of m_k stands for 2^(j - k - 1) of the unit interval: reversed, that is bit k - j.
+    for (unsigned int j = 0; j <= k; ++j) columns.at(k) |= (m.at(k) >> j & 1U) << (k - j);
+  }
+  return columns;
+}
+
+constexpr ReversedMatrix kThird = matrix_of(2, 1, {1, 3, 0});
+constexpr ReversedMatrix kFourth = matrix_of(3, 1, {1, 3, 1});
+
+std::uint32_t sobol_reversed(const ReversedMatrix& matrix, std::uint32_t index) {
+  std::uint32_t number = 0;
+  for (; index != 0; index &= index - 1) number ^= matrix[static_cast<std::size_t>(std::countr_zero(index))];
+  return number;
+}
+
 constexpr double kStep = 1.0 / 4294967296.0;
 
 /// Where the index goes in the order of points of this draw.
@@ -46,23 +81,36 @@ std::uint32_t shuffled(std::uint32_t index, std::uint64_t key) {
   return reversed_bits(scrambled_reversed(reversed_bits(index), static_cast<std::uint32_t>(key)));
 }
 
-/// Sobol's first dimension is the index with its bits reversed.
-double first_of(std::uint32_t place, std::uint64_t key) {
-  return reversed_bits(scrambled_reversed(place, static_cast<std::uint32_t>(key >> 32U))) * kStep;
+double scrambled(std::uint32_t reversed, std::uint32_t seed) {
+  return reversed_bits(scrambled_reversed(reversed, seed)) * kStep;
+}
+
+/// Two dimensions of a number of the sequence, each scrambled in its own way.
+glm::dvec2 scrambled(std::uint32_t reversed_x, std::uint32_t reversed_y, std::uint64_t key) {
+  return {scrambled(reversed_x, static_cast<std::uint32_t>(key >> 32U)),
+          scrambled(reversed_y, static_cast<std::uint32_t>(mixed(key)))};
 }
 
 }  // namespace
 
+// Sobol's first dimension is the index with its bits reversed.
 double Sampler::one() {
   const std::uint64_t key = next_key();
-  return first_of(shuffled(index_, key), key);
+  return scrambled(shuffled(index_, key), static_cast<std::uint32_t>(key >> 32U));
 }
 
 glm::dvec2 Sampler::two() {
   const std::uint64_t key = next_key();
   const std::uint32_t place = shuffled(index_, key);
-  const auto seed = static_cast<std::uint32_t>(mixed(key));
-  return {first_of(place, key), reversed_bits(scrambled_reversed(sobol_second_reversed(place), seed)) * kStep};
+  return scrambled(place, sobol_second_reversed(place), key);
+}
+
+glm::dvec2 Sampler::two_of_pixel() {
+  return scrambled(index_, sobol_second_reversed(index_), next_key());
+}
+
+glm::dvec2 Sampler::two_with_pixel() {
+  return scrambled(sobol_reversed(kThird, index_), sobol_reversed(kFourth, index_), next_key());
 }
 
 std::uint64_t Sampler::next_key() {

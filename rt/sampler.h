@@ -19,6 +19,14 @@ class Sampler {
   [[nodiscard]] double one();
   [[nodiscard]] glm::dvec2 two();
 
+  /// Pairs of one sequence in four dimensions (Sobol'; direction numbers of Joe and Kuo, "Constructing Sobol Sequences
+  /// with Better Two-Dimensional Projections", 2008), scrambled by stream: where in the pixel a sample lies, and what
+  /// chance decides next. Who integrates over both has them spread evenly together, which copies of two dimensions are
+  /// not. Of the second pair a path uses one at the most where choices follow one another; alternatives may each have
+  /// theirs.
+  [[nodiscard]] glm::dvec2 two_of_pixel();
+  [[nodiscard]] glm::dvec2 two_with_pixel();
+
   /// A sampler for one of the ways a path goes on from here, whose numbers have nothing to do with those drawn here.
   [[nodiscard]] Sampler branch(std::uint32_t which) const;
 

@@ -39,6 +39,56 @@ TEST(Sampler, EveryPairIsStratifiedInAllElementaryIntervals) {
   }
 }
 
+TEST(Sampler, PairsOfThePixelAreStratifiedInAllElementaryIntervals) {
+  for (const std::uint64_t stream : {0ULL, 7ULL}) {
+    for (int columns = 1; columns <= 256; columns *= 2) {
+      std::set<int> cells;
+      for (std::uint32_t i = 0; i < 256; ++i) {
+        const glm::dvec2 p = Sampler(stream, i).two_of_pixel();
+        const int rows = 256 / columns;
+        cells.insert(static_cast<int>(p.x * columns) * rows + static_cast<int>(p.y * rows));
+      }
+      EXPECT_EQ(cells.size(), 256U) << columns << " columns";
+    }
+    std::array<std::set<int>, 2> sides;
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      const glm::dvec2 p = Sampler(stream, i).two_with_pixel();
+      sides[0].insert(static_cast<int>(p.x * 256));
+      sides[1].insert(static_cast<int>(p.y * 256));
+    }
+    EXPECT_EQ(sides[0].size(), 256U);
+    EXPECT_EQ(sides[1].size(), 256U);
+  }
+}
+
+/// The squared error of what 256 samples make of a disc's area, which moves with the place in the pixel.
+double moving_disc_error(bool together) {
+  constexpr double kRadius = 0.4;
+  constexpr double kArea = 3.14159265358979 * kRadius * kRadius / 4.0;
+  constexpr int kStreams = 300;
+  double sum = 0.0;
+  for (std::uint64_t stream = 0; stream < kStreams; ++stream) {
+    int inside = 0;
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      const glm::dvec2 pixel = Sampler(1000 + stream, i).two_of_pixel();
+      Sampler sampler(2000 + stream, i);
+      const glm::dvec2 u = together ? sampler.two_with_pixel() : sampler.two();
+      const double x = 2.0 * u.x - 1.0 + 0.6 * (pixel.x - 0.5) - 0.2;
+      const double y = 2.0 * u.y - 1.0 + 0.6 * (pixel.y - 0.5) + 0.2;
+      if (x * x + y * y < kRadius * kRadius) ++inside;
+    }
+    const double error = inside / 256.0 - kArea;
+    sum += error * error / kStreams;
+  }
+  return sum;
+}
+
+TEST(Sampler, WhatGoesWithThePixelIsSpreadEvenlyTogetherWithIt) {
+  const double apart = moving_disc_error(false);
+  EXPECT_LT(moving_disc_error(true), 0.65 * apart);
+  EXPECT_LT(apart, 0.6 * 0.126 * 0.874 / 256.0) << "independent samples";
+}
+
 TEST(Sampler, PairsAndStreamsAreIndependent) {
   const auto correlation = [](const std::vector<glm::dvec2>& a, const std::vector<glm::dvec2>& b) {
     double sum = 0.0;
