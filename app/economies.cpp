@@ -23,7 +23,7 @@ std::vector<std::string> economies_of(const FrameSettings& settings, std::span<c
   const auto runs = [&](std::string_view name) {
     return std::ranges::any_of(passes, [&](const PassPlan& pass) { return pass.runs && pass.name == name; });
   };
-  if (settings.shading == Shading::Deferred) names.emplace_back(kHalfResolution);
+  if (settings.shading == Shading::Deferred && !runs("gather")) names.emplace_back(kHalfResolution);
   if (runs("photon") || runs("gather")) names.emplace_back(kNoPhotons);
   const bool costly = settings.rays.glossy_cutoff > kCheapCutoff || settings.rays.max_depth > kCheapDepth;
   if (costly && (runs("reflection") || runs("refraction"))) names.emplace_back(kLessGlossy);

@@ -187,7 +187,7 @@ std::size_t most_in_round(Session& session, const FramePlan& plan) {
   if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
   if (session.lighter(plan.rays).lights_one_by_one()) return 1;
   // Keys and colours of a round are in memory together.
-  constexpr std::size_t kPixels = std::size_t{1} << 24U;
+  constexpr std::size_t kPixels = std::size_t{1} << 23U;
   std::size_t pixels = 0;
   for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) pixels += plan.layout.size(screen).area();
   return std::clamp(kPixels / std::max<std::size_t>(pixels, 1), std::size_t{1}, PrimaryRays::kMostLooks);

@@ -37,10 +37,11 @@ struct FrameSettings {
   DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Primary::Raster only
   Shading shading = Shading::Deferred;
   RaySettings rays;
-  bool partitioned = false;        ///< each rank's ray scene holds its share of the objects only, and rays travel
-  bool photons_fit_frame = false;  ///< no more photons a sample than the frame has pixels
-  double resolution_scale = 1.0;   ///< of the screens' pixels: the frame is made of so many a side, and enlarged
-  std::vector<Aov> aovs;           ///< with deferred shading only
+  bool partitioned = false;         ///< each rank's ray scene holds its share of the objects only, and rays travel
+  bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
+  bool photons_fit_frame = false;   ///< no more photons a sample than the frame has pixels
+  double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged
+  std::vector<Aov> aovs;            ///< with deferred shading only
 };
 
 /// Who does what in a frame; computed alike on every rank.

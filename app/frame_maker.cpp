@@ -41,6 +41,8 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   settings_.photons_fit_frame = false;
   settings_.rays.photons = plan_.rays.photons;
   settings_.primary = plan_.primary;
+  settings_.rays.gather = plan_.rays.gather;
+  settings_.indirect_is_chosen = true;
   economies_ = economies_of(settings_, plan_passes(session.requirements(), plan_.rays));
   budget_.emplace(BudgetSettings{
       .target_ms = *target_ms_, .most_samples = most_samples(), .economies = static_cast<int>(economies_.size())});

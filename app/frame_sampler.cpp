@@ -147,16 +147,17 @@ void FrameSampler::add_round(std::span<const View> views, std::uint32_t count) {
 
 /// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be
 /// reached; no longer than somebody who sends a signal or looks at a clock would wait.
-std::uint32_t FrameSampler::size_of_round() {
+std::uint32_t FrameSampler::size_of_round(bool hurried) {
   constexpr double kSeconds = 2.0;
-  constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a sample surely takes no longer
+  constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
   const std::uint32_t done = so_far_.samples;
   double most = static_cast<double>(most_in_round(session_, plan_));
   if (sampling_.goal.samples) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
   if (done > 0) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
     most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
-  } else if (const std::size_t pixels = pixels_of(plan_.layout); pixels > kQuickPixels) {
+  } else if (hurried || sampling_.goal.seconds ||
+             pixels_of(plan_.layout) * static_cast<std::size_t>(plan_.rays.light_samples) > kQuickPixels) {
     most = 1.0;
   }
   const auto limit = static_cast<std::uint32_t>(std::max(most, 1.0));
@@ -180,7 +181,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   const Stopwatch watch;
   std::optional<Stopwatch> written;
   while (!reached(sampling_, so_far_)) {
-    if (const std::uint32_t count = size_of_round(); count > 1) {
+    if (const std::uint32_t count = size_of_round(!checkpoint.path.empty()); count > 1) {
       add_round(views, count);
     } else {
       add_sample(views);

@@ -40,8 +40,8 @@ class FrameSampler {
   bool tries_to_write(const CheckpointSettings& checkpoint);
   void add_sample(std::span<const View> views);
   void add_round(std::span<const View> views, std::uint32_t count);
-  /// How many samples to draw together.
-  [[nodiscard]] std::uint32_t size_of_round();
+  /// How many samples to draw together. `hurried`: somebody may end the run by a signal.
+  [[nodiscard]] std::uint32_t size_of_round(bool hurried);
   /// After the first sample drawn since a checkpoint was read: sums go to where their tiles are lit.
   void scatter();
   [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);

@@ -19,8 +19,8 @@ constexpr std::array kKnobs{
     Knob{"passes", "auto, all, none, or a list of shadow, reflection, refraction, photon, gather, ambient-occlusion",
          "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},
     Knob{"indirect", "false, true",
-         "photons wherever light meets rough surfaces, and a gather at every point; under an even sky a ray at every "
-         "point instead",
+         "photons wherever light meets rough surfaces, and a gather at every point; in the open under an even sky a "
+         "ray at every point instead",
          "false: light that rough surfaces scatter on to others: a quarter of what a closed room shows"},
     Knob{"photons", "0 to 1000000000 a sample", "time in proportion, past the frame's pixels without use",
          "fewer photons gather from further away: caustics and indirect light blur; 0 leaves them out"},

@@ -7,9 +7,8 @@
 
 namespace hpr {
 
-/// From so much of open sky on rays bring indirect light with less noise than photons in the same time: they do at 0.85
-/// (spheres in the open), and photons do at 0.03 (a room with a hole), see
-/// docs/decisions/0009-even-skies-are-gathered.md.
+/// From so much of open sky on rays bring indirect light: with less noise than photons in the same time where spheres
+/// hang in the open, and with more in a room with a hole (docs/decisions/0009-even-skies-are-gathered.md).
 inline constexpr double kOpenSky = 0.5;
 
 /// Collective. How much of the sky's light reaches the surfaces that some views see, as about a thousand rays find out:

@@ -6,6 +6,7 @@
 #include "app/frame.h"
 #include "app/open_sky.h"
 #include "app/primary_choice.h"
+#include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
 #include "scene/surface_ranges.h"
 
@@ -122,13 +123,15 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
 }
 
 /// Whether rays or photons are to bring indirect light, where the scene leaves the choice.
-void choose_indirect(Session& session, FramePlan& plan, std::span<const View> views) {
+void choose_indirect(Session& session, const FrameSettings& settings, FramePlan& plan, std::span<const View> views) {
+  if (settings.indirect_is_chosen || !plan.rays.passes.empty()) return;
   RaySettings wanted = plan.rays;
   wanted.gather = true;
   if (wanted.reference || !session.requirements().indirect.needed || !gathers_by_rays(session.requirements(), wanted)) {
     return;
   }
-  const std::optional<double> open = open_sky(session, plan.rays, views);
+  // Processors that round otherwise may count otherwise.
+  const std::optional<double> open = all_gather_value(session.comm(), open_sky(session, plan.rays, views)).front();
   if (!open) return;
   plan.rays.gather = *open >= kOpenSky;
   plan.explained.push_back(fmt::format("indirect light: by {} ({:.0f} % of what is seen lies open to the even sky)",
@@ -187,7 +190,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
   explain_light(session, settings, plan);
-  choose_indirect(session, plan, views);
+  choose_indirect(session, settings, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   return plan;
 }

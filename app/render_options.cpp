@@ -186,7 +186,8 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->check(CLI::Range(std::uint32_t{0}, std::uint32_t{1'000'000'000}));
   app.add_flag_function(
          "--indirect,!--no-indirect", [this](std::int64_t count) { indirect = count > 0; },
-         "photons carry all indirect light, not caustics alone (default: with --quality best, or where --passes "
+         "all indirect light, not caustics alone: by photons, or under an even sky by rays (default: with --quality "
+         "best, or where --passes "
          "names photon)")
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   app.add_flag("--no-terminator-fix", no_terminator_fix,

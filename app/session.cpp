@@ -200,6 +200,7 @@ TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& stra
 std::span<TileLayer<Key>> Session::round_keys(const FrameLayout& layout, std::size_t count) {
   if (!round_keys_.empty() && round_keys_.front().layout() != layout) round_keys_.clear();
   while (round_keys_.size() < count) round_keys_.emplace_back(layout);
+  while (round_keys_.size() > std::max<std::size_t>(count, 2)) round_keys_.pop_back();
   const std::span<TileLayer<Key>> layers = std::span(round_keys_).first(count);
   for (TileLayer<Key>& layer : layers) layer.clear();
   return layers;

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """The hybrid's and Mitsuba 3's time for pictures of equal error: a curve of relMSE over time for each, and their ratio.
 
-usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--particle-spp N] [--trim PERCENT] [--cache FOLDER]
-                      [--json FILE]
+usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--particle-spp N] [--trim PERCENT]
+                      [--sampler NAME] [--cache FOLDER] [--json FILE]
 
 Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). The truth is
 Mitsuba's, of many samples: of its path tracer, but where all lights are small, caustics on matte surfaces are found by paths so
@@ -30,7 +30,7 @@ WAYS = {
     "good": (["--quality", "good"], (1, 4, 16, 64)),
     "best": (["--quality", "best"], (1, 4, 16, 64)),
     # What suits small pictures of many triangles: rays find the first surfaces too, fewer photons go out per sample.
-    "tuned": (["--quality", "best", "--primary", "rays", "--photons", "16384"], (1, 4, 16, 64)),
+    "tuned": (["--quality", "best", "--primary", "rays", "--photons", "16384"], (1, 4, 16, 64, 256)),
     "reference": (["--reference"], (1, 4, 16, 64)),
 }
 
@@ -143,6 +143,7 @@ def main():
     parser.add_argument("--truth-spp", type=int, default=8192)
     parser.add_argument("--particle-spp", type=int, default=131072, help="of the particle tracer, where lights are small; 0: none")
     parser.add_argument("--trim", type=float, default=0.1, help="percent of the pixels, the worst, that do not count")
+    parser.add_argument("--sampler", default="independent", help="Mitsuba's; multijitter and others spread samples evenly")
     parser.add_argument("--ways", default=",".join(WAYS))
     parser.add_argument("--cache", help="a folder for the truths, which take minutes")
     parser.add_argument("--json", help="a file for all figures")
@@ -154,7 +155,7 @@ def main():
         folder = pathlib.Path(scratch)
         for name in options.scenes.split(","):
             file, ambient = peer.SCENES[name]
-            description, notes = peer.to_mitsuba(gltf2mi, mitsuba, numpy, name, scenes / file, folder, options.size)
+            description, notes = peer.to_mitsuba(gltf2mi, mitsuba, numpy, name, scenes / file, folder, options.size, options.sampler)
             scene = mitsuba.load_dict(description)
             truth, noise = truth_of(numpy, mitsuba, scene, description, name, options)
 

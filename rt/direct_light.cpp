@@ -14,7 +14,7 @@ double share_of_ray(const TileWork& tile, double pdf, double light_pdf) {
 
 void add_emission(TileWork& tile, const Wave& wave) {
   for (const PathPoint& point : wave.points) {
-    if (point.material.emission == glm::dvec3(0.0)) continue;
+    if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered)) continue;
     double share = 1.0;
     if (point.seen_pdf > 0.0) {
       share = share_of_ray(
@@ -76,7 +76,8 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
   }
   const double cosine = std::abs(glm::dot(point.material.normal, light.to_light));
   glm::dvec3 radiance = point.throughput * scattered * light.weight * cosine;
-  // The headlight is wherever it is asked for.
+  // The headlight is wherever it is asked for, and shows what is looked at.
+  if (!light.casts_shadows && point.gathered) return;
   if (light.casts_shadows) {
     radiance *= left_of_light(point.media, point.surface, point.material, light.to_light, light.distance);
   }

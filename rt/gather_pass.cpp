@@ -12,7 +12,7 @@ class GatherPass final : public Pass {
   [[nodiscard]] std::string_view name() const override { return "gather"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     if (!scene.indirect.needed || gathers_by_rays(scene, settings)) return scene.indirect;
-    return {false, "photons bring what light surfaces scatter on to others"};
+    return {false, "photons are to bring what light surfaces scatter on, if anything is"};
   }
   [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
     return gathers_by_rays(scene, settings);
@@ -20,7 +20,7 @@ class GatherPass final : public Pass {
   [[nodiscard]] bool follows_the_rest() const override { return true; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    for (const Lobe lobe : {Lobe::Diffuse, Lobe::Reflection}) {
+    for (const Lobe lobe : kLobes) {
       follow_lobe(tile, wave, lobe, Component::Photon, tile.counts.gather, next);
     }
   }
@@ -30,8 +30,8 @@ class GatherPass final : public Pass {
 
 bool gathers_by_rays(const Requirements& scene, const RaySettings& settings) {
   if (std::ranges::find(settings.passes, "gather") != settings.passes.end()) return true;
-  return settings.passes.empty() && (settings.auto_passes || settings.all_passes) && settings.global_photons &&
-         settings.gather && scene.even_sky && settings.half_resolution.empty();
+  return settings.photons > 0 && settings.passes.empty() && (settings.auto_passes || settings.all_passes) &&
+         settings.global_photons && settings.gather && scene.even_sky && settings.half_resolution.empty();
 }
 
 std::unique_ptr<Pass> make_gather_pass() {

@@ -78,7 +78,7 @@ void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool 
                                      .photons = 20'000,
                                      .global_photons = true,
                                      .terminator_fix = terminator_fix},
-                                    48, covering);
+                                    64, covering);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
 }
 
@@ -132,7 +132,9 @@ TEST(Hybrid, RaysGatherTheLightOfAnEvenSky) {
   polished.roughness = 0.2F;
   Material frosted = test::clear_glass(1.5F, 0.0F);
   frosted.roughness = 0.4F;
-  for (const Material& thing : {test::matte({0.3F, 0.6F, 0.9F}), rough, polished, frosted}) {
+  Material sign = test::matte({0.9F, 0.8F, 0.1F});
+  sign.unlit = true;  // lights nothing
+  for (const Material& thing : {test::matte({0.3F, 0.6F, 0.9F}), rough, polished, frosted, sign}) {
     const Scene scene = terrace(thing);
     const RaySettings best{
         .max_depth = 24, .photons = 1000, .global_photons = true, .gather = true, .terminator_fix = false};
@@ -142,8 +144,41 @@ TEST(Hybrid, RaysGatherTheLightOfAnEvenSky) {
     const glm::dvec3 reference =
         mean_of(scene, view, {.max_depth = 25, .terminator_fix = false, .reference = true}, 512);
     const glm::dvec3 hybrid = mean_of(scene, view, best, 512);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.004) << "channel " << c;
+    // Frosted glass under a white sky has fireflies by paths.
+    const double tolerance = thing.transmission > 0.0F ? 0.01 : 0.002;
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, tolerance) << "channel " << c;
   }
+}
+
+/// No pass but gather runs: it follows mirrors too, and no light goes missing.
+TEST(Hybrid, RaysGatherWhatNoOtherPassFollows) {
+  Material polished = test::mirror(0.9F);
+  polished.roughness = 0.2F;
+  Scene scene = terrace(polished);
+  const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
+  const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 25, .terminator_fix = false, .reference = true}, 512);
+  for (const double cutoff : {0.1, 0.3}) {
+    const glm::dvec3 gathered = mean_of(
+        scene, view, {.passes = {"gather"}, .max_depth = 1, .glossy_cutoff = cutoff, .terminator_fix = false}, 512);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(gathered[c] / reference[c], 1.0, 0.002) << cutoff << " channel " << c;
+  }
+  // Where nothing scatters light it does not run, and lights find the sky.
+  scene.materials.assign(3, polished);
+  const glm::dvec3 lit =
+      mean_of(scene, view, {.passes = {"gather"}, .glossy_cutoff = 0.1, .terminator_fix = false}, 64);
+  EXPECT_GT(lit.g, 0.3);
+}
+
+/// Neither a backdrop nor the headlight are light to anything: as the passes have it.
+TEST(Hybrid, RaysGatherNothingFromABackdrop) {
+  Scene scene = terrace(test::matte({0.3F, 0.6F, 0.9F}));
+  scene.environment.reset();
+  scene.background = {5.0F, 5.0F, 5.0F};
+  const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
+  const RaySettings asked{.passes = {"gather"}, .terminator_fix = false};
+  const glm::dvec3 gathered = mean_of(scene, view, asked, 64);
+  const glm::dvec3 none = mean_of(scene, view, {.auto_passes = false, .terminator_fix = false}, 64);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(gathered[c] / none[c], 1.0, 1e-6) << "channel " << c;
 }
 
 /// Where nothing decides for rays, they may be asked for: they meet a lamp too, and ask it.

@@ -46,6 +46,11 @@ void share_out(double spent_ms, std::vector<double>& ms) {
   for (double& step : ms) step *= sum > 0.0 ? spent_ms / sum : 0.0;
 }
 
+bool runs_gather(const Requirements& scene, const RaySettings& settings) {
+  return std::ranges::any_of(plan_passes(scene, settings),
+                             [](const PassPlan& pass) { return pass.runs && pass.name == "gather"; });
+}
+
 // Where each step's time stands.
 constexpr std::size_t kSurfaceStep = 0;
 constexpr std::size_t kDirectStep = 1;
@@ -121,8 +126,7 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
       settings(std::move(chosen)),
       space(lit.bounds),
       surfaces(lit, space),
-      lights(lit,
-             !settings.reference && gathers_by_rays(requirements, settings) ? EvenSky::LeftToRays : EvenSky::Sampled),
+      lights(lit, runs_gather(requirements, settings) ? EvenSky::LeftToRays : EvenSky::Sampled),
       media(lit),
       travelling(others) {
   shared = shared_components(settings);
@@ -216,7 +220,7 @@ const PhotonMaps* Lighter::State::send_photons(const SampleNumber& number, Commu
 
 void Lighter::State::tell_of_cut_rays() {
   if (counts.cut == 0 || std::exchange(has_told, true)) return;
-  log::warning("{} rays of one sample passed {} surfaces that cover in part; what is behind is not all seen",
+  log::warning("{} rays of a sample or a few passed {} surfaces that cover in part; what is behind is not all seen",
                counts.cut, kMostPassed);
 }
 

@@ -95,7 +95,8 @@ struct PassTime {
 [[nodiscard]] std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings);
 
 /// Whether indirect light comes along rays (the pass `gather`) in place of photons: where that is asked for, and where
-/// settings prefer it, all indirect light is asked for and an even sky is all the light there is.
+/// settings prefer it and do not forbid photons, all indirect light is asked for and an even sky is all the light there
+/// is.
 [[nodiscard]] bool gathers_by_rays(const Requirements& scene, const RaySettings& settings);
 
 /// Parts of a pixel's colour; they sum to it.

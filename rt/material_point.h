@@ -26,10 +26,10 @@ struct MaterialPoint {
 };
 
 /// The material with its textures read at the surface's coordinates, vertex colours and normal map applied.
+[[nodiscard]] MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface);
+
 /// Asks the memory for the texels evaluate_material will read there.
 void prefetch_material(const Scene& scene, const SurfacePoint& surface);
-
-[[nodiscard]] MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface);
 
 /// MaterialPoint::normal alone: as the viewer at surface.to_viewer has it.
 [[nodiscard]] glm::dvec3 normal_to_shade_with(const Scene& scene, const SurfacePoint& surface);

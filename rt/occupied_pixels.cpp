@@ -68,16 +68,22 @@ std::optional<Rect> pixels_of(const View& view, const Shifts& shifts, const Pixe
   glm::dvec2 low(std::numeric_limits<double>::infinity());
   glm::dvec2 high(-std::numeric_limits<double>::infinity());
   const double nearest = view.orthographic ? 0.5 : 0.5 * view.near_distance;
+  unsigned int behind = 0;
+  bool reaches_behind = false;
   for (unsigned int corner = 0; corner < 8; ++corner) {
     const glm::dvec4 place((corner & 1U) != 0 ? box.high.x : box.low.x, (corner & 2U) != 0 ? box.high.y : box.low.y,
                            (corner & 4U) != 0 ? box.high.z : box.low.z, 1.0);
     const double w = glm::dot(map.w, place);
-    if (!(w - slack.w >= nearest)) return std::nullopt;
+    if (w + slack.w < nearest) ++behind;
+    reaches_behind = reaches_behind || !(w - slack.w >= nearest);
+    if (reaches_behind) continue;
     const glm::dvec2 pixel(glm::dot(map.x, place) / w, glm::dot(map.y, place) / w);
     const glm::dvec2 moved = (glm::dvec2(slack.x, slack.y) + glm::abs(pixel) * slack.w) / (w - slack.w);
     low = glm::min(low, pixel - moved);
     high = glm::max(high, pixel + moved);
   }
+  if (behind == 8) return Rect{};
+  if (reaches_behind) return std::nullopt;
   low += shifts.least;
   high += shifts.most;
   if (!std::isfinite(low.x + low.y + high.x + high.y)) return std::nullopt;
@@ -143,7 +149,8 @@ void OccupiedPixels::add(const Rect& pixels, const FrameLayout& layout, std::siz
   for (int y = pixels.y0 / kTileSide * kTileSide; y < pixels.y1; y += kTileSide) {
     for (int x = pixels.x0 / kTileSide * kTileSide; x < pixels.x1; x += kTileSide) {
       std::vector<Rect>& seen = seen_[layout.tile_at(screen, x, y) - first_tile_];
-      const Rect tile{x, y, x + kTileSide, y + kTileSide};
+      const Size size = layout.size(screen);
+      const Rect tile{x, y, std::min(x + kTileSide, size.width), std::min(y + kTileSide, size.height)};
       const Rect part = intersection(pixels, tile);
       if (part.empty()) continue;
       // Once all of a tile is seen, nothing more need be known of it.

@@ -36,8 +36,10 @@ struct PathPoint {
   double share = 1.0;                       ///< of the pixel that the first surface of the path covers
   std::uint32_t pixel = 0;                  ///< of TileWork's
   std::uint16_t depth = 0;                  ///< bounces from the eye
+  std::uint16_t followed = 0;               ///< of those, by lobes that passes follow one by one
   Component component = Component::Direct;  ///< where its light counts
   std::uint8_t borrows = 0;                 ///< a bit per component that comes from neighbours, see SharedLight
+  bool gathered = false;  ///< reached by rays that gather: what is to be looked at only lights nothing
 
   [[nodiscard]] bool borrows_light(Component which) const {
     return ((borrows >> static_cast<unsigned>(which)) & 1U) != 0;
@@ -77,9 +79,12 @@ struct TileWork {
   const RaySettings& settings;
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
   bool gathers = false;                              ///< whether one runs that follows all the others
-  const PhotonMaps* photons = nullptr;               ///< null when none were sent
-  const View* view = nullptr;                        ///< of the tile at hand, of whatever sample: the eye's place
-  Media eye_media = {};                              ///< what the eye of that view lies in
+
+  /// Whether a lobe is followed for itself, not by whoever follows the rest.
+  [[nodiscard]] bool follows_for_itself(const Bsdf& bsdf, Lobe lobe) const;
+  const PhotonMaps* photons = nullptr;  ///< null when none were sent
+  const View* view = nullptr;           ///< of the tile at hand, of whatever sample: the eye's place
+  Media eye_media = {};                 ///< what the eye of that view lies in
   bool wants_components = false;
   bool wants_cost = false;
 
@@ -173,7 +178,7 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
 
 /// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach. `component` is
-/// Photon for the pass that follows the rest: where sky it meets is light that sampling lights does not find, that
+/// Photon for the pass that follows the rest: where the sky it meets is light that sampling lights does not find, that
 /// counts as direct light, and what hides it as shadow.
 void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
                  std::vector<PathPoint>& next);

@@ -38,6 +38,10 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
   if (names_pass("gather") && names_pass("photon")) {
     throw Error(ExitCode::Usage, "the passes gather and photon bring the same light", "name one of them");
   }
+  if (names_pass("gather") && !settings.half_resolution.empty()) {
+    throw Error(ExitCode::Usage, "what the pass gather brings belongs to single pixels, and none of it can be shared",
+                "leave out --half-resolution, or name photon in place of gather");
+  }
   std::vector<PassPlan> plan;
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());

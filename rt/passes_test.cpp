@@ -87,6 +87,7 @@ TEST(Passes, RaysGatherIndirectLightWhereAnEvenSkyIsAllThereIs) {
   scene.environment = Environment{Image<Rgb>({8, 4}, {0.5F, 0.6F, 0.9F})};
   EXPECT_FALSE(runs(scene, best, "gather")) << "a picture may hold a sun";
   EXPECT_THROW((void)plan_passes(requirements_of(scene), {.passes = {"gather", "photon"}}), Error);
+  EXPECT_THROW((void)plan_passes(requirements_of(scene), {.passes = {"gather"}, .half_resolution = {"shadow"}}), Error);
 }
 
 TEST(Passes, SayWhy) {

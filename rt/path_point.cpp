@@ -21,6 +21,8 @@ double brightness(const glm::dvec3& color) {
 
 /// Paths that may go on for ever are ended by roulette from here on, by what is left of their throughput.
 constexpr int kRouletteDepth = 3;
+/// And at the latest here; what white rooms would have beyond is less than roulette leaves.
+constexpr int kMostGathered = 256;
 
 /// Where all lobes are followed: each from what the eye sees, and then one of them by chance, in proportion to the
 /// light it scatters.
@@ -28,8 +30,7 @@ void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
   std::array<double, kLobes.size()> bright{};
   double sum = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
-    const bool by_others = is_followed(point.bsdf, kLobes[i], tile.settings.glossy_cutoff);
-    if (by_others && !tile.followed_lobes[i]) continue;
+    if (tile.follows_for_itself(point.bsdf, kLobes[i]) && point.followed >= tile.settings.max_depth) continue;
     sum += bright[i] = brightness(point.throughput * point.bsdf.weight(kLobes[i]));
     point.may_follow[i] = bright[i] > 0.0;
   }
@@ -52,14 +53,19 @@ void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
 }
 
 /// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
-glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction) {
+glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction, bool gathered) {
   const PathPoint& from = *ray.from;
+  if (!tile.scene.environment && (gathered || from.gathered)) return glm::dvec3(0.0);  // a backdrop is no light
   const double light_pdf =
       ray.pdf > 0.0 ? tile.lights.environment_pdf_one(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
   return share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(direction);
 }
 
 }  // namespace
+
+bool TileWork::follows_for_itself(const Bsdf& bsdf, Lobe lobe) const {
+  return followed_lobes[static_cast<std::size_t>(lobe)] && is_followed(bsdf, lobe, settings.glossy_cutoff);
+}
 
 Component component_after(const PathPoint& point, Component first) {
   return point.depth == 0 ? first : point.component;
@@ -69,11 +75,11 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
   point.material = evaluate_material(tile.scene, point.surface);
   if (metres > 0.0) point.throughput *= left_at(point.media, point.surface, point.material, metres);
   point.bsdf = Bsdf(point.material, point.surface);
-  if (point.depth >= tile.settings.max_depth) return;
   if (tile.gathers) {
-    choose_among_all_lobes(tile, point);
+    if (point.depth < kMostGathered) choose_among_all_lobes(tile, point);
     return;
   }
+  if (point.depth >= tile.settings.max_depth) return;
   std::array<double, kLobes.size()> bright{};
   for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
     const auto i = static_cast<std::size_t>(lobe);
@@ -101,7 +107,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
   for (const PathPoint& point : wave.points) {
     const double factor = point.follows[static_cast<std::size_t>(lobe)];
     if (factor == 0.0) continue;
-    if (tile.gathers && is_followed(point.bsdf, lobe, tile.settings.glossy_cutoff) == gathers) continue;
+    if (tile.gathers && tile.follows_for_itself(point.bsdf, lobe) == gathers) continue;
     Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
     const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
     if (!sample) continue;
@@ -127,7 +133,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     const bool leaves = tile.hits[i] == kNoSurface;
     const bool shows_sky = gathers && from.depth == 0;
     if (leaves || (shows_sky && tile.wants_components)) {
-      const glm::dvec3 sky = sky_along(tile, ray, request.direction);
+      const glm::dvec3 sky = sky_along(tile, ray, request.direction, gathers);
       if (leaves) {
         tile.add(from.pixel, shows_sky ? Component::Direct : part, sky);
         continue;
@@ -146,6 +152,8 @@ void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component componen
     reached.sampler = ray.sampler;
     reached.pixel = from.pixel;
     reached.depth = static_cast<std::uint16_t>(from.depth + 1);
+    reached.followed = static_cast<std::uint16_t>(from.followed + (gathers ? 0 : 1));
+    reached.gathered = from.gathered || gathers;
     reached.component = part;
     prefetch_material(tile.scene, reached.surface);
   }

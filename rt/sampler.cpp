@@ -91,6 +91,8 @@ glm::dvec2 scrambled(std::uint32_t reversed_x, std::uint32_t reversed_y, std::ui
           scrambled(reversed_y, static_cast<std::uint32_t>(mixed(key)))};
 }
 
+constexpr std::uint64_t kPixelOrder = 0x5851F42DU;
+
 }  // namespace
 
 // Sobol's first dimension is the index with its bits reversed.
@@ -105,12 +107,16 @@ glm::dvec2 Sampler::two() {
   return scrambled(place, sobol_second_reversed(place), key);
 }
 
+// One order for both pairs, so that they belong together; none in which every other sample lies in the same half of the
+// pixel, as whoever compares even samples with odd ones would take that for noise.
 glm::dvec2 Sampler::two_of_pixel() {
-  return scrambled(index_, sobol_second_reversed(index_), next_key());
+  const std::uint32_t place = shuffled(index_, kPixelOrder);
+  return scrambled(place, sobol_second_reversed(place), next_key());
 }
 
 glm::dvec2 Sampler::two_with_pixel() {
-  return scrambled(sobol_reversed(kThird, index_), sobol_reversed(kFourth, index_), next_key());
+  const std::uint32_t place = shuffled(index_, kPixelOrder);
+  return scrambled(sobol_reversed(kThird, place), sobol_reversed(kFourth, place), next_key());
 }
 
 std::uint64_t Sampler::next_key() {

@@ -61,6 +61,18 @@ TEST(Sampler, PairsOfThePixelAreStratifiedInAllElementaryIntervals) {
   }
 }
 
+TEST(Sampler, EvenAndOddSamplesLookThroughAllOfThePixel) {
+  for (const std::uint32_t samples : {32U, 256U}) {
+    for (const bool odd : {false, true}) {
+      glm::dvec2 sum(0.0);
+      for (std::uint32_t i = odd ? 1 : 0; i < samples; i += 2) sum += Sampler(3, i).two_of_pixel();
+      const glm::dvec2 mean = sum / (0.5 * samples);
+      EXPECT_NEAR(mean.x, 0.5, 1.0 / std::sqrt(samples)) << samples;
+      EXPECT_NEAR(mean.y, 0.5, 1.0 / std::sqrt(samples)) << samples;
+    }
+  }
+}
+
 /// The squared error of what 256 samples make of a disc's area, which moves with the place in the pixel.
 double moving_disc_error(bool together) {
   constexpr double kRadius = 0.4;

@@ -3,7 +3,7 @@
 
 usage: bit_equality_test.py HPR [--full]
 
-Renders gen:gallery, its visible surfaces found by OpenGL, by rays, and with every pass and four samples, and compares the hashes of the visibility
+Renders gen:gallery, its visible surfaces found by OpenGL, by rays, with indirect light along rays, and with every pass and four samples, and compares the hashes of the visibility
 keys (--raw) and of the EXR file's bytes. Without --full, so few small pictures that every two values of different options
 meet in one of them, and the first once more; with it, every combination at 1280x1024. Prints the hashes, the number of
 runs and what differs, and leaves with 1 if anything does.
@@ -26,6 +26,7 @@ FEW = ["--photons", "5000"]
 WAYS = {
     "raster": FEW,
     "rays": ["--primary", "rays", *FEW],
+    "gathered": ["--passes", "shadow,reflection,refraction,gather", "--spp", "3"],
     "all passes": ["--passes", "shadow,reflection,refraction,ambient-occlusion,photon", "--spp", "4", *FEW],
 }
 

@@ -66,11 +66,11 @@ def gltf_spot(numpy, mitsuba, spot, light):
                    "texture": {"type": "bitmap", "bitmap": mitsuba.Bitmap(image), "raw": True, "wrap_mode": "clamp"}}
 
 
-def to_mitsuba(gltf2mi, mitsuba, numpy, name, path, folder, size):
+def to_mitsuba(gltf2mi, mitsuba, numpy, name, path, folder, size, sampler="independent"):
     """The scene as Mitsuba takes it, and the converter's notes."""
     options = argparse.Namespace(
         input=str(path), out=str(folder / f"{name}-mitsuba"), variant="llvm_ad_rgb", brdf="gltf", integrator="path",
-        depth=DEPTH, spp=16, size=[size, size], camera=0, view=[0.6, 0.45, 1.0], sampler="independent",
+        depth=DEPTH, spp=16, size=[size, size], camera=0, view=[0.6, 0.45, 1.0], sampler=sampler,
         ambient=SCENES[name][1] or 0, env=None, light_scale=1, emissive_scale=1, add_floor=False, add_sun=0,
         twosided=True,  # HPR shows and lights both sides of every surface
         thin=False, hide_emitters=False)

@@ -6,8 +6,11 @@ usage: samples_test.py HPR
 Prints what differs and leaves with 1.
 """
 
+import base64
+import itertools
 import json
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
@@ -19,8 +22,8 @@ MATTE = "gen:cornell"
 
 
 def hpr(folder, *arguments):
-    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    expect(result.returncode == 0, f"hpr {' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
+    result = subprocess.run([HPR, *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    expect(result.returncode == 0, f"hpr {' '.join(map(str, arguments))} left with {result.returncode}: {result.stderr[-1000:]}")
     return result
 
 
@@ -42,6 +45,66 @@ def spread_differently(folder):
             ("--ranks", "7", "--distribute", "hybrid", "--strategy", "tree")]
     for way in ways:
         expect(render(folder, "--spp", "4", "--filter", "gaussian", *way) == expected, f"other bits with {' '.join(way)}")
+
+
+def write_boxes(path, boxes):
+    """A glTF of boxes: (low corner, high corner, material)."""
+    data, nodes, meshes, views, accessors, materials = b"", [], [], [], [], []
+    for low, high, material in boxes:
+        corners = [[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)]
+        faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+        points = [corners[corner] for face in faces for corner in face]
+        indices = [4 * face + corner for face in range(6) for corner in (0, 1, 2, 0, 2, 3)]
+        for packed in (struct.pack(f"<{3 * len(points)}f", *itertools.chain(*points)), struct.pack("<36H", *indices)):
+            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(packed)})
+            data += packed
+        number = len(accessors)
+        accessors.append({"bufferView": number, "componentType": 5126, "count": 24, "type": "VEC3", "min": low, "max": high})
+        accessors.append({"bufferView": number + 1, "componentType": 5123, "count": 36, "type": "SCALAR"})
+        meshes.append({"primitives": [{"attributes": {"POSITION": number}, "indices": number + 1, "material": len(materials)}]})
+        nodes.append({"mesh": len(nodes)})
+        materials.append(material)
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    path.write_text(json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(len(nodes)))}], "nodes": nodes, "meshes": meshes,
+        "materials": materials, "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": len(data), "uri": uri}]}))
+
+
+def material(color, metallic=0.0, roughness=1.0, **more):
+    return {"doubleSided": True,
+            "pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": metallic, "roughnessFactor": roughness}} | more
+
+
+def rounds(folder):
+    """Under an even sky, in the open, rays gather indirect light, and samples are drawn together: the bits are those of one by
+    one, as layers ask for. Indoors photons bring it."""
+    white = material([0.8, 0.8, 0.8, 1.0])
+    write_boxes(folder / "open.gltf", [
+        ([-2, -0.2, -2], [2, 0, 2], white), ([-0.9, 0, -0.5], [-0.2, 0.9, 0.2], material([0.7, 0.2, 0.1, 1.0])),
+        ([0.2, 0, -0.5], [0.8, 0.6, 0.1], material([0.9, 0.9, 0.9, 1.0], 1.0, 0.2)),
+        ([-0.3, 0, 0.4], [0.4, 0.5, 0.7], material([0.1, 0.4, 0.8, 0.5], alphaMode="BLEND"))])
+    write_boxes(folder / "room.gltf", [([-2, -2, -2], [2, 2, 2], white), ([-0.5, -2, -0.5], [0.5, -1, 0.5], white)])
+    look = ("--at", "0,0.2,0", "--environment", "0.5,0.6,0.7", "--quality", "best", "--primary", "rays")
+    sky = (*look, "--eye", "0.3,1.2,1.9", "--spp", "13")
+    scene = folder / "open.gltf"
+    hpr(folder, "render", scene, "--size", "168x104", "-o", "b.exr", "--force", "--aov", "direct,shadow,reflection,photon", *sky)
+    layers = exr.read(folder / "b.exr")[2]
+    ways = [(), ("--threads", "1"), ("--ranks", "3"), ("--ranks", "2", "--data", "partitioned")]
+    pictures = {render(folder, *sky, *way, scene=scene) for way in ways}
+    expect(len(pictures) == 1, "rounds, threads, ranks or parts of the scene change bits")
+    rays = json.loads((folder / "a.json").read_text())["rays"]
+    expect(rays["gather"] > 0 and rays["photon"] == 0 and rays["shadow"] == 0, f"an even sky was not gathered: {rays}")
+    image = exr.read(folder / "a.exr")[2]
+    expect(all(list(image[c]) == list(layers[c]) for c in "RGB"), "samples together are not those one by one")
+    for channel in "RGB":
+        parts = [layers[f"{part}.{channel}"] for part in ("direct", "shadow", "reflection", "photon")]
+        wrong = max(abs(sum(values) - total) for *values, total in zip(*parts, layers[channel]))
+        expect(wrong < 1e-5, f"layers do not sum to the colour: {wrong}")
+    for scene, eye, by in (("open.gltf", "0.3,1.2,1.9", "rays"), ("room.gltf", "1.5,1,1.5", "photons")):
+        result = hpr(folder, "render", scene, "-o", "c.exr", "--force", "--size", "40x30", "--spp", "1", "--photons", "1000", *look,
+                     "--eye", eye, "--explain")
+        expect(f"indirect light: by {by} (" in result.stdout + result.stderr, f"{scene}: not by {by}: {result.stderr[-800:]}")
 
 
 def one_sample(folder):
@@ -100,6 +163,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="hpr-samples-") as scratch:
         folder = pathlib.Path(scratch)
         one_sample(folder)
+        rounds(folder)
         spread_differently(folder)
         convergence(folder)
         until_a_time(folder)
