@@ -1,9 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
-#include <vector>
 
+#include "rt/hybrid_test_tools.h"
 #include "rt/lighter.h"
 #include "rt/test_scene.h"
 
@@ -13,57 +12,10 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
+using test::mean_of;
 using test::place;
 using test::quad;
-
-/// A closed room of coloured walls under a lamp, with something in the middle.
-Scene room(const Material& thing, bool is_sheet) {
-  Scene scene;
-  const std::uint32_t white = add_material(scene, test::matte(glm::vec3(0.7F)));
-  const std::uint32_t red = add_material(scene, test::matte({0.6F, 0.1F, 0.1F}));
-  const std::uint32_t green = add_material(scene, test::matte({0.1F, 0.5F, 0.1F}));
-  Material glow = test::matte(glm::vec3(0.7F));
-  glow.emissive = glm::vec3(12.0F, 10.0F, 8.0F);
-  const std::uint32_t lamp = add_material(scene, glow);
-  const std::uint32_t special = add_material(scene, thing);
-  const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b, std::uint32_t material) {
-    place(scene, add_mesh(scene, quad(corner, a, b, material)));
-  };
-  side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white);
-  side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0}, white);
-  side({-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, red);
-  side({1, -1, -1}, {0, 0, 2}, {0, 2, 0}, green);
-  side({-1, -1, -1}, {0, 0, 2}, {2, 0, 0}, white);
-  side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, white);
-  side({-0.4F, 0.98F, -0.4F}, {0.8F, 0, 0}, {0, 0, 0.8F}, lamp);
-  if (is_sheet) {
-    side({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, special);
-  } else {
-    place(scene, add_mesh(scene, test::sphere(0.45, 64, special)),
-          glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
-  }
-  finish_scene(scene);
-  return scene;
-}
-
-/// Keys are those of `covering`, what of the scene covers all behind it; null: all of it.
-glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples,
-                   const Scene* covering = nullptr) {
-  const TileLayer<Key> keys = test::cast_keys(covering != nullptr ? *covering : scene, std::span(&view, 1));
-  Lighter lighter(scene, settings);
-  glm::dvec3 sum(0.0);
-  for (std::uint32_t sample = 0; sample < samples; ++sample) {
-    TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
-    for (int y = 0; y < 16; ++y) {
-      for (int x = 0; x < 16; ++x) {
-        const Rgb& color = radiance.at(0, x, y);
-        sum += glm::dvec3(color.r, color.g, color.b);
-      }
-    }
-  }
-  return sum / (256.0 * samples);
-}
+using test::room;
 
 void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool terminator_fix = false,
                            const Scene* covering = nullptr) {
@@ -108,88 +60,6 @@ TEST(Hybrid, AFloorWhoseNormalsLeanFromIt) {
   spot.inner_cone_radians = 0.1F;
   spot.outer_cone_radians = 0.18F;
   expect_the_same_light(scene);
-}
-
-/// A floor, a wall and a ball in the open, under a sky that is all the light there is.
-Scene terrace(const Material& thing) {
-  Scene scene;
-  const std::uint32_t white = add_material(scene, test::matte(glm::vec3(0.8F)));
-  const std::uint32_t red = add_material(scene, test::matte({0.7F, 0.2F, 0.1F}));
-  const std::uint32_t special = add_material(scene, thing);
-  place(scene, add_mesh(scene, quad({-1, -1, 1}, {2, 0, 0}, {0, 0, -2}, white)));
-  place(scene, add_mesh(scene, quad({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, red)));
-  place(scene, add_mesh(scene, test::sphere(0.45, 64, special)),
-        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
-  scene.environment = test::even_light({1.0F, 0.9F, 0.7F});
-  finish_scene(scene);
-  return scene;
-}
-
-TEST(Hybrid, RaysGatherTheLightOfAnEvenSky) {
-  Material rough = test::mirror(0.9F);
-  rough.roughness = 0.7F;
-  Material polished = test::mirror(0.9F);
-  polished.roughness = 0.2F;
-  Material frosted = test::clear_glass(1.5F, 0.0F);
-  frosted.roughness = 0.4F;
-  Material sign = test::matte({0.9F, 0.8F, 0.1F});
-  sign.unlit = true;  // lights nothing
-  for (const Material& thing : {test::matte({0.3F, 0.6F, 0.9F}), rough, polished, frosted, sign}) {
-    const Scene scene = terrace(thing);
-    const RaySettings best{
-        .max_depth = 24, .photons = 1000, .global_photons = true, .gather = true, .terminator_fix = false};
-    const std::vector<PassPlan> plan = plan_passes(requirements_of(scene), best);
-    ASSERT_TRUE(std::ranges::any_of(plan, [](const PassPlan& pass) { return pass.runs && pass.name == "gather"; }));
-    const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
-    const glm::dvec3 reference =
-        mean_of(scene, view, {.max_depth = 25, .terminator_fix = false, .reference = true}, 512);
-    const glm::dvec3 hybrid = mean_of(scene, view, best, 512);
-    // Frosted glass under a white sky has fireflies by paths.
-    const double tolerance = thing.transmission > 0.0F ? 0.01 : 0.002;
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, tolerance) << "channel " << c;
-  }
-}
-
-/// No pass but gather runs: it follows mirrors too, and no light goes missing.
-TEST(Hybrid, RaysGatherWhatNoOtherPassFollows) {
-  Material polished = test::mirror(0.9F);
-  polished.roughness = 0.2F;
-  Scene scene = terrace(polished);
-  const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
-  const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 25, .terminator_fix = false, .reference = true}, 512);
-  for (const double cutoff : {0.1, 0.3}) {
-    const glm::dvec3 gathered = mean_of(
-        scene, view, {.passes = {"gather"}, .max_depth = 1, .glossy_cutoff = cutoff, .terminator_fix = false}, 512);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(gathered[c] / reference[c], 1.0, 0.002) << cutoff << " channel " << c;
-  }
-  // Where nothing scatters light it does not run, and lights find the sky.
-  scene.materials.assign(3, polished);
-  const glm::dvec3 lit =
-      mean_of(scene, view, {.passes = {"gather"}, .glossy_cutoff = 0.1, .terminator_fix = false}, 64);
-  EXPECT_GT(lit.g, 0.3);
-}
-
-/// Neither a backdrop nor the headlight are light to anything: as the passes have it.
-TEST(Hybrid, RaysGatherNothingFromABackdrop) {
-  Scene scene = terrace(test::matte({0.3F, 0.6F, 0.9F}));
-  scene.environment.reset();
-  scene.background = {5.0F, 5.0F, 5.0F};
-  const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
-  const RaySettings asked{.passes = {"gather"}, .terminator_fix = false};
-  const glm::dvec3 gathered = mean_of(scene, view, asked, 64);
-  const glm::dvec3 none = mean_of(scene, view, {.auto_passes = false, .terminator_fix = false}, 64);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(gathered[c] / none[c], 1.0, 1e-6) << "channel " << c;
-}
-
-/// Where nothing decides for rays, they may be asked for: they meet a lamp too, and ask it.
-TEST(Hybrid, RaysGatherTheLightOfALamp) {
-  const Scene scene = room(test::matte({0.3F, 0.4F, 0.6F}), false);
-  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
-  const glm::dvec3 reference =
-      mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 1500);
-  const glm::dvec3 hybrid = mean_of(
-      scene, view, {.passes = {"shadow", "reflection", "gather"}, .max_depth = 64, .terminator_fix = false}, 1500);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.015) << "channel " << c;
 }
 
 TEST(Hybrid, AMirrorBall) {

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <mutex>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -18,6 +16,7 @@
 #include "rt/direct_light.h"
 #include "rt/first_points.h"
 #include "rt/half_resolution.h"
+#include "rt/light_scratch.h"
 #include "rt/pass.h"
 #include "rt/path_tracer.h"
 #include "rt/photon_maps.h"
@@ -25,26 +24,6 @@
 
 namespace hpr {
 namespace {
-
-/// Points that are worked on together: enough to fill packets, few enough for the second-level cache.
-constexpr std::size_t kWavePoints = 512;
-constexpr int kRowsAtOnce = static_cast<int>(kWavePoints) / kTileSide;
-
-/// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
-struct Scratch {
-  Scratch(TileWork tile_work, std::size_t times) : work(std::move(tile_work)), ms(times, 0.0) {}
-  TileWork work;
-  SharedLight shared;
-  std::vector<std::vector<PathPoint>> waiting;  ///< by depth
-  Wave wave;
-  std::vector<double> ms;
-};
-
-/// While rays travel, more threads wait for theirs than there are: of the time that was spent, each step has its share.
-void share_out(double spent_ms, std::vector<double>& ms) {
-  const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
-  for (double& step : ms) step *= sum > 0.0 ? spent_ms / sum : 0.0;
-}
 
 bool runs_gather(const Requirements& scene, const RaySettings& settings) {
   return std::ranges::any_of(plan_passes(scene, settings),
@@ -57,21 +36,6 @@ constexpr std::size_t kDirectStep = 1;
 constexpr std::size_t kFirstPassStep = 2;
 
 }  // namespace
-
-RayCounts& RayCounts::operator+=(const RayCounts& other) {
-  primary += other.primary;
-  shadow += other.shadow;
-  reflection += other.reflection;
-  refraction += other.refraction;
-  gather += other.gather;
-  ambient_occlusion += other.ambient_occlusion;
-  photon += other.photon;
-  invalid += other.invalid;
-  cut += other.cut;
-  not_finite += other.not_finite;
-  first_not_finite = std::min(first_not_finite, other.first_not_finite);
-  return *this;
-}
 
 struct Lighter::State {
   const Scene& scene;

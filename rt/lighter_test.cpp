@@ -214,54 +214,6 @@ TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
   }
 }
 
-TEST(Lighter, SamplesTogetherAreThoseOneByOne) {
-  Scene scene = busy_scene(false);
-  scene.environment = test::even_light({0.5F, 0.6F, 0.7F});
-  scene.materials.front().alpha_mode = AlphaMode::Blend;
-  scene.materials.front().base_color.a = 0.5F;
-  std::vector<std::vector<View>> looks;
-  std::vector<TileLayer<Key>> keys;
-  for (int i = 0; i < 5; ++i) {
-    View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {150, 130}, scene, 0.7);
-    view.jitter = {0.1 * i, -0.2 * i};
-    looks.push_back({view, view});
-    keys.push_back(test::cast_keys(scene, looks.back()));
-  }
-  const FrameLayout& layout = keys.front().layout();
-  const std::vector<std::size_t> tiles = all_tiles(layout);
-  Lighter lighter(scene, {.threads = 2});
-  std::vector<TileLayer<Rgb>> together;
-  std::vector<TileLayer<Rgb>> normals;
-  std::vector<TileLayer<float>> costs;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    together.emplace_back(layout);
-    normals.emplace_back(layout);
-    costs.emplace_back(layout);
-  }
-  std::vector<LitSample> samples;
-  for (std::uint32_t i = 0; i < looks.size(); ++i) {
-    samples.push_back(
-        {looks[i], &keys[i], {.radiance = &together[i], .normal = &normals[i], .cost = &costs[i]}, {7, i}});
-  }
-  ASSERT_FALSE(lighter.lights_one_by_one());
-  lighter.light(samples, tiles);
-  const RayCounts counts = lighter.counts();
-  RayCounts summed;
-  for (std::uint32_t i = 0; i < looks.size(); ++i) {
-    TileLayer<Rgb> alone(layout);
-    TileLayer<Rgb> normal(layout);
-    TileLayer<float> cost(layout);
-    lighter.light(looks[i], keys[i], tiles, {.radiance = &alone, .normal = &normal, .cost = &cost}, {7, i});
-    summed += lighter.counts();
-    for (const std::size_t tile : tiles) {
-      EXPECT_TRUE(std::ranges::equal(alone.tile(tile), together[i].tile(tile))) << i << ' ' << tile;
-      EXPECT_TRUE(std::ranges::equal(normal.tile(tile), normals[i].tile(tile))) << i << ' ' << tile;
-      EXPECT_TRUE(std::ranges::equal(cost.tile(tile), costs[i].tile(tile))) << i << ' ' << tile;
-    }
-  }
-  EXPECT_EQ(summed, counts);
-}
-
 TEST(Lighter, APixelDoesNotDependOnItsNeighbours) {
   const Scene scene = busy_scene(false);
   const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {64, 64}, scene, 0.7);

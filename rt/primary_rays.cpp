@@ -15,6 +15,7 @@
 #include "rt/denormals.h"
 #include "rt/embree_compat.h"
 #include "rt/occupied_pixels.h"
+#include "rt/on_triangle.h"
 
 namespace hpr {
 namespace {
@@ -63,15 +64,6 @@ double largest_depth_step(const View& view, const RaySpace& space) {
   constexpr double kHalfUlp = 0x1p-24;  // of depths up to 1
   if (view.orthographic) return kHalfUlp * (view.far_distance - view.near_distance) * space.scale;
   return 2.0 * kHalfUlp * (glm::length(space.from_world(view.eye)) + kAround);
-}
-
-/// Barycentric coordinates moved onto the triangle; its middle where they are undefined.
-glm::dvec2 onto_triangle(double u, double v) {
-  if (!std::isfinite(u) || !std::isfinite(v)) return glm::dvec2(1.0 / 3.0);
-  u = std::max(u, 0.0);
-  v = std::max(v, 0.0);
-  const double sum = std::max(u + v, 1.0);
-  return {u / sum, v / sum};
 }
 
 const glm::uvec3& corners_of(const Search& search, std::size_t lane) {

@@ -7,6 +7,7 @@
 
 #include "core/check.h"
 #include "rt/mesh_parts.h"
+#include "rt/on_triangle.h"
 #include "rt/ray_scene.h"
 #include "rt/texture.h"
 
@@ -56,19 +57,6 @@ double row_sum_norm(const glm::dmat3& m) {
   for (int row = 0; row < 3; ++row)
     norm = std::max(norm, std::abs(m[0][row]) + std::abs(m[1][row]) + std::abs(m[2][row]));
   return norm;
-}
-
-/// Moves barycentric coordinates onto the triangle; the middle where they are undefined (a triangle seen edge-on).
-glm::dvec2 onto_triangle(double u, double v) {
-  if (!std::isfinite(u) || !std::isfinite(v)) return glm::dvec2(1.0 / 3.0);
-  u = std::max(u, 0.0);
-  v = std::max(v, 0.0);
-  const double sum = u + v;
-  if (sum > 1.0) {
-    u /= sum;
-    v /= sum;
-  }
-  return {u, v};
 }
 
 }  // namespace

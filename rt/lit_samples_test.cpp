@@ -1,0 +1,66 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "rt/hybrid_test_tools.h"
+#include "rt/lighter.h"
+#include "rt/test_scene.h"
+
+namespace hpr {
+namespace {
+
+TEST(LitSamples, TogetherAreThoseOneByOne) {
+  Scene scene = test::room(test::mirror(0.7F), true);
+  scene.materials.back().alpha_mode = AlphaMode::Blend;
+  scene.materials.back().base_color.a = 0.5F;
+  scene.materials.front().roughness = 0.2F;
+  Light& light = scene.lights.emplace_back();
+  light.position = {0.3, 0.5, 0.2};
+  light.intensity = glm::vec3(2.0F);
+  std::vector<std::vector<View>> looks;
+  std::vector<TileLayer<Key>> keys;
+  for (int i = 0; i < 5; ++i) {
+    View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {150, 130}, scene, 1.3);
+    view.jitter = {0.1 * i, -0.2 * i};
+    looks.push_back({view, view});
+    keys.push_back(test::cast_keys(scene, looks.back()));
+  }
+  const FrameLayout& layout = keys.front().layout();
+  const std::vector<std::size_t> tiles = all_tiles(layout);
+  Lighter lighter(scene, {.threads = 2});
+  std::vector<TileLayer<Rgb>> together;
+  std::vector<TileLayer<Rgb>> normals;
+  std::vector<TileLayer<float>> costs;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    together.emplace_back(layout);
+    normals.emplace_back(layout);
+    costs.emplace_back(layout);
+  }
+  std::vector<LitSample> samples;
+  for (std::uint32_t i = 0; i < looks.size(); ++i) {
+    samples.push_back(
+        {looks[i], &keys[i], {.radiance = &together[i], .normal = &normals[i], .cost = &costs[i]}, {7, i}});
+  }
+  ASSERT_FALSE(lighter.lights_one_by_one());
+  lighter.light(samples, tiles);
+  const RayCounts counts = lighter.counts();
+  RayCounts summed;
+  for (std::uint32_t i = 0; i < looks.size(); ++i) {
+    TileLayer<Rgb> alone(layout);
+    TileLayer<Rgb> normal(layout);
+    TileLayer<float> cost(layout);
+    lighter.light(looks[i], keys[i], tiles, {.radiance = &alone, .normal = &normal, .cost = &cost}, {7, i});
+    summed += lighter.counts();
+    for (const std::size_t tile : tiles) {
+      EXPECT_TRUE(std::ranges::equal(alone.tile(tile), together[i].tile(tile))) << i << ' ' << tile;
+      EXPECT_TRUE(std::ranges::equal(normal.tile(tile), normals[i].tile(tile))) << i << ' ' << tile;
+      EXPECT_TRUE(std::ranges::equal(cost.tile(tile), costs[i].tile(tile))) << i << ' ' << tile;
+    }
+  }
+  EXPECT_EQ(summed, counts);
+}
+
+}  // namespace
+}  // namespace hpr
