@@ -151,7 +151,7 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
   constexpr double kSeconds = 2.0;
   constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
   const std::uint32_t done = so_far_.samples;
-  double most = static_cast<double>(most_in_round(session_, plan_));
+  auto most = static_cast<double>(most_in_round(session_, plan_));
   if (sampling_.goal.samples) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
   if (done > 0) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
@@ -170,6 +170,15 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
   return last;
 }
 
+void FrameSampler::add_samples(std::span<const View> views, bool hurried) {
+  const std::uint32_t count = size_of_round(hurried);
+  if (count > 1) {
+    add_round(views, count);
+  } else {
+    add_sample(views);
+  }
+}
+
 bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
   if (!sampling_.sums()) {
     frame_ = make_frame(session_, plan_, views, &times_, {{number_, 0}, nullptr});
@@ -181,11 +190,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   const Stopwatch watch;
   std::optional<Stopwatch> written;
   while (!reached(sampling_, so_far_)) {
-    if (const std::uint32_t count = size_of_round(!checkpoint.path.empty()); count > 1) {
-      add_round(views, count);
-    } else {
-      add_sample(views);
-    }
+    add_samples(views, !checkpoint.path.empty());
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.

@@ -24,8 +24,10 @@ std::vector<Ray> looks_of(std::span<const View> views) {
   std::vector<Ray> looks;
   for (const View& view : views) {
     for (int i = 0; i < side * side; ++i) {
-      const double x = (i % side + 0.5) * view.size().width / side;
-      const double y = (i / side + 0.5) * view.size().height / side;
+      const int column = i % side;
+      const int row = i / side;
+      const double x = (column + 0.5) * view.size().width / side;
+      const double y = (row + 0.5) * view.size().height / side;
       Ray ray = view_ray(view, x, y);
       ray.origin += ray.direction * view.near_distance;
       ray.direction = glm::normalize(ray.direction);

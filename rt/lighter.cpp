@@ -30,6 +30,14 @@ bool runs_gather(const Requirements& scene, const RaySettings& settings) {
                              [](const PassPlan& pass) { return pass.runs && pass.name == "gather"; });
 }
 
+void check_sizes(std::span<const LitSample> samples) {
+  const FrameLayout& layout = samples.front().keys->layout();
+  for (const LitSample& sample : samples) {
+    HPR_CHECK(sample.keys->layout() == layout && sample.views.size() == layout.screens());
+    for (std::size_t i = 0; i < sample.views.size(); ++i) HPR_CHECK(sample.views[i].size() == layout.size(i));
+  }
+}
+
 // Where each step's time stands.
 constexpr std::size_t kSurfaceStep = 0;
 constexpr std::size_t kDirectStep = 1;
@@ -78,8 +86,10 @@ struct Lighter::State {
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   void tell_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
+  void clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples) const;
   void light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                   std::span<const LitSample> samples) const;
+  void tell(double spent_ms);
   void light_waiting(Scratch& scratch) const;
   void light_wave(Scratch& scratch) const;
 };
@@ -252,29 +262,33 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
   }
 }
 
+/// Clears what a tile's samples are summed in.
+void Lighter::State::clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples) const {
+  const LightOutput& wanted = samples.front().output;  // all want the same
+  tile.wants_components =
+      shared != 0 || std::ranges::any_of(wanted.components, [](const auto* layer) { return layer != nullptr; });
+  tile.wants_cost = wanted.cost != nullptr;
+  const std::size_t pixels = samples.size() * kTilePixels;
+  tile.radiance.assign(pixels, glm::dvec3(0.0));
+  if (tile.wants_components) {
+    for (auto& part : tile.components) part.assign(pixels, glm::dvec3(0.0));
+  }
+  if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
+  for (const LitSample& sample : samples) {
+    for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
+      if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
+    }
+  }
+}
+
 /// Some rows of one sample after those of another: what one sample has looked up the next one finds at hand.
 void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                                 std::span<const LitSample> samples) const {
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
   TileWork& tile = scratch.work;
-  const LightOutput& wanted = samples.front().output;  // all want the same
-  tile.wants_components =
-      shared != 0 || std::ranges::any_of(wanted.components, [](const auto* layer) { return layer != nullptr; });
-  tile.wants_cost = wanted.cost != nullptr;
-  const std::size_t pixels = jobs.size() * kTilePixels;
-  tile.radiance.assign(pixels, glm::dvec3(0.0));
-  if (tile.wants_components) {
-    for (auto& part : tile.components) part.assign(pixels, glm::dvec3(0.0));
-  }
-  if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
+  clear(tile, index, samples);
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
-
-  for (const LitSample& sample : samples) {
-    for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
-      if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
-    }
-  }
   if (shared != 0) scratch.shared.start(shared, tile, jobs.front());
   const int height = jobs.front().place.height();
   for (int row = 0; row < height; row += kRowsAtOnce) {
@@ -289,6 +303,32 @@ void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs,
   }
   if (shared != 0) scratch.shared.spread(tile);
   for (std::size_t i = 0; i < jobs.size(); ++i) store(tile, jobs[i], index, samples[i].output);
+}
+
+/// Counts and times of what was lit, gathered from the threads' memory.
+void Lighter::State::tell(double spent_ms) {
+  counts = {};
+  std::vector<double> ms(kFirstPassStep + passes.size(), 0.0);
+  for (const auto& scratch : idle) {
+    counts += std::exchange(scratch->work.counts, {});
+    counts.cut += std::exchange(scratch->work.scratch.cut, 0);
+    for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
+  }
+  if (travelling != nullptr) share_out(spent_ms, ms);
+  if (photons) {
+    const PhotonCounts sent = photons->take_counts();
+    counts.photon = sent.rays;
+    counts.invalid += sent.invalid;
+    counts.cut += sent.cut;
+  }
+  tell_of_cut_rays();
+  times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
+  for (std::size_t i = 0; i < passes.size(); ++i) {
+    double& spent = ms[kFirstPassStep + i];
+    // Threads send together what they gather one by one: times are summed over threads.
+    if (passes[i]->gathers_photons()) spent += std::exchange(photon_ms, 0.0) * settings.threads;
+    times.push_back({std::string(passes[i]->name()), spent});
+  }
 }
 
 Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays,
@@ -317,12 +357,9 @@ void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std
 
 void Lighter::light(std::span<const LitSample> samples, std::span<const std::size_t> tiles) {
   HPR_CHECK(samples.size() == 1 || (!samples.empty() && !lights_one_by_one()));
+  check_sizes(samples);
   const LitSample& first = samples.front();
   const FrameLayout& layout = first.keys->layout();
-  for (const LitSample& sample : samples) {
-    HPR_CHECK(sample.keys->layout() == layout && sample.views.size() == layout.screens());
-    for (std::size_t i = 0; i < sample.views.size(); ++i) HPR_CHECK(sample.views[i].size() == layout.size(i));
-  }
 
   State& state = *state_;
   if (state.reference) {
@@ -350,30 +387,7 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });
-  const double spent_ms = watch.ms() * state.settings.threads;
-
-  state.counts = {};
-  std::vector<double> ms(kFirstPassStep + state.passes.size(), 0.0);
-  for (const auto& scratch : state.idle) {
-    state.counts += std::exchange(scratch->work.counts, {});
-    state.counts.cut += std::exchange(scratch->work.scratch.cut, 0);
-    for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
-  }
-  if (state.travelling != nullptr) share_out(spent_ms, ms);
-  if (state.photons) {
-    const PhotonCounts sent = state.photons->take_counts();
-    state.counts.photon = sent.rays;
-    state.counts.invalid += sent.invalid;
-    state.counts.cut += sent.cut;
-  }
-  state.tell_of_cut_rays();
-  state.times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
-  for (std::size_t i = 0; i < state.passes.size(); ++i) {
-    double& spent = ms[kFirstPassStep + i];
-    // Threads send together what they gather one by one: times are summed over threads.
-    if (state.passes[i]->gathers_photons()) spent += std::exchange(state.photon_ms, 0.0) * state.settings.threads;
-    state.times.push_back({std::string(state.passes[i]->name()), spent});
-  }
+  state.tell(watch.ms() * state.settings.threads);
 }
 
 void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
@@ -383,5 +397,4 @@ void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
 void Lighter::forget_photons() {
   if (state_->photons) state_->photons->forget();
 }
-
 }  // namespace hpr

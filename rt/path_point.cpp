@@ -61,6 +61,68 @@ glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec
   return share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(direction);
 }
 
+/// A ray per point of the wave that follows the lobe, into tile.following and tile.requests.
+void aim_rays(TileWork& tile, const Wave& wave, Lobe lobe, bool gathers) {
+  std::vector<Following>& rays = tile.following;
+  rays.clear();
+  tile.requests.clear();
+  for (const PathPoint& point : wave.points) {
+    const double factor = point.follows[static_cast<std::size_t>(lobe)];
+    if (factor == 0.0) continue;
+    if (tile.gathers && tile.follows_for_itself(point.bsdf, lobe) == gathers) continue;
+    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
+    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
+    if (!sample) continue;
+    glm::dvec3 throughput = factor * point.throughput * sample->weight;
+    throughput *= survival(brightness(throughput), sampler);
+    if (throughput == glm::dvec3(0.0)) continue;
+    rays.push_back({&point, throughput, sample->pdf, sampler});
+    tile.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
+                             std::numeric_limits<double>::infinity(), nullptr, 0});
+    tile.charge_ray(point.pixel);
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i) tile.requests[i].sampler = &rays[i].sampler;
+}
+
+/// What ray i finds of the sky; of rays that gather from the first surface also what it would have found, as direct
+/// light less its shadow.
+void add_sky(TileWork& tile, std::size_t i, Component part, bool gathers) {
+  const Following& ray = tile.following[i];
+  const PathPoint& from = *ray.from;
+  const bool leaves = tile.hits[i] == kNoSurface;
+  const bool shows_sky = gathers && from.depth == 0;
+  if (!leaves && !(shows_sky && tile.wants_components)) return;
+  const glm::dvec3 sky = sky_along(tile, ray, tile.requests[i].direction, gathers);
+  if (leaves) {
+    tile.add(from.pixel, shows_sky ? Component::Direct : part, sky);
+    return;
+  }
+  tile.components[static_cast<std::size_t>(Component::Direct)][from.pixel] += sky;
+  tile.components[static_cast<std::size_t>(Component::Shadow)][from.pixel] -= sky;
+}
+
+/// The point that ray i reaches, but for what finish_point does.
+PathPoint reached_by(TileWork& tile, std::size_t i, Component part, bool gathers) {
+  const Following& ray = tile.following[i];
+  const RayRequest& request = tile.requests[i];
+  const PathPoint& from = *ray.from;
+  const WorldTriangle& triangle = tile.triangles.load(tile.surfaces, tile.hits[i]);
+  PathPoint reached;
+  reached.surface = tile.surfaces.meet(triangle, request.origin, request.direction);
+  reached.throughput = ray.throughput;
+  reached.media = media_towards(from.media, from.surface, from.material, request.direction);
+  reached.seen_from = from.surface.position;
+  reached.seen_normal = from.bsdf.light_normal();
+  reached.seen_pdf = ray.pdf;
+  reached.sampler = ray.sampler;
+  reached.pixel = from.pixel;
+  reached.depth = static_cast<std::uint16_t>(from.depth + 1);
+  reached.followed = static_cast<std::uint16_t>(from.followed + (gathers ? 0 : 1));
+  reached.gathered = from.gathered || gathers;
+  reached.component = part;
+  return reached;
+}
+
 }  // namespace
 
 bool TileWork::follows_for_itself(const Bsdf& bsdf, Lobe lobe) const {
@@ -100,62 +162,19 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
 
 void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
                  std::vector<PathPoint>& next) {
-  std::vector<Following>& rays = tile.following;
-  rays.clear();
-  tile.requests.clear();
   const bool gathers = component == Component::Photon;
-  for (const PathPoint& point : wave.points) {
-    const double factor = point.follows[static_cast<std::size_t>(lobe)];
-    if (factor == 0.0) continue;
-    if (tile.gathers && tile.follows_for_itself(point.bsdf, lobe) == gathers) continue;
-    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
-    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
-    if (!sample) continue;
-    glm::dvec3 throughput = factor * point.throughput * sample->weight;
-    throughput *= survival(brightness(throughput), sampler);
-    if (throughput == glm::dvec3(0.0)) continue;
-    rays.push_back({&point, throughput, sample->pdf, sampler});
-    tile.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
-                             std::numeric_limits<double>::infinity(), nullptr, 0});
-    tile.charge_ray(point.pixel);
-  }
-  for (std::size_t i = 0; i < rays.size(); ++i) tile.requests[i].sampler = &rays[i].sampler;
-  tile.hits.resize(rays.size());
-  counter += rays.size();
+  aim_rays(tile, wave, lobe, gathers);
+  tile.hits.resize(tile.following.size());
+  counter += tile.following.size();
   tile.counts.invalid += tile.rays->closest(tile.requests, tile.hits, tile.scratch);
 
   const std::size_t before = next.size();
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Following& ray = rays[i];
-    const RayRequest& request = tile.requests[i];
-    const PathPoint& from = *ray.from;
-    const Component part = component_after(from, component);
-    const bool leaves = tile.hits[i] == kNoSurface;
-    const bool shows_sky = gathers && from.depth == 0;
-    if (leaves || (shows_sky && tile.wants_components)) {
-      const glm::dvec3 sky = sky_along(tile, ray, request.direction, gathers);
-      if (leaves) {
-        tile.add(from.pixel, shows_sky ? Component::Direct : part, sky);
-        continue;
-      }
-      tile.components[static_cast<std::size_t>(Component::Direct)][from.pixel] += sky;
-      tile.components[static_cast<std::size_t>(Component::Shadow)][from.pixel] -= sky;
-    }
-    const WorldTriangle& triangle = tile.triangles.load(tile.surfaces, tile.hits[i]);
-    PathPoint& reached = next.emplace_back();
-    reached.surface = tile.surfaces.meet(triangle, request.origin, request.direction);
-    reached.throughput = ray.throughput;
-    reached.media = media_towards(from.media, from.surface, from.material, request.direction);
-    reached.seen_from = from.surface.position;
-    reached.seen_normal = from.bsdf.light_normal();
-    reached.seen_pdf = ray.pdf;
-    reached.sampler = ray.sampler;
-    reached.pixel = from.pixel;
-    reached.depth = static_cast<std::uint16_t>(from.depth + 1);
-    reached.followed = static_cast<std::uint16_t>(from.followed + (gathers ? 0 : 1));
-    reached.gathered = from.gathered || gathers;
-    reached.component = part;
-    prefetch_material(tile.scene, reached.surface);
+  for (std::size_t i = 0; i < tile.following.size(); ++i) {
+    const Component part = component_after(*tile.following[i].from, component);
+    add_sky(tile, i, part, gathers);
+    if (tile.hits[i] == kNoSurface) continue;
+    next.push_back(reached_by(tile, i, part, gathers));
+    prefetch_material(tile.scene, next.back().surface);
   }
   // By now the memory has what materials read.
   for (PathPoint& reached : std::span(next).subspan(before)) {

@@ -15,7 +15,7 @@
 #include "rt/denormals.h"
 #include "rt/embree_compat.h"
 #include "rt/occupied_pixels.h"
-#include "rt/on_triangle.h"
+#include "rt/ray_key.h"
 
 namespace hpr {
 namespace {
@@ -76,30 +76,10 @@ const glm::uvec3& corners_of(const Search& search, std::size_t lane) {
 /// about `distance`.
 Key exact_key(const Search& search, std::size_t lane, const RayGeometry& geometry, std::uint32_t primitive,
               float distance) {
-  const Instance& instance = search.scene->instances[geometry.instance];
-  const Mesh& mesh = search.scene->mesh_of(instance);
-  const glm::uvec3& corners = mesh.triangles[geometry.first_triangle + primitive];
-  const Ray& ray = search.ray[lane];
-  // Edges as differences of the mesh's own coordinates, and all of it relative to the eye: far places cost no digits.
-  const glm::dmat3 linear(instance.to_world);
-  const glm::dvec3 p0(mesh.positions[corners.x]);
-  const glm::dvec3 e1 = linear * (glm::dvec3(mesh.positions[corners.y]) - p0);
-  const glm::dvec3 e2 = linear * (glm::dvec3(mesh.positions[corners.z]) - p0);
-  const glm::dvec3 v0 = linear * p0 + (glm::dvec3(instance.to_world[3]) - search.view->eye);
-
-  // Moeller and Trumbore 1997, from the ray's origin.
-  const glm::dvec3 from_v0 = (ray.origin - search.view->eye) - v0;
-  const glm::dvec3 p = glm::cross(ray.direction, e2);
-  const glm::dvec3 q = glm::cross(from_v0, e1);
-  const double determinant = glm::dot(e1, p);
-  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(ray.direction, q) / determinant);
-  const double along_axis = -glm::dot(v0 + at.x * e1 + at.y * e2, search.view->axes[2]);
-
-  const auto depth = static_cast<float>(reversed_depth(*search.view, along_axis));
-  if (!(depth > 0.0F) || !(depth <= 1.0F)) return kNoKey;
-  const double expected = along_axis * search.scale[lane] - search.start[lane];
-  if (!(std::abs(static_cast<double>(distance) - expected) <= 0.5 * static_cast<double>(kSlack))) return kNoKey;
-  return make_key(depth, geometry.first_surface + primitive);
+  const PlacedKey met = key_along(*search.scene, *search.view, search.ray[lane], geometry, primitive);
+  const double expected = met.along_axis * search.scale[lane] - search.start[lane];
+  const bool near = std::abs(static_cast<double>(distance) - expected) <= 0.5 * static_cast<double>(kSlack);
+  return near ? met.key : kNoKey;
 }
 
 /// Decides between two candidates whose distances say too little. Returns whether the new one stays.
@@ -186,28 +166,19 @@ class TileTracer {
   }
 
   /// Merges the keys of those of `pixels`, in the tile at (x0, y0), that are set in its `mask`; keys[i] are of look i.
-  /// All looks through a pixel lie together: they meet about the same.
+  /// All looks through a pixel lie together, and pixels square by square: they meet about the same.
   void trace(const Rect& pixels, int x0, int y0, std::span<const std::uint8_t> mask,
              std::span<const std::span<Key>> keys) {
     Packet packet;
     for (int y = pixels.y0; y < pixels.y1; y = (y / kPacketHeight + 1) * kPacketHeight) {
       for (int x = pixels.x0; x < pixels.x1; x = (x / kPacketWidth + 1) * kPacketWidth) {
-        const Rect square{x, y, std::min(pixels.x1, (x / kPacketWidth + 1) * kPacketWidth),
-                          std::min(pixels.y1, (y / kPacketHeight + 1) * kPacketHeight)};
-        for (int row = square.y0; row < square.y1; ++row) {
-          for (int column = square.x0; column < square.x1; ++column) {
-            const auto pixel = static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0);
-            if (mask[pixel] == 0) continue;
-            for (std::size_t look = 0; look < looks_.size(); ++look) {
-              packet.look[packet.count] = look;
-              packet.pixel[packet.count] = pixel;
-              packet.x[packet.count] = column + 0.5;
-              packet.y[packet.count++] = row + 0.5;
-              if (packet.count < kWidth) continue;
-              trace(packet, keys);
-              packet.count = 0;
-            }
-          }
+        const Rect square{x, y, (x / kPacketWidth + 1) * kPacketWidth, (y / kPacketHeight + 1) * kPacketHeight};
+        const Rect part = intersection(square, pixels);
+        for (int i = 0; i < part.width() * part.height(); ++i) {
+          const int column = part.x0 + i % part.width();
+          const int row = part.y0 + i / part.width();
+          if (mask[static_cast<std::size_t>((row - y0) * kTileSide + column - x0)] == 0) continue;
+          add(static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0), column, row, packet, keys);
         }
       }
     }
@@ -224,6 +195,19 @@ class TileTracer {
   }
 
  private:
+  /// Every look through a pixel; packets are traced as they fill.
+  void add(std::uint32_t pixel, int column, int row, Packet& packet, std::span<const std::span<Key>> keys) {
+    for (std::size_t look = 0; look < looks_.size(); ++look) {
+      packet.look[packet.count] = look;
+      packet.pixel[packet.count] = pixel;
+      packet.x[packet.count] = column + 0.5;
+      packet.y[packet.count++] = row + 0.5;
+      if (packet.count < kWidth) continue;
+      trace(packet, keys);
+      packet.count = 0;
+    }
+  }
+
   void trace(const Packet& packet, std::span<const std::span<Key>> keys) {
     stats_.rays += packet.count;
     for (std::size_t i = 0; i < packet.count; ++i) {
@@ -352,6 +336,22 @@ class TileTracer {
   PrimaryRayStats stats_;
 };
 
+void draw_tile(TileTracer& tracer, std::size_t tile, std::span<const Rect> parts, std::span<const std::uint8_t> mask,
+               std::span<TileLayer<Key>* const> layers) {
+  const trace::Span span("trace tile", "tile", tile);
+  const DenormalsAsZero mode;
+  const Rect place = layers.front()->layout().place(tile).pixels;
+  std::array<std::span<Key>, PrimaryRays::kMostLooks> keys;
+  std::ranges::transform(layers, keys.begin(), [&](TileLayer<Key>* layer) { return layer->tile(tile); });
+  for (const Rect& part : parts) {
+    const Rect pixels = intersection(part, place);
+    if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(layers.size()));
+  }
+  for (std::size_t look = 0; look < layers.size(); ++look) {
+    if ((tracer.seen() >> look & 1U) != 0) layers[look]->set_active(tile);
+  }
+}
+
 }  // namespace
 
 PrimaryRays::PrimaryRays(const Scene& scene, const RayScene& rays, int threads)
@@ -375,22 +375,11 @@ void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::spa
   const OccupiedPixels occupied(scene_, rays_, boxes_, looks, layout, screen);
   std::mutex mutex;
   parallel_for(threads_, run.count, [&](std::size_t i) {
-    const std::size_t tile = run.first + i;
-    const Rect place = layout.place(tile).pixels;
     std::array<std::uint8_t, kTilePixels> mask;
-    if (!occupied.mark(tile, place, mask)) return;
-    const trace::Span span("trace tile", "tile", tile);
-    const DenormalsAsZero mode;
-    std::array<std::span<Key>, kMostLooks> keys;
-    std::ranges::transform(layers, keys.begin(), [&](TileLayer<Key>* layer) { return layer->tile(tile); });
+    const std::size_t tile = run.first + i;
+    if (!occupied.mark(tile, layout.place(tile).pixels, mask)) return;
     TileTracer tracer(scene_, rays_, looks);
-    for (const Rect& part : parts) {
-      const Rect pixels = intersection(part, place);
-      if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(looks.size()));
-    }
-    for (std::size_t look = 0; look < looks.size(); ++look) {
-      if ((tracer.seen() >> look & 1U) != 0) layers[look]->set_active(tile);
-    }
+    draw_tile(tracer, tile, parts, mask, layers);
     const std::lock_guard lock(mutex);
     stats_ += tracer.stats();
   });
