@@ -26,6 +26,9 @@ SCENES = {
     "pbr-spheres": ("pbr-spheres/PBR_Spheres.glb", 1),
     "glass-table": ("glass-table/glass-table.glb", 1),
 }
+# Caustics of small lights that Mitsuba's paths do not find, as a share of all light: against its particle tracer, the hybrid's matte
+# surfaces have 1.0003 to 1.002 of the light, and the median of paths 0.984 (docs/mitsuba.md). The reference misses the same.
+LACKING = {"two-monkeys": 0.016}
 DEPTH = 16  # segments of the longest path, in both
 
 
@@ -187,7 +190,8 @@ def main():
                                     *camera_options(notes)], check=True, stdout=subprocess.DEVNULL)
                     ours.append(numpy.array(mitsuba.Bitmap(str(picture)))[..., :3])
                 result = compare(numpy, ours, theirs)
-                biased = any(abs(bias) > 0.01 + 4.0 * error for bias, error in (result["bias"], result["usual bias"]))
+                lacking = LACKING.get(name, 0.0) if way == "hybrid" else 0.0
+                biased = any(abs(bias - lacking) > 0.01 + 4.0 * error for bias, error in (result["bias"], result["usual bias"]))
                 off = result["relmse"] > most * result["noise"] + 1e-5
                 failed = biased or off or not result["finite"]
                 failures += failed
