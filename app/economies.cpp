@@ -20,13 +20,10 @@ constexpr int kCheapDepth = 2;
 std::vector<std::string> economies_of(const FrameSettings& settings, std::span<const PassPlan> passes) {
   std::vector<std::string> names;
   if (settings.rays.reference) return names;
-  const auto runs = [&](std::string_view name) {
-    return std::ranges::any_of(passes, [&](const PassPlan& pass) { return pass.runs && pass.name == name; });
-  };
-  if (settings.shading == Shading::Deferred && !runs("gather")) names.emplace_back(kHalfResolution);
-  if (runs("photon") || runs("gather")) names.emplace_back(kNoPhotons);
+  if (settings.shading == Shading::Deferred && !runs_pass(passes, "gather")) names.emplace_back(kHalfResolution);
+  if (runs_pass(passes, "photon") || runs_pass(passes, "gather")) names.emplace_back(kNoPhotons);
   const bool costly = settings.rays.glossy_cutoff > kCheapCutoff || settings.rays.max_depth > kCheapDepth;
-  if (costly && (runs("reflection") || runs("refraction"))) names.emplace_back(kLessGlossy);
+  if (costly && (runs_pass(passes, "reflection") || runs_pass(passes, "refraction"))) names.emplace_back(kLessGlossy);
   return names;
 }
 

@@ -152,10 +152,7 @@ double estimated_relmse(Communicator& comm, const Film& film, std::span<const st
   std::ranges::sort(all, {}, &TileError::tile);  // one order of summing for any number of ranks
   double sum = 0.0;
   for (const TileError& each : all) sum += each.error;
-  std::size_t values = 0;
-  for (std::size_t screen = 0; screen < film.layout().screens(); ++screen) {
-    values += 3 * film.layout().size(screen).area();
-  }
+  const std::size_t values = 3 * film.layout().pixels();
   return values == 0 ? 0.0 : sum / static_cast<double>(values);
 }
 

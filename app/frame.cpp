@@ -51,21 +51,38 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
   }
 }
 
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
-                              TileLayer<Key>& keys) {
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                              std::span<TileLayer<Key>* const> keys) {
   PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
   const trace::Span span("primary rays");
   PrimaryRayStats stats;
-  for (std::size_t screen = 0; screen < views.size(); ++screen) {
+  for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
     const std::vector<Rect> parts = parts_of(plan, screen);
     if (parts.empty()) continue;
-    rays.draw(views[screen], screen, parts, keys);
+    std::vector<View> views;
+    views.reserve(looks.size());
+    for (const FrameLook& look : looks) views.push_back(look.views[screen]);
+    rays.draw(views, screen, parts, keys);
     stats += rays.stats();
   }
   return stats;
 }
 
 namespace {
+
+/// The keys of each look, before any rank meets another.
+FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                     std::span<TileLayer<Key>* const> keys) {
+  FrameTimes taken;
+  const Stopwatch watch;
+  if (plan.primary == Primary::Rays) {
+    taken.primary = trace_primary(session, plan, looks, keys);
+  } else {
+    for (std::size_t i = 0; i < looks.size(); ++i) rasterize(session, plan, looks[i].views, *keys[i]);
+  }
+  taken.primary_ms = watch.ms();
+  return taken;
+}
 
 /// Merges the group's layers; returns the tiles this rank ends up owning.
 std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {
@@ -131,14 +148,9 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
 
 FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                       const SampleNumber& number) {
-  FrameTimes taken;
-  const Stopwatch watch;
-  if (plan.primary == Primary::Rays) {
-    taken.primary = trace_primary(session, plan, views, keys);
-  } else {
-    rasterize(session, plan, views, keys);
-  }
-  taken.primary_ms = watch.ms();
+  const FrameLook look{{views.begin(), views.end()}, {number, nullptr}};
+  TileLayer<Key>* const layer = &keys;
+  FrameTimes taken = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
 
   if (spends_light(plan)) {
     const trace::Span photons("photons");
@@ -188,46 +200,20 @@ std::size_t most_in_round(Session& session, const FramePlan& plan) {
   if (session.lighter(plan.rays).lights_one_by_one()) return 1;
   // Keys and colours of a round are in memory together.
   constexpr std::size_t kPixels = std::size_t{1} << 23U;
-  std::size_t pixels = 0;
-  for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) pixels += plan.layout.size(screen).area();
-  return std::clamp(kPixels / std::max<std::size_t>(pixels, 1), std::size_t{1}, PrimaryRays::kMostLooks);
+  const std::size_t fit = kPixels / std::max<std::size_t>(plan.layout.pixels(), 1);
+  return std::clamp(fit, std::size_t{1}, PrimaryRays::kMostLooks);
 }
-
-namespace {
-
-/// The keys of a round's samples, one layer each.
-FrameTimes draw_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
-                      std::span<TileLayer<Key>> keys) {
-  FrameTimes taken;
-  const Stopwatch watch;
-  if (plan.primary == Primary::Rays) {
-    PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
-    const trace::Span span("primary rays");
-    std::vector<TileLayer<Key>*> layers;
-    for (TileLayer<Key>& layer : keys) layers.push_back(&layer);
-    for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
-      const std::vector<Rect> parts = parts_of(plan, screen);
-      if (parts.empty()) continue;
-      std::vector<View> views;
-      for (const FrameLook& look : looks) views.push_back(look.views[screen]);
-      rays.draw(views, screen, parts, layers);
-      taken.primary += rays.stats();
-    }
-  } else {
-    for (std::size_t i = 0; i < looks.size(); ++i) rasterize(session, plan, looks[i].views, keys[i]);
-  }
-  taken.primary_ms = watch.ms();
-  return taken;
-}
-
-}  // namespace
 
 std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                               FrameTimes& times) {
   const trace::Span span("round", "samples", looks.size());
   const std::span<TileLayer<Key>> keys = session.round_keys(plan.layout, looks.size());
-  for (TileLayer<Key>& layer : keys) layer.set_depth_format(plan.depth_format);
-  times = draw_round(session, plan, looks, keys);
+  std::vector<TileLayer<Key>*> layers;
+  for (TileLayer<Key>& layer : keys) {
+    layer.set_depth_format(plan.depth_format);
+    layers.push_back(&layer);
+  }
+  times = draw_keys(session, plan, looks, layers);
   std::vector<Frame> frames;
   std::vector<LitSample> samples;
   for (std::size_t i = 0; i < looks.size(); ++i) {

@@ -88,17 +88,6 @@ struct FrameTimes {
 /// Collective. Left out, the first frame does it and takes the longer for it.
 void prepare(Session& session, const FramePlan& plan);
 
-/// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
-void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
-/// The same by rays. Returns what it took.
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const View> views,
-                              TileLayer<Key>& keys);
-
-/// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
-/// lit if shading is local. Returns what that took.
-FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
-                      const SampleNumber& number = {});
-
 /// Which frame of several that are one picture's samples.
 struct FrameSample {
   SampleNumber number;
@@ -107,9 +96,20 @@ struct FrameSample {
 
 /// One of several samples that are drawn together.
 struct FrameLook {
-  std::vector<View> views;  ///< those of the samples differ by their jitter only
+  std::vector<View> views;  ///< views[i] is screen i of the plan's layout; those of the samples differ by their jitter
   FrameSample sample;
 };
+
+/// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
+void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
+/// The same by rays, for several looks together, a layer each. Returns what it took.
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                              std::span<TileLayer<Key>* const> keys);
+
+/// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
+/// lit if shading is local. Returns what that took.
+FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+                      const SampleNumber& number = {});
 
 /// How many samples of a plan may be drawn together: 1 where they are composited, or each asks for light of its own.
 [[nodiscard]] std::size_t most_in_round(Session& session, const FramePlan& plan);

@@ -39,12 +39,6 @@ std::string describe(const SampleGoal& goal, const SampleProgress& so_far) {
   return text;
 }
 
-std::size_t pixels_of(const FrameLayout& layout) {
-  std::size_t pixels = 0;
-  for (std::size_t screen = 0; screen < layout.screens(); ++screen) pixels += layout.size(screen).area();
-  return pixels;
-}
-
 }  // namespace
 
 FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame,
@@ -119,27 +113,20 @@ void FrameSampler::scatter() {
   });
 }
 
-void FrameSampler::add_sample(std::span<const View> views) {
-  double weight = 1.0;
-  const FrameLook seen = look(views, film_.samples(), weight);
-  FrameTimes taken;
-  const Frame frame = make_frame(session_, plan_, seen.views, &taken, seen.sample);
-  scatter();
-  film_.add({frame.radiance, frame.aovs, *frame.keys}, weight, homes_->mine(), session_.threads());
-  times_ += taken;
-  frame_.keys = frame.keys;
-}
-
-void FrameSampler::add_round(std::span<const View> views, std::uint32_t count) {
+void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count) {
   std::vector<FrameLook> looks;
   std::vector<double> weights(count);
   for (std::uint32_t i = 0; i < count; ++i) looks.push_back(look(views, film_.samples() + i, weights[i]));
   FrameTimes taken;
-  const std::vector<Frame> frames = make_round(session_, plan_, looks, taken);
+  std::vector<Frame> frames;
+  if (count > 1) {
+    frames = make_round(session_, plan_, looks, taken);
+  } else {
+    frames.push_back(make_frame(session_, plan_, looks.front().views, &taken, looks.front().sample));
+  }
   scatter();
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Frame& frame = frames[i];
-    film_.add({frame.radiance, frame.aovs, *frame.keys}, weights[i], homes_->mine(), session_.threads());
+    film_.add({frames[i].radiance, frames[i].aovs, *frames[i].keys}, weights[i], homes_->mine(), session_.threads());
   }
   times_ += taken;
   frame_.keys = frames.back().keys;
@@ -157,7 +144,7 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
     most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
   } else if (hurried || sampling_.goal.seconds ||
-             pixels_of(plan_.layout) * static_cast<std::size_t>(plan_.rays.light_samples) > kQuickPixels) {
+             plan_.layout.pixels() * static_cast<std::size_t>(plan_.rays.light_samples) > kQuickPixels) {
     most = 1.0;
   }
   const auto limit = static_cast<std::uint32_t>(std::max(most, 1.0));
@@ -168,15 +155,6 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
     if (!sampling_.goal.relmse) break;
   }
   return last;
-}
-
-void FrameSampler::add_samples(std::span<const View> views, bool hurried) {
-  const std::uint32_t count = size_of_round(hurried);
-  if (count > 1) {
-    add_round(views, count);
-  } else {
-    add_sample(views);
-  }
 }
 
 bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
@@ -190,7 +168,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   const Stopwatch watch;
   std::optional<Stopwatch> written;
   while (!reached(sampling_, so_far_)) {
-    add_samples(views, !checkpoint.path.empty());
+    add_samples(views, size_of_round(!checkpoint.path.empty()));
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.
@@ -215,7 +193,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
 void FrameSampler::refine(std::span<const View> views) {
   if (!reached(sampling_, so_far_)) {
     const Stopwatch watch;
-    add_sample(views);
+    add_samples(views, 1);
     const double seconds = so_far_.seconds + 1e-3 * watch.ms();
     so_far_.seconds = agree(session_.comm(), {Request::None, seconds}).seconds;
     so_far_.samples = film_.samples();

@@ -38,10 +38,8 @@ class FrameSampler {
   void write(const CheckpointSettings& checkpoint);
   /// Tells whether it could.
   bool tries_to_write(const CheckpointSettings& checkpoint);
-  void add_sample(std::span<const View> views);
-  /// One, or a round of them.
-  void add_samples(std::span<const View> views, bool hurried);
-  void add_round(std::span<const View> views, std::uint32_t count);
+  /// Together, where there are several: size_of_round() at most.
+  void add_samples(std::span<const View> views, std::uint32_t count);
   /// How many samples to draw together. `hurried`: somebody may end the run by a signal.
   [[nodiscard]] std::uint32_t size_of_round(bool hurried);
   /// After the first sample drawn since a checkpoint was read: sums go to where their tiles are lit.

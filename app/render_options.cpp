@@ -187,8 +187,7 @@ void RenderOptions::declare_light(CLI::App& app) {
   app.add_flag_function(
          "--indirect,!--no-indirect", [this](std::int64_t count) { indirect = count > 0; },
          "all indirect light, not caustics alone: by photons, or under an even sky by rays (default: with --quality "
-         "best, or where --passes "
-         "names photon)")
+         "best, or where --passes names photon)")
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");

@@ -45,6 +45,11 @@ FrameLayout::FrameLayout(std::vector<Size> screens) : sizes_(std::move(screens))
   }
 }
 
+std::size_t FrameLayout::pixels() const {
+  return std::accumulate(sizes_.begin(), sizes_.end(), std::size_t{0},
+                         [](std::size_t sum, const Size& size) { return sum + size.area(); });
+}
+
 Size FrameLayout::tile_grid(std::size_t screen) const {
   return {tiles_along(size(screen).width), tiles_along(size(screen).height)};
 }

@@ -45,6 +45,8 @@ class FrameLayout {
 
   [[nodiscard]] std::size_t screens() const { return sizes_.size(); }
   [[nodiscard]] Size size(std::size_t screen) const { return sizes_.at(screen); }
+  /// Of all screens.
+  [[nodiscard]] std::size_t pixels() const;
   /// Columns and rows of tiles.
   [[nodiscard]] Size tile_grid(std::size_t screen) const;
   /// All tiles of all screens.

@@ -28,8 +28,8 @@ class EnvironmentMap {
   /// Radiance, averaged over all directions.
   [[nodiscard]] const glm::dvec3& mean() const { return mean_; }
 
-  /// Whether radiance is the same in all directions, as it has one pixel.
-  [[nodiscard]] bool is_even() const { return environment_->image.size().area() == 1; }
+  /// Whether radiance is the same in all directions.
+  [[nodiscard]] bool is_even() const { return environment_->is_even(); }
 
   /// How much of a matte surface's samples are better spread by the cosine than by brightness: 1 for a constant
   /// picture, near 0 for one with a sun in it.

@@ -21,7 +21,7 @@ class GatherPass final : public Pass {
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
     for (const Lobe lobe : kLobes) {
-      follow_lobe(tile, wave, lobe, Component::Photon, tile.counts.gather, next);
+      follow_lobe(tile, wave, {lobe, Component::Photon, true}, tile.counts.gather, next);
     }
   }
 };

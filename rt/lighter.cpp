@@ -25,11 +25,6 @@
 namespace hpr {
 namespace {
 
-bool runs_gather(const Requirements& scene, const RaySettings& settings) {
-  return std::ranges::any_of(plan_passes(scene, settings),
-                             [](const PassPlan& pass) { return pass.runs && pass.name == "gather"; });
-}
-
 void check_sizes(std::span<const LitSample> samples) {
   const FrameLayout& layout = samples.front().keys->layout();
   for (const LitSample& sample : samples) {
@@ -100,7 +95,7 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
       settings(std::move(chosen)),
       space(lit.bounds),
       surfaces(lit, space),
-      lights(lit, runs_gather(requirements, settings) ? EvenSky::LeftToRays : EvenSky::Sampled),
+      lights(lit, runs_pass(plan_passes(requirements, settings), "gather") ? EvenSky::LeftToRays : EvenSky::Sampled),
       media(lit),
       travelling(others) {
   shared = shared_components(settings);
@@ -397,4 +392,5 @@ void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
 void Lighter::forget_photons() {
   if (state_->photons) state_->photons->forget();
 }
+
 }  // namespace hpr

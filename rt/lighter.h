@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cluster/communicator.h"
@@ -93,6 +94,8 @@ struct PassTime {
 /// Every pass, in the order they run, for a scene that requires so much. Throws Error (Usage) for a name in `settings`
 /// that is no pass.
 [[nodiscard]] std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings);
+
+[[nodiscard]] bool runs_pass(std::span<const PassPlan> plan, std::string_view name);
 
 /// Whether indirect light comes along rays (the pass `gather`) in place of photons: where that is asked for, and where
 /// settings prefer it and do not forbid photons, all indirect light is asked for and an even sky is all the light there

@@ -1,7 +1,6 @@
 #include "rt/occupied_pixels.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -10,6 +9,8 @@
 #include <glm/vec4.hpp>
 #include <limits>
 #include <optional>
+
+#include "scene/boxes.h"
 
 namespace hpr {
 namespace {
@@ -101,18 +102,9 @@ std::optional<Rect> pixels_of(const View& view, const Shifts& shifts, const Pixe
 MeshBoxes::MeshBoxes(const Scene& scene) : first{0} {
   const std::size_t each = std::max(kFewestTriangles, static_cast<std::size_t>(scene.triangles) / kBoxes);
   for (const Mesh& mesh : scene.meshes) {
-    const std::size_t count = mesh.triangles.size();
-    for (std::size_t begin = 0; begin < count; begin += each) {
-      Bounds box{glm::dvec3(std::numeric_limits<double>::infinity()),
-                 glm::dvec3(-std::numeric_limits<double>::infinity())};
-      for (std::size_t i = begin; i < std::min(begin + each, count); ++i) {
-        for (int corner = 0; corner < 3; ++corner) {
-          const glm::dvec3 place(mesh.positions[mesh.triangles[i][corner]]);
-          box.low = glm::min(box.low, place);
-          box.high = glm::max(box.high, place);
-        }
-      }
-      boxes.push_back(box);
+    for (std::span<const glm::uvec3> rest = mesh.triangles; !rest.empty();
+         rest = rest.subspan(std::min(each, rest.size()))) {
+      boxes.push_back(bounds_of(mesh, rest.first(std::min(each, rest.size()))));
     }
     first.push_back(boxes.size());
   }

@@ -165,11 +165,6 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
   return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
 }
 
-/// What decides at the first surface is spread evenly together with the places in the pixel.
-[[nodiscard]] inline glm::dvec2 next_two(Sampler& sampler, int depth) {
-  return depth == 0 ? sampler.two_with_pixel() : sampler.two();
-}
-
 /// The component that light from a followed lobe of `point` counts in.
 [[nodiscard]] Component component_after(const PathPoint& point, Component first);
 
@@ -177,10 +172,17 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 /// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
 void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
 
-/// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach. `component` is
-/// Photon for the pass that follows the rest: where the sky it meets is light that sampling lights does not find, that
-/// counts as direct light, and what hides it as shadow.
-void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
+/// What a pass follows.
+struct Follows {
+  Lobe lobe = Lobe::Reflection;
+  Component component = Component::Reflection;  ///< where what it brings to the first surface counts
+  /// The lobe where no pass follows it for itself: the sky that such rays find from the first surface counts as direct
+  /// light, and what hides it as shadow.
+  bool rest = false;
+};
+
+/// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach.
+void follow_lobe(TileWork& tile, const Wave& wave, const Follows& what, std::uint64_t& counter,
                  std::vector<PathPoint>& next);
 
 }  // namespace hpr

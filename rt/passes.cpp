@@ -24,6 +24,10 @@ std::vector<std::string> all_pass_names() {
   return names;
 }
 
+bool runs_pass(std::span<const PassPlan> plan, std::string_view name) {
+  return std::ranges::any_of(plan, [&](const PassPlan& pass) { return pass.runs && pass.name == name; });
+}
+
 std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings) {
   const std::vector<std::string> names = all_pass_names();
   for (const std::string& wanted : settings.passes) {
@@ -32,7 +36,7 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
                   unknown_name_hint(wanted, names));
     }
   }
-  const auto names_pass = [&](const char* name) {
+  const auto names_pass = [&](std::string_view name) {
     return std::ranges::find(settings.passes, name) != settings.passes.end();
   };
   if (names_pass("gather") && names_pass("photon")) {
@@ -46,9 +50,8 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());
     const Requirement requirement = pass->requirement(scene, settings);
-    const bool named = std::ranges::find(settings.passes, name) != settings.passes.end();
     const bool wanted =
-        named || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(scene, settings));
+        names_pass(name) || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(scene, settings));
     if (settings.reference) {
       plan.push_back({name, false, "the reference traces whole paths instead"});
       continue;

@@ -19,8 +19,7 @@ Scene scene_with(const Material& material, std::size_t lights) {
 }
 
 bool runs(const Scene& scene, const RaySettings& settings, const std::string& name) {
-  const std::vector<PassPlan> plan = plan_passes(requirements_of(scene), settings);
-  return std::ranges::find(plan, name, &PassPlan::name)->runs;
+  return runs_pass(plan_passes(requirements_of(scene), settings), name);
 }
 
 TEST(Passes, RunOnlyWhereTheSceneCanShowThem) {

@@ -7,6 +7,7 @@
 #include "rt/direct_light.h"
 #include "rt/pass.h"
 #include "rt/photon_gather.h"
+#include "rt/pick.h"
 
 namespace hpr {
 namespace {
@@ -27,51 +28,43 @@ constexpr int kMostGathered = 256;
 /// Where all lobes are followed: each from what the eye sees, and then one of them by chance, in proportion to the
 /// light it scatters.
 void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
-  std::array<double, kLobes.size()> bright{};
+  std::array<double, kLobes.size()> sums{};
   double sum = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
-    if (tile.follows_for_itself(point.bsdf, kLobes[i]) && point.followed >= tile.settings.max_depth) continue;
-    sum += bright[i] = brightness(point.throughput * point.bsdf.weight(kLobes[i]));
-    point.may_follow[i] = bright[i] > 0.0;
+    const bool ends = tile.follows_for_itself(point.bsdf, kLobes[i]) && point.followed >= tile.settings.max_depth;
+    const double bright = ends ? 0.0 : brightness(point.throughput * point.bsdf.weight(kLobes[i]));
+    point.may_follow[i] = bright > 0.0;
+    if (point.depth == 0 && point.may_follow[i]) point.follows[i] = 1.0F;
+    sums[i] = sum += bright;
   }
-  if (!(sum > 0.0)) return;
-  if (point.depth == 0) {
-    for (std::size_t i = 0; i < kLobes.size(); ++i) point.follows[i] = point.may_follow[i] ? 1.0F : 0.0F;
-    return;
-  }
+  if (point.depth == 0 || !(sum > 0.0)) return;
   const double chance = point.depth < kRouletteDepth ? 1.0 : std::min(sum, 1.0);
-  double u = point.sampler.one() / chance;
-  for (std::size_t i = 0; i < kLobes.size(); ++i) {
-    if (!point.may_follow[i]) continue;
-    const double share = bright[i] / sum;
-    if (u < share) {
-      point.follows[i] = static_cast<float>(1.0 / (share * chance));
-      return;
-    }
-    u -= share;
-  }
+  const double u = point.sampler.one() / chance;
+  if (!(u < 1.0)) return;
+  const Picked picked = pick(sums, u);
+  point.follows[picked.index] = static_cast<float>(1.0 / (picked.probability * chance));
 }
 
 /// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
-glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction, bool gathered) {
+glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction, const Follows& what) {
   const PathPoint& from = *ray.from;
-  if (!tile.scene.environment && (gathered || from.gathered)) return glm::dvec3(0.0);  // a backdrop is no light
+  if (!tile.scene.environment && (what.rest || from.gathered)) return glm::dvec3(0.0);  // a backdrop is no light
   const double light_pdf =
       ray.pdf > 0.0 ? tile.lights.environment_pdf_one(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
   return share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(direction);
 }
 
 /// A ray per point of the wave that follows the lobe, into tile.following and tile.requests.
-void aim_rays(TileWork& tile, const Wave& wave, Lobe lobe, bool gathers) {
+void aim_rays(TileWork& tile, const Wave& wave, const Follows& what) {
   std::vector<Following>& rays = tile.following;
   rays.clear();
   tile.requests.clear();
   for (const PathPoint& point : wave.points) {
-    const double factor = point.follows[static_cast<std::size_t>(lobe)];
+    const double factor = point.follows[static_cast<std::size_t>(what.lobe)];
     if (factor == 0.0) continue;
-    if (tile.gathers && tile.follows_for_itself(point.bsdf, lobe) == gathers) continue;
-    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
-    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
+    if (tile.gathers && tile.follows_for_itself(point.bsdf, what.lobe) == what.rest) continue;
+    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(what.lobe));
+    const auto sample = point.bsdf.sample(what.lobe, next_two(sampler, point.depth));
     if (!sample) continue;
     glm::dvec3 throughput = factor * point.throughput * sample->weight;
     throughput *= survival(brightness(throughput), sampler);
@@ -86,15 +79,15 @@ void aim_rays(TileWork& tile, const Wave& wave, Lobe lobe, bool gathers) {
 
 /// What ray i finds of the sky; of rays that gather from the first surface also what it would have found, as direct
 /// light less its shadow.
-void add_sky(TileWork& tile, std::size_t i, Component part, bool gathers) {
+void add_sky(TileWork& tile, std::size_t i, const Follows& what) {
   const Following& ray = tile.following[i];
   const PathPoint& from = *ray.from;
   const bool leaves = tile.hits[i] == kNoSurface;
-  const bool shows_sky = gathers && from.depth == 0;
+  const bool shows_sky = what.rest && from.depth == 0;
   if (!leaves && !(shows_sky && tile.wants_components)) return;
-  const glm::dvec3 sky = sky_along(tile, ray, tile.requests[i].direction, gathers);
+  const glm::dvec3 sky = sky_along(tile, ray, tile.requests[i].direction, what);
   if (leaves) {
-    tile.add(from.pixel, shows_sky ? Component::Direct : part, sky);
+    tile.add(from.pixel, shows_sky ? Component::Direct : component_after(from, what.component), sky);
     return;
   }
   tile.components[static_cast<std::size_t>(Component::Direct)][from.pixel] += sky;
@@ -102,7 +95,7 @@ void add_sky(TileWork& tile, std::size_t i, Component part, bool gathers) {
 }
 
 /// The point that ray i reaches, but for what finish_point does.
-PathPoint reached_by(TileWork& tile, std::size_t i, Component part, bool gathers) {
+PathPoint reached_by(TileWork& tile, std::size_t i, const Follows& what) {
   const Following& ray = tile.following[i];
   const RayRequest& request = tile.requests[i];
   const PathPoint& from = *ray.from;
@@ -117,9 +110,9 @@ PathPoint reached_by(TileWork& tile, std::size_t i, Component part, bool gathers
   reached.sampler = ray.sampler;
   reached.pixel = from.pixel;
   reached.depth = static_cast<std::uint16_t>(from.depth + 1);
-  reached.followed = static_cast<std::uint16_t>(from.followed + (gathers ? 0 : 1));
-  reached.gathered = from.gathered || gathers;
-  reached.component = part;
+  reached.followed = static_cast<std::uint16_t>(from.followed + (what.rest ? 0 : 1));
+  reached.gathered = from.gathered || what.rest;
+  reached.component = component_after(from, what.component);
   return reached;
 }
 
@@ -145,8 +138,7 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
   std::array<double, kLobes.size()> bright{};
   for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
     const auto i = static_cast<std::size_t>(lobe);
-    if (!tile.followed_lobes[i]) continue;
-    if (!is_followed(point.bsdf, lobe, tile.settings.glossy_cutoff)) continue;
+    if (!tile.follows_for_itself(point.bsdf, lobe)) continue;
     bright[i] = brightness(point.throughput * point.bsdf.weight(lobe));
     point.may_follow[i] = bright[i] > 0.0;
     point.follows[i] = static_cast<float>(survival(bright[i], point.sampler));
@@ -160,20 +152,18 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
   point.follows[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - share));
 }
 
-void follow_lobe(TileWork& tile, const Wave& wave, Lobe lobe, Component component, std::uint64_t& counter,
+void follow_lobe(TileWork& tile, const Wave& wave, const Follows& what, std::uint64_t& counter,
                  std::vector<PathPoint>& next) {
-  const bool gathers = component == Component::Photon;
-  aim_rays(tile, wave, lobe, gathers);
+  aim_rays(tile, wave, what);
   tile.hits.resize(tile.following.size());
   counter += tile.following.size();
   tile.counts.invalid += tile.rays->closest(tile.requests, tile.hits, tile.scratch);
 
   const std::size_t before = next.size();
   for (std::size_t i = 0; i < tile.following.size(); ++i) {
-    const Component part = component_after(*tile.following[i].from, component);
-    add_sky(tile, i, part, gathers);
+    add_sky(tile, i, what);
     if (tile.hits[i] == kNoSurface) continue;
-    next.push_back(reached_by(tile, i, part, gathers));
+    next.push_back(reached_by(tile, i, what));
     prefetch_material(tile.scene, next.back().surface);
   }
   // By now the memory has what materials read.

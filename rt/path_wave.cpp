@@ -84,11 +84,6 @@ std::size_t pick(const std::array<double, kLobes.size()>& chances, double u) {
   return last;
 }
 
-/// What decides at the first surface is spread evenly together with the places in the pixel.
-glm::dvec2 next_two(Path& path) {
-  return path.segments == 1 ? path.sampler.two_with_pixel() : path.sampler.two();
-}
-
 }  // namespace
 
 void PathWave::start(const View& view, std::size_t pixels) {
@@ -220,7 +215,7 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
 
   const std::size_t chosen = pick(chances, path.sampler.one());
   const Lobe lobe = kLobes[chosen];
-  const auto sample = bsdf.sample(lobe, next_two(path));
+  const auto sample = bsdf.sample(lobe, next_two(path.sampler, path.segments - 1));
   if (!sample) return;
   if (bsdf.is_delta(lobe)) {
     path.throughput *= sample->weight / chances[chosen];
@@ -251,7 +246,7 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
 void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
                          const std::array<double, kLobes.size()>& chances) {
   const double u_choice = path.sampler.one();
-  const glm::dvec2 u = next_two(path);
+  const glm::dvec2 u = next_two(path.sampler, path.segments - 1);
   const auto light = shared_.lights.sample_any(point.position, bsdf.light_normal(), *view_, u_choice, u);
   if (!light || light->weight == glm::dvec3(0.0)) return;
   const Technique technique = shared_.settings.technique;

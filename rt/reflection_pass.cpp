@@ -19,7 +19,7 @@ class ReflectionPass final : public Pass {
   [[nodiscard]] const Lobe* follows() const override { return &kLobe; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    follow_lobe(tile, wave, kLobe, Component::Reflection, tile.counts.reflection, next);
+    follow_lobe(tile, wave, {kLobe, Component::Reflection}, tile.counts.reflection, next);
   }
 
  private:

@@ -13,7 +13,7 @@ class RefractionPass final : public Pass {
   [[nodiscard]] const Lobe* follows() const override { return &kLobe; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    follow_lobe(tile, wave, kLobe, Component::Refraction, tile.counts.refraction, next);
+    follow_lobe(tile, wave, {kLobe, Component::Refraction}, tile.counts.refraction, next);
   }
 
  private:

@@ -38,6 +38,12 @@ class Sampler {
   std::uint32_t drawn_ = 0;
 };
 
+/// What decides after so many bounces from the eye: at the first surface spread evenly together with the places in the
+/// pixel.
+[[nodiscard]] inline glm::dvec2 next_two(Sampler& sampler, int bounces) {
+  return bounces == 0 ? sampler.two_with_pixel() : sampler.two();
+}
+
 /// Whether a path passes a surface of partial coverage: drawn only where it is partial.
 [[nodiscard]] inline bool passes_by_chance(double coverage, Sampler& sampler) {
   return coverage < 1.0 && !(sampler.one() < coverage);

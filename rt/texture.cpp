@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 
 namespace hpr {
 namespace {
@@ -40,10 +38,6 @@ glm::dvec4 decoded(Rgba8 texel, Encoding encoding) {
   return glm::dvec4(texel.r, texel.g, texel.b, texel.a) * kLevel;
 }
 
-bool same(Rgba8 a, Rgba8 b) {
-  return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
-}
-
 }  // namespace
 
 glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 uv) {
@@ -68,9 +62,7 @@ glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 
   const std::array<Rgba8, 4> texels{texture.image.at(left, above), texture.image.at(right, above),
                                     texture.image.at(left, below), texture.image.at(right, below)};
   // Much of most textures is even.
-  if (same(texels[0], texels[1]) && same(texels[0], texels[2]) && same(texels[0], texels[3])) {
-    return decoded(texels[0], encoding);
-  }
+  if (texels[0] == texels[1] && texels[0] == texels[2] && texels[0] == texels[3]) return decoded(texels[0], encoding);
   const glm::dvec4 upper = decoded(texels[0], encoding) * (1.0 - fx) + decoded(texels[1], encoding) * fx;
   const glm::dvec4 lower = decoded(texels[2], encoding) * (1.0 - fx) + decoded(texels[3], encoding) * fx;
   return upper * (1.0 - fy) + lower * fy;

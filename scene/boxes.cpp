@@ -6,9 +6,13 @@
 namespace hpr {
 
 Bounds mesh_bounds(const Mesh& mesh) {
+  return bounds_of(mesh, mesh.triangles);
+}
+
+Bounds bounds_of(const Mesh& mesh, std::span<const glm::uvec3> triangles) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Bounds bounds{glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
-  for (const glm::uvec3& triangle : mesh.triangles) {
+  for (const glm::uvec3& triangle : triangles) {
     for (int corner = 0; corner < 3; ++corner) {
       const glm::dvec3 p(mesh.positions[triangle[corner]]);
       bounds.low = glm::min(bounds.low, p);

@@ -178,7 +178,7 @@ Requirements requirements_of(const Scene& scene) {
     needs.least_roughness = std::min(needs.least_roughness, least_roughness(scene, *material));
     needs.most_roughness = std::max(needs.most_roughness, material->roughness);
   }
-  needs.even_sky = lights == 1 && shines(scene.environment) && scene.environment->image.size().area() == 1;
+  needs.even_sky = lights == 1 && shines(scene.environment) && scene.environment->is_even();
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};

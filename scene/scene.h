@@ -125,6 +125,8 @@ struct Environment {
   /// Known where it was loaded.
   std::uint64_t not_finite = 0;
   std::size_t first_not_finite = 0;
+
+  [[nodiscard]] bool is_even() const { return image.size().area() == 1; }
 };
 
 struct PerspectiveLens {
