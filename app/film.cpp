@@ -62,14 +62,14 @@ void Film::set_counters(const Counters& counters) {
   weights_ = counters.weights;
 }
 
-void Film::add_tile(const SampleLight& light, double weight, std::size_t tile) {
+void Film::add_tile(const SampleLight& light, double weight, std::uint32_t number, std::size_t tile) {
   const auto sum_up = [&](TileLayer<ColorSum>& sums, const TileLayer<Rgb>& colors) {
     const std::span<const Rgb> from = colors.tile(tile);
     const std::span<ColorSum> to = sums.tile(tile);
     for (std::size_t i = 0; i < to.size(); ++i) add_to(to[i], from[i], weight);
     sums.set_active(tile);
   };
-  sum_up(halves_[samples_ % 2], light.radiance);
+  sum_up(halves_[number % 2], light.radiance);
   for (auto& [aov, sums] : means_) sum_up(sums, light.aovs.rgb.at(aov));
   if (cost_.tiles() > 0) {
     const std::span<const float> from = light.aovs.single.at(Aov::Cost).tile(tile);
@@ -77,17 +77,23 @@ void Film::add_tile(const SampleLight& light, double weight, std::size_t tile) {
     for (std::size_t i = 0; i < to.size(); ++i) to[i] += static_cast<double>(from[i]);
     cost_.set_active(tile);
   }
-  if (samples_ > 0) return;
+  if (number > 0) return;
   for (auto& [aov, layer] : first_.rgb) copy_tiles(light.aovs.rgb.at(aov), layer, {&tile, 1});
   for (auto& [aov, layer] : first_.single) copy_tiles(light.aovs.single.at(aov), layer, {&tile, 1});
   if (keeps_keys_) copy_tiles(light.keys, keys_, {&tile, 1});
 }
 
-void Film::add(const SampleLight& light, double weight, std::span<const std::size_t> tiles, int threads) {
-  HPR_CHECK(light.radiance.layout() == layout());
-  parallel_for(threads, tiles.size(), [&](std::size_t i) { add_tile(light, weight, tiles[i]); });
-  weights_[samples_ % 2] += weight;
-  ++samples_;
+void Film::add(std::span<const SampleLight> lights, std::span<const double> weights, std::span<const std::size_t> tiles,
+               int threads) {
+  HPR_CHECK(lights.size() == weights.size());
+  for (const SampleLight& light : lights) HPR_CHECK(light.radiance.layout() == layout());
+  // Tile by tile, as sums stay at hand.
+  parallel_for(threads, tiles.size(), [&](std::size_t i) {
+    for (std::size_t sample = 0; sample < lights.size(); ++sample) {
+      add_tile(lights[sample], weights[sample], samples_ + static_cast<std::uint32_t>(sample), tiles[i]);
+    }
+  });
+  for (const double weight : weights) weights_[samples_++ % 2] += weight;
 }
 
 void Film::resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rgb>& radiance, AovLayers& aovs) const {

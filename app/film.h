@@ -45,8 +45,9 @@ class Film {
   /// How many were added.
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
 
-  /// Adds sample number samples() for `tiles`.
-  void add(const SampleLight& light, double weight, std::span<const std::size_t> tiles, int threads);
+  /// Adds samples of the numbers from samples() on, each with its weight, for `tiles`.
+  void add(std::span<const SampleLight> lights, std::span<const double> weights, std::span<const std::size_t> tiles,
+           int threads);
 
   /// The means: weighted by their sum, which is not 0. Finite.
   void resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rgb>& radiance, AovLayers& aovs) const;
@@ -79,7 +80,7 @@ class Film {
   void set_counters(const Counters& counters);
 
  private:
-  void add_tile(const SampleLight& light, double weight, std::size_t tile);
+  void add_tile(const SampleLight& light, double weight, std::uint32_t number, std::size_t tile);
 
   std::array<TileLayer<ColorSum>, 2> halves_;
   std::map<Aov, TileLayer<ColorSum>> means_;

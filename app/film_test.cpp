@@ -30,6 +30,11 @@ struct Light {
   TileLayer<Key> keys;
 };
 
+void add_to(Film& film, const Light& light, double weight) {
+  const SampleLight sample = light.sample();
+  film.add({&sample, 1}, {&weight, 1}, all_tiles(film.layout()), 1);
+}
+
 Image<Rgb> mean_of(const Film& film) {
   TileLayer<Rgb> radiance(film.layout());
   AovLayers none;
@@ -43,7 +48,7 @@ TEST(Film, OneSampleComesBackBitByBit) {
   const Rgb color{0.1F, std::numeric_limits<float>::denorm_min(), 3e38F};
   light.fill(color);
   Film film(layout, {});
-  film.add(light.sample(), 1.0, all_tiles(layout), 1);
+  add_to(film, light, 1.0);
   const Image<Rgb> mean = mean_of(film);
   for (const Rgb& pixel : mean.pixels()) EXPECT_EQ(pixel, color);
 }
@@ -74,7 +79,7 @@ TEST(Film, AMillionSamplesLoseNothing) {
     const std::uint32_t value = steps();
     sum += value;
     light.radiance.at(0, 0, 0) = {tenth, static_cast<float>(value * kStep), 1e-30F};
-    film.add(light.sample(), 1.0, all_tiles(layout), 1);
+    add_to(film, light, 1.0);
   }
   const Rgb mean = mean_of(film).at(0, 0);
   EXPECT_EQ(film.samples(), std::uint32_t{kAll});
@@ -88,9 +93,9 @@ TEST(Film, WeightsCountAndTheirSumDivides) {
   Light light(layout);
   Film film(layout, {});
   light.fill({1.0F, 2.0F, 3.0F});
-  for (int i = 0; i < 3; ++i) film.add(light.sample(), 1.0, all_tiles(layout), 1);
+  for (int i = 0; i < 3; ++i) add_to(film, light, 1.0);
   light.fill({5.0F, 2.0F, 0.0F});
-  film.add(light.sample(), -1.0, all_tiles(layout), 1);
+  add_to(film, light, -1.0);
   EXPECT_EQ(mean_of(film).at(1, 1), (Rgb{-1.0F, 2.0F, 4.5F}));
 }
 
@@ -99,9 +104,9 @@ TEST(Film, MeansStayFinite) {
   Light light(layout);
   Film film(layout, {});
   light.fill({3e38F, 3e38F, 0.0F});
-  for (int i = 0; i < 3; ++i) film.add(light.sample(), 1.0, all_tiles(layout), 1);
+  for (int i = 0; i < 3; ++i) add_to(film, light, 1.0);
   light.fill({-3e38F, 0.0F, 0.0F});
-  film.add(light.sample(), -1.0, all_tiles(layout), 1);
+  add_to(film, light, -1.0);
   const Rgb mean = mean_of(film).at(0, 0);
   EXPECT_TRUE(std::isfinite(mean.r) && std::isfinite(mean.g));
   EXPECT_GT(mean.r, 3.4e38F);
@@ -124,7 +129,7 @@ TEST(Film, PartsAreMeansAndSurfacesAreTheFirstSamples) {
     light.aovs.single.at(Aov::Cost).at(0, 1, 0) = 2.0F * value;
     light.keys.at(0, 1, 0) = make_key(0.5F, static_cast<std::uint32_t>(i) + 40U);
     light.keys.set_active(0);
-    film.add(light.sample(), 1.0, all_tiles(layout), 1);
+    add_to(film, light, 1.0);
   }
   TileLayer<Rgb> radiance(layout);
   AovLayers aovs(layout, wanted);
@@ -152,7 +157,7 @@ TEST(Film, TheHalvesTellTheErrorOfTheMean) {
       }
       light.radiance.set_active(tile);
     }
-    film.add(light.sample(), 1.0, all_tiles(layout), 1);
+    add_to(film, light, 1.0);
   }
   const double expected = (1.0 / 12.0) / kSamples / (1.5 * 1.5 + 0.01);
   std::vector<double> found;

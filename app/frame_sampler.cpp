@@ -125,9 +125,9 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
     frames.push_back(make_frame(session_, plan_, looks.front().views, &taken, looks.front().sample));
   }
   scatter();
-  for (std::uint32_t i = 0; i < count; ++i) {
-    film_.add({frames[i].radiance, frames[i].aovs, *frames[i].keys}, weights[i], homes_->mine(), session_.threads());
-  }
+  std::vector<SampleLight> lights;
+  for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
+  film_.add(lights, weights, homes_->mine(), session_.threads());
   times_ += taken;
   frame_.keys = frames.back().keys;
 }

@@ -17,18 +17,14 @@ Sampler sampler_of(const TileWork& tile, const TileJob& job, int x, int y) {
           job.number.sample};
 }
 
-PathPoint first_point(const TileWork& tile, const TileJob& job, int x, int y, const SurfacePoint& surface,
-                      double share) {
-  const View& view = *job.view;
-  PathPoint point;
-  point.surface = surface;
+/// Sets a point whose surface is set, seen at pixel (x, y) of the tile.
+void start(const TileWork& tile, const TileJob& job, int x, int y, double share, PathPoint& point) {
   point.share = share;
   point.media = tile.eye_media;
-  point.throughput = share * left_after(point.media.here, glm::distance(view.eye, surface.position));
+  point.throughput = share * left_after(point.media.here, glm::distance(job.view->eye, point.surface.position));
   point.sampler = sampler_of(tile, job, x, y);
   point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
   prefetch_material(tile.scene, point.surface);
-  return point;
 }
 
 /// See find_first_points. Points are finished once all are found: by then the memory has what materials read.
@@ -61,8 +57,9 @@ class FirstPoints {
         }
         const Ray ray = ray_of(x, y);
         const WorldTriangle& triangle = tile_.triangles.load(tile_.surfaces, key_surface(job_.keys[pixel]));
-        points_.push_back(
-            first_point(tile_, job_, x, y, tile_.surfaces.meet(triangle, ray.origin, ray.direction), share));
+        PathPoint& point = points_.emplace_back();
+        point.surface = tile_.surfaces.meet(triangle, ray.origin, ray.direction);
+        start(tile_, job_, x, y, share, point);
       }
     }
   }
@@ -110,7 +107,11 @@ class FirstPoints {
       Sampler sampler = sampler_of(tile_, job_, x, y).branch(surface.surface);
       const double covered = left_[pixel] * coverage;
       const double share = covered * survival(covered, sampler);
-      if (share > 0.0) points_.push_back(first_point(tile_, job_, x, y, surface, share));
+      if (share > 0.0) {
+        PathPoint& point = points_.emplace_back();
+        point.surface = surface;
+        start(tile_, job_, x, y, share, point);
+      }
       left_[pixel] *= 1.0 - coverage;
       left_[pixel] *= survival(left_[pixel], sampler);
       return left_[pixel] > 0.0;

@@ -94,7 +94,7 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
     : scene(lit),
       settings(std::move(chosen)),
       space(lit.bounds),
-      surfaces(lit, space),
+      surfaces(lit, space, lifts_origins(plan_passes(requirements, settings), settings)),
       lights(lit, runs_pass(plan_passes(requirements, settings), "gather") ? EvenSky::LeftToRays : EvenSky::Sampled),
       media(lit),
       travelling(others) {

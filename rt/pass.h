@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -146,6 +147,9 @@ class Pass {
 
 /// All passes there are, in the order they run.
 [[nodiscard]] std::vector<std::unique_ptr<Pass>> make_all_passes();
+
+/// Whether a pass that runs sends rays from lifted origins, see SurfacePoint::lift.
+[[nodiscard]] bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings);
 
 [[nodiscard]] std::unique_ptr<Pass> make_shadow_pass();
 [[nodiscard]] std::unique_ptr<Pass> make_reflection_pass();

@@ -28,6 +28,10 @@ bool runs_pass(std::span<const PassPlan> plan, std::string_view name) {
   return std::ranges::any_of(plan, [&](const PassPlan& pass) { return pass.runs && pass.name == name; });
 }
 
+bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings) {
+  return runs_pass(plan, "ambient-occlusion") || (settings.terminator_fix && runs_pass(plan, "shadow"));
+}
+
 std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings) {
   const std::vector<std::string> names = all_pass_names();
   for (const std::string& wanted : settings.passes) {

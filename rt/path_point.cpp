@@ -32,12 +32,16 @@ void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
   double sum = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
     const bool ends = tile.follows_for_itself(point.bsdf, kLobes[i]) && point.followed >= tile.settings.max_depth;
+    if (point.depth == 0) {
+      point.may_follow[i] = !ends && point.bsdf.present(kLobes[i]);
+      point.follows[i] = point.may_follow[i] ? 1.0F : 0.0F;
+      continue;
+    }
     const double bright = ends ? 0.0 : brightness(point.throughput * point.bsdf.weight(kLobes[i]));
     point.may_follow[i] = bright > 0.0;
-    if (point.depth == 0 && point.may_follow[i]) point.follows[i] = 1.0F;
     sums[i] = sum += bright;
   }
-  if (point.depth == 0 || !(sum > 0.0)) return;
+  if (!(sum > 0.0)) return;
   const double chance = point.depth < kRouletteDepth ? 1.0 : std::min(sum, 1.0);
   const double u = point.sampler.one() / chance;
   if (!(u < 1.0)) return;
@@ -94,13 +98,12 @@ void add_sky(TileWork& tile, std::size_t i, const Follows& what) {
   tile.components[static_cast<std::size_t>(Component::Shadow)][from.pixel] -= sky;
 }
 
-/// The point that ray i reaches, but for what finish_point does.
-PathPoint reached_by(TileWork& tile, std::size_t i, const Follows& what) {
+/// Sets the point that ray i reaches, but for what finish_point does.
+void reach(TileWork& tile, std::size_t i, const Follows& what, PathPoint& reached) {
   const Following& ray = tile.following[i];
   const RayRequest& request = tile.requests[i];
   const PathPoint& from = *ray.from;
   const WorldTriangle& triangle = tile.triangles.load(tile.surfaces, tile.hits[i]);
-  PathPoint reached;
   reached.surface = tile.surfaces.meet(triangle, request.origin, request.direction);
   reached.throughput = ray.throughput;
   reached.media = media_towards(from.media, from.surface, from.material, request.direction);
@@ -113,7 +116,6 @@ PathPoint reached_by(TileWork& tile, std::size_t i, const Follows& what) {
   reached.followed = static_cast<std::uint16_t>(from.followed + (what.rest ? 0 : 1));
   reached.gathered = from.gathered || what.rest;
   reached.component = component_after(from, what.component);
-  return reached;
 }
 
 }  // namespace
@@ -163,7 +165,7 @@ void follow_lobe(TileWork& tile, const Wave& wave, const Follows& what, std::uin
   for (std::size_t i = 0; i < tile.following.size(); ++i) {
     add_sky(tile, i, what);
     if (tile.hits[i] == kNoSurface) continue;
-    next.push_back(reached_by(tile, i, what));
+    reach(tile, i, what, next.emplace_back());
     prefetch_material(tile.scene, next.back().surface);
   }
   // By now the memory has what materials read.

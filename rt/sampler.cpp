@@ -115,8 +115,19 @@ glm::dvec2 Sampler::two_of_pixel() {
 }
 
 glm::dvec2 Sampler::two_with_pixel() {
-  const std::uint32_t place = shuffled(index_, kPixelOrder);
-  return scrambled(sobol_reversed(kThird, place), sobol_reversed(kFourth, place), next_key());
+  // Before it is scrambled, a sample's pair is the same for all pixels.
+  struct Pair {
+    std::uint32_t index;
+    std::uint32_t third;
+    std::uint32_t fourth;
+  };
+  static thread_local Pair last{0, sobol_reversed(kThird, shuffled(0, kPixelOrder)),
+                                sobol_reversed(kFourth, shuffled(0, kPixelOrder))};
+  if (last.index != index_) {
+    const std::uint32_t place = shuffled(index_, kPixelOrder);
+    last = {index_, sobol_reversed(kThird, place), sobol_reversed(kFourth, place)};
+  }
+  return scrambled(last.third, last.fourth, next_key());
 }
 
 std::uint64_t Sampler::next_key() {

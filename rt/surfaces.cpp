@@ -61,7 +61,8 @@ double row_sum_norm(const glm::dmat3& m) {
 
 }  // namespace
 
-Surfaces::Surfaces(const Scene& scene, const RaySpace& space) : scene_(scene), space_(space) {
+Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
+    : scene_(scene), space_(space), lifts_(lifts) {
   std::vector<double> mesh_reach(scene.meshes.size(), 0.0);
   parts_.resize(scene.meshes.size());
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
@@ -177,15 +178,8 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
   point.shading_normal = side * smooth;
 
-  // Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, chapter 4: the origin is lifted to where the corners'
-  // tangent planes are, as far as they lie above the triangle.
-  const glm::dvec3 in_triangle = at.x * triangle.e1 + at.y * triangle.e2;
-  const std::array<glm::dvec3, 3> from_corner{in_triangle, in_triangle - triangle.e1, in_triangle - triangle.e2};
   const Weights weight{b0, at.x, at.y};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const glm::dvec3 normal = side * corner[i];
-    point.lift -= weight[i] * std::min(0.0, glm::dot(from_corner[i], normal)) * normal;
-  }
+  if (lifts_) lift(triangle, weight, side, point);
   point.offset = triangle.offset;
 
   const Mesh& mesh = scene_.mesh_of(scene_.instances[triangle.instance]);
@@ -205,6 +199,17 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   point.layer = layer_of(triangle, point.inside);
   if (scene_.materials[mesh.material].normal_texture.present()) add_tangents(triangle, weight, point);
   return point;
+}
+
+/// Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, chapter 4: the origin is lifted to where the corners'
+/// tangent planes are, as far as they lie above the triangle.
+void Surfaces::lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point) {
+  const glm::dvec3 in_triangle = weights[1] * triangle.e1 + weights[2] * triangle.e2;
+  const std::array<glm::dvec3, 3> from_corner{in_triangle, in_triangle - triangle.e1, in_triangle - triangle.e2};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3 normal = side * triangle.normals[i];
+    point.lift -= weights[i] * std::min(0.0, glm::dot(from_corner[i], normal)) * normal;
+  }
 }
 
 void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const {

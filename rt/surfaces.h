@@ -67,8 +67,8 @@ struct SurfacePoint {
 /// Surface ids -> triangles -> points. Keeps per instance what every one of its triangles needs.
 class Surfaces {
  public:
-  /// The scene must outlive this.
-  Surfaces(const Scene& scene, const RaySpace& space);
+  /// The scene must outlive this. Without `lifts` points have none, for whoever sends no shadow rays.
+  Surfaces(const Scene& scene, const RaySpace& space, bool lifts = true);
 
   /// Sets `triangle` to surface `id` unless it already is; neighbouring pixels mostly share theirs, or the instance.
   void load(std::uint32_t id, WorldTriangle& triangle) const;
@@ -86,6 +86,7 @@ class Surfaces {
   using Weights = std::array<double, 3>;
 
   [[nodiscard]] std::uint8_t layer_of(const WorldTriangle& triangle, bool inside) const;
+  static void lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point);
   void add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const;
 
   struct Placed {
@@ -98,6 +99,7 @@ class Surfaces {
 
   const Scene& scene_;
   RaySpace space_;
+  bool lifts_;
   std::vector<Placed> placed_;
   std::vector<std::vector<std::uint32_t>> parts_;  ///< [mesh][triangle]; empty but for those that cover in part
 };
@@ -107,13 +109,17 @@ class RecentTriangles {
  public:
   [[nodiscard]] const WorldTriangle& load(const Surfaces& surfaces, std::uint32_t id) {
     WorldTriangle& place = triangles_[id % kPlaces];
+    if (place.surface == id) return place;
+    place.instance = instance_;
     surfaces.load(id, place);
+    instance_ = place.instance;
     return place;
   }
 
  private:
   static constexpr std::size_t kPlaces = 512;
   std::vector<WorldTriangle> triangles_ = std::vector<WorldTriangle>(kPlaces);
+  std::uint32_t instance_ = 0;  ///< of the last one loaded, which the next mostly shares
 };
 
 }  // namespace hpr

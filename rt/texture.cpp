@@ -9,6 +9,10 @@ namespace {
 
 /// A coordinate brought into [0, 1] by the wrap mode, before it is scaled to texels: huge values lose nothing more.
 double wrapped(double coordinate, Wrap wrap) {
+  if (wrap == Wrap::Repeat && std::abs(coordinate) < 0x1p31) {
+    const double left = coordinate - static_cast<double>(static_cast<std::int64_t>(coordinate));
+    return left < 0.0 ? left + 1.0 : left;
+  }
   if (!std::isfinite(coordinate)) return 0.0;
   switch (wrap) {
     case Wrap::ClampToEdge:

@@ -53,7 +53,8 @@ class LongExposure {
     for (std::uint32_t i = 0; i < samples; ++i) {
       const std::size_t which = random_.below(kColors);
       const double weight = random_.one() < kNegative ? -1.0 : 1.0;
-      film_.add({samples_[which].radiance, samples_[which].aovs, samples_[which].keys}, weight, tile, 1);
+      const SampleLight light{samples_[which].radiance, samples_[which].aovs, samples_[which].keys};
+      film_.add({&light, 1}, {&weight, 1}, tile, 1);
       (weight < 0.0 ? negative_ : positive_).at(which) += 1;
     }
   }
