@@ -16,7 +16,7 @@ namespace hpr {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'H', 'P', 'R', 'C', 'K', 'P', 'T', '\n'};
-constexpr std::uint32_t kFormat = 1;
+constexpr std::uint32_t kFormat = 2;
 
 class Writer {
  public:
@@ -155,6 +155,8 @@ std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film
   const Film::Counters counters = film.counters();
   out.put(counters.samples);
   out.put(counters.weights);
+  out.put(progress.samples);
+  out.put(progress.budget);
   out.put(progress.seconds);
   out.put(progress.relmse.value_or(-1.0));
   film.each_layer([&](const auto& layer) { put_layer(out, layer); });
@@ -174,7 +176,10 @@ SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::st
   Film::Counters counters;
   counters.samples = in.get<std::uint32_t>();
   counters.weights = in.get<std::array<double, 2>>();
-  SampleProgress progress{counters.samples, in.get<double>(), {}};
+  SampleProgress progress;
+  progress.samples = in.get<std::uint32_t>();
+  progress.budget = in.get<std::uint32_t>();
+  progress.seconds = in.get<double>();
   if (const auto relmse = in.get<double>(); relmse >= 0.0) progress.relmse = relmse;
   film.each_layer([&](auto& layer) { get_layer(in, layer); });
   if (in.left() != 0) in.fail();

@@ -13,7 +13,7 @@ namespace hpr {
 namespace {
 
 const RunIdentity kIdentity{{"scene", "0123"}, {"seed", "1"}, {"filter", "box"}};
-const FilmContent kContent{{Aov::Id, Aov::Direct, Aov::Rank, Aov::Cost}, true};
+const FilmContent kContent{{Aov::Id, Aov::Direct, Aov::Rank, Aov::Cost}, true, 8};
 const FrameLayout kLayout({{100, 70}, {10, 10}});
 
 /// A film with something in every layer, and an empty tile.
@@ -37,7 +37,7 @@ Film some_film() {
 
 std::vector<std::byte> some_checkpoint() {
   Film film = some_film();
-  return encode_checkpoint(kIdentity, film, {17, 3.5, 0.25});
+  return encode_checkpoint(kIdentity, film, {15, 3.5, 0.25, 64});
 }
 
 /// What a checkpoint is refused with; empty when it is taken.
@@ -56,7 +56,9 @@ TEST(Checkpoint, GivesBackEveryBit) {
   const std::vector<std::byte> bytes = some_checkpoint();
   Film film(kLayout, kContent);
   const SampleProgress progress = decode_checkpoint(bytes, "a.checkpoint", kIdentity, film);
-  EXPECT_EQ(progress.samples, 17U);
+  EXPECT_EQ(progress.samples, 15U);
+  EXPECT_EQ(progress.budget, 64U);
+  EXPECT_EQ(film.samples(), 17U);
   EXPECT_EQ(progress.seconds, 3.5);
   EXPECT_EQ(progress.relmse, 0.25);
   EXPECT_EQ(film.counters().weights[1], 9.0);
@@ -85,8 +87,8 @@ TEST(Checkpoint, TheErrorNamesWhatDiffers) {
 
 TEST(Checkpoint, OtherFormatsAreNamed) {
   std::vector<std::byte> bytes = some_checkpoint();
-  bytes[8] = std::byte{2};
-  EXPECT_NE(refusal(bytes).find("format 2"), std::string::npos);
+  bytes[8] = std::byte{1};
+  EXPECT_NE(refusal(bytes).find("format 1"), std::string::npos);
   EXPECT_NE(refusal(std::as_bytes(std::span("no checkpoint at all"))).find("not a checkpoint"), std::string::npos);
 }
 

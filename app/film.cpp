@@ -31,6 +31,11 @@ float to_float(double value) {
   return static_cast<float>(std::clamp(value, -kLargest, kLargest));
 }
 
+double length2(const Rgb& color) {
+  const auto square = [](float value) { return static_cast<double>(value) * static_cast<double>(value); };
+  return square(color.r) + square(color.g) + square(color.b);
+}
+
 double squared_error(double even, double odd, const std::array<double, 2>& weights) {
   const double half = 0.5 * (even / weights[0] - odd / weights[1]);
   const double mean = (even + odd) / (weights[0] + weights[1]);
@@ -40,7 +45,9 @@ double squared_error(double even, double odd, const std::array<double, 2>& weigh
 }  // namespace
 
 Film::Film(const FrameLayout& layout, const FilmContent& content)
-    : halves_{TileLayer<ColorSum>(layout), TileLayer<ColorSum>(layout)}, keeps_keys_(content.keys) {
+    : halves_{TileLayer<ColorSum>(layout), TileLayer<ColorSum>(layout)},
+      keeps_keys_(content.keys),
+      pilot_(content.pilot) {
   std::vector<Aov> first;
   for (const Aov aov : content.aovs) {
     if (is_mean(aov)) {
@@ -55,6 +62,7 @@ Film::Film(const FrameLayout& layout, const FilmContent& content)
   }
   first_ = AovLayers(layout, first);
   if (keeps_keys_) keys_ = TileLayer<Key>(layout);
+  if (is_adaptive()) pixel_samples_ = TileLayer<PixelSamples>(layout);
 }
 
 void Film::set_counters(const Counters& counters) {
@@ -62,11 +70,19 @@ void Film::set_counters(const Counters& counters) {
   weights_ = counters.weights;
 }
 
-void Film::add_tile(const SampleLight& light, double weight, std::uint32_t number, std::size_t tile) {
+void Film::add_tile(const SampleLight& light, double weight, std::uint32_t number, std::size_t tile,
+                    std::span<const std::uint16_t> due) {
+  const auto each_due = [&](const auto& body) {
+    if (is_adaptive()) {
+      for (const std::uint16_t i : due) body(i);
+    } else {
+      for (std::size_t i = 0; i < kTilePixels; ++i) body(i);
+    }
+  };
   const auto sum_up = [&](TileLayer<ColorSum>& sums, const TileLayer<Rgb>& colors) {
     const std::span<const Rgb> from = colors.tile(tile);
     const std::span<ColorSum> to = sums.tile(tile);
-    for (std::size_t i = 0; i < to.size(); ++i) add_to(to[i], from[i], weight);
+    each_due([&](std::size_t i) { add_to(to[i], from[i], weight); });
     sums.set_active(tile);
   };
   sum_up(halves_[number % 2], light.radiance);
@@ -74,8 +90,18 @@ void Film::add_tile(const SampleLight& light, double weight, std::uint32_t numbe
   if (cost_.tiles() > 0) {
     const std::span<const float> from = light.aovs.single.at(Aov::Cost).tile(tile);
     const std::span<double> to = cost_.tile(tile);
-    for (std::size_t i = 0; i < to.size(); ++i) to[i] += static_cast<double>(from[i]);
+    each_due([&](std::size_t i) { to[i] += static_cast<double>(from[i]); });
     cost_.set_active(tile);
+  }
+  if (is_adaptive()) {
+    const std::span<const Rgb> from = light.radiance.tile(tile);
+    const std::span<PixelSamples> pixels = pixel_samples_.tile(tile);
+    each_due([&](std::size_t i) {
+      pixels[i].weights[number % 2] += weight;
+      pixels[i].squares += weight * length2(from[i]);
+      ++pixels[i].taken;
+    });
+    pixel_samples_.set_active(tile);
   }
   if (number > 0) return;
   for (auto& [aov, layer] : first_.rgb) copy_tiles(light.aovs.rgb.at(aov), layer, {&tile, 1});
@@ -89,37 +115,43 @@ void Film::add(std::span<const SampleLight> lights, std::span<const double> weig
   for (const SampleLight& light : lights) HPR_CHECK(light.radiance.layout() == layout());
   // Tile by tile, as sums stay at hand.
   parallel_for(threads, tiles.size(), [&](std::size_t i) {
+    const std::vector<std::uint16_t> due = due_pixels(tiles[i]);
     for (std::size_t sample = 0; sample < lights.size(); ++sample) {
-      add_tile(lights[sample], weights[sample], samples_ + static_cast<std::uint32_t>(sample), tiles[i]);
+      add_tile(lights[sample], weights[sample], samples_ + static_cast<std::uint32_t>(sample), tiles[i], due);
     }
   });
   for (const double weight : weights) weights_[samples_++ % 2] += weight;
 }
 
 void Film::resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rgb>& radiance, AovLayers& aovs) const {
-  const double weights = weights_[0] + weights_[1];
-  HPR_CHECK(weights != 0.0);
-  const auto mean = [&](double sum) { return to_float(sum / weights); };
+  HPR_CHECK(weights_[0] + weights_[1] != 0.0);
   parallel_for(threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
+    const auto each = [&](auto& layer, const auto& value) {
+      const auto to = layer.tile(tile);
+      for (std::size_t pixel = 0; pixel < to.size(); ++pixel) to[pixel] = value(pixel);
+      layer.set_active(tile);
+    };
+    const auto mean = [&](std::size_t pixel, const ColorSum& sum) {
+      const std::array<double, 2>& halves = weights_at(tile, pixel);
+      const double weights = halves[0] + halves[1];
+      return Rgb{to_float(sum.r / weights), to_float(sum.g / weights), to_float(sum.b / weights)};
+    };
     const std::span<const ColorSum> even = halves_[0].tile(tile);
     const std::span<const ColorSum> odd = halves_[1].tile(tile);
-    std::ranges::transform(even, odd, radiance.tile(tile).begin(), [&](const ColorSum& a, const ColorSum& b) {
-      return Rgb{mean(a.r + b.r), mean(a.g + b.g), mean(a.b + b.b)};
+    each(radiance, [&](std::size_t pixel) {
+      const ColorSum& a = even[pixel];
+      const ColorSum& b = odd[pixel];
+      return mean(pixel, {a.r + b.r, a.g + b.g, a.b + b.b});
     });
-    radiance.set_active(tile);
     for (const auto& [aov, sums] : means_) {
-      TileLayer<Rgb>& to = aovs.rgb.at(aov);
-      std::ranges::transform(sums.tile(tile), to.tile(tile).begin(), [&](const ColorSum& sum) {
-        return Rgb{mean(sum.r), mean(sum.g), mean(sum.b)};
-      });
-      to.set_active(tile);
+      each(aovs.rgb.at(aov), [&](std::size_t pixel) { return mean(pixel, sums.tile(tile)[pixel]); });
     }
     if (cost_.tiles() > 0) {
-      TileLayer<float>& to = aovs.single.at(Aov::Cost);
-      std::ranges::transform(cost_.tile(tile), to.tile(tile).begin(),
-                             [&](double sum) { return to_float(sum / static_cast<double>(samples_)); });
-      to.set_active(tile);
+      each(aovs.single.at(Aov::Cost), [&](std::size_t pixel) {
+        const std::uint32_t samples = is_adaptive() ? pixel_samples_.tile(tile)[pixel].taken : samples_;
+        return to_float(cost_.tile(tile)[pixel] / static_cast<double>(samples));
+      });
     }
     for (const auto& [aov, layer] : first_.rgb) copy_tiles(layer, aovs.rgb.at(aov), {&tile, 1});
     for (const auto& [aov, layer] : first_.single) copy_tiles(layer, aovs.single.at(aov), {&tile, 1});
@@ -133,12 +165,49 @@ std::vector<double> Film::squared_errors(std::span<const std::size_t> tiles, int
     const std::span<const ColorSum> even = halves_[0].tile(tiles[i]);
     const std::span<const ColorSum> odd = halves_[1].tile(tiles[i]);
     for (std::size_t pixel = 0; pixel < even.size(); ++pixel) {
-      errors[i] += squared_error(even[pixel].r, odd[pixel].r, weights_) +
-                   squared_error(even[pixel].g, odd[pixel].g, weights_) +
-                   squared_error(even[pixel].b, odd[pixel].b, weights_);
+      const std::array<double, 2>& weights = weights_at(tiles[i], pixel);
+      errors[i] += squared_error(even[pixel].r, odd[pixel].r, weights) +
+                   squared_error(even[pixel].g, odd[pixel].g, weights) +
+                   squared_error(even[pixel].b, odd[pixel].b, weights);
     }
   });
   return errors;
+}
+
+std::vector<std::uint16_t> Film::due_pixels(std::size_t tile) const {
+  std::vector<std::uint16_t> due;
+  if (!is_adaptive()) return due;
+  const std::span<const PixelSamples> pixels = pixel_samples_.tile(tile);
+  for (std::size_t i = 0; i < kTilePixels; ++i) {
+    if (is_due(pixels[i])) due.push_back(static_cast<std::uint16_t>(i));
+  }
+  return due;
+}
+
+void Film::mark_due(std::span<const std::size_t> tiles, PixelMask& due) const {
+  for (const std::size_t tile : tiles) {
+    std::ranges::transform(pixel_samples_.tile(tile), due.tile(tile).begin(),
+                           [&](const PixelSamples& pixel) { return static_cast<std::uint8_t>(is_due(pixel) ? 1 : 0); });
+    due.set_active(tile);
+  }
+}
+
+std::vector<double> Film::variances(std::size_t tile) const {
+  constexpr double kRounding = 1e-10;
+  const std::span<const ColorSum> even = halves_[0].tile(tile);
+  const std::span<const ColorSum> odd = halves_[1].tile(tile);
+  std::vector<double> variances(kTilePixels, 0.0);
+  for (std::size_t i = 0; i < kTilePixels; ++i) {
+    const PixelSamples& pixel = pixel_samples_.tile(tile)[i];
+    const double weights = pixel.weights[0] + pixel.weights[1];
+    if (!(weights > 0.0)) continue;
+    const ColorSum mean{(even[i].r + odd[i].r) / weights, (even[i].g + odd[i].g) / weights,
+                        (even[i].b + odd[i].b) / weights};
+    const double squared = mean.r * mean.r + mean.g * mean.g + mean.b * mean.b;
+    const double variance = pixel.squares / weights - squared;
+    if (variance > kRounding * squared) variances[i] = variance / (squared / 3.0 + kRelativeFloor);
+  }
+  return variances;
 }
 
 double estimated_relmse(Communicator& comm, const Film& film, std::span<const std::size_t> tiles, int threads) {

@@ -175,5 +175,19 @@ TEST(Film, TheHalvesTellTheErrorOfTheMean) {
   EXPECT_EQ(found.at(0), found.at(1)) << "ranks change its bits";
 }
 
+TEST(Film, VariancesAreThoseOfSamplesRelativeToTheirMean) {
+  const FrameLayout layout({{2, 1}});
+  Film film(layout, {{}, false, 8});
+  Light light(layout);
+  for (int i = 0; i < 8; ++i) {
+    light.fill({0.25F, 0.25F, 0.25F});
+    light.radiance.at(0, 1, 0) = i % 2 == 0 ? Rgb{1.0F, 1.0F, 1.0F} : Rgb{3.0F, 3.0F, 3.0F};
+    add_to(film, light, 1.0);
+  }
+  const std::vector<double> variances = film.variances(0);
+  EXPECT_EQ(variances[0], 0.0);
+  EXPECT_NEAR(variances[1], 3.0 / (4.0 + 0.01), 1e-12);
+}
+
 }  // namespace
 }  // namespace hpr

@@ -62,7 +62,9 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
     std::vector<View> views;
     views.reserve(looks.size());
     for (const FrameLook& look : looks) views.push_back(look.views[screen]);
-    rays.draw(views, screen, parts, keys);
+    // Ranks that draw for others do not know what those want.
+    const bool draws_own = session.comm().size() == 1 || plan.distribution == Distribution::SortFirst;
+    rays.draw(views, screen, parts, keys, draws_own ? looks.front().sample.wanted : nullptr);
     stats += rays.stats();
   }
   return stats;
@@ -147,18 +149,18 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
 }
 
 FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
-                      const SampleNumber& number) {
-  const FrameLook look{{views.begin(), views.end()}, {number, nullptr}};
+                      const FrameSample& sample) {
+  const FrameLook look{{views.begin(), views.end()}, sample};
   TileLayer<Key>* const layer = &keys;
   FrameTimes taken = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
 
   if (spends_light(plan)) {
     const trace::Span photons("photons");
-    session.lighter(plan.rays).send_photons(session.comm(), number);
+    session.lighter(plan.rays).send_photons(session.comm(), sample.number);
   }
   if (plan.shading == Shading::Local) {
     const trace::Span shading("light");
-    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, number);
+    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
     add_light(session.lighter(plan.rays), taken);
   }
   return taken;
@@ -169,7 +171,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   const trace::Span span("sample", "number", sample.number.sample);
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
   keys.set_depth_format(plan.depth_format);
-  FrameTimes taken = draw_layer(session, plan, views, keys, sample.number);
+  FrameTimes taken = draw_layer(session, plan, views, keys, sample);
 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
@@ -185,7 +187,8 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   } else if (plan.lit) {
     const trace::Span light("light");
     Lighter& lighter = session.lighter(plan.rays);
-    lighter.light(views, keys, frame.owned, frame.aovs.output(frame.radiance), sample.number);
+    const LitSample lit{views, &keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
+    lighter.light(std::span(&lit, 1), frame.owned);
     mark_rank(session, frame);
     add_light(lighter, taken);
   }
@@ -221,7 +224,8 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
     if (looks[i].sample.homes != nullptr) bring_home(session, plan, *looks[i].sample.homes, frames.back());
   }
   for (std::size_t i = 0; i < looks.size(); ++i) {
-    samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, looks[i].sample.number});
+    const FrameSample& sample = looks[i].sample;
+    samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});
   }
   const trace::Span light("light");
   Lighter& lighter = session.lighter(plan.rays);

@@ -92,6 +92,7 @@ void prepare(Session& session, const FramePlan& plan);
 struct FrameSample {
   SampleNumber number;
   std::optional<TileHomes>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
+  const PixelMask* wanted = nullptr;          ///< pixels that are lit; null: all. Others' radiance means nothing
 };
 
 /// One of several samples that are drawn together.
@@ -102,20 +103,20 @@ struct FrameLook {
 
 /// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
-/// The same by rays, for several looks together, a layer each. Returns what it took.
+/// The same by rays, for several looks together, a layer each; all want the same pixels. Returns what it took.
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                               std::span<TileLayer<Key>* const> keys);
 
 /// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
 /// lit if shading is local. Returns what that took.
 FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
-                      const SampleNumber& number = {});
+                      const FrameSample& sample = {});
 
 /// How many samples of a plan may be drawn together: 1 where they are composited, or each asks for light of its own.
 [[nodiscard]] std::size_t most_in_round(Session& session, const FramePlan& plan);
 
 /// Collective: several samples step by step together, to the bit what make_frame gives one by one. What rays and lights
-/// look up for one sample is at hand for the next. At least one and at most most_in_round().
+/// look up for one sample is at hand for the next. At least one and at most most_in_round(); all want the same pixels.
 [[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                                             FrameTimes& times);
 

@@ -47,12 +47,19 @@ FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampli
       plan_(plan),
       sampling_(sampling),
       number_(frame),
-      film_(sampling.sums() ? plan.layout : FrameLayout(), {plan.aovs, keeps_keys}),
-      keeps_keys_(sampling.sums() && film_.keys().tiles() > 0) {}
+      film_(sampling.sums() ? plan.layout : FrameLayout(),
+            {plan.aovs, keeps_keys, sampling.adaptive ? AdaptiveSampling::pilot_of(sampling) : 0}),
+      keeps_keys_(sampling.sums() && film_.keys().tiles() > 0) {
+  if (!film_.is_adaptive()) return;
+  adaptive_.emplace(sampling);
+  due_ = PixelMask(film_.layout());
+}
 
 void FrameSampler::load(const CheckpointSettings& checkpoint) {
   struct Start {
     Film::Counters counters;
+    std::uint32_t samples = 0;
+    std::uint32_t budget = 0;
     double seconds = 0.0;
     double relmse = -1.0;
   };
@@ -60,7 +67,7 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
   check_on_root(session_.comm(), [&] {
     const auto bytes = read_file(checkpoint.path, std::numeric_limits<std::uint64_t>::max());
     const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity, film_);
-    start = {film_.counters(), found.seconds, found.relmse.value_or(-1.0)};
+    start = {film_.counters(), found.samples, found.budget, found.seconds, found.relmse.value_or(-1.0)};
     if (checkpoint.takes_more || found.samples <= sampling_.goal.samples.value_or(found.samples)) return;
     throw Error(ExitCode::BadInput,
                 fmt::format("{}: the checkpoint holds {} samples, more than the {} asked for", checkpoint.path.string(),
@@ -69,8 +76,10 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
   });
   start = all_gather_value(session_.comm(), start).front();
   film_.set_counters(start.counters);
-  so_far_ = {start.counters.samples, start.seconds, {}};
+  so_far_ = {start.samples, start.seconds, {}, start.budget};
   if (start.relmse >= 0.0) so_far_.relmse = start.relmse;
+  if (adaptive_) adaptive_->resume(session_.comm(), so_far_, film_, tiles());
+  resumed_ = so_far_.samples;
   scattered_ = false;
   if (session_.rank() == 0) log::info("going on after {} samples", so_far_.samples);
 }
@@ -100,7 +109,7 @@ bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
 
 FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
   const FilterSample through = look_through(sampling_, {plan_.rays.seed, number_}, number);
-  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_}};
+  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, nullptr}};
   for (View& view : look.views) view.jitter = through.offset;
   weight = through.weight;
   return look;
@@ -113,10 +122,30 @@ void FrameSampler::scatter() {
   });
 }
 
+/// What rank 0 has of a checkpoint is all its own until tiles have their homes.
+std::vector<std::size_t> FrameSampler::tiles() const {
+  if (homes_ && scattered_) return homes_->mine();
+  return session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
+}
+
+/// The first samples after a checkpoint was read are drawn for all pixels: where those will be is not known yet.
+const PixelMask* FrameSampler::choose_pixels() {
+  if (!adaptive_) return nullptr;
+  if (adaptive_->is_stage_done()) adaptive_->deal(session_.comm(), film_, tiles(), session_.threads());
+  if (film_.samples() < film_.pilot() || !homes_ || !scattered_) return nullptr;
+  film_.mark_due(homes_->mine(), due_);
+  return &due_;
+}
+
 void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count) {
+  const PixelMask* const wanted = choose_pixels();
+  if (adaptive_) count = std::min(count, adaptive_->most_together());
   std::vector<FrameLook> looks;
   std::vector<double> weights(count);
-  for (std::uint32_t i = 0; i < count; ++i) looks.push_back(look(views, film_.samples() + i, weights[i]));
+  for (std::uint32_t i = 0; i < count; ++i) {
+    looks.push_back(look(views, film_.samples() + i, weights[i]));
+    looks.back().sample.wanted = wanted;
+  }
   FrameTimes taken;
   std::vector<Frame> frames;
   if (count > 1) {
@@ -128,8 +157,21 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   std::vector<SampleLight> lights;
   for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
   film_.add(lights, weights, homes_->mine(), session_.threads());
+  if (adaptive_) adaptive_->added(count, film_);
   times_ += taken;
   frame_.keys = frames.back().keys;
+}
+
+void FrameSampler::tell_progress(double seconds) {
+  so_far_.samples = adaptive_ ? adaptive_->samples() : film_.samples();
+  if (adaptive_) {
+    so_far_.budget = adaptive_->budget();
+    times_.samples = static_cast<int>(so_far_.samples - resumed_);
+  }
+  so_far_.seconds = seconds;
+  const bool milestone = adaptive_ ? adaptive_->at_milestone() : is_milestone(film_.samples());
+  if (!milestone || so_far_.samples < 2) return;
+  so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
 }
 
 /// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be
@@ -139,7 +181,7 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
   constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
   const std::uint32_t done = so_far_.samples;
   auto most = static_cast<double>(most_in_round(session_, plan_));
-  if (sampling_.goal.samples) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
+  if (sampling_.goal.samples && !adaptive_) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
   if (done > 0) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
     most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
@@ -148,6 +190,7 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
     most = 1.0;
   }
   const auto limit = static_cast<std::uint32_t>(std::max(most, 1.0));
+  if (adaptive_) return limit;  // add_samples() ends it where another step begins
   std::uint32_t last = limit;
   for (std::uint32_t count = limit; count > 0; --count) {
     if (!is_milestone(done + count)) continue;
@@ -174,11 +217,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     // One signal reaches the ranks of a job one by one, maybe in different samples.
     if (request == Request::Write && written && written->ms() < 1000.0) request = Request::None;
     const Word word = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
-    so_far_.samples = film_.samples();
-    so_far_.seconds = word.seconds;
-    if (is_milestone(so_far_.samples) && so_far_.samples > 1) {
-      so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
-    }
+    tell_progress(word.seconds);
     progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
     if (word.request == Request::None || reached(sampling_, so_far_)) continue;
     progress.end();
@@ -195,11 +234,7 @@ void FrameSampler::refine(std::span<const View> views) {
     const Stopwatch watch;
     add_samples(views, 1);
     const double seconds = so_far_.seconds + 1e-3 * watch.ms();
-    so_far_.seconds = agree(session_.comm(), {Request::None, seconds}).seconds;
-    so_far_.samples = film_.samples();
-    if (is_milestone(so_far_.samples) && so_far_.samples > 1) {
-      so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
-    }
+    tell_progress(agree(session_.comm(), {Request::None, seconds}).seconds);
   }
   finish();
 }

@@ -3,6 +3,7 @@
 #include <optional>
 #include <span>
 
+#include "app/adaptive.h"
 #include "app/checkpoint.h"
 #include "app/film.h"
 #include "app/frame.h"
@@ -45,6 +46,12 @@ class FrameSampler {
   /// After the first sample drawn since a checkpoint was read: sums go to where their tiles are lit.
   void scatter();
   [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);
+  /// This rank's tiles.
+  [[nodiscard]] std::vector<std::size_t> tiles() const;
+  /// Before samples are drawn: which pixels they are for; null: all.
+  [[nodiscard]] const PixelMask* choose_pixels();
+  /// How far it has come, after samples were added.
+  void tell_progress(double seconds);
   void finish();
 
   Session& session_;
@@ -52,8 +59,11 @@ class FrameSampler {
   Sampling sampling_;
   std::uint64_t number_;
   Film film_;
+  std::optional<AdaptiveSampling> adaptive_;
+  PixelMask due_;  ///< for the samples at hand
   bool keeps_keys_;
-  bool scattered_ = true;  ///< false: rank 0 alone has the sums of a checkpoint
+  std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
+  bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint
   std::optional<TileHomes> homes_;
   SampleProgress so_far_;
   Frame frame_;

@@ -167,6 +167,7 @@ void RenderOptions::declare_light(CLI::App& app) {
   app.add_option("--quality", quality, "draft, good or best: what the options of light are that are not given")
       ->capture_default_str();
   app.add_option("--spp", spp, "samples of a pixel: a number, until:60s or until:relmse=1e-3")->type_name("N");
+  app.add_flag("--adaptive", adaptive, "more samples for pixels whose samples differ more, --spp of them on average");
   app.add_option("--filter", filter,
                  "how samples make up a pixel: box, triangle, gaussian, b-spline or mitchell (default: the centre for "
                  "one sample, box for more)");
@@ -265,6 +266,7 @@ Sampling RenderOptions::sampling() const {
   Sampling sampling;
   sampling.goal = spp ? parse_sample_goal(*spp) : parse_sample_goal(std::to_string(find_quality(quality).samples));
   if (!filter.empty()) sampling.filter = parse_pixel_filter(filter);
+  sampling.adaptive = adaptive && sampling.sums();
   check_sampling(sampling);
   return sampling;
 }
@@ -331,6 +333,11 @@ void RenderOptions::check_combination(const FrameSettings& settings) const {
   if (reference && (splits || settings.shading == Shading::Local)) {
     throw Error(ExitCode::Usage, "--reference has no light of its own passes to show or to composite",
                 "with it, use --shading deferred and of --aov only depth, id and rank");
+  }
+  const bool shares_light = !half_resolution.empty() && half_resolution != "none";
+  if (adaptive && (settings.shading == Shading::Local || shares_light)) {
+    throw Error(ExitCode::Usage, "--adaptive lights pixels one by one, as --shading local and --half-resolution do not",
+                "use it without them");
   }
   if (!settings.aovs.empty() && settings.shading == Shading::Local) {
     throw Error(ExitCode::Usage, "--aov needs surfaces, which --shading local replaces by colours",

@@ -34,6 +34,7 @@ struct RenderOptions {
   double resolution_scale = 1.0;  ///< of the pixels a side
   std::string half_resolution;    ///< passes
   std::string filter;
+  bool adaptive = false;
   std::string aov;
   std::string environment;
   bool reference = false;

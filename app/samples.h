@@ -27,6 +27,7 @@ struct SampleGoal {
 struct Sampling {
   SampleGoal goal;
   std::optional<PixelFilter> filter;  ///< none: box for several samples, the pixel's centre for one
+  bool adaptive = false;              ///< more samples for pixels whose samples differ more, as many on average
 
   /// Whether frames are summed at all.
   [[nodiscard]] bool sums() const { return !goal.one() || filter.has_value(); }
@@ -48,6 +49,7 @@ struct SampleProgress {
   std::uint32_t samples = 0;
   double seconds = 0.0;          ///< since the first sample began, interruptions left out
   std::optional<double> relmse;  ///< at the last milestone
+  std::uint32_t budget = 0;      ///< adaptive: samples there will be at the end of the stage at hand
 };
 
 /// Whether the goal is reached. No goal is before a filter has the samples it needs, and a relative error is believed

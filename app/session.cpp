@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/parallel.h"
 #include "core/trace.h"
 #include "scene/surface_ranges.h"
 
@@ -202,7 +203,7 @@ std::span<TileLayer<Key>> Session::round_keys(const FrameLayout& layout, std::si
   while (round_keys_.size() < count) round_keys_.emplace_back(layout);
   while (round_keys_.size() > std::max<std::size_t>(count, 2)) round_keys_.pop_back();
   const std::span<TileLayer<Key>> layers = std::span(round_keys_).first(count);
-  for (TileLayer<Key>& layer : layers) layer.clear();
+  parallel_for(threads(), layers.size(), [&](std::size_t i) { layers[i].clear(); });
   return layers;
 }
 

@@ -198,6 +198,14 @@ class TileLayer {
   DepthFormat depth_format_ = DepthFormat::Float32;
 };
 
+/// 1 at the pixels somebody is to work at. Tiles that are not active: at all of them.
+using PixelMask = TileLayer<std::uint8_t>;
+
+/// A tile of a mask; empty where all pixels are meant.
+[[nodiscard]] inline std::span<const std::uint8_t> mask_of(const PixelMask* mask, std::size_t tile) {
+  return mask != nullptr && mask->active(tile) ? mask->tile(tile) : std::span<const std::uint8_t>();
+}
+
 /// Every tile of a frame.
 [[nodiscard]] std::vector<std::size_t> all_tiles(const FrameLayout& layout);
 

@@ -49,7 +49,7 @@ class FirstPoints {
       for (int x = 0; x < job_.place.width(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         const double share = left_.empty() ? 1.0 : left_[pixel];
-        if (!(share > 0.0)) continue;
+        if (!(share > 0.0) || !job_.wants(pixel)) continue;
         if (job_.keys[pixel] == kNoKey) {
           const glm::dvec3 light = even ? *even : tile_.lights.environment(glm::normalize(ray_of(x, y).direction));
           tile_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, share * light);
@@ -83,6 +83,7 @@ class FirstPoints {
     for (int y = rows_.first; y < rows_.end; ++y) {
       for (int x = 0; x < job_.place.width(); ++x) {
         const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
+        if (!job_.wants(pixel)) continue;
         const Ray ray = ray_of(x, y);
         RayRequest request;
         request.origin = ray.origin + ray.direction * job_.view->near_distance;
@@ -127,6 +128,17 @@ class FirstPoints {
 };
 
 }  // namespace
+
+int end_of_wave(const TileJob& job, int first) {
+  if (job.wanted.empty()) return std::min(first + static_cast<int>(kWavePoints) / kTileSide, job.place.height());
+  std::size_t points = 0;
+  int row = first;
+  do {
+    const auto pixels = job.wanted.subspan(static_cast<std::size_t>(row) * kTileSide, kTileSide);
+    points += static_cast<std::size_t>(std::ranges::count(pixels, std::uint8_t{1}));
+  } while (++row < job.place.height() && points + kTileSide <= kWavePoints);
+  return row;
+}
 
 void find_first_points(TileWork& tile, const TileJob& job, const RowRange& rows, std::vector<PathPoint>& points) {
   FirstPoints(tile, job, rows, points).find();

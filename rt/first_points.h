@@ -15,7 +15,10 @@ struct TileJob {
   SampleNumber number;
   std::span<const Key> keys;
   const View* view = nullptr;
-  std::uint32_t first_pixel = 0;  ///< of TileWork's: those of other samples come before
+  std::uint32_t first_pixel = 0;              ///< of TileWork's: those of other samples come before
+  std::span<const std::uint8_t> wanted = {};  ///< 1 at the pixels that are lit; empty: all
+
+  [[nodiscard]] bool wants(std::size_t pixel) const { return wanted.empty() || wanted[pixel] != 0; }
 };
 
 /// Rows of a tile, from its own first one.
@@ -23,6 +26,12 @@ struct RowRange {
   int first = 0;
   int end = 0;
 };
+
+/// Points that are worked on together: enough to fill packets, few enough for the second-level cache.
+inline constexpr std::size_t kWavePoints = 512;
+
+/// Past the last of the rows, `first` and on, whose pixels make a wave.
+[[nodiscard]] int end_of_wave(const TileJob& job, int first);
 
 /// The first generation of points in some rows of a tile: the surfaces its keys name, and those of partial coverage
 /// before them, each with the share of the pixel it covers. Adds the background where neither is.

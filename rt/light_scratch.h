@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
 #include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -9,10 +12,6 @@
 #include "rt/pass.h"
 
 namespace hpr {
-
-/// Points that are worked on together: enough to fill packets, few enough for the second-level cache.
-inline constexpr std::size_t kWavePoints = 512;
-inline constexpr int kRowsAtOnce = static_cast<int>(kWavePoints) / kTileSide;
 
 /// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
 struct Scratch {
@@ -23,6 +22,18 @@ struct Scratch {
   Wave wave;
   std::vector<double> ms;
 };
+
+/// Sums of so many pixels, tile after tile, made 0 where they are wanted, which is everywhere when the mask is empty.
+inline void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::span<const std::uint8_t> wanted) {
+  if (wanted.empty()) {
+    sums.assign(pixels, glm::dvec3(0.0));
+    return;
+  }
+  sums.resize(pixels);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    if (wanted[pixel % kTilePixels] != 0) sums[pixel] = glm::dvec3(0.0);
+  }
+}
 
 /// While rays travel, more threads wait for theirs than there are: of the time that was spent, each step has its share.
 inline void share_out(double spent_ms, std::vector<double>& ms) {

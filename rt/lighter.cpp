@@ -76,8 +76,7 @@ struct Lighter::State {
   void for_each(std::size_t count, const std::function<void(std::size_t)>& body) const;
   /// What rays meet that decide about coverage themselves.
   const RayScene& whole_scene();
-  void trace_reference(std::span<const View> views, std::span<const std::size_t> tiles, const LightOutput& output,
-                       const SampleNumber& number);
+  void trace_reference(const LitSample& sample, std::span<const std::size_t> tiles);
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   void tell_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
@@ -162,10 +161,9 @@ const RayScene& Lighter::State::whole_scene() {
   return whole ? *whole : build(whole, {SurfaceRange{0, scene.triangles}});
 }
 
-void Lighter::State::trace_reference(std::span<const View> views, std::span<const std::size_t> tiles,
-                                     const LightOutput& output, const SampleNumber& number) {
+void Lighter::State::trace_reference(const LitSample& sample, std::span<const std::size_t> tiles) {
   const Stopwatch watch;
-  reference->trace(views, tiles, number, *output.radiance);
+  reference->trace(sample.views, tiles, sample.number, *sample.output.radiance, sample.wanted);
   const PathCounts& traced = reference->counts();
   counts = {};
   counts.primary = traced.primary;
@@ -260,13 +258,14 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
 /// Clears what a tile's samples are summed in.
 void Lighter::State::clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples) const {
   const LightOutput& wanted = samples.front().output;  // all want the same
+  const std::span<const std::uint8_t> wanted_pixels = mask_of(samples.front().wanted, index);
   tile.wants_components =
       shared != 0 || std::ranges::any_of(wanted.components, [](const auto* layer) { return layer != nullptr; });
   tile.wants_cost = wanted.cost != nullptr;
   const std::size_t pixels = samples.size() * kTilePixels;
-  tile.radiance.assign(pixels, glm::dvec3(0.0));
+  clear_sums(tile.radiance, pixels, wanted_pixels);
   if (tile.wants_components) {
-    for (auto& part : tile.components) part.assign(pixels, glm::dvec3(0.0));
+    for (auto& part : tile.components) clear_sums(part, pixels, wanted_pixels);
   }
   if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
   for (const LitSample& sample : samples) {
@@ -286,12 +285,13 @@ void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs,
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
   if (shared != 0) scratch.shared.start(shared, tile, jobs.front());
   const int height = jobs.front().place.height();
-  for (int row = 0; row < height; row += kRowsAtOnce) {
+  for (RowRange rows; rows.first < height; rows.first = rows.end) {
+    rows.end = end_of_wave(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       const Stopwatch watch;
-      find_first_points(tile, jobs[i], {row, std::min(row + kRowsAtOnce, height)}, scratch.waiting[0]);
+      find_first_points(tile, jobs[i], rows, scratch.waiting[0]);
       add_first_surfaces(scratch.waiting[0], index, samples[i].output);
-      if (shared != 0) scratch.shared.choose(scratch.waiting[0], row);
+      if (shared != 0) scratch.shared.choose(scratch.waiting[0], rows.first);
       scratch.ms[kSurfaceStep] += watch.ms();
       light_waiting(scratch);
     }
@@ -358,7 +358,7 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
 
   State& state = *state_;
   if (state.reference) {
-    state.trace_reference(first.views, tiles, first.output, first.number);
+    state.trace_reference(first, tiles);
     state.tell_of_cut_rays();
     return;
   }
@@ -368,11 +368,13 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
   state.for_each(tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const TilePlace place = layout.place(tile);
+    const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
+    if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
     std::vector<TileJob> jobs;
     for (const LitSample& sample : samples) {
       set_active(sample.output, tile);
       jobs.push_back({place.pixels, sample.number, sample.keys->tile(tile), &sample.views[place.screen],
-                      static_cast<std::uint32_t>(jobs.size() * kTilePixels)});
+                      static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
     }
     std::unique_ptr<Scratch> scratch = state.take_scratch();
     scratch->work.view = &first.views[place.screen];

@@ -128,6 +128,7 @@ struct LitSample {
   const TileLayer<Key>* keys = nullptr;
   LightOutput output;
   SampleNumber number;
+  const PixelMask* wanted = nullptr;  ///< pixels that are lit; null: all. What is stored elsewhere means nothing
 };
 
 /// Turns keys into radiance: reconstructs the surface each key names, adds emission and direct light, then what the

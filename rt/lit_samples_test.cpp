@@ -62,5 +62,36 @@ TEST(LitSamples, TogetherAreThoseOneByOne) {
   EXPECT_EQ(summed, counts);
 }
 
+/// Other pixels' light is not worked out, and what is worked out does not change but for the order of its sums.
+TEST(LitSamples, OnlyPixelsThatAreWanted) {
+  const Scene scene = test::room(test::mirror(0.7F), true);
+  const std::vector<View> views(1, test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {150, 130}, scene, 1.3));
+  const TileLayer<Key> keys = test::cast_keys(scene, views);
+  const FrameLayout& layout = keys.layout();
+  const std::vector<std::size_t> tiles = all_tiles(layout);
+  PixelMask wanted(layout);
+  for (const std::size_t tile : tiles) {
+    for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) wanted.tile(tile)[pixel] = pixel * 7919 % 5 == 0 ? 1 : 0;
+    if (tile != 2) wanted.set_active(tile);  // there all are wanted
+    if (tile == 3) std::ranges::fill(wanted.tile(tile), std::uint8_t{0});
+  }
+  for (const bool reference : {false, true}) {
+    Lighter lighter(scene, {.reference = reference, .threads = 2});
+    TileLayer<Rgb> all(layout);
+    lighter.light(views, keys, tiles, {.radiance = &all}, {7, 3});
+    const RayCounts of_all = lighter.counts();
+    TileLayer<Rgb> some(layout);
+    const LitSample sample{views, &keys, {.radiance = &some}, {7, 3}, &wanted};
+    lighter.light(std::span(&sample, 1), tiles);
+    EXPECT_LT(lighter.counts().shadow, of_all.shadow / 2);
+    for (const std::size_t tile : tiles) {
+      for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+        if (wanted.active(tile) && wanted.tile(tile)[pixel] == 0) continue;
+        EXPECT_NEAR(some.tile(tile)[pixel].g, all.tile(tile)[pixel].g, 1e-6 * all.tile(tile)[pixel].g);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hpr

@@ -72,7 +72,7 @@ struct PathTracer::State {
 
   std::unique_ptr<PathWave> take_wave();
   void trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
-                  const SampleNumber& number, std::span<Rgb> pixels) const;
+                  const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels) const;
 };
 
 std::unique_ptr<PathWave> PathTracer::State::take_wave() {
@@ -88,7 +88,8 @@ std::unique_ptr<PathWave> PathTracer::State::take_wave() {
 }
 
 void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
-                                   const SampleNumber& number, std::span<Rgb> pixels) const {
+                                   const SampleNumber& number, std::span<const std::uint8_t> wanted,
+                                   std::span<Rgb> pixels) const {
   const DenormalsAsZero mode;
   std::ranges::fill(pixels, Rgb{});
   const Rect& rect = place.pixels;
@@ -97,6 +98,8 @@ void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media
     wave.start(view, static_cast<std::size_t>(bottom - top) * kTileSide);
     for (int y = top; y < bottom; ++y) {
       for (int x = rect.x0; x < rect.x1; ++x) {
+        const auto pixel = static_cast<std::size_t>(y - rect.y0) * kTileSide + static_cast<std::size_t>(x - rect.x0);
+        if (!wanted.empty() && wanted[pixel] == 0) continue;
         Path path = path_from_eye(view, eye, shared.settings, x, y, number);
         path.pixel = static_cast<std::uint32_t>((y - top) * kTileSide + x - rect.x0);
         wave.add(path);
@@ -131,7 +134,7 @@ const PathCounts& PathTracer::counts() const {
 }
 
 void PathTracer::trace(std::span<const View> views, std::span<const std::size_t> tiles, const SampleNumber& number,
-                       TileLayer<Rgb>& radiance) {
+                       TileLayer<Rgb>& radiance, const PixelMask* wanted) {
   const FrameLayout& layout = radiance.layout();
   HPR_CHECK(views.size() == layout.screens());
   for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
@@ -144,7 +147,8 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
     const TilePlace place = layout.place(tile);
     radiance.set_active(tile);
     std::unique_ptr<PathWave> wave = state.take_wave();
-    state.trace_tile(*wave, views[place.screen], eyes[place.screen], place, number, radiance.tile(tile));
+    state.trace_tile(*wave, views[place.screen], eyes[place.screen], place, number, mask_of(wanted, tile),
+                     radiance.tile(tile));
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(wave));
   });

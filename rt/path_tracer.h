@@ -74,10 +74,11 @@ class PathTracer {
   PathTracer& operator=(PathTracer&&) noexcept;
 
   /// Sets every pixel of `tiles` (screen i of the layer is seen by views[i], of equal size) to the radiance of one
-  /// sample, and makes the tiles active; other tiles stay as they are. Values are finite and never negative. Memory:
-  /// below 1 MB a thread, whatever the depth.
+  /// sample, and makes the tiles active; other tiles stay as they are. Where pixels are not `wanted`, which is all of
+  /// them when null, they are black. Values are finite and never negative. Memory: below 1 MB a thread, whatever the
+  /// depth.
   void trace(std::span<const View> views, std::span<const std::size_t> tiles, const SampleNumber& number,
-             TileLayer<Rgb>& radiance);
+             TileLayer<Rgb>& radiance, const PixelMask* wanted = nullptr);
 
   /// Of the last trace().
   [[nodiscard]] const PathCounts& counts() const;

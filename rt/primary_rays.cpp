@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <limits>
@@ -363,7 +364,7 @@ void PrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rec
 }
 
 void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
-                       std::span<TileLayer<Key>* const> layers) {
+                       std::span<TileLayer<Key>* const> layers, const PixelMask* wanted) {
   HPR_CHECK(!looks.empty() && looks.size() <= kMostLooks && looks.size() == layers.size());
   const View& view = looks.front();
   const FrameLayout& layout = layers.front()->layout();
@@ -378,6 +379,8 @@ void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::spa
     std::array<std::uint8_t, kTilePixels> mask;
     const std::size_t tile = run.first + i;
     if (!occupied.mark(tile, layout.place(tile).pixels, mask)) return;
+    const std::span<const std::uint8_t> asked = mask_of(wanted, tile);
+    if (!asked.empty()) std::ranges::transform(mask, asked, mask.begin(), std::bit_and<>());
     TileTracer tracer(scene_, rays_, looks);
     draw_tile(tracer, tile, parts, mask, layers);
     const std::lock_guard lock(mutex);

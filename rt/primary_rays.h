@@ -50,8 +50,9 @@ class PrimaryRays {
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
   /// The same for several views that differ by their jitter only, kMostLooks at most, together: rays through one pixel
   /// are quicker in one another's company. Keys of looks[i] go to layers[i]; they are those each draw() would make.
+  /// Where pixels are not `wanted`, which is all of them when null, there are none.
   void draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
-            std::span<TileLayer<Key>* const> layers);
+            std::span<TileLayer<Key>* const> layers, const PixelMask* wanted = nullptr);
   static constexpr std::size_t kMostLooks = 16;
 
   [[nodiscard]] const PrimaryRayStats& stats() const { return stats_; }

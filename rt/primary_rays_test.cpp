@@ -357,5 +357,29 @@ TEST(PrimaryRays, NothingAndImpossibleEyesSeeNothing) {
   EXPECT_EQ(layer.active_tiles(), 0U);
 }
 
+TEST(PrimaryRays, OnlyPixelsThatAreWantedHaveKeys) {
+  const Scene scene = mixed_scene();
+  const View view = front_view(scene, {150, 90});
+  const Image<Key> all = draw(scene, view).keys;
+  TileLayer<Key> layer(FrameLayout({view.size()}));
+  PixelMask wanted(layer.layout());
+  for (std::size_t tile = 0; tile < wanted.tiles(); ++tile) {
+    for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) wanted.tile(tile)[pixel] = pixel % 3 == 0 ? 1 : 0;
+    if (tile != 1) wanted.set_active(tile);  // there all are wanted
+  }
+  const RayScene rays(scene, RaySpace(scene.bounds), 2);
+  PrimaryRays primary(scene, rays, 2);
+  TileLayer<Key>* const only = &layer;
+  primary.draw(std::span(&view, 1), 0, std::array{Rect{0, 0, 150, 90}}, std::span(&only, 1), &wanted);
+  const Image<Key> some = to_image(layer, 0);
+  for (int y = 0; y < all.height(); ++y) {
+    for (int x = 0; x < all.width(); ++x) {
+      const std::size_t tile = wanted.layout().tile_at(0, x, y);
+      const bool is_wanted = !wanted.active(tile) || wanted.at(0, x, y) != 0;
+      EXPECT_EQ(some.at(x, y), is_wanted ? all.at(x, y) : kNoKey) << x << ' ' << y;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hpr

@@ -20,13 +20,15 @@ bool is_finite(const Rgb& color) {
 void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output) {
   const auto each = [&](auto&& body) {
     for (int y = 0; y < job.place.height(); ++y) {
-      for (int x = 0; x < job.place.width(); ++x)
-        body(static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x));
+      for (int x = 0; x < job.place.width(); ++x) {
+        const auto pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+        if (job.wants(pixel)) body(pixel);
+      }
     }
   };
   const auto start = [&](auto* layer) {
     const auto pixels = layer->tile(index);
-    std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
+    if (job.wanted.empty()) std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
     return pixels;
   };
   const auto colors = start(output.radiance);

@@ -34,8 +34,8 @@ def last_rank_of(pid):
     return processes.ranks_of(pid)[-1]
 
 
-def interrupt(folder, wanted, target, *arguments):
-    """Starts hpr and sends it `wanted` once some samples are done. Returns its code, its stderr, and the samples that
+def interrupt(folder, wanted, target, *arguments, after=12):
+    """Starts hpr and sends it `wanted` once `after` samples are done. Returns its code, its stderr, and the samples that
     were done when the signal went out."""
     process = subprocess.Popen([HPR, *ARGUMENTS, *arguments], cwd=folder, stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE, text=True)
@@ -43,7 +43,7 @@ def interrupt(folder, wanted, target, *arguments):
     done = None
     for line in process.stderr:
         lines.append(line)
-        if done is None and line.startswith("hpr: sample ") and int(line.split()[2].split("/")[0]) >= 12:
+        if done is None and line.startswith("hpr: sample ") and int(line.split()[2].split("/")[0]) >= after:
             done = int(line.split()[2].split("/")[0])
             os.kill(target(process.pid), wanted)
     return process.wait(timeout=300), "".join(lines), done
@@ -60,8 +60,8 @@ def itself(pid):
     return pid
 
 
-def stop_and_resume(folder, whole, case, target, before, after):
-    code, message, sent_at = interrupt(folder, signal.SIGUSR1, target, "-o", "a.exr", "--spp", str(SAMPLES), *before)
+def stop_and_resume(folder, whole, case, target, before, after, at=12):
+    code, message, sent_at = interrupt(folder, signal.SIGUSR1, target, "-o", "a.exr", "--spp", str(SAMPLES), *before, after=at)
     expect(code == 75, f"{case}: left with {code} instead of 75: {message[-800:]}")
     expect(not (folder / "a.exr").exists(), f"{case}: stopped, but wrote a picture")
     stopped_at = samples_in(message)
@@ -112,7 +112,7 @@ def refusals(folder, state):
     foreign = {"scene": ["gen:cornell", *size], "seed": [*scene, *size, "--seed", "2"], "view": [*scene, "--size", "95x64"],
                "filter": [*scene, *size, "--filter", "gaussian"], "view 0": [*scene, *size, "--fov", "30"],
                "passes": [*scene, *size, "--passes", "none"], "depth": [*scene, *size, "--max-depth", "3"],
-               "AOVs": [*scene, *size, "--aov", "id"], "--raw": [*scene, *size, "--raw", "c.keys"]}
+               "AOVs": [*scene, *size, "--aov", "id"], "adaptive": [*scene, *size, "--adaptive"], "--raw": [*scene, *size, "--raw", "c.keys"]}
     for field, arguments in foreign.items():
         result = subprocess.run([HPR, "render", *arguments, *COMMON, "--spp", "20", *resume], cwd=folder,
                                 capture_output=True, text=True, timeout=300, check=False)
@@ -183,6 +183,14 @@ def main():
         stop_and_resume(folder, whole, "one rank, then three", itself, [], sort_last)
         stop_and_resume(folder, whole, "three ranks, then two", itself, sort_last, ["--ranks", "2"])
         stop_and_resume(folder, whole, "a signal to one rank of two", last_rank_of, ["--ranks", "2"], [])
+        result = run(folder, "-o", "adaptive.exr", "--spp", str(SAMPLES), "--adaptive")
+        expect(result.returncode == 0, f"--adaptive left with {result.returncode}: {result.stderr}")
+        adaptive = (folder / "adaptive.exr").read_bytes()
+        expect(adaptive != whole, "--adaptive makes no difference")
+        for at in (12, 60):  # where all pixels get the same samples, and where they do not
+            stop_and_resume(folder, adaptive, f"adaptive, at {at}, one rank, then three", itself, ["--adaptive"],
+                            ["--adaptive", *sort_last], at)
+        stop_and_resume(folder, adaptive, "adaptive, three ranks, then one", itself, ["--adaptive", *sort_last], ["--adaptive"], 60)
         state = write_and_go_on(folder, whole)
         if state.exists():
             refusals(folder, state)

@@ -107,14 +107,46 @@ def rounds(folder):
         expect(f"indirect light: by {by} (" in result.stdout + result.stderr, f"{scene}: not by {by}: {result.stderr[-800:]}")
 
 
+def adaptive(folder):
+    """Samples go where noise is, alike however the work is spread, and pay: as many on average, for less error."""
+    few = ("--spp", "32", "--adaptive", "--photons", "1000")
+    expected = render(folder, *few)
+    expect(json.loads((folder / "a.json").read_text())["samples"] == 32, "32 adaptive samples are not called so")
+    expect(expected != render(folder, "--spp", "32", "--photons", "1000"), "adaptive samples make no difference")
+    for way in (("--threads", "2"), ("--ranks", "3", "--distribute", "sort-first"),
+                ("--ranks", "3", "--distribute", "sort-last", "--strategy", "direct-send"),
+                ("--ranks", "4", "--distribute", "sort-last", "--strategy", "binary-swap")):
+        expect(render(folder, *few, *way) == expected, f"adaptive samples have other bits with {' '.join(way)}")
+    scene = folder / "open.gltf"
+    sky = ("--at", "0,0.2,0", "--eye", "0.3,1.2,1.9", "--environment", "0.5,0.6,0.7", "--primary", "rays")
+    ways = [(), ("--threads", "1"), ("--ranks", "3"), ("--ranks", "2", "--data", "partitioned"),
+            ("--ranks", "3", "--distribute", "sort-last")]
+    for light in (("--quality", "best", "--spp", "32"), ("--reference", "--spp", "16")):
+        pictures = {render(folder, *sky, "--adaptive", *light, *way, scene=scene) for way in ways}
+        expect(len(pictures) == 1, f"adaptive samples under a sky, {light}: threads, ranks or parts of the scene change bits")
+    render(folder, *sky, "--quality", "best", "--spp", "256", scene=scene)
+    reference = exr.read(folder / "a.exr")[2]
+    error = {more: squared_error(folder, reference, 64, *sky, "--quality", "best", *more, scene=scene)[0]
+             for more in ((), ("--adaptive",))}
+    expect(error["--adaptive",] < 0.9 * error[()], f"adaptive samples do not pay: {error}")
+    for other in (("--shading", "local"), ("--half-resolution", "reflection")):
+        result = subprocess.run([HPR, "render", "gen:gallery", "-o", "x.png", "--adaptive", *other], cwd=folder,
+                                capture_output=True, text=True, timeout=60, check=False)
+        expect(result.returncode == 2 and "--adaptive" in result.stderr, f"--adaptive {other}: left with {result.returncode}")
+    render(folder, "--adaptive", "--spp", "until:1s", "--photons", "1000")
+    render(folder, "--adaptive", "--spp", "until:relmse=0.02", scene=MATTE)
+    stats = json.loads((folder / "a.json").read_text())
+    expect(stats["estimated_relmse"] <= 0.02, f"until 0.02: {stats['estimated_relmse']}")
+
+
 def one_sample(folder):
     plain = render(folder)
     expect(render(folder, "--spp", "1") == plain, "--spp 1 is not the default")
     expect(render(folder, "--spp", "1", "--filter", "box") != plain, "a filter's one sample looks through the centre")
 
 
-def squared_error(folder, reference, samples):
-    render(folder, "--spp", str(samples), scene=MATTE)
+def squared_error(folder, reference, samples, *more, scene=MATTE):
+    render(folder, "--spp", str(samples), *more, scene=scene)
     image = exr.read(folder / "a.exr")[2]
     total = sum((a - b) ** 2 / (b * b + 1e-2) for c in "RGB" for a, b in zip(image[c], reference[c]))
     return total / (3 * len(image["R"])), json.loads((folder / "a.json").read_text())
@@ -164,6 +196,7 @@ def main():
         folder = pathlib.Path(scratch)
         one_sample(folder)
         rounds(folder)
+        adaptive(folder)
         spread_differently(folder)
         convergence(folder)
         until_a_time(folder)
