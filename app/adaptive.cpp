@@ -38,11 +38,15 @@ Counts sum_over_ranks(Communicator& comm, const Counts& mine) {
   return sum;
 }
 
+std::size_t index_of(int column, int row) {
+  return static_cast<std::size_t>(row) * kTileSide + static_cast<std::size_t>(column);
+}
+
 /// Calls `body` with the index, column and row of each pixel of a tile that is in the picture.
 template <typename Body>
 void each_pixel(const Rect& place, const Body& body) {
   for (int y = 0; y < place.height(); ++y) {
-    for (int x = 0; x < place.width(); ++x) body(static_cast<std::size_t>(y * kTileSide + x), x, y);
+    for (int x = 0; x < place.width(); ++x) body(index_of(x, y), x, y);
   }
 }
 
@@ -51,7 +55,7 @@ double mean_about(std::span<const double> values, const Rect& place, int column,
   int count = 0;
   for (int y = std::max(row - 1, 0); y < std::min(row + 2, place.height()); ++y) {
     for (int x = std::max(column - 1, 0); x < std::min(column + 2, place.width()); ++x) {
-      sum += values[static_cast<std::size_t>(y * kTileSide + x)];
+      sum += values[index_of(x, y)];
       ++count;
     }
   }
@@ -83,8 +87,8 @@ struct Levels {
   int lowest = 0;
   int highest = 0;
 
-  explicit Levels(std::uint32_t budget)
-      : lowest(level_of(std::max(budget / 4, 1U))),
+  Levels(std::uint32_t budget, std::uint32_t pilot)
+      : lowest(level_of(std::max(budget / 4, pilot))),
         highest(level_of(std::bit_ceil(2 * std::min(budget, kMostSamples / 2)))) {}
 
   [[nodiscard]] int of(int bin, int shift) const {
@@ -141,7 +145,8 @@ std::uint32_t AdaptiveSampling::budget_after(std::uint32_t budget) const {
   return next;
 }
 
-void AdaptiveSampling::find_steps(Communicator& comm, const Film& film, std::span<const std::size_t> tiles) {
+void AdaptiveSampling::find_steps(Communicator& comm, const Film& film, std::span<const std::size_t> tiles,
+                                  std::uint32_t from) {
   std::array<std::uint64_t, kLevels> mine{};
   for (const std::size_t tile : tiles) {
     const std::span<const PixelSamples> pixels = film.pixel_samples().tile(tile);
@@ -159,8 +164,8 @@ void AdaptiveSampling::find_steps(Communicator& comm, const Film& film, std::spa
     if (pixels[level] == 0) continue;
     const std::uint32_t begin = std::uint32_t{1} << level;
     // A step that was broken off goes on.
-    const std::uint32_t number = std::clamp(film.samples(), begin, 2 * begin - 1);
-    steps_.push_back({begin, 2 * begin, steps_.empty() && film.samples() > begin ? number : begin, pixels[level]});
+    const std::uint32_t number = steps_.empty() && from > begin ? std::min(from, 2 * begin - 1) : begin;
+    steps_.push_back({begin, 2 * begin, number, pixels[level]});
     total_ += pixels[level] * (steps_.back().end - steps_.back().number);
   }
 }
@@ -175,12 +180,20 @@ void AdaptiveSampling::resume(Communicator& comm, const SampleProgress& reached,
     before_ = 0;
     return;
   }
-  find_steps(comm, film, tiles);
+  find_steps(comm, film, tiles, film.samples());
 }
 
 void AdaptiveSampling::deal(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) {
-  before_ = budget_;
-  budget_ = budget_after(budget_);
+  do {
+    before_ = budget_;
+    budget_ = budget_after(budget_);
+    choose(comm, film, tiles, threads);
+    find_steps(comm, film, tiles, 0);
+  } while (steps_.empty() && budget_after(budget_) > budget_);
+  if (!steps_.empty()) film.go_on_with(steps_.front().number);
+}
+
+void AdaptiveSampling::choose(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) const {
   std::vector<TileBins> bins(tiles.size());
   parallel_for(threads, tiles.size(), [&](std::size_t i) { bins[i] = bins_of(film, tiles[i]); });
   Histogram mine{};
@@ -189,7 +202,7 @@ void AdaptiveSampling::deal(Communicator& comm, Film& film, std::span<const std:
       if (bin != kCalm) ++mine[static_cast<std::size_t>(bin)];
     }
   }
-  const Levels levels(budget_);
+  const Levels levels(budget_, film.pilot());
   const int shift = shift_within(sum_over_ranks(comm, mine), levels, budget_);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const std::span<PixelSamples> pixels = film.pixel_samples().tile(tiles[i]);
@@ -198,9 +211,6 @@ void AdaptiveSampling::deal(Communicator& comm, Film& film, std::span<const std:
       pixels[pixel].wanted = std::max(pixels[pixel].taken, wanted);
     });
   }
-  film.go_on_with(0);
-  find_steps(comm, film, tiles);
-  if (!steps_.empty()) film.go_on_with(steps_.front().number);
 }
 
 void AdaptiveSampling::added(std::uint32_t count, Film& film) {

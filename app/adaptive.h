@@ -13,10 +13,10 @@ namespace hpr {
 
 /// Which pixels of an adaptive film get which samples: in stages, each of about four times as many samples as the one
 /// before. The first gives every pixel the same, a later one gives each between a quarter and twice as many as a pixel
-/// gets on average, more where its samples and its neighbours' differ more; always a power of two, so that what a pixel
-/// has is a whole net of its sequence. Samples of a pixel whose variance is v have an error of about v n^-1.5 in
-/// outlines and v / n elsewhere; with n in proportion to v^0.4 the next sample is worth the same everywhere
-/// (Neyman's allocation, for an exponent between the two).
+/// gets on average (the powers of two about that, where it is none), more where its samples and its neighbours' differ
+/// more; always a power of two, so that what a pixel has is a whole net of its sequence. Samples of a pixel whose
+/// variance is v have an error of about v n^-1.5 in outlines and v / n elsewhere; with n in proportion to v^0.4 the
+/// next sample is worth the same everywhere (Neyman's allocation, for an exponent between the two).
 ///
 /// All pixels of the frame share the samples, and neighbours are those of the same tile: ranks, threads and ways of
 /// compositing change nothing. The mean of pixels that chance made look calm is a little off: samples decide how many
@@ -35,7 +35,8 @@ class AdaptiveSampling {
 
   /// Whether deal() has to come before the next sample.
   [[nodiscard]] bool is_stage_done() const { return steps_.empty(); }
-  /// Collective. Begins the next stage: decides what each pixel of `tiles` wants, this rank's.
+  /// Collective. Begins the next stage in which any pixel wants more: decides what each pixel of `tiles` wants, this
+  /// rank's. Where there is none before the goal, all samples that are asked for are there.
   void deal(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads);
 
   /// How many samples from the film's next one on go to the same pixels.
@@ -60,8 +61,10 @@ class AdaptiveSampling {
   };
 
   [[nodiscard]] std::uint32_t budget_after(std::uint32_t budget) const;
-  /// Finds the steps that are left of a stage.
-  void find_steps(Communicator& comm, const Film& film, std::span<const std::size_t> tiles);
+  /// Finds the steps of a stage that are left from a sample on.
+  void find_steps(Communicator& comm, const Film& film, std::span<const std::size_t> tiles, std::uint32_t from);
+  /// Decides what pixels want in the stage at hand.
+  void choose(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) const;
 
   Sampling sampling_;
   std::uint32_t budget_ = 0;  ///< of the stage at hand

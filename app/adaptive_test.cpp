@@ -178,6 +178,33 @@ TEST(AdaptiveSampling, RanksRoundsAndBreaksChangeNothing) {
   }
 }
 
+/// Stages in which no pixel wants more are passed over; at the end nothing is left to draw.
+TEST(AdaptiveSampling, PicturesWithoutNoiseComeToAnEnd) {
+  const std::vector<std::size_t> calm{0, 3};
+  for (const auto filter : {PixelFilter::Box, PixelFilter::Mitchell}) {
+    for (const std::uint32_t samples : {16U, 17U, 31U, 32U, 64U, 256U}) {
+      Sampling sampling = sampling_of(samples);
+      sampling.filter = filter;
+      Film film = film_for(sampling);
+      AdaptiveSampling adaptive(sampling);
+      run_local_ranks(1, [&](Communicator& comm) {
+        for (int rounds = 0; adaptive.samples() < samples && rounds < 1000; ++rounds) {
+          if (adaptive.is_stage_done()) adaptive.deal(comm, film, calm, 1);
+          if (adaptive.is_stage_done()) continue;
+          const std::uint32_t count = std::min(adaptive.most_together(), 16U);
+          add_some(film, calm, count);
+          adaptive.added(count, film);
+        }
+      });
+      EXPECT_EQ(adaptive.samples(), samples);
+      const std::uint32_t taken = film.pixel_samples().at(0, 0, 0).taken;
+      EXPECT_LE(taken, std::max(samples / 4, AdaptiveSampling::pilot_of(sampling)));
+      EXPECT_GE(taken, std::max(samples / 8, 8U));
+      EXPECT_GE(film.samples(), film.pilot()) << "a checkpoint of it would be taken for one of the pilot";
+    }
+  }
+}
+
 TEST(AdaptiveSampling, WithoutAGoalStagesGoOn) {
   const Sampling sampling = sampling_of({});
   Film film = film_for(sampling);

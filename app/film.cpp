@@ -1,6 +1,7 @@
 #include "app/film.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -98,7 +99,7 @@ void Film::add_tile(const SampleLight& light, double weight, std::uint32_t numbe
     const std::span<PixelSamples> pixels = pixel_samples_.tile(tile);
     each_due([&](std::size_t i) {
       pixels[i].weights[number % 2] += weight;
-      pixels[i].squares += weight * length2(from[i]);
+      pixels[i].squares += length2(from[i]);
       ++pixels[i].taken;
     });
     pixel_samples_.set_active(tile);
@@ -145,7 +146,8 @@ void Film::resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rg
       return mean(pixel, {a.r + b.r, a.g + b.g, a.b + b.b});
     });
     for (const auto& [aov, sums] : means_) {
-      each(aovs.rgb.at(aov), [&](std::size_t pixel) { return mean(pixel, sums.tile(tile)[pixel]); });
+      const std::span<const ColorSum> of_tile = sums.tile(tile);
+      each(aovs.rgb.at(aov), [&](std::size_t pixel) { return mean(pixel, of_tile[pixel]); });
     }
     if (cost_.tiles() > 0) {
       each(aovs.single.at(Aov::Cost), [&](std::size_t pixel) {
@@ -160,12 +162,12 @@ void Film::resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rg
 
 std::vector<double> Film::squared_errors(std::span<const std::size_t> tiles, int threads) const {
   std::vector<double> errors(tiles.size(), 0.0);
-  if (!(weights_[0] > 0.0) || !(weights_[1] > 0.0)) return errors;
   parallel_for(threads, tiles.size(), [&](std::size_t i) {
     const std::span<const ColorSum> even = halves_[0].tile(tiles[i]);
     const std::span<const ColorSum> odd = halves_[1].tile(tiles[i]);
     for (std::size_t pixel = 0; pixel < even.size(); ++pixel) {
       const std::array<double, 2>& weights = weights_at(tiles[i], pixel);
+      if (!(weights[0] > 0.0) || !(weights[1] > 0.0)) continue;
       errors[i] += squared_error(even[pixel].r, odd[pixel].r, weights) +
                    squared_error(even[pixel].g, odd[pixel].g, weights) +
                    squared_error(even[pixel].b, odd[pixel].b, weights);
@@ -204,7 +206,8 @@ std::vector<double> Film::variances(std::size_t tile) const {
     const ColorSum mean{(even[i].r + odd[i].r) / weights, (even[i].g + odd[i].g) / weights,
                         (even[i].b + odd[i].b) / weights};
     const double squared = mean.r * mean.r + mean.g * mean.g + mean.b * mean.b;
-    const double variance = pixel.squares / weights - squared;
+    // Where a filter with negative weights overshoots, the mean of squares may be the smaller one.
+    const double variance = std::abs(pixel.squares / pixel.taken - squared);
     if (variance > kRounding * squared) variances[i] = variance / (squared / 3.0 + kRelativeFloor);
   }
   return variances;

@@ -33,7 +33,7 @@ struct SampleLight {
 /// What a film knows of a pixel that may have another number of samples than its neighbours.
 struct PixelSamples {
   std::array<double, 2> weights{};  ///< of the halves
-  double squares = 0.0;             ///< weighted sum of the colours' squared lengths
+  double squares = 0.0;             ///< sum of the colours' squared lengths
   std::uint32_t taken = 0;
   std::uint32_t wanted = 0;
 };

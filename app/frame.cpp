@@ -176,6 +176,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
   if (sample.homes != nullptr) bring_home(session, plan, *sample.homes, frame);
+  if (sample.at_home != nullptr) (*sample.at_home)();
   taken.composite_ms = watch.ms();
 
   if (plan.shading == Shading::Local) {
@@ -223,6 +224,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
     frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, {}});
     if (looks[i].sample.homes != nullptr) bring_home(session, plan, *looks[i].sample.homes, frames.back());
   }
+  if (looks.front().sample.at_home != nullptr) (*looks.front().sample.at_home)();
   for (std::size_t i = 0; i < looks.size(); ++i) {
     const FrameSample& sample = looks[i].sample;
     samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -93,6 +94,7 @@ struct FrameSample {
   SampleNumber number;
   std::optional<TileHomes>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
   const PixelMask* wanted = nullptr;          ///< pixels that are lit; null: all. Others' radiance means nothing
+  const std::function<void()>* at_home = nullptr;  ///< called once tiles are at home, before any is lit
 };
 
 /// One of several samples that are drawn together.

@@ -48,7 +48,7 @@ FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampli
       sampling_(sampling),
       number_(frame),
       film_(sampling.sums() ? plan.layout : FrameLayout(),
-            {plan.aovs, keeps_keys, sampling.adaptive ? AdaptiveSampling::pilot_of(sampling) : 0}),
+            {plan.aovs, keeps_keys, sampling.adaptive && sampling.sums() ? AdaptiveSampling::pilot_of(sampling) : 0}),
       keeps_keys_(sampling.sums() && film_.keys().tiles() > 0) {
   if (!film_.is_adaptive()) return;
   adaptive_.emplace(sampling);
@@ -109,7 +109,7 @@ bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
 
 FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
   const FilterSample through = look_through(sampling_, {plan_.rays.seed, number_}, number);
-  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, nullptr}};
+  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
   for (View& view : look.views) view.jitter = through.offset;
   weight = through.weight;
   return look;
@@ -120,6 +120,7 @@ void FrameSampler::scatter() {
   film_.each_layer([&](auto& layer) {
     if (layer.tiles() > 0) homes_->scatter(session_.comm(), layer);
   });
+  if (adaptive_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
 }
 
 /// What rank 0 has of a checkpoint is all its own until tiles have their homes.
@@ -128,23 +129,24 @@ std::vector<std::size_t> FrameSampler::tiles() const {
   return session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
 }
 
-/// The first samples after a checkpoint was read are drawn for all pixels: where those will be is not known yet.
-const PixelMask* FrameSampler::choose_pixels() {
-  if (!adaptive_) return nullptr;
+/// Those of the first sample after a checkpoint was read are not known before its tiles are at home.
+void FrameSampler::choose_pixels() {
   if (adaptive_->is_stage_done()) adaptive_->deal(session_.comm(), film_, tiles(), session_.threads());
-  if (film_.samples() < film_.pilot() || !homes_ || !scattered_) return nullptr;
-  film_.mark_due(homes_->mine(), due_);
-  return &due_;
+  if (homes_ && scattered_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
 }
 
 void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count) {
-  const PixelMask* const wanted = choose_pixels();
-  if (adaptive_) count = std::min(count, adaptive_->most_together());
+  if (adaptive_) {
+    choose_pixels();
+    if (adaptive_->is_stage_done()) return;  // no pixel wants more
+    count = std::min(count, scattered_ ? adaptive_->most_together() : 1);
+  }
+  const std::function<void()> at_home = [this] { scatter(); };
   std::vector<FrameLook> looks;
   std::vector<double> weights(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     looks.push_back(look(views, film_.samples() + i, weights[i]));
-    looks.back().sample.wanted = wanted;
+    looks.back().sample.at_home = &at_home;
   }
   FrameTimes taken;
   std::vector<Frame> frames;
@@ -153,8 +155,8 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   } else {
     frames.push_back(make_frame(session_, plan_, looks.front().views, &taken, looks.front().sample));
   }
-  scatter();
   std::vector<SampleLight> lights;
+  lights.reserve(count);
   for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
   film_.add(lights, weights, homes_->mine(), session_.threads());
   if (adaptive_) adaptive_->added(count, film_);
@@ -171,7 +173,7 @@ void FrameSampler::tell_progress(double seconds) {
   so_far_.seconds = seconds;
   const bool milestone = adaptive_ ? adaptive_->at_milestone() : is_milestone(film_.samples());
   if (!milestone || so_far_.samples < 2) return;
-  so_far_.relmse = estimated_relmse(session_.comm(), film_, homes_->mine(), session_.threads());
+  so_far_.relmse = estimated_relmse(session_.comm(), film_, tiles(), session_.threads());
 }
 
 /// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be

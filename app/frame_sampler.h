@@ -43,13 +43,13 @@ class FrameSampler {
   void add_samples(std::span<const View> views, std::uint32_t count);
   /// How many samples to draw together. `hurried`: somebody may end the run by a signal.
   [[nodiscard]] std::uint32_t size_of_round(bool hurried);
-  /// After the first sample drawn since a checkpoint was read: sums go to where their tiles are lit.
+  /// When the first sample drawn since a checkpoint was read is at home: sums go to where their tiles are lit.
   void scatter();
   [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);
   /// This rank's tiles.
   [[nodiscard]] std::vector<std::size_t> tiles() const;
-  /// Before samples are drawn: which pixels they are for; null: all.
-  [[nodiscard]] const PixelMask* choose_pixels();
+  /// Before samples are drawn: which pixels they are for, in due_.
+  void choose_pixels();
   /// How far it has come, after samples were added.
   void tell_progress(double seconds);
   void finish();
@@ -60,7 +60,7 @@ class FrameSampler {
   std::uint64_t number_;
   Film film_;
   std::optional<AdaptiveSampling> adaptive_;
-  PixelMask due_;  ///< for the samples at hand
+  PixelMask due_;  ///< for the samples at hand; empty: all are
   bool keeps_keys_;
   std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
   bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint

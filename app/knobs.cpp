@@ -16,9 +16,10 @@ constexpr std::array kKnobs{
     Knob{"quality", "draft, good, best", "all of the below that are not given", "all of the below that are not given"},
     Knob{"spp", "1, 2, 3 ...; until:60s; until:relmse=1e-3", "time in proportion",
          "noise: its squared error falls as 1 / spp, faster where it is only edges"},
-    Knob{"adaptive", "false, true", "nothing: as many samples, but in more rounds of fewer pixels",
-         "less noise where light differs from pixel to pixel; a pixel that looks calm by chance gets fewer samples, a "
-         "quarter of --spp at least"},
+    Knob{
+        "adaptive", "false, true", "a tenth of the time for as many samples, in more rounds of fewer pixels",
+        "false: noise of the pixels whose samples differ most; true: a little of the mean, as pixels that look calm by "
+        "chance get fewer samples"},
     Knob{"passes", "auto, all, none, or a list of shadow, reflection, refraction, photon, gather, ambient-occlusion",
          "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},
     Knob{"indirect", "false, true",

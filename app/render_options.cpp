@@ -266,7 +266,7 @@ Sampling RenderOptions::sampling() const {
   Sampling sampling;
   sampling.goal = spp ? parse_sample_goal(*spp) : parse_sample_goal(std::to_string(find_quality(quality).samples));
   if (!filter.empty()) sampling.filter = parse_pixel_filter(filter);
-  sampling.adaptive = adaptive && sampling.sums();
+  sampling.adaptive = adaptive;
   check_sampling(sampling);
   return sampling;
 }

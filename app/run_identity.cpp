@@ -68,10 +68,8 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   std::vector<std::string_view> aovs;
   for (const Aov aov : plan.aovs) aovs.push_back(name_of(aov));
   identity.emplace_back("list of AOVs", fmt::format("'{}'", fmt::join(aovs, ",")));
-  if (sampling.adaptive) {
-    identity.emplace_back("number of adaptive samples",
-                          sampling.goal.samples ? fmt::format("{}", *sampling.goal.samples) : "open");
-  }
+  const std::string goal = sampling.goal.samples ? fmt::format("{}", *sampling.goal.samples) : "open";
+  identity.emplace_back("number of adaptive samples", sampling.adaptive ? goal : "none");
   identity.emplace_back("--raw", keeps_keys ? "given" : "left out");
   return identity;
 }

@@ -191,6 +191,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   best.photon_radius = 0.0;
   best.resolution_scale = 1.0;
   best.half_resolution.clear();
+  best.adaptive = false;
   best.wire = {};
   best.indirect.reset();
   best.reference = !passes;

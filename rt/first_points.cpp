@@ -50,18 +50,22 @@ class FirstPoints {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         const double share = left_.empty() ? 1.0 : left_[pixel];
         if (!(share > 0.0) || !job_.wants(pixel)) continue;
-        if (job_.keys[pixel] == kNoKey) {
-          const glm::dvec3 light = even ? *even : tile_.lights.environment(glm::normalize(ray_of(x, y).direction));
-          tile_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, share * light);
+        if (job_.keys[pixel] != kNoKey) {
+          find_surface(x, y, job_.keys[pixel], share);
           continue;
         }
-        const Ray ray = ray_of(x, y);
-        const WorldTriangle& triangle = tile_.triangles.load(tile_.surfaces, key_surface(job_.keys[pixel]));
-        PathPoint& point = points_.emplace_back();
-        point.surface = tile_.surfaces.meet(triangle, ray.origin, ray.direction);
-        start(tile_, job_, x, y, share, point);
+        const glm::dvec3 light = even ? *even : tile_.lights.environment(glm::normalize(ray_of(x, y).direction));
+        tile_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, share * light);
       }
     }
+  }
+
+  void find_surface(int x, int y, Key key, double share) {
+    const Ray ray = ray_of(x, y);
+    const WorldTriangle& triangle = tile_.triangles.load(tile_.surfaces, key_surface(key));
+    PathPoint& point = points_.emplace_back();
+    point.surface = tile_.surfaces.meet(triangle, ray.origin, ray.direction);
+    start(tile_, job_, x, y, share, point);
   }
 
   void prefetch(int y) const {

@@ -32,7 +32,14 @@ bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings) 
   return runs_pass(plan, "ambient-occlusion") || (settings.terminator_fix && runs_pass(plan, "shadow"));
 }
 
-std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings) {
+namespace {
+
+bool names_pass(const RaySettings& settings, std::string_view name) {
+  return std::ranges::find(settings.passes, name) != settings.passes.end();
+}
+
+/// Throws Error (Usage) for names that are no passes, and for those that do not go together.
+void check_names(const RaySettings& settings) {
   const std::vector<std::string> names = all_pass_names();
   for (const std::string& wanted : settings.passes) {
     if (std::ranges::find(names, wanted) == names.end()) {
@@ -40,22 +47,25 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
                   unknown_name_hint(wanted, names));
     }
   }
-  const auto names_pass = [&](std::string_view name) {
-    return std::ranges::find(settings.passes, name) != settings.passes.end();
-  };
-  if (names_pass("gather") && names_pass("photon")) {
+  if (names_pass(settings, "gather") && names_pass(settings, "photon")) {
     throw Error(ExitCode::Usage, "the passes gather and photon bring the same light", "name one of them");
   }
-  if (names_pass("gather") && !settings.half_resolution.empty()) {
+  if (names_pass(settings, "gather") && !settings.half_resolution.empty()) {
     throw Error(ExitCode::Usage, "what the pass gather brings belongs to single pixels, and none of it can be shared",
                 "leave out --half-resolution, or name photon in place of gather");
   }
+}
+
+}  // namespace
+
+std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings) {
+  check_names(settings);
   std::vector<PassPlan> plan;
   for (const auto& pass : make_all_passes()) {
     const std::string name(pass->name());
     const Requirement requirement = pass->requirement(scene, settings);
-    const bool wanted =
-        names_pass(name) || (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(scene, settings));
+    const bool wanted = names_pass(settings, name) ||
+                        (settings.passes.empty() && settings.auto_passes && pass->runs_by_default(scene, settings));
     if (settings.reference) {
       plan.push_back({name, false, "the reference traces whole paths instead"});
       continue;

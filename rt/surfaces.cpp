@@ -59,6 +59,14 @@ double row_sum_norm(const glm::dmat3& m) {
   return norm;
 }
 
+void prefetch_vertex(const Mesh& mesh, std::uint32_t vertex) {
+  __builtin_prefetch(&mesh.positions[vertex]);
+  __builtin_prefetch(&mesh.normals[vertex]);
+  for (const auto& uvs : mesh.uvs) {
+    if (!uvs.empty()) __builtin_prefetch(&uvs[vertex]);
+  }
+}
+
 }  // namespace
 
 Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
@@ -138,13 +146,7 @@ void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
       __builtin_prefetch(corners[count++]);
     }
     for (std::size_t i = 0; i < count; ++i) {
-      for (int corner = 0; corner < 3; ++corner) {
-        __builtin_prefetch(&meshes[i]->positions[(*corners[i])[corner]]);
-        __builtin_prefetch(&meshes[i]->normals[(*corners[i])[corner]]);
-        for (const auto& uvs : meshes[i]->uvs) {
-          if (!uvs.empty()) __builtin_prefetch(&uvs[(*corners[i])[corner]]);
-        }
-      }
+      for (int corner = 0; corner < 3; ++corner) prefetch_vertex(*meshes[i], (*corners[i])[corner]);
     }
   }
 }

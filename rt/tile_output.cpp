@@ -15,17 +15,31 @@ bool is_finite(const Rgb& color) {
   return std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b);
 }
 
+/// Calls `body` with each pixel of the tile that is lit.
+template <typename Body>
+void each_lit(const TileJob& job, const Body& body) {
+  for (int y = 0; y < job.place.height(); ++y) {
+    for (int x = 0; x < job.place.width(); ++x) {
+      const auto pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+      if (job.wants(pixel)) body(pixel);
+    }
+  }
+}
+
+/// Tells of a pixel whose radiance is no finite number.
+void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) {
+  ++counts.not_finite;
+  const Rect& block = job.view->block;
+  const auto x = static_cast<int>(pixel % kTileSide);
+  const auto y = static_cast<int>(pixel / kTileSide);
+  counts.first_not_finite =
+      std::min(counts.first_not_finite,
+               ScreenPixel{job.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
+}
+
 }  // namespace
 
 void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output) {
-  const auto each = [&](auto&& body) {
-    for (int y = 0; y < job.place.height(); ++y) {
-      for (int x = 0; x < job.place.width(); ++x) {
-        const auto pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
-        if (job.wants(pixel)) body(pixel);
-      }
-    }
-  };
   const auto start = [&](auto* layer) {
     const auto pixels = layer->tile(index);
     if (job.wanted.empty()) std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
@@ -33,31 +47,22 @@ void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOut
   };
   const auto colors = start(output.radiance);
   const std::size_t first = job.first_pixel;
-  each([&](std::size_t i) {
+  each_lit(job, [&](std::size_t i) {
     const Rgb color = to_rgb(tile.radiance[first + i]);
-    if (is_finite(color)) {
-      colors[i] = color;
-    } else {
-      ++tile.counts.not_finite;
-      const Rect& block = job.view->block;
-      const auto x = static_cast<int>(i % kTileSide);
-      const auto y = static_cast<int>(i / kTileSide);
-      tile.counts.first_not_finite =
-          std::min(tile.counts.first_not_finite,
-                   ScreenPixel{job.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
-    }
+    colors[i] = is_finite(color) ? color : Rgb{};
+    if (!is_finite(color)) count_not_finite(job, i, tile.counts);
   });
   for (std::size_t part = 0; part < kComponents; ++part) {
     if (output.components.at(part) == nullptr) continue;
     const auto pixels = start(output.components.at(part));
-    each([&](std::size_t i) {
+    each_lit(job, [&](std::size_t i) {
       const Rgb color = to_rgb(tile.components[part][first + i]);
       if (is_finite(color) && is_finite(to_rgb(tile.radiance[first + i]))) pixels[i] = color;
     });
   }
   if (output.cost != nullptr) {
     const auto pixels = start(output.cost);
-    each([&](std::size_t i) { pixels[i] = tile.cost[first + i]; });
+    each_lit(job, [&](std::size_t i) { pixels[i] = tile.cost[first + i]; });
   }
 }
 

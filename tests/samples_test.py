@@ -107,6 +107,11 @@ def rounds(folder):
         expect(f"indirect light: by {by} (" in result.stdout + result.stderr, f"{scene}: not by {by}: {result.stderr[-800:]}")
 
 
+def differ(one, other):
+    hashes = [json.loads((wall / "manifest.json").read_text())["frames"][0]["screens"][0]["xxh64"] for wall in (one, other)]
+    return hashes[0] != hashes[1], "--adaptive makes no difference to a wall with a target"
+
+
 def adaptive(folder):
     """Samples go where noise is, alike however the work is spread, and pay: as many on average, for less error."""
     few = ("--spp", "32", "--adaptive", "--photons", "1000")
@@ -129,6 +134,14 @@ def adaptive(folder):
     error = {more: squared_error(folder, reference, 64, *sky, "--quality", "best", *more, scene=scene)[0]
              for more in ((), ("--adaptive",))}
     expect(error["--adaptive",] < 0.9 * error[()], f"adaptive samples do not pay: {error}")
+    for calm in (("--eye", "0,1000,0", "--at", "0,2000,1", "--spp", "64"), ("--passes", "none", "--spp", "until:relmse=0.1")):
+        for ranks in ("1", "2"):
+            render(folder, "--adaptive", *calm, "--ranks", ranks)
+    hpr(folder, "render", "gen:gallery", "--size", "96x64", "--adaptive", "--spp", "32", "--raw", "calm.keys")
+    hpr(folder, "render", "gen:gallery", "--size", "1x1", "-o", "one.exr", "--adaptive", "--spp", "20", "--filter", "mitchell")
+    for more in ((), ("--adaptive",)):
+        hpr(folder, "wall", "run", "1x1@96x64", MATTE, "-o", "w" + "".join(more), "--target-error", "0.001", *more)
+    expect(*differ(folder / "w", folder / "w--adaptive"))
     for other in (("--shading", "local"), ("--half-resolution", "reflection")):
         result = subprocess.run([HPR, "render", "gen:gallery", "-o", "x.png", "--adaptive", *other], cwd=folder,
                                 capture_output=True, text=True, timeout=60, check=False)
