@@ -178,7 +178,7 @@ void FrameSampler::tell_progress(double seconds) {
 
 /// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be
 /// reached; no longer than somebody who sends a signal or looks at a clock would wait.
-std::uint32_t FrameSampler::size_of_round(bool hurried) {
+std::uint32_t FrameSampler::size_of_round() {
   constexpr double kSeconds = 2.0;
   constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
   const std::uint32_t done = so_far_.samples;
@@ -187,7 +187,7 @@ std::uint32_t FrameSampler::size_of_round(bool hurried) {
   if (done > 0) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
     most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
-  } else if (hurried || sampling_.goal.seconds ||
+  } else if (sampling_.goal.seconds ||
              plan_.layout.pixels() * static_cast<std::size_t>(plan_.rays.light_samples) > kQuickPixels) {
     most = 1.0;
   }
@@ -213,7 +213,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   const Stopwatch watch;
   std::optional<Stopwatch> written;
   while (!reached(sampling_, so_far_)) {
-    add_samples(views, size_of_round(!checkpoint.path.empty()));
+    add_samples(views, size_of_round());
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.

@@ -41,8 +41,8 @@ class FrameSampler {
   bool tries_to_write(const CheckpointSettings& checkpoint);
   /// Together, where there are several: size_of_round() at most.
   void add_samples(std::span<const View> views, std::uint32_t count);
-  /// How many samples to draw together. `hurried`: somebody may end the run by a signal.
-  [[nodiscard]] std::uint32_t size_of_round(bool hurried);
+  /// How many samples to draw together.
+  [[nodiscard]] std::uint32_t size_of_round();
   /// When the first sample drawn since a checkpoint was read is at home: sums go to where their tiles are lit.
   void scatter();
   [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);
