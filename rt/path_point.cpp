@@ -31,7 +31,7 @@ void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
   std::array<double, kLobes.size()> sums{};
   double sum = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
-    const bool ends = tile.follows_for_itself(point.bsdf, kLobes[i]) && point.followed >= tile.settings.max_depth;
+    const bool ends = point.followed >= tile.settings.max_depth && tile.follows_for_itself(point.bsdf, kLobes[i]);
     if (point.depth == 0) {
       point.may_follow[i] = !ends && point.bsdf.present(kLobes[i]);
       point.follows[i] = point.may_follow[i] ? 1.0F : 0.0F;

@@ -12,6 +12,7 @@ Rgb to_rgb(const glm::dvec3& sum) {
 }
 
 bool is_finite(const Rgb& color) {
+  if (std::isfinite(color.r + color.g + color.b)) return true;  // what is not finite makes the sum so
   return std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b);
 }
 
