@@ -207,8 +207,7 @@ void AdaptiveSampling::choose(Communicator& comm, Film& film, std::span<const st
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const std::span<PixelSamples> pixels = film.pixel_samples().tile(tiles[i]);
     each_pixel(film.layout().place(tiles[i]).pixels, [&](std::size_t pixel, int, int) {
-      const std::uint32_t wanted = std::uint32_t{1} << static_cast<unsigned int>(levels.of(bins[i][pixel], shift));
-      pixels[pixel].wanted = std::max(pixels[pixel].taken, wanted);
+      pixels[pixel].wanted = std::uint32_t{1} << static_cast<unsigned int>(levels.of(bins[i][pixel], shift));
     });
   }
 }
