@@ -181,9 +181,11 @@ class TileTracer {
           if (mask[static_cast<std::size_t>((row - y0) * kTileSide + column - x0)] == 0) continue;
           add(static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0), column, row, packet, keys);
         }
+        // A packet that reaches into two squares is slower than two packets.
+        if (packet.count > 0) trace(packet, keys);
+        packet.count = 0;
       }
     }
-    if (packet.count > 0) trace(packet, keys);
   }
 
   /// A bit per look in which any surface is seen.
