@@ -53,11 +53,12 @@ glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 
     const int column = texel_index(static_cast<int>(s), size.width, texture.wrap_s);
     return decoded(texture.image.at(column, texel_index(static_cast<int>(t), size.height, texture.wrap_t)), encoding);
   }
-  // Neither is negative, so that cutting off rounds down.
-  const int x0 = static_cast<int>(s + 0.5) - 1;
-  const int y0 = static_cast<int>(t + 0.5) - 1;
-  const double fx = s - 0.5 - x0;
-  const double fy = t - 0.5 - y0;
+  const double x = s - 0.5;
+  const double y = t - 0.5;
+  const int x0 = x < 0.0 ? -1 : static_cast<int>(x);
+  const int y0 = y < 0.0 ? -1 : static_cast<int>(y);
+  const double fx = x - x0;
+  const double fy = y - y0;
   const int left = texel_index(x0, size.width, texture.wrap_s);
   const int right = texel_index(x0 + 1, size.width, texture.wrap_s);
   const int above = texel_index(y0, size.height, texture.wrap_t);
