@@ -7,7 +7,6 @@
 
 #include "cluster/collectives.h"
 #include "core/parallel.h"
-#include "image/pixel_filter.h"
 
 namespace hpr {
 namespace {
@@ -118,14 +117,10 @@ int shift_within(const Histogram& pixels, const Levels& levels, std::uint32_t bu
   return low;
 }
 
-std::uint32_t first_pilot(const Sampling& sampling) {
-  return std::max(kFewest, static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box))));
-}
-
 }  // namespace
 
 std::uint32_t AdaptiveSampling::pilot_of(const Sampling& sampling) {
-  const std::uint32_t fewest = first_pilot(sampling);
+  const std::uint32_t fewest = std::max(kFewest, least_samples(sampling));
   if (!sampling.goal.samples) return fewest;
   std::uint32_t pilot = *sampling.goal.samples;
   while (std::bit_floor(pilot / 4) >= fewest) pilot = std::bit_floor(pilot / 4);

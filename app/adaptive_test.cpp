@@ -149,10 +149,10 @@ TEST(AdaptiveSampling, MeansAreOfTheSamplesAPixelHas) {
   }
 }
 
-/// Layers, counters and progress of films that were drawn in other ways.
+/// Films that were drawn in other ways.
 TEST(AdaptiveSampling, RanksRoundsAndBreaksChangeNothing) {
   const Sampling sampling = sampling_of(64);
-  const auto wanted_of = [](const Film& film, std::size_t tile) {
+  const auto taken_of = [](const Film& film, std::size_t tile) {
     std::vector<std::uint32_t> taken;
     for (const PixelSamples& pixel : film.pixel_samples().tile(tile)) taken.push_back(pixel.taken);
     return taken;
@@ -191,7 +191,7 @@ TEST(AdaptiveSampling, RanksRoundsAndBreaksChangeNothing) {
         }
         adaptive = other;
       }
-      for (const std::size_t tile : mine) EXPECT_EQ(wanted_of(film, tile), wanted_of(expected, tile)) << tile;
+      for (const std::size_t tile : mine) EXPECT_EQ(taken_of(film, tile), taken_of(expected, tile)) << tile;
     });
   }
 }

@@ -188,8 +188,8 @@ std::vector<std::uint16_t> Film::due_pixels(std::size_t tile) const {
 
 void Film::mark_due(std::span<const std::size_t> tiles, PixelMask& due) const {
   for (const std::size_t tile : tiles) {
-    std::ranges::transform(pixel_samples_.tile(tile), due.tile(tile).begin(),
-                           [&](const PixelSamples& pixel) { return static_cast<std::uint8_t>(is_due(pixel) ? 1 : 0); });
+    std::ranges::fill(due.tile(tile), std::uint8_t{0});
+    for (const std::uint16_t pixel : due_pixels(tile)) due.tile(tile)[pixel] = 1;
     due.set_active(tile);
   }
 }

@@ -56,14 +56,14 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
   PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
   const trace::Span span("primary rays");
   PrimaryRayStats stats;
+  // Ranks that draw for others do not know what those want.
+  const bool draws_own = session.comm().size() == 1 || plan.distribution == Distribution::SortFirst;
   for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
     const std::vector<Rect> parts = parts_of(plan, screen);
     if (parts.empty()) continue;
     std::vector<View> views;
     views.reserve(looks.size());
     for (const FrameLook& look : looks) views.push_back(look.views[screen]);
-    // Ranks that draw for others do not know what those want.
-    const bool draws_own = session.comm().size() == 1 || plan.distribution == Distribution::SortFirst;
     rays.draw(views, screen, parts, keys, draws_own ? looks.front().sample.wanted : nullptr);
     stats += rays.stats();
   }

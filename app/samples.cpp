@@ -35,10 +35,6 @@ std::optional<Number> parse_whole(std::string_view text) {
   return number;
 }
 
-std::uint32_t least(const Sampling& sampling) {
-  return static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
-}
-
 }  // namespace
 
 SampleGoal parse_sample_goal(const std::string& text) {
@@ -60,12 +56,16 @@ SampleGoal parse_sample_goal(const std::string& text) {
   return {{}, std::chrono::duration<double>(*duration).count(), {}};
 }
 
+std::uint32_t least_samples(const Sampling& sampling) {
+  return static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
+}
+
 void check_sampling(const Sampling& sampling) {
-  if (!sampling.goal.samples || *sampling.goal.samples >= least(sampling)) return;
+  if (!sampling.goal.samples || *sampling.goal.samples >= least_samples(sampling)) return;
   throw Error(ExitCode::Usage,
               fmt::format("--filter {} needs {} samples, as some of its weights are negative",
-                          name_of(*sampling.filter), least(sampling)),
-              fmt::format("use --spp {} or more, or another filter", least(sampling)));
+                          name_of(*sampling.filter), least_samples(sampling)),
+              fmt::format("use --spp {} or more, or another filter", least_samples(sampling)));
 }
 
 FilterSample look_through(const Sampling& sampling, const RandomKey& random, std::uint32_t number) {
@@ -81,7 +81,7 @@ bool is_milestone(std::uint32_t samples) {
 
 bool reached(const Sampling& sampling, const SampleProgress& progress) {
   const SampleGoal& goal = sampling.goal;
-  if (progress.samples < least(sampling)) return false;
+  if (progress.samples < least_samples(sampling)) return false;
   if (progress.samples == std::numeric_limits<std::uint32_t>::max()) return true;
   if (goal.samples && progress.samples >= *goal.samples) return true;
   if (goal.seconds && progress.seconds >= *goal.seconds) return true;

@@ -33,6 +33,9 @@ struct Sampling {
   [[nodiscard]] bool sums() const { return !goal.one() || filter.has_value(); }
 };
 
+/// How many samples the filter needs.
+[[nodiscard]] std::uint32_t least_samples(const Sampling& sampling);
+
 /// Throws Error (Usage) where a filter needs more samples than are asked for.
 void check_sampling(const Sampling& sampling);
 

@@ -43,6 +43,7 @@ constexpr std::size_t kFirstPassStep = 2;
 struct Lighter::State {
   const Scene& scene;
   RaySettings settings;
+  std::vector<PassPlan> plan;
   RaySpace space;
   Surfaces surfaces;
   LightSet lights;
@@ -92,13 +93,13 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
                       TravellingRays* others)
     : scene(lit),
       settings(std::move(chosen)),
+      plan(plan_passes(requirements, settings)),
       space(lit.bounds),
-      surfaces(lit, space, lifts_origins(plan_passes(requirements, settings), settings)),
-      lights(lit, runs_pass(plan_passes(requirements, settings), "gather") ? EvenSky::LeftToRays : EvenSky::Sampled),
+      surfaces(lit, space, lifts_origins(plan, settings)),
+      lights(lit, runs_pass(plan, "gather") ? EvenSky::LeftToRays : EvenSky::Sampled),
       media(lit),
       travelling(others) {
   shared = shared_components(settings);
-  const std::vector<PassPlan> plan = plan_passes(requirements, settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
   bool needs_rays = settings.reference || !covering_surfaces(lit, true).empty();
   for (std::size_t i = 0; i < all.size(); ++i) {

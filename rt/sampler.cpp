@@ -93,6 +93,18 @@ glm::dvec2 scrambled(std::uint32_t reversed_x, std::uint32_t reversed_y, std::ui
 
 constexpr std::uint64_t kPixelOrder = 0x5851F42DU;
 
+/// What two_with_pixel() scrambles.
+struct SecondPair {
+  std::uint32_t index;
+  std::uint32_t third;
+  std::uint32_t fourth;
+
+  explicit SecondPair(std::uint32_t of_index)
+      : index(of_index),
+        third(sobol_reversed(kThird, shuffled(index, kPixelOrder))),
+        fourth(sobol_reversed(kFourth, shuffled(index, kPixelOrder))) {}
+};
+
 }  // namespace
 
 // Sobol's first dimension is the index with its bits reversed.
@@ -116,17 +128,8 @@ glm::dvec2 Sampler::two_of_pixel() {
 
 glm::dvec2 Sampler::two_with_pixel() {
   // Before it is scrambled, a sample's pair is the same for all pixels.
-  struct Pair {
-    std::uint32_t index;
-    std::uint32_t third;
-    std::uint32_t fourth;
-  };
-  static thread_local Pair last{0, sobol_reversed(kThird, shuffled(0, kPixelOrder)),
-                                sobol_reversed(kFourth, shuffled(0, kPixelOrder))};
-  if (last.index != index_) {
-    const std::uint32_t place = shuffled(index_, kPixelOrder);
-    last = {index_, sobol_reversed(kThird, place), sobol_reversed(kFourth, place)};
-  }
+  static thread_local SecondPair last(0);
+  if (last.index != index_) last = SecondPair(index_);
   return scrambled(last.third, last.fourth, next_key());
 }
 
