@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
-#include <semaphore>
 #include <thread>
 
 #include "cluster/collectives.h"
@@ -70,11 +69,22 @@ struct TravellingRays::Run {
   std::size_t count;
   const std::function<void(std::size_t)>& body;
   std::atomic<std::size_t> next = 0;
-  std::counting_semaphore<> cores;  ///< that nobody works on
+  int cores;  ///< that nobody works on; mutex_ guards it, and failure
+  std::condition_variable core_is_free;
   std::exception_ptr failure;
 
   Run(int budget, std::size_t calls, const std::function<void(std::size_t)>& what)
       : threads(budget), count(calls), body(what), cores(budget) {}
+
+  // Not a std::counting_semaphore: that of GCC 12 may sleep though it counts more than 0 (GCC bug 104928).
+  void take_core(std::unique_lock<std::mutex>& lock) {
+    core_is_free.wait(lock, [this] { return cores > 0; });
+    --cores;
+  }
+  void leave_core() {
+    ++cores;
+    core_is_free.notify_one();
+  }
 };
 
 /// Rays of one query that came from one rank, as they lie in its message, and where in the answer theirs stand.
@@ -145,17 +155,15 @@ void TravellingRays::address(Query& query) const {
 /// Rests until the other ranks have answered.
 void TravellingRays::ask(Query& query) {
   if (std::ranges::all_of(query.to, [](const auto& rays) { return rays.empty(); })) return;
-  {
-    std::unique_lock lock(mutex_);
-    HPR_CHECK(run_ != nullptr);
-    waiting_.push_back(&query);
-    const std::uint64_t asked = round_;
-    run_->cores.release();
-    if (--running_ == 0) all_rest_.notify_one();
-    answered_.wait(lock, [&] { return round_ != asked || failed_; });
-    if (round_ == asked) throw lost();
-  }
-  run_->cores.acquire();
+  std::unique_lock lock(mutex_);
+  HPR_CHECK(run_ != nullptr);
+  waiting_.push_back(&query);
+  const std::uint64_t asked = round_;
+  run_->leave_core();
+  if (--running_ == 0) all_rest_.notify_one();
+  answered_.wait(lock, [&] { return round_ != asked || failed_; });
+  if (round_ == asked) throw lost();
+  run_->take_core(lock);
 }
 
 void TravellingRays::release(bool answered) {
@@ -172,18 +180,20 @@ void TravellingRays::release(bool answered) {
 
 /// What one of the threads does.
 void TravellingRays::work(Run& run) {
-  run.cores.acquire();
+  std::unique_lock lock(mutex_);
+  run.take_core(lock);
+  lock.unlock();
+  std::exception_ptr failure;
   try {
     for (std::size_t i = run.next++; i < run.count; i = run.next++) run.body(i);
-    run.cores.release();
   } catch (...) {
     run.next = run.count;
-    const std::lock_guard lock(mutex_);
-    if (!run.failure) run.failure = std::current_exception();
-    // Who fails may rest or not; nobody is to wait for a core any more.
-    run.cores.release(run.threads);
+    failure = std::current_exception();
   }
-  const std::lock_guard lock(mutex_);
+  lock.lock();
+  if (failure && !run.failure) run.failure = failure;
+  // Who has failed may have had a core or not. One too many does no harm: others soon end as well.
+  run.leave_core();
   if (--running_ == 0) all_rest_.notify_one();
 }
 

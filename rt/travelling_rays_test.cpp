@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <thread>
+#include <vector>
 
 #include "cluster/assignment.h"
 #include "cluster/local_communicator.h"
@@ -144,6 +146,41 @@ TEST(TravellingRays, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
       EXPECT_EQ(shadow_rays, one.counts().shadow);
     }
   }
+}
+
+// Every round wakes all threads that rest, for fewer cores: whoever finds none free must not miss the next one. A wait
+// that misses one in a million stands still here once in sixty times.
+TEST(TravellingRays, RestAndGoOnThousandsOfTimes) {
+  constexpr std::size_t kJobs = 300;
+  constexpr int kCalls = 10;
+  const Scene scene = crowd();
+  const RaySpace space(scene.bounds);
+  std::atomic<std::size_t> done = 0;
+  // As ranks of MPI do that wait.
+  std::vector<std::jthread> pollers(3);
+  for (std::jthread& poller : pollers) {
+    poller = std::jthread([](const std::stop_token& stop) {
+      while (!stop.stop_requested()) std::this_thread::yield();
+    });
+  }
+  run_local_ranks(3, [&](Communicator& comm) {
+    const std::vector<SurfaceRange> mine = part_of(scene, comm);
+    TravellingRays others(comm, scene, space, mine);
+    RayScene part(scene, space, 1, mine);
+    part.share(others);
+    for (int call = 0; call < kCalls; ++call) {
+      part.for_each(1, kJobs, [&](std::size_t job) {
+        const int count = 1 << (job * 7 % 11);
+        const RayBatch rays = random_rays(count, static_cast<unsigned int>(job));
+        std::vector<std::uint8_t> blocked(static_cast<std::size_t>(count));
+        std::vector<std::uint32_t> met(static_cast<std::size_t>(count));
+        for (int round = 0; round < 4; ++round) (void)part.occluded(rays, blocked);
+        (void)part.closest(rays, met);
+        ++done;
+      });
+    }
+  });
+  EXPECT_EQ(done, 3 * kCalls * kJobs);
 }
 
 TEST(TravellingRays, ARankThatFailsEndsTheOthers) {
