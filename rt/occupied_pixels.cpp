@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
 #include <optional>
@@ -20,7 +22,7 @@ namespace {
 constexpr double kRounding = 1.0 / 2048.0;
 /// Past this many boxes looking at each costs more than rays that miss.
 constexpr std::size_t kMostBoxes = 200'000;
-/// About so many are made of a scene, of no fewer triangles each.
+/// About so many are made of a scene's surfaces, of no fewer triangles each on average.
 constexpr std::size_t kBoxes = 2048;
 constexpr std::size_t kFewestTriangles = 64;
 
@@ -97,14 +99,58 @@ std::optional<Rect> pixels_of(const View& view, const Shifts& shifts, const Pixe
               within(high.y + 0.51, size.height)};
 }
 
+/// Cells of a grid over a box, cubes: the box's own surface would be in about `wanted` of them.
+class Cells {
+ public:
+  Cells(const Bounds& box, std::size_t wanted) : low_(box.low) {
+    const glm::dvec3 size = box.high - box.low;
+    const double area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    const double most = std::max(static_cast<double>(wanted), 1.0);
+    const double side = std::max(std::sqrt(area / most), std::max({size.x, size.y, size.z}) / most);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(side > 0.0) || !(size[axis] > 0.0)) continue;
+      per_metre_[axis] = 1.0 / side;
+      count_[axis] = static_cast<std::uint32_t>(size[axis] / side) + 1;
+    }
+  }
+
+  [[nodiscard]] std::size_t count() const { return std::size_t{count_.x} * count_.y * count_.z; }
+  [[nodiscard]] std::size_t of(const glm::dvec3& place) const {
+    const glm::dvec3 at = (place - low_) * per_metre_;
+    std::size_t cell = 0;
+    for (int axis = 2; axis >= 0; --axis) {
+      const auto along = static_cast<std::uint32_t>(std::max(at[axis], 0.0));
+      cell = cell * count_[axis] + std::min(along, count_[axis] - 1);
+    }
+    return cell;
+  }
+
+ private:
+  glm::dvec3 low_;
+  glm::dvec3 per_metre_{0.0};
+  glm::uvec3 count_{1U};
+};
+
+Bounds union_of(const Bounds& a, const Bounds& b) {
+  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
+}
+
 }  // namespace
 
 MeshBoxes::MeshBoxes(const Scene& scene) : first{0} {
   const std::size_t each = std::max(kFewestTriangles, static_cast<std::size_t>(scene.triangles) / kBoxes);
   for (const Mesh& mesh : scene.meshes) {
-    for (std::span<const glm::uvec3> rest = mesh.triangles; !rest.empty();
-         rest = rest.subspan(std::min(each, rest.size()))) {
-      boxes.push_back(bounds_of(mesh, rest.first(std::min(each, rest.size()))));
+    const Cells cells(mesh_bounds(mesh), mesh.triangles.size() / each);
+    std::vector<Bounds> filled(cells.count());
+    std::vector<bool> is_filled(cells.count());
+    for (const glm::uvec3& triangle : mesh.triangles) {
+      const Bounds box = bounds_of(mesh, std::span(&triangle, 1));
+      const std::size_t cell = cells.of(0.5 * (box.low + box.high));
+      filled[cell] = is_filled[cell] ? union_of(filled[cell], box) : box;
+      is_filled[cell] = true;
+    }
+    for (std::size_t cell = 0; cell < filled.size(); ++cell) {
+      if (is_filled[cell]) boxes.push_back(filled[cell]);
     }
     first.push_back(boxes.size());
   }

@@ -12,7 +12,8 @@
 
 namespace hpr {
 
-/// What neighbouring triangles of a scene's meshes fill, in the meshes' own coordinates: a few thousand boxes.
+/// What a scene's meshes fill, in the meshes' own coordinates: a few thousand boxes, each about the triangles whose
+/// middles lie in one cell of a grid.
 struct MeshBoxes {
   explicit MeshBoxes(const Scene& scene);
 
