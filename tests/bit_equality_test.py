@@ -3,10 +3,10 @@
 
 usage: bit_equality_test.py HPR [--full]
 
-Renders gen:gallery, its visible surfaces found by OpenGL, by rays, with indirect light along rays, and with every pass and four samples, and compares the hashes of the visibility
-keys (--raw) and of the EXR file's bytes. Without --full, so few small pictures that every two values of different options
-meet in one of them, and the first once more; with it, every combination at 1280x1024. Prints the hashes, the number of
-runs and what differs, and leaves with 1 if anything does.
+Renders gen:gallery, its visible surfaces found by OpenGL, by rays, with indirect light along rays, and with every pass and
+four samples, and compares the hashes of the visibility keys (--raw) and of the EXR file's bytes. Without --full, so few
+small pictures that every two values of different options meet in one of them, and the first once more; with it, every
+combination at 1280x1024. Prints the hashes, the number of runs and what differs, and leaves with 1 if anything does.
 """
 
 import hashlib
@@ -113,8 +113,8 @@ def main():
         traced = list(itertools.product(ranks, (*distributions, parts), ("auto",), threads, backends[:1]))
         lit = list(itertools.product(ranks, (*(distributions if FULL else ("sort-first", "sort-last")), parts), ("auto",), threads,
                                      backends[:1]))
-        bad = sum(differing(way, runs if FULL else covering(runs), folder)
-                  for way, runs in (("raster", drawn), ("rays", traced), ("all passes", lit)))
+        runs = dict.fromkeys(WAYS, lit) | {"raster": drawn, "rays": traced}
+        bad = sum(differing(way, runs[way] if FULL else covering(runs[way]), folder) for way in WAYS)
     return 1 if bad else 0
 
 
