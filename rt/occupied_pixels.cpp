@@ -140,7 +140,7 @@ Bounds union_of(const Bounds& a, const Bounds& b) {
 MeshBoxes::MeshBoxes(const Scene& scene) : first{0} {
   const std::size_t each = std::max(kFewestTriangles, static_cast<std::size_t>(scene.triangles) / kBoxes);
   for (const Mesh& mesh : scene.meshes) {
-    const Cells cells(mesh_bounds(mesh), mesh.triangles.size() / each);
+    const Cells cells(mesh_bounds(mesh), std::min(mesh.triangles.size() / each, kBoxes));
     std::vector<Bounds> filled(cells.count());
     std::vector<bool> is_filled(cells.count());
     for (const glm::uvec3& triangle : mesh.triangles) {

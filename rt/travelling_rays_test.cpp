@@ -152,7 +152,7 @@ TEST(TravellingRays, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
 // that misses one in a million stands still here once in sixty times.
 TEST(TravellingRays, RestAndGoOnThousandsOfTimes) {
   constexpr std::size_t kJobs = 300;
-  constexpr int kCalls = 10;
+  constexpr std::size_t kCalls = 10;
   const Scene scene = crowd();
   const RaySpace space(scene.bounds);
   std::atomic<std::size_t> done = 0;
@@ -168,7 +168,7 @@ TEST(TravellingRays, RestAndGoOnThousandsOfTimes) {
     TravellingRays others(comm, scene, space, mine);
     RayScene part(scene, space, 1, mine);
     part.share(others);
-    for (int call = 0; call < kCalls; ++call) {
+    for (std::size_t call = 0; call < kCalls; ++call) {
       part.for_each(1, kJobs, [&](std::size_t job) {
         const int count = 1 << (job * 7 % 11);
         const RayBatch rays = random_rays(count, static_cast<unsigned int>(job));
