@@ -153,7 +153,7 @@ Scene floating_scene() {
   Mesh splinters = soup(40);
   for (glm::vec3& position : splinters.positions) position = 0.3F * position + glm::vec3(0.5F, -1.0F, 0.3F);
   test::place(scene, test::add_mesh(scene, splinters));
-  const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.3, 16, 0));
+  const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.3, 24, 0));
   for (const double x : {-1.2, -0.4, 0.6, 1.2}) {
     const glm::dmat4 there = glm::translate(glm::dmat4(1.0), {x, 0.3 * x, 0.5});
     test::place(scene, shared, glm::scale(glm::rotate(there, x, glm::dvec3(0.6, 0.8, 0.0)), {x, 1.0, 0.4}));
@@ -305,7 +305,7 @@ TEST(PrimaryRays, OrthographicViewsSeeBetweenTheirPlanes) {
   view.near_distance = 3.5;
   view.far_distance = 4.25;
   const Drawn drawn = draw(scene, view);
-  EXPECT_GT(covered(drawn.keys), 800U);
+  EXPECT_GT(covered(drawn.keys), 1000U);
   EXPECT_LT(covered(drawn.keys), 14000U);
   for (const Key key : drawn.keys.pixels()) EXPECT_LE(key_depth(key), 1.0F);
   view.near_distance = 1.0;
