@@ -77,8 +77,7 @@ MediumFinder::MediumFinder(const Scene& scene) : scene_(scene) {
         solids_.emplace_back(Solid{i, transformed(instance.to_world, of_mesh.at(instance.mesh)), from_world});
     if (!is_absorber(material)) continue;
     Bounds& box = of_material.try_emplace(mesh.material, solid.box).first->second;
-    box.low = glm::min(box.low, solid.box.low);
-    box.high = glm::max(box.high, solid.box.high);
+    box = united(box, solid.box);
   }
   for (const auto& [material, box] : of_material) boxes_.push_back(box);
 }

@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -119,7 +120,7 @@ class Cells {
     const glm::dvec3 at = (place - low_) * per_metre_;
     std::size_t cell = 0;
     for (int axis = 2; axis >= 0; --axis) {
-      const auto along = static_cast<std::uint32_t>(std::max(at[axis], 0.0));
+      const auto along = static_cast<std::uint32_t>(std::max(0.0, at[axis]));
       cell = cell * count_[axis] + std::min(along, count_[axis] - 1);
     }
     return cell;
@@ -131,27 +132,19 @@ class Cells {
   glm::uvec3 count_{1U};
 };
 
-Bounds union_of(const Bounds& a, const Bounds& b) {
-  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
-}
-
 }  // namespace
 
 MeshBoxes::MeshBoxes(const Scene& scene) : first{0} {
   const std::size_t each = std::max(kFewestTriangles, static_cast<std::size_t>(scene.triangles) / kBoxes);
   for (const Mesh& mesh : scene.meshes) {
     const Cells cells(mesh_bounds(mesh), std::min(mesh.triangles.size() / each, kBoxes));
-    std::vector<Bounds> filled(cells.count());
-    std::vector<bool> is_filled(cells.count());
+    std::vector<Bounds> filled(cells.count(), empty_bounds());
     for (const glm::uvec3& triangle : mesh.triangles) {
       const Bounds box = bounds_of(mesh, std::span(&triangle, 1));
-      const std::size_t cell = cells.of(0.5 * (box.low + box.high));
-      filled[cell] = is_filled[cell] ? union_of(filled[cell], box) : box;
-      is_filled[cell] = true;
+      Bounds& cell = filled[cells.of(0.5 * (box.low + box.high))];
+      cell = united(cell, box);
     }
-    for (std::size_t cell = 0; cell < filled.size(); ++cell) {
-      if (is_filled[cell]) boxes.push_back(filled[cell]);
-    }
+    std::ranges::copy_if(filled, std::back_inserter(boxes), [](const Bounds& box) { return box.low.x <= box.high.x; });
     first.push_back(boxes.size());
   }
 }

@@ -5,13 +5,21 @@
 
 namespace hpr {
 
+Bounds empty_bounds() {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return {glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+}
+
+Bounds united(const Bounds& a, const Bounds& b) {
+  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
+}
+
 Bounds mesh_bounds(const Mesh& mesh) {
   return bounds_of(mesh, mesh.triangles);
 }
 
 Bounds bounds_of(const Mesh& mesh, std::span<const glm::uvec3> triangles) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Bounds bounds{glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+  Bounds bounds = empty_bounds();
   for (const glm::uvec3& triangle : triangles) {
     for (int corner = 0; corner < 3; ++corner) {
       const glm::dvec3 p(mesh.positions[triangle[corner]]);

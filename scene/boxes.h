@@ -8,8 +8,12 @@
 
 namespace hpr {
 
-/// The box of the positions a mesh uses, or some triangles of it, in its own coordinates; empty (low > high) when there
-/// are none.
+/// What holds nothing: low > high.
+[[nodiscard]] Bounds empty_bounds();
+/// The box about both.
+[[nodiscard]] Bounds united(const Bounds& a, const Bounds& b);
+
+/// The box of the positions a mesh uses, or some triangles of it, in its own coordinates; empty when there are none.
 [[nodiscard]] Bounds mesh_bounds(const Mesh& mesh);
 [[nodiscard]] Bounds bounds_of(const Mesh& mesh, std::span<const glm::uvec3> triangles);
 

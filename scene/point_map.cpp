@@ -6,9 +6,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <limits>
 
 #include "core/check.h"
+#include "scene/boxes.h"
 
 namespace hpr {
 namespace {
@@ -52,9 +52,8 @@ PointMap::PointMap(Image<glm::vec3> points) : points_(std::move(points)) {
   HPR_CHECK(points_.size().area() > 0);
   for (int y = 0; y < points_.height(); y += kBlockSide) {
     for (int x = 0; x < points_.width(); x += kBlockSide) {
-      Block block{{x, y, std::min(x + kBlockSide, points_.width()), std::min(y + kBlockSide, points_.height())}, {}};
-      block.box = {glm::dvec3(std::numeric_limits<double>::infinity()),
-                   glm::dvec3(-std::numeric_limits<double>::infinity())};
+      Block block{{x, y, std::min(x + kBlockSide, points_.width()), std::min(y + kBlockSide, points_.height())},
+                  empty_bounds()};
       visit(block, [&](const glm::dvec3& point) {
         block.box.low = glm::min(block.box.low, point);
         block.box.high = glm::max(block.box.high, point);

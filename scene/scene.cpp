@@ -15,14 +15,13 @@ namespace hpr {
 void finish_scene(Scene& scene) {
   if (scene.materials.empty()) scene.materials.emplace_back();
   constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() - std::uint64_t{1};
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
   std::vector<Bounds> boxes;
   boxes.reserve(scene.meshes.size());
   for (const Mesh& mesh : scene.meshes) boxes.push_back(mesh_bounds(mesh));
 
   std::uint64_t triangles = 0;
-  Bounds bounds{glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+  Bounds bounds = empty_bounds();
   for (Instance& instance : scene.instances) {
     HPR_CHECK(instance.mesh < scene.meshes.size());
     instance.first_surface = static_cast<std::uint32_t>(triangles);
@@ -33,8 +32,7 @@ void finish_scene(Scene& scene) {
     }
     if (scene.mesh_of(instance).triangles.empty()) continue;
     const Bounds box = transformed(instance.to_world, boxes[instance.mesh]);
-    bounds.low = glm::min(bounds.low, box.low);
-    bounds.high = glm::max(bounds.high, box.high);
+    bounds = united(bounds, box);
   }
   scene.triangles = static_cast<std::uint32_t>(triangles);
   scene.bounds = triangles > 0 ? bounds : Bounds{};
