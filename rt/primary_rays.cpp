@@ -218,6 +218,7 @@ class TileTracer {
     }
     for (std::size_t i = packet.count; i < kWidth; ++i) leave_out(i);
     search_.through = false;
+    search_.found.fill(false);
     intersect();
     const std::size_t again = settle();
     if (again > 0) {
