@@ -218,7 +218,6 @@ class TileTracer {
     }
     for (std::size_t i = packet.count; i < kWidth; ++i) leave_out(i);
     search_.through = false;
-    search_.found.fill(false);
     intersect();
     const std::size_t again = settle();
     if (again > 0) {
@@ -274,6 +273,7 @@ class TileTracer {
     valid_[lane] = usable ? -1 : 0;
     if (!usable) {
       leave_out(lane);
+      search_.found[lane] = false;  // which the packet before may have left there
       ++stats_.invalid;
     }
   }
