@@ -1,11 +1,14 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 
 #include "image/color_format.h"
 #include "image/depth_format.h"
 #include "rt/ray_build.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace hpr {
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <hpr/version.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 

@@ -1,12 +1,15 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 #include <vector>
 
 #include "app/bench_raster.h"
 #include "app/command.h"
 #include "app/render_options.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace hpr {
 

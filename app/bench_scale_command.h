@@ -1,12 +1,15 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 #include <vector>
 
 #include "app/bench_scale.h"
 #include "app/bench_scale_report.h"
 #include "app/command.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace hpr {
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <CLI/App.hpp>
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -14,6 +12,10 @@
 #include "cluster/communicator.h"
 #include "core/error.h"
 #include "scene/load_scene.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace hpr {
 

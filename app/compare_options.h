@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +9,11 @@
 #include "image/image.h"
 
 /// The options of `hpr compare`, and how their values are written. What is written otherwise throws Error (Usage).
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace hpr {
 
 /// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".

@@ -1,5 +1,6 @@
 #include "app/demo_command.h"
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <filesystem>
 #include <fstream>

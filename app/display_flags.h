@@ -1,11 +1,14 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 #include <string_view>
 
 #include "app/command.h"
 #include "walls/display.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace hpr {
 

@@ -9,6 +9,11 @@
 #include "walls/manifest.h"
 #include "walls/wall.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace hpr {
 
 class WallSender;

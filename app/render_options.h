@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -11,6 +10,10 @@
 #include "app/quality.h"
 #include "app/samples.h"
 #include "scene/view.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace hpr {
 

@@ -1,5 +1,7 @@
 #include "app/view_command.h"
 
+#include <CLI/CLI.hpp>
+
 #include "app/launcher.h"
 #include "app/wall_run.h"
 #include "walls/displays/window_display.h"

@@ -1,5 +1,6 @@
 #include "app/wall_pattern.h"
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <numeric>
 #include <optional>

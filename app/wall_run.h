@@ -12,6 +12,10 @@
 #include "app/render_options.h"
 #include "walls/wall.h"
 
+namespace CLI {
+class App;
+}  // namespace CLI
+
 namespace hpr {
 
 /// Driving a wall from a scene, as `wall run` and `demo --wall` do it.

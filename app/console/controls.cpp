@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <CLI/Error.hpp>
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <glm/vector_relational.hpp>
 
