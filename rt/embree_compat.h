@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <span>
 
 #if __has_include(<embree3/rtcore.h>)
 #include <embree3/rtcore.h>
@@ -59,6 +61,15 @@ inline void intersect(const int* valid, RTCScene scene, Context& context, RTCFil
   rtcIntersect16(valid, scene, &rays, &arguments);
 }
 
+/// Every ray of several packets that ends no sooner than it starts.
+inline void intersect(RTCScene scene, Context& context, RTCFilterFunctionN filter, std::span<HitPacket> packets) {
+  for (HitPacket& rays : packets) {
+    alignas(64) std::array<int, kWidth> valid;
+    for (std::size_t i = 0; i < kWidth; ++i) valid[i] = rays.ray.tnear[i] <= rays.ray.tfar[i] ? -1 : 0;
+    intersect(valid.data(), scene, context, filter, rays);
+  }
+}
+
 inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {
   RTCOccludedArguments arguments = occluded_arguments(context);
   rtcOccluded8(valid, scene, &rays, &arguments);
@@ -84,6 +95,13 @@ inline void intersect(const int* valid, RTCScene scene, Context& context, RTCFil
                       RTCRayHit16& rays) {
   context.filter = filter;
   rtcIntersect16(valid, scene, &context, &rays);
+}
+
+/// Every ray of several packets that ends no sooner than it starts. Coherent ones go down the tree together.
+inline void intersect(RTCScene scene, Context& context, RTCFilterFunctionN filter, std::span<HitPacket> packets) {
+  context.filter = filter;
+  rtcIntersectNM(scene, &context, reinterpret_cast<RTCRayHitN*>(packets.data()), kWidth,
+                 static_cast<unsigned int>(packets.size()), sizeof(HitPacket));
 }
 
 inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {

@@ -26,13 +26,18 @@ using embree::kWidth;
 constexpr int kPacketWidth = 4;
 constexpr int kPacketHeight = static_cast<int>(kWidth) / kPacketWidth;
 
+// Packets that go down Embree's tree together, and the side of the square of pixels they fill.
+constexpr std::size_t kPackets = 8;
+constexpr int kSide = 8;
+constexpr std::size_t kLanes = kPackets * kWidth;
+
 /// Twice what the distance of a hit, in ray space, may be wrong by.
 constexpr float kSlack = 1.0F / 1024.0F;
 
 /// Rays need not start farther than this from the middle of ray space, of which the scene fills [-2, 2]^3 at most.
 constexpr double kAround = 4.0;
 
-/// The pixels of one packet, and the surfaces found so far. The Embree context comes first: the filter is handed its
+/// The rays in flight, and the surfaces found so far. The Embree context comes first: the filter is handed its
 /// address.
 struct Search {
   embree::Context context;
@@ -46,18 +51,18 @@ struct Search {
   float slack = kSlack;
   std::uint64_t weighed = 0;
 
-  std::array<Ray, kWidth> ray;         ///< world
-  std::array<double, kWidth> scale{};  ///< from the ray's own parameter to distances in ray space
-  std::array<double, kWidth> start{};  ///< distance in ray space at which the traced ray begins
-  std::array<float, kWidth> reach{};
-  std::array<float, kWidth> weigh_below{};  ///< nearer candidates may lie before the near plane
+  std::array<Ray, kLanes> ray;              ///< world
+  std::array<double, kLanes> scale{};       ///< from the ray's own parameter to distances in ray space
+  std::array<double, kLanes> start{};       ///< distance in ray space at which the traced ray begins
+  std::array<float, kLanes> reach{};        ///< below 0: not traced
+  std::array<float, kLanes> weigh_below{};  ///< nearer candidates may lie before the near plane
 
-  std::array<bool, kWidth> found{};
-  std::array<bool, kWidth> misled{};  ///< something that proved no hit may have hidden a hit
-  std::array<float, kWidth> distance{};
-  std::array<RayGeometry, kWidth> geometry{};
-  std::array<std::uint32_t, kWidth> primitive{};
-  std::array<Key, kWidth> key{};  ///< kNoKey: not reckoned yet
+  std::array<bool, kLanes> found{};
+  std::array<bool, kLanes> misled{};  ///< something that proved no hit may have hidden a hit
+  std::array<float, kLanes> distance{};
+  std::array<RayGeometry, kLanes> geometry{};
+  std::array<std::uint32_t, kLanes> primitive{};
+  std::array<Key, kLanes> key{};  ///< kNoKey: not reckoned yet
 };
 
 /// How far apart, in ray space, two surfaces of the scene may lie at most along a ray and have the same depth in keys.
@@ -135,15 +140,6 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
   }
 }
 
-/// Where a packet's pixels go: lane i to keys[pixel[i]] of a tile, as its look sees it.
-struct Packet {
-  std::size_t count = 0;
-  std::array<std::size_t, kWidth> look{};
-  std::array<std::uint32_t, kWidth> pixel{};
-  std::array<double, kWidth> x{};  ///< of the view
-  std::array<double, kWidth> y{};
-};
-
 /// One thread's work on a tile.
 class TileTracer {
  public:
@@ -157,12 +153,13 @@ class TileTracer {
     stand_at(rays.space().from_world(view.eye));
     search_.slack = static_cast<float>(
         std::min<double>(kSlack + 2.0 * largest_depth_step(view, rays.space()), std::numeric_limits<float>::max()));
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      embree_.ray.tnear[i] = 0.0F;
-      embree_.ray.time[i] = 0.0F;
-      embree_.ray.mask[i] = 0xFFFFFFFFU;
-      embree_.ray.id[i] = static_cast<unsigned int>(i);
-      embree_.ray.flags[i] = 0;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      embree::RayPacket& packet = packets_[lane / kWidth].ray;
+      packet.tnear[lane % kWidth] = 0.0F;
+      packet.time[lane % kWidth] = 0.0F;
+      packet.mask[lane % kWidth] = 0xFFFFFFFFU;
+      packet.id[lane % kWidth] = static_cast<unsigned int>(lane);
+      packet.flags[lane % kWidth] = 0;
     }
   }
 
@@ -170,22 +167,20 @@ class TileTracer {
   /// All looks through a pixel lie together, and pixels square by square: they meet about the same.
   void trace(const Rect& pixels, int x0, int y0, std::span<const std::uint8_t> mask,
              std::span<const std::span<Key>> keys) {
-    Packet packet;
-    for (int y = pixels.y0; y < pixels.y1; y = (y / kPacketHeight + 1) * kPacketHeight) {
-      for (int x = pixels.x0; x < pixels.x1; x = (x / kPacketWidth + 1) * kPacketWidth) {
-        const Rect square{x, y, (x / kPacketWidth + 1) * kPacketWidth, (y / kPacketHeight + 1) * kPacketHeight};
-        const Rect part = intersection(square, pixels);
+    for_squares(pixels, kSide, kSide, [&](const Rect& square) {
+      for_squares(square, kPacketWidth, kPacketHeight, [&](const Rect& part) {
         for (int i = 0; i < part.width() * part.height(); ++i) {
           const int column = part.x0 + i % part.width();
           const int row = part.y0 + i / part.width();
-          if (mask[static_cast<std::size_t>((row - y0) * kTileSide + column - x0)] == 0) continue;
-          add(static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0), column, row, packet, keys);
+          const auto pixel = static_cast<std::uint32_t>((row - y0) * kTileSide + column - x0);
+          if (mask[pixel] != 0) add(pixel, column, row, keys);
         }
-        // A packet that reaches into two squares is slower than two packets.
-        if (packet.count > 0) trace(packet, keys);
-        packet.count = 0;
-      }
-    }
+        // A packet that reaches into two parts is slower than two packets.
+        while (lanes_ % kWidth != 0) leave_out(lanes_++);
+        if (lanes_ == kLanes) trace(keys);
+      });
+      if (lanes_ > 0) trace(keys);
+    });
   }
 
   /// A bit per look in which any surface is seen.
@@ -198,25 +193,30 @@ class TileTracer {
   }
 
  private:
-  /// Every look through a pixel; packets are traced as they fill.
-  void add(std::uint32_t pixel, int column, int row, Packet& packet, std::span<const std::span<Key>> keys) {
-    for (std::size_t look = 0; look < looks_.size(); ++look) {
-      packet.look[packet.count] = look;
-      packet.pixel[packet.count] = pixel;
-      packet.x[packet.count] = column + 0.5;
-      packet.y[packet.count++] = row + 0.5;
-      if (packet.count < kWidth) continue;
-      trace(packet, keys);
-      packet.count = 0;
+  /// The pieces of `pixels` on a grid of that many pixels.
+  template <typename Visit>
+  static void for_squares(const Rect& pixels, int width, int height, Visit&& visit) {
+    for (int y = pixels.y0; y < pixels.y1; y = (y / height + 1) * height) {
+      for (int x = pixels.x0; x < pixels.x1; x = (x / width + 1) * width) {
+        visit(intersection(Rect{x, y, (x / width + 1) * width, (y / height + 1) * height}, pixels));
+      }
     }
   }
 
-  void trace(const Packet& packet, std::span<const std::span<Key>> keys) {
-    stats_.rays += packet.count;
-    for (std::size_t i = 0; i < packet.count; ++i) {
-      aim(i, view_ray(looks_[packet.look[i]], packet.x[i], packet.y[i]));
+  /// Every look through a pixel; rays are traced when no lane is free.
+  void add(std::uint32_t pixel, int column, int row, std::span<const std::span<Key>> keys) {
+    for (std::size_t look = 0; look < looks_.size(); ++look) {
+      if (lanes_ == kLanes) trace(keys);
+      look_[lanes_] = look;
+      pixel_[lanes_] = pixel;
+      aim(lanes_++, view_ray(looks_[look], column + 0.5, row + 0.5));
+      ++stats_.rays;
     }
-    for (std::size_t i = packet.count; i < kWidth; ++i) leave_out(i);
+  }
+
+  /// The rays added since the last time; full packets of them.
+  void trace(std::span<const std::span<Key>> keys) {
+    HPR_CHECK(lanes_ % kWidth == 0);
     search_.through = false;
     intersect();
     const std::size_t again = settle();
@@ -225,12 +225,13 @@ class TileTracer {
       search_.through = true;
       intersect();
     }
-    for (std::size_t i = 0; i < packet.count; ++i) {
-      if (!search_.found[i]) continue;
-      Key& key = keys[packet.look[i]][packet.pixel[i]];
-      key = std::max(key, search_.key[i]);
-      seen_ |= std::uint64_t{1} << packet.look[i];
+    for (std::size_t lane = 0; lane < lanes_; ++lane) {
+      if (!search_.found[lane]) continue;
+      Key& key = keys[look_[lane]][pixel_[lane]];
+      key = std::max(key, search_.key[lane]);
+      seen_ |= std::uint64_t{1} << look_[lane];
     }
+    lanes_ = 0;
   }
 
   /// Where rays come from, in ray space.
@@ -259,72 +260,70 @@ class TileTracer {
     search_.reach[lane] = static_cast<float>(reach);
     search_.weigh_below[lane] = static_cast<float>(near - start) + kSlack;
 
-    embree::RayPacket& rays = embree_.ray;
-    rays.org_x[lane] = static_cast<float>(origin.x);
-    rays.org_y[lane] = static_cast<float>(origin.y);
-    rays.org_z[lane] = static_cast<float>(origin.z);
-    rays.dir_x[lane] = static_cast<float>(direction.x);
-    rays.dir_y[lane] = static_cast<float>(direction.y);
-    rays.dir_z[lane] = static_cast<float>(direction.z);
+    search_.found[lane] = search_.misled[lane] = false;
+    search_.key[lane] = kNoKey;
+
+    embree::RayPacket& rays = packets_[lane / kWidth].ray;
+    const std::size_t i = lane % kWidth;
+    rays.org_x[i] = static_cast<float>(origin.x);
+    rays.org_y[i] = static_cast<float>(origin.y);
+    rays.org_z[i] = static_cast<float>(origin.z);
+    rays.dir_x[i] = static_cast<float>(direction.x);
+    rays.dir_y[i] = static_cast<float>(direction.y);
+    rays.dir_z[i] = static_cast<float>(direction.z);
     const glm::dvec3 size = glm::abs(origin);
     // Comparisons with NaN are false, so NaN fails here too. A direction of unit length needs no more than that.
     const bool usable = size.x < kFarthestRay && size.y < kFarthestRay && size.z < kFarthestRay && length > 0.0 &&
                         length < kFarthestRay && reach >= 0.0;
-    valid_[lane] = usable ? -1 : 0;
     if (!usable) {
       leave_out(lane);
-      search_.found[lane] = false;  // which the packet before may have left there
       ++stats_.invalid;
     }
   }
 
-  /// The mask alone does not do: where Embree has no native packet of this width it goes by tnear <= tfar instead, and
-  /// its assertions look at every lane.
+  /// A lane that shall find nothing. Embree's assertions look at its ray all the same.
   void leave_out(std::size_t lane) {
-    embree::RayPacket& rays = embree_.ray;
-    rays.org_x[lane] = rays.org_y[lane] = rays.org_z[lane] = 0.0F;
-    rays.dir_x[lane] = rays.dir_y[lane] = rays.dir_z[lane] = 1.0F;
+    embree::RayPacket& rays = packets_[lane / kWidth].ray;
+    const std::size_t i = lane % kWidth;
+    rays.org_x[i] = rays.org_y[i] = rays.org_z[i] = 0.0F;
+    rays.dir_x[i] = rays.dir_y[i] = rays.dir_z[i] = 1.0F;
     search_.reach[lane] = -1.0F;
-    valid_[lane] = 0;
+    search_.found[lane] = search_.misled[lane] = false;
   }
 
   void intersect() {
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      embree_.ray.tfar[i] = search_.reach[i];
-      embree_.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-      embree_.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-      if (valid_[i] == 0) continue;
-      search_.found[i] = false;
-      search_.misled[i] = false;
-      search_.key[i] = kNoKey;
+    const std::size_t packets = lanes_ / kWidth;
+    for (std::size_t packet = 0; packet < packets; ++packet) {
+      for (std::size_t i = 0; i < kWidth; ++i) {
+        packets_[packet].ray.tfar[i] = search_.reach[packet * kWidth + i];
+        packets_[packet].hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        packets_[packet].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+      }
     }
-    embree::intersect(valid_.data(), rays_.embree(), search_.context, &keep_largest_key, embree_);
+    embree::intersect(rays_.embree(), search_.context, &keep_largest_key, std::span(packets_).first(packets));
   }
 
-  /// Reckons the keys still missing; leaves valid, and returns the number of, the lanes to trace once more.
+  /// Reckons the keys still missing; leaves in flight, and returns the number of, the lanes to trace once more.
   std::size_t settle() {
     // Triangles of neighbouring pixels lie far apart in memory: all are asked for before the first is used.
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      if (valid_[i] == 0 || !search_.found[i]) continue;
-      const Mesh& mesh = search_.scene->mesh_of(search_.scene->instances[search_.geometry[i].instance]);
-      const glm::uvec3& corners = corners_of(search_, i);
+    for (std::size_t lane = 0; lane < lanes_; ++lane) {
+      if (!search_.found[lane]) continue;
+      const Mesh& mesh = search_.scene->mesh_of(search_.scene->instances[search_.geometry[lane].instance]);
+      const glm::uvec3& corners = corners_of(search_, lane);
       for (int corner = 0; corner < 3; ++corner) __builtin_prefetch(&mesh.positions[corners[corner]]);
     }
     std::size_t again = 0;
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      if (valid_[i] == 0) continue;
-      if (search_.found[i] && search_.key[i] == kNoKey) {
-        search_.key[i] = exact_key(search_, i, search_.geometry[i], search_.primitive[i], search_.distance[i]);
-        search_.misled[i] = search_.misled[i] || search_.key[i] == kNoKey;
+    for (std::size_t lane = 0; lane < lanes_; ++lane) {
+      if (search_.found[lane] && search_.key[lane] == kNoKey) {
+        search_.key[lane] =
+            exact_key(search_, lane, search_.geometry[lane], search_.primitive[lane], search_.distance[lane]);
+        search_.misled[lane] = search_.misled[lane] || search_.key[lane] == kNoKey;
       }
-      if (search_.misled[i]) {
-        ++again;
-      } else {
-        valid_[i] = 0;
-      }
+      again += search_.misled[lane] ? 1U : 0U;
     }
-    for (std::size_t i = 0; again > 0 && i < kWidth; ++i) {
-      if (valid_[i] == 0) leave_out(i);
+    for (std::size_t lane = 0; again > 0 && lane < lanes_; ++lane) {
+      if (!search_.misled[lane]) search_.reach[lane] = -1.0F;  // what it has found stays
+      if (search_.misled[lane]) search_.found[lane] = false;
     }
     return again;
   }
@@ -335,8 +334,11 @@ class TileTracer {
   glm::dvec3 eye_{0.0};
   double outside_ = 0.0;  ///< how far the eye lies outside of what the scene can fill
   Search search_{};
-  embree::HitPacket embree_{};
-  alignas(64) std::array<int, kWidth> valid_{};
+  std::size_t lanes_ = 0;  ///< in use
+  // Where a lane's key goes: to keys[pixel] of a tile, as its look sees it.
+  std::array<std::size_t, kLanes> look_{};
+  std::array<std::uint32_t, kLanes> pixel_{};
+  std::array<embree::HitPacket, kPackets> packets_{};
   PrimaryRayStats stats_;
 };
 
