@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """The hybrid's and Mitsuba 3's time for pictures of equal error: a curve of relMSE over time for each, and their ratio.
 
-usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--truth-spp N] [--particle-spp N] [--trim PERCENT]
-                      [--sampler NAME] [--cache FOLDER] [--json FILE]
+usage: equal_error.py HPR [--scenes NAME,...] [--size N] [--ways NAME,...] [--rounds N] [--truth-spp N] [--particle-spp N]
+                      [--trim PERCENT] [--sampler NAME] [--cache FOLDER] [--json FILE]
 
-Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). The truth is
+Times are of rendering alone: no loading, no compiling (Mitsuba renders each size once before it is timed). Each round takes
+every picture of both renderers once, those of equal samples next to each other, and compares times of that round alone: a
+machine that slows down slows down both. Ratios are medians of the rounds, the least and the greatest beside them. The truth is
 Mitsuba's, of many samples: of its path tracer, but where all lights are small, caustics on matte surfaces are found by paths so
 seldom that most of their light is missing from the mean and the rest is fireflies; there indirect light is that of its particle
 tracer. relMSE is trimmed by the worst 0.1 % of pixels (--trim), which in Mitsuba's pictures are fireflies. What chance leaves in
@@ -15,6 +17,7 @@ import json
 import math
 import os
 import pathlib
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -24,6 +27,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "tests")
 import mitsuba_test as peer  # noqa: E402
 
 SAMPLES_AT_ONCE = 64  # of Mitsuba: more of them need more memory, not less time
+MITSUBA_SAMPLES = (1, 4, 16, 64, 256, 1024)
 WAYS = {
     # name: (options, samples of a pixel)
     "draft": (["--quality", "draft"], (1, 2, 4, 8, 16, 32)),
@@ -50,16 +54,6 @@ def render_mitsuba(numpy, mitsuba, scene, spp, seed):
     return total / spp, time.perf_counter() - start
 
 
-def mitsuba_curve(numpy, mitsuba, scene, error):
-    points = []
-    for spp in (1, 4, 16, 64, 256, 1024):
-        render_mitsuba(numpy, mitsuba, scene, min(spp, SAMPLES_AT_ONCE), 1)
-        runs = [render_mitsuba(numpy, mitsuba, scene, spp, seed) for seed in ((2, 3, 4) if spp < 256 else (2,))]
-        points.append({"spp": spp, "seconds": sorted(seconds for _, seconds in runs)[len(runs) // 2],
-                       "relmse": sum(error(picture) for picture, _ in runs) / len(runs)})
-    return points
-
-
 def render_hpr(numpy, mitsuba, hpr, path, options, size, spp, seed, folder):
     picture, stats = folder / "picture.exr", folder / "stats.json"
     subprocess.run([hpr, "render", str(path), "-o", str(picture), "--force", "--stats", str(stats), "--size", f"{size}x{size}",
@@ -69,16 +63,60 @@ def render_hpr(numpy, mitsuba, hpr, path, options, size, spp, seed, folder):
     return pixels, json.loads(stats.read_text())["ms"] / 1000.0
 
 
-def seconds_at(curve, error):
-    """When a curve of Mitsuba's reaches the error: between its points and beyond them as noise falls, 1 / time."""
-    points = sorted(curve, key=lambda point: -point["relmse"])
-    if error >= points[0]["relmse"]:
-        return points[0]["seconds"]
-    for before, after in zip(points, points[1:]):
-        if error >= after["relmse"]:
-            part = math.log(before["relmse"] / error) / math.log(before["relmse"] / after["relmse"])
-            return before["seconds"] * (after["seconds"] / before["seconds"]) ** part
-    return points[-1]["seconds"] * points[-1]["relmse"] / error
+def seconds_at(errors, seconds, error):
+    """When Mitsuba reaches the error: between its points and beyond them as noise falls, 1 / time."""
+    points = sorted(zip(errors, seconds), reverse=True)
+    if error >= points[0][0]:
+        return points[0][1]
+    for (error_before, before), (error_after, after) in zip(points, points[1:]):
+        if error >= error_after:
+            part = math.log(error_before / error) / math.log(error_before / error_after)
+            return before * (after / before) ** part
+    return points[-1][1] * points[-1][0] / error
+
+
+def take_rounds(renderers, rounds, error):
+    """Pictures of all renderers, taken in turn: {(name, samples): {"relmse": mean, "seconds": [of each round]}}.
+
+    renderers: {name: (samples of a pixel, render(spp, seed) -> (picture, seconds))}."""
+    turns = sorted(((spp, name) for name, (samples, _) in renderers.items() for spp in samples), key=lambda turn: turn[0])
+    found = {(name, spp): {"relmse": 0.0, "seconds": []} for spp, name in turns}
+    for number in range(1, rounds + 1):
+        for spp, name in turns:
+            if sys.stderr.isatty():
+                print(f"\rround {number} of {rounds}: {name}, {spp} spp      ", end="", file=sys.stderr, flush=True)
+            picture, seconds = renderers[name][1](spp, number)
+            found[name, spp]["relmse"] += error(picture) / rounds
+            found[name, spp]["seconds"].append(seconds)
+    if sys.stderr.isatty():
+        print("\r" + 60 * " " + "\r", end="", file=sys.stderr, flush=True)
+    return found
+
+
+def curves_of(renderers, found):
+    """For each renderer its points by samples: relMSE, median seconds and, but for Mitsuba, how many times faster than it."""
+    errors = [found["mitsuba", spp]["relmse"] for spp in MITSUBA_SAMPLES]
+    curves = {}
+    for name, (samples, _) in renderers.items():
+        curves[name] = []
+        for spp in samples:
+            relmse, seconds = found[name, spp]["relmse"], found[name, spp]["seconds"]
+            point = {"spp": spp, "relmse": relmse, "seconds": statistics.median(seconds)}
+            if name != "mitsuba":
+                peers = zip(*(found["mitsuba", peer_spp]["seconds"] for peer_spp in MITSUBA_SAMPLES))
+                ratios = [seconds_at(errors, of_round, relmse) / own for of_round, own in zip(peers, seconds)]
+                point |= {"times_faster": statistics.median(ratios), "least": min(ratios), "greatest": max(ratios)}
+            curves[name].append(point)
+    return curves
+
+
+def print_curves(curves):
+    for name, points in curves.items():
+        for point in points:
+            line = f"  {name:10} {point['spp']:5d} spp {point['seconds']:8.3f} s  relMSE {point['relmse']:.3g}"
+            if "times_faster" in point:
+                line += f"  {point['times_faster']:.2f} x faster ({point['least']:.2f} to {point['greatest']:.2f})"
+            print(line, flush=True)
 
 
 def mean_of(numpy, mitsuba, scene, integrators, spp, seed):
@@ -141,6 +179,7 @@ def main():
     parser.add_argument("hpr")
     parser.add_argument("--scenes", default="pbr-spheres,two-monkeys")
     parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--truth-spp", type=int, default=8192)
     parser.add_argument("--particle-spp", type=int, default=131072, help="of the particle tracer, where lights are small; 0: none")
     parser.add_argument("--trim", type=float, default=0.1, help="percent of the pixels, the worst, that do not count")
@@ -163,24 +202,26 @@ def main():
             def error(picture, truth=truth, noise=noise):
                 return max(relmse(numpy, picture, truth, options.trim) - noise, 0.1 * noise)
 
-            curve = mitsuba_curve(numpy, mitsuba, scene, error)
-            report[name] = {"truth_noise": noise, "mitsuba": curve}
-            print(f"{name}: the truth's own relMSE is about {noise:.2g}")
-            for point in curve:
-                print(f"  mitsuba    {point['spp']:5d} spp {point['seconds']:8.3f} s  relMSE {point['relmse']:.3g}", flush=True)
             light = ["--environment", f"{ambient},{ambient},{ambient}"] if ambient else []
+            common = [*light, *peer.camera_options(notes)]
+
+            def render_peer(spp, seed, scene=scene):
+                return render_mitsuba(numpy, mitsuba, scene, spp, seed)
+
+            renderers = {"mitsuba": (MITSUBA_SAMPLES, render_peer)}
             for way in options.ways.split(","):
                 settings, samples = WAYS[way]
-                report[name][way] = []
-                for spp in samples:
-                    runs = [render_hpr(numpy, mitsuba, options.hpr, scenes / file, [*settings, *light, *peer.camera_options(notes)],
-                                       options.size, spp, seed, folder) for seed in ((1, 2, 3) if spp < 64 else (1,))]
-                    point = {"spp": spp, "seconds": sorted(seconds for _, seconds in runs)[len(runs) // 2],
-                             "relmse": sum(error(picture) for picture, _ in runs) / len(runs)}
-                    point["times_faster"] = seconds_at(curve, point["relmse"]) / point["seconds"]
-                    report[name][way].append(point)
-                    print(f"  {way:10} {spp:5d} spp {point['seconds']:8.3f} s  relMSE {point['relmse']:.3g}  "
-                          f"{point['times_faster']:.2f} x faster", flush=True)
+
+                def render_way(spp, seed, path=scenes / file, settings=(*settings, *common)):
+                    return render_hpr(numpy, mitsuba, options.hpr, path, settings, options.size, spp, seed, folder)
+
+                renderers[way] = (samples, render_way)
+            for spp in MITSUBA_SAMPLES:
+                render_mitsuba(numpy, mitsuba, scene, min(spp, SAMPLES_AT_ONCE), 99)
+            curves = curves_of(renderers, take_rounds(renderers, options.rounds, error))
+            report[name] = {"truth_noise": noise, **curves}
+            print(f"{name}: the truth's own relMSE is about {noise:.2g}")
+            print_curves(curves)
     if options.json:
         pathlib.Path(options.json).write_text(json.dumps(report, indent=2) + "\n")
     return 0
