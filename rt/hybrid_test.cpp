@@ -4,7 +4,6 @@
 
 #include "rt/hybrid_test_tools.h"
 #include "rt/lighter.h"
-#include "rt/test_samples.h"
 #include "rt/test_scene.h"
 
 // All passes together, held to the reference: light is neither lost between them nor counted twice.
@@ -24,15 +23,15 @@ void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool 
   const glm::dvec3 reference =
       mean_of(scene, view,
               {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = terminator_fix, .reference = true},
-              512 / test::kSampleShare, covering);
+              512, covering);
   const glm::dvec3 hybrid = mean_of(scene, view,
                                     {.max_depth = 24,
                                      .glossy_cutoff = glossy_cutoff,
                                      .photons = 20'000,
                                      .global_photons = true,
                                      .terminator_fix = terminator_fix},
-                                    64 / test::kSampleShare, covering);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025 * test::kMoreNoise) << "channel " << c;
+                                    64, covering);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
 }
 
 TEST(Hybrid, AHeadlightShowsWhatIsLookedAtAndIsScatteredNoFurther) {
