@@ -8,12 +8,12 @@
 #include "app/compare.h"
 #include "image/image.h"
 
-/// The options of `hpr compare`, and how their values are written. What is written otherwise throws Error (Usage).
 namespace CLI {
 class App;
 class Option;
 }  // namespace CLI
 
+/// The options of `hpr compare`, and how their values are written. What is written otherwise throws Error (Usage).
 namespace hpr {
 
 /// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "app/bench_times.h"
 #include "core/stopwatch.h"
 #include "raster/rasterizer.h"
 #include "rt/primary_rays.h"
@@ -116,11 +117,6 @@ double time_of(TileLayer<Key>& layer, Draw&& draw) {
   return watch.ms();
 }
 
-double median(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + std::ssize(values) / 2);
-  return values[values.size() / 2];
-}
-
 /// Draws both ways, in turn, so that a machine that slows down slows down both; prints what `tries` > 1 tries took.
 Agreement agreement_on(const std::string& source, Size size, int tries) {
   const Scene scene = load_scene(source, {});
@@ -150,10 +146,8 @@ Agreement agreement_on(const std::string& source, Size size, int tries) {
   if (tries > 1) {
     fmt::print(
         "{}: {} triangles, raster {:.1f} ms, rays {:.1f} ms ({:.2f} x, from {:.2f} to {:.2f}; Embree's scene {:.0f} "
-        "ms), "
-        "{} of {} pixels covered, {} ({:.4f} %) show another surface, {} of them nothing on one side, {:.4f} px at "
-        "most from an "
-        "edge; {} weighed, {} retraced\n",
+        "ms), {} of {} pixels covered, {} ({:.4f} %) show another surface, {} of them nothing on one side, {:.4f} px "
+        "at most from an edge; {} weighed, {} retraced\n",
         source, scene.triangles, median(raster_ms), median(rays_ms), median(ratios), std::ranges::min(ratios),
         std::ranges::max(ratios), build_ms, result.covered, result.pixels, result.differing,
         100.0 * static_cast<double>(result.differing) / static_cast<double>(result.pixels), result.coverage,
