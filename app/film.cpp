@@ -83,6 +83,7 @@ void Film::add_tile(const SampleLight& light, double weight, std::uint32_t numbe
   const auto sum_up = [&](TileLayer<ColorSum>& sums, const TileLayer<Rgb>& colors) {
     const std::span<const Rgb> from = colors.tile(tile);
     const std::span<ColorSum> to = sums.tile(tile);
+    sums.touch(tile);
     each_due([&](std::size_t i) { add_to(to[i], from[i], weight); });
     sums.set_active(tile);
   };
@@ -91,6 +92,7 @@ void Film::add_tile(const SampleLight& light, double weight, std::uint32_t numbe
   if (cost_.tiles() > 0) {
     const std::span<const float> from = light.aovs.single.at(Aov::Cost).tile(tile);
     const std::span<double> to = cost_.tile(tile);
+    cost_.touch(tile);
     each_due([&](std::size_t i) { to[i] += static_cast<double>(from[i]); });
     cost_.set_active(tile);
   }
@@ -116,6 +118,7 @@ void Film::add(std::span<const SampleLight> lights, std::span<const double> weig
   for (const SampleLight& light : lights) HPR_CHECK(light.radiance.layout() == layout());
   // Tile by tile, as sums stay at hand.
   parallel_for(threads, tiles.size(), [&](std::size_t i) {
+    if (is_adaptive()) pixel_samples_.touch(tiles[i]);
     const std::vector<std::uint16_t> due = due_pixels(tiles[i]);
     for (std::size_t sample = 0; sample < lights.size(); ++sample) {
       add_tile(lights[sample], weights[sample], samples_ + static_cast<std::uint32_t>(sample), tiles[i], due);

@@ -151,6 +151,11 @@ class TileLayer {
   [[nodiscard]] Pixel& at(std::size_t screen, int x, int y) { return pixels_[index(screen, x, y)]; }
   [[nodiscard]] const Pixel& at(std::size_t screen, int x, int y) const { return pixels_[index(screen, x, y)]; }
 
+  /// For whoever is going to add to a tile that may never have been written to: reading would map the system's page of
+  /// zeros first, and each page's first write after that stops all cores to take it back.
+  void touch(std::size_t tile) {
+    if (!active(tile)) std::ranges::fill(this->tile(tile), Pixel{});
+  }
   /// Makes a tile zero and inactive.
   void clear(std::size_t tile) {
     if (!active(tile)) return;

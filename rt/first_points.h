@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "image/key.h"
+#include "image/tiles.h"
 #include "rt/pass.h"
 
 namespace hpr {
@@ -20,6 +22,11 @@ struct TileJob {
 
   [[nodiscard]] bool wants(std::size_t pixel) const { return wanted.empty() || wanted[pixel] != 0; }
 };
+
+/// `tiles` in the order of work in which threads end together: those that see most surfaces first. As they are where
+/// there are so many that the last ones hardly matter.
+[[nodiscard]] std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const TileLayer<Key>& keys,
+                                                     int threads);
 
 /// Rows of a tile, from its own first one.
 struct RowRange {

@@ -366,8 +366,9 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
   const PhotonMaps* const photons = state.send_photons(first.number, nullptr);
   const std::vector<Media> eyes = state.media.of_eyes(first.views);
   const Stopwatch watch;
-  state.for_each(tiles.size(), [&](std::size_t i) {
-    const std::size_t tile = tiles[i];
+  const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
+  state.for_each(order.size(), [&](std::size_t i) {
+    const std::size_t tile = order[i];
     const TilePlace place = layout.place(tile);
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
     if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;

@@ -348,7 +348,10 @@ void draw_tile(TileTracer& tracer, std::size_t tile, std::span<const Rect> parts
   const DenormalsAsZero mode;
   const Rect place = layers.front()->layout().place(tile).pixels;
   std::array<std::span<Key>, PrimaryRays::kMostLooks> keys;
-  std::ranges::transform(layers, keys.begin(), [&](TileLayer<Key>* layer) { return layer->tile(tile); });
+  std::ranges::transform(layers, keys.begin(), [&](TileLayer<Key>* layer) {
+    layer->touch(tile);
+    return layer->tile(tile);
+  });
   for (const Rect& part : parts) {
     const Rect pixels = intersection(part, place);
     if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(layers.size()));
