@@ -20,7 +20,8 @@ constexpr int kCheapDepth = 2;
 std::vector<std::string> economies_of(const FrameSettings& settings, std::span<const PassPlan> passes) {
   std::vector<std::string> names;
   if (settings.rays.reference) return names;
-  if (settings.shading == Shading::Deferred && !runs_pass(passes, "gather")) names.emplace_back(kHalfResolution);
+  const bool shares_otherwise = runs_pass(passes, "gather") || settings.rays.denoise;
+  if (settings.shading == Shading::Deferred && !shares_otherwise) names.emplace_back(kHalfResolution);
   if (runs_pass(passes, "photon") || runs_pass(passes, "gather")) names.emplace_back(kNoPhotons);
   const bool costly = settings.rays.glossy_cutoff > kCheapCutoff || settings.rays.max_depth > kCheapDepth;
   if (costly && (runs_pass(passes, "reflection") || runs_pass(passes, "refraction"))) names.emplace_back(kLessGlossy);

@@ -120,6 +120,9 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
   if (!plan.rays.half_resolution.empty()) {
     lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
   }
+  if (plan.rays.denoise) {
+    lines.push_back(fmt::format("denoiser: in the first {} samples (as asked)", kDenoisedSamples));
+  }
 }
 
 /// Whether rays or photons are to bring indirect light, where the scene leaves the choice.

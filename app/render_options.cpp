@@ -12,9 +12,9 @@
 
 #include "app/output.h"
 #include "app/quality.h"
+#include "app/words.h"
 #include "compositing/compositor.h"
 #include "core/names.h"
-#include "rt/half_resolution.h"
 #include "scene/environment.h"
 #include "scene/load_scene.h"
 
@@ -26,16 +26,6 @@ constexpr int kReferenceDepth = 64;
 
 glm::dvec3 to_point(const std::vector<double>& values) {
   return {values[0], values[1], values[2]};
-}
-
-std::vector<std::string> split_list(const std::string& text) {
-  std::vector<std::string> words;
-  for (std::size_t start = 0; start <= text.size();) {
-    const std::size_t end = std::min(text.find(',', start), text.size());
-    if (end > start) words.push_back(text.substr(start, end - start));
-    start = end + 1;
-  }
-  return words;
 }
 
 Shading parse_shading(const std::string& name) {
@@ -91,7 +81,7 @@ void note_not_finite(const std::string& name, Scene& scene) {
 
 /// Throws Error (Usage) for what is no list of passes.
 void choose_passes(const std::string& passes, RaySettings& rays) {
-  const std::vector<std::string> named = split_list(passes);
+  const std::vector<std::string> named = split_words(passes);
   if (named.empty()) {
     throw Error(ExitCode::Usage, "--passes names none", "write auto, all, none, or a list such as shadow,reflection");
   }
@@ -169,6 +159,9 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--spp", spp, "samples of a pixel: a number, until:60s or until:relmse=1e-3")->type_name("N");
   app.add_flag("--adaptive", adaptive, "more samples for pixels whose samples differ more, --spp of them on average");
+  app.add_flag(
+      "--denoise", denoise,
+      "neighbours that see the like share light, and outlines are looked at more closely, in the first samples");
   app.add_option("--filter", filter,
                  "how samples make up a pixel: box, triangle, gaussian, b-spline or mitchell (default: the centre for "
                  "one sample, box for more)");
@@ -193,39 +186,6 @@ void RenderOptions::declare_light(CLI::App& app) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   app.add_flag("--no-terminator-fix", no_terminator_fix,
                "shadow rays leave from the triangles, not the smooth surface they stand for");
-}
-
-void RenderOptions::declare_economies(CLI::App& app) {
-  app.add_option(
-         "--photon-radius", photon_radius,
-         "metres about a point in which photons count, in a frame's first sample (default 0: from their density)")
-      ->check(CLI::Range(0.0, 1e30));
-  app.add_option("--resolution-scale", resolution_scale,
-                 "the frame is made of so many of the pixels a side, and shown at full size by a filter")
-      ->check(CLI::Range(0.1, 1.0))
-      ->capture_default_str();
-  app.add_option("--half-resolution", half_resolution,
-                 "a list of passes whose light is worked out for one pixel in four where neighbours see the like")
-      ->type_name("LIST");
-}
-
-void RenderOptions::settle_economies(FrameSettings& settings) const {
-  if (!std::isfinite(photon_radius) || !std::isfinite(resolution_scale)) {
-    throw Error(ExitCode::Usage, "--photon-radius and --resolution-scale take finite numbers",
-                "write e.g. --resolution-scale 0.5");
-  }
-  if (resolution_scale != 1.0 && !settings.aovs.empty()) {
-    throw Error(ExitCode::Usage, "--aov has a value for every pixel, of which --resolution-scale makes fewer",
-                "draw a smaller picture with --size");
-  }
-  settings.rays.photon_radius = photon_radius;
-  settings.resolution_scale = resolution_scale;
-  if (half_resolution != "none") settings.rays.half_resolution = split_list(half_resolution);
-  (void)shared_components(settings.rays);  // as for unknown passes
-  if (!settings.rays.half_resolution.empty() && (reference || settings.shading == Shading::Local)) {
-    throw Error(ExitCode::Usage, "--half-resolution is about passes over what is seen in the end",
-                "use it without --reference and with --shading deferred");
-  }
 }
 
 Camera RenderOptions::choose_camera(const Scene& scene) const {
@@ -275,7 +235,7 @@ Sampling RenderOptions::sampling() const {
 std::vector<std::string> RenderOptions::without_use() const {
   std::vector<std::string> names;
   if (!reference) {
-    const std::vector<std::string> named = split_list(passes);
+    const std::vector<std::string> named = split_words(passes);
     const bool may_send = passes == "auto" || passes == "all" || std::ranges::find(named, "photon") != named.end();
     if (!may_send && photons.value_or(0) > 0) names.emplace_back("--photons");
     if (!may_send && photon_radius > 0.0) names.emplace_back("--photon-radius");

@@ -38,6 +38,7 @@ struct RenderOptions {
   std::string half_resolution;    ///< passes
   std::string filter;
   bool adaptive = false;
+  bool denoise = false;
   std::string aov;
   std::string environment;
   bool reference = false;
@@ -79,6 +80,7 @@ struct RenderOptions {
   void check_combination(const FrameSettings& settings) const;
   void settle_photons(const Quality& defaults, RaySettings& rays) const;
   void settle_economies(FrameSettings& settings) const;
+  void settle_denoiser(FrameSettings& settings) const;
 };
 
 /// Of those RenderOptions declares, without their dashes.

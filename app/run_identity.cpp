@@ -64,6 +64,7 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
                                                rays.photon_radius));
   identity.emplace_back("ambient light", fmt::format("{} by {} rays", rays.ambient, rays.occlusion_rays));
   identity.emplace_back("list at half resolution", fmt::format("'{}'", fmt::join(rays.half_resolution, ",")));
+  identity.emplace_back("denoiser", rays.denoise ? "on" : "off");
   identity.emplace_back("terminator fix", rays.terminator_fix ? "on" : "off");
   std::vector<std::string_view> aovs;
   for (const Aov aov : plan.aovs) aovs.push_back(name_of(aov));

@@ -192,6 +192,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   best.resolution_scale = 1.0;
   best.half_resolution.clear();
   best.adaptive = false;
+  best.denoise = false;
   best.wire = {};
   best.indirect.reset();
   best.reference = !passes;

@@ -18,16 +18,6 @@ Sampler sampler_of(const TileWork& tile, const TileJob& job, int x, int y) {
           job.number.sample};
 }
 
-/// Sets a point whose surface is set, seen at pixel (x, y) of the tile.
-void start(const TileWork& tile, const TileJob& job, int x, int y, double share, PathPoint& point) {
-  point.share = share;
-  point.media = tile.eye_media;
-  point.throughput = share * left_after(point.media.here, glm::distance(job.view->eye, point.surface.position));
-  point.sampler = sampler_of(tile, job, x, y);
-  point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
-  prefetch_material(tile.scene, point.surface);
-}
-
 /// See find_first_points. Points are finished once all are found: by then the memory has what materials read.
 class FirstPoints {
  public:
@@ -66,7 +56,7 @@ class FirstPoints {
     const WorldTriangle& triangle = tile_.triangles.load(tile_.surfaces, key_surface(key));
     PathPoint& point = points_.emplace_back();
     point.surface = tile_.surfaces.meet(triangle, ray.origin, ray.direction);
-    start(tile_, job_, x, y, share, point);
+    start_point(tile_, job_, x, y, share, point);
   }
 
   void prefetch(int y) const {
@@ -90,10 +80,7 @@ class FirstPoints {
         const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
         if (!job_.wants(pixel)) continue;
         const Ray ray = ray_of(x, y);
-        RayRequest request;
-        request.origin = ray.origin + ray.direction * job_.view->near_distance;
-        request.direction = glm::normalize(ray.direction);
-        request.reach = std::numeric_limits<double>::infinity();
+        RayRequest request = eye_ray(*job_.view, job_, x + 0.5, y + 0.5);
         if (job_.keys[pixel] != kNoKey) {
           tile_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
           const SurfacePoint behind = tile_.surfaces.meet(triangle, ray.origin, ray.direction);
@@ -116,7 +103,7 @@ class FirstPoints {
       if (share > 0.0) {
         PathPoint& point = points_.emplace_back();
         point.surface = surface;
-        start(tile_, job_, x, y, share, point);
+        start_point(tile_, job_, x, y, share, point);
       }
       left_[pixel] *= 1.0 - coverage;
       left_[pixel] *= survival(left_[pixel], sampler);
@@ -133,6 +120,24 @@ class FirstPoints {
 };
 
 }  // namespace
+
+void start_point(const TileWork& tile, const TileJob& job, int x, int y, double share, PathPoint& point) {
+  point.share = share;
+  point.media = tile.eye_media;
+  point.throughput = share * left_after(point.media.here, glm::distance(job.view->eye, point.surface.position));
+  point.sampler = sampler_of(tile, job, x, y);
+  point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
+  prefetch_material(tile.scene, point.surface);
+}
+
+RayRequest eye_ray(const View& view, const TileJob& job, double x, double y) {
+  const Ray ray = view_ray(view, job.place.x0 + x, job.place.y0 + y);
+  RayRequest request;
+  request.origin = ray.origin + ray.direction * view.near_distance;
+  request.direction = glm::normalize(ray.direction);
+  request.reach = view.orthographic ? view.far_distance - view.near_distance : std::numeric_limits<double>::infinity();
+  return request;
+}
 
 std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const TileLayer<Key>& keys, int threads) {
   constexpr std::size_t kManyPerThread = 64;

@@ -37,8 +37,15 @@ struct RowRange {
 /// Points that are worked on together: enough to fill packets, few enough for the second-level cache.
 inline constexpr std::size_t kWavePoints = 512;
 
+/// The ray through (x, y) of the tile, in pixels from its upper left corner, from the near plane to the far one.
+/// `view`: the job's, looked through at any place of the pixels.
+[[nodiscard]] RayRequest eye_ray(const View& view, const TileJob& job, double x, double y);
+
 /// Past the last of the rows, `first` and on, whose pixels make a wave.
 [[nodiscard]] int end_of_wave(const TileJob& job, int first);
+
+/// Sets a point whose surface is set, seen at pixel (x, y) of the tile, of which it covers `share`.
+void start_point(const TileWork& tile, const TileJob& job, int x, int y, double share, PathPoint& point);
 
 /// The first generation of points in some rows of a tile: the surfaces its keys name, and those of partial coverage
 /// before them, each with the share of the pixel it covers. Adds the background where neither is.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -8,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "rt/denoiser.h"
 #include "rt/half_resolution.h"
 #include "rt/pass.h"
 
@@ -18,6 +20,7 @@ struct Scratch {
   Scratch(TileWork tile_work, std::size_t times) : work(std::move(tile_work)), ms(times, 0.0) {}
   TileWork work;
   SharedLight shared;
+  Denoiser denoiser;
   std::vector<std::vector<PathPoint>> waiting;  ///< by depth
   Wave wave;
   std::vector<double> ms;
@@ -32,6 +35,32 @@ inline void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::s
   sums.resize(pixels);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     if (wanted[pixel % kTilePixels] != 0) sums[pixel] = glm::dvec3(0.0);
+  }
+}
+
+/// What all steps took so far.
+[[nodiscard]] inline double spent_ms(const Scratch& scratch) {
+  return std::accumulate(scratch.ms.begin(), scratch.ms.end(), 0.0);
+}
+
+/// Clears what samples of tile `index` are summed in, and room for `spare` pixels more. With `parts` components too.
+inline void clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples, bool parts,
+                  std::size_t spare) {
+  const LightOutput& output = samples.front().output;  // all want the same
+  tile.wants_components =
+      parts || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
+  tile.wants_cost = output.cost != nullptr;
+  const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, index);
+  const std::size_t pixels = samples.size() * kTilePixels + spare;
+  clear_sums(tile.radiance, pixels, wanted);
+  if (tile.wants_components) {
+    for (auto& part : tile.components) clear_sums(part, pixels, wanted);
+  }
+  if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
+  for (const LitSample& sample : samples) {
+    for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
+      if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
+    }
   }
 }
 

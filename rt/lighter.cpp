@@ -59,6 +59,7 @@ struct Lighter::State {
   std::optional<RayScene> whole;  ///< for photons; only where `opaque` is not all
   std::optional<PhotonSender> photons;
   std::optional<PathTracer> reference;
+  Outlines outlines;  ///< where denoising looks again
   std::vector<std::unique_ptr<Scratch>> idle;
   std::mutex mutex;
   RayCounts counts;
@@ -81,9 +82,9 @@ struct Lighter::State {
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   void tell_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
-  void clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples) const;
   void light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
-                  std::span<const LitSample> samples) const;
+                  std::span<const LitSample> samples);
+  void denoise(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
   void tell(double spent_ms);
   void light_waiting(Scratch& scratch) const;
   void light_wave(Scratch& scratch) const;
@@ -101,7 +102,7 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
       travelling(others) {
   shared = shared_components(settings);
   std::vector<std::unique_ptr<Pass>> all = make_all_passes();
-  bool needs_rays = settings.reference || !covering_surfaces(lit, true).empty();
+  bool needs_rays = settings.reference || settings.denoise || !covering_surfaces(lit, true).empty();
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!plan[i].runs) continue;
     needs_rays = needs_rays || all[i]->needs_rays();
@@ -208,7 +209,7 @@ std::unique_ptr<Scratch> Lighter::State::take_scratch() {
                                             .settings = settings,
                                             .followed_lobes = followed_lobes,
                                             .gathers = gathers},
-                                   kFirstPassStep + passes.size());
+                                   kFirstPassStep + passes.size() + 1);
 }
 
 void Lighter::State::light_wave(Scratch& scratch) const {
@@ -256,33 +257,29 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
   }
 }
 
-/// Clears what a tile's samples are summed in.
-void Lighter::State::clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples) const {
-  const LightOutput& wanted = samples.front().output;  // all want the same
-  const std::span<const std::uint8_t> wanted_pixels = mask_of(samples.front().wanted, index);
-  tile.wants_components =
-      shared != 0 || std::ranges::any_of(wanted.components, [](const auto* layer) { return layer != nullptr; });
-  tile.wants_cost = wanted.cost != nullptr;
-  const std::size_t pixels = samples.size() * kTilePixels;
-  clear_sums(tile.radiance, pixels, wanted_pixels);
-  if (tile.wants_components) {
-    for (auto& part : tile.components) clear_sums(part, pixels, wanted_pixels);
+/// Light of neighbours in place of a sample's own, once that is known.
+void Lighter::State::denoise(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index) {
+  const Stopwatch watch;
+  const double before = spent_ms(scratch);
+  const std::span<const std::uint8_t> crossed = outlines.of_tile(scratch.work, jobs.front(), index);
+  for (const TileJob& job : jobs) {
+    if (job.number.sample >= kDenoisedSamples) break;
+    scratch.denoiser.look_again(scratch.work, job, crossed, scratch.waiting[0]);
+    light_waiting(scratch);
+    scratch.denoiser.resolve(scratch.work, job, crossed);
   }
-  if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
-  for (const LitSample& sample : samples) {
-    for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
-      if (layer != nullptr) std::ranges::fill(layer->tile(index), Rgb{});
-    }
-  }
+  scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
 }
 
 /// Some rows of one sample after those of another: what one sample has looked up the next one finds at hand.
 void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
-                                std::span<const LitSample> samples) const {
+                                std::span<const LitSample> samples) {
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
   TileWork& tile = scratch.work;
-  clear(tile, index, samples);
+  const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
+  clear(tile, index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises ? kTilePixels : 0);
+  if (denoises) scratch.denoiser.start(jobs.size());
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
   if (shared != 0) scratch.shared.start(shared, tile, jobs.front());
   const int height = jobs.front().place.height();
@@ -293,18 +290,20 @@ void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs,
       find_first_points(tile, jobs[i], rows, scratch.waiting[0]);
       add_first_surfaces(scratch.waiting[0], index, samples[i].output);
       if (shared != 0) scratch.shared.choose(scratch.waiting[0], rows.first);
+      if (denoises) scratch.denoiser.note(tile, scratch.waiting[0]);
       scratch.ms[kSurfaceStep] += watch.ms();
       light_waiting(scratch);
     }
   }
   if (shared != 0) scratch.shared.spread(tile);
+  if (denoises) denoise(scratch, jobs, index);
   for (std::size_t i = 0; i < jobs.size(); ++i) store(tile, jobs[i], index, samples[i].output);
 }
 
 /// Counts and times of what was lit, gathered from the threads' memory.
 void Lighter::State::tell(double spent_ms) {
   counts = {};
-  std::vector<double> ms(kFirstPassStep + passes.size(), 0.0);
+  std::vector<double> ms(kFirstPassStep + passes.size() + 1, 0.0);
   for (const auto& scratch : idle) {
     counts += std::exchange(scratch->work.counts, {});
     counts.cut += std::exchange(scratch->work.scratch.cut, 0);
@@ -325,6 +324,7 @@ void Lighter::State::tell(double spent_ms) {
     if (passes[i]->gathers_photons()) spent += std::exchange(photon_ms, 0.0) * settings.threads;
     times.push_back({std::string(passes[i]->name()), spent});
   }
+  if (settings.denoise) times.push_back({"denoise", ms.back()});
 }
 
 Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays,
@@ -356,7 +356,6 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
   check_sizes(samples);
   const LitSample& first = samples.front();
   const FrameLayout& layout = first.keys->layout();
-
   State& state = *state_;
   if (state.reference) {
     state.trace_reference(first, tiles);
@@ -366,6 +365,7 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
   const PhotonMaps* const photons = state.send_photons(first.number, nullptr);
   const std::vector<Media> eyes = state.media.of_eyes(first.views);
   const Stopwatch watch;
+  if (state.settings.denoise) state.outlines.prepare(layout, first.views);
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     const std::size_t tile = order[i];

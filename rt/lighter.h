@@ -14,6 +14,7 @@
 #include "cluster/communicator.h"
 #include "image/color.h"
 #include "image/key.h"
+#include "image/pixel_filter.h"
 #include "image/tiles.h"
 #include "rt/ray_build.h"
 #include "rt/sampler.h"
@@ -48,13 +49,18 @@ struct RaySettings {
   std::vector<std::string> half_resolution = {};
   /// Surfaces that this rank's rays meet at home, as those of the others travel to it; none: all of them.
   std::optional<std::vector<SurfaceRange>> part = {};
-  bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
-  std::uint64_t seed = 1;  ///< of all randomness
+  bool denoise = false;                   ///< see Denoiser
+  PixelFilter filter = PixelFilter::Box;  ///< of which denoising looks at more places; none of its weights < 0
+  bool reference = false;                 ///< path tracing in place of all passes, paths of max_depth segments
+  std::uint64_t seed = 1;                 ///< of all randomness
   int threads = 1;
   int host_ranks = 1;  ///< ranks of this host: they share its memory
 
   bool operator==(const RaySettings&) const = default;
 };
+
+/// So many first samples of a frame are denoised; further ones have less noise together than neighbours differ.
+inline constexpr std::uint32_t kDenoisedSamples = 16;
 
 /// Photons sent per sample where the pass is named and nothing says how many.
 inline constexpr std::uint32_t kPhotons = 200'000;

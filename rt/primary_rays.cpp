@@ -347,11 +347,12 @@ void draw_tile(TileTracer& tracer, std::size_t tile, std::span<const Rect> parts
   const trace::Span span("trace tile", "tile", tile);
   const DenormalsAsZero mode;
   const Rect place = layers.front()->layout().place(tile).pixels;
+  if (std::ranges::none_of(parts, [&](const Rect& part) { return !intersection(part, place).empty(); })) return;
   std::array<std::span<Key>, PrimaryRays::kMostLooks> keys;
-  std::ranges::transform(layers, keys.begin(), [&](TileLayer<Key>* layer) {
-    layer->touch(tile);
-    return layer->tile(tile);
-  });
+  for (std::size_t look = 0; look < layers.size(); ++look) {
+    layers[look]->touch(tile);
+    keys.at(look) = layers[look]->tile(tile);
+  }
   for (const Rect& part : parts) {
     const Rect pixels = intersection(part, place);
     if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(layers.size()));
@@ -367,8 +368,7 @@ PrimaryRays::PrimaryRays(const Scene& scene, const RayScene& rays, int threads)
     : scene_(scene), rays_(rays), threads_(threads), boxes_(scene) {}
 
 void PrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
-  TileLayer<Key>* const only = &layer;
-  draw(std::span(&view, 1), screen, parts, std::span(&only, 1));
+  draw(std::span(&view, 1), screen, parts, std::array{&layer});
 }
 
 void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
@@ -389,6 +389,7 @@ void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::spa
     if (!occupied.mark(tile, layout.place(tile).pixels, mask)) return;
     const std::span<const std::uint8_t> asked = mask_of(wanted, tile);
     if (!asked.empty()) std::ranges::transform(mask, asked, mask.begin(), std::bit_and<>());
+    if (std::ranges::find(mask, std::uint8_t{1}) == mask.end()) return;
     TileTracer tracer(scene_, rays_, looks);
     draw_tile(tracer, tile, parts, mask, layers);
     const std::lock_guard lock(mutex);

@@ -112,7 +112,8 @@ def refusals(folder, state):
     foreign = {"scene": ["gen:cornell", *size], "seed": [*scene, *size, "--seed", "2"], "view": [*scene, "--size", "95x64"],
                "filter": [*scene, *size, "--filter", "gaussian"], "view 0": [*scene, *size, "--fov", "30"],
                "passes": [*scene, *size, "--passes", "none"], "depth": [*scene, *size, "--max-depth", "3"],
-               "AOVs": [*scene, *size, "--aov", "id"], "adaptive": [*scene, *size, "--adaptive"], "--raw": [*scene, *size, "--raw", "c.keys"]}
+               "AOVs": [*scene, *size, "--aov", "id"], "adaptive": [*scene, *size, "--adaptive"],
+               "denoiser": [*scene, *size, "--denoise"], "--raw": [*scene, *size, "--raw", "c.keys"]}
     for field, arguments in foreign.items():
         result = subprocess.run([HPR, "render", *arguments, *COMMON, "--spp", "20", *resume], cwd=folder,
                                 capture_output=True, text=True, timeout=300, check=False)
@@ -191,6 +192,10 @@ def main():
             stop_and_resume(folder, adaptive, f"adaptive, at {at}, one rank, then three", itself, ["--adaptive"],
                             ["--adaptive", *sort_last], at)
         stop_and_resume(folder, adaptive, "adaptive, three ranks, then one", itself, ["--adaptive", *sort_last], ["--adaptive"], 60)
+        result = run(folder, "-o", "denoised.exr", "--spp", str(SAMPLES), "--denoise")
+        denoised = (folder / "denoised.exr").read_bytes()
+        expect(denoised != whole, "--denoise makes no difference")
+        stop_and_resume(folder, denoised, "denoised, at 5, one rank, then three", itself, ["--denoise"], ["--denoise", *sort_last], 5)
         state = write_and_go_on(folder, whole)
         if state.exists():
             refusals(folder, state)
