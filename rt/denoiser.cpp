@@ -63,6 +63,10 @@ bool make_up(float borrower, float lender, float& ratio) {
   return ratio <= kMostBrighter && ratio >= 1.0F / kMostBrighter;
 }
 
+std::size_t index_of(int column, int row) {
+  return static_cast<std::size_t>(row) * kTileSide + static_cast<std::size_t>(column);
+}
+
 double brightness(const glm::dvec3& light) {
   return std::max({light.r, light.g, light.b});
 }
@@ -228,30 +232,33 @@ void Denoiser::add_look(TileWork& tile, const TileJob& job, const Look& look, st
   });
 }
 
-void Denoiser::set_apart(const TileWork& tile, const TileJob& job) {
-  const auto light_of = [&](int x, int y) -> const glm::dvec3& {
-    return tile.radiance[job.first_pixel + static_cast<std::size_t>(y * kTileSide + x)];
-  };
-  std::vector<std::uint32_t> apart;
-  for (int y = 0; y < job.place.height(); ++y) {
-    for (int x = 0; x < job.place.width(); ++x) {
-      const std::uint32_t own = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
-      if (states_[own] != State::Lends) continue;
-      const glm::dvec3& light = light_of(x, y);
-      double about = 0.0;
-      const Rect pixels = intersection({x - 1, y - 1, x + 2, y + 2}, {0, 0, job.place.width(), job.place.height()});
-      for (int j = pixels.y0; j < pixels.y1; ++j) {
-        for (int i = pixels.x0; i < pixels.x1; ++i) {
-          const bool is_other = i != x || j != y;
-          if (is_other && job.wants(static_cast<std::size_t>(j * kTileSide + i))) {
-            about = std::max(about, brightness(light_of(i, j)));
-          }
-        }
-      }
-      if (!fits_floats(light) || brightness(light) > kFarBrighter * about) apart.push_back(own);
+/// The brightest of the pixels about one that are lit.
+double Denoiser::brightest_about(const TileWork& tile, const TileJob& job, int column, int row) {
+  const Rect about{column - 1, row - 1, column + 2, row + 2};
+  const Rect pixels = intersection(about, {0, 0, job.place.width(), job.place.height()});
+  double found = 0.0;
+  for (int y = pixels.y0; y < pixels.y1; ++y) {
+    for (int x = pixels.x0; x < pixels.x1; ++x) {
+      const std::size_t pixel = index_of(x, y);
+      if ((x == column && y == row) || !job.wants(pixel)) continue;
+      found = std::max(found, brightness(tile.radiance[job.first_pixel + pixel]));
     }
   }
-  for (const std::uint32_t pixel : apart) states_[pixel] = State::Apart;
+  return found;
+}
+
+void Denoiser::set_apart(const TileWork& tile, const TileJob& job) {
+  std::vector<std::size_t> apart;
+  for (int y = 0; y < job.place.height(); ++y) {
+    for (int x = 0; x < job.place.width(); ++x) {
+      const std::size_t own = job.first_pixel + index_of(x, y);
+      if (states_[own] != State::Lends) continue;
+      const glm::dvec3& light = tile.radiance[own];
+      const bool is_far_brighter = brightness(light) > kFarBrighter * brightest_about(tile, job, x, y);
+      if (!fits_floats(light) || is_far_brighter) apart.push_back(own);
+    }
+  }
+  for (const std::size_t pixel : apart) states_[pixel] = State::Apart;
 }
 
 void Denoiser::look_again(TileWork& tile, const TileJob& job, std::span<const std::uint8_t> outlines,
@@ -273,7 +280,9 @@ void Denoiser::look_again(TileWork& tile, const TileJob& job, std::span<const st
     tile.requests.clear();
     for (const std::uint32_t pixel : pixels) {
       for (const View& view : views) {
-        tile.requests.push_back(eye_ray(view, job, pixel % kTileSide + 0.5, pixel / kTileSide + 0.5));
+        const auto column = static_cast<int>(pixel % kTileSide);
+        const auto row = static_cast<int>(pixel / kTileSide);
+        tile.requests.push_back(eye_ray(view, job, column + 0.5, row + 0.5));
         tile.charge_ray(job.first_pixel + pixel);
       }
     }

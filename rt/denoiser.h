@@ -79,6 +79,7 @@ class Denoiser {
     float sum = 0.0F;
   };
 
+  [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
   void set_apart(const TileWork& tile, const TileJob& job);
   [[nodiscard]] static Seen look_at(const SurfacePoint& surface, const glm::dvec3& eye);
