@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "image/pixel_filter.h"
+#include "rt/tile_output.h"
 
 namespace hpr {
 namespace {
@@ -20,8 +21,8 @@ constexpr std::uint32_t kLookBranch = 0x4C4F4F4BU;
 
 /// Distance of unit normals from which on two places are not alike, in a frame's first sample.
 constexpr float kNormalWidth = 0.6F;
-/// Pixels that see smoother surfaces lend in proportion to roughness over this, and a tenth of the width at least: what
-/// mirrors show changes quickly with their normal.
+/// On surfaces smoother than this roughness normals must be closer and neighbours count less, in proportion down to a
+/// tenth: what mirrors show changes quickly with their normal and with the place.
 constexpr float kSmooth = 0.25F;
 constexpr float kLeastWidth = 0.1F;
 /// Samples after which neighbours count less.
@@ -65,16 +66,6 @@ bool make_up(float borrower, float lender, float& ratio) {
 
 std::size_t index_of(int column, int row) {
   return static_cast<std::size_t>(row) * kTileSide + static_cast<std::size_t>(column);
-}
-
-double brightness(const glm::dvec3& light) {
-  return std::max({light.r, light.g, light.b});
-}
-
-/// As pixels do: what does not is black in the end, and counted.
-bool fits_floats(const glm::dvec3& light) {
-  const glm::vec3 stored(light);
-  return std::isfinite(stored.r) && std::isfinite(stored.g) && std::isfinite(stored.b);
 }
 
 /// Places of sample `number` in the pixel.
@@ -200,7 +191,7 @@ void Denoiser::each_sum(TileWork& tile, const Body& body) {
   for (std::size_t i = 0; i < kComponents; ++i) body(1 + i, tile.components[i]);
 }
 
-/// What ray `i` of those traced sees, which is one of the looks at a pixel.
+/// What one of the rays traced sees, which is one of the looks at a pixel.
 void Denoiser::add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray,
                         std::vector<PathPoint>& alone) {
   const RayRequest& request = tile.requests[ray];
@@ -252,9 +243,10 @@ void Denoiser::set_apart(const TileWork& tile, const TileJob& job) {
   for (int y = 0; y < job.place.height(); ++y) {
     for (int x = 0; x < job.place.width(); ++x) {
       const std::size_t own = job.first_pixel + index_of(x, y);
-      if (states_[own] != State::Lends) continue;
+      if (states_[own] == State::Unlit) continue;
       const glm::dvec3& light = tile.radiance[own];
-      const bool is_far_brighter = brightness(light) > kFarBrighter * brightest_about(tile, job, x, y);
+      const bool is_far_brighter =
+          states_[own] == State::Lends && brightness(light) > kFarBrighter * brightest_about(tile, job, x, y);
       if (!fits_floats(light) || is_far_brighter) apart.push_back(own);
     }
   }
@@ -327,16 +319,14 @@ void Denoiser::resolve(TileWork& tile, const TileJob& job, std::span<const std::
       const std::uint32_t own = job.first_pixel + pixel;
       if (tile.wants_cost) tile.cost[own] += std::exchange(tile.cost[spare_ + pixel], 0.0F);
       const bool is_crossed = outlines[pixel] != 0 && states_[own] != State::Apart;
-      if (!is_crossed && states_[own] != State::Lends) {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from) { sums_.at(i)[pixel] = from[own]; });
-        continue;
-      }
       if (is_crossed) {
         each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from) {
           sums_.at(i)[pixel] += from[spare_ + pixel];
         });
-      } else {
+      } else if (states_[own] == State::Lends) {
         share(tile, pixel, own, lenders_of_pixel(job, pixel));
+      } else {
+        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from) { sums_.at(i)[pixel] = from[own]; });
       }
     }
   }

@@ -83,8 +83,8 @@ class Denoiser {
   /// Finds pixels that stay apart.
   void set_apart(const TileWork& tile, const TileJob& job);
   [[nodiscard]] static Seen look_at(const SurfacePoint& surface, const glm::dvec3& eye);
-  template <typename Weigh>
   /// Of the 3 x 3 pixels about one, or about another one so many columns and rows away.
+  template <typename Weigh>
   [[nodiscard]] Lenders lenders_about(const TileJob& job, std::uint32_t pixel, const glm::ivec2& shift,
                                       const Weigh& weigh) const;
   [[nodiscard]] Lenders lenders_of_look(const TileJob& job, const Look& look, const Seen& seen) const;

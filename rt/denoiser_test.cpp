@@ -14,22 +14,9 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
+using test::corner;
 using test::place;
 using test::quad;
-
-/// A floor and a back, of two materials, with a ball between, in the open.
-Scene corner(const Material& ball, glm::vec3 floor = glm::vec3(0.8F), glm::vec3 back = glm::vec3(0.2F, 0.4F, 0.6F)) {
-  Scene scene;
-  add_material(scene, test::matte(floor));
-  add_material(scene, test::matte(back));
-  add_material(scene, ball);
-  place(scene, add_mesh(scene, quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}, 0)));
-  place(scene, add_mesh(scene, quad({-2, 0, -2}, {4, 0, 0}, {0, 3, 0}, 1)));
-  place(scene, add_mesh(scene, test::sphere(1.0, 12, 2)), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 1));
-  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
-  finish_scene(scene);
-  return scene;
-}
 
 View look(const Scene& scene, Size size = {139, 71}) {
   return test::view_from({0.5, 2, 7}, {0, 1, 0}, size, scene);
@@ -78,7 +65,7 @@ double mean(const Image<Rgb>& image) {
 const RaySettings kGathered{.passes = {"gather"}, .max_depth = 4};
 
 TEST(Denoiser, TakesMostOfTheErrorOfOneSampleAndKeepsTheMean) {
-  const Scene scene = corner(test::matte(glm::vec3(0.5F)));
+  const Scene scene = corner(test::matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
   const View view = look(scene, {70, 52});
   const Image<Rgb> truth = mean_picture(scene, view, kGathered, 256);
   const Image<Rgb> plain = mean_picture(scene, view, kGathered, 1);
@@ -304,6 +291,26 @@ TEST(Denoiser, WhatIsFarBrighterThanAllAboutStaysApart) {
   EXPECT_LT(bright(plain), 200);
   EXPECT_EQ(bright(smooth), bright(plain));
   EXPECT_NEAR(mean(smooth) / mean(plain), 1.0, 0.01);
+}
+
+/// Light that no pixel can hold is black and told of, at outlines and on what glows too.
+TEST(Denoiser, TellsOfLightThatIsNoFiniteNumber) {
+  for (const float glow : {0.0F, 0.1F}) {
+    Scene scene;
+    Material lit = test::matte();
+    lit.emissive = glm::vec3(glow);
+    add_material(scene, lit);
+    place(scene, add_mesh(scene, quad({-0.7F, -0.9F, 0}, {1.3F, 0.1F, 0}, {0.1F, 1.5F, 0}, 0)));
+    Light& light = scene.lights.emplace_back();
+    light.position = {0.6, 0.0, 0.1};
+    light.intensity = glm::vec3(3e38F);
+    finish_scene(scene);
+    const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
+    const RaySettings settings{.passes = {"shadow"}};
+    const std::uint64_t plain = test::light(scene, view, settings).counts.not_finite;
+    EXPECT_GT(plain, 5U);
+    EXPECT_EQ(test::light(scene, view, denoised(settings)).counts.not_finite, plain) << glow;
+  }
 }
 
 /// Stripes of light and of black on one surface, thinner than pixels: looks at its outlines see both.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "rt/hybrid_test_tools.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -12,25 +13,12 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
+using test::corner;
 using test::place;
 using test::quad;
 
 const std::vector<std::string> kAll{"shadow", "reflection", "refraction", "ambient-occlusion", "photon"};
 constexpr Size kOdd{139, 71};
-
-/// A room's floor and back, of two materials, with a sphere between, under an even sky.
-Scene corner(const Material& ball, glm::vec3 floor = glm::vec3(0.8F), glm::vec3 back = glm::vec3(0.2F, 0.4F, 0.6F)) {
-  Scene scene;
-  add_material(scene, test::matte(floor));
-  add_material(scene, test::matte(back));
-  add_material(scene, ball);
-  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
-  place(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 6, 0}, 1)));
-  place(scene, add_mesh(scene, test::sphere(1.0, 24, 2)), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 1));
-  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
-  finish_scene(scene);
-  return scene;
-}
 
 View look(const Scene& scene, Size size = kOdd) {
   return test::view_from({0.5, 2, 7}, {0, 1, 0}, size, scene);

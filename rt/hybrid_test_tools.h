@@ -38,6 +38,21 @@ inline Scene room(const Material& thing, bool is_sheet) {
   return scene;
 }
 
+/// A room's floor and back, of two materials, with a sphere between, under an even sky.
+inline Scene corner(const Material& ball, glm::vec3 floor = glm::vec3(0.8F),
+                    glm::vec3 back = glm::vec3(0.2F, 0.4F, 0.6F), int rings = 24) {
+  Scene scene;
+  add_material(scene, matte(floor));
+  add_material(scene, matte(back));
+  add_material(scene, ball);
+  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  place(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 6, 0}, 1)));
+  place(scene, add_mesh(scene, sphere(1.0, rings, 2)), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 1));
+  scene.environment = even_light({1.0F, 1.0F, 1.0F});
+  finish_scene(scene);
+  return scene;
+}
+
 /// Keys are those of `covering`, what of the scene covers all behind it; null: all of it.
 inline glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples,
                           const Scene* covering = nullptr) {

@@ -59,7 +59,7 @@ struct RaySettings {
   bool operator==(const RaySettings&) const = default;
 };
 
-/// So many first samples of a frame are denoised; further ones have less noise together than neighbours differ.
+/// So many first samples of a frame are denoised: with more of them, further plain ones are the better use of time.
 inline constexpr std::uint32_t kDenoisedSamples = 16;
 
 /// Photons sent per sample where the pass is named and nothing says how many.

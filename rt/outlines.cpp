@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <optional>
 
 namespace hpr {
 namespace {
@@ -12,10 +13,6 @@ constexpr float kMostBent = 0.5F;
 constexpr float kMostApart = 0.1F;
 /// Cosine between the normals of two corners of a pixel that no outline lies between.
 constexpr float kLeastCosine = 0.8F;
-
-float square(float value) {
-  return value * value;
-}
 
 bool goes_through_the_same(const std::optional<PixelPoints>& a, const std::optional<PixelPoints>& b) {
   if (!a || !b) return a.has_value() == b.has_value();
@@ -51,9 +48,10 @@ bool is_outline(const View& view, const Corner& a, const Corner& b) {
 bool is_placed_alike(const View& view, const glm::vec3& first, const glm::vec3& second, const glm::vec3& normal) {
   const glm::vec3 way = second - first;
   const float distance2 = glm::dot(way, way);
-  if (square(glm::dot(way, normal)) > square(kMostBent) * distance2) return false;
+  const float off = glm::dot(way, normal);
+  if (off * off > kMostBent * kMostBent * distance2) return false;
   // Parallel rays have no eye to be far from.
-  return view.orthographic || distance2 <= square(kMostApart) * glm::dot(second, second);
+  return view.orthographic || distance2 <= kMostApart * kMostApart * glm::dot(second, second);
 }
 
 void trace_from_eye(TileWork& work) {
@@ -84,9 +82,7 @@ Outlines::Mask Outlines::find(TileWork& work, const TileJob& job) {
   const int height = job.place.height();
   work.requests.clear();
   for (int y = 0; y <= height; ++y) {
-    for (int x = 0; x <= width; ++x) {
-      work.requests.push_back(eye_ray(view, job, x, y));
-    }
+    for (int x = 0; x <= width; ++x) work.requests.push_back(eye_ray(view, job, x, y));
   }
   trace_from_eye(work);
   std::vector<Corner> corners(work.hits.size());

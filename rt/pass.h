@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -161,6 +162,10 @@ class Pass {
 /// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
 /// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
 inline constexpr double kLeastThroughput = 1.0 / 65536.0;
+
+[[nodiscard]] inline double brightness(const glm::dvec3& color) {
+  return std::max({color.r, color.g, color.b});
+}
 
 /// What a path whose throughput is so bright is to be multiplied by: 1, or what roulette makes of it, 0 where it ends.
 [[nodiscard]] inline double survival(double brightness, Sampler& sampler) {

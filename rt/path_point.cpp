@@ -16,10 +16,6 @@ namespace {
 /// would double with every surface.
 constexpr int kChoosingDepth = 2;
 
-double brightness(const glm::dvec3& color) {
-  return std::max({color.r, color.g, color.b});
-}
-
 /// Paths that may go on for ever are ended by roulette from here on, by what is left of their throughput.
 constexpr int kRouletteDepth = 3;
 /// And at the latest here; what white rooms would have beyond is less than roulette leaves.

@@ -40,6 +40,10 @@ void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) 
 
 }  // namespace
 
+bool fits_floats(const glm::dvec3& light) {
+  return is_finite(to_rgb(light));
+}
+
 void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output) {
   const auto start = [&](auto* layer) {
     const auto pixels = layer->tile(index);

@@ -9,6 +9,9 @@
 
 namespace hpr {
 
+/// Whether a pixel can hold it: what does not fit is black there.
+[[nodiscard]] bool fits_floats(const glm::dvec3& light);
+
 /// The tile's sums as pixels of tile `index`. Light that is no finite number is black, in all layers, and counted.
 void store(TileWork& tile, const TileJob& job, std::size_t index, const LightOutput& output);
 
