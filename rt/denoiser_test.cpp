@@ -293,33 +293,6 @@ TEST(Denoiser, WhatIsFarBrighterThanAllAboutStaysApart) {
   EXPECT_NEAR(mean(smooth) / mean(plain), 1.0, 0.01);
 }
 
-/// Light that no pixel can hold is black and told of, at outlines and on what glows too.
-TEST(Denoiser, TellsOfLightThatIsNoFiniteNumber) {
-  for (const float glow : {0.0F, 0.1F}) {
-    Scene scene;
-    Material lit = test::matte();
-    lit.emissive = glm::vec3(glow);
-    add_material(scene, lit);
-    place(scene, add_mesh(scene, quad({-0.7F, -0.9F, 0}, {1.3F, 0.1F, 0}, {0.1F, 1.5F, 0}, 0)));
-    Light& light = scene.lights.emplace_back();
-    light.position = {0.6, 0.0, 0.1};
-    scene.background = {0.25F, 0.25F, 0.25F};
-    light.intensity = glm::vec3(3e38F);
-    finish_scene(scene);
-    const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
-    const RaySettings settings{.passes = {"shadow"}};
-    const test::Lit plain = test::light(scene, view, settings);
-    const test::Lit smooth = test::light(scene, view, denoised(settings));
-    EXPECT_GT(plain.counts.not_finite, 5U);
-    // And where looks find it.
-    EXPECT_GE(smooth.counts.not_finite, plain.counts.not_finite);
-    for (std::size_t i = 0; i < plain.image.pixels().size(); ++i) {
-      if (plain.image.pixels()[i] != Rgb{}) continue;
-      ASSERT_EQ(smooth.image.pixels()[i], Rgb{}) << glow << ' ' << i;
-    }
-  }
-}
-
 /// Stripes of light and of black on one surface, thinner than pixels: looks at its outlines see both.
 TEST(Denoiser, LooksSeeWhatGlowsInPart) {
   Scene scene;
