@@ -22,7 +22,7 @@ constexpr std::array kKnobs{
         "false: noise of the pixels whose samples differ most; true: a little of the mean, as pixels that look calm by "
         "chance get fewer samples"},
     Knob{
-        "denoise", "false, true", "a sixth to as much again of a frame's first 16 samples",
+        "denoise", "false, true", "a sixth to one and a quarter times as much again of a frame's first 16 samples",
         "false: noise, and steps at outlines; true: detail of light finer than a pixel or two, less with more samples"},
     Knob{"passes", "auto, all, none, or a list of shadow, reflection, refraction, photon, gather, ambient-occlusion",
          "the rays of each pass", "the light a pass carries is missing, or there where it is blocked"},

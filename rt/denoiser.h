@@ -9,22 +9,18 @@
 #include <vector>
 
 #include "rt/first_points.h"
-#include "rt/outlines.h"
 #include "rt/pass.h"
+#include "rt/pixel_parts.h"
 
 namespace hpr {
-
-/// At how many places of a pixel that an outline crosses a sample looks again. All looks of a frame's samples are one
-/// Sobol' sequence in the order of the samples, of which each has a net.
-[[nodiscard]] std::uint32_t looks_of(std::uint32_t sample);
 
 /// Smooths a sample's light over the pixels about each that see the like (a cross-bilateral filter: Eisemann, Durand,
 /// "Flash Photography Enhancement via Intrinsic Relighting", 2004), and looks again where outlines are, lighting there
 /// only what no pixel about has lit (as in Chajdas, McGuire, Luebke, "Subpixel Reconstruction Antialiasing", 2011).
-/// Alike are places of one material, turned and placed alike; what one lends another is made up for how much light the
-/// two scatter, so textures stay. From sample to sample fewer neighbours are alike and count less, so that the mean of
-/// many samples is nearly that without. What emits light, is seen through an absorbing medium or lies behind surfaces
-/// that cover in part keeps to itself. Only a frame's first kDenoisedSamples are.
+/// Alike are places of one material, turned and placed alike; what one pixel lends another is made up for how much
+/// light the two scatter, so textures stay. From sample to sample fewer neighbours are alike and count less, so that
+/// the mean of many samples is nearly that without. What emits light, is seen through an absorbing medium or lies
+/// behind surfaces that cover in part keeps to itself. Only a frame's first kDenoisedSamples are.
 ///
 /// Light stays in its tile, and a sample in itself: neither ranks nor threads change a bit.
 class Denoiser {
@@ -38,43 +34,50 @@ class Denoiser {
   /// Takes note of points the eye sees, which are finished but not lit.
   void note(const TileWork& tile, std::span<const PathPoint> points);
 
-  /// Once all is lit: looks again where `outlines` is 1. Puts what is to be lit in addition into `alone`.
-  void look_again(TileWork& tile, const TileJob& job, std::span<const std::uint8_t> outlines,
-                  std::vector<PathPoint>& alone);
+  /// Once all is lit: looks again at pixels that outlines cross. Puts what is to be lit in addition into `alone`.
+  void look_again(TileWork& tile, const TileJob& job, const TileParts& again, std::vector<PathPoint>& alone);
 
   /// Once that is lit too: replaces the sample's sums.
-  void resolve(TileWork& tile, const TileJob& job, std::span<const std::uint8_t> outlines);
+  void resolve(TileWork& tile, const TileJob& job, const TileParts& again);
 
  private:
   enum class State : std::uint8_t {
     Unlit,
     Lends,
     KeepsToItself,
-    Apart,  ///< keeps its own light even on an outline: it is no finite number, or far brighter than all about
+    Apart,  ///< keeps its own light even on an outline
   };
 
   /// What tells whether two places are alike.
   struct Seen {
-    glm::vec3 place{0.0F};   ///< from the eye, metres
-    glm::vec3 normal{0.0F};  ///< interpolated
-    glm::vec3 mapped{0.0F};  ///< the one shaded with
+    Sight sight;
+    glm::vec3 mapped{0.0F};  ///< the normal shaded with
     glm::vec3 weight{0.0F};  ///< about the share of light that it scatters to the eye
     float width = 1.0F;      ///< how far normals may differ, in parts of what those of rough surfaces may
-    std::uint32_t material = 0;
   };
 
   /// One more place of a pixel.
   struct Look {
-    std::uint32_t pixel = 0;  ///< of the tile
-    std::uint32_t number = 0;
-    glm::dvec2 offset{0.0};  ///< from the pixel's centre
-    double share = 0.0;      ///< of the pixel
+    std::uint32_t pixel = 0;   ///< of the tile
+    std::uint32_t number = 0;  ///< of the pixel's looks
+    glm::vec2 place{0.0F};     ///< from the pixel's centre
+    double share = 0.0;        ///< of the pixel
   };
+
+  /// Pixels about one, or about another so many columns and rows away: so many to either side.
+  struct Window {
+    std::uint32_t pixel = 0;
+    glm::ivec2 shift{0};
+    int radius = 1;
+  };
+  static constexpr int kMostRadius = 2;
 
   /// Who lends to a place, and how much.
   struct Lenders {
-    std::array<std::uint32_t, 9> at{};  ///< pixels of TileWork's
-    std::array<glm::vec3, 9> weights{};
+    static constexpr std::size_t kSide = 2 * kMostRadius + 1;
+    static constexpr std::size_t kMost = kSide * kSide;
+    std::array<std::uint32_t, kMost> at;  ///< pixels of TileWork's; set up to `count`, as are weights
+    std::array<glm::vec3, kMost> weights;
     std::size_t count = 0;
     float sum = 0.0F;
   };
@@ -82,13 +85,17 @@ class Denoiser {
   [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
   void set_apart(const TileWork& tile, const TileJob& job);
-  [[nodiscard]] static Seen look_at(const SurfacePoint& surface, const glm::dvec3& eye);
-  /// Of the 3 x 3 pixels about one, or about another one so many columns and rows away.
+  [[nodiscard]] static bool are_placed_alike(const TileJob& job, const Sight& lender, const Sight& borrower);
   template <typename Weigh>
-  [[nodiscard]] Lenders lenders_about(const TileJob& job, std::uint32_t pixel, const glm::ivec2& shift,
-                                      const Weigh& weigh) const;
-  [[nodiscard]] Lenders lenders_of_look(const TileJob& job, const Look& look, const Seen& seen) const;
+  [[nodiscard]] Lenders lenders_in(const TileJob& job, const Window& window, const Weigh& weigh) const;
+  [[nodiscard]] Lenders lenders_of_look(const TileJob& job, const Look& look, const Sight& seen) const;
   [[nodiscard]] Lenders lenders_of_pixel(const TileJob& job, std::uint32_t pixel) const;
+  void add_background(TileWork& tile, const Look& look, const glm::dvec3& direction);
+  /// False where nobody lends.
+  [[nodiscard]] bool add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen);
+  /// Pixels whose sample sees what none of their parts is stay apart: so what was missed keeps its light.
+  void set_unexpected_apart(const TileJob& job, std::span<const PixelPart> parts);
+  void look_at_part(TileWork& tile, const TileJob& job, View& view, const PixelPart& part, const Looks& places);
   void add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray, std::vector<PathPoint>& alone);
   void share(TileWork& tile, std::uint32_t pixel, std::uint32_t own, const Lenders& lenders);
   template <typename Body>
@@ -97,6 +104,7 @@ class Denoiser {
   std::vector<State> states_;  ///< per pixel, sample after sample
   std::vector<Seen> seen_;     ///< likewise, of those that lend
   float narrowed_ = 1.0F;      ///< how far normals may differ in the sample at hand, in parts of the first one's
+  std::vector<Look> looks_;    ///< that rays were sent for
   std::uint32_t spare_ = 0;    ///< where the tile's sums have room for what is lit in addition
   /// Of the sample at hand, per pixel: radiance, then the components that are wanted.
   std::array<std::vector<glm::dvec3>, 1 + kComponents> sums_;

@@ -12,6 +12,7 @@
 #include "rt/denoiser.h"
 #include "rt/half_resolution.h"
 #include "rt/pass.h"
+#include "rt/pixel_parts.h"
 
 namespace hpr {
 
@@ -21,6 +22,7 @@ struct Scratch {
   TileWork work;
   SharedLight shared;
   Denoiser denoiser;
+  PartFinder finder;
   std::vector<std::vector<PathPoint>> waiting;  ///< by depth
   Wave wave;
   std::vector<double> ms;

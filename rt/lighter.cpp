@@ -59,7 +59,7 @@ struct Lighter::State {
   std::optional<RayScene> whole;  ///< for photons; only where `opaque` is not all
   std::optional<PhotonSender> photons;
   std::optional<PathTracer> reference;
-  Outlines outlines;  ///< where denoising looks again
+  PixelParts parts;  ///< what denoising looks at again
   std::vector<std::unique_ptr<Scratch>> idle;
   std::mutex mutex;
   RayCounts counts;
@@ -261,12 +261,12 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
 void Lighter::State::denoise(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index) {
   const Stopwatch watch;
   const double before = spent_ms(scratch);
-  const std::span<const std::uint8_t> crossed = outlines.of_tile(scratch.work, jobs.front(), index);
+  const TileParts& again = parts.of_tile(scratch.work, jobs.front(), index, scratch.finder);
   for (const TileJob& job : jobs) {
     if (job.number.sample >= kDenoisedSamples) break;
-    scratch.denoiser.look_again(scratch.work, job, crossed, scratch.waiting[0]);
+    scratch.denoiser.look_again(scratch.work, job, again, scratch.waiting[0]);
     light_waiting(scratch);
-    scratch.denoiser.resolve(scratch.work, job, crossed);
+    scratch.denoiser.resolve(scratch.work, job, again);
   }
   scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
 }
@@ -365,7 +365,7 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
   const PhotonMaps* const photons = state.send_photons(first.number, nullptr);
   const std::vector<Media> eyes = state.media.of_eyes(first.views);
   const Stopwatch watch;
-  if (state.settings.denoise) state.outlines.prepare(layout, first.views);
+  if (state.settings.denoise) state.parts.prepare(layout, first.views, state.settings);
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     const std::size_t tile = order[i];
