@@ -35,7 +35,7 @@ WAYS = {
     "best": (["--quality", "best"], (1, 4, 16, 64)),
     # What suits small pictures of many triangles: rays find the first surfaces too, fewer photons go out per sample.
     "tuned": (["--quality", "best", "--primary", "rays", "--photons", "16384"], (1, 4, 16, 64, 256)),
-    "denoised": (["--quality", "best", "--primary", "rays", "--photons", "16384", "--denoise"], (1, 4, 16)),
+    "denoised": (["--quality", "best", "--primary", "rays", "--photons", "16384", "--denoise"], (1, 2, 4, 8, 16)),
     "adaptive": (["--quality", "best", "--primary", "rays", "--photons", "16384", "--adaptive"], (16, 64, 256)),
     "reference": (["--reference"], (1, 4, 16, 64)),
 }
