@@ -113,16 +113,11 @@ Denoiser::Lenders Denoiser::lenders_in(const TileJob& job, const Window& window,
   return found;
 }
 
-bool Denoiser::are_placed_alike(const TileJob& job, const Sight& lender, const Sight& borrower) {
-  return lender.material == borrower.material &&
-         is_placed_alike(*job.view, lender.place, borrower.place, lender.normal);
-}
-
 Denoiser::Lenders Denoiser::lenders_of_look(const TileJob& job, const Look& look, const Sight& seen) const {
   const glm::vec2 way = look.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
   const Window window{look.pixel, glm::ivec2(glm::round(way)), 1};
   return lenders_in(job, window, [&](const Seen& lender, int dx, int dy, glm::vec3&) {
-    if (!are_placed_alike(job, lender.sight, seen)) return 0.0F;
+    if (!is_beside(*job.view, lender.sight, seen)) return 0.0F;
     const float distance2 = square(static_cast<float>(dx) - way.x) + square(static_cast<float>(dy) - way.y);
     return spatial_weight(distance2, window.radius) *
            normal_weight(lender.sight.normal, seen.normal, sharpness_of(narrowed_ * lender.width));
@@ -136,7 +131,7 @@ Denoiser::Lenders Denoiser::lenders_of_pixel(const TileJob& job, std::uint32_t p
   const Window window{pixel, {}, job.number.sample == 0 ? kMostRadius : 1};
   return lenders_in(job, window, [&](const Seen& lender, int dx, int dy, glm::vec3& ratio) {
     if (dx == 0 && dy == 0) return 1.0F;
-    if (!are_placed_alike(job, lender.sight, borrower.sight)) return 0.0F;
+    if (!is_beside(*job.view, lender.sight, borrower.sight)) return 0.0F;
     for (int i = 0; i < 3; ++i) {
       if (!make_up(borrower.weight[i], lender.weight[i], ratio[i])) return 0.0F;
     }

@@ -85,7 +85,6 @@ class Denoiser {
   [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
   void set_apart(const TileWork& tile, const TileJob& job);
-  [[nodiscard]] static bool are_placed_alike(const TileJob& job, const Sight& lender, const Sight& borrower);
   template <typename Weigh>
   [[nodiscard]] Lenders lenders_in(const TileJob& job, const Window& window, const Weigh& weigh) const;
   [[nodiscard]] Lenders lenders_of_look(const TileJob& job, const Look& look, const Sight& seen) const;

@@ -121,15 +121,9 @@ TEST(Denoiser, ThinThingsKeepTheirLight) {
   // The mean over places of a frame's samples, each of which is the first.
   double dark = 0.0;
   constexpr int kFrames = 64;
-  Lighter lighter(scene, denoised(kGathered));
-  for (std::uint32_t i = 0; i < kFrames; ++i) {
-    View shaken = view;
-    shaken.jitter = Sampler(7, i).two() - 0.5;
-    const TileLayer<Key> keys = test::cast_keys(scene, std::span(&shaken, 1));
-    TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&shaken, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.frame = i});
+  test::for_each_shaken(scene, view, denoised(kGathered), kFrames, [&](const TileLayer<Rgb>& radiance) {
     for (const Rgb& color : radiance.tile(0)) dark += (1.0 - static_cast<double>(color.g)) / kTilePixels / kFrames;
-  }
+  });
   EXPECT_GT(truth, 0.01);
   EXPECT_NEAR(dark / truth, 1.0, 0.02);
 }

@@ -53,6 +53,21 @@ inline Scene corner(const Material& ball, glm::vec3 floor = glm::vec3(0.8F),
   return scene;
 }
 
+/// Calls body(radiance) for so many frames of one sample each, at other places of the pixels.
+template <typename Body>
+void for_each_shaken(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t frames,
+                     const Body& body) {
+  Lighter lighter(scene, settings);
+  for (std::uint32_t i = 0; i < frames; ++i) {
+    View shaken = view;
+    shaken.jitter = Sampler(7, i).two() - 0.5;
+    const TileLayer<Key> keys = cast_keys(scene, std::span(&shaken, 1));
+    TileLayer<Rgb> radiance(keys.layout());
+    lighter.light(std::span(&shaken, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.frame = i});
+    body(radiance);
+  }
+}
+
 /// Keys are those of `covering`, what of the scene covers all behind it; null: all of it.
 inline glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples,
                           const Scene* covering = nullptr) {

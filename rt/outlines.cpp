@@ -67,24 +67,22 @@ Sight sight_of(const SurfacePoint& point, const glm::dvec3& eye) {
   return {true, point.material, point.position - eye, point.facing_normal()};
 }
 
-bool is_near(const View& view, const glm::vec3& first, const glm::vec3& second) {
-  const glm::vec3 way = second - first;
+bool is_near(const View& view, const Sight& first, const Sight& second) {
+  if (first.material != second.material) return false;
+  const glm::vec3 way = second.place - first.place;
   // Parallel rays have no eye to be far from.
-  return view.orthographic || glm::dot(way, way) <= kMostApart * kMostApart * glm::dot(second, second);
+  return view.orthographic || glm::dot(way, way) <= kMostApart * kMostApart * glm::dot(second.place, second.place);
 }
 
-bool is_placed_alike(const View& view, const glm::vec3& first, const glm::vec3& second, const glm::vec3& normal) {
-  const glm::vec3 way = second - first;
-  const float distance2 = glm::dot(way, way);
-  const float off = glm::dot(way, normal);
-  return off * off <= kMostBent * kMostBent * distance2 && is_near(view, first, second);
+bool is_beside(const View& view, const Sight& first, const Sight& second) {
+  const glm::vec3 way = second.place - first.place;
+  const float off = glm::dot(way, first.normal);
+  return off * off <= kMostBent * kMostBent * glm::dot(way, way) && is_near(view, first, second);
 }
 
 bool is_outline(const View& view, const Sight& a, const Sight& b) {
   if (a.is_surface != b.is_surface) return true;
-  if (!a.is_surface) return false;
-  return a.material != b.material || glm::dot(a.normal, b.normal) < kLeastCosine ||
-         !is_placed_alike(view, a.place, b.place, a.normal);
+  return a.is_surface && (glm::dot(a.normal, b.normal) < kLeastCosine || !is_beside(view, a, b));
 }
 
 View unjittered(const TileJob& job) {

@@ -24,13 +24,11 @@ struct Sight {
 
 [[nodiscard]] Sight sight_of(const SurfacePoint& point, const glm::dvec3& eye);
 
-/// Whether the second place lies beside the first one, whose normal it is, and near it as the view sees it. Places are
-/// metres from the view's eye.
-[[nodiscard]] bool is_placed_alike(const View& view, const glm::vec3& first, const glm::vec3& second,
-                                   const glm::vec3& normal);
+/// Whether both show one material, at places near each other as the view sees them.
+[[nodiscard]] bool is_near(const View& view, const Sight& first, const Sight& second);
 
-/// Whether the second place is near the first one as the view sees it.
-[[nodiscard]] bool is_near(const View& view, const glm::vec3& first, const glm::vec3& second);
+/// Whether, besides, the second place lies beside the first one.
+[[nodiscard]] bool is_beside(const View& view, const Sight& first, const Sight& second);
 
 /// Whether an outline lies between the two: another material, a sharp turn or a jump.
 [[nodiscard]] bool is_outline(const View& view, const Sight& a, const Sight& b);

@@ -172,11 +172,6 @@ Sight Patch::at(const glm::vec2& place) const {
   return sight;
 }
 
-/// Of one place of the screen two places of a surface would lie one behind the other: normals and planes tell nothing.
-bool Patch::is_like(const View& view, const Sight& sight, const glm::vec2& place) const {
-  return sight.is_surface && sight.material == material_ && is_near(view, at(place).place, sight.place);
-}
-
 glm::vec2 PixelPart::place(const Looks& places, std::uint32_t number) const {
   if (looks == 0) return middle;
   std::uint32_t left = looks;
@@ -188,8 +183,8 @@ bool PixelPart::is_like(const View& view, const Sight& sight, const glm::vec2& p
   switch (shows) {
     case Shows::Background:
       return !sight.is_surface;
-    case Shows::Surface:
-      return patch.is_like(view, sight, place);
+    case Shows::Surface:  // the two lie one behind the other at most: what is beside tells nothing
+      return sight.is_surface && is_near(view, patch.at(place), sight);
     case Shows::Many:
       return true;
   }

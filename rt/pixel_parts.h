@@ -25,8 +25,6 @@ class Patch {
 
   /// At a place of the pixel, from its centre.
   [[nodiscard]] Sight at(const glm::vec2& place) const;
-  /// Whether that may be what is seen there.
-  [[nodiscard]] bool is_like(const View& view, const Sight& sight, const glm::vec2& place) const;
 
  private:
   /// In the pixel's centre, and by how much it changes with x and with y.

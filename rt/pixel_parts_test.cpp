@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -40,9 +39,8 @@ struct Error {
 };
 
 /// Of a picture of such a scene, by what `hides` says of rays through many places of each pixel.
-Error error_of(const Scene& scene, const View& view, const std::function<bool(const Ray&)>& hides,
-               const RaySettings& settings = kDenoised) {
-  const Image<Rgb> image = test::light(scene, view, settings).image;
+Error error_of(const Scene& scene, const View& view, const std::function<bool(const Ray&)>& hides) {
+  const Image<Rgb> image = test::light(scene, view, kDenoised).image;
   constexpr int kSide = 48;
   Error error;
   for (int y = 0; y < image.height(); ++y) {
@@ -134,16 +132,10 @@ TEST(PixelParts, WhatNoCornerSeesKeepsItsLight) {
     constexpr int kFrames = 64;
     RaySettings settings = kDenoised;
     settings.denoise = denoise;
-    Lighter lighter(scene, settings);
     double sum = 0.0;
-    for (std::uint32_t i = 0; i < kFrames; ++i) {
-      View shaken = view;
-      shaken.jitter = Sampler(7, i).two() - 0.5;
-      const TileLayer<Key> keys = test::cast_keys(scene, std::span(&shaken, 1));
-      TileLayer<Rgb> radiance(keys.layout());
-      lighter.light(std::span(&shaken, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.frame = i});
+    test::for_each_shaken(scene, view, settings, kFrames, [&](const TileLayer<Rgb>& radiance) {
       for (int x = 0; x < kTileSide; ++x) sum += static_cast<double>(radiance.at(0, x, 31).g) / kTileSide / kFrames;
-    }
+    });
     return sum;
   };
   const double truth = mean_of(false);
