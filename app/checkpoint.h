@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,11 +19,11 @@ using RunIdentity = std::vector<std::pair<std::string, std::string>>;
 
 /// Where a run's sums go when it is stopped, and what it is.
 struct CheckpointSettings {
-  std::filesystem::path path;  ///< empty: none is written
-  bool resume = false;         ///< begin with what stands there
-  RunIdentity identity;
-  bool at_end = false;      ///< also when the goal is reached, for a later run that wants more
-  bool takes_more = false;  ///< one that holds more samples than are asked for will do
+  std::filesystem::path path;             ///< empty: none is written
+  bool resume = false;                    ///< begin with what stands there
+  std::function<RunIdentity()> identity;  ///< asked when it is wanted: it takes a look at the whole scene
+  bool at_end = false;                    ///< also when the goal is reached, for a later run that wants more
+  bool takes_more = false;                ///< one that holds more samples than are asked for will do
 };
 
 /// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the

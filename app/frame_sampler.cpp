@@ -66,7 +66,7 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
   Start start;
   check_on_root(session_.comm(), [&] {
     const auto bytes = read_file(checkpoint.path, std::numeric_limits<std::uint64_t>::max());
-    const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity, film_);
+    const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity(), film_);
     start = {film_.counters(), found.samples, found.budget, found.seconds, found.relmse.value_or(-1.0)};
     if (checkpoint.takes_more || found.samples <= sampling_.goal.samples.value_or(found.samples)) return;
     throw Error(ExitCode::BadInput,
@@ -91,7 +91,7 @@ void FrameSampler::write(const CheckpointSettings& checkpoint) {
   });
   agree_on_failure(session_.comm(), [&] {
     if (session_.rank() != 0) return;
-    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity, film_, so_far_));
+    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity(), film_, so_far_));
   });
 }
 

@@ -199,9 +199,10 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
   const Setup setup = set_up(session, best, how.size, globals.seed ^ kOtherSeed);
 
   CheckpointSettings kept;
-  kept.identity = identity_of(session, setup.plan, setup.blocks.views, setup.sampling, false);
+  RunIdentity identity = identity_of(session, setup.plan, setup.blocks.views, setup.sampling, false);
+  kept.identity = [&] { return identity; };
   std::string name;
-  for (const auto& [key, value] : kept.identity) name += fmt::format("{}={}\n", key, value);
+  for (const auto& [key, value] : identity) name += fmt::format("{}={}\n", key, value);
   kept.path = cache / fmt::format("reference-{}.checkpoint", hex16(xxh64(std::as_bytes(std::span(name)))));
   kept.at_end = true;
   kept.takes_more = true;

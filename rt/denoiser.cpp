@@ -15,10 +15,10 @@ namespace {
 constexpr std::uint32_t kLookBranch = 0x4C4F4F4BU;
 
 /// Distance of unit normals from which on two places are not alike, in a frame's first sample.
-constexpr float kNormalWidth = 0.6F;
+constexpr float kNormalWidth = 0.9F;
 /// On surfaces smoother than this roughness normals must be closer and neighbours count less, in proportion down to a
 /// tenth: what mirrors show changes quickly with their normal and with the place.
-constexpr float kSmooth = 0.25F;
+constexpr float kSmooth = 0.5F;
 constexpr float kLeastWidth = 0.1F;
 /// At so many places of a pixel's part that shows a surface a sample looks again, and of one that shows many.
 constexpr std::uint32_t kLooksAgain = 2;
@@ -30,6 +30,8 @@ constexpr float kNeighbourSamples = 16.0F;
 constexpr double kFarBrighter = 3.0;
 /// How many times as much light one may scatter as the other.
 constexpr float kMostBrighter = 4.0F;
+constexpr auto kDirect = static_cast<std::size_t>(Component::Direct);
+constexpr auto kShadow = static_cast<std::size_t>(Component::Shadow);
 
 float square(float value) {
   return value * value;
@@ -40,29 +42,12 @@ float sharpness_of(float width) {
   return 1.0F / square(kNormalWidth * width);
 }
 
-/// 1 for the same normal; 0 from a distance on, the inverse of whose square is `sharpness`.
-float normal_weight(const glm::vec3& a, const glm::vec3& b, float sharpness) {
-  const glm::vec3 difference = a - b;
-  return square(std::max(0.0F, 1.0F - glm::dot(difference, difference) * sharpness));
-}
-
-/// 0 just outside the window.
-float spatial_weight(float distance2, int radius) {
-  return std::max(0.0F, 1.0F - distance2 / square(static_cast<float>(radius) + 1.0F));
-}
-
-/// What the lender's light is multiplied by; nothing where the two scatter too different shares.
-bool make_up(float borrower, float lender, float& ratio) {
-  if (borrower == lender) {
-    ratio = 1.0F;
-    return true;
-  }
-  ratio = borrower / lender;
-  return ratio <= kMostBrighter && ratio >= 1.0F / kMostBrighter;
-}
-
 std::size_t index_of(int column, int row) {
   return static_cast<std::size_t>(row) * kTileSide + static_cast<std::size_t>(column);
+}
+
+std::size_t plane_index(std::uint32_t pixel) {
+  return LenderPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
 }
 
 }  // namespace
@@ -70,6 +55,8 @@ std::size_t index_of(int column, int row) {
 void Denoiser::start(std::size_t samples) {
   states_.assign(samples * kTilePixels, State::Unlit);
   seen_.resize(states_.size());
+  some_split_ = false;
+  if (!sights_) sights_ = std::make_unique<LenderSights>();
   spare_ = static_cast<std::uint32_t>(states_.size());
 }
 
@@ -84,68 +71,79 @@ void Denoiser::note(const TileWork& tile, std::span<const PathPoint> points) {
     if (!lends) continue;
     seen.mapped = point.material.normal;
     seen.width = std::clamp(static_cast<float>(point.material.roughness) / kSmooth, kLeastWidth, 1.0F);
-    seen.weight = glm::vec3(0.0F);
-    for (const Lobe lobe : kLobes) seen.weight += glm::vec3(point.bsdf.weight(lobe));
+    seen.matte = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
+    seen.mirrored = glm::vec3(0.0F);
+    seen.is_split = seen.width < 1.0F && seen.matte != glm::vec3(0.0F);
+    for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
+      seen.mirrored += glm::vec3(point.bsdf.weight(lobe));
+      if (point.bsdf.present(lobe) && !tile.follows_for_itself(point.bsdf, lobe)) seen.is_split = false;
+    }
+    some_split_ |= seen.is_split;
   }
 }
 
-template <typename Weigh>
-Denoiser::Lenders Denoiser::lenders_in(const TileJob& job, const Window& window, const Weigh& weigh) const {
-  const int column = static_cast<int>(window.pixel % kTileSide);
-  const int row = static_cast<int>(window.pixel / kTileSide);
-  const glm::ivec2 middle = glm::ivec2(column, row) + window.shift;
-  const int radius = window.radius;
-  Lenders found;
-  const Rect about{middle.x - radius, middle.y - radius, middle.x + radius + 1, middle.y + radius + 1};
-  const Rect pixels = intersection(about, {0, 0, job.place.width(), job.place.height()});
-  for (int y = pixels.y0; y < pixels.y1; ++y) {
-    for (int x = pixels.x0; x < pixels.x1; ++x) {
-      const std::uint32_t lender = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
-      if (states_[lender] != State::Lends) continue;
-      glm::vec3 ratio(1.0F);
-      const float weight = weigh(seen_[lender], x - column, y - row, ratio);
-      if (!(weight > 0.0F)) continue;
-      found.at[found.count] = lender;
-      found.weights[found.count++] = weight * ratio;
-      found.sum += weight;
-    }
-  }
-  return found;
+Borrower Denoiser::borrower_of(const View& view, const Sight& sight, std::uint32_t pixel) {
+  Borrower borrower;
+  borrower.material = static_cast<std::int32_t>(sight.material);
+  borrower.place = sight.place;
+  borrower.most_apart2 = most_apart2(view, sight.place);
+  borrower.most_bent2 = square(kMostBent);
+  borrower.most_brighter = kMostBrighter;
+  borrower.pixel = {pixel % kTileSide, pixel / kTileSide};
+  return borrower;
 }
 
-Denoiser::Lenders Denoiser::lenders_of_look(const TileJob& job, const Look& look, const Sight& seen) const {
-  const glm::vec2 way = look.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
-  const Window window{look.pixel, glm::ivec2(glm::round(way)), 1};
-  return lenders_in(job, window, [&](const Seen& lender, int dx, int dy, glm::vec3&) {
-    if (!is_beside(*job.view, lender.sight, seen)) return 0.0F;
-    const float distance2 = square(static_cast<float>(dx) - way.x) + square(static_cast<float>(dy) - way.y);
-    return spatial_weight(distance2, window.radius) *
-           normal_weight(lender.sight.normal, seen.normal, sharpness_of(narrowed_ * lender.width));
-  });
-}
-
-Denoiser::Lenders Denoiser::lenders_of_pixel(const TileJob& job, std::uint32_t pixel) const {
-  const Seen& borrower = seen_[job.first_pixel + pixel];
-  const float sharpness = sharpness_of(narrowed_ * borrower.width);
-  const float others = borrower.width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
-  const Window window{pixel, {}, job.number.sample == 0 ? kMostRadius : 1};
-  return lenders_in(job, window, [&](const Seen& lender, int dx, int dy, glm::vec3& ratio) {
-    if (dx == 0 && dy == 0) return 1.0F;
-    if (!is_beside(*job.view, lender.sight, borrower.sight)) return 0.0F;
-    for (int i = 0; i < 3; ++i) {
-      if (!make_up(borrower.weight[i], lender.weight[i], ratio[i])) return 0.0F;
-    }
-    return others * spatial_weight(static_cast<float>(dx * dx + dy * dy), window.radius) *
-           normal_weight(lender.mapped, borrower.mapped, sharpness);
-  });
-}
-
-/// Calls `body` with the index of each sum that is wanted and its pixels.
+/// Calls `body` with the index of each sum that is wanted, its pixels, and what of them is matte.
 template <typename Body>
 void Denoiser::each_sum(TileWork& tile, const Body& body) {
-  body(std::size_t{0}, tile.radiance);
+  body(std::size_t{0}, tile.radiance, tile.matte);
   if (!tile.wants_components) return;
-  for (std::size_t i = 0; i < kComponents; ++i) body(1 + i, tile.components[i]);
+  for (std::size_t i = 0; i < kComponents; ++i) body(1 + i, tile.components[i], tile.matte_components[i]);
+}
+
+/// Light of small lights has no noise that sharing would take, and shadows with edges.
+bool Denoiser::keeps(const TileWork& tile, std::size_t sum) {
+  return keeps_direct(tile.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
+}
+
+void Denoiser::set_sights(const TileJob& job) {
+  for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
+    const std::uint32_t own = job.first_pixel + pixel;
+    const std::size_t at = plane_index(pixel);
+    sights_->lends.at(at) = LenderSights::kLendsNothing;
+    if (states_[own] != State::Lends) continue;
+    const Seen& seen = seen_[own];
+    sights_->lends.at(at) = static_cast<std::int32_t>(seen.sight.material);
+    sights_->place.set(at, seen.sight.place);
+    sights_->normal.set(at, seen.sight.normal);
+    sights_->mapped.set(at, seen.mapped);
+    sights_->mirrored.set(at, seen.mirrored);
+    sights_->matte.set(at, seen.matte);
+    sights_->sharpness.at(at) = 1.0F / square(seen.width);
+  }
+}
+
+void Denoiser::set_lent(TileWork& tile, const TileJob& job) {
+  const auto set = [&](LenderVectors<double>& lent, const auto& light_of) {
+    for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
+      const std::uint32_t own = job.first_pixel + pixel;
+      lent.set(plane_index(pixel), states_[own] == State::Lends ? light_of(own) : glm::dvec3(0.0));
+    }
+  };
+  const auto kept = [&](std::size_t part, std::uint32_t pixel) {
+    return tile.components.at(part)[pixel] - tile.matte_components.at(part)[pixel];
+  };
+  const std::size_t sums = tile.wants_components ? 1 + kComponents : 1;
+  lent_.resize(sums);
+  if (some_split_) matte_.resize(sums);
+  if (keeps_direct(tile.scene)) kept_.resize(sums);
+  each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const std::vector<glm::dvec3>& matte) {
+    set(lent_[i], [&](std::uint32_t pixel) { return from[pixel]; });
+    if (some_split_) set(matte_[i], [&](std::uint32_t pixel) { return matte[pixel]; });
+    if (!keeps(tile, i)) return;
+    set(kept_[i],
+        [&](std::uint32_t pixel) { return i == 0 ? kept(kDirect, pixel) + kept(kShadow, pixel) : kept(i - 1, pixel); });
+  });
 }
 
 void Denoiser::add_background(TileWork& tile, const Look& look, const glm::dvec3& direction) {
@@ -157,13 +155,16 @@ void Denoiser::add_background(TileWork& tile, const Look& look, const glm::dvec3
 bool Denoiser::add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen) {
   const Material& material = tile.scene.materials[seen.material];
   if (material.unlit || material.emissive != glm::vec3(0.0F)) return false;  // what emits lends nothing
-  const Lenders lenders = lenders_of_look(job, look, seen);
-  if (lenders.count == 0) return false;
-  const double share = look.share / static_cast<double>(lenders.sum);
-  each_sum(tile, [&](std::size_t sum, const std::vector<glm::dvec3>& from) {
-    glm::dvec3 light(0.0);
-    for (std::size_t i = 0; i < lenders.count; ++i) light += glm::dvec3(lenders.weights[i]) * from[lenders.at[i]];
-    sums_.at(sum)[look.pixel] += share * light;
+  Borrower borrower = borrower_of(*job.view, seen, look.pixel);
+  borrower.normal = seen.normal;
+  borrower.sharpness = sharpness_of(narrowed_);
+  borrower.radius = job.number.sample == 0 ? 2 : 1;
+  borrower.way = look.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
+  borrower.is_pixel = false;
+  weigh_lenders(*sights_, borrower, weights_);
+  if (weights_.sum == 0.0F) return false;
+  each_sum(tile, [&](std::size_t i, const auto& /*from*/, const auto& /*matte*/) {
+    sums_.at(i)[look.pixel] += look.share * mean_of(weights_, lent_[i]);
   });
   return true;
 }
@@ -230,12 +231,14 @@ void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const PixelPar
 
 void Denoiser::look_again(TileWork& tile, const TileJob& job, const TileParts& again, std::vector<PathPoint>& alone) {
   set_apart(tile, job);
-  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& from) {
+  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& from, const auto& /*matte*/) {
     sums_.at(i).assign(kTilePixels, glm::dvec3(0.0));
     std::fill_n(from.begin() + spare_, kTilePixels, glm::dvec3(0.0));
   });
   narrowed_ = 1.0F / std::sqrt(std::sqrt(1.0F + static_cast<float>(job.number.sample)));
   set_unexpected_apart(job, again.parts);
+  set_sights(job);
+  set_lent(tile, job);
   View view = unjittered(job);
   tile.requests.clear();
   looks_.clear();
@@ -268,26 +271,29 @@ void Denoiser::look_at_part(TileWork& tile, const TileJob& job, View& view, cons
   }
 }
 
-/// Light of small lights has no noise that sharing would take, and shadows with edges.
-void Denoiser::share(TileWork& tile, std::uint32_t pixel, std::uint32_t own, const Lenders& lenders) {
-  const auto sharp = [&](std::uint32_t of) {
-    const auto part = [&](Component component) { return tile.components[static_cast<std::size_t>(component)][of]; };
-    return keeps_direct(tile.scene) ? part(Component::Direct) + part(Component::Shadow) : glm::dvec3(0.0);
-  };
-  each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from) {
-    const bool is_sharp =
-        i == 1 + static_cast<std::size_t>(Component::Direct) || i == 1 + static_cast<std::size_t>(Component::Shadow);
+Borrower Denoiser::borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const {
+  const Seen& seen = seen_[job.first_pixel + pixel];
+  const float width = lent == Lent::Matte ? 1.0F : seen.width;
+  Borrower borrower = borrower_of(*job.view, seen.sight, pixel);
+  borrower.normal = seen.mapped;
+  borrower.sharpness = sharpness_of(narrowed_ * width);
+  borrower.others = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
+  borrower.weight = lent == Lent::All ? seen.mirrored + seen.matte : lent == Lent::Matte ? seen.matte : seen.mirrored;
+  borrower.lent = lent;
+  borrower.radius = (width < 1.0F ? 1 : 2) + (job.number.sample == 0 ? 1 : 0);
+  return borrower;
+}
+
+void Denoiser::share(TileWork& tile, const TileJob& job, std::uint32_t pixel) {
+  const bool is_split = seen_[job.first_pixel + pixel].is_split;
+  const std::size_t own = plane_index(pixel);
+  weigh_lenders(*sights_, borrower_at(job, pixel, is_split ? Lent::Mirrored : Lent::All), weights_);
+  if (is_split) weigh_lenders(*sights_, borrower_at(job, pixel, Lent::Matte), matte_weights_);
+  each_sum(tile, [&](std::size_t i, const auto& /*from*/, const auto& /*matte*/) {
     glm::dvec3& sum = sums_.at(i)[pixel];
-    if (is_sharp && keeps_direct(tile.scene)) {
-      sum = from[own];
-      return;
-    }
-    for (std::size_t k = 0; k < lenders.count; ++k) {
-      const glm::dvec3 light = i == 0 ? from[lenders.at[k]] - sharp(lenders.at[k]) : from[lenders.at[k]];
-      sum += glm::dvec3(lenders.weights[k]) * light;
-    }
-    sum /= static_cast<double>(lenders.sum);
-    if (i == 0) sum += sharp(own);
+    sum = mean_of(weights_, lent_[i]);
+    if (is_split) sum += mean_of(matte_weights_, matte_[i]) - mean_of(weights_, matte_[i]);
+    if (keeps(tile, i)) sum += kept_[i].at(own) - mean_of(weights_, kept_[i]);
   });
 }
 
@@ -300,17 +306,19 @@ void Denoiser::resolve(TileWork& tile, const TileJob& job, const TileParts& agai
       if (tile.wants_cost) tile.cost[own] += std::exchange(tile.cost[spare_ + pixel], 0.0F);
       const bool is_crossed = again.crossed[pixel] != 0 && states_[own] != State::Apart;
       if (is_crossed) {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from) {
+        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const auto& /*matte*/) {
           sums_.at(i)[pixel] += from[spare_ + pixel];
         });
       } else if (states_[own] == State::Lends) {
-        share(tile, pixel, own, lenders_of_pixel(job, pixel));
+        share(tile, job, pixel);
       } else {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from) { sums_.at(i)[pixel] = from[own]; });
+        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const auto& /*matte*/) {
+          sums_.at(i)[pixel] = from[own];
+        });
       }
     }
   }
-  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& to) {
+  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& to, const auto& /*matte*/) {
     std::ranges::copy(sums_.at(i), to.begin() + job.first_pixel);
   });
 }

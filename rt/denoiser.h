@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "rt/first_points.h"
+#include "rt/lenders.h"
 #include "rt/pass.h"
 #include "rt/pixel_parts.h"
 
@@ -51,9 +53,11 @@ class Denoiser {
   /// What tells whether two places are alike.
   struct Seen {
     Sight sight;
-    glm::vec3 mapped{0.0F};  ///< the normal shaded with
-    glm::vec3 weight{0.0F};  ///< about the share of light that it scatters to the eye
-    float width = 1.0F;      ///< how far normals may differ, in parts of what those of rough surfaces may
+    glm::vec3 mapped{0.0F};    ///< the normal shaded with
+    glm::vec3 mirrored{0.0F};  ///< about the share of light that it mirrors and lets through to the eye
+    glm::vec3 matte{0.0F};     ///< and that it scatters otherwise
+    float width = 1.0F;        ///< how far normals may differ, in parts of what those of rough surfaces may
+    bool is_split = false;     ///< that holds for what it mirrors alone, and matte light is known
   };
 
   /// One more place of a pixel.
@@ -64,31 +68,17 @@ class Denoiser {
     double share = 0.0;        ///< of the pixel
   };
 
-  /// Pixels about one, or about another so many columns and rows away: so many to either side.
-  struct Window {
-    std::uint32_t pixel = 0;
-    glm::ivec2 shift{0};
-    int radius = 1;
-  };
-  static constexpr int kMostRadius = 2;
-
-  /// Who lends to a place, and how much.
-  struct Lenders {
-    static constexpr std::size_t kSide = 2 * kMostRadius + 1;
-    static constexpr std::size_t kMost = kSide * kSide;
-    std::array<std::uint32_t, kMost> at;  ///< pixels of TileWork's; set up to `count`, as are weights
-    std::array<glm::vec3, kMost> weights;
-    std::size_t count = 0;
-    float sum = 0.0F;
-  };
-
   [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
   void set_apart(const TileWork& tile, const TileJob& job);
-  template <typename Weigh>
-  [[nodiscard]] Lenders lenders_in(const TileJob& job, const Window& window, const Weigh& weigh) const;
-  [[nodiscard]] Lenders lenders_of_look(const TileJob& job, const Look& look, const Sight& seen) const;
-  [[nodiscard]] Lenders lenders_of_pixel(const TileJob& job, std::uint32_t pixel) const;
+  /// Whether there is light in a sum that stays with its pixel.
+  [[nodiscard]] static bool keeps(const TileWork& tile, std::size_t sum);
+  /// Sets what the pixels that lend see and lend.
+  void set_sights(const TileJob& job);
+  void set_lent(TileWork& tile, const TileJob& job);
+  /// Without what pixels and looks have of their own.
+  [[nodiscard]] static Borrower borrower_of(const View& view, const Sight& sight, std::uint32_t pixel);
+  [[nodiscard]] Borrower borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const;
   void add_background(TileWork& tile, const Look& look, const glm::dvec3& direction);
   /// False where nobody lends.
   [[nodiscard]] bool add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen);
@@ -96,15 +86,23 @@ class Denoiser {
   void set_unexpected_apart(const TileJob& job, std::span<const PixelPart> parts);
   void look_at_part(TileWork& tile, const TileJob& job, View& view, const PixelPart& part, const Looks& places);
   void add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray, std::vector<PathPoint>& alone);
-  void share(TileWork& tile, std::uint32_t pixel, std::uint32_t own, const Lenders& lenders);
+  void share(TileWork& tile, const TileJob& job, std::uint32_t pixel);
   template <typename Body>
   static void each_sum(TileWork& tile, const Body& body);
 
-  std::vector<State> states_;  ///< per pixel, sample after sample
-  std::vector<Seen> seen_;     ///< likewise, of those that lend
-  float narrowed_ = 1.0F;      ///< how far normals may differ in the sample at hand, in parts of the first one's
-  std::vector<Look> looks_;    ///< that rays were sent for
-  std::uint32_t spare_ = 0;    ///< where the tile's sums have room for what is lit in addition
+  std::vector<State> states_;             ///< per pixel, sample after sample
+  std::vector<Seen> seen_;                ///< likewise, of those that lend
+  std::unique_ptr<LenderSights> sights_;  ///< of the sample at hand
+  /// Likewise light, 0 where nothing is lent: radiance, then the components that are wanted.
+  std::vector<LenderVectors<double>> lent_;
+  std::vector<LenderVectors<double>> matte_;  ///< of that; when some pixel of the tile is_split
+  std::vector<LenderVectors<double>> kept_;   ///< of that: light of small lights, which stays with its pixel
+  bool some_split_ = false;
+  LenderWeights weights_;
+  LenderWeights matte_weights_;
+  float narrowed_ = 1.0F;    ///< how far normals may differ in the sample at hand, in parts of the first one's
+  std::vector<Look> looks_;  ///< that rays were sent for
+  std::uint32_t spare_ = 0;  ///< where the tile's sums have room for what is lit in addition
   /// Of the sample at hand, per pixel: radiance, then the components that are wanted.
   std::array<std::vector<glm::dvec3>, 1 + kComponents> sums_;
 };

@@ -74,6 +74,47 @@ TEST(Denoiser, TakesMostOfTheErrorOfOneSampleAndKeepsTheMean) {
   EXPECT_NEAR(mean(smooth) / mean(truth), 1.0, 0.01);
 }
 
+/// Light that a lacquered surface scatters below its lacquer is shared as if it were matte, what it mirrors is not;
+/// where there are lamps, whose light is not shared, that of the sky still is.
+TEST(Denoiser, MatteLightOfSmoothSurfacesIsSharedAsWidely) {
+  Scene scene = corner(test::matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
+  for (Material& material : scene.materials) {
+    material.roughness = 0.0F;
+    material.ior = 1.5F;
+  }
+  for (const bool has_lamp : {false, true}) {
+    if (has_lamp) scene.lights.emplace_back().position = {0.0, 5.0, 4.0};
+    finish_scene(scene);
+    const View view = look(scene, {70, 52});
+    RaySettings settings = kGathered;
+    settings.passes.emplace_back("reflection");
+    const Image<Rgb> truth = mean_picture(scene, view, settings, 96);
+    const Image<Rgb> plain = mean_picture(scene, view, settings, 1);
+    const Image<Rgb> smooth = mean_picture(scene, view, denoised(settings), 1);
+    EXPECT_LT(squared_error(smooth, truth), 0.15 * squared_error(plain, truth)) << has_lamp;
+    EXPECT_NEAR(mean(smooth) / mean(truth), 1.0, 0.01) << has_lamp;
+  }
+}
+
+/// Where rays that gather follow mirrors too, what those show is not taken for matte light.
+TEST(Denoiser, GatheredMirrorImagesAreNotSharedWidely) {
+  Scene scene;
+  Material half = test::mirror(0.5F);
+  half.metallic = 0.5F;
+  add_material(scene, half);
+  add_material(scene, test::matte(glm::vec3(0.0F)));
+  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  for (int i = -4; i < 4; ++i) {
+    place(scene, add_mesh(scene, quad({static_cast<float>(i), 0.2F, -4}, {0.5F, 0, 0}, {0, 6, 0}, 1)));
+  }
+  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
+  finish_scene(scene);
+  const View view = test::view_from({0, 4, 6}, {0, 0, -1}, {64, 64}, scene);
+  const Image<Rgb> plain = test::light(scene, view, kGathered).image;
+  const Image<Rgb> smooth = test::light(scene, view, denoised(kGathered)).image;
+  EXPECT_LT(squared_error(smooth, plain), 0.011);  // 0.0145 if they were
+}
+
 TEST(Denoiser, LeavesSamplesPastTheFirstAlone) {
   const Scene scene = corner(test::matte(glm::vec3(0.5F)));
   const View view = look(scene);
@@ -179,7 +220,12 @@ TEST(Denoiser, NoLightCrossesToAnotherMaterial) {
 
 TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
   Scene scene = corner(test::mirror(0.9F));
-  scene.materials[0].roughness = 0.3F;
+  scene.materials[0].roughness = 0.2F;
+  scene.materials[0].ior = 1.5F;
+  Light& light = scene.lights.emplace_back();
+  light.position = {1.0, 5.0, 2.0};
+  light.intensity = glm::vec3(20.0F);
+  finish_scene(scene);
   std::vector<View> views;
   std::vector<TileLayer<Key>> keys;
   for (int i = 0; i < 3; ++i) {
@@ -190,6 +236,7 @@ TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
   const FrameLayout& layout = keys.front().layout();
   const std::vector<std::size_t> tiles = all_tiles(layout);
   RaySettings settings = denoised(kGathered);
+  settings.passes = {"gather", "shadow", "reflection"};
   Lighter one(scene, settings);
   settings.threads = 3;
   Lighter three(scene, settings);
@@ -229,7 +276,7 @@ TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
     }
   }
   const RayCounts& counts = three.counts();
-  const double traced = static_cast<double>(counts.primary + counts.reflection + counts.gather);
+  const double traced = static_cast<double>(counts.primary + counts.shadow + counts.reflection + counts.gather);
   EXPECT_LT(rays, traced);  // those that find outlines are no pixel's
   EXPECT_GT(rays, 0.5 * traced);
 }

@@ -45,18 +45,21 @@ inline void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::s
   return std::accumulate(scratch.ms.begin(), scratch.ms.end(), 0.0);
 }
 
-/// Clears what samples of tile `index` are summed in, and room for `spare` pixels more. With `parts` components too.
-inline void clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples, bool parts,
-                  std::size_t spare) {
+/// Clears what samples of tile `index` are summed in. With `parts` components too; as a denoiser needs it, also what of
+/// it is matte, and room for a tile's pixels more.
+inline void clear(TileWork& tile, std::size_t index, std::span<const LitSample> samples, bool parts, bool denoises) {
   const LightOutput& output = samples.front().output;  // all want the same
   tile.wants_components =
       parts || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
+  tile.wants_matte = denoises;
   tile.wants_cost = output.cost != nullptr;
   const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, index);
-  const std::size_t pixels = samples.size() * kTilePixels + spare;
+  const std::size_t pixels = (samples.size() + (denoises ? 1 : 0)) * kTilePixels;
   clear_sums(tile.radiance, pixels, wanted);
-  if (tile.wants_components) {
-    for (auto& part : tile.components) clear_sums(part, pixels, wanted);
+  if (tile.wants_matte) clear_sums(tile.matte, pixels, wanted);
+  for (std::size_t i = 0; tile.wants_components && i < kComponents; ++i) {
+    clear_sums(tile.components.at(i), pixels, wanted);
+    if (tile.wants_matte) clear_sums(tile.matte_components.at(i), pixels, wanted);
   }
   if (tile.wants_cost) tile.cost.assign(pixels, 0.0F);
   for (const LitSample& sample : samples) {

@@ -278,7 +278,7 @@ void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs,
   const DenormalsAsZero mode;
   TileWork& tile = scratch.work;
   const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
-  clear(tile, index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises ? kTilePixels : 0);
+  clear(tile, index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises);
   if (denoises) scratch.denoiser.start(jobs.size());
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
   if (shared != 0) scratch.shared.start(shared, tile, jobs.front());

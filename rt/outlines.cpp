@@ -1,24 +1,30 @@
 #include "rt/outlines.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 
 namespace hpr {
 namespace {
 
-/// How far one place may lie off the other's tangent plane, in distances between the two.
-constexpr float kMostBent = 0.5F;
 /// How far apart they may lie, in distances from the eye.
 constexpr float kMostApart = 0.1F;
 /// Cosine between the normals of two places that no outline lies between.
 constexpr float kLeastCosine = 0.8F;
-/// Halvings of an edge: they leave a thirty-second of a pixel to either side.
-constexpr int kHalvings = 4;
+/// Halvings of an edge: they leave a sixty-fourth of a pixel to either side.
+constexpr int kHalvings = 5;
 /// Halvings of how far an outline may bend, and so far, in pixels and in lengths of the line.
 constexpr int kBendHalvings = 3;
 constexpr float kMostBend = 0.125F;
 constexpr float kMostBendOfWay = 0.25F;
+/// So far outlines may bend whose bend is told by the pixels before and after, in lengths of the line, and so far may
+/// what the two tell lie apart, in pixels.
+constexpr float kMostEvenBend = 0.025F;
+constexpr float kMostUneven = 0.03F;
+/// By how much more than nothing the pixels about must tell: the error of an edge over the bends there are, squared.
+constexpr float kBendRidge = 0.01F;
 /// Pixels of a square that are gone through together: so rays are coherent.
 constexpr int kBlock = 8;
 
@@ -48,6 +54,10 @@ void measure(std::span<const glm::vec2> polygon, TileOutlines::Pixel& pixel) {
   pixel.middle /= pixel.share;
 }
 
+float square(float value) {
+  return value * value;
+}
+
 float most_bend(const TileOutlines::Pixel& pixel) {
   return std::min(kMostBend, kMostBendOfWay * glm::length(pixel.way));
 }
@@ -67,11 +77,15 @@ Sight sight_of(const SurfacePoint& point, const glm::dvec3& eye) {
   return {true, point.material, point.position - eye, point.facing_normal()};
 }
 
+float most_apart2(const View& view, const glm::vec3& place) {
+  // Parallel rays have no eye to be far from.
+  return view.orthographic ? std::numeric_limits<float>::infinity() : square(kMostApart) * glm::dot(place, place);
+}
+
 bool is_near(const View& view, const Sight& first, const Sight& second) {
   if (first.material != second.material) return false;
   const glm::vec3 way = second.place - first.place;
-  // Parallel rays have no eye to be far from.
-  return view.orthographic || glm::dot(way, way) <= kMostApart * kMostApart * glm::dot(second.place, second.place);
+  return glm::dot(way, way) <= most_apart2(view, second.place);
 }
 
 bool is_beside(const View& view, const Sight& first, const Sight& second) {
@@ -100,15 +114,15 @@ RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, cons
   return ray;
 }
 
-void trace_from_eye(TileWork& work) {
+void trace_from_eye(TileWork& work, Coherence coherence) {
   work.hits.resize(work.requests.size());
   if (work.requests.empty()) return;
   work.counts.primary += work.requests.size();
-  work.counts.invalid += work.rays->closest(work.requests, work.hits, work.scratch);
+  work.counts.invalid += work.rays->closest(work.requests, work.hits, work.scratch, coherence);
 }
 
-void look_from_eye(TileWork& work, const glm::dvec3& eye, std::vector<Sight>& seen) {
-  trace_from_eye(work);
+void look_from_eye(TileWork& work, const glm::dvec3& eye, std::vector<Sight>& seen, Coherence coherence) {
+  trace_from_eye(work, coherence);
   seen.clear();
   for (std::size_t i = 0; i < work.hits.size(); ++i) {
     Sight& sight = seen.emplace_back();
@@ -124,7 +138,7 @@ void TileOutlines::look_at_corners(TileWork& work, const TileJob& job) {
   for (int y = -1; y <= height_ + 1; ++y) {
     for (int x = -1; x <= width_ + 1; ++x) work.requests.push_back(eye_ray(view_, job, x, y));
   }
-  look_from_eye(work, view_.eye, sights_);
+  look_from_eye(work, view_.eye, sights_, Coherence::High);
 }
 
 void TileOutlines::find_edge(int x, int y, int axis) {
@@ -178,6 +192,7 @@ void TileOutlines::find_sides(Pixel& pixel, int x, int y, const std::array<std::
   }
   if (crossings != ends.size()) return;
   pixel.has_sides = true;
+  for (std::size_t i = 0; i < ends.size(); ++i) pixel.edges.at(i) = static_cast<std::uint32_t>(around.at(ends.at(i)));
   const glm::dvec2 centre(x + 0.5, y + 0.5);
   const auto put = [&](std::size_t side, const glm::vec2& place, std::uint32_t sight) {
     pixel.known.at(side).at(pixel.counts.at(side)++) = {place, sight};
@@ -237,7 +252,55 @@ void TileOutlines::find_pixels() {
     pixel.pixel = static_cast<std::uint32_t>(y * kTileSide + x);
     const bool is_some_thin = is_thin(x, y) || is_thin(x + 1, y) || is_thin(x, y + 1) || is_thin(x + 1, y + 1);
     if (!is_some_thin) find_sides(pixel, x, y, around);
+    if (!pixel.has_sides) return;
+    for (const std::uint32_t edge : pixel.edges) {
+      std::array<std::int32_t, 2>& pixels = edges_[edge].pixels;
+      pixels.at(pixels[0] < 0 ? 0 : 1) = static_cast<std::int32_t>(crossed_.size() - 1);
+    }
   });
+}
+
+/// Where the outline leaves the pixel that it goes on in, from this one's centre.
+std::optional<glm::vec2> TileOutlines::end_of_next(const Pixel& pixel, std::size_t end) const {
+  const std::uint32_t edge = pixel.edges.at(end);
+  for (const std::int32_t i : edges_[edge].pixels) {
+    if (i < 0 || crossed_[static_cast<std::size_t>(i)].pixel == pixel.pixel) continue;
+    const Pixel& next = crossed_[static_cast<std::size_t>(i)];
+    const auto place = [](const Pixel& of) { return glm::vec2(of.pixel % kTileSide, of.pixel / kTileSide); };
+    return place(next) - place(pixel) + next.end(next.edges[0] == edge ? 1 : 0);
+  }
+  return std::nullopt;
+}
+
+/// The bend of a parabola through both ends and those of the pixels before and after; nothing where it would not do.
+std::optional<float> TileOutlines::even_bend(const Pixel& pixel) const {
+  if (view_.points) return std::nullopt;  // corners and pixels may see otherwise
+  const float length = glm::length(pixel.way);
+  const glm::vec2 along = pixel.way / length;
+  float sum = 0.0F;
+  float weights = 0.0F;
+  float least = std::numeric_limits<float>::infinity();
+  float most = -least;
+  for (const std::size_t end : {0U, 1U}) {
+    const std::optional<glm::vec2> next = end_of_next(pixel, end);
+    if (!next) continue;
+    // From the nearer end, away from the pixel; the second divided difference and the inverse of its variance.
+    const glm::vec2 way = *next - pixel.end(end);
+    const float away = end == 0 ? -glm::dot(way, along) : glm::dot(way, along);
+    if (!(away > 0.0F)) return std::nullopt;
+    const float product = away * (away + length);
+    const float curve = glm::dot(way, pixel.to_left) / product;
+    const float weight =
+        1.0F / (1.0F / square(product) + 1.0F / square(away * length) + 1.0F / square(length * (away + length)));
+    const float bend = -0.25F * curve * square(length);
+    least = std::min(least, bend);
+    most = std::max(most, bend);
+    sum += weight * bend;
+    weights += weight;
+  }
+  if (weights == 0.0F || most - least > kMostUneven) return std::nullopt;
+  const float bend = sum / (weights + kBendRidge);
+  return std::abs(bend) <= kMostEvenBend * length ? std::optional(bend) : std::nullopt;
 }
 
 bool TileOutlines::is_on_side(const Pixel& pixel, std::size_t side, const Sight& sight) const {
@@ -264,6 +327,11 @@ void TileOutlines::bisect_bends(TileWork& work, const TileJob& job) {
   between_.clear();
   for (Pixel& pixel : crossed_) {
     if (!pixel.has_sides) continue;
+    if (const std::optional<float> bend = even_bend(pixel)) {
+      pixel.bend = *bend;
+      take_bend(pixel);
+      continue;
+    }
     bent_.push_back(&pixel);
     between_.push_back({-most_bend(pixel), most_bend(pixel)});
   }

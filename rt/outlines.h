@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,12 @@ struct Sight {
 
 [[nodiscard]] Sight sight_of(const SurfacePoint& point, const glm::dvec3& eye);
 
+/// How far one place may lie off the other's tangent plane, in distances between the two, for it to lie beside it.
+inline constexpr float kMostBent = 0.5F;
+
+/// How far from a place, squared, another may lie for the view to see it near.
+[[nodiscard]] float most_apart2(const View& view, const glm::vec3& place);
+
 /// Whether both show one material, at places near each other as the view sees them.
 [[nodiscard]] bool is_near(const View& view, const Sight& first, const Sight& second);
 
@@ -40,10 +47,11 @@ struct Sight {
 [[nodiscard]] RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, const glm::vec2& place);
 
 /// Traces work.requests, which start at the eye: sets work.hits.
-void trace_from_eye(TileWork& work);
+void trace_from_eye(TileWork& work, Coherence coherence = Coherence::Low);
 
 /// Traces them and tells what they see.
-void look_from_eye(TileWork& work, const glm::dvec3& eye, std::vector<Sight>& seen);
+void look_from_eye(TileWork& work, const glm::dvec3& eye, std::vector<Sight>& seen,
+                   Coherence coherence = Coherence::Low);
 
 /// Where in a pixel something is known to be seen.
 struct Known {
@@ -61,16 +69,18 @@ class TileOutlines {
     std::uint32_t pixel = 0;  ///< of the tile
     /// Whether one outline goes through that is about a parabola: then there are two sides.
     bool has_sides = false;
-    glm::vec2 start{0.0F};    ///< of the outline in the pixel, from the pixel's centre, pixels
-    glm::vec2 way{0.0F};      ///< from there to its end
-    glm::vec2 to_left{0.0F};  ///< unit length: across the way; y is down
-    float bend = 0.0F;        ///< by how much the outline's middle lies to the left of the straight line
-    float share = 0.0F;       ///< of the left side
-    glm::vec2 middle{0.0F};   ///< of the left side
+    glm::vec2 start{0.0F};                 ///< of the outline in the pixel, from the pixel's centre, pixels
+    glm::vec2 way{0.0F};                   ///< from there to its end
+    glm::vec2 to_left{0.0F};               ///< unit length: across the way; y is down
+    float bend = 0.0F;                     ///< by how much the outline's middle lies to the left of the straight line
+    float share = 0.0F;                    ///< of the left side
+    glm::vec2 middle{0.0F};                ///< of the left side
+    std::array<std::uint32_t, 2> edges{};  ///< where it starts and ends
     /// What is known of each side; the first is that to the left.
     std::array<std::array<Known, 8>, 2> known{};
     std::array<std::uint8_t, 2> counts{};
 
+    [[nodiscard]] glm::vec2 end(std::size_t i) const { return i == 0 ? start : start + way; }
     [[nodiscard]] glm::vec2 middle_of_outline() const { return start + 0.5F * way + bend * to_left; }
     /// Whether a place of the pixel, from its centre, lies on the left side, but for the bend.
     [[nodiscard]] bool is_left(const glm::vec2& place) const { return glm::dot(place - start, to_left) > 0.0F; }
@@ -92,7 +102,8 @@ class TileOutlines {
     double most = 1.0;
     std::uint32_t before = 0;
     std::uint32_t after = 0;
-    bool is_clear = true;  ///< what was seen between was always like one of them, and only one
+    bool is_clear = true;                        ///< what was seen between was always like one of them, and only one
+    std::array<std::int32_t, 2> pixels{-1, -1};  ///< of those crossed: that have sides and this edge; -1: none
 
     [[nodiscard]] glm::dvec2 at(double part) const { return start + part * way; }
     [[nodiscard]] glm::dvec2 middle() const { return at(0.5 * (least + most)); }
@@ -111,6 +122,8 @@ class TileOutlines {
   [[nodiscard]] bool is_thin(int x, int y) const;
   [[nodiscard]] bool is_thin_along(int x, int y, const glm::ivec2& axis) const;
   void find_sides(Pixel& pixel, int x, int y, const std::array<std::int32_t, 4>& around) const;
+  [[nodiscard]] std::optional<glm::vec2> end_of_next(const Pixel& pixel, std::size_t end) const;
+  [[nodiscard]] std::optional<float> even_bend(const Pixel& pixel) const;
   void bisect_bends(TileWork& work, const TileJob& job);
   void halve_bend(std::size_t i);
   [[nodiscard]] bool is_on_side(const Pixel& pixel, std::size_t side, const Sight& sight) const;

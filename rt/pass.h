@@ -88,12 +88,17 @@ struct TileWork {
   const View* view = nullptr;           ///< of the tile at hand, of whatever sample: the eye's place
   Media eye_media = {};                 ///< what the eye of that view lies in
   bool wants_components = false;
+  bool wants_matte = false;
   bool wants_cost = false;
 
   /// Per pixel of the tile, sample after sample, summed in a fixed order.
   std::vector<glm::dvec3> radiance = {};
   std::array<std::vector<glm::dvec3>, kComponents> components = {};  ///< likewise, when wanted
-  std::vector<float> cost = {};                                      ///< rays per pixel, when wanted
+  /// Of both, what the first surface scatters by lobes that no pass follows for itself, but for what lights bring that
+  /// are sampled: likewise, when wanted.
+  std::vector<glm::dvec3> matte = {};
+  std::array<std::vector<glm::dvec3>, kComponents> matte_components = {};
+  std::vector<float> cost = {};  ///< rays per pixel, when wanted
   RayCounts counts = {};
   WalkScratch scratch = {};
   std::vector<RayRequest> requests = {};
@@ -104,8 +109,18 @@ struct TileWork {
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
+    if (component == Component::Photon || component == Component::AmbientOcclusion) {
+      return add_matte(pixel, component, light);
+    }
     radiance[pixel] += light;
     if (wants_components) components[static_cast<std::size_t>(component)][pixel] += light;
+  }
+  void add_matte(std::uint32_t pixel, Component component, const glm::dvec3& light) {
+    radiance[pixel] += light;
+    if (wants_matte) matte[pixel] += light;
+    if (!wants_components) return;
+    components[static_cast<std::size_t>(component)][pixel] += light;
+    if (wants_matte) matte_components[static_cast<std::size_t>(component)][pixel] += light;
   }
   void charge_ray(std::uint32_t pixel) {
     if (wants_cost) cost[pixel] += 1.0F;

@@ -71,7 +71,7 @@ void PartFinder::ask(TileWork& work, const TileJob& job, TileParts& found) {
   for (const std::uint32_t pixel : asked_) {
     for (const glm::vec2& place : places) work.requests.push_back(ray_through(view_, job, pixel, place));
   }
-  look_from_eye(work, view_.eye, seen_);
+  look_from_eye(work, view_.eye, seen_, Coherence::High);
   for (std::size_t i = 0; i < asked_.size(); ++i) {
     group(job, asked_[i], std::span(seen_).subspan(i * places.size(), places.size()), found);
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -89,12 +90,13 @@ TEST(PixelParts, SharesOfStraightOutlinesAreMeasured) {
 TEST(PixelParts, SharesOfRoundOutlinesAreMeasured) {
   for (const double radius : {0.2, 0.4, 0.8}) {
     Scene scene = before_the_sky();
-    place(scene, add_mesh(scene, test::sphere(radius, 64, 0)));
+    const glm::dvec3 centre(0.013, 0.037, 0.0);  // else the same few pixels stand all about
+    place(scene, add_mesh(scene, test::sphere(radius, 64, 0)), glm::translate(glm::dmat4(1.0), centre));
     finish_scene(scene);
     const Error error = error_of(scene, straight_on(scene, {64, 48}), [&](const Ray& ray) {
-      const glm::dvec3 way = glm::normalize(ray.direction);
-      const double along = glm::dot(ray.origin, way);
-      return glm::dot(ray.origin, ray.origin) - along * along < radius * radius;
+      const glm::dvec3 start = ray.origin - centre;
+      const double along = glm::dot(start, glm::normalize(ray.direction));
+      return glm::dot(start, start) - along * along < radius * radius;
     });
     EXPECT_GT(error.pixels, 18) << radius;
     EXPECT_LT(error.rms, 0.012) << radius;
@@ -102,20 +104,28 @@ TEST(PixelParts, SharesOfRoundOutlinesAreMeasured) {
   }
 }
 
-/// A corner in a pixel is no outline that bends a little.
+/// A corner in a pixel, sharp or blunt, is no outline that bends a little, nor is one beside it.
 TEST(PixelParts, CornersAreCounted) {
-  Scene scene = before_the_sky();
-  const glm::vec3 tip(0.017F, 0.52F, 0.0F);
-  place(scene, add_mesh(scene, quad(tip, {-1.3F, -1.5F, 0}, {1.5F, -1.3F, 0}, 0)));
-  finish_scene(scene);
-  const Error error = error_of(scene, straight_on(scene), [&](const Ray& ray) {
-    const glm::dvec3 at = ray.origin - ray.origin.z / ray.direction.z * ray.direction - glm::dvec3(tip);
-    const double along = (-1.3 * at.x - 1.5 * at.y) / (1.3 * 1.3 + 1.5 * 1.5);
-    const double across = (1.5 * at.x - 1.3 * at.y) / (1.3 * 1.3 + 1.5 * 1.5);
-    return along > 0.0 && along < 1.0 && across > 0.0 && across < 1.0;
-  });
-  EXPECT_GT(error.pixels, 50);
-  EXPECT_LT(error.most, 0.055);
+  struct Wedge {
+    glm::dvec3 a, b;
+    double most;
+  };
+  for (const Wedge& wedge : {Wedge{{-1.3, -1.5, 0}, {1.5, -1.3, 0}, 0.055}, {{-3, -0.8, 0}, {3, -0.7, 0}, 0.02}}) {
+    for (const double x : {0.017, 0.03, 0.043}) {
+      Scene scene = before_the_sky();
+      const glm::dvec3 tip(x, 0.52, 0.0);
+      place(scene, add_mesh(scene, quad(tip, wedge.a, wedge.b, 0)));
+      finish_scene(scene);
+      const glm::dmat2 to_sides = glm::inverse(glm::dmat2(glm::dvec2(wedge.a), glm::dvec2(wedge.b)));
+      const Error error = error_of(scene, straight_on(scene), [&](const Ray& ray) {
+        const glm::dvec3 at = ray.origin - ray.origin.z / ray.direction.z * ray.direction - tip;
+        const glm::dvec2 along = to_sides * glm::dvec2(at);
+        return along.x > 0.0 && along.x < 1.0 && along.y > 0.0 && along.y < 1.0;
+      });
+      EXPECT_GT(error.pixels, 50);
+      EXPECT_LT(error.most, wedge.most) << x;
+    }
+  }
 }
 
 /// Strips thinner than a pixel before an outline, which corners between two of them know nothing of.

@@ -60,12 +60,12 @@ void RayWalk::visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch
   }
 }
 
-std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
-                               WalkScratch& scratch) const {
+std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, WalkScratch& scratch,
+                               Coherence coherence) const {
   HPR_CHECK(hits.size() == rays.size());
   scratch.batch.clear();
   for (const RayRequest& ray : rays) push(ray, scratch.batch);
-  const std::uint64_t invalid = opaque_.closest(scratch.batch, hits);
+  const std::uint64_t invalid = opaque_.closest(scratch.batch, hits, coherence);
   surfaces_.prefetch(hits);
   if (holed_ == nullptr) return invalid;
   WorldTriangle triangle;

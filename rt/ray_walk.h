@@ -59,7 +59,8 @@ class RayWalk {
 
   /// hits[i] is the surface ray i meets first; kNoSurface where it leaves the scene. Returns how many rays were
   /// invalid.
-  std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, WalkScratch& scratch) const;
+  std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, WalkScratch& scratch,
+                        Coherence coherence = Coherence::Low) const;
 
   /// passed[i] is the share of light that gets through to the end of ray i: 0 behind anything opaque. Returns how many
   /// rays were invalid.
