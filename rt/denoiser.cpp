@@ -37,7 +37,7 @@ float square(float value) {
   return value * value;
 }
 
-/// What `normal_weight` takes of so narrow a width, in parts of kNormalWidth.
+/// What a borrower takes of so narrow a width, in parts of kNormalWidth.
 float sharpness_of(float width) {
   return 1.0F / square(kNormalWidth * width);
 }
@@ -60,6 +60,11 @@ void Denoiser::start(std::size_t samples) {
   spare_ = static_cast<std::uint32_t>(states_.size());
 }
 
+/// Light that is sampled comes by all lobes together: where it does not stay with its pixel, matte light is not known.
+bool Denoiser::tells_matte(const TileWork& tile) {
+  return keeps_direct(tile.scene) || (tile.lights.listed() == 0 && !tile.lights.has_sampled());
+}
+
 void Denoiser::note(const TileWork& tile, std::span<const PathPoint> points) {
   for (const PathPoint& point : points) {
     State& state = states_[point.pixel];
@@ -73,7 +78,7 @@ void Denoiser::note(const TileWork& tile, std::span<const PathPoint> points) {
     seen.width = std::clamp(static_cast<float>(point.material.roughness) / kSmooth, kLeastWidth, 1.0F);
     seen.matte = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
     seen.mirrored = glm::vec3(0.0F);
-    seen.is_split = seen.width < 1.0F && seen.matte != glm::vec3(0.0F);
+    seen.is_split = seen.width < 1.0F && seen.matte != glm::vec3(0.0F) && tells_matte(tile);
     for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
       seen.mirrored += glm::vec3(point.bsdf.weight(lobe));
       if (point.bsdf.present(lobe) && !tile.follows_for_itself(point.bsdf, lobe)) seen.is_split = false;

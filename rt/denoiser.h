@@ -68,6 +68,7 @@ class Denoiser {
     double share = 0.0;        ///< of the pixel
   };
 
+  [[nodiscard]] static bool tells_matte(const TileWork& tile);
   [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
   void set_apart(const TileWork& tile, const TileJob& job);

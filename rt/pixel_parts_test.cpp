@@ -81,7 +81,7 @@ TEST(PixelParts, SharesOfStraightOutlinesAreMeasured) {
       return glm::dot(at, glm::dvec3(across)) > 0.03;
     });
     EXPECT_GT(error.pixels, 50) << angle;
-    EXPECT_LT(error.rms, 0.015) << angle;  // edges are halved four times: up to 1/32 off at each end
+    EXPECT_LT(error.rms, 0.015) << angle;  // edges are halved five times: up to 1/64 off at each end
     EXPECT_NEAR(error.mean, 0.0, 0.006) << angle;
   }
 }
