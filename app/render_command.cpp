@@ -143,8 +143,13 @@ class RenderCommand final : public Command {
     const std::size_t sent_before = session.comm().bytes_sent();
     FrameSampler sampler(session, plan, sampling, 0, !files_.raw.empty());
     Progress progress(speaks ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
-    const CheckpointSettings checkpoint{
-        checkpoint_, resume_, [&] { return identity_of(session, plan, blocks.views, sampling, !files_.raw.empty()); }};
+    std::optional<RunIdentity> identity;
+    const CheckpointSettings checkpoint{checkpoint_, resume_, [&] {
+                                          if (!identity)
+                                            identity =
+                                                identity_of(session, plan, blocks.views, sampling, !files_.raw.empty());
+                                          return *identity;
+                                        }};
     if (!sampler.draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
     progress.end();
     const CollectedPicture picture(session, sampler.frame(), blocks, size, files_);

@@ -89,7 +89,7 @@ void Denoiser::note(const TileWork& tile, std::span<const PathPoint> points) {
 
 Borrower Denoiser::borrower_of(const View& view, const Sight& sight, std::uint32_t pixel) {
   Borrower borrower;
-  borrower.material = static_cast<std::int32_t>(sight.material);
+  borrower.material = sight.material;
   borrower.place = sight.place;
   borrower.most_apart2 = most_apart2(view, sight.place);
   borrower.most_bent2 = square(kMostBent);
@@ -118,7 +118,7 @@ void Denoiser::set_sights(const TileJob& job) {
     sights_->lends.at(at) = LenderSights::kLendsNothing;
     if (states_[own] != State::Lends) continue;
     const Seen& seen = seen_[own];
-    sights_->lends.at(at) = static_cast<std::int32_t>(seen.sight.material);
+    sights_->lends.at(at) = kind_of_lender(seen.sight.material, seen.is_split);
     sights_->place.set(at, seen.sight.place);
     sights_->normal.set(at, seen.sight.normal);
     sights_->mapped.set(at, seen.mapped);
@@ -280,6 +280,7 @@ Borrower Denoiser::borrower_at(const TileJob& job, std::uint32_t pixel, Lent len
   const Seen& seen = seen_[job.first_pixel + pixel];
   const float width = lent == Lent::Matte ? 1.0F : seen.width;
   Borrower borrower = borrower_of(*job.view, seen.sight, pixel);
+  borrower.is_split = seen.is_split;
   borrower.normal = seen.mapped;
   borrower.sharpness = sharpness_of(narrowed_ * width);
   borrower.others = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "rt/hybrid_test_tools.h"
-#include "rt/test_scene.h"
+#include "rt/denoiser_test_tools.h"
 
 namespace hpr {
 namespace {
@@ -15,54 +14,16 @@ namespace {
 using test::add_material;
 using test::add_mesh;
 using test::corner;
+using test::denoised;
+using test::expect_same_inside;
+using test::kGathered;
+using test::look;
+using test::mean;
+using test::mean_picture;
+using test::painted_floor;
 using test::place;
 using test::quad;
-
-View look(const Scene& scene, Size size = {139, 71}) {
-  return test::view_from({0.5, 2, 7}, {0, 1, 0}, size, scene);
-}
-
-RaySettings denoised(RaySettings settings) {
-  settings.denoise = true;
-  return settings;
-}
-
-/// The mean over its samples of a picture whose keys are found for each.
-Image<Rgb> mean_picture(const Scene& scene, View view, const RaySettings& settings, std::uint32_t samples) {
-  Image<Rgb> sum(view.size());
-  Lighter lighter(scene, settings);
-  for (std::uint32_t i = 0; i < samples; ++i) {
-    view.jitter = Sampler(7, i).two() - 0.5;
-    const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-    TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = i});
-    for (int y = 0; y < sum.height(); ++y) {
-      for (int x = 0; x < sum.width(); ++x) {
-        const Rgb& color = radiance.at(0, x, y);
-        Rgb& to = sum.at(x, y);
-        const auto share = 1.0F / static_cast<float>(samples);
-        to = {to.r + share * color.r, to.g + share * color.g, to.b + share * color.b};
-      }
-    }
-  }
-  return sum;
-}
-
-double squared_error(const Image<Rgb>& image, const Image<Rgb>& truth) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-    sum += std::pow(static_cast<double>(image.pixels()[i].g - truth.pixels()[i].g), 2.0);
-  }
-  return sum / static_cast<double>(image.pixels().size());
-}
-
-double mean(const Image<Rgb>& image) {
-  double sum = 0.0;
-  for (const Rgb& color : image.pixels()) sum += static_cast<double>(color.g);
-  return sum / static_cast<double>(image.pixels().size());
-}
-
-const RaySettings kGathered{.passes = {"gather"}, .max_depth = 4};
+using test::squared_error;
 
 TEST(Denoiser, TakesMostOfTheErrorOfOneSampleAndKeepsTheMean) {
   const Scene scene = corner(test::matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
@@ -72,47 +33,6 @@ TEST(Denoiser, TakesMostOfTheErrorOfOneSampleAndKeepsTheMean) {
   const Image<Rgb> smooth = mean_picture(scene, view, denoised(kGathered), 1);
   EXPECT_LT(squared_error(smooth, truth), 0.2 * squared_error(plain, truth));
   EXPECT_NEAR(mean(smooth) / mean(truth), 1.0, 0.01);
-}
-
-/// Light that a lacquered surface scatters below its lacquer is shared as if it were matte, what it mirrors is not;
-/// where there are lamps, whose light is not shared, that of the sky still is.
-TEST(Denoiser, MatteLightOfSmoothSurfacesIsSharedAsWidely) {
-  Scene scene = corner(test::matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
-  for (Material& material : scene.materials) {
-    material.roughness = 0.0F;
-    material.ior = 1.5F;
-  }
-  for (const bool has_lamp : {false, true}) {
-    if (has_lamp) scene.lights.emplace_back().position = {0.0, 5.0, 4.0};
-    finish_scene(scene);
-    const View view = look(scene, {70, 52});
-    RaySettings settings = kGathered;
-    settings.passes.emplace_back("reflection");
-    const Image<Rgb> truth = mean_picture(scene, view, settings, 96);
-    const Image<Rgb> plain = mean_picture(scene, view, settings, 1);
-    const Image<Rgb> smooth = mean_picture(scene, view, denoised(settings), 1);
-    EXPECT_LT(squared_error(smooth, truth), 0.15 * squared_error(plain, truth)) << has_lamp;
-    EXPECT_NEAR(mean(smooth) / mean(truth), 1.0, 0.01) << has_lamp;
-  }
-}
-
-/// Where rays that gather follow mirrors too, what those show is not taken for matte light.
-TEST(Denoiser, GatheredMirrorImagesAreNotSharedWidely) {
-  Scene scene;
-  Material half = test::mirror(0.5F);
-  half.metallic = 0.5F;
-  add_material(scene, half);
-  add_material(scene, test::matte(glm::vec3(0.0F)));
-  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
-  for (int i = -4; i < 4; ++i) {
-    place(scene, add_mesh(scene, quad({static_cast<float>(i), 0.2F, -4}, {0.5F, 0, 0}, {0, 6, 0}, 1)));
-  }
-  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
-  finish_scene(scene);
-  const View view = test::view_from({0, 4, 6}, {0, 0, -1}, {64, 64}, scene);
-  const Image<Rgb> plain = test::light(scene, view, kGathered).image;
-  const Image<Rgb> smooth = test::light(scene, view, denoised(kGathered)).image;
-  EXPECT_LT(squared_error(smooth, plain), 0.011);  // 0.0145 if they were
 }
 
 TEST(Denoiser, LeavesSamplesPastTheFirstAlone) {
@@ -169,46 +89,11 @@ TEST(Denoiser, ThinThingsKeepTheirLight) {
   EXPECT_NEAR(dark / truth, 1.0, 0.02);
 }
 
-/// A sheet alone under an even sky, which sends back its base colour.
-Scene painted_floor() {
-  Scene scene;
-  add_material(scene, test::matte());
-  Mesh floor = quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0);
-  floor.colors = {
-      {0.2F, 0.9F, 0.5F, 1.0F}, {0.9F, 0.8F, 0.5F, 1.0F}, {0.5F, 0.5F, 0.5F, 1.0F}, {0.7F, 0.3F, 0.5F, 1.0F}};
-  place(scene, add_mesh(scene, floor));
-  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
-  finish_scene(scene);
-  return scene;
-}
-
-void expect_same_inside(const Image<Rgb>& smooth, const Image<Rgb>& plain, float most) {
-  for (int y = 12; y < 54; ++y) {
-    for (int x = 12; x < 78; ++x) {
-      ASSERT_NEAR(smooth.at(x, y).r, plain.at(x, y).r, most) << x << ' ' << y;
-      ASSERT_NEAR(smooth.at(x, y).g, plain.at(x, y).g, most) << x << ' ' << y;
-    }
-  }
-}
-
 TEST(Denoiser, TexturesStay) {
   const Scene scene = painted_floor();
   const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
   const Image<Rgb> plain = test::light(scene, view, kGathered).image;
   expect_same_inside(test::light(scene, view, denoised(kGathered)).image, plain, 1e-5F);
-}
-
-/// Light that is sampled comes by all lobes of a smooth surface together.
-TEST(Denoiser, TexturesOfSmoothSurfacesStayInSampledLight) {
-  Scene scene = painted_floor();
-  scene.environment.reset();  // the headlight shines
-  scene.materials[0].roughness = 0.2F;
-  finish_scene(scene);
-  const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
-  const test::Lit plain = test::light(scene, view, kGathered);
-  const test::Lit smooth = test::light(scene, view, denoised(kGathered));
-  EXPECT_GT(mean(plain.image), 0.05);
-  expect_same_inside(smooth.image, plain.image, 1e-3F);
 }
 
 /// A mirror that shows something black, and beside it in the same plane what is matte and sees the sky about that.

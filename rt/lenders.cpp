@@ -11,34 +11,15 @@
 // After foreach_target.h, as Highway asks.
 #include <hwy/highway.h>
 
+#include "rt/packed_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace hpr {  // NOLINT(modernize-concat-nested-namespaces): HWY_NAMESPACE is a macro
-/// Only operations that every processor rounds alike, in an order that does not depend on the width of vectors.
+/// Sums are taken in an order that does not depend on the width of vectors.
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Floats = hn::CappedTag<float, LenderWeights::kLanes>;
-using Words = hn::RebindToSigned<Floats>;
-using Doubles = hn::CappedTag<double, LenderWeights::kLanes>;
-using Vector = hn::Vec<Floats>;
-using Mask = hn::Mask<Floats>;
-
-struct Vector3 {
-  Vector x, y, z;
-};
-
-HWY_INLINE Vector all(float value) {
-  return hn::Set(Floats(), value);
-}
-
-HWY_INLINE Vector squared(Vector a) {
-  return hn::Mul(a, a);
-}
-
-HWY_INLINE Vector dot(const Vector3& a, const Vector3& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
+using Doubles = hn::CappedTag<double, kPlaces>;
+static_assert(LenderWeights::kPlaces == kPlaces);
 
 HWY_INLINE Vector3 load(const LenderVectors<float>& from, std::size_t i) {
   return {hn::LoadU(Floats(), &from.x[i]), hn::LoadU(Floats(), &from.y[i]), hn::LoadU(Floats(), &from.z[i])};
@@ -79,34 +60,37 @@ void weigh(const LenderSights& sights, const Borrower& borrower, LenderWeights& 
   const int y0 = inside(borrower.pixel.y + shift.y);
   const float reach = static_cast<float>(borrower.radius) + 1.0F;
   const Vector inverse_reach2 = all(1.0F / (reach * reach));
+  const auto borrower_kind =
+      hn::Set(Words(), kind_of_lender(borrower.material, !borrower.is_pixel || borrower.is_split));
   const LenderVectors<float>& normals = borrower.is_pixel ? sights.mapped : sights.normal;
   weights.first = LenderPlanes::index(x0, y0);
   weights.rows = static_cast<std::size_t>(side);
-  std::array<float, LenderWeights::kLanes> sums{};
+  std::array<float, kPlaces> sums{};
   for (std::size_t row = 0; row < weights.rows; ++row) {
     const int columns_off = x0 - borrower.pixel.x;
     const int rows_off = y0 + static_cast<int>(row) - borrower.pixel.y;
     const Vector down = all(static_cast<float>(rows_off) - borrower.way.y);
-    for (std::size_t lane = 0; lane < LenderWeights::kLanes; lane += hn::Lanes(floats)) {
+    for (std::size_t lane = 0; lane < weights.rows; lane += hn::Lanes(floats)) {
       const std::size_t i = weights.first + row * LenderPlanes::kStride + lane;
       const Vector column = hn::Iota(floats, static_cast<float>(columns_off + static_cast<int>(lane)));
       const Vector right = hn::Sub(column, all(borrower.way.x));
-      const Vector off2 = hn::Add(squared(right), squared(down));
+      const Vector off2 = hn::Add(square(right), square(down));
       const Vector spatial = hn::Sub(all(1.0F), hn::Mul(off2, inverse_reach2));
       const Vector3 way = less(load(sights.place, i), borrower.place);
-      const Vector way2 = dot(way, way);
+      const Vector way2 = length2(way);
       const Vector bent = dot(way, load(sights.normal, i));
       const Vector3 turned = less(load(normals, i), borrower.normal);
       Vector sharpness = all(borrower.sharpness);
       if (!borrower.is_pixel) sharpness = hn::Mul(sharpness, hn::LoadU(floats, &sights.sharpness[i]));
-      const Vector alike = hn::Sub(all(1.0F), hn::Mul(dot(turned, turned), sharpness));
-      const auto material = hn::LoadU(Words(), &sights.lends[i]);
-      Mask lends = hn::RebindMask(floats, hn::Eq(material, hn::Set(Words(), borrower.material)));
+      const Vector alike = hn::Sub(all(1.0F), hn::Mul(length2(turned), sharpness));
+      auto lender = hn::LoadU(Words(), &sights.lends[i]);
+      if (!borrower.is_pixel) lender = hn::Or(lender, hn::Set(Words(), 1));
+      Mask lends = hn::RebindMask(floats, hn::Eq(lender, borrower_kind));
       lends = hn::And(lends, hn::Lt(column, all(static_cast<float>(columns_off + side))));
       lends = hn::And(lends, hn::And(hn::Gt(spatial, hn::Zero(floats)), hn::Gt(alike, hn::Zero(floats))));
       lends = hn::And(lends, hn::And(hn::Le(way2, all(borrower.most_apart2)),
-                                     hn::Le(squared(bent), hn::Mul(all(borrower.most_bent2), way2))));
-      Vector weight = hn::Mul(hn::Mul(all(borrower.others), spatial), squared(alike));
+                                     hn::Le(square(bent), hn::Mul(all(borrower.most_bent2), way2))));
+      Vector weight = hn::Mul(hn::Mul(all(borrower.others), spatial), square(alike));
       Vector red = all(1.0F);
       Vector green = red;
       Vector blue = red;
@@ -118,7 +102,7 @@ void weigh(const LenderSights& sights, const Borrower& borrower, LenderWeights& 
         if (rows_off == 0) weight = hn::IfThenElse(hn::Eq(column, hn::Zero(floats)), all(1.0F), weight);
       }
       weight = hn::IfThenElseZero(lends, weight);
-      const std::size_t at = row * LenderWeights::kLanes + lane;
+      const std::size_t at = row * kPlaces + lane;
       hn::StoreU(hn::IfThenElseZero(lends, hn::Mul(weight, red)), floats, &weights.red[at]);
       hn::StoreU(hn::IfThenElseZero(lends, hn::Mul(weight, green)), floats, &weights.green[at]);
       hn::StoreU(hn::IfThenElseZero(lends, hn::Mul(weight, blue)), floats, &weights.blue[at]);
@@ -132,11 +116,11 @@ void weigh(const LenderSights& sights, const Borrower& borrower, LenderWeights& 
 HWY_INLINE double sum_of(const LenderWeights& weights, const LenderWeights::Rows& of, const double* light) {
   const Doubles doubles;
   const hn::Rebind<float, Doubles> floats;
-  std::array<double, LenderWeights::kLanes> sums{};
-  for (std::size_t lane = 0; lane < LenderWeights::kLanes; lane += hn::Lanes(doubles)) {
+  std::array<double, kPlaces> sums{};
+  for (std::size_t lane = 0; lane < weights.rows; lane += hn::Lanes(doubles)) {
     auto sum = hn::Zero(doubles);
     for (std::size_t row = 0; row < weights.rows; ++row) {
-      const auto weight = hn::PromoteTo(doubles, hn::LoadU(floats, &of[row * LenderWeights::kLanes + lane]));
+      const auto weight = hn::PromoteTo(doubles, hn::LoadU(floats, &of[row * kPlaces + lane]));
       const auto lent = hn::LoadU(doubles, light + weights.first + row * LenderPlanes::kStride + lane);
       sum = hn::Add(sum, hn::Mul(weight, lent));
     }

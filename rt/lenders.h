@@ -15,7 +15,7 @@ struct LenderPlanes {
   static constexpr int kMostRadius = 3;                ///< of windows
   static constexpr int kMargin = 2 * kMostRadius + 1;  ///< has room for a window that holds none of the tile's pixels
   static constexpr int kStride = kTileSide + 2 * kMargin;
-  /// Rows are read eight pixels at a time.
+  /// Rows are read as many pixels at a time as vectors are wide.
   static constexpr std::size_t kSize = std::size_t{kStride} * (kStride + 1);
 
   [[nodiscard]] static std::size_t index(int x, int y) {
@@ -36,11 +36,16 @@ struct LenderVectors {
   [[nodiscard]] glm::vec<3, T> at(std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
+/// What lenders and borrowers have in common: the material, and whether what it mirrors is shared apart from the rest.
+[[nodiscard]] inline std::int32_t kind_of_lender(std::uint32_t material, bool is_split) {
+  return static_cast<std::int32_t>(2 * material + (is_split ? 1 : 0));
+}
+
 /// What each pixel of a tile sees in one sample, as far as it tells whether light may be lent. Set for those that lend.
 struct LenderSights {
   LenderSights() { lends.fill(kLendsNothing); }
 
-  std::array<std::int32_t, LenderPlanes::kSize> lends;  ///< the material of what lends light; else kLendsNothing
+  std::array<std::int32_t, LenderPlanes::kSize> lends;  ///< the kind of what lends light; else kLendsNothing
   LenderVectors<float> place;                           ///< from the eye, metres
   LenderVectors<float> normal;                          ///< interpolated
   LenderVectors<float> mapped;                          ///< the normal shaded with
@@ -48,7 +53,7 @@ struct LenderSights {
   LenderVectors<float> matte;     ///< and that it scatters otherwise
   std::array<float, LenderPlanes::kSize> sharpness;  ///< see Borrower
 
-  static constexpr std::int32_t kLendsNothing = -1;
+  static constexpr std::int32_t kLendsNothing = -2;
 };
 
 /// What is lent of a place's light.
@@ -60,7 +65,8 @@ enum class Lent : std::uint8_t {
 
 /// A place that light is lent to by pixels about.
 struct Borrower {
-  std::int32_t material = 0;
+  std::uint32_t material = 0;
+  bool is_split = false;  ///< lenders are so too; all the same to looks
   glm::vec3 place{0.0F};  ///< from the eye, metres
   glm::vec3 normal{0.0F};
   float most_apart2 = 0.0F;  ///< lenders lie nearer than its root
@@ -78,14 +84,14 @@ struct Borrower {
   bool is_pixel = true;        ///< what the pixel itself sees; else a look, to which lenders give as they are
 };
 
-/// What each pixel of a window gives: rows of eight of which the first ones are in use.
+/// What each pixel of a window gives: rows of which the first places are in use.
 struct LenderWeights {
-  static constexpr std::size_t kLanes = 8;
+  static constexpr std::size_t kPlaces = 16;
   static constexpr std::size_t kMostRows = 2 * LenderPlanes::kMostRadius + 1;
-  using Rows = std::array<float, kMostRows * kLanes>;
+  using Rows = std::array<float, kMostRows * kPlaces>;
 
-  std::size_t first = 0;  ///< the window's first pixel, an index of planes
-  std::size_t rows = 0;
+  std::size_t first = 0;              ///< the window's first pixel, an index of planes
+  std::size_t rows = 0;               ///< and as many columns
   alignas(32) Rows red, green, blue;  ///< set as far as there are rows
   float sum = 0.0F;                   ///< of weights before what the two scatter is made up for
 };

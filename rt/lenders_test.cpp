@@ -33,7 +33,7 @@ void set_pixel(Planes& planes, std::mt19937& random, int x, int y) {
   const glm::vec3 nothing(std::numeric_limits<float>::quiet_NaN());
   const glm::vec3 place(0.01F * static_cast<float>(x), 0.01F * static_cast<float>(y), -1.0F);
   const glm::vec3 normal = glm::normalize(about(random, {0, 0, 1}, 0.3F));
-  sights.lends[i] = lends ? static_cast<std::int32_t>(random() % 2) : LenderSights::kLendsNothing;
+  sights.lends[i] = lends ? kind_of_lender(random() % 2, random() % 4 == 0) : LenderSights::kLendsNothing;
   sights.place.set(i, lends ? about(random, place, 0.002F) : nothing);
   sights.normal.set(i, lends ? normal : nothing);
   sights.mapped.set(i, lends ? about(random, normal, 0.1F) : nothing);
@@ -66,7 +66,10 @@ glm::vec3 weight_of(const LenderSights& sights, Lent lent, std::size_t i) {
 std::pair<float, glm::vec3> given(const LenderSights& sights, const Borrower& borrower, const glm::ivec2& pixel) {
   constexpr std::pair<float, glm::vec3> kNothing{0.0F, glm::vec3(0.0F)};
   const std::size_t i = LenderPlanes::index(pixel.x, pixel.y);
-  if (sights.lends[i] != borrower.material) return kNothing;
+  const bool is_alike =
+      sights.lends[i] == kind_of_lender(borrower.material, borrower.is_split) ||
+      (!borrower.is_pixel && sights.lends[i] == kind_of_lender(borrower.material, !borrower.is_split));
+  if (!is_alike) return kNothing;
   const glm::vec2 off = glm::vec2(pixel - borrower.pixel) - borrower.way;
   const float reach = static_cast<float>(borrower.radius) + 1.0F;
   const float spatial = 1.0F - glm::dot(off, off) / (reach * reach);
@@ -124,7 +127,8 @@ TEST(Lenders, LendToPixelsAsEachOfThemWould) {
         for (const int x : {0, 1, 2, 3, 20, 31, 60, 61, 62, 63}) {
           const std::size_t own = LenderPlanes::index(x, y);
           if (planes.sights->lends[own] == LenderSights::kLendsNothing) continue;
-          compare(planes, {.material = planes.sights->lends[own],
+          compare(planes, {.material = static_cast<std::uint32_t>(planes.sights->lends[own] / 2),
+                           .is_split = planes.sights->lends[own] % 2 != 0,
                            .place = planes.sights->place.at(own),
                            .normal = planes.sights->mapped.at(own),
                            .most_apart2 = 0.0005F,
@@ -153,7 +157,7 @@ TEST(Lenders, LendToLooksByTheirOwnWidth) {
     const glm::ivec2 pixel(random() % kTileSide, random() % kTileSide);
     const glm::vec2 way(off(random), off(random));
     const glm::vec2 at = 0.01F * (glm::vec2(pixel) + way);
-    compare(planes, {.material = static_cast<std::int32_t>(random() % 2),
+    compare(planes, {.material = static_cast<std::uint32_t>(random() % 2),
                      .place = {at, -1.0F},
                      .normal = about(random, {0, 0, 1}, 0.1F),
                      .most_apart2 = std::numeric_limits<float>::infinity(),

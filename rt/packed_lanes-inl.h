@@ -42,6 +42,10 @@ HWY_INLINE Vector dot(const Vector3& a, const glm::vec3& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, all(b.x)), hn::Mul(a.y, all(b.y))), hn::Mul(a.z, all(b.z)));
 }
 
+HWY_INLINE Vector dot(const Vector3& a, const Vector3& b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+
 HWY_INLINE Vector length2(const Vector3& a) {
   return hn::Add(hn::Add(square(a.x), square(a.y)), square(a.z));
 }

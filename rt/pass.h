@@ -109,18 +109,21 @@ struct TileWork {
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
-    if (component == Component::Photon || component == Component::AmbientOcclusion) {
-      return add_matte(pixel, component, light);
-    }
-    radiance[pixel] += light;
-    if (wants_components) components[static_cast<std::size_t>(component)][pixel] += light;
+    add(pixel, component, light, component == Component::Photon || component == Component::AmbientOcclusion);
   }
-  void add_matte(std::uint32_t pixel, Component component, const glm::dvec3& light) {
+  void add(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
     radiance[pixel] += light;
-    if (wants_matte) matte[pixel] += light;
-    if (!wants_components) return;
+    if (is_matte && wants_matte) matte[pixel] += light;
+    if (wants_components) add_part(pixel, component, light, is_matte);
+  }
+  /// Adds matte light that something hides, to components that are wanted: as direct light and its shadow.
+  void add_hidden(std::uint32_t pixel, const glm::dvec3& light) {
+    add_part(pixel, Component::Direct, light, true);
+    add_part(pixel, Component::Shadow, -light, true);
+  }
+  void add_part(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
     components[static_cast<std::size_t>(component)][pixel] += light;
-    if (wants_matte) matte_components[static_cast<std::size_t>(component)][pixel] += light;
+    if (is_matte && wants_matte) matte_components[static_cast<std::size_t>(component)][pixel] += light;
   }
   void charge_ray(std::uint32_t pixel) {
     if (wants_cost) cost[pixel] += 1.0F;

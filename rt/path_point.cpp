@@ -87,12 +87,8 @@ void add_sky(TileWork& tile, std::size_t i, const Follows& what) {
   if (!leaves && !(shows_sky && tile.wants_components)) return;
   const glm::dvec3 sky = sky_along(tile, ray, tile.requests[i].direction, what);
   if (!shows_sky) return tile.add(from.pixel, component_after(from, what.component), sky);
-  if (leaves) return tile.add_matte(from.pixel, Component::Direct, sky);
-  for (auto* parts : {&tile.components, &tile.matte_components}) {
-    if (parts == &tile.matte_components && !tile.wants_matte) continue;
-    (*parts)[static_cast<std::size_t>(Component::Direct)][from.pixel] += sky;
-    (*parts)[static_cast<std::size_t>(Component::Shadow)][from.pixel] -= sky;
-  }
+  if (leaves) return tile.add(from.pixel, Component::Direct, sky, true);
+  tile.add_hidden(from.pixel, sky);
 }
 
 /// Sets the point that ray i reaches, but for what finish_point does.
