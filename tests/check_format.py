@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every source stands as clang-format writes it, and no file is longer than the limit of 400 lines.
+"""Every source stands as clang-format writes it, and no file is longer than the limit of 700 lines.
 
 usage: check_format.py ROOT
 
@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 FOLDERS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "app", "tests", "bench", "docs"]
-LONGEST = 400
+LONGEST = 700
 
 
 def main(root):

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
+#include "walls/example_walls.h"
 #include "walls/wall_file.h"
 
 namespace hpr {
@@ -19,7 +18,7 @@ TEST(AdjacentScreens, AreThoseOfAGridUpToItsEdges) {
 }
 
 TEST(AdjacentScreens, GoOnAroundCorners) {
-  const Wall cave = load_wall(std::filesystem::path(HPR_WALL_EXAMPLES) / "cave-4.toml");
+  const Wall cave = load_wall(test::example_wall("cave-4.toml"));
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < cave.screens.size(); ++i) {
     const Found found = adjacent_screens(cave, i);

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <glm/geometric.hpp>
 #include <random>
 
+#include "walls/example_walls.h"
 #include "walls/wall_file.h"
 
 namespace hpr {
@@ -44,10 +44,6 @@ WallScreen screen_at(const glm::dvec3& ll, const glm::dvec3& lr, const glm::dvec
   screen.lower_right = lr;
   screen.upper_left = ul;
   return screen;
-}
-
-std::string example(const char* name) {
-  return std::filesystem::path(HPR_WALL_EXAMPLES) / name;
 }
 
 /// Where a ray meets the screen's plane, wall space (the camera is straight(), the eye is the viewer).
@@ -99,7 +95,7 @@ TEST(WallGeometry, RaysThroughPixelCornersHitTheScreensCorners) {
 }
 
 TEST(WallGeometry, TheCavesScreensMeetAtTheirEdges) {
-  const Wall wall = load_wall(example("cave-4.toml"));
+  const Wall wall = load_wall(test::example_wall("cave-4.toml"));
   const std::vector<View> views = wall_views(wall, straight(), kBounds);
   ASSERT_EQ(views.size(), 4U);
   const View& left = views[0];
@@ -134,7 +130,7 @@ glm::dvec2 project(const View& view, const glm::dvec3& world) {
 
 TEST(WallGeometry, ALineStaysStraightAcrossGapsOfFractionalPixels) {
   for (const char* const name : {"desktop-3x2.toml", "wall-6x3-4k.toml"}) {
-    const Wall wall = load_wall(example(name));
+    const Wall wall = load_wall(test::example_wall(name));
     const Camera camera = perspective(0.8);
     const std::vector<View> views = wall_views(wall, camera, kBounds);
     const WallExtent extent = wall_extent(wall);
@@ -260,7 +256,7 @@ TEST(WallGeometry, NearPlaneIsTheWallsElseTheCameras) {
 }
 
 TEST(WallPictureTest, AFlatWallStandsAtItsPixelsWithRoundedGaps) {
-  const Wall wall = load_wall(example("desktop-3x2.toml"));
+  const Wall wall = load_wall(test::example_wall("desktop-3x2.toml"));
   const WallPicture picture = wall_picture(wall, 16384);
   EXPECT_EQ(picture.size, (Size{1945, 733}));
   EXPECT_EQ(picture.screens[0], (Rect{0, 0, 640, 360}));
@@ -271,7 +267,7 @@ TEST(WallPictureTest, AFlatWallStandsAtItsPixelsWithRoundedGaps) {
 
 TEST(WallPictureTest, ALargeWallIsScaledDownAndNeverOverlaps) {
   for (const char* const name : {"wall-6x3-4k.toml", "cave-4.toml", "desktop-3x2.toml"}) {
-    const Wall wall = load_wall(example(name));
+    const Wall wall = load_wall(test::example_wall(name));
     for (const int side : {1, 10, 777, 4096, 100000}) {
       const WallPicture picture = wall_picture(wall, side);
       if (side >= 10) {
@@ -291,7 +287,7 @@ TEST(WallPictureTest, ALargeWallIsScaledDownAndNeverOverlaps) {
 }
 
 TEST(WallPictureTest, ACaveIsUnfoldedLeftFrontRightWithTheFloorBelow) {
-  const WallPicture picture = wall_picture(load_wall(example("cave-4.toml")), 2000);
+  const WallPicture picture = wall_picture(load_wall(test::example_wall("cave-4.toml")), 2000);
   const Rect left = picture.screens[0];
   const Rect front = picture.screens[1];
   const Rect right = picture.screens[2];
@@ -304,17 +300,17 @@ TEST(WallPictureTest, ACaveIsUnfoldedLeftFrontRightWithTheFloorBelow) {
 }
 
 TEST(WallSeamsTest, CountsWhatWholePixelsWouldLose) {
-  const WallSeams desktop = wall_seams(load_wall(example("desktop-3x2.toml")));
+  const WallSeams desktop = wall_seams(load_wall(test::example_wall("desktop-3x2.toml")));
   EXPECT_EQ(desktop.count, 2 * 2 + 3);
   EXPECT_NEAR(desktop.narrowest_m, 0.010, 1e-12);
   EXPECT_NEAR(desktop.widest_m, 0.010, 1e-12);
   EXPECT_NEAR(desktop.largest_error_px, 0.5, 1e-9);
-  const WallSeams large = wall_seams(load_wall(example("wall-6x3-4k.toml")));
+  const WallSeams large = wall_seams(load_wall(test::example_wall("wall-6x3-4k.toml")));
   EXPECT_EQ(large.count, 3 * 5 + 6 * 2);
   EXPECT_NEAR(large.largest_error_px, 0.2857, 1e-4);
   EXPECT_NEAR(large.accumulated_error_px, 1.4286, 1e-4);
   EXPECT_NEAR(wall_seams(load_wall("3x2")).largest_error_px, 0.0, 1e-9);
-  EXPECT_EQ(wall_seams(load_wall(example("cave-4.toml"))).count, 0);
+  EXPECT_EQ(wall_seams(load_wall(test::example_wall("cave-4.toml"))).count, 0);
   // Passive stereo has each screen twice, in one place.
   Wall passive = load_wall("3x2");
   const int seams = wall_seams(passive).count;
@@ -330,7 +326,7 @@ TEST(WallSeamsTest, CountsWhatWholePixelsWouldLose) {
 
 TEST(WallPlanes, GroupScreensByPlaneFromLeftToRight) {
   EXPECT_EQ(wall_planes(load_wall("3x2")), (std::vector<std::vector<std::size_t>>{{0, 1, 2, 3, 4, 5}}));
-  const auto cave = wall_planes(load_wall(example("cave-4.toml")));
+  const auto cave = wall_planes(load_wall(test::example_wall("cave-4.toml")));
   ASSERT_EQ(cave.size(), 4U);
   EXPECT_EQ(std::ranges::count(cave, std::vector<std::size_t>{3}), 1);
 }

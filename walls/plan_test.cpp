@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <glm/geometric.hpp>
 
 #include "core/error.h"
 #include "walls/canvas.h"
+#include "walls/example_walls.h"
 #include "walls/geometry.h"
 #include "walls/pattern.h"
 #include "walls/wall_file.h"
@@ -16,12 +16,8 @@
 namespace hpr {
 namespace {
 
-std::string example(const char* name) {
-  return std::filesystem::path(HPR_WALL_EXAMPLES) / name;
-}
-
 TEST(WallPlan, NamesEveryScreenWithItsSizesAndOwner) {
-  const Wall wall = load_wall(example("desktop-3x2.toml"));
+  const Wall wall = load_wall(test::example_wall("desktop-3x2.toml"));
   const std::string svg = wall_plan_svg(wall);
   for (const WallScreen& screen : wall.screens) {
     EXPECT_NE(svg.find(">" + screen.id + "</text>"), std::string::npos);
@@ -43,7 +39,7 @@ TEST(WallPlan, EscapesWhatXmlWouldTakeForMarkup) {
 }
 
 TEST(WallPlan, ThePictureShowsEachOwnerInAColourOfItsOwn) {
-  const Wall wall = load_wall(example("desktop-3x2.toml"));
+  const Wall wall = load_wall(test::example_wall("desktop-3x2.toml"));
   const Image<Rgba8> image = wall_plan_image(wall);
   const auto has = [&](Rgba8 color) { return std::ranges::count(image.pixels(), color) > 10000; };
   EXPECT_TRUE(has({176, 206, 240, 255}));
@@ -55,7 +51,7 @@ TEST(WallPlan, WallsOfOneAndOfManyScreensCanBeDrawn) {
   EXPECT_GT(wall_plan_svg(load_wall("1x1@1x1")).size(), 100U);
   EXPECT_GT(wall_plan_svg(load_wall("64x64")).size(), 64U * 64U * 50U);
   EXPECT_GT(wall_plan_svg(load_wall("1x200")).size(), 100U);
-  EXPECT_GT(wall_plan_image(load_wall(example("cave-4.toml"))).size().area(), 0U);
+  EXPECT_GT(wall_plan_image(load_wall(test::example_wall("cave-4.toml"))).size().area(), 0U);
 }
 
 /// The yellow pixels of a screen's pattern, as points of the wall in metres about its centre.
@@ -75,7 +71,7 @@ std::vector<glm::dvec2> circle_points(const Wall& wall, std::size_t index) {
 }
 
 TEST(WallPattern, TheCircleIsOneCircleAcrossAllScreens) {
-  const Wall wall = load_wall(example("desktop-3x2.toml"));
+  const Wall wall = load_wall(test::example_wall("desktop-3x2.toml"));
   const WallExtent extent = wall_extent(wall);
   const double radius = 0.94 * 0.5 * extent.height;
   std::size_t screens_with_circle = 0;
@@ -103,7 +99,7 @@ TEST(WallPattern, TheOutermostPixelsAreWhite) {
 
 TEST(WallPattern, RulersCountMillimetresFromTheLeftAndTheTop) {
   // 640 pixels are 512 mm: a tick every 5 mm, a long one every 50.
-  const Image<Rgba8> image = wall_pattern(load_wall(example("desktop-3x2.toml")), 0);
+  const Image<Rgba8> image = wall_pattern(load_wall(test::example_wall("desktop-3x2.toml")), 0);
   constexpr Rgba8 kWhite{255, 255, 255, 255};
   for (int i = 8; i < 90; ++i) {
     const int at = static_cast<int>(std::lround(i * 5.0 * 640.0 / 512.0));
@@ -115,7 +111,7 @@ TEST(WallPattern, RulersCountMillimetresFromTheLeftAndTheTop) {
 }
 
 TEST(WallPattern, ArrowsPointToTheNeighboursThereAre) {
-  const Wall wall = load_wall(example("desktop-3x2.toml"));
+  const Wall wall = load_wall(test::example_wall("desktop-3x2.toml"));
   const auto arrows = [&](std::size_t screen, const Rect& part) {
     const Image<Rgba8> image = wall_pattern(wall, screen);
     std::size_t count = 0;

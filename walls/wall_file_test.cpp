@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/file.h"
+#include "walls/example_walls.h"
 
 namespace hpr {
 namespace {
@@ -326,10 +327,9 @@ TEST(WallFile, AShorthandIsAGridWithoutViewer) {
 }
 
 TEST(WallFile, AnExpandedWallIsTheSameWall) {
-  const std::string examples = std::filesystem::path(HPR_WALL_EXAMPLES);
-  for (const std::string& spec :
-       {examples + "/desktop-3x2.toml", examples + "/wall-6x3-4k.toml", examples + "/cave-4.toml",
-        examples + "/cave-4-stereo.toml", std::string("6x3@3840x2160"), std::string("7x3@333x217")}) {
+  for (const std::string& spec : {test::example_wall("desktop-3x2.toml"), test::example_wall("wall-6x3-4k.toml"),
+                                  test::example_wall("cave-4.toml"), test::example_wall("cave-4-stereo.toml"),
+                                  std::string("6x3@3840x2160"), std::string("7x3@333x217")}) {
     const Wall wall = load_wall(spec);
     const WallReading again = parse_wall(expand_wall(wall), "expanded");
     ASSERT_TRUE(again.findings.empty()) << spec << ": " << again.findings.front().what;
@@ -338,7 +338,7 @@ TEST(WallFile, AnExpandedWallIsTheSameWall) {
 }
 
 TEST(WallFile, AnExpandedWarpedWallIsTheSameWall) {
-  const std::string path = std::string(HPR_WALL_EXAMPLES) + "/half-cylinder.toml";
+  const std::string path = test::example_wall("half-cylinder.toml");
   const Wall wall = load_wall(path);
   ASSERT_TRUE(wall.screens.front().warp.points && wall.screens.front().warp.light);
   const WallReading again = parse_wall(expand_wall(wall), path);
@@ -369,8 +369,7 @@ TEST(WallFile, AScreenThatCannotBeReadDoesNotMakeItsWindowIdle) {
 }
 
 TEST(WallFile, AScaledWallKeepsItsMetres) {
-  const std::string examples = std::filesystem::path(HPR_WALL_EXAMPLES);
-  const Wall wall = scale_wall(load_wall(examples + "/wall-6x3-4k.toml"), 0.0625);
+  const Wall wall = scale_wall(load_wall(test::example_wall("wall-6x3-4k.toml")), 0.0625);
   EXPECT_EQ(wall.screens[17].pixels, (Size{240, 135}));
   EXPECT_EQ(wall.screens[17].viewport, (Rect{0, 0, 240, 135}));
   EXPECT_EQ(wall.windows[1].rect, (Rect{240, 0, 480, 135}));
