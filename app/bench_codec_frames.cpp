@@ -25,7 +25,7 @@ CodecFrames draw_codec_frames(const std::string& scene, Size size, int count, co
   frames.scene = scene;
   const RenderOptions options;
   run_local_ranks(1, [&](Communicator& comm) {
-    Session session(comm, globals, [&] { return options.load(scene, globals); });
+    Session session(comm, globals.session(), [&] { return options.load(scene, globals); });
     const Camera camera = options.choose_camera(session.scene());
     const auto seen = [&](int steps) { return make_view(turned(camera, steps), size, session.scene().bounds); };
     const View first = seen(0);

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "app/bench_codec.h"
-#include "app/command.h"
+#include "app/globals.h"
 
 namespace hpr {
 

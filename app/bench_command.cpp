@@ -1,5 +1,3 @@
-#include "app/bench_command.h"
-
 #include <fmt/format.h>
 #include <hpr/version.h>
 
@@ -16,9 +14,11 @@
 #include "app/bench_rays.h"
 #include "app/bench_scale_command.h"
 #include "app/bench_scene.h"
-#include "app/launcher.h"
+#include "app/command.h"
 #include "app/machine.h"
 #include "app/output.h"
+#include "app/run_ranks.h"
+#include "core/job_environment.h"
 #include "core/parallel.h"
 #include "core/units.h"
 #include "raster/gl_context.h"
@@ -105,7 +105,7 @@ class BenchCommand final : public Command {
       throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", codec_size_), "write e.g. 1280x720");
     }
     const Size size{extent->first, extent->second};
-    check_size(size, globals);
+    check_size(size, globals.picture_limits());
     std::vector<BenchRow> rows;
     for (const std::string& scene : codec_scenes_) {
       const std::vector<BenchRow> more = bench_codec(draw_codec_frames(scene, size, codec_frames_, globals));

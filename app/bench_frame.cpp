@@ -208,7 +208,7 @@ void FrameBench::declare(CLI::App& app) {
 
 std::vector<BenchRow> FrameBench::run(const Globals& globals) const {
   const Size size = parse_size(size_, "--size", kRasterLimit);
-  check_size(size, globals);
+  check_size(size, globals.picture_limits());
   (void)options_.settings(globals.seed);
   if (!options_.sampling().goal.samples) {
     throw Error(ExitCode::Usage, "bench frame draws the same frame again and again: --spp takes a number here",
@@ -219,7 +219,7 @@ std::vector<BenchRow> FrameBench::run(const Globals& globals) const {
   }
   std::vector<BenchRow> rows;
   run_local_ranks(1, [&](Communicator& comm) {
-    Session session(comm, globals, [&] { return options_.load(scene_, globals); });
+    Session session(comm, globals.session(), [&] { return options_.load(scene_, globals); });
     Bench bench(session, globals, options_, size);
     bench.draw(frames_);
     const bool draws = !bench.by_rays() && session.scene().triangles <= kMostBareTriangles;

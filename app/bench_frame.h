@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "app/bench_raster.h"
-#include "app/command.h"
+#include "app/globals.h"
 #include "app/render_options.h"
 
 namespace CLI {

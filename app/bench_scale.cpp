@@ -128,7 +128,7 @@ ScaleRun run_from(const Json& json) {
 
 std::vector<ScaleRun> measure_scale(Communicator& comm, const Globals& globals, const ScaleInput& input, int frames) {
   HPR_CHECK(frames > 0);
-  Session session(comm, globals, [&] { return input.options.load(input.scene, globals); });
+  Session session(comm, globals.session(), [&] { return input.options.load(input.scene, globals); });
   const std::vector<std::string> hosts = all_gather_texts(comm, session.host());
   std::vector<ScaleRun> runs;
   for (const Size grid : input.grids) {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/command.h"
+#include "app/globals.h"
 #include "app/render_options.h"
 #include "image/image.h"
 

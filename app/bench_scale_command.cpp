@@ -15,11 +15,14 @@
 #include "app/bench_scale_html.h"
 #include "app/launcher.h"
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/progress.h"
+#include "app/run_ranks.h"
 #include "app/shell_line.h"
 #include "app/words.h"
-#include "cluster/scene_distribution.h"
+#include "cluster/agreement.h"
 #include "core/file.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "scene/view.h"
@@ -120,11 +123,11 @@ std::vector<ScaleBench::Job> ScaleBench::jobs(const Globals& globals) const {
 
 ScaleInput ScaleBench::make_input(const Globals& globals) const {
   ScaleInput input{scene_, options_, parse_size(size_, "--size", kRasterLimit), {}, warmup_};
-  check_size(input.size, globals);
+  check_size(input.size, globals.picture_limits());
   for (const std::string& tiles : split_commas(tiles_)) {
     const Size grid = parse_size(tiles, "--tiles", kMostScreensASide);
     (void)wall_from_shorthand(wall_of(grid, input.size));  // refuses too many screens
-    check_size({grid.width * input.size.width, grid.height * input.size.height}, globals);
+    check_size({grid.width * input.size.width, grid.height * input.size.height}, globals.picture_limits());
     if (std::ranges::find(input.grids, grid) == input.grids.end()) input.grids.push_back(grid);
   }
   (void)options_.settings(globals.seed);

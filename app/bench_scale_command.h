@@ -5,7 +5,7 @@
 
 #include "app/bench_scale.h"
 #include "app/bench_scale_report.h"
-#include "app/command.h"
+#include "app/globals.h"
 
 namespace CLI {
 class App;

@@ -1,5 +1,3 @@
-#include "app/compare_command.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <unistd.h>
@@ -10,19 +8,24 @@
 #include <cstdlib>
 #include <limits>
 
+#include "app/command.h"
+#include "app/compare.h"
 #include "app/compare_html.h"
 #include "app/compare_options.h"
 #include "app/compare_report.h"
+#include "app/compare_scene.h"
 #include "app/compare_threads.h"
 #include "app/launcher.h"
 #include "app/output.h"
+#include "app/run_ranks.h"
 #include "app/shell_line.h"
 #include "app/trace_file.h"
 #include "app/words.h"
-#include "cluster/scene_distribution.h"
+#include "cluster/agreement.h"
 #include "compositing/plugin.h"
 #include "compositing/synthetic.h"
 #include "core/file.h"
+#include "core/job_environment.h"
 #include "core/units.h"
 #include "image/image_io.h"
 #include "scene/view.h"
@@ -40,15 +43,13 @@ bool hands_over() {
 
 class CompareCommand final : public Command {
  public:
-  explicit CompareCommand(SceneInput scene_input) : scene_input_(std::move(scene_input)) {}
-
   [[nodiscard]] bool collective() const override { return true; }
   [[nodiscard]] std::string_view name() const override { return "compare"; }
   [[nodiscard]] std::string_view summary() const override {
     return "measure compositing strategies against each other on the same layers, and check that they agree";
   }
 
-  void declare(CLI::App& app) override { options_.declare(app, scene_input_ != nullptr); }
+  void declare(CLI::App& app) override { options_.declare(app); }
 
   ExitCode run(const Globals& globals) override {
     if (!options_.plugin.empty()) load_compositor_plugin(options_.plugin);
@@ -63,15 +64,14 @@ class CompareCommand final : public Command {
   [[nodiscard]] CompareInput make_input(const Globals& globals) const {
     const Size screen = parse_size(options_.size, "--size", kRasterLimit);
     const Size grid = parse_size(options_.tiles, "--tiles", kMostScreensASide);
-    check_size(screen, globals);
-    check_size({screen.width * grid.width, screen.height * grid.height}, globals);
+    check_size(screen, globals.picture_limits());
+    check_size({screen.width * grid.width, screen.height * grid.height}, globals.picture_limits());
     if (options_.scene.empty() == options_.synthetic.empty()) {
       throw Error(ExitCode::Usage,
                   options_.scene.empty() ? "nothing to composite" : "a scene and --synthetic exclude each other",
-                  scene_input_ ? "name a scene, or --synthetic dense|half|sparse|scatter|checker"
-                               : "add --synthetic dense|half|sparse|scatter|checker");
+                  "name a scene, or --synthetic dense|half|sparse|scatter|checker");
     }
-    if (!options_.scene.empty()) return scene_input_(options_.scene, screen, grid, options_.local_shading(), globals);
+    if (!options_.scene.empty()) return scene_layers(options_.scene, screen, grid, options_.local_shading(), globals);
     if (globals.seed > std::numeric_limits<std::uint32_t>::max()) {
       throw Error(ExitCode::Usage, fmt::format("--seed: synthetic layers take 32 bits, {} has more", globals.seed),
                   fmt::format("take one from 0 to {}", std::numeric_limits<std::uint32_t>::max()));
@@ -218,14 +218,14 @@ class CompareCommand final : public Command {
     return verdict_on(report.runs);
   }
 
-  SceneInput scene_input_;
   CompareOptions options_;
 };
 
 }  // namespace
 
-std::unique_ptr<Command> make_compare_command(SceneInput scene_input) {
-  return std::make_unique<CompareCommand>(std::move(scene_input));
+/// `hpr compare SCENE|--synthetic KIND`.
+std::unique_ptr<Command> make_compare_command() {
+  return std::make_unique<CompareCommand>();
 }
 
 }  // namespace hpr

@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <charconv>
 
-#include "app/launcher.h"
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/simulate_option.h"
 #include "app/words.h"
 #include "compositing/blender.h"
 #include "compositing/compositor.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/job_environment.h"
 #include "core/names.h"
 #include "core/units.h"
 
@@ -43,14 +44,12 @@ std::vector<std::string> split_strategies(std::string_view list) {
   return names;
 }
 
-void CompareOptions::declare(CLI::App& app, bool draws_scenes) {
-  if (draws_scenes) {
-    app.add_option("scene", scene, "a scene to draw the layers from")->type_name("SCENE");
-    app.add_option("--shading", shading,
-                   "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
-        ->type_name("NAME")
-        ->capture_default_str();
-  }
+void CompareOptions::declare(CLI::App& app) {
+  app.add_option("scene", scene, "a scene to draw the layers from")->type_name("SCENE");
+  app.add_option("--shading", shading,
+                 "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
+      ->type_name("NAME")
+      ->capture_default_str();
   app.add_option("--synthetic", synthetic, "made-up layers: dense, half, sparse, scatter or checker")
       ->type_name("KIND");
   app.add_option("--size", size, "pixels of one screen")->type_name("WxH")->capture_default_str();

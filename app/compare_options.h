@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "app/command.h"
 #include "app/compare.h"
+#include "app/globals.h"
 #include "image/image.h"
 
 namespace CLI {
@@ -40,7 +40,7 @@ struct CompareOptions {
   std::string picture;
   std::string raw;
 
-  void declare(CLI::App& app, bool draws_scenes);
+  void declare(CLI::App& app);
   /// What is left open is settled by what was said. Throws Error for what can be refused before any rank starts, but
   /// for the names of files.
   void settle();

@@ -12,7 +12,7 @@ namespace {
 /// Collective: this rank's share of a frame, drawn.
 DrawnTiles draw_share(Communicator& comm, const std::string& scene, const Wall& wall, const Globals& globals,
                       const FrameSettings& settings) {
-  Session session(comm, globals, [&] { return load_scene(scene, globals.scene_limits()); });
+  Session session(comm, globals.session(), [&] { return load_scene(scene, globals.scene_limits()); });
   const std::vector<View> views =
       wall_views(wall, RenderOptions{}.choose_camera(session.scene()), session.scene().bounds);
   FramePlan plan = plan_frame(session, settings, views);

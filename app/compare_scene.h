@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "app/command.h"
 #include "app/compare.h"
+#include "app/globals.h"
 
 namespace hpr {
 

@@ -1,5 +1,3 @@
-#include "app/demo_command.h"
-
 #include <CLI/CLI.hpp>
 #include <array>
 #include <filesystem>
@@ -7,6 +5,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "app/command.h"
 #include "app/wall_run.h"
 
 namespace hpr {

@@ -1,5 +1,3 @@
-#include "app/diff_command.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -7,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/command.h"
 #include "app/diff.h"
 #include "app/output.h"
 #include "core/file.h"
@@ -40,7 +39,7 @@ class DiffCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     check_options(globals);
     const int threads = globals.threads > 0 ? globals.threads : usable_cores();
-    const DiffReport report = diff_files(a_, b_, tolerance_, picture_limits(globals), metrics_, threads);
+    const DiffReport report = diff_files(a_, b_, tolerance_, globals.picture_limits(), metrics_, threads);
     if (!heat_.empty()) write_png(heat_, heat_map(report));
     const std::string text = json_ ? diff_json(report, metrics_, a_, b_, tolerance_) : diff_table(report, metrics_);
     std::fputs(text.c_str(), stdout);
@@ -96,6 +95,7 @@ class DiffCommand final : public Command {
 
 }  // namespace
 
+/// `hpr diff A B`: how far two pictures, or two files of keys, are apart. Exit 0 when within tolerance, else 1.
 std::unique_ptr<Command> make_diff_command() {
   return std::make_unique<DiffCommand>();
 }

@@ -1,5 +1,3 @@
-#include "app/display_command.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,9 +5,9 @@
 #include <csignal>
 #include <filesystem>
 
+#include "app/command.h"
 #include "app/display_flags.h"
 #include "app/output.h"
-#include "app/remote_wall.h"
 #include "app/signals.h"
 #include "app/wall_run.h"
 #include "core/file.h"
@@ -19,6 +17,7 @@
 #include "image/image_io.h"
 #include "walls/link/display_process.h"
 #include "walls/link/hosts.h"
+#include "walls/link/token.h"
 #include "walls/wall_file.h"
 
 namespace hpr {
@@ -73,7 +72,7 @@ class DisplayCommand final : public Command {
     if (scale_ != 1.0) whole = scale_wall(std::move(whole), scale_);
     const WallHost host = find_host(whole, host_.empty() ? only_host(whole) : host_);
     const Wall wall = wall_of_host(whole, host);
-    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
+    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals.picture_limits());
 
     ReceiverSettings settings{.build = link_build(),
                               .host = host.host,
@@ -128,6 +127,7 @@ class DisplayCommand final : public Command {
 
 }  // namespace
 
+/// `hpr display`: a display process outside the MPI job.
 std::unique_ptr<Command> make_display_command() {
   return std::make_unique<DisplayCommand>();
 }

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "cluster/communicator.h"
+#include "core/error.h"
 #include "core/names.h"
 #include "core/units.h"
 

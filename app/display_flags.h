@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "app/command.h"
+#include "app/globals.h"
 #include "walls/display.h"
 
 namespace CLI {

@@ -1,5 +1,3 @@
-#include "app/doctor_command.h"
-
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -7,7 +5,10 @@
 #include <cstdlib>
 #include <utility>
 
-#include "app/launcher.h"
+#include "app/command.h"
+#include "app/doctor.h"
+#include "app/graphics_checks.h"
+#include "core/job_environment.h"
 
 namespace hpr {
 namespace {
@@ -21,8 +22,6 @@ bool colors_wanted() {
 
 class DoctorCommand final : public Command {
  public:
-  explicit DoctorCommand(std::vector<Check> graphics) : graphics_(std::move(graphics)) {}
-
   [[nodiscard]] std::string_view name() const override { return "doctor"; }
   [[nodiscard]] std::string_view summary() const override {
     return "what this machine can do, and the command that mends what it cannot";
@@ -32,7 +31,8 @@ class DoctorCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
     std::vector<Check> checks = machine_checks();
-    checks.insert(checks.end(), graphics_.begin(), graphics_.end());
+    const std::vector<Check> graphics = graphics_checks();
+    checks.insert(checks.end(), graphics.begin(), graphics.end());
     const std::vector<Finding> findings = examine(checks);
     const std::string text = json_ ? findings_json(findings) : findings_text(findings, colors_wanted());
     std::fputs(text.c_str(), stdout);
@@ -40,14 +40,14 @@ class DoctorCommand final : public Command {
   }
 
  private:
-  std::vector<Check> graphics_;
   bool json_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Command> make_doctor_command(std::vector<Check> graphics) {
-  return std::make_unique<DoctorCommand>(std::move(graphics));
+/// `hpr doctor`: what this machine can do, and the command that mends what it cannot. Exit 1 when a finding is red.
+std::unique_ptr<Command> make_doctor_command() {
+  return std::make_unique<DoctorCommand>();
 }
 
 }  // namespace hpr

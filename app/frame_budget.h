@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace hpr {
@@ -20,6 +21,15 @@ struct Effort {
   int scale_step = 0;  ///< see scale_of_step
 
   bool operator==(const Effort&) const = default;
+};
+
+/// What a frame with a target time was made with, as reports show it.
+struct BudgetReport {
+  double target_ms = 0.0;
+  double resolution_scale = 1.0;      ///< of the screens' pixels a side
+  std::uint32_t samples = 1;          ///< of the picture shown
+  std::vector<std::string> given_up;  ///< in the order in which it is
+  bool resting = false;               ///< it added to a picture seen from one place, and has no target
 };
 
 struct BudgetSettings {

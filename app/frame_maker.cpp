@@ -138,7 +138,7 @@ void FrameMaker::took(double slowest_ms) {
 }
 
 void FrameMaker::write_report(const Effort& effort, std::uint32_t samples) {
-  BudgetRecord report{*target_ms_, settings_.resolution_scale * scale_of_step(effort.scale_step), samples, {}};
+  BudgetReport report{*target_ms_, settings_.resolution_scale * scale_of_step(effort.scale_step), samples, {}};
   if (samples < most_samples() && !refining_) report.given_up.emplace_back("samples");
   for (int i = 0; i < effort.economies; ++i) report.given_up.push_back(economies_[static_cast<std::size_t>(i)]);
   if (effort.scale_step > 0) report.given_up.emplace_back("resolution");

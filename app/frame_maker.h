@@ -9,7 +9,6 @@
 #include "app/frame_budget.h"
 #include "app/frame_sampler.h"
 #include "app/output.h"
-#include "walls/manifest.h"
 
 namespace hpr {
 
@@ -41,7 +40,7 @@ class FrameMaker {
   [[nodiscard]] const FrameTimes& times_before() const { return times_before_; }
   [[nodiscard]] std::optional<double> relmse() const { return relmse_; }
   /// What of the last frame was given up; none without a target.
-  [[nodiscard]] const std::optional<BudgetRecord>& report() const { return report_; }
+  [[nodiscard]] const std::optional<BudgetReport>& report() const { return report_; }
 
  private:
   void plan_for(const Effort& effort, std::span<const View> screens);
@@ -69,7 +68,7 @@ class FrameMaker {
   FrameTimes times_;
   FrameTimes times_before_;
   std::optional<double> relmse_;
-  std::optional<BudgetRecord> report_;
+  std::optional<BudgetReport> report_;
 };
 
 }  // namespace hpr

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "app/signals.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"

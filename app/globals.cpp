@@ -1,8 +1,11 @@
+#include "app/globals.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "app/command.h"
+#include "cluster/communicator.h"
+#include "core/error.h"
 #include "core/units.h"
 
 namespace hpr {
@@ -23,6 +26,10 @@ SceneLimits Globals::scene_limits() const {
     limits.image.pixels = static_cast<std::uint64_t>(extent->first) * static_cast<std::uint64_t>(extent->second);
   }
   return limits;
+}
+
+ImageLimits Globals::picture_limits() const {
+  return limit_image.empty() ? kPictureLimits : scene_limits().image;
 }
 
 std::chrono::nanoseconds Globals::hang_limit() const {

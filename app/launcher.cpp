@@ -21,6 +21,7 @@
 #include "app/passed_signals.h"
 #include "app/process_tree.h"
 #include "core/error.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 
 namespace hpr {
@@ -40,13 +41,6 @@ constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
     {"HWLOC_COMPONENTS", "-gl"},   // asks X servers, also one that hangs, for nothing that is needed
 }};
 
-/// Tells rank 0, which reads from a pipe, that its launcher reads from a terminal.
-constexpr const char* kTypedInput = "HPR_TYPED_INPUT";
-/// Tells the ranks of a job, whose stderr is a pipe, that their launcher's is a terminal.
-constexpr const char* kTerminalVariable = "HPR_TERMINAL";
-/// Tells rank 0 to say on its standard output, before all else, that the ranks have started. Open MPI takes variables
-/// of this prefix to other hosts.
-constexpr const char* kStartVariable = "OMPI_HPR_SAY_START";
 constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
 
 /// What starting processes may take beside what its ranks may take to start MPI, which they time themselves.
@@ -72,8 +66,8 @@ constexpr std::chrono::seconds kLongestEnd{10};
   ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
-  if (typed) ::setenv(kTypedInput, "1", 1);
-  ::setenv(kStartVariable, "1", 1);
+  if (typed) ::setenv(kTypedInputVariable, "1", 1);
+  ::setenv(kReportStartVariable, "1", 1);
   ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
@@ -225,25 +219,6 @@ std::optional<std::filesystem::path> find_on_path(std::string_view program) {
   return std::nullopt;
 }
 
-int launched_rank() {
-  for (const char* const name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"}) {
-    if (const char* const value = std::getenv(name); value != nullptr) return std::atoi(value);
-  }
-  return 0;
-}
-
-bool inside_mpi_job() {
-  for (const char* const name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"}) {
-    if (std::getenv(name) != nullptr) return true;
-  }
-  return false;
-}
-
-bool launched_by_hpr() {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
-  return inside_mpi_job() && std::getenv(kStartVariable) != nullptr;
-}
-
 void tell_launcher() {
   if (!launched_by_hpr()) return;
   std::fwrite(kStartMark.data(), 1, kStartMark.size(), stdout);
@@ -252,16 +227,6 @@ void tell_launcher() {
 
 std::string program_path() {
   return std::filesystem::read_symlink("/proc/self/exe").string();
-}
-
-bool input_is_typed() {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
-  return ::isatty(STDIN_FILENO) == 1 || std::getenv(kTypedInput) != nullptr;
-}
-
-bool stderr_is_terminal() {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
-  return ::isatty(STDERR_FILENO) == 1 || (inside_mpi_job() && std::getenv(kTerminalVariable) != nullptr);
 }
 
 int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options) {

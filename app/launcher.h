@@ -34,23 +34,9 @@ struct JobOptions {
   std::chrono::nanoseconds hang_limit = kHangTimeout;  ///< how long its ranks wait for each other
 };
 
-/// Whether somebody types what this process reads on standard input, at a terminal of its own or its launcher's.
-[[nodiscard]] bool input_is_typed();
-/// Whether somebody looks on at a terminal: what is drawn on stderr may be drawn over.
-[[nodiscard]] bool stderr_is_terminal();
-
 /// Of rank 0, when all ranks of its job have started: tells a launcher of this program that they take SIGUSR1 and
 /// SIGUSR2 now, if they ever do.
 void tell_launcher();
-
-/// True when this process was started by mpirun, mpiexec or srun as one rank of a job.
-[[nodiscard]] bool inside_mpi_job();
-
-/// True when that was done by run_mpiexec, in a process that waits for this one.
-[[nodiscard]] bool launched_by_hpr();
-
-/// This process's rank as its launcher wrote it into the environment: known before MPI starts. 0 outside a job.
-[[nodiscard]] int launched_rank();
 
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
 /// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit

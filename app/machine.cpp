@@ -5,8 +5,8 @@
 
 #include <fstream>
 
-#include "app/launcher.h"
 #include "cluster/mpi_communicator.h"
+#include "core/job_environment.h"
 #include "core/parallel.h"
 
 namespace hpr {

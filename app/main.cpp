@@ -16,11 +16,11 @@
 #include <thread>
 
 #include "app/command.h"
-#include "app/host_name.h"
 #include "app/knobs.h"
-#include "app/launcher.h"
 #include "app/report_error.h"
 #include "app/trace_file.h"
+#include "core/host_name.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "raster/gl_context.h"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "app/frame.h"
+#include "app/frame_budget.h"
 #include "image/image_parts.h"
-#include "walls/manifest.h"
 
 namespace hpr {
 
@@ -38,13 +38,6 @@ template <typename Pixel>
   return image;
 }
 
-/// How large a picture may be that HPR itself draws or reads back: --limit-image, or 2^20 a side and 2^31 pixels.
-[[nodiscard]] ImageLimits picture_limits(const Globals& globals);
-
-/// Throws Error (Limit) when a picture or screen is beyond --limit-image, or what one can be without it: 2^20 a side,
-/// 2^31 pixels.
-void check_size(Size size, const Globals& globals);
-
 /// A frame's tiles as display colours,
 /// `exposure_stops` brighter.
 [[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops);
@@ -57,7 +50,7 @@ struct RunStats {
   int samples = 1;                     ///< drawn by this run
   int samples_in_all = 1;              ///< of the picture: with those of a checkpoint
   std::optional<double> relmse;        ///< of a frame of several samples, as their halves tell it
-  std::optional<BudgetRecord> budget;  ///< of a frame with a target time
+  std::optional<BudgetReport> budget;  ///< of a frame with a target time
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
@@ -81,18 +74,5 @@ struct FrameCost {
 [[nodiscard]] inline ExitCode verdict(const RunStats& stats, bool strict) {
   return strict && stats.rays.not_finite > 0 ? ExitCode::CheckFailed : ExitCode::Done;
 }
-
-/// `text` to the file `path`, or to standard output where that is empty. Throws Error where the file is there and
-/// `overwrite` is not said, or cannot be written.
-void write_or_print(std::string_view text, const std::string& path, bool overwrite);
-
-void write_stats(const std::filesystem::path& path, const RunStats& stats);
-
-/// Throws Error (Usage) when two of these paths of results, or one and `trace`, are one file. Empty ones are none.
-void check_distinct(std::span<const std::string> paths, const std::string& trace);
-
-/// Throws Error (Usage) where a result would take the place of a file that is read: one of the scene's, or of `inputs`.
-void check_spared(const std::string& scene, const SceneLimits& limits, std::span<const std::string> inputs,
-                  std::span<const std::string> results);
 
 }  // namespace hpr

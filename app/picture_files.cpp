@@ -91,17 +91,6 @@ void CollectedPicture::collect_radiance(Session& session, Frame& frame) const {
   }
 }
 
-void check_raw(const RenderOptions& options) {
-  if (options.shading == "local") {
-    throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
-                "use --shading deferred");
-  }
-  if (options.resolution_scale != 1.0) {
-    throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
-                "draw a smaller picture with --size");
-  }
-}
-
 std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,
                                  std::span<const Aov> aovs) {
   // All blocks of a screen have one lens.

@@ -6,7 +6,6 @@
 
 #include "app/frame.h"
 #include "app/output.h"
-#include "app/render_options.h"
 #include "image/color_format.h"
 
 namespace hpr {
@@ -25,9 +24,6 @@ struct PictureFiles {
   /// For --explain.
   [[nodiscard]] std::string explain_colors() const;
 };
-
-/// Throws Error (Usage) where `options` leave no surface for every pixel of a file of keys.
-void check_raw(const RenderOptions& options);
 
 /// On the rank that has all of `frame`: the layers of the pixels of `screen`.
 [[nodiscard]] std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,

@@ -6,8 +6,8 @@
 #include "app/frame.h"
 #include "app/open_sky.h"
 #include "app/primary_choice.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "scene/surface_ranges.h"
 
 namespace hpr {

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "app/launcher.h"
+#include "core/job_environment.h"
 
 namespace hpr {
 namespace {

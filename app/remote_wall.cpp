@@ -9,10 +9,11 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "app/launcher.h"
 #include "app/run_journal.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
+#include "core/error.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/units.h"
@@ -48,15 +49,6 @@ int levels_of(std::string text) {
 }
 
 }  // namespace
-
-std::string link_build() {
-  return fmt::format("hpr {} ({})", kVersion, kCommit);
-}
-
-std::string link_token() {
-  const char* const token = std::getenv("HPR_TOKEN");
-  return token == nullptr ? "" : token;
-}
 
 void RemoteOptions::declare(CLI::App& app) {
   const auto group = [this](CLI::Option* option) {

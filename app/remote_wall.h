@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "app/command.h"
+#include "cluster/communicator.h"
 #include "walls/manifest.h"
 #include "walls/wall.h"
 
@@ -18,12 +18,6 @@ namespace hpr {
 
 class WallSender;
 struct SenderSettings;
-
-/// What a display process and a run compare to know that they are of one build.
-[[nodiscard]] std::string link_build();
-
-/// The secret both ends of a TCP link know: HPR_TOKEN; empty where it is not set.
-[[nodiscard]] std::string link_token();
 
 /// How `wall run --display remote` reaches its displays: options, declared once.
 struct RemoteOptions {

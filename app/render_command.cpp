@@ -1,5 +1,3 @@
-#include "app/render_command.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -7,17 +5,21 @@
 #include <limits>
 #include <optional>
 
+#include "app/command.h"
 #include "app/frame_sampler.h"
-#include "app/launcher.h"
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/picture_files.h"
 #include "app/render_options.h"
 #include "app/resolution.h"
 #include "app/run_identity.h"
+#include "app/run_ranks.h"
 #include "app/signals.h"
+#include "app/stats_file.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "core/file.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/units.h"
@@ -49,7 +51,7 @@ class RenderCommand final : public Command {
     const auto extent = parse_extent(size_);
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
     const Size size{extent->first, extent->second};
-    check_size(size, globals);
+    check_size(size, globals.picture_limits());
     const FrameSettings settings = options_.settings(globals.seed);
     const Sampling sampling = options_.sampling();
     files_.aovs = settings.aovs;
@@ -68,7 +70,7 @@ class RenderCommand final : public Command {
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
       if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(globals); });
-      Session session(comm, globals, [&] { return options_.load(source_, globals); });
+      Session session(comm, globals.session(), [&] { return options_.load(source_, globals); });
       return draw(session, globals, settings, sampling, size);
     });
   }

@@ -207,7 +207,7 @@ Camera RenderOptions::choose_camera(const Scene& scene) const {
 Scene RenderOptions::load(const std::string& source, const Globals& globals) const {
   Scene scene = load_scene(source, globals.scene_limits());
   if (!environment.empty()) {
-    scene.environment = load_environment(environment, picture_limits(globals));
+    scene.environment = load_environment(environment, globals.picture_limits());
     note_not_finite(printable(environment), scene);
   }
   if (strict && scene.not_finite > 0) {
@@ -332,6 +332,17 @@ FrameSettings RenderOptions::settings(std::uint64_t seed) const {
   check_combination(settings);
   settle_economies(settings);
   return settings;
+}
+
+void check_raw(const RenderOptions& options) {
+  if (options.shading == "local") {
+    throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
+                "use --shading deferred");
+  }
+  if (options.resolution_scale != 1.0) {
+    throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
+                "draw a smaller picture with --size");
+  }
 }
 
 std::vector<std::string> option_names() {

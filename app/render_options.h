@@ -7,6 +7,7 @@
 
 #include "app/accuracy_options.h"
 #include "app/frame.h"
+#include "app/globals.h"
 #include "app/quality.h"
 #include "app/samples.h"
 #include "scene/view.h"
@@ -82,6 +83,9 @@ struct RenderOptions {
   void settle_economies(FrameSettings& settings) const;
   void settle_denoiser(FrameSettings& settings) const;
 };
+
+/// Throws Error (Usage) where `options` leave no surface for every pixel of a file of keys.
+void check_raw(const RenderOptions& options);
 
 /// Of those RenderOptions declares, without their dashes.
 [[nodiscard]] std::vector<std::string> option_names();

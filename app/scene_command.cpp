@@ -1,11 +1,10 @@
-#include "app/scene_command.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "app/command.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"

@@ -3,10 +3,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <thread>
 
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
 #include "cluster/scene_distribution.h"
+#include "cluster/texts.h"
 #include "core/error.h"
+#include "core/host_name.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/parallel.h"
@@ -23,21 +27,37 @@ Scene load_scene_of_all(Communicator& comm, const std::function<Scene()>& load) 
 
 }  // namespace
 
-Session::Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load)
+Session::Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load)
     : comm_(comm),
-      share_(host_share(comm, globals)),
+      share_(share_host(comm, settings.threads)),
       scene_(load_scene_of_all(comm_, load)),
       requirements_(requirements_of(scene_)) {
   warn_of_scene();
   agree_on_failure(comm_, [&] {
     const trace::Span span("start OpenGL");
-    gl_ = make_gl_context({.backend = globals.backend,
-                           .device = globals.device,
+    gl_ = make_gl_context({.backend = settings.backend,
+                           .device = settings.device,
                            .local_rank = share_.local_rank,
                            .threads = share_.threads});
   });
   log::debug("OpenGL: {}", gl_->description());
   compare_rasterizers();
+}
+
+Session::HostShare Session::share_host(Communicator& comm, int threads) {
+  HostShare share;
+  share.host = host_name();
+  share.ranks = 0;
+  const std::vector<std::string> hosts = all_gather_texts(comm, share.host);
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    if (hosts[static_cast<std::size_t>(rank)] != share.host) continue;
+    if (rank < comm.rank()) ++share.local_rank;
+    ++share.ranks;
+  }
+  // A launcher may already have given this rank cores of its own; else the ranks of a host share all of them.
+  const int online = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  share.threads = threads > 0 ? threads : std::clamp(online / share.ranks, 1, usable_cores());
+  return share;
 }
 
 void Session::load(const std::function<Scene()>& load) {

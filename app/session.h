@@ -1,11 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "app/command.h"
+#include "app/session_settings.h"
 #include "cluster/assignment.h"
 #include "cluster/counting_communicator.h"
 #include "compositing/assembly.h"
@@ -26,7 +28,7 @@ namespace hpr {
 class Session {
  public:
   /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
-  Session(Communicator& comm, const Globals& globals, const std::function<Scene()>& load);
+  Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load);
 
   /// Collective. Another scene in this one's place; when it cannot be loaded, this one stays.
   void load(const std::function<Scene()>& load);
@@ -78,6 +80,15 @@ class Session {
   [[nodiscard]] std::unique_ptr<RayScene> build_ray_scene(std::span<const SurfaceRange> objects) const;
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
                                             std::span<const int> members);
+
+  /// What this rank may use of the machine it runs on.
+  struct HostShare {
+    std::string host;
+    int local_rank = 0;  ///< among the ranks of this host
+    int ranks = 1;       ///< of this host
+    int threads = 1;
+  };
+  [[nodiscard]] static HostShare share_host(Communicator& comm, int threads);
 
   struct Group {
     std::vector<int> members;

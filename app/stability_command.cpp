@@ -1,5 +1,3 @@
-#include "app/stability_command.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -10,6 +8,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "app/command.h"
 #include "app/progress.h"
 #include "app/stability/stability.h"
 #include "core/error.h"
@@ -117,6 +116,7 @@ class StabilityCommand final : public Command {
 
 }  // namespace
 
+/// `hpr stability`: every extreme's limit, what was measured and where it breaks. Exit 1 when a promise does not hold.
 std::unique_ptr<Command> make_stability_command() {
   return std::make_unique<StabilityCommand>();
 }

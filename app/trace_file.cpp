@@ -17,15 +17,15 @@
 #include <utility>
 #include <vector>
 
-#include "app/host_name.h"
-#include "app/launcher.h"
 #include "app/shell_line.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
 #include "cluster/local_communicator.h"
-#include "cluster/scene_distribution.h"
 #include "cluster/tracing_communicator.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/host_name.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/trace.h"

@@ -2,7 +2,9 @@
 
 #include <functional>
 
-#include "app/command.h"
+#include "app/globals.h"
+#include "cluster/communicator.h"
+#include "core/error.h"
 
 namespace hpr {
 

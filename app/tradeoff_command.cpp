@@ -1,5 +1,3 @@
-#include "app/tradeoff_command.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <hpr/version.h>
@@ -13,17 +11,19 @@
 #include <set>
 
 #include "app/cache_folder.h"
-#include "app/launcher.h"
+#include "app/command.h"
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/progress.h"
+#include "app/run_ranks.h"
 #include "app/shell_line.h"
 #include "app/signals.h"
 #include "app/tradeoff_html.h"
 #include "app/tradeoff_measure.h"
 #include "app/tradeoff_report.h"
 #include "app/words.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -102,7 +102,7 @@ class TradeoffCommand final : public Command {
     check_options(globals);
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
-      Session session(comm, globals, [&] { return options_.load(scene_, globals); });
+      Session session(comm, globals.session(), [&] { return options_.load(scene_, globals); });
       return sweep(session, globals);
     });
   }
@@ -110,7 +110,7 @@ class TradeoffCommand final : public Command {
  private:
   void check_options(const Globals& globals) {
     how_.size = parse_size(size_, "--size", kRasterLimit);
-    check_size(how_.size, globals);
+    check_size(how_.size, globals.picture_limits());
     std::vector<KnobSweep> sweeps;
     for (const std::string& text : vary_) sweeps.push_back(parse_knob_sweep(text));
     for (const KnobSweep& sweep : sweeps) report_.knobs.push_back(sweep.knob);

@@ -13,8 +13,8 @@
 #include "app/picture_files.h"
 #include "app/resolution.h"
 #include "app/run_identity.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "core/base64.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -88,7 +88,7 @@ double mean_of(const Image<Rgb>& picture) {
 }
 
 ReferencePicture read_reference(const std::string& path, Size size, const Globals& globals) {
-  const FloatImage file = read_image(path, picture_limits(globals));
+  const FloatImage file = read_image(path, globals.picture_limits());
   if (file.size != size) {
     throw Error(ExitCode::BadInput,
                 fmt::format("{} has {}x{} pixels, the pictures of the sweep {}x{}", path, file.size.width,

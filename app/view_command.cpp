@@ -1,9 +1,8 @@
-#include "app/view_command.h"
-
 #include <CLI/CLI.hpp>
 
-#include "app/launcher.h"
+#include "app/command.h"
 #include "app/wall_run.h"
+#include "core/job_environment.h"
 #include "walls/displays/window_display.h"
 
 namespace hpr {
@@ -50,6 +49,7 @@ class ViewCommand final : public Command {
 
 }  // namespace
 
+/// `hpr view SCENE`: a wall in windows, or in a browser where there is no desktop.
 std::unique_ptr<Command> make_view_command() {
   return std::make_unique<ViewCommand>();
 }

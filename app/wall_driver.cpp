@@ -10,11 +10,12 @@
 #include <nlohmann/json.hpp>
 
 #include "app/remote_wall.h"
+#include "app/run_journal.h"
 #include "app/screen_owners.h"
 #include "app/signals.h"
 #include "app/wall_status.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "cluster/texts.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -117,7 +118,7 @@ void WallDriver::start_frames(const FrameSettings& settings, const WallRun& run)
   const std::vector<View> views = screens_in(0, resting_heads(wall_));
   const FrameSettings used = settings_for(wall_, settings);
   curved_.emplace(views, used.primary == Primary::Rays);
-  for (const Size& size : curved_->sizes()) check_size(size, globals_);
+  for (const Size& size : curved_->sizes()) check_size(size, globals_.picture_limits());
   showing_ = {curved_->sizes(), picture_owners(wall_, owners_), run.options.exposure};
   frames_.emplace(session_, used, sampling_of(run), curved_->drawn(views), target_of(run), resting_of(run),
                   !run.raw.empty());
@@ -360,7 +361,8 @@ std::vector<ScreenRecord> WallDriver::record_screens() {
 void WallDriver::record(std::uint64_t number) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
   frames_->took(slowest);
-  FrameRecord frame{number, slowest, strategy(), record_screens(), frames_->report()};
+  FrameRecord frame{number, slowest, strategy(), record_screens()};
+  if (frames_->report()) frame.budget = to_record(*frames_->report());
   frame.slowest = slowest_of(session_, *frames_, hosts_);
   frame.heads = heads_.report();
   for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) {

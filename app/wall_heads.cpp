@@ -4,8 +4,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "walls/geometry.h"
 
 namespace hpr {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/shell_line.h"
 #include "core/log.h"
 #include "core/names.h"

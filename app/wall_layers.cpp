@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "app/picture_files.h"
-#include "cluster/scene_distribution.h"
+#include "cluster/agreement.h"
 #include "core/file.h"
 #include "core/trace.h"
 #include "walls/stereo.h"

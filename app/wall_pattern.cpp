@@ -95,7 +95,7 @@ class WallPatternCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     Wall wall = load_wall(wall_, overrides_);
     if (scale_ != 1.0) wall = scale_wall(std::move(wall), scale_);
-    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
+    for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals.picture_limits());
     if (!host_.empty() && (display_.remote() || display_.kind().whole_wall)) {
       throw Error(ExitCode::Usage, "--host is about windows and files: other displays show the whole wall",
                   "leave it out, or use --display window");

@@ -15,16 +15,20 @@
 #include "app/camera_path.h"
 #include "app/launcher.h"
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/progress.h"
 #include "app/run_journal.h"
 #include "app/signals.h"
+#include "app/stats_file.h"
+#include "app/supervisor.h"
 #include "app/wall_driver.h"
 #include "app/wall_layers.h"
 #include "app/wall_status.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
 #include "cluster/texts.h"
 #include "core/file.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
@@ -167,7 +171,7 @@ ExitCode drive(const WallRun& run, const Wall& wall, const FrameSettings& settin
   const bool seen = driver.finish();
   RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
   stats.relmse = driver.relmse();
-  stats.budget = driver.manifest().frames.back().budget;
+  stats.budget = driver.frames().report();
   if (speaks && stats.budget) report_budget(driver.manifest());
   write_layers(WallLayers(run, wall, settings), settings.aovs, driver, session);
   std::vector<Image<Rgba8>> pictures;
@@ -296,8 +300,8 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
   if (run.scale != 1.0) wall = scale_wall(std::move(wall), run.scale);
   const FrameSettings settings = run.options.settings(globals.seed);
   check_options(run);
-  for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals);
-  for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals);
+  for (const WallScreen& screen : wall.screens) check_size(screen.pixels, globals.picture_limits());
+  for (const WallMonitor& monitor : wall.monitors) check_size(monitor.pixels, globals.picture_limits());
   const std::string folder = run.writes_files() ? run.display.output : "";
   const EmptyFolders tidy(folder);
   run.open_ended() ? watch_interrupts() : watch_requests();
@@ -315,7 +319,7 @@ ExitCode run_wall(const WallRun& run, const Globals& given) {
     const EmptyFolders tidy_in_job(folder);  // a rank that fails leaves run_ranks only to end the job
     const WallRun agreed = with_display_of_root(run, comm);
     if (inside_mpi_job()) check_on_root(comm, [&] { claim_outputs(agreed); });
-    Session session(comm, globals, [&] { return run.options.load(run.scene, globals); });
+    Session session(comm, globals.session(), [&] { return run.options.load(run.scene, globals); });
     return drive(agreed, wall, settings, globals, session);
   };
   const int restarts = run.display.kind().stream ? 0 : run.restarts;

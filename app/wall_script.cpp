@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "app/output.h"
+#include "app/output_files.h"
 #include "app/shell_line.h"
 #include "core/names.h"
 #include "walls/display.h"

@@ -57,6 +57,10 @@ SlowestRecord slowest_of(Session& session, const FrameMaker& frames, std::span<c
   return {static_cast<int>(rank), hosts[rank], most->ms, pass, most->pass_ms};
 }
 
+BudgetRecord to_record(const BudgetReport& report) {
+  return {report.target_ms, report.resolution_scale, report.samples, report.given_up, report.resting};
+}
+
 std::string describe_status(std::span<const double> frame_ms, const FrameRecord& last,
                             std::span<const ScreenState> states) {
   std::vector<double> sorted(frame_ms.begin(), frame_ms.end());

@@ -15,6 +15,9 @@ namespace hpr {
 /// per rank.
 [[nodiscard]] SlowestRecord slowest_of(Session& session, const FrameMaker& frames, std::span<const std::string> hosts);
 
+/// As manifests have it.
+[[nodiscard]] BudgetRecord to_record(const BudgetReport& report);
+
 /// "24.1 fps (min 11.0), slowest rank 3 on wall05: shadow 21.0 ms; stale: wall-r0c1": the frames that took `frame_ms`
 /// each, what the last of them was held up by, and what its screens show; `states` per screen of `last`.
 [[nodiscard]] std::string describe_status(std::span<const double> frame_ms, const FrameRecord& last,

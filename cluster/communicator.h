@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "image/tiles.h"
+#include "core/peer_memory.h"
 
 namespace hpr {
 

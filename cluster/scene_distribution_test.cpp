@@ -9,10 +9,13 @@
 
 #include "cluster/forwarding_communicator.h"
 #include "cluster/local_communicator.h"
+#include "cluster/test_failures.h"
 #include "core/error.h"
 
 namespace hpr {
 namespace {
+
+using test::expect_error_on_all;
 
 Scene small_scene() {
   Scene scene;
@@ -39,22 +42,6 @@ class DamagingCommunicator final : public ForwardingCommunicator {
     return message;
   }
 };
-
-/// Runs `body` on `size` ranks and expects every one of them to throw just this.
-void expect_error_on_all(int size, ExitCode code, const std::string& what,
-                         const std::function<void(Communicator&)>& body) {
-  std::atomic<int> thrown = 0;
-  run_local_ranks(size, [&](Communicator& comm) {
-    try {
-      body(comm);
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), code);
-      EXPECT_EQ(error.what(), what);
-      ++thrown;
-    }
-  });
-  EXPECT_EQ(thrown, size);
-}
 
 TEST(DistributeScene, EveryRankHoldsTheSceneOfRankZero) {
   const std::uint64_t expected = content_hash(small_scene());
@@ -114,38 +101,6 @@ TEST(DistributeScene, ARankThatHoldsAnotherSceneIsNamedOnEveryRank) {
     }
   });
   EXPECT_EQ(thrown, 4);
-}
-
-TEST(OnRoot, RunsOnRankZeroAloneAndGivesAllItsBytes) {
-  std::atomic<int> runs = 0;
-  run_local_ranks(5, [&](Communicator& comm) {
-    const auto bytes = on_root(comm, [&] {
-      ++runs;
-      return std::vector<std::byte>(3, std::byte{9});
-    });
-    EXPECT_EQ(bytes, std::vector<std::byte>(3, std::byte{9}));
-    EXPECT_TRUE(on_root(comm, [] { return std::vector<std::byte>{}; }).empty());
-  });
-  EXPECT_EQ(runs, 1);
-}
-
-TEST(AgreeOnFailure, TheLowestFailingRankSpeaksForAll) {
-  for (const int size : {3, 4, 9}) {
-    expect_error_on_all(size, ExitCode::Limit, "rank 1 failed", [](Communicator& comm) {
-      agree_on_failure(comm, [&] {
-        if (comm.rank() == 1) throw Error(ExitCode::Limit, "rank 1 failed");
-        if (comm.rank() == 2) throw Error(ExitCode::Io, "rank 2 failed");
-      });
-    });
-  }
-}
-
-TEST(AgreeOnFailure, IsSilentWhenAllSucceed) {
-  std::atomic<int> done = 0;
-  run_local_ranks(6, [&](Communicator& comm) {
-    agree_on_failure(comm, [&] { ++done; });
-    EXPECT_EQ(done, 6);
-  });
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "image/tiles.h"
+#include "core/peer_memory.h"
 
 namespace hpr {
 

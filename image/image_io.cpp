@@ -47,6 +47,14 @@ Image<Rgba8> to_srgb(const Image<Rgb>& image) {
 
 }  // namespace
 
+void check_size(Size size, const ImageLimits& limits) {
+  if (size.width <= limits.side && size.height <= limits.side && size.area() <= limits.pixels) return;
+  throw Error(ExitCode::Limit,
+              fmt::format("a picture of {}x{} pixels is beyond the limit of {} a side and {} in all", size.width,
+                          size.height, limits.side, limits.pixels),
+              "draw a smaller one, or raise --limit-image");
+}
+
 std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
   return codec().encode_png(image);
 }

@@ -19,6 +19,12 @@ struct ImageLimits {
   std::uint64_t pixels = std::uint64_t{1} << 27;  ///< 128 Mi
 };
 
+/// For pictures that HPR itself draws or reads back, unless the user says otherwise.
+inline constexpr ImageLimits kPictureLimits{.side = 1 << 20, .pixels = std::uint64_t{1} << 31};
+
+/// Throws Error (Limit) for a picture or screen beyond `limits`.
+void check_size(Size size, const ImageLimits& limits);
+
 /// A picture read from a file: `values` [height][width][channels], linear for EXR and Radiance (.hdr), the stored level
 /// / 255 for PNG and JPEG.
 struct FloatImage {

@@ -24,13 +24,6 @@ void ask_for_huge_pages(void* memory, std::size_t bytes) {
   if (end > first) (void)::madvise(static_cast<std::byte*>(memory) + (first - start), end - first, MADV_HUGEPAGE);
 }
 
-bool shared_by_all(PeerMemory& memory, int ranks) {
-  for (int rank = 0; rank < ranks; ++rank) {
-    if (memory.of(rank).empty()) return false;
-  }
-  return true;
-}
-
 std::vector<std::size_t> all_tiles(const FrameLayout& layout) {
   std::vector<std::size_t> tiles(layout.tiles());
   std::iota(tiles.begin(), tiles.end(), std::size_t{0});

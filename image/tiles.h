@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/check.h"
+#include "core/peer_memory.h"
 #include "image/depth_format.h"
 #include "image/image.h"
 
@@ -65,25 +66,6 @@ class FrameLayout {
 
 /// Asks the system to back large memory with huge pages: frames are touched all over, and other ranks copy from them.
 void ask_for_huge_pages(void* memory, std::size_t bytes);
-
-/// Memory of every rank of a communicator, of which a rank sees its own and that of the ranks on its host. Layers that
-/// live in it can be merged where they lie. Whoever reads what another rank wrote needs a message between the two, or a
-/// meeting of all, first.
-class PeerMemory {
- public:
-  virtual ~PeerMemory() = default;
-
-  /// This rank's own.
-  [[nodiscard]] virtual std::span<std::byte> mine() = 0;
-  /// That of a rank; empty when it runs on another host.
-  [[nodiscard]] virtual std::span<std::byte> of(int rank) = 0;
-  /// Collective over the ranks of this host: returns when all of them have called it. Waits asleep, so that ranks that
-  /// still have work find a free core. Throws Error (Hang) past the communicator's time limit.
-  virtual void meet() = 0;
-};
-
-/// Whether all ranks of the communicator that `memory` came from, which has so many, run on this host.
-[[nodiscard]] bool shared_by_all(PeerMemory& memory, int ranks);
 
 /// One value per pixel of a frame, tile after tile, row-major inside a tile, and a flag per tile that says whether
 /// anything stands in it. Memory comes zeroed from the system and is touched only where tiles are active, so an empty

@@ -8,7 +8,8 @@
 #include "app/picture_files.h"
 #include "app/progress.h"
 #include "app/resolution.h"
-#include "cluster/scene_distribution.h"
+#include "app/stats_file.h"
+#include "cluster/agreement.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -42,7 +43,7 @@ View Console::view() const {
 std::string Console::set_size(Words words) {
   const auto extent = words.size() == 1 ? parse_extent(words[0]) : std::nullopt;
   if (!extent) refuse("a size is two numbers", "size 1920x1080");
-  check_size({extent->first, extent->second}, globals_);
+  check_size({extent->first, extent->second}, globals_.picture_limits());
   size_ = {extent->first, extent->second};
   return "";
 }

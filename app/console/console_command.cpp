@@ -1,5 +1,3 @@
-#include "app/console/console_command.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -8,17 +6,20 @@
 #include <optional>
 #include <utility>
 
+#include "app/command.h"
 #include "app/console/console.h"
 #include "app/console/forgivable.h"
 #include "app/console/hearing.h"
 #include "app/launcher.h"
-#include "app/remote_wall.h"
 #include "app/render_options.h"
 #include "app/report_error.h"
+#include "app/run_ranks.h"
+#include "cluster/agreement.h"
 #include "cluster/collectives.h"
-#include "cluster/scene_distribution.h"
+#include "core/job_environment.h"
 #include "core/log.h"
 #include "core/units.h"
+#include "walls/link/token.h"
 
 namespace hpr {
 namespace {
@@ -46,7 +47,7 @@ class ConsoleCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const auto extent = parse_extent(size_);
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
-    check_size({extent->first, extent->second}, globals);
+    check_size({extent->first, extent->second}, globals.picture_limits());
     if (!options_.stats.empty() || options_.explain) {
       throw Error(ExitCode::Usage, "--stats and --explain are commands here", "say stats FILE.json, or explain");
     }
@@ -54,7 +55,7 @@ class ConsoleCommand final : public Command {
     (void)options_.sampling();
     return run_ranks(globals,
                      [&](Communicator& comm) {
-                       Session session(comm, globals, [&] { return options_.load(source_, globals); });
+                       Session session(comm, globals.session(), [&] { return options_.load(source_, globals); });
                        Console console(session, globals, options_, {extent->first, extent->second});
                        return converse(session.comm(), console);
                      },
@@ -155,6 +156,7 @@ class ConsoleCommand final : public Command {
 
 }  // namespace
 
+/// `hpr console SCENE`.
 std::unique_ptr<Command> make_console_command() {
   return std::make_unique<ConsoleCommand>();
 }

@@ -10,9 +10,9 @@
 #include <cerrno>
 #include <vector>
 
-#include "app/remote_wall.h"
 #include "core/log.h"
 #include "core/secrets.h"
+#include "walls/link/token.h"
 
 namespace hpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/command.h"
+#include "app/globals.h"
 #include "app/stability/stability.h"
 #include "image/color.h"
 #include "image/image.h"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/command.h"
+#include "app/globals.h"
 
 namespace hpr {
 

@@ -139,7 +139,7 @@ double edges(const Image<Key>& keys) {
 Picture make_picture(const Globals& globals, const Scene& scene, const View& view, const RaySettings& settings) {
   Picture picture;
   run_local_ranks(1, [&](Communicator& comm) {
-    Session session(comm, globals, [&] { return scene; });
+    Session session(comm, globals.session(), [&] { return scene; });
     FrameSettings frame_settings;
     frame_settings.rays = settings;
     const std::array views{view};

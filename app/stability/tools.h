@@ -8,7 +8,7 @@
 #include <memory>
 #include <span>
 
-#include "app/command.h"
+#include "app/globals.h"
 #include "image/color.h"
 #include "image/key.h"
 #include "image/tiles.h"

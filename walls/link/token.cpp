@@ -1,13 +1,26 @@
 #include "walls/link/token.h"
 
+#include <fmt/format.h>
+#include <hpr/version.h>
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
+
+#include <cstdlib>
 
 #include "core/check.h"
 #include "core/secrets.h"
 
 namespace hpr {
+
+std::string link_build() {
+  return fmt::format("hpr {} ({})", kVersion, kCommit);
+}
+
+std::string link_token() {
+  const char* const token = std::getenv("HPR_TOKEN");  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
+  return token == nullptr ? "" : token;
+}
 
 LinkNonce make_nonce() {
   LinkNonce nonce{};

@@ -7,6 +7,12 @@
 /// The session token: both ends of a TCP link show that they know it without sending it.
 namespace hpr {
 
+/// What a display process and a run compare to know that they are of one build.
+[[nodiscard]] std::string link_build();
+
+/// The secret that both ends of a TCP link know: HPR_TOKEN; empty where it is not set.
+[[nodiscard]] std::string link_token();
+
 /// Random bytes from the system.
 [[nodiscard]] LinkNonce make_nonce();
 

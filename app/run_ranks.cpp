@@ -1,9 +1,10 @@
+#include "app/run_ranks.h"
+
 #include <fmt/format.h>
 #include <mpi.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
@@ -11,17 +12,15 @@
 #include <optional>
 #include <thread>
 
-#include "app/command.h"
-#include "app/host_name.h"
 #include "app/launcher.h"
 #include "app/report_error.h"
 #include "app/trace_file.h"
 #include "cluster/collectives.h"
 #include "cluster/local_communicator.h"
 #include "cluster/mpi_communicator.h"
-#include "cluster/texts.h"
+#include "core/host_name.h"
+#include "core/job_environment.h"
 #include "core/log.h"
-#include "core/parallel.h"
 
 namespace hpr {
 namespace {
@@ -92,33 +91,6 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
 }
 
 }  // namespace
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
-}
-
-std::string said_by(int rank) {
-  return rank == 0 ? "" : fmt::format("rank {} on {}: ", rank, host_name());
-}
-
-HostShare host_share(Communicator& comm, const Globals& globals) {
-  const std::string mine = host_name();
-  HostShare share;
-  share.host = mine;
-  share.ranks = 0;
-  const std::vector<std::string> hosts = all_gather_texts(comm, mine);
-  for (int rank = 0; rank < comm.size(); ++rank) {
-    if (hosts[static_cast<std::size_t>(rank)] != mine) continue;
-    if (rank < comm.rank()) ++share.local_rank;
-    ++share.ranks;
-  }
-  // A launcher may already have given this rank cores of its own; else the ranks of a host share all of them.
-  const int online = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  share.threads = globals.threads > 0 ? globals.threads : std::clamp(online / share.ranks, 1, usable_cores());
-  return share;
-}
 
 ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& untraced,
                    const JobOptions& options) {

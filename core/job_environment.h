@@ -1,0 +1,29 @@
+#pragma once
+
+/// What the environment of this process says about the MPI job it belongs to, before MPI starts.
+namespace hpr {
+
+/// Set for rank 0, whose standard input is a pipe, when its launcher reads from a terminal.
+inline constexpr const char* kTypedInputVariable = "HPR_TYPED_INPUT";
+/// Set for the ranks of a job, whose stderr is a pipe, when their launcher's stderr is a terminal.
+inline constexpr const char* kTerminalVariable = "HPR_TERMINAL";
+/// Set for the ranks of a job that this program launched: rank 0 reports on standard output, before all else, that the
+/// ranks have started. Open MPI takes variables of this prefix to other hosts.
+inline constexpr const char* kReportStartVariable = "OMPI_HPR_SAY_START";
+
+/// True when this process was started by mpirun, mpiexec or srun as one rank of a job.
+[[nodiscard]] bool inside_mpi_job();
+
+/// True when this program launched the job, in a process that waits for this one.
+[[nodiscard]] bool launched_by_hpr();
+
+/// This process's rank as its launcher wrote it into the environment. 0 outside a job.
+[[nodiscard]] int launched_rank();
+
+/// Whether standard input of this process, or of its launcher, is a terminal.
+[[nodiscard]] bool input_is_typed();
+
+/// Whether stderr of this process, or of the launcher of its job, is a terminal: a progress bar may redraw itself.
+[[nodiscard]] bool stderr_is_terminal();
+
+}  // namespace hpr
