@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/globals.h"
+#include "app/options/globals.h"
 #include "core/error.h"
 
 namespace CLI {

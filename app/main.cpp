@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "app/command.h"
-#include "app/knobs.h"
+#include "app/options/knobs.h"
 #include "app/report_error.h"
 #include "app/trace_file.h"
 #include "core/host_name.h"
@@ -245,7 +245,7 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   // So does a file that may not grow further.
   std::signal(SIGXFSZ, SIG_IGN);
-  // What a checkpoint is asked for by is nothing to commands that write none (app/signals.h).
+  // What a checkpoint is asked for by is nothing to commands that write none (engine/signals.h).
   for (const int request : {SIGUSR1, SIGUSR2}) std::signal(request, SIG_IGN);
   // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "app/wall_status.h"
 #include "core/file.h"
-#include "walls/budget_json.h"
+#include "engine/wall/wall_status.h"
+#include "walls/manifest/budget_json.h"
 
 namespace hpr {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "app/output.h"
+#include "engine/output.h"
 
 namespace hpr {
 

@@ -17,11 +17,11 @@
 #include <utility>
 #include <vector>
 
-#include "app/shell_line.h"
-#include "cluster/agreement.h"
-#include "cluster/collectives.h"
-#include "cluster/local_communicator.h"
-#include "cluster/tracing_communicator.h"
+#include "app/launch/shell_line.h"
+#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/local_communicator.h"
+#include "cluster/transport/tracing_communicator.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/host_name.h"

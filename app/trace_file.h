@@ -2,8 +2,8 @@
 
 #include <functional>
 
-#include "app/globals.h"
-#include "cluster/communicator.h"
+#include "app/options/globals.h"
+#include "cluster/transport/communicator.h"
 #include "core/error.h"
 
 namespace hpr {

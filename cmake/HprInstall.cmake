@@ -1,16 +1,16 @@
 # What `cmake --install` leaves: the program, and below it a library for strategies of one's own: find_package(HPR) gives
-# hpr::core, hpr::image, hpr::scene, hpr::cluster, hpr::compositing and what they depend on.
+# hpr::core, hpr::image, hpr::scene, hpr::transport, hpr::distribution, hpr::compositing and what they depend on.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS hpr RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS hpr_imageio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
-set(library core image scene cluster compositing)
+set(library core image scene transport distribution compositing)
 foreach(part IN LISTS library ITEMS options version)
   set_target_properties(hpr_${part} PROPERTIES EXPORT_NAME ${part})
   install(TARGETS hpr_${part} EXPORT HPRTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endforeach()
-install(DIRECTORY ${library} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hpr FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY core image scene cluster compositing DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hpr FILES_MATCHING PATTERN "*.h")
 install(FILES ${PROJECT_BINARY_DIR}/generated/hpr/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hpr/hpr)
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/HPR)

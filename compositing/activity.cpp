@@ -1,6 +1,6 @@
 #include "compositing/activity.h"
 
-#include "cluster/collectives.h"
+#include "cluster/transport/collectives.h"
 #include "core/check.h"
 
 namespace hpr {

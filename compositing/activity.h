@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "cluster/communicator.h"
+#include "cluster/transport/communicator.h"
 #include "compositing/sparse.h"
 #include "image/tiles.h"
 

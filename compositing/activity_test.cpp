@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "cluster/local_communicator.h"
+#include "cluster/transport/local_communicator.h"
 #include "compositing/test_layers.h"
 
 namespace hpr {

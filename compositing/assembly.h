@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "cluster/communicator.h"
+#include "cluster/transport/communicator.h"
 #include "compositing/tile_codec.h"
 #include "core/check.h"
 #include "core/error.h"

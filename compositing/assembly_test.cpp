@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "cluster/counting_communicator.h"
-#include "cluster/local_communicator.h"
+#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
 #include "compositing/test_layers.h"
 #include "core/error.h"

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "cluster/renumbered_communicator.h"
-#include "compositing/binary_swap.h"
-#include "compositing/direct_send.h"
-#include "compositing/radix_k.h"
-#include "compositing/serial.h"
-#include "compositing/shared_memory.h"
-#include "compositing/tree.h"
+#include "cluster/transport/renumbered_communicator.h"
+#include "compositing/strategies/binary_swap.h"
+#include "compositing/strategies/direct_send.h"
+#include "compositing/strategies/radix_k.h"
+#include "compositing/strategies/serial.h"
+#include "compositing/strategies/shared_memory.h"
+#include "compositing/strategies/tree.h"
 #include "core/error.h"
 #include "core/names.h"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cluster/communicator.h"
+#include "cluster/transport/communicator.h"
 #include "compositing/compositor.h"
 #include "image/premultiplied.h"
 #include "image/tiles.h"

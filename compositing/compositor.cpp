@@ -4,15 +4,15 @@
 
 #include <string>
 
-#include "compositing/auto.h"
-#include "compositing/binary_swap.h"
-#include "compositing/direct_send.h"
-#include "compositing/mpi_reduce.h"
-#include "compositing/radix_k.h"
-#include "compositing/ring.h"
-#include "compositing/serial.h"
-#include "compositing/shared_memory.h"
-#include "compositing/tree.h"
+#include "compositing/strategies/auto.h"
+#include "compositing/strategies/binary_swap.h"
+#include "compositing/strategies/direct_send.h"
+#include "compositing/strategies/mpi_reduce.h"
+#include "compositing/strategies/radix_k.h"
+#include "compositing/strategies/ring.h"
+#include "compositing/strategies/serial.h"
+#include "compositing/strategies/shared_memory.h"
+#include "compositing/strategies/tree.h"
 #include "core/error.h"
 #include "core/names.h"
 

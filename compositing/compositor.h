@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "cluster/communicator.h"
-#include "compositing/cost_model.h"
+#include "cluster/transport/communicator.h"
+#include "compositing/model/cost_model.h"
 #include "image/key.h"
 #include "image/tiles.h"
 

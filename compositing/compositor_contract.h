@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cluster/local_communicator.h"
+#include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
 #include "compositing/test_layers.h"
 

@@ -9,12 +9,12 @@
 #include <random>
 #include <vector>
 
-#include "cluster/counting_communicator.h"
-#include "cluster/local_communicator.h"
+#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/local_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
+#include "compositing/model/synthetic.h"
 #include "compositing/narrow_keys.h"
-#include "compositing/synthetic.h"
 #include "compositing/test_layers.h"
 
 namespace hpr {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "cluster/communicator.h"
+#include "cluster/transport/communicator.h"
 #include "compositing/tile_codec.h"
 #include "core/byte_buffer.h"
 #include "image/key.h"

@@ -4,17 +4,17 @@
 #include <bit>
 #include <string>
 
-#include "cluster/counting_communicator.h"
-#include "cluster/local_communicator.h"
-#include "compositing/binary_swap.h"
-#include "compositing/direct_send.h"
-#include "compositing/radix_k.h"
-#include "compositing/ring.h"
-#include "compositing/serial.h"
-#include "compositing/shared_memory.h"
-#include "compositing/synthetic.h"
+#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/local_communicator.h"
+#include "compositing/model/synthetic.h"
+#include "compositing/strategies/binary_swap.h"
+#include "compositing/strategies/direct_send.h"
+#include "compositing/strategies/radix_k.h"
+#include "compositing/strategies/ring.h"
+#include "compositing/strategies/serial.h"
+#include "compositing/strategies/shared_memory.h"
+#include "compositing/strategies/tree.h"
 #include "compositing/test_layers.h"
-#include "compositing/tree.h"
 #include "core/error.h"
 
 // What each strategy sends, held to what its paper says: messages exactly, bytes up to the head of a message.

@@ -12,8 +12,8 @@
 #include <string>
 #include <tuple>
 
-#include "cluster/counting_communicator.h"
-#include "cluster/local_communicator.h"
+#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/local_communicator.h"
 #include "compositing/blender.h"
 #include "compositing/over.h"
 #include "compositing/test_layers.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "cluster/communicator.h"
+#include "cluster/transport/communicator.h"
 #include "compositing/sparse.h"
 #include "core/byte_buffer.h"
 #include "image/key.h"

@@ -8,7 +8,7 @@
 #include <random>
 #include <utility>
 
-#include "cluster/local_communicator.h"
+#include "cluster/transport/local_communicator.h"
 #include "compositing/sparse.h"
 #include "compositing/test_layers.h"
 #include "core/error.h"

@@ -9,9 +9,9 @@
 #include "core/error.h"
 #include "raster/gl_functions.h"
 #include "raster/raster_test_scenes.h"
-#include "scene/generated.h"
-#include "scene/gltf_test_tools.h"
-#include "scene/gltf_writer.h"
+#include "scene/generators/generated.h"
+#include "scene/gltf/test_tools.h"
+#include "scene/gltf/writer.h"
 
 namespace hpr {
 namespace {

@@ -12,15 +12,15 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/trace.h"
-#include "rt/denormals.h"
-#include "rt/direct_light.h"
-#include "rt/first_points.h"
-#include "rt/half_resolution.h"
-#include "rt/light_scratch.h"
-#include "rt/pass.h"
-#include "rt/path_tracer.h"
-#include "rt/photon_maps.h"
+#include "rt/lights/direct_light.h"
+#include "rt/passes/first_points.h"
+#include "rt/passes/half_resolution.h"
+#include "rt/passes/light_scratch.h"
+#include "rt/passes/pass.h"
+#include "rt/photons/photon_maps.h"
+#include "rt/reference/path_tracer.h"
 #include "rt/tile_output.h"
+#include "rt/trace/denormals.h"
 
 namespace hpr {
 namespace {

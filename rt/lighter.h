@@ -11,14 +11,14 @@
 #include <string_view>
 #include <vector>
 
-#include "cluster/communicator.h"
+#include "cluster/transport/communicator.h"
 #include "image/color.h"
 #include "image/key.h"
 #include "image/pixel_filter.h"
 #include "image/tiles.h"
-#include "rt/ray_build.h"
-#include "rt/sampler.h"
+#include "rt/sampling/sampler.h"
 #include "rt/screen_pixel.h"
+#include "rt/trace/ray_build.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 #include "scene/view.h"

@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "rt/first_points.h"
 #include "rt/lighter.h"
-#include "rt/pass.h"
+#include "rt/passes/first_points.h"
+#include "rt/passes/pass.h"
 
 namespace hpr {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "scene/gltf_test_tools.h"
+#include "scene/gltf/test_tools.h"
 
 namespace hpr {
 namespace {

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "scene/generated.h"
-#include "scene/gltf_loader.h"
+#include "scene/generators/generated.h"
+#include "scene/gltf/loader.h"
 
 namespace hpr {
 namespace {

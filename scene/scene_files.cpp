@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
-#include "scene/gltf_scan.h"
-#include "scene/gltf_uri.h"
+#include "scene/gltf/scan.h"
+#include "scene/gltf/uri.h"
 
 namespace hpr {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scene/gltf_test_tools.h"
+#include "scene/gltf/test_tools.h"
 
 namespace hpr {
 namespace {

@@ -11,7 +11,8 @@ import shutil
 import subprocess
 import sys
 
-FOLDERS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "app", "tests", "bench", "docs"]
+FOLDERS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "engine", "app", "tools", "tests",
+           "bench", "docs"]
 LONGEST = 700
 
 

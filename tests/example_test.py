@@ -24,7 +24,7 @@ extern "C" const hpr::CompositorPlugin* hpr_compositor_plugin() {
 }
 """
 TAKEN = """#include "compositing/plugin.h"
-#include "compositing/serial.h"
+#include "compositing/strategies/serial.h"
 HPR_COMPOSITOR_PLUGIN(hpr::Serial)
 """
 failures = []

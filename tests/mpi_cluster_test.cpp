@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "cluster/collectives.h"
-#include "cluster/mpi_communicator.h"
-#include "cluster/scene_distribution.h"
-#include "cluster/test_exchange.h"
+#include "cluster/distribution/scene_distribution.h"
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/mpi_communicator.h"
+#include "cluster/transport/test_exchange.h"
 #include "core/error.h"
 
 namespace hpr {

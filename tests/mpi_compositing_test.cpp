@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "cluster/mpi_communicator.h"
+#include "cluster/transport/mpi_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/blender.h"
 #include "compositing/compositor.h"

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "app/bench_times.h"
 #include "core/stopwatch.h"
 #include "raster/rasterizer.h"
-#include "rt/primary_rays.h"
-#include "rt/surfaces.h"
+#include "rt/trace/primary_rays.h"
+#include "rt/trace/surfaces.h"
 #include "scene/load_scene.h"
+#include "tools/bench/bench_times.h"
 
 // Keys by OpenGL against keys by rays. HPR_AGREEMENT="SCENE SCENE ..." compares, and times, those scenes at 1920x1080.
 namespace hpr {

@@ -5,16 +5,16 @@
 
 #include <utility>
 
-#include "app/picture_files.h"
-#include "app/progress.h"
-#include "app/resolution.h"
 #include "app/stats_file.h"
-#include "cluster/agreement.h"
+#include "cluster/transport/agreement.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/names.h"
+#include "core/progress.h"
 #include "core/stopwatch.h"
 #include "core/units.h"
+#include "engine/picture_files.h"
+#include "engine/resolution.h"
 
 namespace hpr {
 

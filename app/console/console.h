@@ -3,9 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "app/console/controls.h"
-#include "app/frame_sampler.h"
-#include "app/output.h"
+#include "engine/frame_sampler.h"
+#include "engine/output.h"
+#include "engine/wall/controls.h"
 
 namespace hpr {
 

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "walls/codec.h"
-#include "walls/codec_choice.h"
+#include "walls/codecs/codec.h"
+#include "walls/codecs/codec_choice.h"
 
 namespace hpr {
 

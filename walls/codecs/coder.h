@@ -8,7 +8,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
-#include "walls/codec.h"
+#include "walls/codecs/codec.h"
 
 namespace hpr {
 

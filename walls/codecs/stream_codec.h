@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "walls/codec.h"
+#include "walls/codecs/codec.h"
 #include "walls/codecs/coder.h"
 #include "walls/codecs/envelope.h"
 

@@ -12,7 +12,7 @@
 #include "core/names.h"
 #include "core/stopwatch.h"
 #include "image/image_io.h"
-#include "walls/scan_out.h"
+#include "walls/drawing/scan_out.h"
 
 namespace hpr {
 namespace {

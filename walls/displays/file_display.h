@@ -1,6 +1,6 @@
 #pragma once
 
-#include "walls/display.h"
+#include "walls/displays/display.h"
 
 namespace hpr {
 

@@ -8,9 +8,9 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/names.h"
-#include "walls/assemble.h"
 #include "walls/displays/sink.h"
-#include "walls/y4m.h"
+#include "walls/displays/y4m.h"
+#include "walls/drawing/assemble.h"
 
 namespace hpr {
 namespace {

@@ -9,8 +9,8 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/stopwatch.h"
-#include "walls/display.h"
-#include "walls/wall_file.h"
+#include "walls/config/wall_file.h"
+#include "walls/displays/display.h"
 
 namespace hpr {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "walls/assemble.h"
+#include "walls/drawing/assemble.h"
 
 namespace hpr {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "core/stopwatch.h"
 #include "walls/codecs/jpeg_encoder.h"
-#include "walls/display.h"
-#include "walls/geometry.h"
+#include "walls/displays/display.h"
+#include "walls/geometry/geometry.h"
 
 namespace hpr {
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "walls/wall_file.h"
+#include "walls/config/wall_file.h"
 
 namespace hpr {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "walls/display.h"
+#include "walls/displays/display.h"
 
 /// What of a browser's request is believed.
 namespace hpr {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "core/error.h"
-#include "walls/wall_file.h"
+#include "walls/config/wall_file.h"
 
 namespace hpr {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "walls/displays/window_thread.h"
-#include "walls/scan_out.h"
+#include "walls/drawing/scan_out.h"
 
 namespace hpr {
 namespace {

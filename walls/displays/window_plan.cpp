@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "walls/geometry.h"
+#include "walls/geometry/geometry.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "walls/wall.h"
+#include "walls/config/wall.h"
 
 namespace hpr {
 

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "walls/scan_out.h"
-#include "walls/wall_file.h"
+#include "walls/config/wall_file.h"
+#include "walls/drawing/scan_out.h"
 
 namespace hpr {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
-#include "walls/display.h"
+#include "walls/displays/display.h"
 #include "walls/displays/window_plan.h"
 
 namespace hpr {

@@ -13,7 +13,7 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "image/image_parts.h"
-#include "walls/canvas.h"
+#include "walls/drawing/canvas.h"
 
 namespace hpr {
 namespace {

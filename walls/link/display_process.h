@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "walls/display.h"
+#include "walls/config/wall.h"
+#include "walls/displays/display.h"
 #include "walls/link/receiver.h"
-#include "walls/wall.h"
 
 namespace hpr {
 

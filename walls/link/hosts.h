@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "walls/config/wall.h"
 #include "walls/link/protocol.h"
-#include "walls/wall.h"
 
 namespace hpr {
 

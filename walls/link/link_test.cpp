@@ -10,10 +10,10 @@
 #include <thread>
 
 #include "core/error.h"
+#include "walls/config/wall_file.h"
 #include "walls/link/display_process.h"
 #include "walls/link/receiver.h"
 #include "walls/link/sender.h"
-#include "walls/wall_file.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "core/hash.h"
-#include "walls/wall_file.h"
+#include "walls/config/wall_file.h"
 
 namespace hpr {
 namespace {

@@ -11,13 +11,13 @@
 #include <thread>
 #include <vector>
 
-#include "walls/codec.h"
-#include "walls/display.h"
+#include "walls/codecs/codec.h"
+#include "walls/config/wall.h"
+#include "walls/displays/display.h"
 #include "walls/link/client_link.h"
 #include "walls/link/clock.h"
 #include "walls/link/hosts.h"
 #include "walls/link/swap_barrier.h"
-#include "walls/wall.h"
 
 namespace hpr {
 

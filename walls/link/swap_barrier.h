@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "walls/manifest.h"
+#include "walls/manifest/manifest.h"
 
 namespace hpr {
 

@@ -1,0 +1,206 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "app/command.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "scene/generators/generated.h"
+#include "scene/gltf/writer.h"
+#include "scene/load_scene.h"
+#include "scene/requirements.h"
+
+namespace hpr {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Names from files may hold anything; JSON wants UTF-8.
+std::string dump(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+Json corner(const glm::dvec3& p) {
+  return Json::array({p.x, p.y, p.z});
+}
+
+Json requirement_json(const Requirement& requirement) {
+  return {{"needed", requirement.needed}, {"why", requirement.why}};
+}
+
+Json info_json(const Scene& scene) {
+  const Requirements required = requirements_of(scene);
+  Json cameras = Json::array();
+  for (const Camera& camera : scene.cameras) cameras.push_back(camera.name);
+  return {{"schema", "hpr.scene-info/1"},
+          {"triangles", scene.triangles},
+          {"meshes", scene.meshes.size()},
+          {"instances", scene.instances.size()},
+          {"materials", scene.materials.size()},
+          {"textures", scene.textures.size()},
+          {"lights", scene.lights.size()},
+          {"cameras", cameras},
+          {"bounds", Json::array({corner(scene.bounds.low), corner(scene.bounds.high)})},
+          {"requires",
+           {{"shadow", requirement_json(required.shadow)},
+            {"reflection", requirement_json(required.reflection)},
+            {"refraction", requirement_json(required.refraction)},
+            {"photon", requirement_json(required.photon)}}},
+          {"warnings", scene.warnings}};
+}
+
+void print_info(const Scene& scene) {
+  const glm::dvec3& low = scene.bounds.low;
+  const glm::dvec3& high = scene.bounds.high;
+  fmt::print("{}\n", printable(scene.name));
+  fmt::print("  triangles  {}\n  meshes     {}\n  instances  {}\n", scene.triangles, scene.meshes.size(),
+             scene.instances.size());
+  fmt::print("  materials  {}\n  textures   {}\n  lights     {}\n", scene.materials.size(), scene.textures.size(),
+             scene.lights.size());
+  fmt::print("  bounds     {:g} {:g} {:g} to {:g} {:g} {:g} m\n", low.x, low.y, low.z, high.x, high.y, high.z);
+  for (const Camera& camera : scene.cameras) fmt::print("  camera     {}\n", printable(camera.name));
+  const Requirements required = requirements_of(scene);
+  const auto line = [](const char* name, const Requirement& requirement) {
+    fmt::print("  {:<10} {}: {}\n", name, requirement.needed ? "needed" : "not needed", requirement.why);
+  };
+  line("shadow", required.shadow);
+  line("reflection", required.reflection);
+  line("refraction", required.refraction);
+  line("photon", required.photon);
+}
+
+void log_warnings(const Scene& scene) {
+  for (const std::string& warning : scene.warnings) log::warning("{}", printable(warning, 400));
+}
+
+/// Looks at scenes and makes them: what is in one, whether it can be drawn, and those HPR generates.
+class SceneCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "scene"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "what a scene holds, whether it loads, and new ones";
+  }
+
+  void declare(CLI::App& app) override {
+    app.require_subcommand(1);
+    info_ = app.add_subcommand("info", "counts, bounds and the passes the scene requires");
+    validate_ = app.add_subcommand("validate", "findings; exit code 0 when the scene can be drawn");
+    for (CLI::App* const sub : {info_, validate_}) {
+      sub->add_option("SCENE", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+      sub->add_flag("--json", json_, "one JSON document");
+      sub->fallthrough();
+    }
+    make_ = app.add_subcommand("make", "writes a generated scene as binary glTF");
+    make_->add_option("NAME", source_, "one of `hpr scene list`, also as NAME?key=value")->required();
+    make_->add_option("--triangles", triangles_, "about this many, the nearest size the generator has")
+        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{4'294'967'294}));
+    make_->add_option("-o", output_, "the .glb file")->required();
+    make_->fallthrough();
+    list_ = app.add_subcommand("list", "the scenes HPR generates and their options");
+    list_->fallthrough();
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    if (info_->parsed()) return info(globals);
+    if (validate_->parsed()) return validate(globals);
+    if (make_->parsed()) return make(globals);
+    return list();
+  }
+
+ private:
+  [[nodiscard]] ExitCode info(const Globals& globals) const {
+    const Scene scene = load_scene(source_, globals.scene_limits());
+    if (json_) {
+      fmt::print("{}\n", dump(info_json(scene)));
+    } else {
+      print_info(scene);
+      log_warnings(scene);
+    }
+    return ExitCode::Done;
+  }
+
+  [[nodiscard]] ExitCode validate(const Globals& globals) const {
+    Json json{{"schema", "hpr.scene-validate/1"}, {"scene", source_}};
+    try {
+      const Scene scene = load_scene(source_, globals.scene_limits());
+      log_warnings(scene);
+      if (json_) {
+        json["verdict"] = scene.warnings.empty() ? "ok" : "warn";
+        json["warnings"] = scene.warnings;
+        fmt::print("{}\n", dump(json));
+      } else {
+        fmt::print("{}: can be drawn: {} triangles, {} warnings\n", printable(source_, 300), scene.triangles,
+                   scene.warnings.size());
+      }
+      return ExitCode::Done;
+    } catch (const Error& error) {
+      if (json_) {
+        json["verdict"] = "error";
+        json["error"] = error.what();
+        json["exit_code"] = static_cast<int>(error.code());
+        fmt::print("{}\n", dump(json));
+      }
+      throw;
+    }
+  }
+
+  [[nodiscard]] ExitCode make(const Globals& globals) const {
+    constexpr std::string_view kPrefix = "gen:";  // as `list` names them
+    std::string text = source_.starts_with(kPrefix) ? source_.substr(kPrefix.size()) : source_;
+    const Generator& generator = find_generator(text.substr(0, text.find('?')));
+    if (!output_.ends_with(".glb")) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("cannot write '{}': scenes are written as binary glTF", printable(output_)),
+                  "name a .glb file");
+    }
+    const auto add = [&](const std::string& key, const std::string& value) {
+      text += fmt::format("{}{}={}", text.find('?') == std::string::npos ? '?' : '&', key, value);
+    };
+    if (triangles_ > 0) {
+      const GeneratorOptions options = options_for_triangles(generator, triangles_);
+      if (options.empty()) log::warning("{} has only one size; --triangles changes nothing", generator.name);
+      for (const auto& [key, value] : options) add(key, value);
+    }
+    constexpr std::uint64_t kDefaultSeed = 1;
+    if (generator.options.contains("seed")) {
+      if (text.find("seed=") == std::string::npos) add("seed", std::to_string(globals.seed));
+    } else if (globals.seed != kDefaultSeed) {
+      log::warning("{} has nothing random; --seed changes nothing", generator.name);
+    }
+    check_writable(output_, globals.force);
+    const Scene scene = generate_scene(text);
+    if (scene.background != Rgb{}) log::warning("glTF has no backgrounds; that of gen:{} is left out", text);
+    const std::vector<std::byte> file = encode_glb(scene);
+    write_file_atomically(output_, file);
+    log::info("{}: gen:{}, {} triangles, {} bytes", output_, text, scene.triangles, file.size());
+    return ExitCode::Done;
+  }
+
+  [[nodiscard]] static ExitCode list() {
+    for (const Generator& generator : all_generators()) {
+      fmt::print("gen:{}  {}\n", generator.name, generator.summary);
+      for (const auto& [key, meaning] : generator.options) fmt::print("    {:<10} {}\n", key, meaning);
+    }
+    return ExitCode::Done;
+  }
+
+  CLI::App* info_ = nullptr;
+  CLI::App* validate_ = nullptr;
+  CLI::App* make_ = nullptr;
+  CLI::App* list_ = nullptr;
+  std::string source_;
+  std::string output_;
+  std::uint64_t triangles_ = 0;
+  bool json_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_scene_command() {
+  return std::make_unique<SceneCommand>();
+}
+
+}  // namespace hpr

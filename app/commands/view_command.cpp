@@ -1,0 +1,57 @@
+#include <CLI/CLI.hpp>
+
+#include "app/command.h"
+#include "app/commands/wall_run.h"
+#include "core/job_environment.h"
+#include "walls/displays/window_display.h"
+
+namespace hpr {
+namespace {
+
+class ViewCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "view"; }
+  [[nodiscard]] std::string_view summary() const override { return "look around in a scene: in windows or a browser"; }
+
+  void declare(CLI::App& app) override {
+    app.add_option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+    app.add_option("--wall", run_.wall, "a wall file, or CxR, or CxR@WxH")->capture_default_str();
+    app.add_flag("--web", address_, "=ADDR:PORT: in a browser instead of windows; by default on loopback, a free port");
+    app.add_option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
+        ->check(CLI::Range(1, 1'000'000));
+    declare_target_ms(app, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
+    run_.options.declare(app);
+    app.get_option("--aov")->group("");  // it writes no files, and refuses it
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    run_.display.display = display();
+    return run_wall(run_, globals);
+  }
+
+ private:
+  /// By the command line and, on rank 0, whether there is a desktop; the others will take its word.
+  [[nodiscard]] std::string display() const {
+    if (address_.empty()) return launched_rank() == 0 && has_desktop() ? "window" : "web";
+    return address_ == "true" ? "web" : "web=" + address_;  // a flag without a value is true
+  }
+
+  WallRun run_ = first_view();
+  std::string address_;
+
+  [[nodiscard]] static WallRun first_view() {
+    WallRun run;
+    run.wall = "1x1@1280x720";
+    return run;
+  }
+};
+
+}  // namespace
+
+/// `hpr view SCENE`: a wall in windows, or in a browser where there is no desktop.
+std::unique_ptr<Command> make_view_command() {
+  return std::make_unique<ViewCommand>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,104 @@
+#include "app/commands/wall_init.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+
+#include "app/launch/shell_line.h"
+#include "app/output_files.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "core/units.h"
+#include "engine/output.h"
+#include "walls/config/host_list.h"
+#include "walls/config/wall_file.h"
+#include "walls/config/wall_template.h"
+
+namespace hpr {
+namespace {
+
+std::optional<double> metres_of(std::string_view text) {
+  double metres = 0.0;
+  const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), metres);
+  if (failed != std::errc() || end != text.data() + text.size() || !std::isfinite(metres)) return std::nullopt;
+  return metres;
+}
+
+/// "1.018x0.573", or with `one_is_both` also "0.0055".
+glm::dvec2 metres_pair(const std::string& option, const std::string& text, bool one_is_both) {
+  const std::size_t cross = text.find('x');
+  const auto first = metres_of(std::string_view(text).substr(0, cross));
+  const auto second = cross == std::string::npos ? first : metres_of(std::string_view(text).substr(cross + 1));
+  if (first && second && (one_is_both || cross != std::string::npos)) return {*first, *second};
+  throw Error(ExitCode::Usage, fmt::format("{}: '{}' is no two lengths in metres", option, printable(text)),
+              fmt::format("write e.g. {} {}", option, one_is_both ? "0.0055, or 0.0055x0.004" : "1.018x0.573"));
+}
+
+class WallInitCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "init"; }
+  [[nodiscard]] std::string_view summary() const override { return "a wall file to begin with"; }
+
+  void declare(CLI::App& app) override {
+    app.add_option("--cols", wall_.columns, "screens beside each other")->required();
+    app.add_option("--rows", wall_.rows, "screens above each other")->required();
+    app.add_option("--hosts", hosts_, "as Slurm writes them: wall0[1-9] or a[01-03,07],b2 (default: this machine)")
+        ->type_name("LIST");
+    app.add_option("--tiles-per-host", wall_.tiles_per_host, "neighbours each drives (default: shared out evenly)")
+        ->check(CLI::Range(1, kMostScreens));
+    app.add_option("--ranks-per-host", wall_.ranks_per_host, "render processes on each")
+        ->check(CLI::Range(1, 4096))
+        ->capture_default_str();
+    app.add_option("--tile-pixels", pixels_, "of a screen (default: 1920x1080; on this machine 640x360)")
+        ->type_name("WxH");
+    app.add_option("--tile-size-m", size_, "a screen's lit area in metres (default: of a 46 inch panel)")
+        ->type_name("WxH");
+    app.add_option("--gap-m", gap_, "metres from lit edge to lit edge (default: 0.0055; negative: overlap)")
+        ->type_name("GAP|XxY");
+    app.add_option("-o,--output", output_, "instead of standard output")->type_name("FILE");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    WallTemplate wall = wall_;
+    if (!hosts_.empty()) wall.hosts = parse_host_list(hosts_);
+    if (hosts_.empty() && wall.tiles_per_host) {
+      throw Error(ExitCode::Usage, "--tiles-per-host needs hosts", "name them, e.g. --hosts wall0[1-9]");
+    }
+    if (!pixels_.empty()) {
+      const auto extent = parse_extent(pixels_);
+      if (!extent) {
+        throw Error(ExitCode::Usage, fmt::format("--tile-pixels: '{}' is no size of a screen", printable(pixels_)),
+                    "write e.g. 1920x1080");
+      }
+      wall.tile_pixels = Size{extent->first, extent->second};
+    }
+    if (!size_.empty()) wall.tile_size_m = metres_pair("--tile-size-m", size_, false);
+    if (!gap_.empty()) wall.gap_m = metres_pair("--gap-m", gap_, true);
+    wall.command = "hpr " + shell_line(globals.args);
+    const std::string text = write_wall_template(wall);
+    for (const WallFinding& finding : parse_wall(text, "the new wall").findings) {
+      if (finding.error) throw Error(ExitCode::Usage, finding.what, finding.hint, finding.line);
+      log::warning("{} ({})", finding.what, finding.hint);
+    }
+    write_or_print(text, output_, globals.force);
+    return ExitCode::Done;
+  }
+
+ private:
+  WallTemplate wall_;
+  std::string hosts_;
+  std::string pixels_;
+  std::string size_;
+  std::string gap_;
+  std::string output_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_wall_init_command() {
+  return std::make_unique<WallInitCommand>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,150 @@
+#include "app/commands/wall_remote.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "core/units.h"
+#include "engine/wall/run_control.h"
+
+namespace hpr {
+namespace {
+
+/// What they share: which run is meant, and how long it may take to answer.
+class WallRemoteCommand : public Command {
+ public:
+  void declare(CLI::App& app) override {
+    app.add_option("--run", run_, "which one, where several run: its number in wall status");
+    app.add_option("--wait", wait_, "how long the run may take to answer")
+        ->capture_default_str()
+        ->type_name("DURATION");
+  }
+
+ protected:
+  [[nodiscard]] std::string say(const std::string& line) const { return ask(chosen(), line, longest()); }
+  [[nodiscard]] RunningWall chosen() const {
+    const std::vector<RunningWall> walls = running_walls();
+    if (walls.empty()) {
+      throw Error(ExitCode::Lost, "no wall of this user runs on this host", "start one with hpr wall run");
+    }
+    std::vector<std::string> runs;
+    for (const RunningWall& wall : walls) {
+      if (wall.run == run_) return wall;
+      runs.push_back(wall.run);
+    }
+    if (!run_.empty()) {
+      throw Error(ExitCode::Usage, fmt::format("there is no run '{}'", printable(run_)), unknown_name_hint(run_, runs));
+    }
+    if (walls.size() > 1) {
+      throw Error(ExitCode::Usage, fmt::format("{} walls run: {}", walls.size(), fmt::join(runs, ", ")),
+                  "name one of them with --run");
+    }
+    return walls.front();
+  }
+
+ private:
+  [[nodiscard]] std::chrono::milliseconds longest() const {
+    const auto wait = parse_duration(wait_);
+    if (!wait || wait->count() <= 0) {
+      throw Error(ExitCode::Usage, fmt::format("--wait: '{}' is no duration", printable(wait_)), "write e.g. 10s");
+    }
+    return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*wait, kLongestWait));
+  }
+
+  std::string run_;
+  std::string wait_ = "10s";
+};
+
+class WallStatusCommand final : public WallRemoteCommand {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "status"; }
+  [[nodiscard]] std::string_view summary() const override { return "what a running wall shows, and how fast"; }
+  void declare(CLI::App& app) override {
+    WallRemoteCommand::declare(app);
+    app.add_flag("--json", json_, "print one JSON document (hpr.wall-status/1)");
+  }
+  [[nodiscard]] ExitCode run(const Globals&) override {
+    const std::string told = say("status");
+    if (json_) {
+      fmt::print("{}", told);
+      return ExitCode::Done;
+    }
+    const auto status = nlohmann::json::parse(told);
+    fmt::print("run {}: {} on {}, frame {}, {:.1f} ms a frame, {} rank{}, {} restart{}\n", status["run"].get<int>(),
+               printable(status["scene"].get<std::string>()), printable(status["wall"].get<std::string>()),
+               status["frame"].get<std::uint64_t>(), status["ms"].get<double>(), status["ranks"].get<int>(),
+               status["ranks"] == 1 ? "" : "s", status["restarts"].size(), status["restarts"].size() == 1 ? "" : "s");
+    for (const auto& screen : status["screens"]) {
+      fmt::print("screen {}: {}\n", screen["id"].get<std::string>(), screen["state"].get<std::string>());
+    }
+    return ExitCode::Done;
+  }
+
+ private:
+  bool json_ = false;
+};
+
+class WallCtlCommand final : public WallRemoteCommand {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "ctl"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "tell a running wall what to do, as in a console: 'ctl help' lists it";
+  }
+  void declare(CLI::App& app) override {
+    WallRemoteCommand::declare(app);
+    app.prefix_command();  // what is told may look like an option: -1,0,0
+    app.fallthrough(false);
+    app_ = &app;
+  }
+  [[nodiscard]] ExitCode run(const Globals&) override {
+    std::ostringstream line;
+    const std::vector<std::string> words = app_->remaining();
+    if (words.empty())
+      throw Error(ExitCode::Usage, "there is nothing to tell", "write e.g. hpr wall ctl quality draft");
+    for (const std::string& word : words) {
+      if (std::ranges::any_of(word, [](unsigned char c) { return std::iscntrl(c) != 0; })) {
+        throw Error(ExitCode::Usage, fmt::format("'{}' holds what no line may", printable(word)),
+                    "tell one thing a time");
+      }
+      const bool plain = !word.empty() && word.find_first_of(" \"\\#") == std::string::npos;
+      line << (line.tellp() > 0 ? " " : "");
+      plain ? line << word : line << std::quoted(word);
+    }
+    fmt::print("{}", say(line.str()));
+    return ExitCode::Done;
+  }
+
+ private:
+  const CLI::App* app_ = nullptr;
+};
+
+class WallStopCommand final : public WallRemoteCommand {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "stop"; }
+  [[nodiscard]] std::string_view summary() const override { return "end a running wall after its frame"; }
+  [[nodiscard]] ExitCode run(const Globals&) override {
+    (void)say("stop");
+    return ExitCode::Done;
+  }
+};
+
+}  // namespace
+
+std::vector<std::unique_ptr<Command>> make_wall_remote_commands() {
+  std::vector<std::unique_ptr<Command>> commands;
+  commands.push_back(std::make_unique<WallStatusCommand>());
+  commands.push_back(std::make_unique<WallCtlCommand>());
+  commands.push_back(std::make_unique<WallStopCommand>());
+  return commands;
+}
+
+}  // namespace hpr

@@ -1,0 +1,293 @@
+#include "app/launch/launcher.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "app/launch/passed_signals.h"
+#include "app/launch/process_tree.h"
+#include "core/error.h"
+#include "core/job_environment.h"
+#include "core/log.h"
+
+namespace hpr {
+namespace {
+
+/// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.
+constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
+    {"OMPI_ALLOW_RUN_AS_ROOT", "1"},
+    {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
+    {"OMPI_MCA_rmaps_base_oversubscribe", "1"},
+    {"OMPI_MCA_hwloc_base_binding_policy", "none"},
+    {"OMPI_MCA_mpi_yield_when_idle", "1"},
+    {"OMPI_MCA_pml", "ob1"},
+    {"OMPI_MCA_btl", "self,vader,tcp"},
+    {"OMPI_MCA_orte_execute_quiet", "1"},
+    {"OMPI_MCA_opal_signal", ""},  // no stack dumps
+    {"HWLOC_COMPONENTS", "-gl"},   // asks X servers, also one that hangs, for nothing that is needed
+}};
+
+constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
+
+/// What starting processes may take beside what its ranks may take to start MPI, which they time themselves.
+constexpr std::chrono::seconds kStartGrace{10};
+constexpr std::chrono::milliseconds kStartOfRank{500};
+/// Between these a job may take as long as its ranks wait for each other to end once it was told to. Open MPI gives
+/// ranks a second.
+constexpr std::chrono::seconds kLeastEnd{2};
+constexpr std::chrono::seconds kLongestEnd{10};
+
+/// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
+[[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
+                         pid_t parent) {
+  // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
+  if (options.input == StandardInput::None) ::setpgid(0, 0);
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (::getppid() != parent) ::_exit(1);
+  if (options.input == StandardInput::None) {
+    const int null = ::open("/dev/null", O_RDONLY);
+    if (null >= 0) ::dup2(null, STDIN_FILENO);
+  }
+  const bool typed = options.input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
+  ::dup2(stdout_pipe, STDOUT_FILENO);
+  // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
+  for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
+  if (typed) ::setenv(kTypedInputVariable, "1", 1);
+  ::setenv(kReportStartVariable, "1", 1);
+  ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
+  for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
+  // NOLINTEND(concurrency-mt-unsafe)
+  ::execvp(arguments.front(), arguments.data());
+  ::_exit(127);
+}
+
+/// False with errno. A reader that stands still keeps nobody who wants to end this.
+bool write_all(int file, std::string_view text) {
+  while (!text.empty()) {
+    errno = EINTR;
+    const ssize_t written = PassedSignals::ends() ? -1 : ::write(file, text.data(), text.size());
+    if (written < 0 && errno == EINTR && !PassedSignals::ends()) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Takes the mark of the start from the front of what a job says.
+class StartMark {
+ public:
+  /// What of `text`, the next piece of that, is not the mark. Meaningful until the next call.
+  std::string_view take(std::string_view text) {
+    if (looked_) return text;
+    front_.append(text);
+    const std::size_t length = std::min(front_.size(), kStartMark.size());
+    const bool like = front_.compare(0, length, kStartMark, 0, length) == 0;
+    if (like && length < kStartMark.size()) return {};
+    looked_ = true;
+    PassedSignals::note_start();
+    return std::string_view(front_).substr(like ? length : 0);
+  }
+
+  /// Whether the job has said anything. Where ranks run elsewhere that may be all there is to go by.
+  [[nodiscard]] bool heard() const { return looked_; }
+
+ private:
+  std::string front_;
+  bool looked_ = false;
+};
+
+/// A job from its start to its end. What it says on its standard output is collected, or said here as it comes: mpiexec
+/// does not tell when nobody can take it. No wait for mpiexec is without a limit.
+class RunningJob {
+ public:
+  RunningJob(pid_t child, int ranks, int output, const JobOptions& options)
+      : child_(child),
+        output_(output),
+        collected_(options.captured_stdout),
+        start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kLongestWait) + kStartGrace +
+                     ranks * kStartOfRank),
+        end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kLeastEnd, kLongestEnd)) {}
+
+  /// Waits for its end; its status as waitpid tells it.
+  int follow() {
+    while (true) {
+      const bool heard = hear(output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms);
+      keep_limits();
+      if (heard && !killed_) continue;
+      int status = 0;
+      const pid_t ended = ::waitpid(child_, &status, WNOHANG);
+      if (ended < 0 && errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
+      if (ended != child_) continue;
+      while (hear(0)) {  // what it said last
+      }
+      if (output_ >= 0) ::close(output_);  // somebody it left behind holds the other end
+      return status;
+    }
+  }
+
+  [[nodiscard]] bool heard() const { return mark_.heard(); }
+  /// The errno that kept what it said from being said, and ended it; 0: all was said.
+  [[nodiscard]] int unsaid() const { return unsaid_; }
+  /// Its ranks had not started in time, and it was ended.
+  [[nodiscard]] bool late() const { return late_; }
+  /// It did not end in time when it was told to.
+  [[nodiscard]] bool killed() const { return killed_; }
+  [[nodiscard]] std::chrono::duration<double> start_limit() const { return start_limit_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr int kBetweenLooks_ms = 200;
+  static constexpr int kToTheEnd_ms = 5;
+
+  /// False when it says nothing just now, or nothing more.
+  bool hear(int wait_ms) {
+    pollfd waiting{.fd = output_, .events = POLLIN, .revents = 0};  // one below 0 is passed over
+    if (::poll(&waiting, 1, wait_ms) <= 0) return false;
+    std::array<char, 65536> buffer{};
+    const ssize_t got = ::read(output_, buffer.data(), buffer.size());
+    if (got < 0 && errno == EINTR) return true;
+    if (got <= 0) {
+      ::close(std::exchange(output_, -1));
+      return false;
+    }
+    const std::string_view text = mark_.take({buffer.data(), static_cast<std::size_t>(got)});
+    if (collected_ != nullptr) {
+      collected_->append(text);
+    } else if (unsaid_ == 0 && !write_all(STDOUT_FILENO, text)) {
+      const int reason = errno;
+      if (PassedSignals::ends()) return true;  // it was told already, and twice is without mercy
+      unsaid_ = reason;
+      ::kill(child_, SIGTERM);
+    }
+    return true;
+  }
+
+  void keep_limits() {
+    const Clock::time_point now = Clock::now();
+    if (!told_ && (PassedSignals::ends() || unsaid_ != 0)) told_ = now;
+    if (!told_ && !mark_.heard() && now - begin_ > start_limit_) {
+      late_ = true;
+      told_ = now;
+      ::kill(child_, SIGTERM);
+    }
+    if (!told_ || killed_ || now - *told_ <= end_limit_) return;
+    log::warning("mpiexec has not ended {:g} s after it was told to, and is killed",
+                 std::chrono::duration<double>(end_limit_).count());
+    kill_with_descendants(child_);
+    killed_ = true;
+  }
+
+  pid_t child_;
+  int output_;
+  std::string* collected_;
+  std::chrono::nanoseconds start_limit_;
+  std::chrono::nanoseconds end_limit_;
+  StartMark mark_;
+  Clock::time_point begin_ = Clock::now();
+  std::optional<Clock::time_point> told_;  ///< to end
+  int unsaid_ = 0;
+  bool late_ = false;
+  bool killed_ = false;
+};
+
+}  // namespace
+
+std::optional<std::filesystem::path> find_on_path(std::string_view program) {
+  const char* const path = std::getenv("PATH");
+  std::string_view rest = path == nullptr ? "" : path;
+  while (!rest.empty()) {
+    const std::string_view folder = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
+    std::filesystem::path candidate = std::filesystem::path(folder.empty() ? "." : folder) / program;
+    std::error_code error;
+    if (std::filesystem::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0) return candidate;
+  }
+  return std::nullopt;
+}
+
+void tell_launcher() {
+  if (!launched_by_hpr()) return;
+  std::fwrite(kStartMark.data(), 1, kStartMark.size(), stdout);
+  std::fflush(stdout);
+}
+
+std::string program_path() {
+  return std::filesystem::read_symlink("/proc/self/exe").string();
+}
+
+int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options) {
+  if (!find_on_path("mpiexec")) {
+    throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
+                "install openmpi-bin, or run with --ranks 1");
+  }
+  std::vector<std::string> words{"mpiexec", "-n", std::to_string(ranks), program_path()};
+  words.insert(words.end(), args.begin(), args.end());
+  std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+
+  std::array<int, 2> pipe{-1, -1};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+    throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
+  }
+  const PassedSignals passed(options);
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0)
+    throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
+  if (child == 0) become(arguments, options, pipe[1], parent);
+  PassedSignals::to(child);
+
+  ::close(pipe[1]);
+  RunningJob job(child, ranks, pipe[0], options);
+  const int status = job.follow();
+  PassedSignals::to_nobody();
+  if (job.unsaid() != 0) {
+    throw Error(ExitCode::Io,
+                fmt::format("cannot write to standard output: {}", std::generic_category().message(job.unsaid())),
+                "free some space, or see who closed the pipe");
+  }
+  if (job.late()) {
+    throw Error(
+        ExitCode::Io, fmt::format("mpiexec has not started {} ranks in {:g} s", ranks, job.start_limit().count()),
+        "its own words, if any, stand above; see that TMPDIR may be written and has space, and that no limit of "
+        "file sizes (ulimit -f) is in its way; raise --hang-timeout if it only needs longer; or use --ranks 1");
+  }
+  if (job.killed()) return 128 + PassedSignals::interrupted_by();
+  // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
+  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
+    const char* const signal = ::sigdescr_np(code - 128);
+    throw Error(ExitCode::Lost,
+                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, signal ? signal : "unknown"),
+                "the system's log may say why (out of memory?); nothing partial was left");
+  }
+  if (code == 127) {
+    throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
+  }
+  // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
+  if (code == static_cast<int>(ExitCode::CheckFailed) && !job.heard() && PassedSignals::interrupted_by() == 0) {
+    throw Error(
+        ExitCode::Io, fmt::format("MPI could not start {} ranks", ranks),
+        "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "
+        "or use --ranks 1");
+  }
+  return code;
+}
+
+}  // namespace hpr

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cluster/transport/communicator.h"
+
+namespace hpr {
+
+/// What a job's ranks read on standard input.
+enum class StandardInput : std::uint8_t {
+  None,
+  OfRank0,  ///< rank 0 reads what the launcher was given
+};
+
+/// What SIGINT and SIGTERM do to a job.
+enum class Interrupts : std::uint8_t {
+  End,   ///< end it
+  Stop,  ///< the first one reaches its ranks as SIGUSR1: they come to an orderly end by themselves
+};
+
+/// How a job is started.
+struct JobOptions {
+  std::string* captured_stdout = nullptr;  ///< where its standard output is collected; null: it passes through
+  std::map<std::string, std::string> environment = {};  ///< added to this process's own
+  StandardInput input = StandardInput::None;
+  Interrupts interrupts = Interrupts::End;
+  std::chrono::nanoseconds hang_limit = kHangTimeout;  ///< how long its ranks wait for each other
+};
+
+/// Of rank 0, when all ranks of its job have started: tells a launcher of this program that they take SIGUSR1 and
+/// SIGUSR2 now, if they ever do.
+void tell_launcher();
+
+/// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
+/// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
+/// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks, once these have started,
+/// if this process watches for them (engine/signals.h).
+/// A job that takes longer to start than `options.hang_limit`, 10 s and half a second a rank is ended; one that does
+/// not end when it is told to, in as long as that limit but at least 2 and at most 10 s, is killed. Throws Error: Io
+/// when mpiexec or MPI cannot be started, Lost when a rank or mpiexec itself was killed.
+int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
+
+/// The first executable file of this name on the PATH.
+[[nodiscard]] std::optional<std::filesystem::path> find_on_path(std::string_view program);
+
+/// The path of the running program.
+[[nodiscard]] std::string program_path();
+
+}  // namespace hpr

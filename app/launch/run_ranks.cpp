@@ -1,0 +1,110 @@
+#include "app/launch/run_ranks.h"
+
+#include <fmt/format.h>
+#include <mpi.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "app/launch/launcher.h"
+#include "app/report_error.h"
+#include "app/trace_file.h"
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/local_communicator.h"
+#include "cluster/transport/mpi_communicator.h"
+#include "core/host_name.h"
+#include "core/job_environment.h"
+#include "core/log.h"
+
+namespace hpr {
+namespace {
+
+/// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 speaks first, so
+/// that an error all ranks agreed on is printed once.
+[[noreturn]] void abort_job(int rank, const Error& error) {
+  if (rank != 0) std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  print_error(error, said_by(rank));
+  std::fflush(nullptr);
+  MPI_Abort(MPI_COMM_WORLD, static_cast<int>(error.code()));
+  std::abort();  // MPI_Abort does not return
+}
+
+/// A time limit for the calls of MPI that cannot be polled: starting and ending. When it passes, this rank says so and
+/// ends, and the launcher ends the others.
+class CallLimit {
+ public:
+  CallLimit(std::chrono::nanoseconds limit, const char* doing)
+      : thread_([this, limit, doing](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          if (done_.wait_for(lock, stop, std::min<std::chrono::nanoseconds>(limit, kLongestWait), [] { return false; }))
+            return;
+          if (stop.stop_requested()) return;
+          print_error({ExitCode::Hang, fmt::format("rank {} on {}: still {}", launched_rank(), host_name(), doing),
+                       "a rank stands still; raise --hang-timeout if it only needs longer"});
+          std::fflush(nullptr);
+          ::_exit(static_cast<int>(ExitCode::Hang));
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any done_;
+  std::jthread thread_;
+};
+
+/// MPI_Init and, on success only, MPI_Finalize: a rank that left early would hang in it.
+ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
+  std::optional<CallLimit> limit;
+  limit.emplace(globals.hang_limit(), "starting MPI");
+  int provided = 0;
+  MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  ExitCode code = ExitCode::Done;
+  try {
+    MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
+    limit.reset();
+    if (rank == 0) tell_launcher();
+    if (globals.ranks > 0 && globals.ranks != comm.size()) {
+      throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
+                  "leave --ranks out under mpirun or srun: the launcher sets the number");
+    }
+    if (rank != 0) {
+      log::configure(globals.verbosity >= 2 ? log::Level::Debug : log::Level::Error, said_by(rank));
+    }
+    for (const ExitCode vote : all_gather_value(comm, body(comm))) code = std::max(code, vote);
+  } catch (const Error& error) {
+    abort_job(rank, error);
+  } catch (const std::bad_alloc&) {
+    abort_job(rank, Error(ExitCode::Limit, "out of memory", "use more ranks, a smaller picture or a smaller scene"));
+  } catch (const std::exception& error) {
+    abort_job(rank, Error(ExitCode::Internal, error.what()));
+  }
+  limit.emplace(globals.hang_limit(), "ending MPI");
+  MPI_Finalize();
+  return code;
+}
+
+}  // namespace
+
+ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& untraced,
+                   const JobOptions& options) {
+  const auto body = [&](Communicator& comm) { return traced(comm, globals, untraced); };
+  if (inside_mpi_job()) return run_in_mpi_job(globals, body);
+  if (globals.ranks > 1) {
+    JobOptions limited = options;
+    limited.hang_limit = globals.hang_limit();
+    return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, limited));
+  }
+  ExitCode code = ExitCode::Done;
+  run_local_ranks(
+      1, [&](Communicator& comm) { code = body(comm); }, globals.hang_limit());
+  return code;
+}
+
+}  // namespace hpr

@@ -1,0 +1,101 @@
+#include "app/options/display_flags.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "cluster/transport/communicator.h"
+#include "core/error.h"
+#include "core/names.h"
+#include "core/units.h"
+
+namespace hpr {
+namespace {
+
+std::string name_in(const std::string& display) {
+  return display.substr(0, display.find('='));
+}
+
+std::chrono::milliseconds time_limit(const std::string& text) {
+  const auto limit = parse_duration(text);
+  if (!limit || *limit <= std::chrono::nanoseconds::zero()) {
+    throw Error(ExitCode::Usage, fmt::format("--pipe-timeout: '{}' is no duration", printable(text)), "write e.g. 30s");
+  }
+  return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*limit, kLongestWait));
+}
+
+/// At once, also where stdout is a pipe or file: somebody waits for it.
+void say(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+void DisplayFlags::declare(CLI::App& app) {
+  const char* const remote_too = outside_job ? " or none" : ", none, or remote: display processes, see hpr display";
+  app.add_option(flag, display, fmt::format("file, window, web, web=ADDR:PORT, pipe{}", remote_too))
+      ->capture_default_str();
+  app.add_option("-o,--output", output,
+                 outside_job
+                     ? "folder for display.json, and the pictures of the file display"
+                     : "folder for the file display's pictures and the manifest; file or - for the pipe display")
+      ->type_name(outside_job ? "DIR" : "PATH");
+  app.add_flag("--keep-frames", keep_frames, "the file display keeps every frame, in DIR/frame-000042/");
+  app.add_option("--pipe-to", pipe_to, "the pipe display's frames go to this command's standard input")
+      ->type_name("COMMAND");
+  app.add_option("--pipe-format", pipe_format, "of the pipe display: y4m or rgba")->capture_default_str();
+  app.add_option("--pipe-screen", pipe_screen, "the pipe display sends this screen instead of the assembled wall")
+      ->type_name("ID");
+  app.add_option("--pipe-fps", pipe_fps, "frames per second as Y4M says it")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--pipe-timeout", pipe_timeout, "how long the pipe's reader may read nothing")->capture_default_str();
+}
+
+const DisplayKind& DisplayFlags::kind() const {
+  static const DisplayKind elsewhere{
+      .name = kRemoteDisplay, .make = find_display("none").make, .check = find_display("none").check};
+  static const std::vector<std::string> elsewhere_only{std::string(kRemoteDisplay)};
+  if (remote() && !outside_job) return elsewhere;
+  return find_display(name_in(display), outside_job ? std::span<const std::string>() : elsewhere_only);
+}
+
+DisplayOptions DisplayFlags::options(const Globals& globals) const {
+  const std::string_view name = kind().name;
+  const std::size_t value = display.find('=');
+  if (value != std::string::npos && name != "web") {
+    throw Error(ExitCode::Usage, fmt::format("the {} display takes no value", name), "only web=ADDR:PORT does");
+  }
+  if (name == "file" && output.empty()) {
+    throw Error(ExitCode::Usage, "the file display needs a folder",
+                fmt::format("name one with -o DIR, or use {} none", flag));
+  }
+  if (name != "file" && keep_frames) {
+    throw Error(ExitCode::Usage, "only the file display keeps frames",
+                fmt::format("use {} file with --keep-frames", flag));
+  }
+  if (name != "pipe" && !(pipe_to.empty() && pipe_screen.empty())) {
+    throw Error(ExitCode::Usage, "--pipe-to and --pipe-screen are the pipe display's",
+                fmt::format("add {} pipe", flag));
+  }
+  DisplayOptions made{.folder = output, .overwrite = globals.force, .keep_frames = keep_frames};
+  made.pipe = {.command = pipe_to,
+               .file = outside_job ? "" : output,
+               .format = parse_pipe_format(pipe_format),
+               .screen = pipe_screen,
+               .frames_per_second = pipe_fps,
+               .time_limit = time_limit(pipe_timeout)};
+  if (value != std::string::npos) made.web_address = display.substr(value + 1);
+  made.announce = say;
+  return made;
+}
+
+bool DisplayFlags::frames_on_stdout() const {
+  return name_in(display) == "pipe" && pipe_to.empty() && output == "-";
+}
+
+}  // namespace hpr

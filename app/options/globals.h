@@ -1,0 +1,38 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/session_settings.h"
+#include "image/image_io.h"
+#include "scene/load_scene.h"
+
+namespace hpr {
+
+/// The options every command has.
+struct Globals {
+  int verbosity = 0;  ///< -v, -vv; -1 is -q
+  std::uint64_t seed = 1;
+  std::string backend = "auto";
+  int device = -1;  ///< -1: by local rank
+  std::string progress = "auto";
+  std::string limit_mem;
+  std::string limit_image;
+  std::string hang_timeout;
+  bool force = false;             ///< overwrite files
+  std::string trace;              ///< the file that shall tell where the time went; empty: none
+  int ranks = 0;                  ///< 0: as many as the launcher started, else 1
+  int threads = 0;                ///< of one rank; 0: the machine's cores divided among the ranks of a host
+  std::vector<std::string> args;  ///< this process's command line after the program's name
+
+  /// Throws Error (Usage) for malformed sizes.
+  [[nodiscard]] SceneLimits scene_limits() const;
+  /// How large a picture may be that HPR itself draws or reads back: --limit-image, or kPictureLimits.
+  [[nodiscard]] ImageLimits picture_limits() const;
+  [[nodiscard]] std::chrono::nanoseconds hang_limit() const;
+  [[nodiscard]] SessionSettings session() const { return {backend, device, threads}; }
+};
+
+}  // namespace hpr

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "cluster/transport/communicator.h"
+#include "core/check.h"
+
+/// Collectives over any Communicator, built from its messages: every rank of `comm` calls them together.
+namespace hpr {
+
+/// `bytes` of `root` reach all ranks, along a binomial tree: ceil(log2 P) rounds.
+void broadcast(Communicator& comm, std::vector<std::byte>& bytes, int root = 0);
+
+/// Returns when all ranks have called it.
+void barrier(Communicator& comm);
+
+/// Each rank's bytes, in order of rank, on `root`; empty elsewhere.
+[[nodiscard]] std::vector<std::vector<std::byte>> gather(Communicator& comm, std::span<const std::byte> bytes,
+                                                         int root = 0);
+
+/// Each rank's bytes, in order of rank, on every rank, in ceil(log2 P) rounds of one message each: Bruck, Ho, Kipnis,
+/// Upfal and Weathersby, "Efficient Algorithms for All-to-All Communications in Multiport Message-Passing Systems",
+/// 1997; each part brings its size along.
+[[nodiscard]] std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes);
+
+/// Collective: per rank the first rank of the host it shares `memory` with.
+[[nodiscard]] std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory);
+
+/// Each rank's value, in order of rank, on every rank.
+template <typename Value>
+[[nodiscard]] std::vector<Value> all_gather_value(Communicator& comm, const Value& value) {
+  static_assert(std::is_trivially_copyable_v<Value>);
+  const auto parts = all_gather(comm, std::as_bytes(std::span(&value, 1)));
+  std::vector<Value> values(parts.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    HPR_CHECK(parts[i].size() == sizeof(Value));
+    std::memcpy(&values[i], parts[i].data(), sizeof(Value));
+  }
+  return values;
+}
+
+}  // namespace hpr

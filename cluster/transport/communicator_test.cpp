@@ -1,0 +1,380 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/local_communicator.h"
+#include "cluster/transport/test_exchange.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+constexpr std::chrono::milliseconds kSoon{50};
+
+/// `size` bytes that tell who wrote them.
+Bytes message_of(int rank, std::size_t size) {
+  Bytes bytes(size);
+  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + static_cast<std::size_t>(rank) * 7);
+  return bytes;
+}
+
+Bytes letter(char c) {
+  return Bytes{static_cast<std::byte>(c)};
+}
+
+TEST(LocalRanks, RunOnceEachAndKnowThemselves) {
+  for (const int size : {1, 2, 5, 17}) {
+    std::vector<std::atomic<int>> seen(static_cast<std::size_t>(size));
+    run_local_ranks(size, [&](Communicator& comm) {
+      EXPECT_EQ(comm.size(), size);
+      EXPECT_EQ(comm.transport(), "threads");
+      ++seen[static_cast<std::size_t>(comm.rank())];
+    });
+    for (const auto& count : seen) EXPECT_EQ(count, 1);
+  }
+}
+
+TEST(LocalRanks, MessagesOfAnySizeArriveWholeAndInOrder) {
+  run_local_ranks(3, [](Communicator& comm) {
+    const int next = (comm.rank() + 1) % 3;
+    const int previous = (comm.rank() + 2) % 3;
+    for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{5'000'000}}) {
+      comm.send(message_of(comm.rank(), size), next);
+      comm.send(letter('z'), next);
+      Bytes got(size);
+      comm.receive(got, previous);
+      EXPECT_EQ(got, message_of(previous, size));
+      EXPECT_EQ(comm.receive(previous), letter('z'));
+    }
+  });
+}
+
+TEST(LocalRanks, ExchangeMayHaveTwoSizesAndAPeerMayBeOneself) {
+  run_local_ranks(2, [](Communicator& comm) {
+    const std::size_t mine = comm.rank() == 0 ? 0 : 1000;
+    EXPECT_EQ(test::exchange_with(comm, message_of(comm.rank(), mine), 1 - comm.rank()),
+              message_of(1 - comm.rank(), 1000 - mine));
+    EXPECT_EQ(test::exchange_with(comm, letter('m'), comm.rank()), letter('m'));
+  });
+}
+
+TEST(LocalRanks, AMessageOfAnotherSizeIsAnInternalError) {
+  try {
+    run_local_ranks(2, [](Communicator& comm) {
+      if (comm.rank() == 0) {
+        comm.send(message_of(0, 3), 1);
+      } else {
+        Bytes four(4);
+        comm.receive(four, 0);
+      }
+    });
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Internal);
+  }
+}
+
+TEST(LocalRanks, ReduceMaxLeavesTheLargestOfEachOnTheRoot) {
+  for (const int size : {1, 2, 3, 8, 17}) {
+    for (int root = 0; root < size; ++root) {
+      run_local_ranks(size, [&](Communicator& comm) {
+        std::vector<std::uint64_t> values(100);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+          // Rank i % size holds the largest; the top bit says that the comparison is unsigned.
+          values[i] = static_cast<int>(i) % size == comm.rank() ? ~std::uint64_t{0} - i
+                                                                : static_cast<std::uint64_t>(comm.rank());
+        }
+        comm.reduce_max(values, root);
+        if (comm.rank() != root) return;
+        for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], ~std::uint64_t{0} - i);
+      });
+    }
+  }
+}
+
+TEST(LocalRanks, AReductionDoesNotTakeAMessageSentBefore) {
+  run_local_ranks(2, [](Communicator& comm) {
+    std::vector<std::uint64_t> values{static_cast<std::uint64_t>(comm.rank()) + 5};
+    if (comm.rank() == 1) comm.send(message_of(1, 8), 0);
+    comm.reduce_max(values, 0);
+    if (comm.rank() == 0) {
+      EXPECT_EQ(values[0], 6U);
+      EXPECT_EQ(comm.receive(1), message_of(1, 8));
+    }
+  });
+}
+
+TEST(LocalRanks, ASubsetNumbersItsMembersInOrder) {
+  run_local_ranks(5, [](Communicator& comm) {
+    const std::vector<int> members = comm.rank() % 2 == 0 ? std::vector<int>{0, 2, 4} : std::vector<int>{1, 3};
+    const auto part = comm.subset(members);
+    EXPECT_EQ(part->size(), static_cast<int>(members.size()));
+    EXPECT_EQ(members[static_cast<std::size_t>(part->rank())], comm.rank());
+    const auto ranks = all_gather_value(*part, comm.rank());
+    EXPECT_EQ(ranks, members);
+  });
+}
+
+TEST(LocalRanks, MessagesOfASubsetMeetNoOthers) {
+  run_local_ranks(3, [](Communicator& comm) {
+    // The same members as the world, twice, and a subset of one of them: four communicators between ranks 0 and 1.
+    const std::vector<int> all{0, 1, 2};
+    const auto first = comm.subset(all);
+    const auto second = comm.subset(all);
+    if (comm.rank() == 2) return;
+    const auto pair = second->subset(std::vector<int>{0, 1});
+    if (comm.rank() == 0) {
+      comm.send(letter('w'), 1);
+      first->send(letter('1'), 1);
+      second->send(letter('2'), 1);
+      pair->send(letter('p'), 1);
+    } else {
+      EXPECT_EQ(pair->receive(0), letter('p'));
+      EXPECT_EQ(second->receive(0), letter('2'));
+      EXPECT_EQ(first->receive(0), letter('1'));
+      EXPECT_EQ(comm.receive(0), letter('w'));
+    }
+  });
+}
+
+TEST(LocalRanks, SubsetsNeedNoCallFromOtherRanks) {
+  run_local_ranks(3, [](Communicator& comm) {
+    // Rank 0 makes two, the others one each: their counts must not have to agree.
+    if (comm.rank() != 2) {
+      EXPECT_EQ(all_gather_value(*comm.subset(std::vector<int>{0, 1}), 7).size(), 2U);
+    }
+    if (comm.rank() != 1) {
+      EXPECT_EQ(all_gather_value(*comm.subset(std::vector<int>{0, 2}), 7).size(), 2U);
+    }
+  });
+}
+
+TEST(LocalRanks, AWaitEndsAtTheTimeLimitAndNamesTheRank) {
+  try {
+    run_local_ranks(
+        3,
+        [](Communicator& comm) {
+          if (comm.rank() == 1) (void)comm.receive(2);
+        },
+        kSoon);
+    FAIL() << "nobody sent anything";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Hang);
+    EXPECT_NE(std::string(error.what()).find("rank 1"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("rank 2"), std::string::npos);
+  }
+}
+
+TEST(LocalRanks, TheLongestTimeLimitIsNotTakenForAPassedOne) {
+  run_local_ranks(
+      2,
+      [](Communicator& comm) {
+        if (comm.rank() == 0) std::this_thread::sleep_for(kSoon);
+        barrier(comm);
+      },
+      std::chrono::nanoseconds::max());
+}
+
+TEST(LocalRanks, WhenOneFailsItsPeersAreLostAndTheFirstFailureComesOut) {
+  std::atomic<int> lost = 0;
+  try {
+    run_local_ranks(5, [&](Communicator& comm) {
+      if (comm.rank() == 3) {
+        std::this_thread::sleep_for(kSoon);
+        throw std::runtime_error("rank 3 broke");
+      }
+      try {
+        (void)comm.receive(3);
+      } catch (const Error& error) {
+        if (error.code() == ExitCode::Lost) ++lost;
+        throw;
+      }
+    });
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "rank 3 broke");
+  }
+  EXPECT_EQ(lost, 4);
+}
+
+TEST(LocalRanks, AFailureOfRankZeroComesOutToo) {
+  EXPECT_THROW(run_local_ranks(3,
+                               [](Communicator& comm) {
+                                 if (comm.rank() == 0) throw std::invalid_argument("rank 0 broke");
+                                 barrier(comm);
+                               }),
+               std::invalid_argument);
+}
+
+TEST(LocalRanksDeathTest, APeerThatDoesNotExistBreaksTheContract) {
+  EXPECT_DEATH(run_local_ranks(1, [](Communicator& comm) { comm.send({}, 1); }), "broken contract");
+  EXPECT_DEATH(run_local_ranks(1, [](Communicator& comm) { (void)comm.receive(-1); }), "broken contract");
+}
+
+TEST(Collectives, BroadcastReachesAllRanksFromEveryRoot) {
+  for (int size = 1; size <= 17; ++size) {
+    run_local_ranks(size, [&](Communicator& comm) {
+      for (int root = 0; root < size; ++root) {
+        for (const std::size_t length : {0U, 1U, 1000U}) {
+          Bytes bytes = comm.rank() == root ? message_of(root, length) : message_of(99, 5);
+          broadcast(comm, bytes, root);
+          EXPECT_EQ(bytes, message_of(root, length));
+        }
+      }
+    });
+  }
+}
+
+TEST(Collectives, GatherHoldsEveryRanksBytesInOrderOnEveryRoot) {
+  for (int size = 1; size <= 17; ++size) {
+    run_local_ranks(size, [&](Communicator& comm) {
+      for (int root = 0; root < size; ++root) {
+        const auto parts = gather(comm, message_of(comm.rank(), static_cast<std::size_t>(comm.rank())), root);
+        if (comm.rank() != root) {
+          EXPECT_TRUE(parts.empty());
+          continue;
+        }
+        ASSERT_EQ(parts.size(), static_cast<std::size_t>(size));
+        for (int rank = 0; rank < size; ++rank) {
+          EXPECT_EQ(parts[static_cast<std::size_t>(rank)], message_of(rank, static_cast<std::size_t>(rank)));
+        }
+      }
+    });
+  }
+}
+
+TEST(Collectives, AllGatherGivesEveryRankTheSame) {
+  for (int size = 1; size <= 17; ++size) {
+    run_local_ranks(size, [&](Communicator& comm) {
+      // Rank 0 sends nothing: an empty part must not vanish.
+      const auto parts = all_gather(comm, message_of(comm.rank(), static_cast<std::size_t>(comm.rank()) * 3));
+      ASSERT_EQ(parts.size(), static_cast<std::size_t>(size));
+      for (int rank = 0; rank < size; ++rank) {
+        EXPECT_EQ(parts[static_cast<std::size_t>(rank)], message_of(rank, static_cast<std::size_t>(rank) * 3));
+      }
+      std::vector<double> expected(static_cast<std::size_t>(size));
+      std::iota(expected.begin(), expected.end(), 0.5);
+      EXPECT_EQ(all_gather_value(comm, comm.rank() + 0.5), expected);
+    });
+  }
+}
+
+TEST(Collectives, NobodyLeavesABarrierBeforeAllHaveCome) {
+  for (int size = 1; size <= 17; ++size) {
+    std::atomic<int> arrived = 0;
+    run_local_ranks(size, [&](Communicator& comm) {
+      for (int round = 1; round <= 5; ++round) {
+        ++arrived;
+        barrier(comm);
+        EXPECT_GE(arrived, round * size);
+        barrier(comm);
+      }
+    });
+  }
+}
+
+TEST(Counting, CountsWhatThisRankSendsAlsoThroughSubsets) {
+  run_local_ranks(3, [](Communicator& comm) {
+    CountingCommunicator counting(comm);
+    EXPECT_EQ(counting.rank(), comm.rank());
+    EXPECT_EQ(counting.size(), 3);
+    const int next = (comm.rank() + 1) % 3;
+    const int previous = (comm.rank() + 2) % 3;
+    counting.send(message_of(0, 10), next);
+    (void)counting.receive(previous);
+    EXPECT_EQ(counting.messages_sent(), 1U);
+    EXPECT_EQ(counting.bytes_sent(), 10U);
+
+    std::vector<std::uint64_t> values(4);
+    counting.reduce_max(values, 0);
+    const std::size_t reduced = comm.rank() == 0 ? 0 : 1;
+    EXPECT_EQ(counting.messages_sent(), 1 + reduced);
+    EXPECT_EQ(counting.bytes_sent(), 10 + 32 * reduced);
+
+    if (comm.rank() == 2) return;
+    const auto part = counting.subset(std::vector<int>{0, 1});
+    (void)test::exchange_with(*part, message_of(0, 7), 1 - part->rank());
+    EXPECT_EQ(counting.messages_sent(), 2 + reduced);
+    EXPECT_EQ(counting.bytes_sent(), 17 + 32 * reduced);
+  });
+}
+
+TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
+  for (const std::uint64_t disorder : {0U, 1U, 2U}) {
+    run_local_ranks({.size = 5, .disorder = disorder}, [](Communicator& comm) {
+      for (int round = 0; round < 20; ++round) {
+        std::vector<std::vector<std::byte>> heads;
+        std::vector<std::vector<std::byte>> parts;
+        std::vector<Outgoing> out;
+        std::vector<int> from;
+        for (int peer = 0; peer < comm.size(); ++peer) {
+          heads.push_back(message_of(comm.rank() + round, 3 + static_cast<std::size_t>(peer)));
+          parts.push_back(message_of(comm.rank() + 7, 100));
+          if (peer != comm.rank()) from.push_back(peer);
+        }
+        const std::array<std::span<const std::byte>, 2> bodies{parts[0], parts[1]};
+        for (const int peer : from) out.push_back({peer, heads[static_cast<std::size_t>(peer)], bodies});
+        std::vector<int> came;
+        comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
+          came.push_back(peer);
+          EXPECT_TRUE(std::ranges::equal(message, message_of(peer + round, 3 + static_cast<std::size_t>(comm.rank()))));
+          for (int body = 0; body < 2; ++body) EXPECT_EQ(comm.receive(peer), message_of(peer + 7, 100));
+        });
+        std::ranges::sort(came);
+        EXPECT_EQ(came, from);
+      }
+    });
+  }
+}
+
+TEST(LocalRanks, RanksOfAHostSeeEachOthersMemoryAndMeet) {
+  run_local_ranks({.size = 5, .ranks_per_host = 2}, [](Communicator& comm) {
+    const auto memory = comm.share(3);
+    EXPECT_EQ(memory->mine().size(), 3U);
+    for (int frame = 0; frame < 50; ++frame) {
+      memory->mine()[1] = static_cast<std::byte>(comm.rank() + frame);
+      memory->meet();
+      for (int peer = 0; peer < comm.size(); ++peer) {
+        const bool here = peer / 2 == comm.rank() / 2;
+        EXPECT_EQ(memory->of(peer).size(), here ? 3U : 0U);
+        if (here) {
+          EXPECT_EQ(memory->of(peer)[1], static_cast<std::byte>(peer + frame));
+        }
+      }
+      memory->meet();
+    }
+  });
+}
+
+TEST(LocalRanks, ARankThatDoesNotComeToAMeetingIsAHangAndOneThatFailsIsLost) {
+  for (const bool fails : {false, true}) {
+    try {
+      run_local_ranks({.size = 2, .hang_timeout = std::chrono::milliseconds(fails ? 60'000 : 100)},
+                      [&](Communicator& comm) {
+                        const auto memory = comm.share(8);
+                        if (comm.rank() == 0) {
+                          memory->meet();
+                        } else if (fails) {
+                          throw Error(ExitCode::Io, "gone");
+                        } else {
+                          std::this_thread::sleep_for(std::chrono::milliseconds(400));
+                        }
+                      });
+      FAIL() << "expected an Error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), fails ? ExitCode::Io : ExitCode::Hang);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,250 @@
+#include "cluster/transport/mpi_communicator.h"
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <exception>
+#include <string>
+
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/mpi_error.h"
+#include "cluster/transport/window_memory.h"
+#include "core/check.h"
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kTag = 0;
+
+}  // namespace
+
+MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes)
+    : MpiCommunicator(
+          Owned{},
+          [&] {
+            MPI_Comm copy = MPI_COMM_NULL;
+            check_mpi(MPI_Comm_dup(parent, &copy), "MPI_Comm_dup");
+            return copy;
+          }(),
+          hang_timeout, part_bytes) {}
+
+MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout,
+                                 std::size_t part_bytes)
+    : comm_(comm), hang_timeout_(std::min(hang_timeout, kLongestWait)), part_bytes_(part_bytes) {
+  HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kLargestPart);
+  check_mpi(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  check_mpi(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
+  check_mpi(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
+}
+
+MpiCommunicator::~MpiCommunicator() {
+  // After a failed call MPI may still hold buffers that are gone by now; freeing would let it write to them. The job
+  // ends anyway.
+  if (!abandoned_ && std::uncaught_exceptions() == exceptions_at_birth_) MPI_Comm_free(&comm_);
+}
+
+template <typename Done>
+void MpiCommunicator::poll(Done done, std::string_view doing, int peer) {
+  const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
+  for (unsigned tries = 0; !done(); ++tries) {
+    // Ranks may outnumber cores: after a short spin each failed look gives the core away.
+    if (tries < 64) continue;
+    sched_yield();
+    if (tries % 256 == 0 && std::chrono::steady_clock::now() > deadline) {
+      abandoned_ = true;
+      throw Error(ExitCode::Hang,
+                  fmt::format("rank {}: still {} rank {} after {:.1f} s", rank_, doing, peer,
+                              std::chrono::duration<double>(hang_timeout_).count()),
+                  "a rank stands still; raise --hang-timeout if it only needs longer");
+    }
+  }
+}
+
+void MpiCommunicator::wait(std::vector<MPI_Request>& requests, std::string_view doing, int peer) {
+  poll(
+      [&] {
+        int all = 0;
+        check_mpi(MPI_Testall(static_cast<int>(requests.size()), requests.data(), &all, MPI_STATUSES_IGNORE),
+                  "MPI_Testall");
+        return all != 0;
+      },
+      doing, peer);
+}
+
+void MpiCommunicator::start_send(std::span<const std::byte> message, int to, std::vector<MPI_Request>& requests) {
+  while (true) {
+    // The last part is the first one shorter than a full one; it may be empty.
+    const auto part = message.first(std::min(message.size(), part_bytes_));
+    requests.push_back(MPI_REQUEST_NULL);
+    check_mpi(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, kTag, comm_, &requests.back()),
+              "MPI_Isend");
+    if (part.size() < part_bytes_) return;
+    message = message.subspan(part_bytes_);
+  }
+}
+
+void MpiCommunicator::send(std::span<const std::byte> message, int to) {
+  std::vector<MPI_Request> requests;
+  start_send(message, to, requests);
+  wait(requests, "sending to", to);
+}
+
+std::size_t MpiCommunicator::next_part(int from, MPI_Message& part) {
+  MPI_Status status;
+  poll(
+      [&] {
+        int found = 0;
+        check_mpi(MPI_Improbe(from, kTag, comm_, &found, &part, &status), "MPI_Improbe");
+        return found != 0;
+      },
+      "waiting for a message from", from);
+  int count = 0;
+  check_mpi(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
+  return static_cast<std::size_t>(count);
+}
+
+std::vector<std::byte> MpiCommunicator::receive(int from) {
+  std::vector<std::byte> message;
+  while (true) {
+    MPI_Message part = MPI_MESSAGE_NULL;
+    const std::size_t size = next_part(from, part);
+    message.resize(message.size() + size);
+    std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+    check_mpi(
+        MPI_Imrecv(message.data() + (message.size() - size), static_cast<int>(size), MPI_BYTE, &part, request.data()),
+        "MPI_Imrecv");
+    wait(request, "receiving from", from);
+    if (size < part_bytes_) return message;
+  }
+}
+
+void MpiCommunicator::receive(std::span<std::byte> message, int from) {
+  std::size_t done = 0;
+  while (true) {
+    MPI_Message part = MPI_MESSAGE_NULL;
+    const std::size_t size = next_part(from, part);
+    if (size > message.size() - done || (size < part_bytes_ && done + size != message.size())) {
+      throw Error(ExitCode::Internal, fmt::format("rank {} expected {} bytes from rank {}, got {}", rank_,
+                                                  message.size(), from, done + size));
+    }
+    std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+    check_mpi(MPI_Imrecv(message.data() + done, static_cast<int>(size), MPI_BYTE, &part, request.data()), "MPI_Imrecv");
+    wait(request, "receiving from", from);
+    done += size;
+    if (size < part_bytes_) return;
+  }
+}
+
+bool MpiCommunicator::advance(Incoming& incoming) {
+  while (true) {
+    int done = 0;
+    if (incoming.request == MPI_REQUEST_NULL) {
+      MPI_Message part = MPI_MESSAGE_NULL;
+      MPI_Status status;
+      check_mpi(MPI_Improbe(incoming.from, kTag, comm_, &done, &part, &status), "MPI_Improbe");
+      if (done == 0) return false;
+      int count = 0;
+      check_mpi(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
+      incoming.last_part = static_cast<std::size_t>(count);
+      check_mpi(
+          MPI_Imrecv(incoming.buffer.extend(incoming.last_part).data(), count, MPI_BYTE, &part, &incoming.request),
+          "MPI_Imrecv");
+    }
+    check_mpi(MPI_Test(&incoming.request, &done, MPI_STATUS_IGNORE), "MPI_Test");
+    if (done == 0) return false;
+    if (incoming.last_part < part_bytes_) return true;
+  }
+}
+
+void MpiCommunicator::exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) {
+  std::vector<MPI_Request> sends;
+  for (const Outgoing& outgoing : out) {
+    start_send(outgoing.message, outgoing.to, sends);
+    for (const auto body : outgoing.bodies) start_send(body, outgoing.to, sends);
+  }
+  std::vector<std::unique_ptr<Incoming>> waited;
+  for (const int rank : from) {
+    if (idle_.empty()) idle_.push_back(std::make_unique<Incoming>());
+    waited.push_back(std::move(idle_.back()));
+    idle_.pop_back();
+    waited.back()->from = rank;
+    waited.back()->buffer.clear();
+  }
+  while (!waited.empty()) {
+    auto whole = waited.end();
+    poll(
+        [&] {
+          // Every message is moved on before one is handed out, so that the network works while this rank merges.
+          for (auto it = waited.begin(); it != waited.end(); ++it) {
+            if (advance(**it)) {
+              whole = it;
+              return true;
+            }
+          }
+          return false;
+        },
+        "waiting for a message from", waited.front()->from);
+    std::unique_ptr<Incoming> message = std::move(*whole);
+    waited.erase(whole);
+    arrived(message->from, message->buffer.bytes());
+    idle_.push_back(std::move(message));
+  }
+  if (!sends.empty()) wait(sends, "sending to", out.front().to);
+}
+
+void MpiCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
+  const std::size_t most = part_bytes_ / sizeof(std::uint64_t);
+  std::vector<std::uint64_t> result(rank_ == root ? std::min(values.size(), most) : 0);
+  while (!values.empty()) {
+    const auto part = values.first(std::min(values.size(), most));
+    std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+    check_mpi(MPI_Ireduce(part.data(), result.data(), static_cast<int>(part.size()), MPI_UINT64_T, MPI_MAX, root, comm_,
+                          request.data()),
+              "MPI_Ireduce");
+    wait(request, "reducing to", root);
+    if (rank_ == root) std::copy_n(result.begin(), part.size(), part.begin());
+    values = values.subspan(part.size());
+  }
+}
+
+std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> members) {
+  MPI_Group all = MPI_GROUP_NULL;
+  MPI_Group some = MPI_GROUP_NULL;
+  MPI_Comm comm = MPI_COMM_NULL;
+  check_mpi(MPI_Comm_group(comm_, &all), "MPI_Comm_group");
+  check_mpi(MPI_Group_incl(all, static_cast<int>(members.size()), members.data(), &some), "MPI_Group_incl");
+  check_mpi(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
+  MPI_Group_free(&some);
+  MPI_Group_free(&all);
+  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_));
+}
+
+std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
+  // Every rank of the host will take as much; all ranks must decide alike, so the tightest host decides.
+  constexpr std::uint64_t kBookkeeping = std::uint64_t{1} << 20U;
+  const std::vector<std::uint64_t> room = all_gather_value(*this, free_shared_memory());
+  const std::uint64_t least = std::ranges::min(room);
+  const std::uint64_t needed = (bytes + kBookkeeping) * static_cast<std::uint64_t>(size_);
+  if (needed > least) {
+    throw Error(ExitCode::Limit,
+                fmt::format("{} ranks need {} MiB of shared memory, {} has {} MiB left", size_, needed >> 20U,
+                            kSharedMemoryFolder, least >> 20U),
+                "enlarge /dev/shm (docker run --shm-size), or choose another strategy than shared-memory");
+  }
+  auto memory = make_window_memory(comm_, bytes, hang_timeout_);
+  barrier(*this);  // every part is zero before any rank writes to one
+  return memory;
+}
+
+std::string mpi_version() {
+  std::string text(MPI_MAX_LIBRARY_VERSION_STRING, '\0');
+  int length = 0;
+  check_mpi(MPI_Get_library_version(text.data(), &length), "MPI_Get_library_version");
+  text.resize(static_cast<std::size_t>(length));
+  // What follows the first comma or line break says who built it, where and when.
+  return text.substr(0, text.find_first_of(",\n"));
+}
+
+}  // namespace hpr

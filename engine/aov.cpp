@@ -1,0 +1,110 @@
+#include "engine/aov.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "core/check.h"
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::array<std::string_view, 12> kNames{
+    "depth",  "id",   "normal", "albedo", "direct", "shadow", "reflection", "refraction", "ambient-occlusion",
+    "photon", "rank", "cost"};
+
+// Components stand in the lighter's order.
+static_assert(static_cast<std::size_t>(Aov::Photon) - static_cast<std::size_t>(Aov::Direct) ==
+              static_cast<std::size_t>(Component::Photon));
+
+constexpr std::uint32_t kNothingSeen = 0xFFFFFFFFU;
+
+std::vector<std::string> channels(Aov aov, std::string_view letters) {
+  std::vector<std::string> names;
+  for (const char letter : letters) names.push_back(fmt::format("{}.{}", name_of(aov), letter));
+  return names;
+}
+
+}  // namespace
+
+std::string_view name_of(Aov aov) {
+  return kNames.at(static_cast<std::size_t>(aov));
+}
+
+std::vector<Aov> parse_aovs(const std::string& list) {
+  std::vector<Aov> aovs;
+  for (std::size_t start = 0; start <= list.size();) {
+    const std::size_t end = std::min(list.find(',', start), list.size());
+    const std::string word = list.substr(start, end - start);
+    start = end + 1;
+    if (word.empty()) continue;
+    const auto found = std::ranges::find(kNames, word);
+    if (found == kNames.end()) {
+      const std::vector<std::string> choices(kNames.begin(), kNames.end());
+      throw Error(ExitCode::Usage, fmt::format("unknown AOV '{}'", printable(word)), unknown_name_hint(word, choices));
+    }
+    aovs.push_back(static_cast<Aov>(found - kNames.begin()));
+  }
+  std::ranges::sort(aovs);
+  aovs.erase(std::unique(aovs.begin(), aovs.end()), aovs.end());
+  return aovs;
+}
+
+AovLayers::AovLayers(const FrameLayout& layout, std::span<const Aov> wanted) {
+  for (const Aov aov : wanted) {
+    if (has_rgb(aov)) {
+      rgb.emplace(aov, layout);
+    } else if (!needs_keys(aov)) {
+      single.emplace(aov, layout);
+    }
+  }
+}
+
+LightOutput AovLayers::output(TileLayer<Rgb>& radiance) {
+  LightOutput out;
+  out.radiance = &radiance;
+  const auto find = [&](Aov aov) {
+    const auto found = rgb.find(aov);
+    return found == rgb.end() ? nullptr : &found->second;
+  };
+  for (std::size_t i = 0; i < kComponents; ++i) {
+    out.components.at(i) = find(static_cast<Aov>(static_cast<std::size_t>(Aov::Direct) + i));
+  }
+  out.normal = find(Aov::Normal);
+  out.albedo = find(Aov::Albedo);
+  const auto cost = single.find(Aov::Cost);
+  out.cost = cost == single.end() ? nullptr : &cost->second;
+  return out;
+}
+
+ExrLayer to_exr(Aov aov, const Image<Rgb>& values) {
+  ExrLayer layer{channels(aov, aov == Aov::Normal ? "XYZ" : "RGB"), {}, {}};
+  layer.values.reserve(values.pixels().size() * 3);
+  for (const Rgb& value : values.pixels()) layer.values.insert(layer.values.end(), {value.r, value.g, value.b});
+  return layer;
+}
+
+ExrLayer to_exr(Aov aov, const Image<float>& values) {
+  return {channels(aov, "X"), {values.pixels().begin(), values.pixels().end()}, {}};
+}
+
+ExrLayer to_exr(Aov aov, const Image<Key>& keys, const View& view) {
+  HPR_CHECK(needs_keys(aov));
+  ExrLayer layer{channels(aov, aov == Aov::Depth ? "Z" : "X"), {}, {}};
+  for (const Key key : keys.pixels()) {
+    if (aov == Aov::Id) {
+      layer.integers.push_back(key == kNoKey ? kNothingSeen : key_surface(key));
+    } else {
+      layer.values.push_back(key == kNoKey
+                                 ? std::numeric_limits<float>::infinity()
+                                 : static_cast<float>(view_distance(view, static_cast<double>(key_depth(key)))));
+    }
+  }
+  return layer;
+}
+
+}  // namespace hpr

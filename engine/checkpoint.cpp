@@ -1,0 +1,190 @@
+#include "engine/checkpoint.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::array<char, 8> kMagic{'H', 'P', 'R', 'C', 'K', 'P', 'T', '\n'};
+constexpr std::uint32_t kFormat = 2;
+
+class Writer {
+ public:
+  template <typename Value>
+  void put(const Value& value) {
+    static_assert(std::is_trivially_copyable_v<Value>);
+    put_bytes(std::as_bytes(std::span(&value, 1)));
+  }
+  void put(const std::string& text) {
+    put(std::uint64_t{text.size()});
+    put_bytes(std::as_bytes(std::span(text)));
+  }
+  void put_bytes(std::span<const std::byte> bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
+
+  [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
+  [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+/// Reads what a Writer wrote. The checksum was right, so what does not fit is another program's doing.
+class Reader {
+ public:
+  Reader(std::span<const std::byte> bytes, const std::string& name) : rest_(bytes), name_(name) {}
+
+  template <typename Value>
+  [[nodiscard]] Value get() {
+    static_assert(std::is_trivially_copyable_v<Value>);
+    Value value{};
+    take(std::as_writable_bytes(std::span(&value, 1)));
+    return value;
+  }
+  [[nodiscard]] std::string text() {
+    const auto size = get<std::uint64_t>();
+    if (size > rest_.size()) fail();
+    std::string text(size, '\0');
+    take(std::as_writable_bytes(std::span(text)));
+    return text;
+  }
+  void take(std::span<std::byte> to) {
+    if (to.size() > rest_.size()) fail();
+    if (!to.empty()) std::memcpy(to.data(), rest_.data(), to.size());
+    rest_ = rest_.subspan(to.size());
+  }
+  [[nodiscard]] std::size_t left() const { return rest_.size(); }
+
+  [[noreturn]] void fail() const {
+    throw Error(ExitCode::BadInput, fmt::format("{}: the checkpoint is damaged", name_),
+                "start anew, without --resume");
+  }
+
+ private:
+  std::span<const std::byte> rest_;
+  const std::string& name_;
+};
+
+template <typename Pixel>
+void put_layer(Writer& out, const TileLayer<Pixel>& layer) {
+  out.put(std::uint64_t{sizeof(Pixel)});
+  out.put(std::uint64_t{layer.active_tiles()});
+  for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
+    if (!layer.active(tile)) continue;
+    out.put(std::uint64_t{tile});
+    out.put_bytes(std::as_bytes(layer.tile(tile)));
+  }
+}
+
+template <typename Pixel>
+void get_layer(Reader& in, TileLayer<Pixel>& layer) {
+  if (in.get<std::uint64_t>() != sizeof(Pixel)) in.fail();
+  const auto count = in.get<std::uint64_t>();
+  if (count > layer.tiles()) in.fail();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto tile = in.get<std::uint64_t>();
+    if (tile >= layer.tiles() || layer.active(tile)) in.fail();
+    in.take(std::as_writable_bytes(layer.tile(tile)));
+    layer.set_active(tile);
+  }
+}
+
+RunIdentity get_identity(Reader& in) {
+  RunIdentity found(std::min<std::uint64_t>(in.get<std::uint64_t>(), 1024));
+  for (auto& [field, value] : found) {
+    field = in.text();
+    value = in.text();
+  }
+  return found;
+}
+
+void compare_identities(const RunIdentity& found, const RunIdentity& expected, const std::string& name) {
+  for (std::size_t i = 0; i < std::max(found.size(), expected.size()); ++i) {
+    if (i < found.size() && i < expected.size() && found[i] == expected[i]) continue;
+    const auto& field = i < expected.size() ? expected[i].first : found[i].first;
+    const auto& theirs = i < found.size() ? found[i].second : std::string("none");
+    const auto& ours = i < expected.size() ? expected[i].second : std::string("none");
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: the checkpoint is of another run: its {} is {}, not {}", name, printable(field),
+                            printable(theirs, 200), printable(ours, 200)),
+                "give the options it was made with, or start anew without --resume");
+  }
+}
+
+/// The part the checksum covers.
+std::span<const std::byte> checked_part(std::span<const std::byte> bytes, const std::string& name) {
+  constexpr std::size_t kHead = kMagic.size() + sizeof kFormat;
+  if (bytes.size() < kMagic.size() || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
+    throw Error(ExitCode::BadInput, fmt::format("{}: not a checkpoint", name), "name one that hpr wrote");
+  }
+  std::uint32_t format = 0;
+  if (bytes.size() >= kHead) std::memcpy(&format, bytes.data() + kMagic.size(), sizeof format);
+  std::uint64_t hash = 0;
+  if (format == kFormat && bytes.size() >= kHead + sizeof hash) {
+    std::memcpy(&hash, bytes.data() + bytes.size() - sizeof hash, sizeof hash);
+    const auto covered = bytes.first(bytes.size() - sizeof hash);
+    if (xxh64(covered) == hash) return covered.subspan(kHead);
+  } else if (bytes.size() >= kHead && format != kFormat) {
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: a checkpoint of format {}; this hpr reads {}", name, format, kFormat),
+                "go on with the hpr that wrote it, or start anew without --resume");
+  }
+  throw Error(ExitCode::BadInput, fmt::format("{}: the checkpoint is damaged", name), "start anew, without --resume");
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film, const SampleProgress& progress) {
+  Writer out;
+  out.put(kMagic);
+  out.put(kFormat);
+  out.put(std::uint64_t{identity.size()});
+  for (const auto& [field, value] : identity) {
+    out.put(field);
+    out.put(value);
+  }
+  const Film::Counters counters = film.counters();
+  out.put(counters.samples);
+  out.put(counters.weights);
+  out.put(progress.samples);
+  out.put(progress.budget);
+  out.put(progress.seconds);
+  out.put(progress.relmse.value_or(-1.0));
+  film.each_layer([&](const auto& layer) { put_layer(out, layer); });
+  out.put(xxh64(out.bytes()));
+  return out.take();
+}
+
+RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name) {
+  Reader in(checked_part(bytes, name), name);
+  return get_identity(in);
+}
+
+SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name, const RunIdentity& identity,
+                                 Film& film) {
+  Reader in(checked_part(bytes, name), name);
+  compare_identities(get_identity(in), identity, name);
+  Film::Counters counters;
+  counters.samples = in.get<std::uint32_t>();
+  counters.weights = in.get<std::array<double, 2>>();
+  SampleProgress progress;
+  progress.samples = in.get<std::uint32_t>();
+  progress.budget = in.get<std::uint32_t>();
+  progress.seconds = in.get<double>();
+  if (const auto relmse = in.get<double>(); relmse >= 0.0) progress.relmse = relmse;
+  film.each_layer([&](auto& layer) { get_layer(in, layer); });
+  if (in.left() != 0) in.fail();
+  film.set_counters(counters);
+  return progress;
+}
+
+}  // namespace hpr

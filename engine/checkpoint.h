@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/film.h"
+#include "engine/samples.h"
+
+namespace hpr {
+
+/// Names and values of everything that decides the bits of a picture, but for the number of samples. How the work is
+/// spread over ranks and threads is not among them.
+using RunIdentity = std::vector<std::pair<std::string, std::string>>;
+
+/// Where a run's sums go when it is stopped, and what it is.
+struct CheckpointSettings {
+  std::filesystem::path path;             ///< empty: none is written
+  bool resume = false;                    ///< begin with what stands there
+  std::function<RunIdentity()> identity;  ///< asked when it is wanted: it takes a look at the whole scene
+  bool at_end = false;                    ///< also when the goal is reached, for a later run that wants more
+  bool takes_more = false;                ///< one that holds more samples than are asked for will do
+};
+
+/// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the
+/// counters, every layer's active tiles, and the XXH64 of all that.
+[[nodiscard]] std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film,
+                                                       const SampleProgress& progress);
+
+/// Of which run a checkpoint is. Throws Error (BadInput) when `bytes` are no checkpoint, damaged, or of another
+/// version.
+[[nodiscard]] RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name);
+
+/// Fills `film`, a new one of the same layout and content. `name` stands in errors. Throws Error (BadInput) when
+/// `bytes` are no checkpoint, damaged, of another version, or of a run with another identity: then the error names what
+/// differs. Nothing of damaged bytes but the header is looked at.
+[[nodiscard]] SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name,
+                                               const RunIdentity& identity, Film& film);
+
+}  // namespace hpr

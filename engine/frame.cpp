@@ -1,0 +1,240 @@
+#include "engine/frame.h"
+
+#include <algorithm>
+
+#include "core/stopwatch.h"
+#include "core/trace.h"
+
+// The frame loop: the place to start reading. A frame flows one way,
+//
+//     scene ──> cluster ──> raster ──> compositing ──> rt ──> walls
+//
+// and each step below is one of its arrows. What the scene is and who does what stand in the Session and the FramePlan
+// (engine/plan.cpp); the last arrow, tiles to screens, is taken by whoever shows the frame (engine/output.cpp).
+namespace hpr {
+
+namespace {
+
+bool spends_light(const FramePlan& plan) {
+  return plan.lit || plan.shading == Shading::Local;
+}
+
+/// The rectangles of a screen this rank's group covers.
+std::vector<Rect> parts_of(const FramePlan& plan, std::size_t screen) {
+  std::vector<Rect> parts;
+  for (const ScreenRect& rect : plan.mine.area) {
+    if (rect.screen == screen) parts.push_back(rect.pixels);
+  }
+  return parts;
+}
+
+}  // namespace
+
+void prepare(Session& session, const FramePlan& plan) {
+  if (!plan.mine.area.empty()) {
+    if (plan.primary == Primary::Rays) {
+      (void)session.primary_rays(plan.mine.objects, plan.rays);
+    } else {
+      (void)session.rasterizer(plan.mine.objects);
+    }
+  }
+  if (spends_light(plan)) (void)session.lighter(plan.rays);
+  if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
+}
+
+void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys) {
+  Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
+  const trace::Span span("raster");
+  for (std::size_t screen = 0; screen < views.size(); ++screen) {
+    const std::vector<Rect> parts = parts_of(plan, screen);
+    if (!parts.empty()) rasterizer.draw(views[screen], screen, parts, keys);
+  }
+}
+
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                              std::span<TileLayer<Key>* const> keys) {
+  PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
+  const trace::Span span("primary rays");
+  PrimaryRayStats stats;
+  // Ranks that draw for others do not know what those want.
+  const bool draws_own = session.comm().size() == 1 || plan.distribution == Distribution::SortFirst;
+  for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
+    const std::vector<Rect> parts = parts_of(plan, screen);
+    if (parts.empty()) continue;
+    std::vector<View> views;
+    views.reserve(looks.size());
+    for (const FrameLook& look : looks) views.push_back(look.views[screen]);
+    rays.draw(views, screen, parts, keys, draws_own ? looks.front().sample.wanted : nullptr);
+    stats += rays.stats();
+  }
+  return stats;
+}
+
+namespace {
+
+/// The keys of each look, before any rank meets another.
+FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                     std::span<TileLayer<Key>* const> keys) {
+  FrameTimes taken;
+  const Stopwatch watch;
+  if (plan.primary == Primary::Rays) {
+    taken.primary = trace_primary(session, plan, looks, keys);
+  } else {
+    for (std::size_t i = 0; i < looks.size(); ++i) rasterize(session, plan, looks[i].views, *keys[i]);
+  }
+  taken.primary_ms = watch.ms();
+  return taken;
+}
+
+/// Merges the group's layers; returns the tiles this rank ends up owning.
+std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {
+  if (plan.mine.group.size() == 1) return plan.tiles;
+  const trace::Span span("composite");
+  Compositor& compositor = session.compositor(plan.strategy, plan.mine.group);
+  return compositor.composite(session.group(plan.mine.group), keys, plan.tiles).tiles;
+}
+
+/// The colours of keys that already carry them; none where there is no key.
+void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance) {
+  for (const std::size_t tile : tiles) {
+    const auto from = keys.tile(tile);
+    const auto to = radiance.tile(tile);
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      const Rgba8 color = from_word(key_rgba(from[i]));
+      if (from[i] != kNoKey) to[i] = {srgb_to_linear(color.r), srgb_to_linear(color.g), srgb_to_linear(color.b)};
+    }
+    radiance.set_active(tile);
+  }
+}
+
+/// What the last call of light() took.
+void add_light(const Lighter& lighter, FrameTimes& taken) {
+  FrameTimes light;
+  light.passes = lighter.times();
+  light.rays = lighter.counts();
+  taken += light;
+}
+
+/// Moves keys to where their tiles' sums are.
+void bring_home(Session& session, const FramePlan& plan, std::optional<TileHomes>& homes, Frame& frame) {
+  if (!homes) homes.emplace(session.comm(), plan.layout, frame.owned);
+  if (plan.distribution == Distribution::SortFirst) return;
+  homes->bring(session.comm(), *frame.keys, frame.owned);
+  frame.owned = homes->mine();
+}
+
+void mark_rank(const Session& session, Frame& frame) {
+  const auto layer = frame.aovs.single.find(Aov::Rank);
+  if (layer == frame.aovs.single.end()) return;
+  for (const std::size_t tile : frame.owned) {
+    std::ranges::fill(layer->second.tile(tile), static_cast<float>(session.rank()));
+    layer->second.set_active(tile);
+  }
+}
+
+}  // namespace
+
+FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
+  primary_ms += other.primary_ms;
+  primary += other.primary;
+  composite_ms += other.composite_ms;
+  if (passes.empty()) {
+    passes = other.passes;
+  } else {
+    for (std::size_t i = 0; i < other.passes.size(); ++i) passes.at(i).ms += other.passes[i].ms;
+  }
+  rays += other.rays;
+  samples += other.samples;
+  return *this;
+}
+
+FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+                      const FrameSample& sample) {
+  const FrameLook look{{views.begin(), views.end()}, sample};
+  TileLayer<Key>* const layer = &keys;
+  FrameTimes taken = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
+
+  if (spends_light(plan)) {
+    const trace::Span photons("photons");
+    session.lighter(plan.rays).send_photons(session.comm(), sample.number);
+  }
+  if (plan.shading == Shading::Local) {
+    const trace::Span shading("light");
+    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
+    add_light(session.lighter(plan.rays), taken);
+  }
+  return taken;
+}
+
+Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
+                 const FrameSample& sample) {
+  const trace::Span span("sample", "number", sample.number.sample);
+  TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
+  keys.set_depth_format(plan.depth_format);
+  FrameTimes taken = draw_layer(session, plan, views, keys, sample);
+
+  const Stopwatch watch;
+  Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
+  if (sample.homes != nullptr) bring_home(session, plan, *sample.homes, frame);
+  if (sample.at_home != nullptr) (*sample.at_home)();
+  taken.composite_ms = watch.ms();
+
+  if (plan.shading == Shading::Local) {
+    const trace::Span light("light");
+    Lighter& lighter = session.lighter(plan.rays);
+    unpack_colors(keys, frame.owned, frame.radiance);
+    light_empty(lighter, views, keys, frame.owned, frame.radiance, sample.number);
+    add_light(lighter, taken);
+  } else if (plan.lit) {
+    const trace::Span light("light");
+    Lighter& lighter = session.lighter(plan.rays);
+    const LitSample lit{views, &keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
+    lighter.light(std::span(&lit, 1), frame.owned);
+    mark_rank(session, frame);
+    add_light(lighter, taken);
+  }
+  taken.samples = 1;
+  if (times != nullptr) *times = taken;
+  return frame;
+}
+
+std::size_t most_in_round(Session& session, const FramePlan& plan) {
+  if (session.comm().size() > 1 && plan.distribution != Distribution::SortFirst) return 1;
+  if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
+  if (session.lighter(plan.rays).lights_one_by_one()) return 1;
+  // Keys and colours of a round are in memory together.
+  constexpr std::size_t kPixels = std::size_t{1} << 23U;
+  const std::size_t fit = kPixels / std::max<std::size_t>(plan.layout.pixels(), 1);
+  return std::clamp(fit, std::size_t{1}, PrimaryRays::kMostLooks);
+}
+
+std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+                              FrameTimes& times) {
+  const trace::Span span("round", "samples", looks.size());
+  const std::span<TileLayer<Key>> keys = session.round_keys(plan.layout, looks.size());
+  std::vector<TileLayer<Key>*> layers;
+  for (TileLayer<Key>& layer : keys) {
+    layer.set_depth_format(plan.depth_format);
+    layers.push_back(&layer);
+  }
+  times = draw_keys(session, plan, looks, layers);
+  std::vector<Frame> frames;
+  std::vector<LitSample> samples;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, {}});
+    if (looks[i].sample.homes != nullptr) bring_home(session, plan, *looks[i].sample.homes, frames.back());
+  }
+  if (looks.front().sample.at_home != nullptr) (*looks.front().sample.at_home)();
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    const FrameSample& sample = looks[i].sample;
+    samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});
+  }
+  const trace::Span light("light");
+  Lighter& lighter = session.lighter(plan.rays);
+  lighter.light(samples, frames.front().owned);
+  add_light(lighter, times);
+  times.samples = static_cast<int>(looks.size());
+  return frames;
+}
+
+}  // namespace hpr

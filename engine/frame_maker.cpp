@@ -1,0 +1,148 @@
+#include "engine/frame_maker.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "cluster/transport/collectives.h"
+#include "engine/economies.h"
+#include "engine/resolution.h"
+#include "image/pixel_filter.h"
+
+namespace hpr {
+namespace {
+
+/// Of a frame that has a goal other than a number of samples.
+constexpr std::uint32_t kMostSamples = 64;
+
+/// From the same place in the same direction.
+bool same_look(const View& a, const View& b) {
+  return a.eye == b.eye && a.axes == b.axes && a.left == b.left && a.right == b.right && a.top == b.top &&
+         a.bottom == b.bottom;
+}
+
+}  // namespace
+
+FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling& sampling,
+                       std::span<const View> screens, std::optional<double> target_ms,
+                       const std::optional<SampleGoal>& resting, bool keeps_keys)
+    : session_(session),
+      settings_(std::move(settings)),
+      sampling_(sampling),
+      resting_(sampling),
+      target_ms_(target_ms),
+      keeps_keys_(keeps_keys) {
+  if (resting) resting_.goal = *resting;
+  plan_for({}, screens);
+  if (!target_ms_) return;
+  // Whatever the size of a frame, it has as many photons and takes its keys the same way: the lighter stays.
+  settings_.photons_fit_frame = false;
+  settings_.rays.photons = plan_.rays.photons;
+  settings_.primary = plan_.primary;
+  settings_.rays.gather = plan_.rays.gather;
+  settings_.indirect_is_chosen = true;
+  economies_ = economies_of(settings_, plan_passes(session.requirements(), plan_.rays));
+  budget_.emplace(BudgetSettings{
+      .target_ms = *target_ms_, .most_samples = most_samples(), .economies = static_cast<int>(economies_.size())});
+  std::vector<std::string> explained = plan_.explained;
+  explained.push_back(fmt::format("budget: {} ms a frame (as asked); given up, first to last: {}", *target_ms_,
+                                  fmt::join(all_to_give_up(), ", ")));
+  plan_for(budget_->effort(), screens);
+  plan_.explained = std::move(explained);
+}
+
+std::vector<std::string> FrameMaker::all_to_give_up() const {
+  std::vector<std::string> names;
+  if (most_samples() > 1) names.emplace_back("samples");
+  for (const std::string& economy : economies_) names.push_back(economy);
+  names.emplace_back("resolution");
+  return names;
+}
+
+std::uint32_t FrameMaker::most_samples() const {
+  return std::min(sampling_.goal.samples.value_or(kMostSamples), kMostSamples);
+}
+
+void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
+  const bool same_plan =
+      plan_.layout.tiles() > 0 && effort.economies == effort_.economies && effort.scale_step == effort_.scale_step;
+  effort_ = effort;
+  const double scale = settings_.resolution_scale * scale_of_step(effort.scale_step);
+  blocks_ = cut_blocks(at_resolution(screens, scale));
+  if (same_plan) return;
+  sampler_.reset();  // it holds on to the plan
+  const auto count = static_cast<std::size_t>(effort.economies);
+  plan_ = plan_frame(session_, economize(settings_, std::span(economies_).first(count)), blocks_.views);
+}
+
+bool FrameMaker::rests(std::span<const View> screens) const {
+  return std::ranges::equal(screens, last_screens_, same_look);
+}
+
+bool FrameMaker::refined(std::span<const View> screens) const {
+  return refining_ && rests(screens) && reached(resting_, sampler_->reached_so_far());
+}
+
+Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress) {
+  if (!budget_) {
+    plan_for({}, screens);
+    make_anew(number, sampling_.goal.samples.value_or(0), progress);
+  } else if (rests(screens)) {
+    refine(screens, number, progress);
+  } else {
+    refining_ = false;
+    const Effort effort = all_gather_value(session_.comm(), budget_->effort()).front();
+    plan_for(effort, screens);
+    make_anew(number, effort.samples, progress);
+    write_report(effort, effort.samples);
+  }
+  last_screens_.assign(screens.begin(), screens.end());
+  return sampler_->frame();
+}
+
+void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress) {
+  times_before_ = {};
+  Sampling sampling = sampling_;
+  if (budget_) {
+    sampling.goal = {.samples = samples, .seconds = {}, .relmse = {}};
+    const auto least = static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
+    if (samples < least) sampling.filter.reset();
+  }
+  sampler_.emplace(session_, plan_, sampling, number, keeps_keys_);
+  (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
+  times_ = sampler_->times();
+  relmse_ = sampler_->reached_so_far().relmse;
+}
+
+void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Progress& progress) {
+  times_before_ = refining_ ? times_ : FrameTimes{};
+  if (!refining_) {
+    sampler_.reset();
+    plan_for({}, screens);
+    sampler_.emplace(session_, plan_, resting_, number, false);
+    // A single look with nothing given up: there is nothing to add to it.
+    if (!resting_.sums()) (void)sampler_->draw(blocks_.views, {}, progress);
+  }
+  refining_ = true;
+  if (resting_.sums()) sampler_->refine(blocks_.views);
+  times_ = sampler_->times();
+  relmse_ = sampler_->reached_so_far().relmse;
+  write_report({most_samples(), 0, 0}, sampler_->reached_so_far().samples);
+  report_->resting = true;
+}
+
+void FrameMaker::took(double slowest_ms) {
+  if (budget_ && !refining_) budget_->took(slowest_ms);
+}
+
+void FrameMaker::write_report(const Effort& effort, std::uint32_t samples) {
+  BudgetReport report{*target_ms_, settings_.resolution_scale * scale_of_step(effort.scale_step), samples, {}};
+  if (samples < most_samples() && !refining_) report.given_up.emplace_back("samples");
+  for (int i = 0; i < effort.economies; ++i) report.given_up.push_back(economies_[static_cast<std::size_t>(i)]);
+  if (effort.scale_step > 0) report.given_up.emplace_back("resolution");
+  report_ = std::move(report);
+}
+
+}  // namespace hpr

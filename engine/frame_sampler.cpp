@@ -1,0 +1,256 @@
+#include "engine/frame_sampler.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/stopwatch.h"
+#include "engine/signals.h"
+
+namespace hpr {
+namespace {
+
+/// What ranks tell each other between samples.
+struct Word {
+  Request request = Request::None;
+  double seconds = 0.0;  ///< rank 0's clock is everybody's
+};
+
+Word agree(Communicator& comm, const Word& mine) {
+  const std::vector<Word> all = all_gather_value(comm, mine);
+  Word agreed = all.front();
+  for (const Word& each : all) agreed.request = std::max(agreed.request, each.request);
+  return agreed;
+}
+
+std::string describe(const SampleGoal& goal, const SampleProgress& so_far) {
+  std::string text = fmt::format("{:.1f} s", so_far.seconds);
+  if (so_far.relmse) text += fmt::format(", relMSE about {:.2g}", *so_far.relmse);
+  if (const auto left = seconds_left(goal, so_far)) text += fmt::format(", {:.0f} s left", *left);
+  return text;
+}
+
+}  // namespace
+
+FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame,
+                           bool keeps_keys)
+    : session_(session),
+      plan_(plan),
+      sampling_(sampling),
+      number_(frame),
+      film_(sampling.sums() ? plan.layout : FrameLayout(),
+            {plan.aovs, keeps_keys, sampling.adaptive && sampling.sums() ? AdaptiveSampling::pilot_of(sampling) : 0}),
+      keeps_keys_(sampling.sums() && film_.keys().tiles() > 0) {
+  if (!film_.is_adaptive()) return;
+  adaptive_.emplace(sampling);
+  due_ = PixelMask(film_.layout());
+}
+
+void FrameSampler::load(const CheckpointSettings& checkpoint) {
+  struct Start {
+    Film::Counters counters;
+    std::uint32_t samples = 0;
+    std::uint32_t budget = 0;
+    double seconds = 0.0;
+    double relmse = -1.0;
+  };
+  Start start;
+  check_on_root(session_.comm(), [&] {
+    const auto bytes = read_file(checkpoint.path, std::numeric_limits<std::uint64_t>::max());
+    const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity(), film_);
+    start = {film_.counters(), found.samples, found.budget, found.seconds, found.relmse.value_or(-1.0)};
+    if (checkpoint.takes_more || found.samples <= sampling_.goal.samples.value_or(found.samples)) return;
+    throw Error(ExitCode::BadInput,
+                fmt::format("{}: the checkpoint holds {} samples, more than the {} asked for", checkpoint.path.string(),
+                            found.samples, *sampling_.goal.samples),
+                "ask for as many with --spp, or start anew without --resume");
+  });
+  start = all_gather_value(session_.comm(), start).front();
+  film_.set_counters(start.counters);
+  so_far_ = {start.samples, start.seconds, {}, start.budget};
+  if (start.relmse >= 0.0) so_far_.relmse = start.relmse;
+  if (adaptive_) adaptive_->resume(session_.comm(), so_far_, film_, tiles());
+  resumed_ = so_far_.samples;
+  scattered_ = false;
+  if (session_.rank() == 0) log::info("going on after {} samples", so_far_.samples);
+}
+
+void FrameSampler::write(const CheckpointSettings& checkpoint) {
+  const std::vector<int> to_root(plan_.layout.screens(), 0);
+  film_.each_layer([&](auto& layer) {
+    if (layer.tiles() > 0) session_.assembler().assemble(session_.comm(), layer, homes_->mine(), to_root);
+  });
+  agree_on_failure(session_.comm(), [&] {
+    if (session_.rank() != 0) return;
+    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity(), film_, so_far_));
+  });
+}
+
+bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
+  try {
+    write(checkpoint);
+  } catch (const Error& error) {
+    // On every rank alike. Samples that cannot be written are not to be lost as well.
+    if (session_.rank() == 0) log::error("{}: going on without a checkpoint; {}", error.what(), error.hint());
+    return false;
+  }
+  if (session_.rank() == 0) log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
+  return true;
+}
+
+FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
+  const FilterSample through = look_through(sampling_, {plan_.rays.seed, number_}, number);
+  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
+  for (View& view : look.views) view.jitter = through.offset;
+  weight = through.weight;
+  return look;
+}
+
+void FrameSampler::scatter() {
+  if (std::exchange(scattered_, true)) return;
+  film_.each_layer([&](auto& layer) {
+    if (layer.tiles() > 0) homes_->scatter(session_.comm(), layer);
+  });
+  if (adaptive_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
+}
+
+/// What rank 0 has of a checkpoint is all its own until tiles have their homes.
+std::vector<std::size_t> FrameSampler::tiles() const {
+  if (homes_ && scattered_) return homes_->mine();
+  return session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
+}
+
+/// Those of the first sample after a checkpoint was read are not known before its tiles are at home.
+void FrameSampler::choose_pixels() {
+  if (adaptive_->is_stage_done()) adaptive_->deal(session_.comm(), film_, tiles(), session_.threads());
+  if (homes_ && scattered_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
+}
+
+void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count) {
+  if (adaptive_) {
+    choose_pixels();
+    if (adaptive_->is_stage_done()) return;  // no pixel wants more
+    count = std::min(count, scattered_ ? adaptive_->most_together() : 1);
+  }
+  const std::function<void()> at_home = [this] { scatter(); };
+  std::vector<FrameLook> looks;
+  std::vector<double> weights(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    looks.push_back(look(views, film_.samples() + i, weights[i]));
+    looks.back().sample.at_home = &at_home;
+  }
+  FrameTimes taken;
+  std::vector<Frame> frames;
+  if (count > 1) {
+    frames = make_round(session_, plan_, looks, taken);
+  } else {
+    frames.push_back(make_frame(session_, plan_, looks.front().views, &taken, looks.front().sample));
+  }
+  std::vector<SampleLight> lights;
+  lights.reserve(count);
+  for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
+  film_.add(lights, weights, homes_->mine(), session_.threads());
+  if (adaptive_) adaptive_->added(count, film_);
+  times_ += taken;
+  frame_.keys = frames.back().keys;
+}
+
+void FrameSampler::tell_progress(double seconds) {
+  so_far_.samples = adaptive_ ? adaptive_->samples() : film_.samples();
+  if (adaptive_) {
+    so_far_.budget = adaptive_->budget();
+    times_.samples = static_cast<int>(so_far_.samples - resumed_);
+  }
+  so_far_.seconds = seconds;
+  const bool milestone = adaptive_ ? adaptive_->at_milestone() : is_milestone(film_.samples());
+  if (!milestone || so_far_.samples < 2) return;
+  so_far_.relmse = estimated_relmse(session_.comm(), film_, tiles(), session_.threads());
+}
+
+/// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be
+/// reached; no longer than somebody who sends a signal or looks at a clock would wait.
+std::uint32_t FrameSampler::size_of_round() {
+  constexpr double kSeconds = 2.0;
+  constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
+  const std::uint32_t done = so_far_.samples;
+  auto most = static_cast<double>(most_in_round(session_, plan_));
+  if (sampling_.goal.samples && !adaptive_) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
+  if (done > 0) {
+    const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
+    most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
+  } else if (sampling_.goal.seconds ||
+             plan_.layout.pixels() * static_cast<std::size_t>(plan_.rays.light_samples) > kQuickPixels) {
+    most = 1.0;
+  }
+  const auto limit = static_cast<std::uint32_t>(std::max(most, 1.0));
+  if (adaptive_) return limit;  // add_samples() ends it where another step begins
+  std::uint32_t last = limit;
+  for (std::uint32_t count = limit; count > 0; --count) {
+    if (!is_milestone(done + count)) continue;
+    last = count;
+    if (!sampling_.goal.relmse) break;
+  }
+  return last;
+}
+
+bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
+  if (!sampling_.sums()) {
+    frame_ = make_frame(session_, plan_, views, &times_, {{number_, 0}, nullptr});
+    so_far_.samples = 1;
+    return true;
+  }
+  if (checkpoint.resume) load(checkpoint);
+  const double before = so_far_.seconds;
+  const Stopwatch watch;
+  std::optional<Stopwatch> written;
+  while (!reached(sampling_, so_far_)) {
+    add_samples(views, size_of_round());
+    // Without a checkpoint a request is for whoever draws frame after frame.
+    Request request = checkpoint.path.empty() ? Request::None : take_request();
+    // One signal reaches the ranks of a job one by one, maybe in different samples.
+    if (request == Request::Write && written && written->ms() < 1000.0) request = Request::None;
+    const Word word = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
+    tell_progress(word.seconds);
+    progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
+    if (word.request == Request::None || reached(sampling_, so_far_)) continue;
+    progress.end();
+    if (tries_to_write(checkpoint) && word.request == Request::Stop) return false;
+    written.emplace();
+  }
+  if (checkpoint.at_end && homes_) write(checkpoint);
+  finish();
+  return true;
+}
+
+void FrameSampler::refine(std::span<const View> views) {
+  if (!reached(sampling_, so_far_)) {
+    const Stopwatch watch;
+    add_samples(views, 1);
+    const double seconds = so_far_.seconds + 1e-3 * watch.ms();
+    tell_progress(agree(session_.comm(), {Request::None, seconds}).seconds);
+  }
+  finish();
+}
+
+void FrameSampler::finish() {
+  if (!homes_) {  // a checkpoint that had reached the goal: rank 0 has it all
+    const std::vector<std::size_t> all = session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
+    homes_.emplace(session_.comm(), plan_.layout, all);
+  }
+  frame_.owned = homes_->mine();
+  frame_.radiance = TileLayer<Rgb>(plan_.layout);
+  frame_.aovs = AovLayers(plan_.layout, plan_.aovs);
+  film_.resolve(frame_.owned, session_.threads(), frame_.radiance, frame_.aovs);
+  if (keeps_keys_) frame_.keys = &film_.keys();
+}
+
+}  // namespace hpr

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/progress.h"
+#include "engine/adaptive.h"
+#include "engine/checkpoint.h"
+#include "engine/film.h"
+#include "engine/frame.h"
+#include "engine/samples.h"
+
+namespace hpr {
+
+/// Makes a frame: draws samples, each a frame seen through its own place of the pixels, until the goal is reached, and
+/// takes their mean. A single look through the pixels' centres is that frame itself, and nothing is summed.
+class FrameSampler {
+ public:
+  /// `frame`: its number, by which its noise differs from other frames'. `keeps_keys`, and AOVs that need them:
+  /// frame().keys are those of the first sample; else they are the last one's, and none where no sample was drawn.
+  FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame, bool keeps_keys);
+
+  /// Collective. views[i] is screen i of the plan's layout. Between samples all ranks ask each other for signals (see
+  /// Request). False when it stopped before its goal: then a checkpoint was written. Throws Error as decode_checkpoint
+  /// does, and Io.
+  [[nodiscard]] bool draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress);
+
+  /// Collective. Draws one more sample unless the goal is reached; frame() is the means of those so far. Signals wait.
+  void refine(std::span<const View> views);
+
+  /// After draw() returned true: the means. Valid as long as this.
+  [[nodiscard]] Frame& frame() { return frame_; }
+  /// Summed over the samples this run drew.
+  [[nodiscard]] const FrameTimes& times() const { return times_; }
+  [[nodiscard]] const SampleProgress& reached_so_far() const { return so_far_; }
+
+ private:
+  void load(const CheckpointSettings& checkpoint);
+  void write(const CheckpointSettings& checkpoint);
+  /// Tells whether it could.
+  bool tries_to_write(const CheckpointSettings& checkpoint);
+  /// Together, where there are several: size_of_round() at most.
+  void add_samples(std::span<const View> views, std::uint32_t count);
+  /// How many samples to draw together.
+  [[nodiscard]] std::uint32_t size_of_round();
+  /// When the first sample drawn since a checkpoint was read is at home: sums go to where their tiles are lit.
+  void scatter();
+  [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);
+  /// This rank's tiles.
+  [[nodiscard]] std::vector<std::size_t> tiles() const;
+  /// Before samples are drawn: which pixels they are for, in due_.
+  void choose_pixels();
+  /// How far it has come, after samples were added.
+  void tell_progress(double seconds);
+  void finish();
+
+  Session& session_;
+  const FramePlan& plan_;
+  Sampling sampling_;
+  std::uint64_t number_;
+  Film film_;
+  std::optional<AdaptiveSampling> adaptive_;
+  PixelMask due_;  ///< for the samples at hand; empty: all are
+  bool keeps_keys_;
+  std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
+  bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint
+  std::optional<TileHomes> homes_;
+  SampleProgress so_far_;
+  Frame frame_;
+  FrameTimes times_;
+};
+
+}  // namespace hpr

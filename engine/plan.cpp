@@ -1,0 +1,201 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
+#include "engine/frame.h"
+#include "engine/open_sky.h"
+#include "engine/primary_choice.h"
+#include "scene/surface_ranges.h"
+
+namespace hpr {
+namespace {
+
+/// Past this many triangles a rank's share of the scene matters more than the pixels it composites.
+constexpr std::uint32_t kManyTriangles = 4'000'000;
+
+struct Choice {
+  Distribution distribution;
+  std::string why;
+};
+
+Choice choose_distribution(const FrameSettings& settings, const Scene& scene, int ranks) {
+  if (settings.distribution) return {*settings.distribution, "as asked"};
+  if (ranks == 1) return {Distribution::SortFirst, "one rank draws everything"};
+  if (settings.partitioned)
+    return {Distribution::SortLast, "each rank has its own objects, as the data is partitioned"};
+  if (scene.triangles <= kManyTriangles) {
+    return {
+        Distribution::SortFirst,
+        fmt::format("{} triangles are few enough to cull on every rank, and nothing is composited", scene.triangles)};
+  }
+  return {Distribution::Hybrid,
+          fmt::format("{} triangles are shared inside groups, pixels between them", scene.triangles)};
+}
+
+std::vector<std::size_t> tiles_in(const FrameLayout& layout, const std::vector<ScreenRect>& area) {
+  std::vector<std::size_t> tiles;
+  for (const ScreenRect& rect : area) {
+    for (int y = rect.pixels.y0; y < rect.pixels.y1; y += kTileSide) {
+      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide)
+        tiles.push_back(layout.tile_at(rect.screen, x, y));
+    }
+  }
+  std::ranges::sort(tiles);
+  return tiles;
+}
+
+std::string explain_depth(const FramePlan& plan) {
+  const char* why = "keys of {} bytes instead of 8 where they are sent, drawn so by OpenGL";
+  if (plan.mine.group.size() == 1) {
+    why = "as asked; gains nothing, as nothing is composited";
+  } else if (plan.strategy == "mpi-reduce") {
+    why = "as asked; gains nothing, as MPI's reduction moves whole keys";
+  } else if (plan.strategy == "shared-memory" || plan.strategy == "auto") {
+    why = "keys of {} bytes instead of 8 between hosts; gains nothing inside one, where they are merged in place";
+  }
+  return fmt::format("depth: {} bits ({})", kDepthFormatNames.at(static_cast<std::size_t>(plan.depth_format)),
+                     fmt::format(fmt::runtime(why), sent_bytes(plan.depth_format)));
+}
+
+std::string explain(const RayBuild& build) {
+  return fmt::format("embree: {} build quality, {}", kBuildQualityNames.at(static_cast<std::size_t>(build.quality)),
+                     build.same_instructions
+                         ? "AVX2 on every rank"
+                         : "each rank's widest instructions (last bits may differ between machines)");
+}
+
+/// A map finer than the pixels that look at it is wasted work: progressive samples add up to the same.
+std::uint32_t photons_for(std::uint32_t most, std::span<const View> views) {
+  constexpr std::size_t kFewest = 1000;
+  std::size_t pixels = 0;
+  for (const View& view : views) pixels += view.size().area();
+  return static_cast<std::uint32_t>(std::min<std::size_t>(most, std::max(pixels, kFewest)));
+}
+
+/// One rank composites nothing.
+void check_fits(const std::string& strategy, int ranks) {
+  if (ranks <= 1 || make_compositor(strategy)->fits(ranks)) return;
+  throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", strategy, ranks),
+              "choose other factors or another strategy, or another number of ranks (--ranks, --groups)");
+}
+
+/// Who draws what, and how it comes together.
+void explain_distribution(FramePlan& plan, const FrameSettings& settings, const Choice& choice, int ranks) {
+  auto& lines = plan.explained;
+  lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
+                              ranks == 1 ? "" : "s", choice.why));
+  const char* const why =
+      settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
+  lines.push_back(plan.mine.group.size() > 1
+                      ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
+                      : fmt::format("composite: off (one rank covers each tile)"));
+  if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
+}
+
+/// What lights the pixels, and how many of them.
+void explain_light(Session& session, const FrameSettings& settings, FramePlan& plan) {
+  auto& lines = plan.explained;
+  if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
+  if (plan.rays.part) {
+    lines.emplace_back("data: partitioned (as asked: rays travel to the ranks whose objects they may meet)");
+  } else if (settings.partitioned) {
+    lines.emplace_back("data: whole (one rank has all of it)");
+  }
+  lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
+                              plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
+                                                                : "each rank lights all it drew, before compositing"));
+  if (settings.resolution_scale != 1.0) {
+    lines.push_back(
+        fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
+  }
+  if (!gives_light(session.scene())) {
+    lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
+  } else if (session.scene().triangles > 0 && !session.requirements().indirect.needed &&
+             !session.requirements().shadow.needed) {
+    lines.emplace_back("light: none (what the scene has of lights is black)");
+  }
+  if (!plan.rays.half_resolution.empty()) {
+    lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
+  }
+  if (plan.rays.denoise) {
+    lines.push_back(fmt::format("denoiser: in the first {} samples (as asked)", kDenoisedSamples));
+  }
+}
+
+/// Whether rays or photons are to bring indirect light, where the scene leaves the choice.
+void choose_indirect(Session& session, const FrameSettings& settings, FramePlan& plan, std::span<const View> views) {
+  if (settings.indirect_is_chosen || !plan.rays.passes.empty()) return;
+  RaySettings wanted = plan.rays;
+  wanted.gather = true;
+  if (wanted.reference || !session.requirements().indirect.needed || !gathers_by_rays(session.requirements(), wanted)) {
+    return;
+  }
+  // Processors that round otherwise may count otherwise.
+  const std::optional<double> open = all_gather_value(session.comm(), open_sky(session, plan.rays, views)).front();
+  if (!open) return;
+  plan.rays.gather = *open >= kOpenSky;
+  plan.explained.push_back(fmt::format("indirect light: by {} ({:.0f} % of what is seen lies open to the even sky)",
+                                       plan.rays.gather ? "rays" : "photons", 100.0 * *open));
+}
+
+void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan& plan) {
+  auto& lines = plan.explained;
+  lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
+  if (!pass.runs || pass.name != "photon") return;
+  lines.push_back(
+      fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
+                  settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));
+  if (plan.rays.photon_radius > 0.0) {
+    lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
+  }
+}
+
+}  // namespace
+
+FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
+  const int ranks = session.comm().size();
+  FramePlan plan;
+  std::vector<Size> sizes;
+  sizes.reserve(views.size());
+  for (const View& view : views) sizes.push_back(view.size());
+  plan.layout = FrameLayout(sizes);
+
+  const Choice choice = choose_distribution(settings, session.scene(), ranks);
+  plan.distribution = choice.distribution;
+  plan.groups = std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
+  plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
+  plan.primary = settings.primary;
+  plan.depth_format = settings.depth_format;
+  plan.shading = settings.shading;
+  plan.rays = settings.rays;
+  if (settings.photons_fit_frame) plan.rays.photons = photons_for(plan.rays.photons, views);
+  plan.aovs = settings.aovs;
+  plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
+                               plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
+  if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
+  // Surfaces of partial coverage have no keys: light finds them before what the keys name.
+  if (!covering_surfaces(session.scene(), true).empty()) {
+    plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),
+                                      covering_surfaces(session.scene(), false));
+  }
+  plan.tiles = tiles_in(plan.layout, plan.mine.area);
+
+  if (!settings.strategy.empty()) {
+    agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });
+  }
+
+  explain_distribution(plan, settings, choice, ranks);
+  const char* const asked = plan.primary == Primary::Raster ? "unless asked for rays or a choice" : "as asked";
+  const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
+  plan.explained.push_back(
+      fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
+  explain_light(session, settings, plan);
+  choose_indirect(session, settings, plan, views);
+  for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
+  return plan;
+}
+
+}  // namespace hpr

@@ -1,0 +1,242 @@
+#include "engine/session.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "cluster/distribution/scene_distribution.h"
+#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/texts.h"
+#include "core/error.h"
+#include "core/host_name.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "core/parallel.h"
+#include "core/trace.h"
+#include "scene/surface_ranges.h"
+
+namespace hpr {
+namespace {
+
+Scene load_scene_of_all(Communicator& comm, const std::function<Scene()>& load) {
+  const trace::Span span("load scene");
+  return distribute_scene(comm, load);
+}
+
+}  // namespace
+
+Session::Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load)
+    : comm_(comm),
+      share_(share_host(comm, settings.threads)),
+      scene_(load_scene_of_all(comm_, load)),
+      requirements_(requirements_of(scene_)) {
+  warn_of_scene();
+  agree_on_failure(comm_, [&] {
+    const trace::Span span("start OpenGL");
+    gl_ = make_gl_context({.backend = settings.backend,
+                           .device = settings.device,
+                           .local_rank = share_.local_rank,
+                           .threads = share_.threads});
+  });
+  log::debug("OpenGL: {}", gl_->description());
+  compare_rasterizers();
+}
+
+Session::HostShare Session::share_host(Communicator& comm, int threads) {
+  HostShare share;
+  share.host = host_name();
+  share.ranks = 0;
+  const std::vector<std::string> hosts = all_gather_texts(comm, share.host);
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    if (hosts[static_cast<std::size_t>(rank)] != share.host) continue;
+    if (rank < comm.rank()) ++share.local_rank;
+    ++share.ranks;
+  }
+  // A launcher may already have given this rank cores of its own; else the ranks of a host share all of them.
+  const int online = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  share.threads = threads > 0 ? threads : std::clamp(online / share.ranks, 1, usable_cores());
+  return share;
+}
+
+void Session::load(const std::function<Scene()>& load) {
+  Scene scene = load_scene_of_all(comm_, load);
+  forget_scene();
+  scene_ = std::move(scene);
+  requirements_ = requirements_of(scene_);
+  warn_of_scene();
+}
+
+void Session::change_scene(const std::function<void(Scene&)>& change) {
+  forget_scene();
+  change(scene_);
+  requirements_ = requirements_of(scene_);
+}
+
+void Session::warn_of_scene() const {
+  if (comm_.rank() != 0) return;
+  for (const std::string& warning : scene_.warnings)
+    log::warning("{}: {}", printable(scene_.name), printable(warning, 400));
+}
+
+void Session::forget_scene() {
+  forget_rays();
+  part_.reset();
+  travelling_.reset();
+  traced_objects_.clear();
+  rasterizer_.reset();
+  objects_.clear();
+}
+
+void Session::compare_rasterizers() {
+  if (comm_.size() == 1) return;
+  const auto prints = all_gather_value(comm_, raster_fingerprint(*gl_));
+  std::vector<std::size_t> others;
+  for (std::size_t rank = 0; rank < prints.size(); ++rank) {
+    if (prints[rank] != prints[0]) others.push_back(rank);
+  }
+  if (!others.empty() && comm_.rank() == 0) {
+    log::warning("ranks {} rasterise differently from rank 0 (another GL driver or CPU): pictures may differ at edges",
+                 fmt::join(others, ", "));
+  }
+}
+
+Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
+  if (!rasterizer_ || !std::ranges::equal(objects, objects_)) {
+    const trace::Span span("upload geometry");
+    rasterizer_.reset();  // frees its GPU memory before the next one takes some
+    objects_.assign(objects.begin(), objects.end());
+    rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, objects_, share_.threads);
+  }
+  return *rasterizer_;
+}
+
+void Session::forget_rays() {
+  lighter_.reset();
+  ray_settings_.reset();
+  primary_rays_.reset();
+  traced_share_.reset();
+  ray_scene_.reset();
+}
+
+void Session::build_rays_by(const RayBuild& build) {
+  if (build == ray_build_) return;
+  forget_rays();
+  ray_build_ = build;
+}
+
+void Session::share_rays(const RaySettings& settings) {
+  build_rays_by(settings.build);
+  if (settings.part == part_) return;
+  forget_rays();
+  travelling_.reset();
+  part_ = settings.part;
+  if (part_) travelling_ = std::make_unique<TravellingRays>(comm_, scene_, RaySpace(scene_.bounds), *part_);
+}
+
+std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange> objects) const {
+  const trace::Span span("build ray scene");
+  return std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, objects, ray_build_);
+}
+
+PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings) {
+  share_rays(settings);
+  if (!primary_rays_ || !std::ranges::equal(objects, traced_objects_)) {
+    primary_rays_.reset();
+    traced_share_.reset();  // frees its memory before the next one takes some
+    traced_objects_.assign(objects.begin(), objects.end());
+    const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_part();
+    if (!everything) traced_share_ = build_ray_scene(traced_objects_);
+    primary_rays_ =
+        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_share_, share_.threads);
+  }
+  return *primary_rays_;
+}
+
+/// Of the surfaces that cover what is behind them, those that rays meet at home.
+std::vector<SurfaceRange> Session::covering_part() const {
+  std::vector<SurfaceRange> covering = covering_surfaces(scene_, false);
+  return part_ ? common_ranges(merged_ranges(*part_, scene_.triangles), covering) : covering;
+}
+
+const RayScene& Session::ray_scene(const RayBuild& build) {
+  build_rays_by(build);
+  if (!ray_scene_) {
+    ray_scene_ = build_ray_scene(covering_part());
+    if (travelling_) ray_scene_->share(*travelling_);
+  }
+  return *ray_scene_;
+}
+
+Lighter& Session::lighter(const RaySettings& settings) {
+  share_rays(settings);
+  if (!lighter_ || ray_settings_ != settings) {
+    const trace::Span span("prepare light");
+    lighter_.reset();  // its parts of the scene leave before others come
+    RaySettings own = settings;
+    own.threads = share_.threads;
+    own.host_ranks = share_.ranks;
+    lighter_ = std::make_unique<Lighter>(
+        scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, travelling_.get());
+    ray_settings_ = settings;
+  }
+  return *lighter_;
+}
+
+Communicator& Session::group(std::span<const int> members) {
+  if (static_cast<int>(members.size()) == comm_.size()) return comm_;
+  if (!group_.comm || !std::ranges::equal(members, group_.members)) {
+    compositor_.reset();  // both may hold on to the old group
+    keys_ = {};
+    group_.comm = comm_.subset(members);
+    group_.members.assign(members.begin(), members.end());
+  }
+  return *group_.comm;
+}
+
+Compositor& Session::compositor(const std::string& strategy, std::span<const int> members) {
+  (void)group(members);  // a new group ends the old one's strategy
+  if (!compositor_ || strategy_ != strategy) {
+    compositor_ = make_compositor(strategy);
+    strategy_ = strategy;
+  }
+  return *compositor_;
+}
+
+TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& strategy, std::span<const int> members) {
+  const bool shared = members.size() > 1 && compositor(strategy, members).merges_in_place();
+  const bool fits = keys_.layout() == layout && keys_shared_ == shared && std::ranges::equal(members, keys_members_);
+  if (fits && layout.tiles() > 0) {
+    keys_.clear();
+    return keys_;
+  }
+  keys_ = {};  // before as much is taken again
+  keys_ = shared ? shared_layer(layout, strategy, members) : TileLayer<Key>(layout);
+  keys_shared_ = shared;
+  keys_members_.assign(members.begin(), members.end());
+  return keys_;
+}
+
+std::span<TileLayer<Key>> Session::round_keys(const FrameLayout& layout, std::size_t count) {
+  if (!round_keys_.empty() && round_keys_.front().layout() != layout) round_keys_.clear();
+  while (round_keys_.size() < count) round_keys_.emplace_back(layout);
+  while (round_keys_.size() > std::max<std::size_t>(count, 2)) round_keys_.pop_back();
+  const std::span<TileLayer<Key>> layers = std::span(round_keys_).first(count);
+  parallel_for(threads(), layers.size(), [&](std::size_t i) { layers[i].clear(); });
+  return layers;
+}
+
+TileLayer<Key> Session::shared_layer(const FrameLayout& layout, const std::string& strategy,
+                                     std::span<const int> members) {
+  try {
+    return {layout, group(members).share(TileLayer<Key>::bytes_for(layout))};
+  } catch (const Error& error) {
+    // All ranks of the group failed alike. Whoever leaves the choice of strategy to us gets another one.
+    if (error.code() != ExitCode::Limit || strategy != "auto") throw;
+    if (comm_.rank() == 0) log::warning("{}; compositing by messages", error.what());
+    return TileLayer<Key>(layout);
+  }
+}
+
+}  // namespace hpr

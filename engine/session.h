@@ -1,0 +1,124 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cluster/distribution/assignment.h"
+#include "cluster/transport/counting_communicator.h"
+#include "compositing/assembly.h"
+#include "compositing/compositor.h"
+#include "engine/session_settings.h"
+#include "raster/gl_context.h"
+#include "raster/rasterizer.h"
+#include "rt/lighter.h"
+#include "rt/trace/primary_rays.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/travelling_rays.h"
+#include "scene/requirements.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// What stays resident while frames follow one another: the scene, the GL context, geometry on the GPU, the ray scene,
+/// the frame's memory. One per rank; construction is collective.
+class Session {
+ public:
+  /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
+  Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load);
+
+  /// Collective. Another scene in this one's place; when it cannot be loaded, this one stays.
+  void load(const std::function<Scene()>& load);
+  /// Changes the scene; called alike on every rank. What was made of the old one is made anew when asked for.
+  void change_scene(const std::function<void(Scene&)>& change);
+
+  [[nodiscard]] CountingCommunicator& comm() { return comm_; }
+  [[nodiscard]] int rank() const { return comm_.rank(); }
+  [[nodiscard]] const Scene& scene() const { return scene_; }
+  [[nodiscard]] const Requirements& requirements() const { return requirements_; }
+  [[nodiscard]] int threads() const { return share_.threads; }
+  [[nodiscard]] const std::string& host() const { return share_.host; }
+  [[nodiscard]] const GlContext& gl() const { return *gl_; }
+  [[nodiscard]] Assembler& assembler() { return assembler_; }
+
+  /// The rasteriser that holds `objects`; kept until other objects are asked for.
+  [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
+  /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
+  /// scene are asked for. Collective where `settings` have a part, as lighter() is.
+  [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
+  /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
+  /// asked for. Asking for one built in another way ends it, and the lighter and primary rays that use it.
+  [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
+  /// Collective. Makes what travelling rays need, where `settings` have a part.
+  void share_rays(const RaySettings& settings);
+  /// The lighter of these settings; kept until others are asked for.
+  [[nodiscard]] Lighter& lighter(const RaySettings& settings);
+  /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
+  /// group. What it sends counts in comm() too.
+  [[nodiscard]] Communicator& group(std::span<const int> members);
+  /// The strategy of this name with its scratch memory, for that group; kept until another one is asked for.
+  [[nodiscard]] Compositor& compositor(const std::string& strategy, std::span<const int> members);
+  /// A cleared layer of keys of this layout, reused from frame to frame. With a strategy that merges in place, the
+  /// ranks of one host see the layers of their group's members; collective over the group.
+  [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout, const std::string& strategy,
+                                     std::span<const int> members);
+  /// As many cleared layers that are not composited, reused likewise.
+  [[nodiscard]] std::span<TileLayer<Key>> round_keys(const FrameLayout& layout, std::size_t count);
+
+ private:
+  void compare_rasterizers();
+  void warn_of_scene() const;
+  /// Ends what was made of the scene.
+  void forget_scene();
+  /// Ends what rays meet where it was built in another way.
+  void build_rays_by(const RayBuild& build);
+  void forget_rays();
+  [[nodiscard]] std::vector<SurfaceRange> covering_part() const;
+  [[nodiscard]] std::unique_ptr<RayScene> build_ray_scene(std::span<const SurfaceRange> objects) const;
+  [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
+                                            std::span<const int> members);
+
+  /// What this rank may use of the machine it runs on.
+  struct HostShare {
+    std::string host;
+    int local_rank = 0;  ///< among the ranks of this host
+    int ranks = 1;       ///< of this host
+    int threads = 1;
+  };
+  [[nodiscard]] static HostShare share_host(Communicator& comm, int threads);
+
+  struct Group {
+    std::vector<int> members;
+    std::unique_ptr<Communicator> comm;
+  };
+
+  CountingCommunicator comm_;
+  HostShare share_;
+  Scene scene_;
+  Requirements requirements_;
+  std::unique_ptr<GlContext> gl_;
+  std::vector<SurfaceRange> objects_;
+  std::unique_ptr<Rasterizer> rasterizer_;
+  RayBuild ray_build_;                             ///< of all that follows
+  std::optional<std::vector<SurfaceRange>> part_;  ///< of the scene, likewise; see RaySettings
+  std::unique_ptr<TravellingRays> travelling_;     ///< where there is one
+  std::unique_ptr<RayScene> ray_scene_;
+  std::vector<SurfaceRange> traced_objects_;
+  std::unique_ptr<RayScene> traced_share_;  ///< of primary_rays_; none where ray_scene_ is
+  std::unique_ptr<PrimaryRays> primary_rays_;
+  std::optional<RaySettings> ray_settings_;
+  std::unique_ptr<Lighter> lighter_;
+  Group group_;
+  std::string strategy_;
+  std::unique_ptr<Compositor> compositor_;
+  Assembler assembler_;
+  TileLayer<Key> keys_;
+  std::vector<TileLayer<Key>> round_keys_;
+  bool keys_shared_ = false;       ///< whether they were meant to be
+  std::vector<int> keys_members_;  ///< the group `keys_` was made for
+};
+
+}  // namespace hpr

@@ -1,0 +1,100 @@
+#include "engine/wall/command_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <iomanip>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+std::vector<std::string> words_of(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  std::string word;
+  while (stream >> std::ws && stream.peek() != '#' && !stream.eof()) {
+    const bool quoted = stream.peek() == '"';
+    if (!(stream >> std::quoted(word))) {
+      if (quoted) refuse("a quote is not closed", "hide \"big chair\"");
+      break;
+    }
+    words.push_back(word);
+  }
+  return words;
+}
+
+}  // namespace
+
+CommandTable::CommandTable() {
+  add({"help", "[COMMAND]", "what can be said here", [this](Words words) { return help(words); }});
+}
+
+std::string CommandTable::run(const std::string& line) const {
+  const std::vector<std::string> words = words_of(line);
+  if (words.empty()) return "";
+  const auto found = std::ranges::find(commands_, words.front(), &SessionCommand::name);
+  if (found != commands_.end()) {
+    if (found->usage.empty() && words.size() > 1) {
+      refuse(fmt::format("'{}' takes nothing", words.front()), words.front());
+    }
+    return found->run(Words(words).subspan(1));
+  }
+  std::vector<std::string> names;
+  for (const SessionCommand& command : commands_) names.push_back(command.name);
+  throw Error(ExitCode::Usage, fmt::format("there is no command '{}'", printable(words.front())),
+              unknown_name_hint(words.front(), names));
+}
+
+std::string CommandTable::help(Words words) const {
+  std::string text;
+  for (const SessionCommand& command : commands_) {
+    if (!words.empty() && command.name != words.front()) continue;
+    const std::string written = fmt::format("{} {}", command.name, command.usage);
+    text += fmt::format("{}{:<44} {}", text.empty() ? "" : "\n", written, command.summary);
+  }
+  if (text.empty()) refuse(fmt::format("there is no command '{}'", printable(words.front())), "help");
+  return text;
+}
+
+void refuse(const std::string& problem, const std::string& example) {
+  throw Error(ExitCode::Usage, problem, "write e.g. " + example);
+}
+
+double number_of(const std::string& word) {
+  double number = 0.0;
+  const char* const last = word.data() + word.size();
+  const auto result = std::from_chars(word.data(), last, number);
+  if (result.ec != std::errc() || result.ptr != last || !std::isfinite(number)) {
+    refuse(fmt::format("'{}' is no finite number", printable(word)), "1.5");
+  }
+  return number;
+}
+
+glm::dvec3 point_of(const std::string& word) {
+  glm::dvec3 point{0.0};
+  std::istringstream stream(word);
+  std::string part;
+  int count = 0;
+  for (; std::getline(stream, part, ','); ++count) {
+    if (count < 3) point[count] = number_of(part);
+  }
+  if (count != 3 || word.ends_with(',')) {
+    refuse(fmt::format("'{}' is not X,Y,Z", printable(word)), "0,1.5,-2");
+  }
+  return point;
+}
+
+glm::dvec3 direction_of(const glm::dvec3& point) {
+  const double largest = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
+  if (!(largest > 0.0)) refuse("0,0,0 is no direction", "0,1,0");
+  return glm::normalize(point / largest);
+}
+
+}  // namespace hpr

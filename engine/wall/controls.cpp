@@ -1,0 +1,244 @@
+#include "engine/wall/controls.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <glm/vector_relational.hpp>
+
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+std::string written(const glm::dvec3& point) {
+  return fmt::format("{:g},{:g},{:g}", point.x, point.y, point.z);
+}
+
+void expect(Words words, std::size_t least, std::size_t most, const std::string& example) {
+  if (words.size() < least || words.size() > most) {
+    refuse(words.size() < least ? "something is missing" : "that is too much", example);
+  }
+}
+
+std::string type_of(const Light& light) {
+  switch (light.type) {
+    case LightType::Point:
+      return "point";
+    case LightType::Spot:
+      return "spot";
+    case LightType::Directional:
+      return "directional";
+    case LightType::Headlight:
+      break;
+  }
+  return "headlight";
+}
+
+}  // namespace
+
+Controls::Controls(Session& session, const Globals& globals, RenderOptions& options, CommandTable& table)
+    : session_(session),
+      globals_(globals),
+      options_(options),
+      initial_fov_degrees_(options.fov_degrees),
+      edits_(session.scene()) {
+  add_scene_commands(table);
+  add_light_commands(table);
+  add_drawing_commands(table);
+}
+
+void Controls::add_scene_commands(CommandTable& table) {
+  table.add({"load", "SCENE", "another scene in this one's place", [this](Words words) { return load(words); }});
+  table.add({"nodes", "", "the scene's nodes and where they are", [this](Words) { return list_nodes(); }});
+  table.add({"move", "NODE by|to X,Y,Z", "metres, world space", [this](Words words) { return move(words); }});
+  table.add({"turn", "NODE X,Y,Z DEGREES", "about that axis through its position", [this](Words words) {
+               expect(words, 3, 3, "turn NODE 0,1,0 90");
+               edits_.turn(words[0], direction_of(point_of(words[1])), number_of(words[2]));
+               return scene_changed();
+             }});
+  for (const bool hidden : {true, false}) {
+    const std::string name = hidden ? "hide" : "show";
+    table.add({name, "NODE", hidden ? "draw without it" : "draw it again", [this, hidden, name](Words words) {
+                 expect(words, 1, 1, name + " NODE");
+                 edits_.hide(words[0], hidden);
+                 return scene_changed();
+               }});
+  }
+}
+
+void Controls::add_light_commands(CommandTable& table) {
+  table.add({"lights", "", "the scene's lights", [this](Words) { return list_lights(); }});
+  table.add({"light", "NAME on|off | intensity R,G,B | position X,Y,Z | direction X,Y,Z", "change a light",
+             [this](Words words) { return change_light(words); }});
+}
+
+void Controls::add_drawing_commands(CommandTable& table) {
+  table.add({"cameras", "", "the scene's cameras", [this](Words) { return list_cameras(); }});
+  table.add({"camera", "NAME|INDEX | X,Y,Z at X,Y,Z [up X,Y,Z] [fov DEGREES]", "where the picture is seen from",
+             [this](Words words) { return set_camera(words); }});
+  for (const char* option : {"passes", "quality", "strategy", "spp"}) {
+    table.add({option, "VALUE", fmt::format("as the option --{}", option),
+               [this, option](Words words) { return set(option, words); }});
+  }
+  table.add({"set", "OPTION VALUE", "any other option of render, without its dashes", [this](Words words) {
+               expect(words, 2, 2, "set photons 200000");
+               return set(words[0], words.subspan(1));
+             }});
+}
+
+std::string Controls::scene_changed() {
+  session_.change_scene([this](Scene& scene) { edits_.apply(scene); });
+  ++changes_;
+  return "";
+}
+
+std::string Controls::load(Words words) {
+  expect(words, 1, 1, "load FILE.glb");
+  session_.load([&] { return options_.load(words[0], globals_); });
+  edits_ = SceneEdits(session_.scene());
+  // What names a camera of the old scene names none of this one.
+  options_.camera.clear();
+  ++changes_;
+  const Scene& scene = session_.scene();
+  return fmt::format("{}: {} triangles, {} nodes, {} lights", printable(scene.name), scene.triangles,
+                     edits_.nodes().size(), scene.lights.size());
+}
+
+std::string Controls::move(Words words) {
+  expect(words, 3, 3, "move NODE by 0,1,0");
+  const glm::dvec3 place = point_of(words[2]);
+  if (words[1] == "by") {
+    edits_.move_by(words[0], place);
+  } else if (words[1] == "to") {
+    edits_.move_to(words[0], place);
+  } else {
+    refuse("a node moves by metres or to a place", "move NODE by 0,1,0");
+  }
+  return scene_changed();
+}
+
+std::string Controls::change_light(Words words) {
+  expect(words, 2, 3, "light NAME intensity 10,10,10");
+  SceneEdits::EditedLight& edited = edits_.light(words[0]);
+  const std::string& what = words[1];
+  if (what == "on" || what == "off") {
+    expect(words, 2, 2, "light NAME off");
+    edited.on = what == "on";
+    return scene_changed();
+  }
+  expect(words, 3, 3, "light NAME position 0,2,0");
+  const glm::dvec3 value = point_of(words[2]);
+  if (what == "intensity") {
+    if (glm::any(glm::lessThan(value, glm::dvec3(0.0))) || glm::any(glm::greaterThan(value, glm::dvec3(1e30)))) {
+      refuse("intensities are from 0 to 1e30", "light NAME intensity 10,10,10");
+    }
+    edited.light.intensity = value;
+  } else if (what == "position") {
+    edited.light.position = value;
+  } else if (what == "direction") {
+    edited.light.direction = direction_of(value);
+  } else {
+    throw Error(ExitCode::Usage, fmt::format("a light has no '{}'", printable(what)),
+                unknown_name_hint(what, std::vector<std::string>{"on", "off", "intensity", "position", "direction"}));
+  }
+  return scene_changed();
+}
+
+std::string Controls::set_camera(Words words) {
+  expect(words, 1, 7, "camera 0,1,5 at 0,1,0");
+  refuse_kept("camera");
+  RenderOptions tried = options_;
+  tried.camera.clear();
+  tried.eye.clear();
+  tried.at.clear();
+  tried.up = RenderOptions().up;
+  tried.fov_degrees = initial_fov_degrees_;
+  const auto triple = [](const std::string& word) {
+    const glm::dvec3 point = point_of(word);
+    return std::vector<double>{point.x, point.y, point.z};
+  };
+  if (words.size() == 1) {
+    tried.camera = words[0];
+  } else {
+    tried.eye = triple(words[0]);
+    for (std::size_t i = 1; i < words.size(); i += 2) {
+      if (i + 1 == words.size()) refuse(fmt::format("nothing follows '{}'", printable(words[i])), "at 0,1,0");
+      if (words[i] == "at") {
+        tried.at = triple(words[i + 1]);
+      } else if (words[i] == "up") {
+        tried.up = triple(words[i + 1]);
+      } else if (words[i] == "fov") {
+        tried.fov_degrees = number_of(words[i + 1]);
+        if (!(tried.fov_degrees > 0.0 && tried.fov_degrees < 179.0)) refuse("fov is from 0 to 179 degrees", "fov 45");
+      } else {
+        refuse(fmt::format("'{}' is none of at, up and fov", printable(words[i])), "camera 0,1,5 at 0,1,0 fov 40");
+      }
+    }
+    if (tried.at.empty()) refuse("what does the eye look at?", "camera 0,1,5 at 0,1,0");
+  }
+  (void)tried.choose_camera(session_.scene());  // a camera there is not is refused, and the old one stays
+  options_ = tried;
+  ++changes_;
+  return "";
+}
+
+void Controls::refuse_kept(const std::string& name) const {
+  const auto found = kept_.find(name);
+  if (found != kept_.end()) refuse(fmt::format("'{}' stays as it is: {}", name, found->second), "quality draft");
+}
+
+std::string Controls::set(const std::string& option, Words words) {
+  expect(words, 1, 1, option + " VALUE");
+  for (const char* own : {"stats", "explain", "environment", "camera", "eye", "at", "up", "strict"}) {
+    if (option == own) refuse(fmt::format("--{} is not set from here", option), "set photons 200000");
+  }
+  refuse_kept(option);
+  const std::vector<std::string> options = option_names();
+  if (std::ranges::find(options, option) == options.end()) {
+    throw Error(ExitCode::Usage, fmt::format("render has no option --{}", printable(option)),
+                unknown_name_hint(option, options));
+  }
+  RenderOptions tried = options_;
+  try {
+    set_option(tried, option, words[0]);
+  } catch (const CLI::ParseError& error) {
+    throw Error(ExitCode::Usage, error.what(), "hpr help knobs and hpr render --help list what can be set");
+  }
+  (void)tried.settings(globals_.seed);
+  (void)tried.sampling();
+  (void)tried.wire.colors();
+  options_ = tried;
+  ++changes_;
+  return "";
+}
+
+std::string Controls::list_nodes() const {
+  std::string text;
+  for (const SceneEdits::Node& node : edits_.nodes()) {
+    text += fmt::format("{}{} at {}{}", text.empty() ? "" : "\n", printable(node.name), written(edits_.position(node)),
+                        node.hidden ? ", hidden" : "");
+  }
+  return text;
+}
+
+std::string Controls::list_lights() const {
+  std::string text;
+  for (const SceneEdits::EditedLight& edited : edits_.lights()) {
+    const Light& light = edited.light;
+    text += fmt::format("{}{}: {} at {}, intensity {}{}", text.empty() ? "" : "\n", printable(light.name),
+                        type_of(light), written(light.position), written(light.intensity), edited.on ? "" : ", off");
+  }
+  return text;
+}
+
+std::string Controls::list_cameras() const {
+  std::string text;
+  for (const Camera& camera : session_.scene().cameras) {
+    text += fmt::format("{}{} at {}", text.empty() ? "" : "\n", printable(camera.name), written(camera.eye));
+  }
+  return text;
+}
+
+}  // namespace hpr

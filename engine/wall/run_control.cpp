@@ -1,0 +1,195 @@
+#include "engine/wall/run_control.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <utility>
+
+#include "core/log.h"
+#include "core/names.h"
+#include "core/stopwatch.h"
+#include "engine/wall/forgivable.h"
+#include "engine/wall/hearing.h"
+#include "walls/link/bytes.h"
+#include "walls/link/hosts.h"
+#include "walls/link/socket.h"
+
+namespace hpr {
+namespace {
+
+constexpr std::string_view kPrefix = "wall-";
+constexpr std::string_view kSuffix = ".sock";
+constexpr std::string_view kRefused = "error ";  ///< then the exit code's number, and why
+
+/// To the run that listens there. Throws LinkError.
+Socket connect_to(const std::filesystem::path& path) {
+  const LinkAddress address = socket_address(path);
+  Socket socket = start_connecting(address);
+  finish_connecting(socket, address.tcp);
+  return socket;
+}
+
+/// What a killed run left refuses; a run in the middle of a frame may be too busy to accept.
+bool is_left_over(const std::filesystem::path& path) {
+  try {
+    (void)connect_to(path);
+    return false;
+  } catch (const LinkError& error) {
+    return error.code() == ECONNREFUSED || error.code() == ENOENT;
+  }
+}
+
+/// A run that begins has a socket for an instant before it listens, and refuses as one that was killed does.
+bool is_young(const std::filesystem::path& path) {
+  constexpr std::chrono::seconds kToBegin{10};
+  std::error_code gone;
+  return std::filesystem::last_write_time(path, gone) + kToBegin > std::filesystem::file_time_type::clock::now();
+}
+
+/// Throws Error (Io).
+Socket call(const RunningWall& wall, const std::string& line) {
+  int code = 0;
+  try {
+    Socket socket = connect_to(wall.socket);
+    if (::send(socket.descriptor(), line.data(), line.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(line.size())) {
+      return socket;
+    }
+  } catch (const LinkError& error) {
+    code = error.code();
+  }
+  throw Error(ExitCode::Io, fmt::format("run {} does not answer", wall.run),
+              code == EAGAIN ? "too many wait for it already: try again after its frame"
+                             : "it may just have ended: hpr wall status");
+}
+
+/// `text`: "CODE why".
+[[noreturn]] void throw_refusal(const std::string& text) {
+  const std::size_t space = std::min(text.find(' '), text.size() - 1);
+  for (const ExitCode code : {ExitCode::BadInput, ExitCode::Io, ExitCode::Limit}) {
+    if (text.substr(0, space) == std::to_string(static_cast<int>(code))) throw Error(code, text.substr(space + 1));
+  }
+  throw Error(ExitCode::Usage, text.substr(space + 1), "hpr wall ctl help lists what can be said");
+}
+
+std::string last_line(const std::string& text) {
+  if (!text.ends_with('\n')) return "";
+  const std::size_t before = text.size() < 2 ? std::string::npos : text.rfind('\n', text.size() - 2);
+  return text.substr(before == std::string::npos ? 0 : before + 1);
+}
+
+}  // namespace
+
+std::filesystem::path control_folder() {
+  make_private_folder(socket_folder());
+  return socket_folder();
+}
+
+RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& options,
+                       std::function<std::string()> status, std::function<void()> apply,
+                       std::function<void(const std::string&)> remember)
+    : session_(session),
+      controls_(session, globals, options, table_),
+      options_(options),
+      apply_(std::move(apply)),
+      remember_(std::move(remember)) {
+  table_.add(
+      {"status", "", "what the wall shows and how long it takes, as JSON",
+       [this, status = std::move(status)](Words) { return session_.comm().rank() == 0 ? status() : std::string(); }});
+  table_.add({"stop", "", "end the run after this frame", [this](Words) {
+                stops_ = true;
+                return std::string();
+              }});
+  if (session_.comm().rank() != 0) return;
+  try {
+    source_.emplace(LineSource::Options{
+        .listen = (control_folder() / fmt::format("{}{}{}", kPrefix, ::getpid(), kSuffix)).string()});
+  } catch (const Error& error) {
+    log::warning("the run cannot be told anything while it lasts: {} ({})", error.what(), error.hint());
+  }
+}
+
+std::string RunControl::obey(const std::string& line) {
+  const std::uint64_t before = controls_.changes();
+  const RenderOptions options = options_;
+  std::string told = table_.run(line);
+  if (controls_.changes() == before) return told;
+  try {
+    apply_();
+  } catch (const Error& error) {
+    if (!is_forgivable(error)) throw;
+    options_ = options;
+    apply_();
+    throw;
+  }
+  remember_(line);
+  return told;
+}
+
+void RunControl::replay(std::span<const std::string> lines) {
+  for (const std::string& line : lines) {
+    try {
+      (void)table_.run(line);
+    } catch (const Error& error) {
+      if (!is_forgivable(error)) throw;
+      log::warning("'{}' cannot be done again: {}", printable(line), error.what());
+    }
+  }
+}
+
+void RunControl::attend() {
+  std::optional<InputLine> from;
+  while (const auto line = hear_line(session_.comm(), source_ ? &*source_ : nullptr, {}, from).line) {
+    std::string answer;
+    try {
+      const std::string told = obey(*line);
+      answer = told.empty() ? "ok\n" : told + "\nok\n";
+    } catch (const Error& error) {
+      if (!is_forgivable(error)) throw;
+      answer = fmt::format("{}{} {} ({})\n", kRefused, static_cast<int>(error.code()), error.what(), error.hint());
+    }
+    if (from) source_->answer(*from, answer);
+  }
+}
+
+std::vector<RunningWall> running_walls() {
+  std::vector<RunningWall> walls;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(control_folder())) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
+    if (is_left_over(entry.path())) {
+      if (!is_young(entry.path())) std::filesystem::remove(entry.path(), ignored);
+      continue;
+    }
+    walls.push_back({name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size()), entry.path()});
+  }
+  std::ranges::sort(walls, {}, &RunningWall::run);
+  return walls;
+}
+
+std::string ask(const RunningWall& wall, const std::string& line, std::chrono::milliseconds longest) {
+  const Socket socket = call(wall, line + "\n");
+  const Stopwatch watch;
+  std::string answer;
+  while (true) {
+    const std::string last = last_line(answer);
+    if (last == "ok\n") return answer.substr(0, answer.size() - last.size());
+    if (last.starts_with(kRefused)) throw_refusal(last.substr(kRefused.size(), last.size() - kRefused.size() - 1));
+    pollfd ready{socket.descriptor(), POLLIN, 0};
+    const int left = static_cast<int>(std::min(static_cast<double>(longest.count()) - watch.ms(), 60'000.0));
+    std::array<char, 4096> buffer{};
+    if (left <= 0 || ::poll(&ready, 1, left) <= 0) break;
+    const ssize_t count = ::recv(socket.descriptor(), buffer.data(), buffer.size(), 0);
+    if (count <= 0) break;
+    answer.append(buffer.data(), static_cast<std::size_t>(count));
+  }
+  throw Error(ExitCode::Io, fmt::format("run {} gave no answer within {} s", wall.run, longest.count() / 1000),
+              "it answers between frames: wait longer with --wait");
+}
+
+}  // namespace hpr

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "engine/wall/controls.h"
+#include "engine/wall/line_source.h"
+
+namespace hpr {
+
+/// socket_folder(), made if missing: where running walls of this user are reached, and nobody else may write. Throws
+/// Error (Io) when it cannot be made, or is another's.
+[[nodiscard]] std::filesystem::path control_folder();
+
+/// Lets others tell a running wall what to do, between frames: every command of a console but those about pictures,
+/// and `status` and `stop`.
+class RunControl {
+ public:
+  /// Collective. All outlive this. `options`: what the commands change. `status`: one JSON document; called on rank 0.
+  /// `apply`: called on all ranks after every line that changed something; where it throws what is_forgivable, the
+  /// options are put back and it is called again. `remember`: told every such line that could be applied.
+  RunControl(Session& session, const Globals& globals, RenderOptions& options, std::function<std::string()> status,
+             std::function<void()> apply, std::function<void(const std::string& line)> remember);
+
+  /// See Controls::keep().
+  void keep(const std::string& name, const std::string& why) { controls_.keep(name, why); }
+  /// Collective. Does once more what an earlier job of this run was told, without telling anybody.
+  void replay(std::span<const std::string> lines);
+
+  /// Collective. Carries out what was said by now; never waits.
+  void attend();
+  [[nodiscard]] bool stops() const { return stops_; }
+
+ private:
+  [[nodiscard]] std::string obey(const std::string& line);
+
+  Session& session_;
+  CommandTable table_;
+  Controls controls_;
+  RenderOptions& options_;
+  std::function<void()> apply_;
+  std::function<void(const std::string&)> remember_;
+  std::optional<LineSource> source_;  ///< on rank 0
+  bool stops_ = false;
+};
+
+/// A wall that runs, as its socket is found.
+struct RunningWall {
+  std::string run;  ///< what --run names it by
+  std::filesystem::path socket;
+};
+
+/// Those that answer; sockets that killed runs left are removed.
+[[nodiscard]] std::vector<RunningWall> running_walls();
+
+/// Sends one line to a running wall and waits for its answer, at most `longest`. Throws Error: Io when nobody is there
+/// or the answer does not come; what the wall's own error is (Usage, BadInput, Io, Limit) when it refuses.
+[[nodiscard]] std::string ask(const RunningWall& wall, const std::string& line, std::chrono::milliseconds longest);
+
+}  // namespace hpr

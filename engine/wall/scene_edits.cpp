@@ -1,0 +1,132 @@
+#include "engine/wall/scene_edits.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <unordered_map>
+
+#include "core/error.h"
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+/// As far as a file may place a node.
+constexpr double kFarthest = 1e18;
+
+[[noreturn]] void throw_unknown(std::string_view what, const std::string& name, const std::vector<std::string>& names) {
+  constexpr std::size_t kMostListed = 40;
+  if (names.empty()) {
+    throw Error(ExitCode::Usage, fmt::format("the scene has no {} '{}'", what, printable(name)), "it has none at all");
+  }
+  const auto nearest = nearest_name(name, names);
+  throw Error(ExitCode::Usage, fmt::format("the scene has no {} '{}'", what, printable(name)),
+              names.size() <= kMostListed ? unknown_name_hint(name, names)
+              : nearest                   ? fmt::format("did you mean '{}'?", *nearest)
+                                          : fmt::format("it has {} others: {}s lists them", names.size(), what));
+}
+
+}  // namespace
+
+SceneEdits::SceneEdits(const Scene& scene) : instances_(scene.instances) {
+  std::unordered_map<std::string, std::size_t> known;
+  for (std::size_t i = 0; i < instances_.size(); ++i) {
+    names_.push_back(scene.node_names.empty() ? scene.mesh_of(instances_[i]).name : scene.node_names[i]);
+    if (names_.back().empty()) names_.back() = fmt::format("mesh{}", instances_[i].mesh);
+    const auto [found, is_new] = known.try_emplace(names_.back(), nodes_.size());
+    if (is_new) nodes_.push_back({names_.back(), {}, false});
+    nodes_[found->second].instances.push_back(i);
+  }
+  for (const Light& light : scene.lights) {
+    lights_.push_back({light, true});
+    if (light.name.empty()) lights_.back().light.name = fmt::format("light{}", lights_.size() - 1);
+  }
+}
+
+SceneEdits::Node& SceneEdits::find(const std::string& name) {
+  const auto found = std::ranges::find(nodes_, name, &Node::name);
+  if (found != nodes_.end()) return *found;
+  std::vector<std::string> names;
+  for (const Node& node : nodes_) names.push_back(printable(node.name));
+  throw_unknown("node", name, names);
+}
+
+SceneEdits::EditedLight& SceneEdits::light(const std::string& name) {
+  const auto found = std::ranges::find(lights_, name, [](const EditedLight& edited) { return edited.light.name; });
+  if (found != lights_.end()) return *found;
+  std::vector<std::string> names;
+  for (const EditedLight& edited : lights_) names.push_back(printable(edited.light.name));
+  throw_unknown("light", name, names);
+}
+
+glm::dvec3 SceneEdits::position(const Node& node) const {
+  return instances_[node.instances.front()].to_world[3];
+}
+
+void SceneEdits::place(const Node& node, const glm::dmat4& change) {
+  for (const std::size_t i : node.instances) {
+    const glm::dmat4 moved = change * instances_[i].to_world;
+    for (int column = 0; column < 4; ++column) {
+      for (int row = 0; row < 3; ++row) {
+        if (!(std::abs(moved[column][row]) <= kFarthest)) {
+          throw Error(ExitCode::Usage, fmt::format("node '{}' would lie beyond 1e18 metres", printable(node.name)),
+                      "keep it nearer");
+        }
+      }
+    }
+  }
+  for (const std::size_t i : node.instances) instances_[i].to_world = change * instances_[i].to_world;
+}
+
+void SceneEdits::move_by(const std::string& node, const glm::dvec3& offset) {
+  place(find(node), glm::translate(glm::dmat4(1.0), offset));
+}
+
+void SceneEdits::move_to(const std::string& node, const glm::dvec3& position) {
+  Node& found = find(node);
+  const glm::dvec3 from = this->position(found);
+  place(found, glm::translate(glm::dmat4(1.0), position - from));
+  // Exactly there, whatever the difference was rounded to.
+  for (int i = 0; i < 3; ++i) instances_[found.instances.front()].to_world[3][i] = position[i];
+}
+
+void SceneEdits::turn(const std::string& node, const glm::dvec3& axis, double degrees) {
+  if (!(glm::length(axis) > 0.0) || !std::isfinite(degrees)) {
+    throw Error(ExitCode::Usage, "a node turns about an axis other than 0,0,0 by a number of degrees",
+                "write e.g. turn NODE 0,1,0 90");
+  }
+  Node& found = find(node);
+  const glm::dvec3 about = position(found);
+  glm::dmat4 change = glm::translate(glm::dmat4(1.0), about);
+  change = glm::rotate(change, glm::radians(degrees), glm::normalize(axis));
+  place(found, glm::translate(change, -about));
+}
+
+void SceneEdits::hide(const std::string& node, bool hidden) {
+  find(node).hidden = hidden;
+}
+
+void SceneEdits::apply(Scene& scene) const {
+  std::vector<bool> hidden(instances_.size(), false);
+  for (const Node& node : nodes_) {
+    for (const std::size_t i : node.instances) hidden[i] = node.hidden;
+  }
+  scene.instances.clear();
+  scene.node_names.clear();
+  for (std::size_t i = 0; i < instances_.size(); ++i) {
+    if (hidden[i]) continue;
+    scene.instances.push_back(instances_[i]);
+    scene.node_names.push_back(names_[i]);
+  }
+  scene.lights.clear();
+  for (const EditedLight& edited : lights_) {
+    if (edited.on) scene.lights.push_back(edited.light);
+  }
+  finish_scene(scene);
+}
+
+}  // namespace hpr

@@ -1,0 +1,398 @@
+#include "engine/wall/wall_driver.h"
+
+#include <fmt/format.h>
+#include <hpr/version.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/remote_wall.h"
+#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/texts.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "core/stopwatch.h"
+#include "core/trace.h"
+#include "engine/signals.h"
+#include "engine/wall/screen_owners.h"
+#include "engine/wall/wall_status.h"
+#include "walls/geometry/geometry.h"
+#include "walls/link/sender.h"
+#include "walls/manifest/manifest_file.h"
+#include "walls/manifest/run_journal.h"
+
+namespace hpr {
+namespace {
+
+/// Of each picture that is drawn, its screen's rank.
+std::vector<int> picture_owners(const Wall& wall, const std::vector<int>& owners) {
+  std::vector<int> shown_by;
+  for (const ScreenEye& picture : screen_eyes(wall)) shown_by.push_back(owners[picture.screen]);
+  return shown_by;
+}
+
+bool has_points(const WallScreen& screen) {
+  return screen.warp.points != nullptr;
+}
+
+/// OpenGL needs other pictures than rays where screens are no planes, so the choice cannot be left to a measurement.
+FrameSettings settings_for(const Wall& wall, FrameSettings settings) {
+  const bool curved = std::ranges::any_of(wall.screens, has_points);
+  if (curved && settings.primary == Primary::Auto) settings.primary = Primary::Rays;
+  return settings;
+}
+
+/// A viewer who moves the camera waits no longer for a frame, unless told otherwise.
+std::optional<double> target_of(const WallRun& run) {
+  constexpr double kResponsive_ms = 50.0;
+  if (run.target_ms || !run.open_ended()) return run.target_ms;
+  return kResponsive_ms;
+}
+
+/// While nobody moves the camera, the picture of an open-ended run gets better.
+std::optional<SampleGoal> resting_of(const WallRun& run) {
+  constexpr std::uint32_t kSamplesAtRest = 64;
+  const Sampling sampling = sampling_of(run);
+  if (!run.open_ended() || !sampling.goal.one() || run.options.spp) return std::nullopt;
+  return SampleGoal{.samples = kSamplesAtRest, .seconds = {}, .relmse = {}};
+}
+
+}  // namespace
+
+Sampling sampling_of(const WallRun& run) {
+  Sampling sampling = run.options.sampling();
+  if (!run.target_error) return sampling;
+  sampling.goal.relmse = run.target_error;
+  if (!run.options.spp) sampling.goal.samples.reset();
+  return sampling;
+}
+
+WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
+                       Session& session)
+    : run_(run),
+      wall_(wall),
+      session_(session),
+      path_(run.path.empty() ? std::optional<CameraPath>() : load_camera_path(run.path)),
+      heads_(wall, session.comm()),
+      monitors_(wall),
+      globals_(globals),
+      options_(run.options),
+      start_(run.options.choose_camera(session.scene())),
+      fov_degrees_(run.options.fov_degrees),
+      orbit_(start_, session.scene().bounds),
+      control_(
+          session, globals, options_, [this] { return status(); }, [this] { plan_frames(); },
+          [this](const std::string& line) {
+            if (journal_) journal_->add_command(line);
+          }),
+      hosts_(all_gather_texts(session.comm(), session.host())),
+      owners_(owners_of(wall, hosts_, run.display.remote())) {
+  control_.keep("aov", "its files are named before a wall starts");
+  if (path_) control_.keep("camera", "it follows --path");
+  if (run.display.kind().whole_wall) std::ranges::fill(owners_, 0);
+  start_frames(settings, run);
+  if (run.display.remote()) remote_ = connect_displays(session_.comm(), wall, owners_, run.remote);
+  agree_on_failure(session_.comm(), [&] {
+    DisplayOptions options = run.display.options(globals);
+    options.screens.emplace();
+    for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+      if (owners_[screen] == session_.comm().rank()) options.screens->push_back(screen);
+    }
+    if (shows_any() && !remote_) display_ = run.display.kind().make(wall, options);
+  });
+  manifest_.scene_hash = content_hash(session.scene());
+  manifest_.wall_hash = wall.hash;
+  manifest_.seed = globals.seed;
+  manifest_.versions = {
+      {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
+  take_over();
+}
+
+/// `run`: with its options as they are now.
+void WallDriver::start_frames(const FrameSettings& settings, const WallRun& run) {
+  const std::vector<View> views = screens_in(0, resting_heads(wall_));
+  const FrameSettings used = settings_for(wall_, settings);
+  curved_.emplace(views, used.primary == Primary::Rays);
+  for (const Size& size : curved_->sizes()) check_size(size, globals_.picture_limits());
+  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), run.options.exposure};
+  frames_.emplace(session_, used, sampling_of(run), curved_->drawn(views), target_of(run), resting_of(run),
+                  !run.raw.empty());
+}
+
+std::vector<std::string> WallDriver::explained() const {
+  std::vector<std::string> lines = plan().explained;
+  std::size_t flat = 0;
+  const std::vector<ScreenEye> pictures = screen_eyes(wall_);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    if (has_points(wall_.screens[pictures[i].screen])) flat += curved_->sizes()[i].area();
+  }
+  if (flat == 0) return lines;
+  const auto count = std::ranges::count_if(wall_.screens, has_points);
+  const std::string what = fmt::format("warp: position maps of {} screen{}", count, count == 1 ? "" : "s");
+  lines.push_back(plan().primary == Primary::Rays
+                      ? what + ", rays go through their points"
+                      : fmt::format("{}, seen in flat pictures of {:.2f} million pixels (rays would be exact)", what,
+                                    static_cast<double>(flat) * 1e-6));
+  return lines;
+}
+
+/// What an earlier job of this run did before it was lost, or stopped.
+void WallDriver::take_over() {
+  std::string told = "[]";
+  agree_on_failure(session_.comm(), [&] {
+    if (session_.comm().rank() != 0) return;
+    RunJournal::Entries entries;
+    if (auto journal = RunJournal::of_supervisor()) {
+      journal_.emplace(std::move(*journal));
+      entries = journal_->read();
+    }
+    told = nlohmann::json(entries.commands).dump();
+    if (run_.resume && entries.frames.empty()) resume(entries.frames);
+    if (!run_.open_ended()) {
+      // The last picture is needed for what is written at the end.
+      const auto most = static_cast<std::size_t>(run_.frames.value_or(1) - 1);
+      entries.frames.resize(std::min(entries.frames.size(), most));
+      first_frame_ = entries.frames.size();
+      manifest_.earlier = std::move(entries.frames);
+    }
+    std::ranges::move(entries.restarts, std::back_inserter(manifest_.restarts));
+  });
+  first_frame_ = all_gather_value(session_.comm(), first_frame_)[0];
+  replay(told);
+}
+
+/// `told`: on rank 0, a JSON array of the lines the run was told before.
+void WallDriver::replay(const std::string& told) {
+  const auto lines = nlohmann::json::parse(broadcast_text(session_.comm(), told)).get<std::vector<std::string>>();
+  if (lines.empty()) return;
+  control_.replay(lines);
+  plan_frames();
+}
+
+/// Goes on after what the folder's manifest has, where there is one.
+void WallDriver::resume(std::vector<std::string>& frames) {
+  std::error_code error;
+  if (!std::filesystem::exists(run_.manifest(), error)) return;
+  ManifestFile before = load_manifest(run_.manifest().string());
+  const int asked = run_.frames.value_or(1);
+  std::string other;
+  if (before.wall_hash != manifest_.wall_hash) other = "another wall";
+  if (before.scene_hash != manifest_.scene_hash) other = "another scene";
+  if (before.seed != manifest_.seed) other = fmt::format("seed {}", before.seed);
+  const int of = before.stopped_of.value_or(static_cast<int>(before.frames.size()));
+  if (of != asked) other = fmt::format("{} frames", of);
+  if (!other.empty()) {
+    throw Error(ExitCode::BadInput,
+                fmt::format("'{}' is of a run with {}", printable(run_.manifest().string(), 200), other),
+                "go on with the same command line, or begin anew with --force in place of --resume");
+  }
+  check_records(before, wall_.screens, run_.manifest().string());
+  log::info("going on after {} of {} frames", before.frames.size(), asked);
+  frames = std::move(before.frames);
+  manifest_.restarts = std::move(before.restarts);
+  // A job that is lost from here on starts again from all that was done.
+  if (!journal_) return;
+  for (const std::string& frame : frames) journal_->add_frame(frame);
+  for (const std::string& restart : manifest_.restarts) journal_->keep_restart(restart);
+}
+
+bool WallDriver::obey() {
+  control_.attend();
+  return !control_.stops();
+}
+
+void WallDriver::plan_frames() {
+  WallRun changed = run_;
+  changed.options = options_;
+  const Camera start = options_.choose_camera(session_.scene());
+  if (start.eye != start_.eye || start.axes != start_.axes || options_.fov_degrees != fov_degrees_) {
+    orbit_ = OrbitCamera(start, session_.scene().bounds);
+    start_ = start;
+    fov_degrees_ = options_.fov_degrees;
+  }
+  start_frames(options_.settings(globals_.seed), changed);
+}
+
+std::string WallDriver::status() const {
+  using Json = nlohmann::ordered_json;
+  Json screens = Json::array();
+  Json restarts = Json::array();
+  const bool drawn = !manifest_.frames.empty();
+  if (drawn) {
+    const std::vector<ScreenState> now = states();
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      screens.push_back(Json{{"id", wall_.screens[i].id}, {"state", to_string(now[i])}});
+    }
+  }
+  for (const std::string& restart : manifest_.restarts) restarts.push_back(Json::parse(restart));
+  const Json document{{"schema", "hpr.wall-status/1"},
+                      {"run", ::getpid()},
+                      {"wall", wall_.name},
+                      {"scene", session_.scene().name},
+                      {"ranks", session_.comm().size()},
+                      {"frame", drawn ? manifest_.frames.back().frame : 0},
+                      {"ms", drawn ? manifest_.frames.back().ms : 0.0},
+                      {"screens", std::move(screens)},
+                      {"restarts", std::move(restarts)}};
+  return document.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+WallDriver::~WallDriver() = default;
+
+void WallDriver::draw(std::uint64_t number, Progress& progress) {
+  const trace::Span span("frame", "number", number);
+  const Stopwatch watch;
+  const std::size_t sent_before = session_.comm().bytes_sent();
+  last_heads_ = heads_.at(number);
+  const std::vector<View> views = screens_in(number, last_heads_);
+  Frame& frame = frames_->make(curved_->drawn(views), number, progress);
+  std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
+  curved_->finish(views, pictures, session_.threads());
+  pictures_ = compose_screens(wall_, std::move(pictures));
+  copies_ = monitors_.draw(session_.comm(), pictures_, owners_);
+  last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
+  agree_on_failure(session_.comm(), [&] { show(number); });
+  record(number);
+}
+
+bool WallDriver::follow_viewers() {
+  struct Asked {
+    DisplayInput input;
+    bool interrupt = false;
+  };
+  const Asked mine{display_ ? display_->take_input() : DisplayInput{}, take_request() == Request::Stop};
+  OrbitInput motion;
+  bool stop = false;
+  for (const Asked& asked : all_gather_value(session_.comm(), mine)) {
+    motion += asked.input.orbit;
+    stop = stop || asked.input.stop;
+    interrupted_ = interrupted_ || asked.interrupt;
+  }
+  orbit_.move(motion);
+  return !stop && !interrupted_;
+}
+
+bool WallDriver::settled() {
+  const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
+  if (path_ || heads_.plays_on(last)) return false;
+  return frames_->refined(curved_->drawn(screens_in(0, heads_.at(last + 1))));
+}
+
+bool WallDriver::finish() {
+  agree_on_failure(session_.comm(), [&] {
+    if (display_) display_->finish();
+  });
+  if (journal_) journal_->add_end();
+  return !remote_ || end_displays(session_.comm(), *remote_, manifest_);
+}
+
+std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
+  Communicator& comm = session_.comm();
+  for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+    const int from = owners_[screen];
+    if (from == 0) continue;
+    if (comm.rank() == from) comm.send(std::as_bytes(pictures_[screen].pixels()), 0);
+    if (comm.rank() == 0) {
+      pictures_[screen] = Image<Rgba8>(wall_.screens[screen].pixels);
+      comm.receive(std::as_writable_bytes(pictures_[screen].pixels()), from);
+    }
+  }
+  return std::move(pictures_);
+}
+
+std::vector<View> WallDriver::screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const {
+  const auto frames = static_cast<std::size_t>(run_.frames.value_or(1));
+  const Camera camera = path_ ? camera_of(path_->at_frame(frame, frames)) : orbit_.camera();
+  return wall_views(wall_, heads, camera, session_.scene().bounds);
+}
+
+bool WallDriver::shows_any() const {
+  const bool shows_monitors = run_.display.kind().monitors && monitors_.any() && session_.comm().rank() == 0;
+  return shows_monitors || std::ranges::find(owners_, session_.comm().rank()) != owners_.end();
+}
+
+void WallDriver::show(std::uint64_t number) {
+  if (!display_ && !remote_) return;
+  const trace::Span span("show");
+  std::vector<ScreenPicture> mine;
+  for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
+    if (owners_[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
+  }
+  if (remote_) {
+    remote_->show({number, mine, {}});
+    return;
+  }
+  std::vector<MonitorPicture> monitors;
+  for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) monitors.push_back({monitor, copies_[monitor]});
+  display_->show({number, mine, monitors});
+}
+
+/// Every rank tells of what it showed: the screens' records, on rank 0.
+std::vector<ScreenRecord> WallDriver::record_screens() {
+  // Per screen its hash, its bytes, and the microseconds it took and one; 0: not known.
+  const std::size_t count = owners_.size();
+  std::vector<std::uint64_t> told(3 * count, 0);
+  for (std::size_t screen = 0; screen < count; ++screen) {
+    if (owners_[screen] != session_.comm().rank()) continue;
+    told[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
+  }
+  for (const ScreenCost& cost : remote_ ? remote_->costs() : display_ ? display_->costs() : std::vector<ScreenCost>()) {
+    told[count + cost.screen] = cost.bytes;
+    told[2 * count + cost.screen] = static_cast<std::uint64_t>(1000.0 * cost.ms) + 1;
+  }
+  session_.comm().reduce_max(told, 0);  // all but the owner's are 0
+  std::vector<ScreenRecord> screens;
+  for (std::size_t i = 0; i < count; ++i) {
+    ScreenRecord screen{wall_.screens[i].id, wall_.screens[i].pixels, told[i], ScreenState::Fresh, owners_[i]};
+    if (const std::uint64_t microseconds = told[2 * count + i]; microseconds > 0) {
+      screen.ms = static_cast<double>(microseconds - 1) / 1000.0;
+      screen.bytes = told[count + i];
+    }
+    screens.push_back(std::move(screen));
+  }
+  return screens;
+}
+
+void WallDriver::record(std::uint64_t number) {
+  const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
+  frames_->took(slowest);
+  FrameRecord frame{number, slowest, strategy(), record_screens()};
+  if (frames_->report()) frame.budget = to_record(*frames_->report());
+  frame.slowest = slowest_of(session_, *frames_, hosts_);
+  frame.heads = heads_.report();
+  for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) {
+    frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, copies_[monitor], ScreenState::Fresh));
+  }
+  // Of an open-ended run only now and then: that it gets on is all that counts.
+  constexpr std::uint64_t kSignOfLife = 1000;
+  if (journal_ && (run_.frames || number % kSignOfLife == 0)) journal_->add_frame(to_json(frame));
+  // An open-ended run keeps its last frames only.
+  constexpr std::size_t kMostRecords = 10'000;
+  if (!run_.frames && manifest_.frames.size() == kMostRecords) {
+    manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMostRecords / 2);
+    if (remote_ && session_.comm().rank() == 0) remote_->forget_before(manifest_.frames.front().frame);
+  }
+  manifest_.frames.push_back(std::move(frame));
+}
+
+std::vector<ScreenState> WallDriver::states() const {
+  const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
+  // Of the latest frames displays have not said anything yet.
+  const auto awaited = static_cast<std::uint64_t>(run_.remote.in_flight) + 1;
+  std::vector<ScreenState> unheard(owners_.size(), ScreenState::Fresh);
+  if (!remote_ || last < first_frame_ + awaited) return unheard;
+  return remote_->outcome(last - awaited).screens;
+}
+
+std::string WallDriver::strategy() const {
+  const FramePlan& made = plan();
+  if (made.mine.group.size() == 1) return std::string(name_of(made.distribution));
+  return std::string(session_.compositor(made.strategy, made.mine.group).chosen());
+}
+
+}  // namespace hpr

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "app/commands/wall_run.h"
+#include "core/progress.h"
+#include "engine/camera_path.h"
+#include "engine/frame_maker.h"
+#include "engine/output.h"
+#include "engine/screens.h"
+#include "engine/session.h"
+#include "engine/wall/orbit.h"
+#include "engine/wall/run_control.h"
+#include "engine/wall/wall_heads.h"
+#include "engine/wall/wall_monitors.h"
+#include "walls/config/wall.h"
+#include "walls/displays/display.h"
+#include "walls/geometry/curved.h"
+#include "walls/manifest/manifest.h"
+#include "walls/manifest/run_journal.h"
+
+namespace hpr {
+
+class WallSender;
+
+/// As the run's options say, until its target error where there is one.
+[[nodiscard]] Sampling sampling_of(const WallRun& run);
+
+/// Drives one wall: what stays the same from frame to frame.
+class WallDriver {
+ public:
+  /// Collective. All outlive this.
+  WallDriver(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
+             Session& session);
+  ~WallDriver();
+  WallDriver(const WallDriver&) = delete;
+  WallDriver& operator=(const WallDriver&) = delete;
+
+  [[nodiscard]] const FramePlan& plan() const { return frames_->plan(); }
+  /// The last frame's screens are the pictures of screen_eyes().
+  [[nodiscard]] FrameMaker& frames() { return *frames_; }
+  /// One line per decision, with its reason.
+  [[nodiscard]] std::vector<std::string> explained() const;
+  [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
+  [[nodiscard]] const FrameTimes& times() const { return frames_->times(); }
+  [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
+  [[nodiscard]] std::optional<double> relmse() const { return frames_->relmse(); }
+  /// On rank 0: what the screens show, as far as displays outside the job have told by now.
+  [[nodiscard]] std::vector<ScreenState> states() const;
+
+  /// The frame to begin with: past 0 where an earlier job of this run was lost or stopped.
+  [[nodiscard]] std::uint64_t first_frame() const { return first_frame_; }
+  /// Collective. Does what others told the run since the last frame; false when they ended it.
+  [[nodiscard]] bool obey();
+
+  /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
+  void draw(std::uint64_t number, Progress& progress);
+
+  /// Collective. Moves the camera as viewers on all ranks asked since the last call; a camera on a path stays on it.
+  /// False once one of them, or a signal, asked to end the run.
+  [[nodiscard]] bool follow_viewers();
+  /// Whether it was a signal.
+  [[nodiscard]] bool interrupted() const { return interrupted_; }
+  /// On rank 0: the run ends before its last frame, and its manifest says so.
+  void note_stop(int frames) { manifest_.stopped_of = frames; }
+  /// Collective. Whether the next frame would be the last one again.
+  [[nodiscard]] bool settled();
+  /// Collective. After the last frame. False: displays outside the job were meant to show it, and none ever did.
+  [[nodiscard]] bool finish();
+
+  /// Collective. All screens' pictures of the last frame, on rank 0.
+  [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
+
+ private:
+  void start_frames(const FrameSettings& settings, const WallRun& run);
+  [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const;
+  [[nodiscard]] bool shows_any() const;
+  void plan_frames();
+  void take_over();
+  void replay(const std::string& told);
+  void resume(std::vector<std::string>& frames);
+  [[nodiscard]] std::string status() const;
+  void show(std::uint64_t number);
+  void record(std::uint64_t number);
+  [[nodiscard]] std::vector<ScreenRecord> record_screens();
+  [[nodiscard]] std::string strategy() const;
+
+  const WallRun& run_;
+  const Wall& wall_;
+  Session& session_;
+  std::optional<CameraPath> path_;
+  WallHeads heads_;
+  WallMonitors monitors_;
+  const Globals& globals_;
+  RenderOptions options_;  ///< as changed while it runs
+  Camera start_;           ///< of the orbit, with that angle of view
+  double fov_degrees_;
+  OrbitCamera orbit_;  ///< where there is no path
+  RunControl control_;
+  std::vector<std::string> hosts_;  ///< per rank
+  std::vector<int> owners_;         ///< per screen the rank that shows it
+  Showing showing_;                 ///< of the pictures of screen_eyes()
+  std::optional<CurvedScreens> curved_;
+  std::optional<FrameMaker> frames_;
+  std::unique_ptr<Display> display_;
+  std::unique_ptr<WallSender> remote_;  ///< in place of a display, to those outside the job
+  std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
+  std::vector<Image<Rgba8>> copies_;    ///< per monitor, on rank 0
+  RunManifest manifest_;
+  FrameCost last_cost_;
+  std::vector<HeadPose> last_heads_;
+  std::optional<RunJournal> journal_;  ///< on rank 0, where a supervisor looks on
+  std::uint64_t first_frame_ = 0;
+  bool interrupted_ = false;
+};
+
+}  // namespace hpr

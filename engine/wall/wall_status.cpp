@@ -1,0 +1,78 @@
+#include "engine/wall/wall_status.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "cluster/transport/collectives.h"
+
+namespace hpr {
+namespace {
+
+/// What a rank did for a frame itself. What it took to composite is left out: most of that is waiting.
+struct Work {
+  double ms = 0.0;
+  double pass_ms = 0.0;
+  std::uint64_t pass = 0;  ///< that took most; 0: the keys
+};
+
+Work work_of(const FrameTimes& times, const FrameTimes& before, int threads) {
+  const double primary_ms = times.primary_ms - before.primary_ms;
+  Work work{primary_ms, primary_ms, 0};
+  for (std::size_t i = 0; i < times.passes.size(); ++i) {
+    const double earlier_ms = i < before.passes.size() ? before.passes[i].ms : 0.0;
+    const double ms = (times.passes[i].ms - earlier_ms) / threads;
+    work.ms += ms;
+    if (ms > work.pass_ms) work = {work.ms, ms, i + 1};
+  }
+  return work;
+}
+
+/// "; stale: a, b" for the screens in that state; a few of them by name.
+std::string screens_in(ScreenState state, const FrameRecord& frame, std::span<const ScreenState> states) {
+  constexpr std::size_t kMostNames = 4;
+  std::string text;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (states[i] != state) continue;
+    if (count < kMostNames) text += fmt::format("{}{}", count == 0 ? "" : ", ", frame.screens.at(i).id);
+    ++count;
+  }
+  if (count == 0) return "";
+  if (count > kMostNames) text += fmt::format(" and {} more", count - kMostNames);
+  return fmt::format("; {}: {}", to_string(state), text);
+}
+
+}  // namespace
+
+SlowestRecord slowest_of(Session& session, const FrameMaker& frames, std::span<const std::string> hosts) {
+  const FrameTimes& times = frames.times();
+  const std::vector<Work> works =
+      all_gather_value(session.comm(), work_of(times, frames.times_before(), session.threads()));
+  const auto most = std::ranges::max_element(works, {}, &Work::ms);
+  const auto rank = static_cast<std::size_t>(most - works.begin());
+  std::string pass = frames.plan().primary == Primary::Rays ? "primary-rays" : "raster";
+  if (most->pass > 0) pass = times.passes.at(most->pass - 1).name;
+  return {static_cast<int>(rank), hosts[rank], most->ms, pass, most->pass_ms};
+}
+
+BudgetRecord to_record(const BudgetReport& report) {
+  return {report.target_ms, report.resolution_scale, report.samples, report.given_up, report.resting};
+}
+
+std::string describe_status(std::span<const double> frame_ms, const FrameRecord& last,
+                            std::span<const ScreenState> states) {
+  std::vector<double> sorted(frame_ms.begin(), frame_ms.end());
+  std::ranges::sort(sorted);
+  const auto per_second = [](double ms) { return 1000.0 / std::max(ms, 1e-3); };
+  std::string text = fmt::format("{:.1f} fps", per_second(sorted.at((sorted.size() - 1) / 2)));
+  if (sorted.size() > 1) text += fmt::format(" (min {:.1f})", per_second(sorted.back()));
+  if (last.slowest) {
+    text += fmt::format(", slowest rank {} on {}: {} {:.1f} ms", last.slowest->rank, last.slowest->host,
+                        last.slowest->pass, last.slowest->pass_ms);
+  }
+  return text + screens_in(ScreenState::Stale, last, states) + screens_in(ScreenState::Lost, last, states);
+}
+
+}  // namespace hpr

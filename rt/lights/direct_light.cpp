@@ -1,0 +1,112 @@
+#include "rt/lights/direct_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace hpr {
+
+double share_of_ray(const TileWork& tile, double pdf, double light_pdf) {
+  if (!(pdf > 0.0)) return 1.0;
+  const double lights = light_pdf * tile.settings.light_samples;
+  return pdf / (pdf + lights);
+}
+
+void add_emission(TileWork& tile, const Wave& wave) {
+  for (const PathPoint& point : wave.points) {
+    if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered)) continue;
+    double share = 1.0;
+    if (point.seen_pdf > 0.0) {
+      share = share_of_ray(
+          tile, point.seen_pdf,
+          tile.lights.surface_pdf_one(point.seen_from, point.seen_normal, point.surface.surface, point.surface));
+    }
+    tile.add(point.pixel, point.component, share * point.throughput * point.material.emission);
+  }
+}
+
+bool DirectLight::sample_next() {
+  wave_.samples.clear();
+  if (light_ < tile_.lights.listed()) {
+    sample_listed();
+    return true;
+  }
+  if (tile_.lights.has_sampled() && round_ < tile_.settings.light_samples) {
+    sample_others();
+    return true;
+  }
+  return false;
+}
+
+void DirectLight::sample_listed() {
+  const std::size_t end = std::min(light_ + kLightsAtOnce, tile_.lights.listed());
+  for (; light_ < end; ++light_) {
+    const bool fixed = tile_.lights.listed_is_fixed(light_);
+    for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
+      PathPoint& point = wave_.points[i];
+      if (point.borrows_light(Component::Direct)) continue;
+      const glm::dvec2 u = fixed ? glm::dvec2(0.0) : next_two(point.sampler, point.depth);
+      add(i, tile_.lights.sample_listed(light_, point.surface.position, *tile_.view, u));
+    }
+  }
+}
+
+void DirectLight::sample_others() {
+  for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
+    PathPoint& point = wave_.points[i];
+    if (point.borrows_light(Component::Direct)) continue;
+    const double choice = point.sampler.one();
+    const glm::dvec2 u = round_ == 0 ? next_two(point.sampler, point.depth) : point.sampler.two();
+    auto light = tile_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *tile_.view, choice, u);
+    if (!light) continue;
+    light->weight /= tile_.settings.light_samples;
+    add(i, *light);
+  }
+  ++round_;
+}
+
+void DirectLight::add(std::uint32_t index, const LightSample& light) {
+  if (light.weight == glm::dvec3(0.0)) return;
+  const PathPoint& point = wave_.points[index];
+  glm::dvec3 scattered(0.0);
+  if (!(light.pdf > 0.0)) {
+    scattered = point.bsdf.reflected(light.to_light) + point.bsdf.value(Lobe::Transmission, light.to_light);
+  } else {
+    scattered = shared_scattering(point, light);
+  }
+  const double cosine = std::abs(glm::dot(point.material.normal, light.to_light));
+  glm::dvec3 radiance = point.throughput * scattered * light.weight * cosine;
+  // The headlight is wherever it is asked for, and shows what is looked at.
+  if (!light.casts_shadows && point.gathered) return;
+  if (light.casts_shadows) {
+    radiance *= left_of_light(point.media, point.surface, point.material, light.to_light, light.distance);
+  }
+  if (radiance == glm::dvec3(0.0)) return;
+  wave_.samples.push_back({index, 1.0F, light, radiance});
+}
+
+glm::dvec3 DirectLight::shared_scattering(const PathPoint& point, const LightSample& light) const {
+  glm::dvec3 scattered(0.0);
+  const Scattering all = point.bsdf.scattering(light.to_light);
+  for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
+    const double share = point.may_follow[lobe] ? 1.0 - share_of_ray(tile_, all.pdf[lobe], light.pdf) : 1.0;
+    scattered += share * all.value[lobe];
+  }
+  return scattered;
+}
+
+void add_samples(TileWork& tile, const Wave& wave) {
+  for (const DirectSample& sample : wave.samples) {
+    const PathPoint& point = wave.points[sample.point];
+    const glm::dvec3 arriving = static_cast<double>(sample.visible) * sample.radiance;
+    if (point.component != Component::Direct || !tile.wants_components) {
+      tile.add(point.pixel, point.component, arriving);
+      continue;
+    }
+    tile.radiance[point.pixel] += arriving;
+    tile.components[static_cast<std::size_t>(Component::Direct)][point.pixel] += sample.radiance;
+    tile.components[static_cast<std::size_t>(Component::Shadow)][point.pixel] += arriving - sample.radiance;
+  }
+}
+
+}  // namespace hpr

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "rt/lights/light_sample.h"
+#include "rt/lights/light_tree.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// A triangle of the scene that emits, from both its sides: that is how the emission of surfaces is shown.
+struct TriangleLight {
+  glm::dvec3 v0{0.0};
+  glm::dvec3 e1{0.0};
+  glm::dvec3 e2{0.0};
+  glm::dvec3 normal{0.0};   ///< unit length
+  double area = 0.0;        ///< m^2
+  double offset = 0.0;      ///< metres by which ray origins must leave it
+  glm::dvec3 mean{0.0};     ///< radiance over its area; an estimate where it is textured
+  double brightness = 0.0;  ///< what it is chosen by: above zero wherever it may emit
+  std::uint32_t surface = 0;
+  std::uint32_t instance = 0;
+  std::uint32_t index = 0;  ///< in the instance's mesh
+};
+
+/// Every triangle that emits, sampled by the solid angle it is seen under (Arvo, "Stratified Sampling of Spherical
+/// Triangles", 1995), or by its area when that is below 1e-6 sr or the spherical triangle all but degenerate.
+class TriangleLights {
+ public:
+  /// The scene must outlive this. Triangles without area, and those a texture leaves black, are left out.
+  explicit TriangleLights(const Scene& scene);
+
+  [[nodiscard]] std::size_t size() const { return triangles_.size(); }
+  [[nodiscard]] const TriangleLight& operator[](std::size_t triangle) const { return triangles_[triangle]; }
+  /// The triangle with this surface id, if it emits. O(log n).
+  [[nodiscard]] std::optional<std::size_t> find(std::uint32_t surface) const;
+
+  [[nodiscard]] LightSample sample(std::size_t triangle, const glm::dvec3& place, const glm::dvec2& u) const;
+  /// Per solid angle: the density with which sample() picks the direction to `point` of the triangle.
+  [[nodiscard]] double pdf(std::size_t triangle, const glm::dvec3& place, const glm::dvec3& point) const;
+
+  /// A photon, uniform over area and with a cosine lobe, from the front for `u_side` below a half. The mean of its flux
+  /// is the triangle's power.
+  [[nodiscard]] PhotonStart emit(std::size_t triangle, double u_side, const glm::dvec2& u_place,
+                                 const glm::dvec2& u_direction) const;
+  /// Watts of both sides.
+  [[nodiscard]] glm::dvec3 power(std::size_t triangle) const;
+  [[nodiscard]] LightBounds bounds(std::size_t triangle) const;
+
+ private:
+  [[nodiscard]] glm::dvec3 radiance(const TriangleLight& triangle, const glm::dvec2& at) const;
+  void estimate_brightness(TriangleLight& triangle) const;
+
+  const Scene* scene_;
+  std::vector<TriangleLight> triangles_;  ///< by surface id
+};
+
+}  // namespace hpr

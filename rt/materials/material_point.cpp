@@ -1,0 +1,137 @@
+#include "rt/materials/material_point.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "rt/materials/texture.h"
+
+namespace hpr {
+namespace {
+
+glm::dvec4 texel_of(const Scene& scene, const TextureRef& reference, Encoding encoding,
+                    const std::array<glm::vec2, 2>& uv) {
+  const glm::vec2& set = uv[std::min<std::size_t>(reference.uv_set, uv.size() - 1)];
+  return sample_texture(scene.textures[static_cast<std::size_t>(reference.texture)], encoding,
+                        transformed_uv(reference, set));
+}
+
+/// What a normal map of tangent space makes of the normal; the unmapped one where the result turns away from the viewer
+/// or has no direction.
+glm::dvec3 mapped_normal(const Scene& scene, const Material& material, const SurfacePoint& surface) {
+  const glm::dvec3& plain = surface.facing_normal();
+  if (surface.tangent == glm::dvec3(0.0)) return plain;
+  const glm::dvec3 texel(texel_of(scene, material.normal_texture, Encoding::Linear, surface.uv));
+  const double scale = material.normal_scale;
+  const glm::dvec3 local = (2.0 * texel - 1.0) * glm::dvec3(scale, scale, 1.0);
+  const glm::dvec3 mapped = local.x * surface.tangent + local.y * surface.bitangent + local.z * surface.shading_normal;
+  const double length = glm::length(mapped);
+  if (!(length > 0.0) || !(glm::dot(mapped, surface.to_viewer) > 0.0)) return plain;
+  return mapped / length;
+}
+
+}  // namespace
+
+glm::dvec3 absorption_of(const Material& material) {
+  glm::dvec3 absorption(0.0);
+  if (!std::isfinite(material.attenuation_distance)) return absorption;
+  // What hides all but 1e-30 of the light hides all of it; held finite, so that no distance makes it NaN.
+  constexpr double kLeastLeft = 1e-30;
+  constexpr double kMost = 1e30;
+  for (int c = 0; c < 3; ++c) {
+    const double left = std::clamp(static_cast<double>(material.attenuation_color[c]), kLeastLeft, 1.0);
+    absorption[c] = std::min(-std::log(left) / static_cast<double>(material.attenuation_distance), kMost);
+  }
+  return absorption;
+}
+
+glm::dvec3 normal_to_shade_with(const Scene& scene, const SurfacePoint& surface) {
+  const Material& material = scene.materials[surface.material];
+  return material.normal_texture.present() ? mapped_normal(scene, material, surface) : surface.facing_normal();
+}
+
+void prefetch_material(const Scene& scene, const SurfacePoint& surface) {
+  const Material& material = scene.materials[surface.material];
+  for (const TextureRef* const reference :
+       {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture,
+        &material.emissive_texture, &material.occlusion_texture, &material.transmission_texture}) {
+    if (!reference->present()) continue;
+    const glm::vec2& set = surface.uv[std::min<std::size_t>(reference->uv_set, surface.uv.size() - 1)];
+    prefetch_texture(scene.textures[static_cast<std::size_t>(reference->texture)], transformed_uv(*reference, set));
+  }
+}
+
+MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface) {
+  const Material& material = scene.materials[surface.material];
+  const auto texel = [&](const TextureRef& reference, Encoding encoding) {
+    return texel_of(scene, reference, encoding, surface.uv);
+  };
+  MaterialPoint point;
+  glm::dvec4 base = glm::dvec4(material.base_color) * surface.color;
+  if (material.base_color_texture.present()) base *= texel(material.base_color_texture, Encoding::Srgb);
+  point.base_color = glm::clamp(glm::dvec3(base), 0.0, 1.0);
+  point.alpha = coverage_of(material, base.a);
+  point.normal = normal_to_shade_with(scene, surface);
+  if (material.unlit) {
+    point.unlit = true;
+    point.emission = point.base_color;
+    return point;
+  }
+  double metallic = material.metallic;
+  double roughness = material.roughness;
+  if (material.metallic_roughness_texture.present()) {
+    const glm::dvec4 rough_metal = texel(material.metallic_roughness_texture, Encoding::Linear);
+    metallic *= rough_metal.b;
+    roughness *= rough_metal.g;
+  }
+  point.metallic = std::clamp(metallic, 0.0, 1.0);
+  point.roughness = std::clamp(roughness, 0.0, 1.0);
+  point.ior = material.ior;
+  point.emission = glm::dvec3(material.emissive);
+  if (material.emissive_texture.present()) {
+    point.emission *= glm::dvec3(texel(material.emissive_texture, Encoding::Srgb));
+  }
+  if (material.occlusion_texture.present()) {
+    const double open = texel(material.occlusion_texture, Encoding::Linear).r;
+    point.occlusion = 1.0 + static_cast<double>(material.occlusion_strength) * (open - 1.0);
+  }
+  if (!(material.transmission > 0.0F)) return point;
+  double transmission = material.transmission;
+  if (material.transmission_texture.present()) {
+    transmission *= texel(material.transmission_texture, Encoding::Linear).r;
+  }
+  point.transmission = std::clamp(transmission, 0.0, 1.0);
+  point.solid = material.thickness > 0.0F;
+  if (point.solid) point.absorption = absorption_of(material);
+  return point;
+}
+
+double coverage_of(const Material& material, double alpha) {
+  switch (material.alpha_mode) {
+    case AlphaMode::Mask:
+      // As the cutoff is rounded, so that what a file calls equal is.
+      return static_cast<float>(alpha) >= material.alpha_cutoff ? 1.0 : 0.0;
+    case AlphaMode::Blend:
+      return std::clamp(alpha, 0.0, 1.0);
+    case AlphaMode::Opaque:
+      break;
+  }
+  return 1.0;
+}
+
+bool has_coverage(const Scene& scene) {
+  return std::ranges::any_of(scene.materials, [](const Material& m) { return m.alpha_mode != AlphaMode::Opaque; });
+}
+
+double evaluate_alpha(const Scene& scene, const Material& material, const std::array<glm::vec2, 2>& uv,
+                      double color_alpha) {
+  if (material.alpha_mode == AlphaMode::Opaque) return 1.0;
+  double alpha = static_cast<double>(material.base_color.a) * color_alpha;
+  if (material.base_color_texture.present()) {
+    alpha *= texel_of(scene, material.base_color_texture, Encoding::Srgb, uv).a;
+  }
+  return coverage_of(material, alpha);
+}
+
+}  // namespace hpr

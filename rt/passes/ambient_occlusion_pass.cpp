@@ -1,0 +1,64 @@
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "rt/passes/pass.h"
+
+namespace hpr {
+namespace {
+
+/// How far, in radii of the scene, something counts as near.
+constexpr double kReach = 0.25;
+
+/// A stand-in for indirect light, cheap and not physical: an even light from all sides that surfaces near by keep out
+/// (Zhukov, Iones, Kronin 1998). Runs only where it is asked for; photons do it right.
+class AmbientOcclusionPass final : public Pass {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "ambient-occlusion"; }
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
+    return scene.ambient_occlusion;
+  }
+  [[nodiscard]] bool runs_by_default(const Requirements& /*scene*/, const RaySettings& /*settings*/) const override {
+    return false;
+  }
+
+  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
+    const int count = tile.settings.occlusion_rays;
+    std::vector<glm::dvec3> light;
+    tile.requests.clear();
+    const double reach = kReach * glm::length(tile.scene.bounds.high - tile.scene.bounds.low) / 2.0;
+    for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
+      const PathPoint& point = wave.points[i];
+      if (point.borrows_light(Component::AmbientOcclusion)) continue;
+      if (point.bsdf.weight(Lobe::Diffuse) == glm::dvec3(0.0)) continue;
+      Sampler sampler = point.sampler.branch(kBranch);
+      for (int ray = 0; ray < count; ++ray) {
+        const auto sample = point.bsdf.sample(Lobe::Diffuse, sampler.two());
+        if (!sample) continue;
+        tile.requests.push_back(
+            {ray_origin(point.surface, sample->direction) + point.surface.lift, sample->direction, reach, nullptr, i});
+        light.push_back(point.throughput * sample->weight * point.material.occlusion * tile.settings.ambient /
+                        static_cast<double>(count));
+        tile.charge_ray(point.pixel);
+      }
+    }
+    std::vector<float> passed(tile.requests.size());
+    tile.counts.ambient_occlusion += tile.requests.size();
+    tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
+    for (std::size_t i = 0; i < passed.size(); ++i) {
+      const PathPoint& point = wave.points[tile.requests[i].owner];
+      tile.add(point.pixel, component_after(point, Component::AmbientOcclusion),
+               static_cast<double>(passed[i]) * light[i]);
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kBranch = 16;
+};
+
+}  // namespace
+
+std::unique_ptr<Pass> make_ambient_occlusion_pass() {
+  return std::make_unique<AmbientOcclusionPass>();
+}
+
+}  // namespace hpr

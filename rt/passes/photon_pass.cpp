@@ -1,0 +1,52 @@
+#include "rt/passes/pass.h"
+#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_maps.h"
+
+namespace hpr {
+namespace {
+
+/// Indirect light: what photons that lights sent out bring to lobes that are not followed by rays. Caustics always,
+/// all of it where settings ask for global photons.
+class PhotonPass final : public Pass {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "photon"; }
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    if (gathers_by_rays(scene, settings)) return {false, "rays gather what surfaces scatter on to others"};
+    const bool bundled =
+        scene.shadow.needed && (scene.refraction.needed || follows_reflections(scene, settings.glossy_cutoff));
+    if (settings.global_photons && !bundled) return scene.indirect;
+    if (bundled && !may_take_photons(scene, settings.glossy_cutoff)) {
+      return {false, "no material is matte, or as rough as the glossy cutoff, to show caustics"};
+    }
+    if (bundled == scene.photon.needed) return scene.photon;
+    return {bundled, bundled ? "lights reach materials smoother than the glossy cutoff, which bundle it into caustics"
+                             : "no light is bundled by materials smoother than the glossy cutoff"};
+  }
+  [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
+    return settings.photons > 0 && !gathers_by_rays(scene, settings);
+  }
+  [[nodiscard]] bool gathers_photons() const override { return true; }
+
+  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
+    if (tile.photons == nullptr) return;
+    for (const PathPoint& point : wave.points) {
+      if (point.borrows_light(Component::Photon)) continue;
+      glm::dvec3 light(0.0);
+      for (const PhotonMap* map : {&tile.photons->caustic, &tile.photons->global}) {
+        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff,
+                                tile.found_photons);
+      }
+      if (light != glm::dvec3(0.0)) {
+        tile.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
+      }
+    }
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Pass> make_photon_pass() {
+  return std::make_unique<PhotonPass>();
+}
+
+}  // namespace hpr

@@ -1,0 +1,146 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <vector>
+
+#include "cluster/transport/local_communicator.h"
+#include "core/error.h"
+#include "rt/lighter.h"
+#include "rt/photons/photon_maps.h"
+#include "rt/test_scene.h"
+
+namespace hpr {
+namespace {
+
+using test::add_material;
+using test::add_mesh;
+using test::place;
+using test::quad;
+
+/// A closed box of one grey that emits, two of `size` a side: light is the same everywhere inside.
+Scene furnace(float albedo, float emission, float size = 1.0F) {
+  Scene scene;
+  Material wall = test::matte(glm::vec3(albedo));
+  wall.emissive = glm::vec3(emission);
+  add_material(scene, wall);
+  const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b) {
+    place(scene, add_mesh(scene, quad(size * corner, size * a, size * b, 0)));
+  };
+  side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0});
+  side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0});
+  side({-1, -1, -1}, {0, 2, 0}, {0, 0, 2});
+  side({1, -1, -1}, {0, 0, 2}, {0, 2, 0});
+  side({-1, -1, -1}, {0, 0, 2}, {2, 0, 0});
+  side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
+  finish_scene(scene);
+  return scene;
+}
+
+class PhotonFurnace : public testing::TestWithParam<double> {};
+
+TEST_P(PhotonFurnace, IsAsBrightAsItsSeriesSums) {
+  const double albedo = GetParam();
+  const Scene scene = furnace(static_cast<float>(albedo), 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {8, 8}, scene, 0.5);
+  const RaySettings settings{.photons = 100'000, .global_photons = true};
+  const glm::dvec3 mean = test::mean_pixel(scene, view, 4, 4, 32, settings);
+  EXPECT_NEAR(mean.g * (1.0 - albedo), 1.0, 0.02);
+}
+
+INSTANTIATE_TEST_SUITE_P(Albedos, PhotonFurnace, testing::Values(0.5, 0.9));
+
+TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {16, 16}, scene, 0.5);
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  const RaySettings settings{.photons = 5'000, .global_photons = true};
+  const SampleNumber number{.frame = 2, .sample = 3};
+  TileLayer<Rgb> alone(keys.layout());
+  Lighter one(scene, settings);
+  one.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &alone}, number);
+  EXPECT_GT(one.counts().photon, 5'000U);
+  for (const int ranks : {2, 3, 7}) {
+    run_local_ranks(ranks, [&](Communicator& comm) {
+      Lighter lighter(scene, settings);
+      TileLayer<Rgb> lit(keys.layout());
+      lighter.send_photons(comm, number);
+      lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit}, number);
+      EXPECT_LT(lighter.counts().photon, one.counts().photon);
+      EXPECT_TRUE(std::ranges::equal(lit.tile(0), alone.tile(0)));
+    });
+  }
+}
+
+TEST(PhotonPass, RanksOfAHostShareItsMemory) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {4, 4}, scene, 0.5);
+  RaySettings settings{.photons = 5'000, .global_photons = true};
+  const auto lights = [&] {
+    try {
+      (void)test::light(scene, view, settings);
+      return ExitCode::Done;
+    } catch (const Error& error) {
+      return error.code();
+    }
+  };
+  EXPECT_EQ(lights(), ExitCode::Done);
+  settings.host_ranks = 1 << 30;  // so many leave none of them the memory for a thousand
+  EXPECT_EQ(lights(), ExitCode::Limit);
+}
+
+TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const RaySpace space(scene.bounds);
+  const Surfaces surfaces(scene, space);
+  const RayScene rays(scene, space, 1);
+  const LightSet lights(scene);
+  RaySettings settings{.photons = 40'000, .global_photons = true};
+  PhotonSender whole(scene, surfaces, space, rays, lights, settings);
+  const auto kept = static_cast<double>(whole.send({}, nullptr).global.size());
+  // As much memory as holds three quarters of them: all ranks get all.
+  const double memory = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  settings.host_ranks = static_cast<int>(memory / (128.0 * 0.75 * kept));
+  for (const int ranks : {1, 2}) {
+    EXPECT_THROW(run_local_ranks(ranks,
+                                 [&](Communicator& comm) {
+                                   PhotonSender sender(scene, surfaces, space, rays, lights, settings);
+                                   (void)sender.send({}, &comm);
+                                 }),
+                 Error)
+        << ranks;
+  }
+}
+
+TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
+  const RaySettings settings{.photons = 5'000, .global_photons = true};
+  const auto picture = [&](int strength, int size) {
+    const double scale = std::ldexp(1.0, size);
+    const Scene scene = furnace(0.5F, std::ldexp(1.0F, strength), static_cast<float>(scale));
+    const View view = test::view_from({0, 0, 0.5 * scale}, {0.1 * scale, 0.2 * scale, -scale}, {8, 8}, scene, 0.5);
+    const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+    TileLayer<Rgb> lit(keys.layout());
+    Lighter lighter(scene, settings);
+    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit});
+    std::vector<float> green;
+    for (const Rgb& color : lit.tile(0)) green.push_back(std::ldexp(color.g, -strength));
+    return green;
+  };
+  const std::vector<float> one = picture(0, 0);
+  EXPECT_GT(one.front(), 1.5F);
+  // In watts most of these photons would lie outside of what floats reach, 2^-126 to 2^127.
+  EXPECT_EQ(picture(-110, -5), one);
+  EXPECT_EQ(picture(100, 25), one);
+}
+
+TEST(PhotonPass, SendsNothingWhereNobodyAsksAndNoCausticsWhereNothingBundlesLight) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {4, 4}, scene, 0.5);
+  EXPECT_EQ(test::light(scene, view).counts.photon, 0U);
+  EXPECT_EQ(test::light(scene, view, {.photons = 1'000}).counts.photon, 0U);
+  EXPECT_GT(test::light(scene, view, {.photons = 1'000, .global_photons = true}).counts.photon, 1'000U);
+  EXPECT_EQ(test::light(scene, view, {.passes = {"photon"}}).counts.photon, 0U) << "no caustics in a matte box";
+}
+
+}  // namespace
+}  // namespace hpr

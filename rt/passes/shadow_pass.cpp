@@ -1,0 +1,64 @@
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "rt/passes/pass.h"
+
+namespace hpr {
+namespace {
+
+/// Shadows, hard and soft: one ray per direct sample. Lights with an extent are sampled at a place of chance, so that
+/// their shadows soften.
+class ShadowPass final : public Pass {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "shadow"; }
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    if (scene.even_sky && gathers_by_rays(scene, settings)) {
+      return {false, "rays that gather light find an even sky, and what hides it"};
+    }
+    return scene.shadow;
+  }
+
+  void hide(TileWork& tile, Wave& wave) const override {
+    tile.requests.clear();
+    for (std::uint32_t i = 0; i < wave.samples.size(); ++i) {
+      const DirectSample& sample = wave.samples[i];
+      if (!sample.light.casts_shadows) continue;
+      const PathPoint& point = wave.points[sample.point];
+      tile.requests.push_back(towards(tile, point, sample.light));
+      tile.requests.back().owner = i;
+      tile.charge_ray(point.pixel);
+    }
+    std::vector<float> passed(tile.requests.size());
+    tile.counts.shadow += tile.requests.size();
+    tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
+    for (std::size_t i = 0; i < passed.size(); ++i) wave.samples[tile.requests[i].owner].visible = passed[i];
+  }
+
+ private:
+  static RayRequest towards(const TileWork& tile, const PathPoint& point, const LightSample& light) {
+    RayRequest ray;
+    ray.origin = ray_origin(point.surface, light.to_light);
+    const bool viewers_side = glm::dot(light.to_light, point.surface.geometric_normal) > 0.0;
+    if (tile.settings.terminator_fix && viewers_side) ray.origin += point.surface.lift;
+    ray.direction = light.to_light;
+    ray.reach = light.distance;
+    if (!std::isfinite(light.distance)) return ray;
+    // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies
+    // on a surface is not hidden by it.
+    const glm::dvec3 way = light.goal - ray.origin;
+    const double distance = glm::length(way);
+    const double step = kOriginSteps * kFloatStep;
+    ray.reach = std::max(distance * (1.0 - step) - step * tile.rays->size_of(light.goal), 0.0);
+    if (distance > 0.0) ray.direction = way / distance;
+    return ray;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Pass> make_shadow_pass() {
+  return std::make_unique<ShadowPass>();
+}
+
+}  // namespace hpr

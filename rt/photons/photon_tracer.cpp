@@ -1,0 +1,295 @@
+#include "rt/photons/photon_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "cluster/transport/collectives.h"
+#include "core/error.h"
+#include "rt/lights/punctual_light.h"
+#include "rt/photons/photon_gather.h"
+#include "rt/trace/denormals.h"
+#include "rt/trace/ray_walk.h"
+
+namespace hpr {
+namespace {
+
+/// Photons traced together, generation by generation: enough to fill packets after most have been absorbed, few enough
+/// for the cache.
+constexpr std::uint64_t kBlockPhotons = 2048;
+
+/// Bounces before roulette begins: short paths carry most of the light, and all arrive.
+constexpr int kFirstBounces = 3;
+
+double sum_of(const glm::dvec3& v) {
+  return v.r + v.g + v.b;
+}
+
+/// False for no light at all and for what is not a number.
+bool carries_light(const glm::dvec3& flux) {
+  return sum_of(flux) > 0.0 && std::isfinite(sum_of(flux));
+}
+
+template <typename Value>
+void append(std::vector<Value>& to, const std::vector<Value>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+void share(Communicator& comm, std::vector<Photon>& photons) {
+  const auto parts = all_gather(comm, std::as_bytes(std::span(photons)));
+  std::size_t bytes = 0;
+  for (const auto& part : parts) bytes += part.size();
+  photons.resize(bytes / sizeof(Photon));
+  auto* to = reinterpret_cast<std::byte*>(photons.data());
+  for (const auto& part : parts) to = std::copy(part.begin(), part.end(), to);
+}
+
+}  // namespace
+
+PhotonCounts& PhotonCounts::operator+=(const PhotonCounts& other) {
+  sent += other.sent;
+  caustic += other.caustic;
+  global += other.global;
+  rays += other.rays;
+  invalid += other.invalid;
+  cut += other.cut;
+  lost += other.lost;
+  return *this;
+}
+
+PhotonRange share_of_rank(const PhotonRange& all, int rank, int ranks) {
+  const auto size = static_cast<std::uint64_t>(ranks);
+  const auto from = [&](std::uint64_t r) { return all.count / size * r + all.count % size * r / size; };
+  const auto r = static_cast<std::uint64_t>(rank);
+  return {all.first + from(r), from(r + 1) - from(r)};
+}
+
+struct PhotonTracer::Flight {
+  Sampler sampler;
+  glm::dvec3 place{0.0};   ///< world: where it was scattered last
+  glm::dvec3 origin{0.0};  ///< ray space: off that surface
+  glm::dvec3 direction{0.0};
+  glm::dvec3 flux{0.0};
+  Media media;             ///< that it flies through
+  glm::dvec3 center{0.0};  ///< of its light, and how far that reaches (PhotonStart)
+  double range = 0.0;
+  std::uint32_t photon = 0;  ///< of the block
+  int bounces = 0;
+  int passed = 0;        ///< surfaces since then that do not cover all
+  Passed last;           ///< of those
+  bool followed = true;  ///< has met followed lobes only
+  bool endless = false;  ///< still comes from without the scene
+};
+
+/// Photons under way together and what they left.
+struct PhotonTracer::Block {
+  struct Kept {
+    std::uint32_t photon;
+    bool caustic;
+    Photon stored;
+  };
+  std::vector<Flight> flights;
+  std::vector<Flight> next;
+  std::vector<Kept> kept;
+  RayBatch batch;
+  std::vector<std::uint32_t> hits;
+  std::vector<Passed> met;  ///< by the same flights
+  WorldTriangle triangle;
+  TracedPhotons traced;
+
+  /// From the order of generations into that of photons; each one's bounces keep their order.
+  void sort() {
+    std::ranges::stable_sort(kept, {}, &Kept::photon);
+    for (const Kept& one : kept) (one.caustic ? traced.caustic : traced.global).push_back(one.stored);
+    traced.counts.caustic = traced.caustic.size();
+    traced.counts.global = traced.global.size();
+  }
+};
+
+namespace {
+
+/// Counts what the threads of a rank keep: memory that is promised and not there ends programs without a word.
+class KeptPhotons {
+ public:
+  /// 0: any number.
+  explicit KeptPhotons(std::uint64_t most) : most_(most) {}
+
+  void add(std::uint64_t count) {
+    if (kept_.fetch_add(count) + count <= most_ || most_ == 0) return;
+    throw Error(ExitCode::Limit, "the photons of one sample take more memory than this machine has",
+                "send fewer in a sample and take more samples (--photons, --spp), or run fewer ranks on a host");
+  }
+
+ private:
+  std::uint64_t most_;
+  std::atomic<std::uint64_t> kept_{0};
+};
+
+}  // namespace
+
+TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const {
+  const std::uint64_t stream = photon_stream(key);
+  const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
+  std::vector<TracedPhotons> traced(count);
+  KeptPhotons kept(settings_.most_kept);
+  rays_.for_each(settings_.threads, count, [&](std::size_t i) {
+    const DenormalsAsZero mode;
+    Block block;
+    const std::uint64_t before = i * kBlockPhotons;
+    start(stream, {range.first + before, std::min(kBlockPhotons, range.count - before)},
+          1.0 / static_cast<double>(pass_photons), block);
+    while (!block.flights.empty()) move(block);
+    block.sort();
+    kept.add(block.traced.caustic.size() + block.traced.global.size());
+    traced[i] = std::move(block.traced);
+  });
+  TracedPhotons all;
+  for (const TracedPhotons& part : traced) {
+    append(all.caustic, part.caustic);
+    append(all.global, part.global);
+    all.counts += part.counts;
+  }
+  return all;
+}
+
+void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const {
+  for (std::uint64_t i = 0; i < range.count; ++i) {
+    const std::uint64_t index = range.first + i;
+    Flight flight;
+    // The sampler counts to 2^32; a stream of its own follows.
+    flight.sampler = Sampler(stream + (index >> 32U), static_cast<std::uint32_t>(index));
+    const double u_choice = flight.sampler.one();
+    const glm::dvec2 u_place = flight.sampler.two();
+    const std::optional<PhotonStart> begin = source_(u_choice, u_place, flight.sampler.two());
+    if (!begin) continue;
+    ++block.traced.counts.sent;
+    flight.flux = begin->flux * share;
+    if (!carries_light(flight.flux)) continue;
+    flight.place = begin->origin;
+    flight.direction = begin->direction;
+    flight.media = begin->media;
+    flight.center = begin->center;
+    flight.range = begin->range;
+    flight.endless = begin->endless;
+    glm::dvec3 origin = begin->origin;
+    if (begin->surface != kNoSurface) {
+      surfaces_.load(begin->surface, block.triangle);
+      const double side = glm::dot(block.triangle.normal, begin->direction) < 0.0 ? -1.0 : 1.0;
+      origin += side * begin->offset * block.triangle.normal;
+    }
+    flight.origin = space_.from_world(origin);
+    flight.photon = static_cast<std::uint32_t>(i);
+    block.flights.push_back(flight);
+  }
+}
+
+/// One generation: all flights to the next surface, and on.
+void PhotonTracer::move(Block& block) const {
+  block.batch.clear();
+  block.met.clear();
+  for (const Flight& flight : block.flights) {
+    block.met.push_back(flight.last);
+    block.batch.push(flight.origin, flight.direction, std::numeric_limits<double>::infinity());
+  }
+  block.hits.resize(block.flights.size());
+  block.traced.counts.rays += block.flights.size();
+  block.traced.counts.invalid +=
+      has_coverage_ ? rays_.closest(block.batch, block.met, block.hits) : rays_.closest(block.batch, block.hits);
+  surfaces_.prefetch(block.hits);
+  block.next.clear();
+  for (std::size_t i = 0; i < block.flights.size(); ++i) {
+    if (block.hits[i] == kNoSurface) continue;
+    Flight& flight = block.flights[i];
+    surfaces_.load(block.hits[i], block.triangle);
+    const SurfacePoint surface = surfaces_.meet(block.triangle, flight.place, flight.direction);
+    if (arrive(flight, surface, block.met[i], block)) block.next.push_back(flight);
+  }
+  std::swap(block.flights, block.next);
+}
+
+void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const {
+  const glm::dvec3 at = space_.from_world(surface.position);
+  Photon photon;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    photon.position[axis] = static_cast<float>(at[static_cast<int>(axis)]);
+    photon.flux[axis] = static_cast<float>(flux[static_cast<int>(axis)] / settings_.flux_unit);
+  }
+  photon.facing = pack_facing(surface.geometric_normal, surface.layer);
+  photon.direction = pack_direction(surface.to_viewer);
+  block.kept.push_back({flight.photon, flight.followed, photon});
+}
+
+/// Keeps the photon if it is wanted here and sends it on; false when it ends.
+bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const {
+  const MaterialPoint material = evaluate_material(scene_, surface);
+  const double metres = glm::distance(surface.position, flight.place);
+  // As to lights: nothing is taken from endless ways.
+  glm::dvec3 flux = flight.endless ? flight.flux : flight.flux * left_at(flight.media, surface, material, metres);
+  if (flight.bounces == 0) flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
+  const Bsdf bsdf(material, surface, Carried::Flux);
+  // Whoever gathers counts as much of the surface as there is: all that falls on it is kept, passing or not.
+  if (flight.bounces > 0 && material.alpha > 0.0 && carries_light(flux) &&
+      takes_photons(bsdf, settings_.glossy_cutoff)) {
+    keep(flight, flux, surface, block);
+  }
+  if (passes_by_chance(material.alpha, flight.sampler)) {
+    const double gained = met.distance - flight.last.distance;
+    flight.last = met;
+    if (passes_on(flight.passed, material.alpha, gained)) return true;
+    ++block.traced.counts.cut;
+    return false;
+  }
+  flight.flux = flux;
+  if (!carries_light(flight.flux)) return false;
+  if (flight.bounces < settings_.max_bounces) return scatter(flight, {surface, material, bsdf, block.triangle});
+  ++block.traced.counts.lost;
+  return false;
+}
+
+/// Chooses a lobe by what it makes of the photon's flux, then a direction. After the first bounces the photon ends with
+/// the chance that its light is absorbed.
+bool PhotonTracer::scatter(Flight& flight, const FluxArrival& at) const {
+  const SurfacePoint& surface = at.surface;
+  const FluxScatter scatters(scene_, surfaces_, at);
+  std::array<double, kLobes.size()> chances{};
+  double total = 0.0;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    chances[i] = sum_of(flight.flux * scatters.weight(kLobes[i])) / sum_of(flight.flux);
+    total += chances[i];
+  }
+  if (!(total > 0.0) || !std::isfinite(total)) return false;
+  const double whole = flight.bounces < kFirstBounces ? total : std::max(total, 1.0);
+  double left = flight.sampler.one() * whole;
+  std::size_t chosen = 0;
+  while (chosen < kLobes.size() && left >= chances[chosen]) left -= chances[chosen++];
+  if (chosen == kLobes.size()) return false;
+  const bool follows = is_followed(at.bsdf, kLobes[chosen], settings_.glossy_cutoff);
+  if (settings_.caustics_only && !follows) return false;
+  const std::optional<BsdfSample> sample = scatters.sample(kLobes[chosen], flight.sampler);
+  if (!sample) return false;
+
+  flight.flux *= sample->weight * (whole / chances[chosen]);
+  if (!carries_light(flight.flux)) return false;
+  flight.followed = flight.followed && follows;
+  flight.media = media_towards(flight.media, surface, at.material, sample->direction);
+  flight.direction = sample->direction;
+  flight.place = surface.position;
+  flight.passed = 0;
+  flight.last = {};
+  flight.endless = false;
+  flight.origin = space_.from_world(ray_origin(surface, flight.direction));
+  ++flight.bounces;
+  return true;
+}
+
+void share_photons(Communicator& comm, TracedPhotons& photons) {
+  share(comm, photons.caustic);
+  share(comm, photons.global);
+}
+
+}  // namespace hpr

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "cluster/transport/communicator.h"
+#include "rt/lights/light_set.h"
+#include "rt/materials/bsdf.h"
+#include "rt/photons/flux_scatter.h"
+#include "rt/photons/photon_map.h"
+#include "rt/sampling/sampler.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/ray_space.h"
+#include "rt/trace/surfaces.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+struct PhotonSettings {
+  double glossy_cutoff = 0.25;  ///< specular lobes smoother than it are followed from the eye (photon_gather.h)
+  bool caustics_only = false;   ///< photons end where they would cease to be caustic ones
+  int max_bounces = 1024;       ///< roulette ends paths long before, but for scenes that absorb less than 1 %
+  int threads = 1;
+  double flux_unit = 1.0;       ///< W, a power of two: kept fluxes are floats and reach from 2^-126 to 2^127 of it
+  std::uint64_t most_kept = 0;  ///< by one call of trace(); 0: any number
+};
+
+struct PhotonCounts {
+  std::uint64_t sent = 0;
+  std::uint64_t caustic = 0;  ///< photons kept
+  std::uint64_t global = 0;
+  std::uint64_t rays = 0;
+  std::uint64_t invalid = 0;  ///< of the rays, those Embree could not bear
+  std::uint64_t cut = 0;      ///< photons that ended among surfaces of partial coverage, see kMostPassed
+  std::uint64_t lost = 0;     ///< photons still under way after so many bounces, or no longer finite
+
+  PhotonCounts& operator+=(const PhotonCounts& other);
+  bool operator==(const PhotonCounts&) const = default;
+};
+
+/// Photons that have arrived, by photon sent, then by bounce.
+struct TracedPhotons {
+  std::vector<Photon> caustic;  ///< met only followed lobes on their way from the light
+  std::vector<Photon> global;   ///< all others
+  PhotonCounts counts;          ///< of what this rank traced
+};
+
+/// Photons [first, first + count).
+struct PhotonRange {
+  std::uint64_t first = 0;
+  std::uint64_t count = 0;
+
+  bool operator==(const PhotonRange&) const = default;
+};
+
+/// The part of `all` that a rank traces: parts follow one another in order of rank.
+[[nodiscard]] PhotonRange share_of_rank(const PhotonRange& all, int rank, int ranks);
+
+/// Where photons come from: LightSet::emit.
+using PhotonSource = std::function<std::optional<PhotonStart>(double u_choice, const glm::dvec2& u_place,
+                                                              const glm::dvec2& u_direction)>;
+
+/// Sends photons through the scene and keeps them where the eye's paths will ask for them: at every arrival on a
+/// surface with a lobe that those do not follow, except straight from the light (Jensen, "Global Illumination using
+/// Photon Maps", 1996, with the partition of photon_gather.h). Light that passes a surface of partial coverage still
+/// comes straight from its light; light that glass lets through does not.
+///
+/// A photon depends on the key and its index only; threads, ranks and ranges change no bit.
+class PhotonTracer {
+ public:
+  /// All that is referred to must outlive this.
+  PhotonTracer(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& rays,
+               PhotonSource source, const PhotonSettings& settings)
+      : scene_(scene),
+        surfaces_(surfaces),
+        space_(space),
+        rays_(rays),
+        source_(std::move(source)),
+        settings_(settings),
+        has_coverage_(has_coverage(scene)) {}
+
+  [[nodiscard]] const PhotonSettings& settings() const { return settings_; }
+  /// Of the next trace().
+  void set_flux_unit(double watts) { settings_.flux_unit = watts; }
+  void set_most_kept(std::uint64_t photons) { settings_.most_kept = photons; }
+
+  /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
+  /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are
+  /// kept than may be.
+  [[nodiscard]] TracedPhotons trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const;
+
+ private:
+  struct Flight;
+  struct Block;
+
+  void start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const;
+  void move(Block& block) const;
+  [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const;
+  void keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const;
+  [[nodiscard]] bool scatter(Flight& flight, const FluxArrival& at) const;
+
+  const Scene& scene_;
+  const Surfaces& surfaces_;
+  const RaySpace& space_;
+  const RayScene& rays_;
+  PhotonSource source_;
+  PhotonSettings settings_;
+  bool has_coverage_;
+};
+
+/// Collective: every rank's photons on every rank, in order of rank. The counts stay this rank's own.
+void share_photons(Communicator& comm, TracedPhotons& photons);
+
+}  // namespace hpr

@@ -1,0 +1,174 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "rt/trace/ray_build.h"
+#include "rt/trace/ray_space.h"
+#include "scene/scene.h"
+
+struct RTCSceneTy;
+
+namespace hpr {
+
+inline constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
+
+/// Embree's own limit is the square root of the largest float; past it (or at NaN) builds with assertions abort.
+inline constexpr float kFarthestRay = 1.8e18F;
+
+/// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
+class RayBatch {
+ public:
+  struct Ray {
+    std::array<float, 3> origin{};
+    std::array<float, 3> direction{};
+    float reach = 0.0F;
+  };
+
+  void clear() { size_ = 0; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach) {
+    const std::size_t lane = size_ % kWidth;
+    Packet& packet = next_packet();
+    for (int axis = 0; axis < 3; ++axis) {
+      packet.origin[axis][lane] = static_cast<float>(origin[axis]);
+      packet.direction[axis][lane] = static_cast<float>(direction[axis]);
+    }
+    packet.reach[lane] = static_cast<float>(reach);
+  }
+  void push(const Ray& ray) {
+    const std::size_t lane = size_ % kWidth;
+    Packet& packet = next_packet();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      packet.origin[axis][lane] = ray.origin[axis];
+      packet.direction[axis][lane] = ray.direction[axis];
+    }
+    packet.reach[lane] = ray.reach;
+  }
+  [[nodiscard]] Ray ray(std::size_t i) const {
+    const Packet& packet = packets_[i / kWidth];
+    Ray ray;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ray.origin[axis] = packet.origin[axis][i % kWidth];
+      ray.direction[axis] = packet.direction[axis][i % kWidth];
+    }
+    ray.reach = packet.reach[i % kWidth];
+    return ray;
+  }
+
+ private:
+  friend class RayScene;
+  static constexpr std::size_t kWidth = 8;
+  /// Eight rays as Embree reads them.
+  struct alignas(32) Packet {
+    float origin[3][kWidth];
+    float direction[3][kWidth];
+    float reach[kWidth];
+  };
+
+  /// Counts one more ray, which goes there.
+  Packet& next_packet() {
+    const std::size_t index = size_++ / kWidth;
+    if (index == packets_.size()) packets_.emplace_back();
+    return packets_[index];
+  }
+
+  std::size_t size_ = 0;
+  std::vector<Packet> packets_;
+};
+
+/// Whether Embree can bear it: finite, with a direction, within kFarthestRay.
+[[nodiscard]] bool is_bearable(const RayBatch::Ray& ray);
+
+/// Whether rays that share a packet go the same way; Embree is quicker when told so rightly. No answer depends on it.
+enum class Coherence { Low, High };
+
+/// What a ray has met and passed, if it is sent once more from where it began: it then meets what comes next by
+/// distance, and by id where distances are equal. So nothing is skipped, however close surfaces lie.
+///
+/// Triangles of one instance that are met at one distance, but for rounding, are met once: they share the edge there.
+struct Passed {
+  std::uint32_t surface = kNoSurface;  ///< none yet
+  std::uint32_t instance = 0;
+  float distance = 0.0F;  ///< ray space
+};
+
+/// What one geometry of Embree's scene shows: a run of triangles of an instance, counted by primitive id.
+struct RayGeometry {
+  std::uint32_t instance = 0;
+  std::uint32_t first_triangle = 0;  ///< of the instance's mesh
+  std::uint32_t first_surface = 0;
+};
+
+class TravellingRays;
+
+/// The scene as Embree holds it: meshes used once go in as world triangles, shared ones as instances of a sub-scene.
+///
+/// Answers do not depend on thread counts or on which rays share a packet; of surfaces at equal distance the lowest id
+/// is found, as in keys. A ray that Embree could not bear (not finite, beyond 1.8e18) misses and is counted.
+class RayScene {
+ public:
+  /// Builds with `threads` threads. The scene may go afterwards. Throws Error (NoDevice) when Embree fails.
+  RayScene(const Scene& scene, const RaySpace& space, int threads);
+  /// Only the surfaces of `objects`, ranges in any order. Each is met at the same distance as in the whole scene.
+  RayScene(const Scene& scene, const RaySpace& space, int threads, std::span<const SurfaceRange> objects,
+           const RayBuild& build = {});
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  /// blocked[i] = 1 where something stands between ray i's origin and its reach. Returns how many rays were invalid.
+  [[nodiscard]] std::uint64_t occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+
+  /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
+  [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces,
+                                      Coherence coherence = Coherence::Low) const;
+  /// The same for rays that may have passed surfaces: passed[i] says which, and is set to what ray i meets now.
+  [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<Passed> passed,
+                                      std::span<std::uint32_t> surfaces) const;
+
+  /// This is one rank's part of a scene of which the others hold the rest: from now on answers are of all of it, and
+  /// may be asked for inside for_each() only. Ranks call it alike, scene by scene. `others` outlives this.
+  void share(TravellingRays& others);
+  /// Calls body(i) for i in [0, count) by `threads` threads, as parallel_for; collective where the scene is shared.
+  void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const;
+  /// Of this rank's part alone.
+  [[nodiscard]] std::uint64_t occluded_here(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+  [[nodiscard]] std::uint64_t closest_here(const RayBatch& rays, std::span<Passed> passed,
+                                           std::span<std::uint32_t> surfaces) const;
+
+  /// Triangles left out because their world positions are beyond what float holds.
+  [[nodiscard]] std::uint64_t skipped_triangles() const;
+
+  /// For those in rt/ who ask Embree themselves. Geometry ids of its top level index geometries(); where it holds
+  /// instances, only instance ids do.
+  [[nodiscard]] RTCSceneTy* embree() const;
+  [[nodiscard]] std::span<const RayGeometry> geometries() const;
+  [[nodiscard]] const RaySpace& space() const { return space_; }
+
+ private:
+  std::uint64_t find_closest(const RayBatch& rays, Passed* passed, std::span<std::uint32_t> surfaces,
+                             Coherence coherence) const;
+
+  struct Embree;
+  TravellingRays* others_ = nullptr;  ///< null: this is the whole scene
+  std::uint32_t part_ = 0;            ///< its number there
+  RaySpace space_;
+  std::unique_ptr<Embree> embree_;
+};
+
+/// True where Embree holds instance i of the scene as an instance of a shared mesh. Singular and strongly distorting
+/// placements are never shared: a ray carried into their coordinates would lose its digits.
+[[nodiscard]] std::vector<std::uint8_t> shared_instances(const Scene& scene);
+
+/// How much larger rounding gets when a point is carried into an instance's coordinates and back: the row sum norm of
+/// |A| |A^-1|, A its linear part; infinite when singular.
+[[nodiscard]] double distortion(const glm::dmat3& linear);
+
+}  // namespace hpr

@@ -1,0 +1,267 @@
+#include "rt/trace/surfaces.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "core/check.h"
+#include "rt/materials/texture.h"
+#include "rt/trace/mesh_parts.h"
+#include "rt/trace/on_triangle.h"
+#include "rt/trace/ray_scene.h"
+
+namespace hpr {
+namespace {
+
+double largest(const glm::dvec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Whether a vector of this squared length can be divided by its length as it is.
+bool plain(double length2) {
+  return length2 > 1e-200 && length2 < 1e200;
+}
+
+/// `v` at unit length; `otherwise` where it has none. Tiny and huge vectors are scaled first, so that they keep their
+/// direction.
+glm::dvec3 unit(const glm::dvec3& v, const glm::dvec3& otherwise) {
+  const double length2 = glm::dot(v, v);
+  if (plain(length2)) return v * (1.0 / std::sqrt(length2));
+  const double size = largest(v);
+  if (!(size > 0.0) || !finite(v)) return otherwise;
+  return glm::normalize(v / size);
+}
+
+/// The direction of the cross product, of tiny and huge vectors too; 0 where it has none.
+glm::dvec3 direction_of_cross(const glm::dvec3& a, const glm::dvec3& b) {
+  const glm::dvec3 cross = glm::cross(a, b);
+  const double length2 = glm::dot(cross, cross);
+  if (plain(length2)) return cross * (1.0 / std::sqrt(length2));
+  const double sa = largest(a);
+  const double sb = largest(b);
+  if (!(sa > 0.0) || !(sb > 0.0)) return glm::dvec3(0.0);
+  return unit(glm::cross(a / sa, b / sb), glm::dvec3(0.0));
+}
+
+glm::dmat3 cofactors(const glm::dmat3& m) {
+  return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
+}
+
+double row_sum_norm(const glm::dmat3& m) {
+  double norm = 0.0;
+  for (int row = 0; row < 3; ++row)
+    norm = std::max(norm, std::abs(m[0][row]) + std::abs(m[1][row]) + std::abs(m[2][row]));
+  return norm;
+}
+
+void prefetch_vertex(const Mesh& mesh, std::uint32_t vertex) {
+  __builtin_prefetch(&mesh.positions[vertex]);
+  __builtin_prefetch(&mesh.normals[vertex]);
+  for (const auto& uvs : mesh.uvs) {
+    if (!uvs.empty()) __builtin_prefetch(&uvs[vertex]);
+  }
+}
+
+}  // namespace
+
+Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
+    : scene_(scene), space_(space), lifts_(lifts) {
+  std::vector<double> mesh_reach(scene.meshes.size(), 0.0);
+  parts_.resize(scene.meshes.size());
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const Mesh& mesh = scene.meshes[i];
+    if (scene.materials[mesh.material].alpha_mode == AlphaMode::Blend) parts_[i] = parts_of(mesh);
+    for (const glm::vec3& p : scene.meshes[i].positions)
+      mesh_reach[i] = std::max(mesh_reach[i], largest(glm::dvec3(p)));
+  }
+  const std::vector<std::uint8_t> shared = shared_instances(scene);
+  placed_.resize(scene.instances.size());
+  for (std::size_t i = 0; i < placed_.size(); ++i) {
+    const glm::dmat4& to_world = scene.instances[i].to_world;
+    const glm::dmat3 linear(to_world);
+    const glm::dmat3 scaled = linear / std::max(row_sum_norm(linear), 1e-300);
+    placed_[i].normal_matrix = cofactors(scaled);
+    placed_[i].mirrored = glm::determinant(scaled) < 0.0;
+    if (shared[i] == 0) continue;
+    placed_[i].distortion = distortion(linear);
+    placed_[i].reach = row_sum_norm(linear) * mesh_reach[scene.instances[i].mesh] +
+                       placed_[i].distortion * largest(glm::dvec3(to_world[3]) - space.origin);
+  }
+}
+
+void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
+  HPR_CHECK(id < scene_.triangles);  // keys come from other ranks: a wrong one must not pass for a picture
+  if (triangle.surface == id) return;
+  const Instance* instance = &scene_.instances[triangle.instance];
+  if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangles.size()) {
+    triangle.index = id - instance->first_surface;
+  } else {
+    const SurfacePlace place = locate_surface(scene_, id);
+    triangle.instance = place.instance;
+    triangle.index = place.triangle;
+    instance = &scene_.instances[place.instance];
+  }
+  triangle.surface = id;
+  const Mesh& mesh = scene_.mesh_of(*instance);
+  const Placed& placed = placed_[triangle.instance];
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  triangle.v0 = world_position(*instance, mesh.positions[corners.x]);
+  // Edges come from differences of the mesh's own coordinates: a far translation does not round them.
+  const glm::dmat3 linear(instance->to_world);
+  const glm::dvec3 p0(mesh.positions[corners.x]);
+  triangle.e1 = linear * (glm::dvec3(mesh.positions[corners.y]) - p0);
+  triangle.e2 = linear * (glm::dvec3(mesh.positions[corners.z]) - p0);
+  triangle.normal = direction_of_cross(triangle.e1, triangle.e2);
+  for (int corner = 0; corner < 3; ++corner) {
+    triangle.normals[static_cast<std::size_t>(corner)] =
+        unit(placed.normal_matrix * glm::dvec3(mesh.normals[corners[corner]]), triangle.normal);
+  }
+  const double place = largest(triangle.v0 - space_.origin);
+  const double extent = std::max(largest(triangle.e1), largest(triangle.e2));
+  const double world = place + extent;
+  triangle.offset = kOriginSteps * kFloatStep * std::max(world, placed.distortion * world + placed.reach);
+}
+
+void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
+  constexpr std::size_t kAhead = 64;
+  std::array<const Mesh*, kAhead> meshes;
+  std::array<const glm::uvec3*, kAhead> corners;
+  std::uint32_t instance = 0;
+  for (std::size_t first = 0; first < ids.size(); first += kAhead) {
+    std::size_t count = 0;
+    for (const std::uint32_t id : ids.subspan(first, std::min(kAhead, ids.size() - first))) {
+      if (id >= scene_.triangles) continue;
+      const Instance* at = &scene_.instances[instance];
+      if (id < at->first_surface || id - at->first_surface >= scene_.mesh_of(*at).triangles.size()) {
+        instance = locate_surface(scene_, id).instance;
+        at = &scene_.instances[instance];
+      }
+      meshes[count] = &scene_.mesh_of(*at);
+      corners[count] = &meshes[count]->triangles[id - at->first_surface];
+      __builtin_prefetch(corners[count++]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      for (int corner = 0; corner < 3; ++corner) prefetch_vertex(*meshes[i], (*corners[i])[corner]);
+    }
+  }
+}
+
+/// Neighbours differ: instances that stand 1 to 126 apart, and a mesh's first 127 parts.
+std::uint8_t Surfaces::layer_of(const WorldTriangle& triangle, bool inside) const {
+  const auto& parts = parts_[scene_.instances[triangle.instance].mesh];
+  if (parts.empty()) return 0;
+  const std::uint64_t number = std::uint64_t{triangle.instance} * 31 + parts[triangle.index];
+  return static_cast<std::uint8_t>(2 * (1 + number % 127) + (inside ? 1 : 0));
+}
+
+SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,
+                            const glm::dvec3& direction) const {
+  // Moeller and Trumbore 1997, relative to the ray's origin.
+  const glm::dvec3 from_v0 = origin - triangle.v0;
+  const glm::dvec3 p = glm::cross(direction, triangle.e2);
+  const glm::dvec3 q = glm::cross(from_v0, triangle.e1);
+  const double determinant = glm::dot(triangle.e1, p);
+  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(direction, q) / determinant);
+  const double b0 = 1.0 - at.x - at.y;
+
+  SurfacePoint point;
+  point.position = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
+  point.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
+  const bool against_winding = glm::dot(triangle.normal, point.to_viewer) < 0.0;
+  point.geometric_normal = against_winding ? -triangle.normal : triangle.normal;
+  point.inside = against_winding != placed_[triangle.instance].mirrored;
+  const auto& corner = triangle.normals;
+  const glm::dvec3 smooth = unit(b0 * corner[0] + at.x * corner[1] + at.y * corner[2], triangle.normal);
+  const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  point.shading_normal = side * smooth;
+
+  const Weights weight{b0, at.x, at.y};
+  if (lifts_) lift(triangle, weight, side, point);
+  point.offset = triangle.offset;
+
+  const Mesh& mesh = scene_.mesh_of(scene_.instances[triangle.instance]);
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  for (std::size_t set = 0; set < point.uv.size(); ++set) {
+    const auto& uvs = mesh.uvs[set];
+    if (uvs.empty()) continue;
+    point.uv[set] = glm::vec2(b0 * glm::dvec2(uvs[corners.x]) + at.x * glm::dvec2(uvs[corners.y]) +
+                              at.y * glm::dvec2(uvs[corners.z]));
+  }
+  if (!mesh.colors.empty()) {
+    point.color = b0 * glm::dvec4(mesh.colors[corners.x]) + at.x * glm::dvec4(mesh.colors[corners.y]) +
+                  at.y * glm::dvec4(mesh.colors[corners.z]);
+  }
+  point.surface = triangle.surface;
+  point.material = mesh.material;
+  point.layer = layer_of(triangle, point.inside);
+  if (scene_.materials[mesh.material].normal_texture.present()) add_tangents(triangle, weight, point);
+  return point;
+}
+
+/// Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, chapter 4: the origin is lifted to where the corners'
+/// tangent planes are, as far as they lie above the triangle.
+void Surfaces::lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point) {
+  const glm::dvec3 in_triangle = weights[1] * triangle.e1 + weights[2] * triangle.e2;
+  const std::array<glm::dvec3, 3> from_corner{in_triangle, in_triangle - triangle.e1, in_triangle - triangle.e2};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3 normal = side * triangle.normals[i];
+    point.lift -= weights[i] * std::min(0.0, glm::dot(from_corner[i], normal)) * normal;
+  }
+}
+
+void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const {
+  const Instance& instance = scene_.instances[triangle.instance];
+  const Mesh& mesh = scene_.mesh_of(instance);
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  // Seen from behind, the mapped normal turns round as a whole.
+  const double side = point.inside ? -1.0 : 1.0;
+  const auto between = [&](const auto& of_vertices) {
+    glm::dvec3 sum(0.0);
+    for (int corner = 0; corner < 3; ++corner) {
+      sum += weights[static_cast<std::size_t>(corner)] * glm::dvec3(of_vertices[corners[corner]]);
+    }
+    return sum;
+  };
+  if (!mesh.tangents.empty()) {
+    const glm::dvec3 along = between(mesh.tangents);
+    const glm::dvec3 normal = between(mesh.normals);
+    // glTF 2.0, section 3.7.2.1; both carried into the world, so that mirroring mirrors them.
+    const glm::dvec3 across = static_cast<double>(mesh.tangents[corners.x].w) * glm::cross(normal, along);
+    const glm::dmat3 linear(instance.to_world);
+    const glm::dvec3 tangent = unit(linear * along, glm::dvec3(0.0));
+    const glm::dvec3 bitangent = unit(linear * across, glm::dvec3(0.0));
+    if (tangent != glm::dvec3(0.0) && bitangent != glm::dvec3(0.0)) {
+      point.tangent = side * tangent;
+      point.bitangent = side * bitangent;
+      return;
+    }
+  }
+  const TextureRef& map = scene_.materials[mesh.material].normal_texture;
+  const auto& uvs = mesh.uvs[std::min<std::size_t>(map.uv_set, mesh.uvs.size() - 1)];
+  if (uvs.empty()) return;
+  const glm::dvec2 uv0 = transformed_uv(map, uvs[corners.x]);
+  const glm::dvec2 d1 = transformed_uv(map, uvs[corners.y]) - uv0;
+  const glm::dvec2 d2 = transformed_uv(map, uvs[corners.z]) - uv0;
+  // In the mesh's own coordinates and carried into the world as the file's are, so that stretching treats both alike.
+  const glm::dvec3 p0(mesh.positions[corners.x]);
+  const glm::dvec3 e1 = glm::dvec3(mesh.positions[corners.y]) - p0;
+  const glm::dvec3 e2 = glm::dvec3(mesh.positions[corners.z]) - p0;
+  const glm::dvec3 normal = unit(between(mesh.normals), direction_of_cross(e1, e2));
+  // Positions as a linear function of u and v, times the determinant of the differences.
+  const double turn = d1.x * d2.y - d1.y * d2.x < 0.0 ? -1.0 : 1.0;
+  const glm::dvec3 by_u = turn * (d2.y * e1 - d1.y * e2);
+  const glm::dvec3 by_v = turn * (d1.x * e2 - d2.x * e1);
+  const glm::dvec3 along = unit(by_u - glm::dot(by_u, normal) * normal, glm::dvec3(0.0));
+  const glm::dvec3 across = glm::cross(normal, along);
+  const glm::dmat3 linear(instance.to_world);
+  point.tangent = side * unit(linear * along, glm::dvec3(0.0));
+  // The map's y points up, v points down.
+  point.bitangent = (glm::dot(across, by_v) > 0.0 ? -side : side) * unit(linear * across, glm::dvec3(0.0));
+}
+
+}  // namespace hpr

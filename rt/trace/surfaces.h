@@ -1,0 +1,125 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <span>
+#include <vector>
+
+#include "rt/trace/ray_space.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// A triangle of the scene in world coordinates.
+struct WorldTriangle {
+  std::uint32_t surface = 0xFFFFFFFFU;
+  std::uint32_t instance = 0;
+  std::uint32_t index = 0;  ///< in the instance's mesh
+  glm::dvec3 v0{0.0};
+  glm::dvec3 e1{0.0};
+  glm::dvec3 e2{0.0};
+  glm::dvec3 normal{0.0};               ///< unit length, by the winding; zero when the triangle has no area
+  std::array<glm::dvec3, 3> normals{};  ///< unit length, of the corners
+  double offset = 0.0;                  ///< metres by which ray origins must leave it
+};
+
+/// Where a ray meets a surface, and all that shading asks of the place. World coordinates, metres.
+struct SurfacePoint {
+  glm::dvec3 position{0.0};          ///< v0 + u e1 + v e2
+  glm::dvec3 to_viewer{0.0};         ///< unit length, against the ray
+  glm::dvec3 geometric_normal{0.0};  ///< unit length, on the viewer's side
+  glm::dvec3 shading_normal{0.0};    ///< unit length, interpolated, on the geometric normal's side
+  /// Lifts the origin of shadow rays onto the smooth surface the normals pretend (zero on flat ones).
+  glm::dvec3 lift{0.0};
+  double offset = 0.0;  ///< metres by which ray origins must leave the surface along the geometric normal
+  std::array<glm::vec2, 2> uv{};
+  glm::dvec4 color{1.0};  ///< interpolated of the vertices, linear RGBA; 1 where they have none
+  /// World, for normal maps: where the map's x and y point, so that x tangent + y bitangent + z shading_normal is on
+  /// the viewer's side. Of unit length and at right angles but for what the file's own tangents are not; zero where
+  /// the material has no normal map or the surface no texture coordinates.
+  glm::dvec3 tangent{0.0};
+  glm::dvec3 bitangent{0.0};
+  std::uint32_t surface = 0xFFFFFFFFU;
+  std::uint32_t material = 0;
+  /// 0; of materials that cover in part a number for the side of this part of this instance, which few others have:
+  /// photons of one layer don't light another, however close they lie.
+  std::uint8_t layer = 0;
+  bool inside = false;  ///< the viewer is behind the face, by its winding; mirroring instances swap it
+
+  /// The normal to shade with. A smooth one at a silhouette may turn away from the viewer; the geometric one never does
+  /// and stands in for it there.
+  [[nodiscard]] const glm::dvec3& facing_normal() const {
+    return glm::dot(shading_normal, to_viewer) > 0.0 ? shading_normal : geometric_normal;
+  }
+};
+
+/// Where rays leave a surface towards `direction`: off it, on that side.
+[[nodiscard]] inline glm::dvec3 ray_origin(const SurfacePoint& point, const glm::dvec3& direction) {
+  const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
+  return point.position + side * point.offset * point.geometric_normal;
+}
+
+/// Surface ids -> triangles -> points. Keeps per instance what every one of its triangles needs.
+class Surfaces {
+ public:
+  /// The scene must outlive this. Without `lifts` points have none, for whoever sends no shadow rays.
+  Surfaces(const Scene& scene, const RaySpace& space, bool lifts = true);
+
+  /// Sets `triangle` to surface `id` unless it already is; neighbouring pixels mostly share theirs, or the instance.
+  void load(std::uint32_t id, WorldTriangle& triangle) const;
+
+  /// Asks the memory for the triangles of `ids`, kNoSurface left out, which will be loaded next: they lie far apart.
+  void prefetch(std::span<const std::uint32_t> ids) const;
+
+  /// The point where the ray meets the triangle's plane, moved onto the triangle when it lies outside (a pixel's centre
+  /// may miss a triangle it was given by a hair). Exact to double rounding: nothing is read from depths.
+  [[nodiscard]] SurfacePoint meet(const WorldTriangle& triangle, const glm::dvec3& origin,
+                                  const glm::dvec3& direction) const;
+
+ private:
+  /// Barycentric coordinates of a triangle's corners.
+  using Weights = std::array<double, 3>;
+
+  [[nodiscard]] std::uint8_t layer_of(const WorldTriangle& triangle, bool inside) const;
+  static void lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point);
+  void add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const;
+
+  struct Placed {
+    glm::dmat3 normal_matrix{
+        1.0};                 ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
+    bool mirrored = false;    ///< turns windings round
+    double distortion = 0.0;  ///< 0: not instanced in the ray scene
+    double reach = 0.0;       ///< metres: |A| |vertex| + distortion |translation| of the instanced mesh
+  };
+
+  const Scene& scene_;
+  RaySpace space_;
+  bool lifts_;
+  std::vector<Placed> placed_;
+  std::vector<std::vector<std::uint32_t>> parts_;  ///< [mesh][triangle]; empty but for those that cover in part
+};
+
+/// The triangles met last: neighbouring pixels, and the samples of a pixel, meet the same ones again.
+class RecentTriangles {
+ public:
+  [[nodiscard]] const WorldTriangle& load(const Surfaces& surfaces, std::uint32_t id) {
+    WorldTriangle& place = triangles_[id % kPlaces];
+    if (place.surface == id) return place;
+    place.instance = instance_;
+    surfaces.load(id, place);
+    instance_ = place.instance;
+    return place;
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 512;
+  std::vector<WorldTriangle> triangles_ = std::vector<WorldTriangle>(kPlaces);
+  std::uint32_t instance_ = 0;  ///< of the last one loaded, which the next mostly shares
+};
+
+}  // namespace hpr

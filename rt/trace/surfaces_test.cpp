@@ -1,0 +1,155 @@
+#include "rt/trace/surfaces.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+
+#include "rt/test_scene.h"
+#include "rt/trace/ray_scene.h"
+
+namespace hpr {
+namespace {
+
+Scene one_triangle(const glm::dmat4& to_world = glm::dmat4(1.0)) {
+  Scene scene;
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {2, 0, 0}, {0, 4, 0}};
+  mesh.uvs[0] = {{0, 0}, {1, 0}, {0, 1}};
+  mesh.triangles = {{0, 1, 2}};
+  test::place(scene, test::add_mesh(scene, mesh), to_world);
+  finish_scene(scene);
+  return scene;
+}
+
+SurfacePoint meet(const Scene& scene, std::uint32_t id, const glm::dvec3& origin, const glm::dvec3& direction) {
+  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  WorldTriangle triangle;
+  surfaces.load(id, triangle);
+  return surfaces.meet(triangle, origin, direction);
+}
+
+TEST(Surfaces, ReconstructWhereARayMeetsAKnownTriangle) {
+  const SurfacePoint point = meet(one_triangle(), 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0});
+  EXPECT_EQ(point.position, glm::dvec3(0.5, 1.0, 0.0));
+  EXPECT_EQ(point.uv[0], glm::vec2(0.25F, 0.25F));
+  EXPECT_EQ(point.geometric_normal, glm::dvec3(0.0, 0.0, 1.0));
+  EXPECT_EQ(point.shading_normal, glm::dvec3(0.0, 0.0, 1.0));
+  EXPECT_EQ(point.to_viewer, glm::dvec3(0.0, 0.0, 1.0));
+  EXPECT_EQ(point.lift, glm::dvec3(0.0));
+}
+
+TEST(Surfaces, TurnNormalsToTheViewersSide) {
+  const SurfacePoint point = meet(one_triangle(), 0, {0.5, 1.0, -3.0}, {0.0, 0.0, 1.0});
+  EXPECT_EQ(point.geometric_normal, glm::dvec3(0.0, 0.0, -1.0));
+  EXPECT_EQ(point.shading_normal, glm::dvec3(0.0, 0.0, -1.0));
+}
+
+TEST(Surfaces, ShadeByTheGeometricNormalWhereTheSmoothOneTurnsAway) {
+  Scene scene = one_triangle();
+  scene.meshes[0].normals.assign(3, glm::normalize(glm::vec3(1.0F, 0.0F, 1.0F)));
+  const SurfacePoint from_right = meet(scene, 0, {3.5, 1.0, 1.0}, {-3.0, 0.0, -1.0});
+  EXPECT_EQ(from_right.facing_normal(), from_right.shading_normal);
+  const SurfacePoint from_left = meet(scene, 0, {-2.5, 1.0, 1.0}, {3.0, 0.0, -1.0});
+  EXPECT_GT(glm::dot(from_left.shading_normal, glm::dvec3(0.0, 0.0, 1.0)), 0.7);
+  EXPECT_EQ(from_left.facing_normal(), glm::dvec3(0.0, 0.0, 1.0));
+}
+
+TEST(Surfaces, LeaveMoreRoomWhereARayIsCarriedIntoADistortedMesh) {
+  Scene scene = one_triangle();
+  const double plain = meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -1.0}).offset;
+  EXPECT_GT(plain, 0.0);
+  // Two instances share the mesh; rays of the second are divided by 8 along one axis and come back.
+  test::place(scene, 0, glm::scale(glm::dmat4(1.0), {8.0, 1.0, 1.0}));
+  finish_scene(scene);
+  const SurfacePoint point = meet(scene, 1, {0.5, 1.0, 3.0}, {0.0, 0.0, -1.0});
+  const double world = 8.0 + 16.0;  // from the scene's middle to the corner, and the longest edge
+  EXPECT_DOUBLE_EQ(distortion(glm::dmat3(scene.instances[1].to_world)), 1.0);
+  EXPECT_GE(point.offset, kOriginSteps * kFloatStep * (world + 8.0 * 4.0));
+}
+
+TEST(Surfaces, KeepThePointOnTheTriangleWhenTheRayPassesBeside) {
+  EXPECT_EQ(meet(one_triangle(), 0, {-1.0, 2.0, 1.0}, {0.0, 0.0, -1.0}).position, glm::dvec3(0.0, 2.0, 0.0));
+  const SurfacePoint past = meet(one_triangle(), 0, {2.0, 4.0, 1.0}, {0.0, 0.0, -1.0});
+  EXPECT_NEAR(past.position.x / 2.0 + past.position.y / 4.0, 1.0, 1e-15);
+  const SurfacePoint edge_on = meet(one_triangle(), 0, {-1.0, 1.0, 0.0}, {1.0, 0.0, 0.0});
+  EXPECT_TRUE(std::isfinite(edge_on.position.x) && edge_on.position.z == 0.0);
+}
+
+TEST(Surfaces, AreExactFarFromTheOrigin) {
+  const glm::dvec3 far(1e7, -3e6, 2e7);
+  const Scene scene = one_triangle(glm::translate(glm::dmat4(1.0), far));
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0.0, 0.9);
+  for (int i = 0; i < 200; ++i) {
+    const glm::dvec3 target = far + glm::dvec3(uniform(random), uniform(random), 0.0);
+    const glm::dvec3 eye = far + glm::dvec3(5.0 * uniform(random), 3.0, 100.0);
+    EXPECT_LT(glm::length(meet(scene, 0, eye, target - eye).position - target), 2e-8);
+  }
+}
+
+TEST(Surfaces, TransformNormalsByTheInverseTransposeAndUnderMirroring) {
+  // A slope of 45 degrees squashed to half its height: the normal gets steeper, not flatter.
+  Scene scene;
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 1, 0}, {0, 0, -1}};
+  mesh.triangles = {{0, 1, 2}};
+  const std::uint32_t id = test::add_mesh(scene, mesh);
+  test::place(scene, id, glm::scale(glm::dmat4(1.0), {1.0, 0.5, 1.0}));
+  test::place(scene, id, glm::scale(glm::dmat4(1.0), {1.0, -0.5, 1.0}));
+  test::place(scene, id, glm::scale(glm::dmat4(1.0), {1.0, 0.0, 1.0}));
+  finish_scene(scene);
+  const glm::dvec3 up = glm::normalize(glm::dvec3(-0.5, 1.0, 0.0));
+  EXPECT_LT(glm::length(meet(scene, 0, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - up), 1e-7);
+  const glm::dvec3 mirrored = glm::normalize(glm::dvec3(0.5, 1.0, 0.0));
+  EXPECT_LT(glm::length(meet(scene, 1, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - mirrored), 1e-7);
+  EXPECT_LT(glm::length(meet(scene, 2, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - glm::dvec3(0, 1, 0)), 1e-7);
+}
+
+TEST(Surfaces, KnowWhichSideOfAFaceTheViewerIsOn) {
+  const glm::dmat4 mirror = glm::scale(glm::dmat4(1.0), {-1.0, 1.0, 1.0});
+  for (const double size : {1.0, 1e-120, 1e15}) {
+    const glm::dmat4 scale = glm::scale(glm::dmat4(1.0), glm::dvec3(size));
+    const auto inside = [&](const glm::dmat4& to_world, double x, double z) {
+      return meet(one_triangle(scale * to_world), 0, size * glm::dvec3(x, 1.0, z), {0.0, 0.0, -z}).inside;
+    };
+    EXPECT_FALSE(inside(glm::dmat4(1.0), 0.5, 3.0)) << size;
+    EXPECT_TRUE(inside(glm::dmat4(1.0), 0.5, -3.0)) << size;
+    // Mirroring turns windings round, not the front of a thing.
+    EXPECT_FALSE(inside(mirror, -0.5, 3.0)) << size;
+    EXPECT_TRUE(inside(mirror, -0.5, -3.0)) << size;
+  }
+}
+
+TEST(Surfaces, InterpolateVertexColorsAndTellTheirNumber) {
+  Scene scene = one_triangle();
+  EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).color, glm::dvec4(1.0));
+  EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).surface, 0U);
+  scene.meshes[0].colors = {{1, 0, 0, 1}, {0, 1, 0, 0}, {0, 0, 1, 0.5F}};
+  EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).color, glm::dvec4(0.5, 0.25, 0.25, 0.625));
+  test::place(scene, 0);
+  finish_scene(scene);
+  EXPECT_EQ(meet(scene, 1, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).surface, 1U);
+}
+
+TEST(Surfaces, FindTheInstanceOfAnyIdInAnyOrder) {
+  Scene scene;
+  const std::uint32_t square = test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0));
+  const std::uint32_t empty = test::add_mesh(scene, Mesh{});
+  for (int i = 0; i < 4; ++i) {
+    test::place(scene, square, glm::translate(glm::dmat4(1.0), {10.0 * i, 0.0, 0.0}));
+    test::place(scene, empty);
+  }
+  finish_scene(scene);
+  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  WorldTriangle triangle;
+  for (const std::uint32_t id : {7U, 0U, 1U, 6U, 2U, 3U, 5U, 4U, 4U}) {
+    surfaces.load(id, triangle);
+    EXPECT_EQ(triangle.v0.x, 10.0 * (id / 2)) << id;
+    EXPECT_EQ(triangle.index, id % 2) << id;
+  }
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "scene/gltf/buffers.h"
+#include "scene/gltf/context.h"
+
+namespace hpr {
+
+/// A glTF model together with its bytes: accessors as plain arrays. Indices into sections were checked before
+/// (gltf_shape.h); the constructor checks every range of bytes, so that reading cannot leave a buffer.
+class GltfData {
+ public:
+  /// All three must outlive this. Throws Error (BadInput) for a view or accessor that leaves what holds it.
+  GltfData(const tinygltf::Model& model, const GltfBuffers& buffers, GltfContext& context);
+
+  [[nodiscard]] const tinygltf::Model& model() const { return *model_; }
+  [[nodiscard]] GltfContext& context() const { return *context_; }
+  [[nodiscard]] const tinygltf::Accessor& accessor(int index) const { return model_->accessors[to_size(index)]; }
+  [[nodiscard]] std::size_t count(int index) const { return accessor(index).count; }
+  /// The bytes of a buffer view.
+  [[nodiscard]] std::span<const std::byte> view(int index) const;
+
+  /// Refuses an accessor whose type is not among `types` (TINYGLTF_TYPE_*); `where` names the place that uses it.
+  void require_type(int index, std::initializer_list<int> types, const std::string& where) const;
+
+  /// All values as float: normalised integers in [0, 1] or [-1, 1], others as they are. The type must match.
+  [[nodiscard]] std::vector<float> scalars(int index) const { return read<float>(index); }
+  [[nodiscard]] std::vector<glm::vec2> vec2s(int index) const { return read<glm::vec2>(index); }
+  [[nodiscard]] std::vector<glm::vec3> vec3s(int index) const { return read<glm::vec3>(index); }
+  [[nodiscard]] std::vector<glm::vec4> vec4s(int index) const { return read<glm::vec4>(index); }
+  [[nodiscard]] std::vector<glm::mat4> mat4s(int index) const { return read<glm::mat4>(index); }
+  /// Unsigned integers (1, 2 or 4 bytes), `width` of them per element: vertex indices, joints.
+  [[nodiscard]] std::vector<std::uint32_t> integers(int index) const;
+
+  static std::size_t to_size(int index) { return static_cast<std::size_t>(index); }
+
+ private:
+  template <typename Value>
+  [[nodiscard]] std::vector<Value> read(int index) const {
+    context_->charge(count(index) * sizeof(Value), "an accessor");
+    std::vector<Value> values(count(index));
+    // NOLINTNEXTLINE(bugprone-sizeof-expression): a Value may be one float
+    read_floats(index, reinterpret_cast<float*>(values.data()), sizeof(Value) / sizeof(float));
+    return values;
+  }
+  void read_floats(int index, float* out, std::size_t width) const;
+  void check_view(std::size_t index) const;
+  void check_accessor(std::size_t index) const;
+  void check_sparse(const tinygltf::Accessor& accessor, const std::string& where) const;
+  /// The elements a sparse accessor replaces.
+  [[nodiscard]] std::vector<std::uint32_t> sparse_targets(int index) const;
+
+  const tinygltf::Model* model_;
+  const GltfBuffers* buffers_;
+  GltfContext* context_;
+};
+
+}  // namespace hpr

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "scene/gltf/context.h"
+
+namespace hpr {
+
+enum class Presence { Optional, Required };
+
+/// One JSON object of a glTF document, with checked access to its members. Whatever has the wrong type or an index that
+/// points nowhere throws Error (BadInput) naming the place, e.g. "meshes[2].primitives[0].indices".
+class GltfItem {
+ public:
+  static constexpr double kLargest = std::numeric_limits<float>::max();
+  static constexpr std::uint64_t kMostWhole = std::uint64_t{1} << 53;  ///< what JSON numbers hold exactly
+
+  GltfItem(GltfContext& context, nlohmann::json& root) : context_(&context), root_(&root), value_(&root) {}
+
+  [[nodiscard]] GltfContext& context() const { return *context_; }
+  [[nodiscard]] nlohmann::json& value() const { return *value_; }
+  [[nodiscard]] std::string path() const;
+  [[nodiscard]] bool has(const char* key) const { return value_->contains(key); }
+
+  [[noreturn]] void fail(std::string_view key, std::string_view what, std::string_view hint = kRepairHint) const;
+  void warn(std::string_view key, std::string_view what) const;
+
+  /// A member object; none when it is absent.
+  [[nodiscard]] std::optional<GltfItem> object(const char* key, Presence presence = Presence::Optional) const;
+
+  /// Calls body(item) for every object of the array `key`; returns how many there are.
+  template <typename Body>
+  std::size_t each(const char* key, Presence presence, const Body& body) const {
+    const nlohmann::json* const list = array(key, presence);
+    if (list == nullptr) return 0;
+    for (std::size_t i = 0; i < list->size(); ++i) body(element(key, i));
+    return list->size();
+  }
+
+  std::optional<std::string> text(const char* key, Presence presence = Presence::Optional) const;
+  std::optional<bool> flag(const char* key) const;
+  /// A whole number in [low, high]; 3.0 counts as 3 and is rewritten so, because stricter readers follow.
+  std::optional<std::uint64_t> whole(const char* key, Presence presence = Presence::Optional, std::uint64_t low = 0,
+                                     std::uint64_t high = kMostWhole) const;
+  /// An index into the top-level array `section`, or into `count` entries.
+  std::optional<std::size_t> index(const char* key, const char* section, Presence presence = Presence::Optional) const;
+  std::optional<std::size_t> index_below(const char* key, std::size_t count, Presence presence) const;
+  /// An array of indices into `section`; returns how many.
+  std::size_t indices(const char* key, const char* section, Presence presence = Presence::Optional) const;
+  /// An object whose values are all indices into `section`.
+  std::size_t index_map(const char* key, const char* section, Presence presence) const;
+  /// A number in [low, high].
+  std::optional<double> number(const char* key, Presence presence = Presence::Optional, double low = -kLargest,
+                               double high = kLargest) const;
+  /// A number that is brought into [low, high], with a warning, when it lies outside.
+  std::optional<double> clamped(const char* key, double low, double high) const;
+  /// `count` numbers (any number of them when count is 0), brought into [low, high] with a warning.
+  bool numbers(const char* key, std::size_t count, double low = -kLargest, double high = kLargest) const;
+
+  /// Entries of the top-level array `section`.
+  [[nodiscard]] std::size_t section_size(const char* section) const;
+  /// Entry `index` of the top-level array `section`; it must be there.
+  [[nodiscard]] const nlohmann::json& top(const char* section, std::size_t index) const {
+    return (*root_)[section][index];
+  }
+
+ private:
+  GltfItem(const GltfItem& parent, const char* key, std::size_t position, nlohmann::json& value)
+      : context_(parent.context_), root_(parent.root_), value_(&value), parent_(&parent), key_(key), index_(position) {}
+
+  [[nodiscard]] nlohmann::json* find(const char* key, Presence presence) const;
+  [[nodiscard]] nlohmann::json* array(const char* key, Presence presence) const;
+  [[nodiscard]] GltfItem element(const char* key, std::size_t position) const;
+  void check_index(nlohmann::json& value, std::string_view where, std::size_t count) const;
+  bool clamp_value(nlohmann::json& value, double low, double high) const;
+
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+
+  GltfContext* context_;
+  nlohmann::json* root_;
+  nlohmann::json* value_;
+  const GltfItem* parent_ = nullptr;  ///< outlives this: items are made on the way down
+  const char* key_ = "";
+  std::size_t index_ = kNone;
+};
+
+/// The text as JSON. Throws Error (BadInput) with line, column and the offending line. Call scan_json first.
+[[nodiscard]] nlohmann::json parse_json(std::string_view text, const GltfContext& context);
+
+}  // namespace hpr

@@ -1,0 +1,237 @@
+#include "scene/gltf/materials.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/names.h"
+
+namespace hpr {
+namespace {
+
+const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name) {
+  const auto found = extensions.find(name);
+  return found == extensions.end() ? nullptr : &found->second;
+}
+
+double number_in(const tinygltf::Value& object, const char* key, double fallback) {
+  return object.Has(key) ? object.Get(key).GetNumberAsDouble() : fallback;
+}
+
+std::array<double, 2> pair_in(const tinygltf::Value& object, const char* key, double fallback) {
+  if (!object.Has(key)) return {fallback, fallback};
+  const tinygltf::Value& pair = object.Get(key);
+  return {pair.Get(0).GetNumberAsDouble(), pair.Get(1).GetNumberAsDouble()};
+}
+
+Wrap wrap_of(int mode, const std::string& where, GltfContext& context) {
+  switch (mode) {
+    case TINYGLTF_TEXTURE_WRAP_REPEAT:
+      return Wrap::Repeat;
+    case TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE:
+      return Wrap::ClampToEdge;
+    case TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT:
+      return Wrap::MirroredRepeat;
+    default:
+      context.warn(where, fmt::format("the wrap mode {} is unknown; taken as repeat", mode));
+      return Wrap::Repeat;
+  }
+}
+
+bool is_nearest(int filter, const std::string& where, GltfContext& context) {
+  if (filter == TINYGLTF_TEXTURE_FILTER_NEAREST) return true;
+  if (filter != -1 && filter != TINYGLTF_TEXTURE_FILTER_LINEAR) {
+    context.warn(where, fmt::format("the filter {} is unknown; taken as linear", filter));
+  }
+  return false;
+}
+
+/// KHR_texture_transform: scale, then turn, then move (uv' = T R S uv, with v pointing down).
+std::array<float, 6> uv_transform(const tinygltf::Value& transform) {
+  const auto offset = pair_in(transform, "offset", 0.0);
+  const auto scale = pair_in(transform, "scale", 1.0);
+  const double rotation = number_in(transform, "rotation", 0.0);
+  const double c = std::cos(rotation);
+  const double s = std::sin(rotation);
+  const std::array<double, 6> exact{c * scale[0], -s * scale[0], s * scale[1], c * scale[1], offset[0], offset[1]};
+  std::array<float, 6> rounded{};
+  std::ranges::transform(exact, rounded.begin(), [](double value) { return static_cast<float>(value); });
+  return rounded;
+}
+
+glm::vec3 color_of(const std::vector<double>& values, double fallback) {
+  return values.size() >= 3 ? glm::vec3(glm::dvec3(values[0], values[1], values[2]))
+                            : glm::vec3(static_cast<float>(fallback));
+}
+
+}  // namespace
+
+void GltfLook::build(Scene& scene) {
+  const auto& materials = data_.model().materials;
+  data_.context().charge(materials.size() * sizeof(Material), "the materials");
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    scene.materials.push_back(material(materials[i], fmt::format("materials[{}]", i), scene));
+  }
+}
+
+Material GltfLook::material(const tinygltf::Material& from, const std::string& where, Scene& scene) {
+  const tinygltf::PbrMetallicRoughness& pbr = from.pbrMetallicRoughness;
+  Material to;
+  to.name = from.name;
+  if (const auto& c = pbr.baseColorFactor; c.size() == 4) to.base_color = glm::vec4(glm::dvec4(c[0], c[1], c[2], c[3]));
+  to.base_color_texture = texture_ref(pbr.baseColorTexture, where + ".pbrMetallicRoughness.baseColorTexture", scene);
+  to.metallic = static_cast<float>(pbr.metallicFactor);
+  to.roughness = static_cast<float>(pbr.roughnessFactor);
+  to.metallic_roughness_texture =
+      texture_ref(pbr.metallicRoughnessTexture, where + ".pbrMetallicRoughness.metallicRoughnessTexture", scene);
+  to.emissive = color_of(from.emissiveFactor, 0.0);
+  to.emissive_texture = texture_ref(from.emissiveTexture, where + ".emissiveTexture", scene);
+  to.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::Mask
+                  : from.alphaMode == "BLEND" ? AlphaMode::Blend
+                                              : AlphaMode::Opaque;
+  to.alpha_cutoff = static_cast<float>(from.alphaCutoff);
+  to.double_sided = from.doubleSided;
+  add_detail(from, where, scene, to);
+  add_extensions(from, where, scene, to);
+  return to;
+}
+
+void GltfLook::add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
+  to.normal_texture = texture_ref(from.normalTexture, where + ".normalTexture", scene);
+  to.normal_scale = static_cast<float>(from.normalTexture.scale);
+  to.occlusion_texture = texture_ref(from.occlusionTexture, where + ".occlusionTexture", scene);
+  to.occlusion_strength = static_cast<float>(from.occlusionTexture.strength);
+}
+
+void GltfLook::add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
+  if (const auto* strength = extension(from.extensions, "KHR_materials_emissive_strength")) {
+    to.emissive *= static_cast<float>(number_in(*strength, "emissiveStrength", 1.0));
+  }
+  if (const auto* transmission = extension(from.extensions, "KHR_materials_transmission")) {
+    to.transmission = static_cast<float>(number_in(*transmission, "transmissionFactor", 0.0));
+    if (transmission->Has("transmissionTexture")) {
+      const tinygltf::Value& info = transmission->Get("transmissionTexture");
+      tinygltf::ExtensionMap extensions;
+      if (info.Has("extensions")) extensions = info.Get("extensions").Get<tinygltf::Value::Object>();
+      to.transmission_texture =
+          texture_ref(info.Get("index").GetNumberAsInt(), static_cast<int>(number_in(info, "texCoord", 0.0)),
+                      extensions, where + ".KHR_materials_transmission.transmissionTexture", scene);
+    }
+  }
+  if (const auto* ior = extension(from.extensions, "KHR_materials_ior")) {
+    to.ior = static_cast<float>(number_in(*ior, "ior", 1.5));
+  }
+  if (const auto* volume = extension(from.extensions, "KHR_materials_volume")) {
+    // The texture of the thickness is for renderers that cannot look where light leaves again.
+    to.thickness = static_cast<float>(number_in(*volume, "thicknessFactor", 0.0));
+    to.attenuation_distance = static_cast<float>(
+        number_in(*volume, "attenuationDistance", static_cast<double>(Material{}.attenuation_distance)));
+    if (volume->Has("attenuationColor")) {
+      for (int c = 0; c < 3; ++c) {
+        to.attenuation_color[c] = static_cast<float>(volume->Get("attenuationColor").Get(c).GetNumberAsDouble());
+      }
+    }
+  }
+  to.unlit = extension(from.extensions, "KHR_materials_unlit") != nullptr;
+}
+
+TextureRef GltfLook::texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
+                                 const std::string& where, Scene& scene) {
+  TextureRef ref;
+  if (index < 0) return ref;
+  ref.uv_set = static_cast<std::uint32_t>(uv_set);
+  if (const auto* transform = extension(extensions, "KHR_texture_transform")) {
+    ref.transform = uv_transform(*transform);
+    if (transform->Has("texCoord"))
+      ref.uv_set = static_cast<std::uint32_t>(transform->Get("texCoord").GetNumberAsInt());
+  }
+  if (ref.uv_set > 1) {
+    data_.context().warn(where,
+                         fmt::format("uses TEXCOORD_{}; only 0 and 1 are read, the texture is left out", ref.uv_set));
+    return {};
+  }
+  ref.texture = texture(index, where, scene);
+  return ref.present() ? ref : TextureRef{};
+}
+
+std::int32_t GltfLook::texture(int index, const std::string& where, Scene& scene) {
+  const tinygltf::Texture& from = data_.model().textures[GltfData::to_size(index)];
+  GltfContext& context = data_.context();
+  if (from.source < 0) {
+    context.warn(where, fmt::format("textures[{}] has no picture that HPR reads; left out", index));
+    return -1;
+  }
+  SamplerKey key{from.source, Wrap::Repeat, Wrap::Repeat, false};
+  if (from.sampler >= 0) {
+    const tinygltf::Sampler& sampler = data_.model().samplers[GltfData::to_size(from.sampler)];
+    const std::string place = fmt::format("samplers[{}]", from.sampler);
+    key = {from.source, wrap_of(sampler.wrapS, place, context), wrap_of(sampler.wrapT, place, context),
+           is_nearest(sampler.magFilter, place, context)};
+  }
+  if (const auto known = textures_.find(key); known != textures_.end()) return known->second;
+
+  Texture made;
+  std::tie(std::ignore, made.wrap_s, made.wrap_t, made.nearest) = key;
+  const auto held = pictures_.find(from.source);
+  if (held != pictures_.end() && held->second < 0) return -1;
+  if (held != pictures_.end()) {
+    const Texture& twin = scene.textures[static_cast<std::size_t>(held->second)];
+    context.charge(twin.image.pixels().size_bytes(), "a texture");
+    made.image = twin.image;
+    made.name = twin.name;
+  } else {
+    auto image = picture(from.source);
+    if (!image) {
+      pictures_[from.source] = -1;
+      return -1;
+    }
+    made.image = *std::move(image);
+    const nlohmann::json& entry = images_[GltfData::to_size(from.source)];
+    made.name = entry.contains("name") && entry["name"].is_string() ? entry["name"].get<std::string>()
+                                                                    : fmt::format("image {}", from.source);
+  }
+  const auto position = static_cast<std::int32_t>(scene.textures.size());
+  scene.textures.push_back(std::move(made));
+  textures_[key] = position;
+  pictures_.try_emplace(from.source, position);
+  return position;
+}
+
+std::optional<Image<Rgba8>> GltfLook::picture(int image) {
+  GltfContext& context = data_.context();
+  const nlohmann::json& entry = images_[GltfData::to_size(image)];
+  const std::string where = fmt::format("images[{}]", image);
+  const bool has_uri = entry.contains("uri");
+  const bool has_view = entry.contains("bufferView");
+  if (!has_uri && !has_view) {
+    context.warn(where, "has neither a uri nor a bufferView; left out");
+    return std::nullopt;
+  }
+  if (has_uri && has_view) context.warn(where, "has a uri and a bufferView; the bufferView is read");
+  if (has_view && !entry.contains("mimeType")) context.warn(where, "has no mimeType");
+  try {
+    std::vector<std::byte> file;
+    std::span<const std::byte> bytes;
+    if (has_view) {
+      bytes = data_.view(entry["bufferView"].get<int>());
+    } else {
+      file = buffers_.resolve(entry["uri"].get<std::string>(), where, context);
+      bytes = file;
+    }
+    // Decoding holds the file's channels beside the result.
+    ImageLimits limits = context.limits().image;
+    limits.pixels = std::min(limits.pixels, context.memory_left() / 8);
+    Image<Rgba8> decoded = decode_image(bytes, fmt::format("{}: {}", context.name(), where), limits);
+    context.charge(decoded.pixels().size_bytes(), "a texture");
+    return decoded;
+  } catch (const Error& error) {
+    // A scene without one of its pictures is still worth drawing; past the limits the user has to decide.
+    if (error.code() != ExitCode::BadInput && error.code() != ExitCode::Io) throw;
+    context.warn("", fmt::format("{}; drawn without it", error.what()));
+    return std::nullopt;
+  }
+}
+
+}  // namespace hpr

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "scene/gltf/accessors.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// Turns a document's materials into ours and decodes the pictures they refer to, each once. A picture that is missing
+/// or broken is left out with a warning; one past the limits is an error.
+class GltfLook {
+ public:
+  /// `images` is the document's section of that name (or null): tinygltf never sees pictures.
+  GltfLook(const GltfData& data, const GltfBuffers& buffers, const nlohmann::json& images)
+      : data_(data), buffers_(buffers), images_(images) {}
+
+  /// Fills scene.materials, one per material of the document, and scene.textures.
+  void build(Scene& scene);
+
+ private:
+  using SamplerKey = std::tuple<int, Wrap, Wrap, bool>;
+
+  [[nodiscard]] Material material(const tinygltf::Material& from, const std::string& where, Scene& scene);
+  void add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to);
+  void add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to);
+  /// The three kinds of texture info differ in what they say beside these.
+  [[nodiscard]] TextureRef texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
+                                       const std::string& where, Scene& scene);
+  template <typename Info>
+  [[nodiscard]] TextureRef texture_ref(const Info& info, const std::string& where, Scene& scene) {
+    return texture_ref(info.index, info.texCoord, info.extensions, where, scene);
+  }
+  [[nodiscard]] std::int32_t texture(int index, const std::string& where, Scene& scene);
+  [[nodiscard]] std::optional<Image<Rgba8>> picture(int image);
+
+  const GltfData& data_;
+  const GltfBuffers& buffers_;
+  const nlohmann::json& images_;
+  std::map<SamplerKey, std::int32_t> textures_;
+  std::map<int, std::int32_t> pictures_;  ///< image -> first texture that holds it, -1: cannot be drawn
+};
+
+/// A node's KHR_lights_punctual light, placed in the world; none when it has none.
+[[nodiscard]] std::optional<Light> light_of(const GltfData& data, int node, const glm::dmat4& to_world);
+
+/// A node's camera, placed in the world; its axes are made orthonormal, because scale has no meaning for cameras.
+[[nodiscard]] std::optional<Camera> camera_of(const GltfData& data, int node, const glm::dmat4& to_world);
+
+}  // namespace hpr

@@ -1,0 +1,399 @@
+#include "scene/gltf/mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+namespace hpr {
+namespace {
+
+using Vectors = std::vector<glm::vec3>;
+
+bool finite(const glm::vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Works on one primitive from its accessors to a finished mesh.
+class PrimitiveBuilder {
+ public:
+  PrimitiveBuilder(const GltfData& data, const tinygltf::Primitive& primitive, const std::string& where)
+      : data_(data), primitive_(primitive), where_(where) {}
+
+  Mesh build(const GltfPose& pose) {
+    Mesh mesh;
+    mesh.positions = data_.vec3s(primitive_.attributes.at("POSITION"));
+    check_positions(mesh.positions);
+    if (pose.joints.empty() && pose.weights.empty()) compare_bounds(mesh.positions);
+    if (const auto found = primitive_.attributes.find("NORMAL"); found != primitive_.attributes.end()) {
+      mesh.normals = data_.vec3s(found->second);
+      note_not_finite(mesh.normals, "NORMAL");
+    }
+    read_uvs(mesh);
+    read_colors(mesh);
+    // Tangents without normals are to be ignored (glTF 2.0, section 3.7.2.1).
+    if (const auto found = primitive_.attributes.find("TANGENT");
+        found != primitive_.attributes.end() && !mesh.normals.empty()) {
+      mesh.tangents = data_.vec4s(found->second);
+      note_not_finite(mesh.tangents, "TANGENT");
+    }
+    mesh.triangles = read_triangles(mesh.positions.size());
+    morph(mesh, pose.weights);
+    tame_uvs(mesh);
+    tame_colors(mesh);
+    if (!pose.joints.empty()) skin(mesh, pose.joints);
+    if (mesh.normals.empty()) {
+      make_flat(mesh);
+    } else {
+      repair_normals(mesh);
+      repair_tangents(mesh);
+    }
+    return mesh;
+  }
+
+ private:
+  /// What is no number is replaced wherever the attribute's values are looked at; here it is counted.
+  template <typename Vector>
+  void note_not_finite(const std::vector<Vector>& values, std::string_view attribute) const {
+    std::uint64_t count = 0;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      for (int axis = 0; axis < Vector::length(); ++axis) {
+        if (!std::isfinite(values[i][axis]) && count++ == 0) first = i;
+      }
+    }
+    data_.context().warn_not_finite(fmt::format("{}.attributes.{}", where_, attribute), count, first);
+  }
+
+  void check_positions(const Vectors& positions) const {
+    const auto bad = std::ranges::find_if_not(positions, finite);
+    if (bad != positions.end()) {
+      data_.context().fail(where_ + ".attributes.POSITION",
+                           fmt::format("vertex {} is not finite", bad - positions.begin()));
+    }
+  }
+
+  /// Triangles name their vertices in 32 bits.
+  void check_vertex_count(std::size_t vertices) const {
+    constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+    if (vertices <= kMost) return;
+    data_.context().fail(where_, fmt::format("needs {} vertices; a mesh may have {}", vertices, kMost),
+                         "divide the mesh", ExitCode::Limit);
+  }
+
+  void compare_bounds(const Vectors& positions) const {
+    const tinygltf::Accessor& accessor = data_.accessor(primitive_.attributes.at("POSITION"));
+    if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) return;
+    if (accessor.minValues.size() != 3 || accessor.maxValues.size() != 3) return;
+    glm::vec3 low = positions[0];
+    glm::vec3 high = positions[0];
+    for (const glm::vec3& p : positions) {
+      low = glm::min(low, p);
+      high = glm::max(high, p);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<std::size_t>(axis);
+      const double slack = 1e-4 * (std::abs(accessor.minValues[a]) + std::abs(accessor.maxValues[a])) + 1e-6;
+      if (low[axis] < accessor.minValues[a] - slack || high[axis] > accessor.maxValues[a] + slack) {
+        data_.context().warn(where_, "vertices lie outside of the min and max their accessor declares");
+        return;
+      }
+    }
+  }
+
+  void read_uvs(Mesh& mesh) const {
+    for (const auto& [name, set] : {std::pair{"TEXCOORD_0", 0U}, std::pair{"TEXCOORD_1", 1U}}) {
+      const auto found = primitive_.attributes.find(name);
+      if (found == primitive_.attributes.end()) continue;
+      mesh.uvs[set] = data_.vec2s(found->second);
+      note_not_finite(mesh.uvs[set], name);
+    }
+  }
+
+  void tame_uvs(Mesh& mesh) const {
+    for (const auto& [name, set] : {std::pair{"TEXCOORD_0", 0U}, std::pair{"TEXCOORD_1", 1U}}) {
+      // Samplers turn coordinates into integers; 1e6 repeats of a texture are already below what a float resolves.
+      constexpr float kFarthest = 1e6F;
+      bool odd = false;
+      for (glm::vec2& uv : mesh.uvs[set]) {
+        for (int axis = 0; axis < 2; ++axis) {
+          if (std::abs(uv[axis]) <= kFarthest) continue;
+          uv[axis] = std::isfinite(uv[axis]) ? std::copysign(kFarthest, uv[axis]) : 0.0F;
+          odd = true;
+        }
+      }
+      if (odd) data_.context().warn(where_, fmt::format("{} has values that are not finite or beyond 1e6", name));
+    }
+  }
+
+  void read_colors(Mesh& mesh) const {
+    const auto found = primitive_.attributes.find("COLOR_0");
+    if (found == primitive_.attributes.end()) return;
+    if (data_.accessor(found->second).type == TINYGLTF_TYPE_VEC4) {
+      mesh.colors = data_.vec4s(found->second);
+    } else {
+      const Vectors opaque = data_.vec3s(found->second);
+      data_.context().charge(opaque.size() * sizeof(glm::vec4), "vertex colours");
+      for (const glm::vec3& color : opaque) mesh.colors.emplace_back(color, 1.0F);
+    }
+    note_not_finite(mesh.colors, "COLOR_0");
+  }
+
+  void tame_colors(Mesh& mesh) const {
+    bool odd = false;
+    for (glm::vec4& color : mesh.colors) {
+      for (int c = 0; c < 4; ++c) {
+        if (color[c] >= 0.0F && color[c] <= 1.0F) continue;
+        color[c] = std::isnan(color[c]) ? 1.0F : std::clamp(color[c], 0.0F, 1.0F);
+        odd = true;
+      }
+    }
+    if (odd) data_.context().warn(where_ + ".attributes.COLOR_0", "some values lie outside of 0 to 1; brought into it");
+  }
+
+  [[nodiscard]] std::vector<glm::uvec3> read_triangles(std::size_t vertices) const {
+    std::vector<std::uint32_t> indices;
+    if (primitive_.indices >= 0) {
+      indices = data_.integers(primitive_.indices);
+      const auto bad = std::ranges::find_if(indices, [&](std::uint32_t index) { return index >= vertices; });
+      if (bad != indices.end()) {
+        data_.context().fail(where_ + ".indices", fmt::format("index {} is {}, but there are {} vertices",
+                                                              bad - indices.begin(), *bad, vertices));
+      }
+    }
+    const std::size_t count = primitive_.indices >= 0 ? indices.size() : vertices;
+    check_vertex_count(vertices);
+    const bool list = primitive_.mode == TINYGLTF_MODE_TRIANGLES;
+    if (count < 3 || (list && count % 3 != 0)) {
+      data_.context().warn(where_, fmt::format("{} vertices make no whole number of triangles", count));
+    }
+    // A strip has up to three times as many corners as indices.
+    data_.context().charge(std::uint64_t{count} * (list ? 4U : 12U), "a mesh");
+    return triangles_of(primitive_.mode, vertices, indices);
+  }
+
+  void morph(Mesh& mesh, const std::vector<double>& weights) const {
+    const std::size_t count = std::min(weights.size(), primitive_.targets.size());
+    bool moved = false;
+    for (std::size_t t = 0; t < count; ++t) {
+      if (weights[t] == 0.0) continue;
+      for (const auto& [name, index] : primitive_.targets[t]) move(mesh, name, index, weights[t]);
+      moved = true;
+    }
+    if (moved) check_positions(mesh.positions);
+  }
+
+  void move(Mesh& mesh, const std::string& name, int index, double weight) const {
+    const auto add = [&](const auto& deltas, auto& to) {
+      using Delta = typename std::remove_cvref_t<decltype(deltas)>::value_type;
+      for (std::size_t i = 0; i < to.size(); ++i) {
+        for (int axis = 0; axis < Delta::length(); ++axis) {
+          to[i][axis] = static_cast<float>(double{to[i][axis]} + weight * double{deltas[i][axis]});
+        }
+      }
+    };
+    // Targets of tangents leave their sign alone.
+    if (name == "POSITION") add(data_.vec3s(index), mesh.positions);
+    if (name == "NORMAL") add(data_.vec3s(index), mesh.normals);
+    if (name == "TANGENT") add(data_.vec3s(index), mesh.tangents);
+    if (name == "TEXCOORD_0") add(data_.vec2s(index), mesh.uvs[0]);
+    if (name == "TEXCOORD_1") add(data_.vec2s(index), mesh.uvs[1]);
+    if (name != "COLOR_0") return;
+    if (data_.accessor(index).type == TINYGLTF_TYPE_VEC4) return add(data_.vec4s(index), mesh.colors);
+    add(data_.vec3s(index), mesh.colors);
+  }
+
+  void skin(Mesh& mesh, const std::vector<glm::dmat4>& joints) const {
+    const auto indices = primitive_.attributes.find("JOINTS_0");
+    const auto weights = primitive_.attributes.find("WEIGHTS_0");
+    if (indices == primitive_.attributes.end() || weights == primitive_.attributes.end()) {
+      data_.context().warn(where_, "has a skin, but not JOINTS_0 and WEIGHTS_0; drawn by its first joint");
+      const std::vector<std::uint32_t> first(mesh.positions.size() * 4, 0);
+      return bend(mesh, joints, first, std::vector(mesh.positions.size(), glm::vec4(1.0F, 0.0F, 0.0F, 0.0F)));
+    }
+    if (primitive_.attributes.contains("JOINTS_1")) {
+      data_.context().warn(where_, "joints past the fourth of a vertex are ignored");
+    }
+    bend(mesh, joints, data_.integers(indices->second), data_.vec4s(weights->second));
+  }
+
+  /// What a vertex's joints do to it; sets `odd` where its weights are of no use.
+  [[nodiscard]] glm::dmat4 blend_of(std::size_t vertex, const std::vector<glm::dmat4>& joints,
+                                    const std::vector<std::uint32_t>& indices, const glm::vec4& weights,
+                                    bool& odd) const {
+    glm::dmat4 blend(0.0);
+    double sum = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      const std::uint32_t joint = indices[4 * vertex + static_cast<std::size_t>(k)];
+      const double weight = weights[k];
+      if (!(weight > 0.0) || !std::isfinite(weight)) {
+        odd = odd || weight != 0.0;
+        continue;
+      }
+      if (joint >= joints.size()) {
+        data_.context().fail(where_ + ".attributes.JOINTS_0",
+                             fmt::format("vertex {} names joint {} of {}", vertex, joint, joints.size()));
+      }
+      blend += weight * joints[joint];
+      sum += weight;
+    }
+    odd = odd || sum == 0.0;
+    return sum > 0.0 ? blend / sum : joints[0];
+  }
+
+  void bend(Mesh& mesh, const std::vector<glm::dmat4>& joints, const std::vector<std::uint32_t>& indices,
+            const std::vector<glm::vec4>& weights) const {
+    bool odd = false;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      const glm::dmat4 blend = blend_of(i, joints, indices, weights[i], odd);
+      mesh.positions[i] = glm::vec3(blend * glm::dvec4(mesh.positions[i], 1.0));
+      if (!mesh.normals.empty()) {
+        // The inverse transpose but for its scale, which also exists for singular matrices.
+        const glm::dmat3 m(blend);
+        const glm::dmat3 cofactors(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+        const glm::dvec3 normal = cofactors * glm::dvec3(mesh.normals[i]);
+        const double length = glm::length(normal);
+        mesh.normals[i] = length > 0.0 ? glm::vec3(normal / length) : glm::vec3(0.0F);
+      }
+      if (!mesh.tangents.empty()) {
+        glm::vec4& tangent = mesh.tangents[i];
+        tangent = glm::vec4(glm::vec3(glm::dmat3(blend) * glm::dvec3(tangent)), tangent.w);
+      }
+    }
+    if (odd) data_.context().warn(where_ + ".attributes.WEIGHTS_0", "some vertices have no usable weights");
+    check_positions(mesh.positions);
+  }
+
+  /// Of a triangle without area: any.
+  [[nodiscard]] static glm::vec3 flat_normal(const Mesh& mesh, const glm::uvec3& triangle) {
+    const glm::dvec3 v0(mesh.positions[triangle.x]);
+    const glm::dvec3 cross =
+        glm::cross(glm::dvec3(mesh.positions[triangle.y]) - v0, glm::dvec3(mesh.positions[triangle.z]) - v0);
+    const double length = glm::length(cross);
+    return length > 0.0 && std::isfinite(length) ? glm::vec3(cross / length) : glm::vec3(0.0F, 0.0F, 1.0F);
+  }
+
+  /// One face, one normal: every triangle gets vertices of its own.
+  void make_flat(Mesh& mesh) const {
+    const std::size_t corners = mesh.triangles.size() * 3;
+    check_vertex_count(corners);
+    const auto sets = std::ranges::count_if(mesh.uvs, [](const auto& uvs) { return !uvs.empty(); });
+    const std::size_t colored = mesh.colors.empty() ? 0 : sizeof(glm::vec4);
+    data_.context().charge(
+        corners * (2 * sizeof(glm::vec3) + static_cast<std::size_t>(sets) * sizeof(glm::vec2) + colored),
+        "a mesh without normals");
+    Mesh flat;
+    flat.positions.reserve(corners);
+    flat.normals.reserve(corners);
+    if (!mesh.colors.empty()) flat.colors.reserve(corners);
+    for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
+      if (!mesh.uvs[set].empty()) flat.uvs[set].reserve(corners);
+    }
+    for (glm::uvec3& triangle : mesh.triangles) {
+      const glm::vec3 normal = flat_normal(mesh, triangle);
+      const auto first = static_cast<std::uint32_t>(flat.positions.size());
+      for (int corner = 0; corner < 3; ++corner) {
+        flat.positions.push_back(mesh.positions[triangle[corner]]);
+        flat.normals.push_back(normal);
+        if (!mesh.colors.empty()) flat.colors.push_back(mesh.colors[triangle[corner]]);
+        for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
+          if (!mesh.uvs[set].empty()) flat.uvs[set].push_back(mesh.uvs[set][triangle[corner]]);
+        }
+      }
+      triangle = {first, first + 1, first + 2};
+    }
+    flat.triangles = std::move(mesh.triangles);
+    mesh = std::move(flat);
+  }
+
+  /// Normals become unit length; those without a direction are taken from the triangles around. Normals that are unit
+  /// vectors but for rounding keep their bits.
+  void repair_normals(Mesh& mesh) const {
+    Vectors smooth;
+    bool scaled = false;
+    for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+      const glm::dvec3 normal(mesh.normals[i]);
+      const double square = glm::dot(normal, normal);
+      if (std::abs(square - 1.0) < 1e-6) continue;
+      if (square > 0.0 && std::isfinite(square)) {
+        mesh.normals[i] = glm::vec3(normal / std::sqrt(square));
+        scaled = scaled || std::abs(square - 1.0) > 0.2;
+        continue;
+      }
+      if (smooth.empty()) {
+        data_.context().warn(where_ + ".attributes.NORMAL", "some normals have no direction; computed from the faces");
+        data_.context().charge(mesh.positions.size() * sizeof(glm::vec3), "normals");
+        smooth = smooth_normals(mesh.positions, mesh.triangles);
+      }
+      mesh.normals[i] = smooth[i];
+    }
+    if (scaled) data_.context().warn(where_ + ".attributes.NORMAL", "some normals are no unit vectors; made so");
+  }
+
+  /// Tangents become unit length with a sign of 1 or -1, or zero where they have no direction. Those that are unit
+  /// vectors but for rounding keep their bits.
+  void repair_tangents(Mesh& mesh) const {
+    bool odd = false;
+    for (glm::vec4& tangent : mesh.tangents) {
+      const glm::dvec3 along(tangent);
+      const double square = glm::dot(along, along);
+      const float sign = tangent.w < 0.0F ? -1.0F : 1.0F;
+      odd = odd || !(std::abs(square - 1.0) < 0.2) || tangent.w != sign;
+      tangent.w = sign;
+      if (std::abs(square - 1.0) < 1e-6) continue;
+      const bool directed = square > 0.0 && std::isfinite(square);
+      tangent = glm::vec4(directed ? glm::vec3(along / std::sqrt(square)) : glm::vec3(0.0F), sign);
+    }
+    if (odd) {
+      data_.context().warn(where_ + ".attributes.TANGENT", "some tangents are no unit vectors with a sign; made so");
+    }
+  }
+
+  const GltfData& data_;
+  const tinygltf::Primitive& primitive_;
+  const std::string& where_;
+};
+
+}  // namespace
+
+std::vector<glm::uvec3> triangles_of(int mode, std::size_t count, std::span<const std::uint32_t> indices) {
+  const std::size_t corners = indices.empty() ? count : indices.size();
+  const auto at = [&](std::size_t i) { return indices.empty() ? static_cast<std::uint32_t>(i) : indices[i]; };
+  std::vector<glm::uvec3> triangles;
+  if (corners < 3) return triangles;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    triangles.resize(corners / 3);
+    for (std::size_t t = 0; t < triangles.size(); ++t) triangles[t] = {at(3 * t), at(3 * t + 1), at(3 * t + 2)};
+    return triangles;
+  }
+  triangles.resize(corners - 2);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    // Every other triangle of a strip is turned, so that all face the same way (glTF 2.0, section 3.7.2.1).
+    const std::size_t odd = t % 2;
+    triangles[t] = mode == TINYGLTF_MODE_TRIANGLE_STRIP ? glm::uvec3{at(t), at(t + 1 + odd), at(t + 2 - odd)}
+                                                        : glm::uvec3{at(t + 1), at(t + 2), at(0)};
+  }
+  return triangles;
+}
+
+std::optional<Mesh> build_primitive(const GltfData& data, const tinygltf::Primitive& primitive,
+                                    const std::string& where, const GltfPose& pose, std::uint32_t default_material) {
+  if (!primitive.attributes.contains("POSITION")) {
+    data.context().warn(where, "has no positions and is left out");
+    return std::nullopt;
+  }
+  if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+    data.context().warn(where, "points and lines are not drawn");
+    return std::nullopt;
+  }
+  Mesh mesh = PrimitiveBuilder(data, primitive, where).build(pose);
+  mesh.material = primitive.material >= 0 ? static_cast<std::uint32_t>(primitive.material) : default_material;
+  return mesh;
+}
+
+}  // namespace hpr

@@ -1,0 +1,232 @@
+#include "tools/bench/bench_frame.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstring>
+#include <map>
+
+#include "app/options/words.h"
+#include "cluster/transport/local_communicator.h"
+#include "core/check.h"
+#include "engine/frame_sampler.h"
+#include "engine/output.h"
+#include "engine/resolution.h"
+#include "engine/screens.h"
+#include "tools/bench/bench_bare_gl.h"
+#include "tools/bench/bench_rays.h"
+#include "tools/bench/bench_times.h"
+
+namespace hpr {
+namespace {
+
+constexpr Size kRayPicture{512, 512};
+/// The bare loop has them all in one buffer, instances written out.
+constexpr std::uint32_t kMostBareTriangles = 30'000'000;
+
+/// What one frame took.
+struct Measured {
+  FrameTimes times;
+  double screen_ms = 0.0;
+  double frame_ms = 0.0;
+};
+
+/// The median of what `of` takes out of each frame.
+template <typename Of>
+double middle(const std::vector<Measured>& frames, const Of& of) {
+  std::vector<double> values;
+  values.reserve(frames.size());
+  for (const Measured& frame : frames) values.push_back(of(frame));
+  return median(std::move(values));
+}
+
+/// All visible triangles in world space, as one mesh.
+struct WorldMesh {
+  std::vector<glm::vec3> positions;
+  std::vector<glm::uvec3> triangles;
+
+  explicit WorldMesh(const Scene& scene) {
+    for (const Instance& instance : scene.instances) {
+      const Mesh& mesh = scene.mesh_of(instance);
+      const auto first = static_cast<std::uint32_t>(positions.size());
+      for (const glm::vec3& position : mesh.positions) {
+        positions.emplace_back(instance.to_world * glm::dvec4(position, 1.0));
+      }
+      for (const glm::uvec3& triangle : mesh.triangles) triangles.push_back(triangle + first);
+    }
+  }
+};
+
+double bare_gl_ms(const Globals& globals, int threads, const WorldMesh& mesh, const View& view, int frames) {
+  const auto context =
+      make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
+  BareGl bare(*context, mesh.positions, mesh.triangles, glm::mat4(clip_from_world(view, {0.0, 0.0, 0.0})), view.size());
+  std::vector<double> times;
+  for (int frame = -2; frame < frames; ++frame) {  // two to warm up: shaders are compiled at the first draw
+    const Stopwatch watch;
+    bare.frame();
+    if (frame >= 0) times.push_back(watch.ms());
+  }
+  check_gl(context->gl(), "measuring");
+  return median(std::move(times));
+}
+
+double copy_ms(std::size_t bytes) {
+  const std::vector<std::byte> from(bytes, std::byte{1});
+  std::vector<std::byte> into(bytes);
+  std::vector<double> times;
+  for (int i = 0; i < 9; ++i) {
+    const Stopwatch watch;
+    std::memcpy(into.data(), from.data(), bytes);
+    times.push_back(watch.ms());
+  }
+  return median(std::move(times));
+}
+
+/// The rays of a pass, and which of bench_rays they are like.
+struct PassRays {
+  std::uint64_t count = 0;
+  std::string_view like;
+};
+
+PassRays rays_of(std::string_view pass, const RayCounts& counts) {
+  if (pass == "shadow") return {counts.shadow, "shadow"};
+  if (pass == "reflection") return {counts.reflection, "mirror"};
+  if (pass == "refraction") return {counts.refraction, "mirror"};
+  if (pass == "ambient-occlusion") return {counts.ambient_occlusion, "diffuse"};
+  if (pass == "photon") return {counts.photon, "diffuse"};
+  if (pass == "gather") return {counts.gather, "diffuse"};
+  return {};
+}
+
+BenchRow row_of(std::string name, double ours, double floor) {
+  return {std::move(name), ours, floor, "ms", ours > 0.0 ? floor / ours : 0.0};
+}
+
+double ms_of(const FrameTimes& times, std::string_view pass) {
+  const auto found = std::ranges::find(times.passes, pass, &PassTime::name);
+  return found == times.passes.end() ? 0.0 : found->ms;
+}
+
+/// A frame, drawn again and again, and the floors of its steps.
+class Bench {
+ public:
+  Bench(Session& session, const Globals& globals, const RenderOptions& options, Size size)
+      : session_(session), sampling_(options.sampling()), exposure_(options.exposure) {
+    const FrameSettings settings = options.settings(globals.seed);
+    const Scene& scene = session.scene();
+    camera_ = options.choose_camera(scene);
+    view_ = make_view(camera_, size, scene.bounds);
+    blocks_ = cut_blocks(at_resolution(std::span(&view_, 1), settings.resolution_scale));
+    HPR_CHECK(blocks_.views.size() == 1);
+    plan_ = plan_frame(session, settings, blocks_.views);
+    prepare(session, plan_);
+  }
+
+  void draw(int frames) {
+    Progress silent("none", "sample", 0);
+    for (int frame = -1; frame < frames; ++frame) {
+      session_.lighter(plan_.rays).forget_photons();  // of the same sample, in the frame before
+      const Stopwatch watch;
+      FrameSampler sampler(session_, plan_, sampling_, 0, false);
+      (void)sampler.draw(blocks_.views, {}, silent);  // it stops before its goal for a checkpoint only
+      const double drawn = watch.ms();
+      (void)bring_to_screens(session_, sampler.frame(), blocks_, {{view_.screen}, {0}, exposure_});
+      if (frame >= 0) frames_.push_back({sampler.times(), watch.ms() - drawn, watch.ms()});
+    }
+  }
+
+  /// `bare_keys_ms`: of BareGl, where keys are not made by rays; 0: it was not measured.
+  [[nodiscard]] std::vector<BenchRow> rows(double bare_keys_ms) {
+    const auto rates = embree_rates();
+    const double samples = frames_.front().times.samples;
+    std::vector<BenchRow> rows{
+        keys_row(by_rays() ? static_cast<double>(drawn_view().size().area()) / rates.at("primary") : bare_keys_ms)};
+    for (const PassTime& pass : frames_.front().times.passes) rows.push_back(pass_row(pass.name, rates));
+    rows.push_back(row_of("to the screen", middle(frames_, [](const Measured& frame) { return frame.screen_ms; }),
+                          copy_ms(view_.screen.area() * sizeof(Rgba8))));
+    double floor = 0.0;
+    for (const BenchRow& row : rows) floor += row.floor;
+    rows.push_back(row_of(fmt::format("the frame, {}x{}, {:g} sample{}", view_.screen.width, view_.screen.height,
+                                      samples, samples == 1.0 ? "" : "s"),
+                          middle(frames_, [](const Measured& frame) { return frame.frame_ms; }), floor));
+    return rows;
+  }
+
+  [[nodiscard]] const View& drawn_view() const { return blocks_.views.front(); }
+  [[nodiscard]] bool by_rays() const { return plan_.primary == Primary::Rays; }
+
+ private:
+  using Rates = std::map<std::string, double, std::less<>>;
+
+  /// Rays of bare Embree per ms of all threads, by their kind.
+  [[nodiscard]] Rates embree_rates() {
+    Rates rates;
+    const Scene& scene = session_.scene();
+    const View rays = make_view(camera_, kRayPicture, scene.bounds);
+    for (const BenchRow& row : bench_rays(scene, session_.ray_scene(plan_.rays.build), rays)) {
+      rates[row.name] = row.floor * 1e3 * session_.threads();
+    }
+    return rates;
+  }
+
+  [[nodiscard]] BenchRow keys_row(double floor_ms_of_sample) const {
+    return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles, by_rays() ? " by rays" : ""),
+                  middle(frames_, [](const Measured& frame) { return frame.times.primary_ms; }),
+                  floor_ms_of_sample * frames_.front().times.samples);
+  }
+
+  [[nodiscard]] BenchRow pass_row(const std::string& pass, const Rates& rates) const {
+    const double ours =
+        middle(frames_, [&](const Measured& frame) { return ms_of(frame.times, pass) / session_.threads(); });
+    const PassRays traced = rays_of(pass, frames_.front().times.rays);
+    const auto rate = rates.find(traced.like);
+    if (traced.count == 0 || rate == rates.end()) return row_of(pass, ours, 0.0);
+    const auto count = static_cast<double>(traced.count);
+    return row_of(fmt::format("{}: {:.3g} M rays", pass, count / 1e6), ours, count / rate->second);
+  }
+
+  Session& session_;
+  Sampling sampling_;
+  double exposure_;
+  Camera camera_;
+  View view_;
+  Blocks blocks_;
+  FramePlan plan_;
+  std::vector<Measured> frames_;
+};
+
+}  // namespace
+
+void FrameBench::declare(CLI::App& app) {
+  app.add_option("scene", scene_, "what is drawn")->capture_default_str()->type_name("SCENE");
+  app.add_option("--size", size_, "pixels of the frame")->capture_default_str()->type_name("WxH");
+  app.add_option("--reps", frames_, "measured frames")->check(CLI::Range(1, 10'000))->capture_default_str();
+  options_.declare_frame(app);
+}
+
+std::vector<BenchRow> FrameBench::run(const Globals& globals) const {
+  const Size size = parse_size(size_, "--size", kRasterLimit);
+  check_size(size, globals.picture_limits());
+  (void)options_.settings(globals.seed);
+  if (!options_.sampling().goal.samples) {
+    throw Error(ExitCode::Usage, "bench frame draws the same frame again and again: --spp takes a number here",
+                "write e.g. --spp 16");
+  }
+  if (globals.ranks > 1) {
+    throw Error(ExitCode::Usage, "bench frame draws on one rank", "leave --ranks out, or see hpr bench scale");
+  }
+  std::vector<BenchRow> rows;
+  run_local_ranks(1, [&](Communicator& comm) {
+    Session session(comm, globals.session(), [&] { return options_.load(scene_, globals); });
+    Bench bench(session, globals, options_, size);
+    bench.draw(frames_);
+    const bool draws = !bench.by_rays() && session.scene().triangles <= kMostBareTriangles;
+    rows = bench.rows(
+        draws ? bare_gl_ms(globals, session.threads(), WorldMesh(session.scene()), bench.drawn_view(), frames_) : 0.0);
+  });
+  return rows;
+}
+
+}  // namespace hpr

@@ -1,0 +1,235 @@
+#include "tools/bench/bench_rays.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <span>
+
+#include "core/error.h"
+#include "image/tiles.h"
+#include "rt/trace/denormals.h"
+#include "rt/trace/embree_compat.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/surfaces.h"
+#include "scene/view.h"
+#include "tools/bench/bench_times.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kTries = 5;
+constexpr std::size_t kWidth = 16;
+constexpr std::size_t kBatch = kTilePixels;  // rays a pass traces at once
+constexpr std::size_t kStretch = 4 * kBatch;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// In ray space.
+struct BenchRay {
+  glm::dvec3 origin{0.0};
+  glm::dvec3 direction{0.0};
+  double reach = kInfinity;
+};
+
+enum class Question { Closest, Occluded };
+
+struct RaySet {
+  std::string name;
+  Question question;
+  embree::Rays kind;
+  std::vector<BenchRay> rays;
+};
+
+/// Answers of either side, summed so that no work can be left out.
+using Answers = std::uint64_t;
+
+class OurRays {
+ public:
+  OurRays(const RayScene& scene, const RaySet& set) : scene_(scene), set_(set), hits_(kBatch), blocked_(kBatch) {}
+
+  Answers trace(std::size_t begin, std::size_t end) {
+    Answers sum = 0;
+    for (std::size_t first = begin; first < end; first += kBatch) {
+      batch_.clear();
+      const std::size_t count = std::min(kBatch, end - first);
+      for (const BenchRay& ray : std::span(set_.rays).subspan(first, count)) {
+        batch_.push(ray.origin, ray.direction, ray.reach);
+      }
+      if (set_.question == Question::Closest) {
+        const std::span<std::uint32_t> hits(hits_.data(), count);
+        (void)scene_.closest(batch_, hits, set_.kind == embree::Rays::Coherent ? Coherence::High : Coherence::Low);
+        for (const std::uint32_t hit : hits) sum += hit != kNoSurface ? 1U : 0U;
+      } else {
+        const std::span<std::uint8_t> blocked(blocked_.data(), count);
+        (void)scene_.occluded(batch_, blocked);
+        for (const std::uint8_t hidden : blocked) sum += hidden;
+      }
+    }
+    return sum;
+  }
+
+ private:
+  const RayScene& scene_;
+  const RaySet& set_;
+  RayBatch batch_;
+  std::vector<std::uint32_t> hits_;
+  std::vector<std::uint8_t> blocked_;
+};
+
+/// The floor: Embree alone.
+class BareRays {
+ public:
+  BareRays(const RayScene& scene, const RaySet& set)
+      : scene_(scene), set_(set), packets_((set.rays.size() + kWidth - 1) / kWidth), valid_(packets_.size()) {
+    for (std::size_t i = 0; i < packets_.size() * kWidth; ++i) {
+      const bool used = i < set.rays.size();
+      const BenchRay& ray = set.rays[used ? i : set.rays.size() - 1];
+      const std::size_t lane = i % kWidth;
+      RTCRay16& to = packets_[i / kWidth];
+      to.org_x[lane] = static_cast<float>(ray.origin.x);
+      to.org_y[lane] = static_cast<float>(ray.origin.y);
+      to.org_z[lane] = static_cast<float>(ray.origin.z);
+      to.dir_x[lane] = static_cast<float>(ray.direction.x);
+      to.dir_y[lane] = static_cast<float>(ray.direction.y);
+      to.dir_z[lane] = static_cast<float>(ray.direction.z);
+      to.tnear[lane] = 0.0F;
+      to.tfar[lane] = used ? static_cast<float>(ray.reach) : -1.0F;
+      to.time[lane] = 0.0F;
+      to.mask[lane] = 0xFFFFFFFFU;
+      to.id[lane] = 0;
+      to.flags[lane] = 0;
+      valid_[i / kWidth].lanes[lane] = used ? -1 : 0;
+    }
+  }
+
+  Answers trace(std::size_t begin, std::size_t end) {
+    embree::Context context;
+    embree::start(context, set_.kind);
+    Answers sum = 0;
+    for (std::size_t i = begin / kWidth; i * kWidth < end; ++i) {
+      const int* const valid = valid_[i].lanes.data();
+      if (set_.question == Question::Closest) {
+        RTCRayHit16 packet;
+        packet.ray = packets_[i];
+        std::ranges::fill(packet.hit.geomID, RTC_INVALID_GEOMETRY_ID);
+        std::ranges::fill(packet.hit.instID[0], RTC_INVALID_GEOMETRY_ID);
+        embree::intersect(valid, scene_.embree(), context, nullptr, packet);
+        for (const unsigned int id : packet.hit.geomID) sum += id != RTC_INVALID_GEOMETRY_ID ? 1U : 0U;
+      } else {
+        RTCRay16 packet = packets_[i];
+        embree::occluded(valid, scene_.embree(), context, packet);
+        for (std::size_t lane = 0; lane < kWidth; ++lane) {
+          sum += valid[lane] != 0 && packet.tfar[lane] < 0.0F ? 1U : 0U;
+        }
+      }
+    }
+    return sum;
+  }
+
+ private:
+  struct alignas(64) Lanes {
+    std::array<int, kWidth> lanes;
+  };
+  const RayScene& scene_;
+  const RaySet& set_;
+  std::vector<RTCRay16> packets_;
+  std::vector<Lanes> valid_;
+};
+
+/// Both sides in turn, a stretch of the rays at a time; each side's best on every stretch counts.
+BenchRow compare(const RayScene& scene, const RaySet& set) {
+  OurRays ours(scene, set);
+  BareRays bare(scene, set);
+  double our_ms = 0.0;
+  double floor_ms = 0.0;
+  for (std::size_t begin = 0; begin < set.rays.size(); begin += kStretch) {
+    const std::size_t end = std::min(begin + kStretch, set.rays.size());
+    double our_best = kInfinity;
+    double floor_best = kInfinity;
+    for (int i = 0; i < kTries; ++i) {
+      const double start = thread_ms();
+      const Answers answers = ours.trace(begin, end);
+      const double middle = thread_ms();
+      const Answers expected = bare.trace(begin, end);
+      our_best = std::min(our_best, middle - start);
+      floor_best = std::min(floor_best, thread_ms() - middle);
+      if (answers != expected) {
+        throw Error(ExitCode::CheckFailed,
+                    fmt::format("{} rays: {} met something, but {} in Embree alone", set.name, answers, expected));
+      }
+    }
+    our_ms += our_best;
+    floor_ms += floor_best;
+  }
+  const double rate = static_cast<double>(set.rays.size()) * 1e-3;  // a thousand per ms is a million per second
+  return {set.name, rate / our_ms, rate / floor_ms, "M/s", floor_ms / our_ms};
+}
+
+/// What primary rays meet, and the rays that go on from there, in the order of the primary ones.
+std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const View& view) {
+  const RaySpace& space = rays.space();
+  std::vector<RaySet> sets{{"primary", Question::Closest, embree::Rays::Coherent, {}},
+                           {"shadow", Question::Occluded, embree::Rays::Incoherent, {}},
+                           {"mirror", Question::Closest, embree::Rays::Incoherent, {}},
+                           {"diffuse", Question::Closest, embree::Rays::Incoherent, {}}};
+  RayBatch batch;
+  std::vector<Ray> seen;
+  const Size size = view.size();
+  for (int i = 0; i < size.width * size.height; ++i) {
+    // Squares of four by four, square after square in a row of them.
+    const int x = i / 16 % (size.width / 4) * 4 + i % 4;
+    const int y = i / (size.width * 4) * 4 + i / 4 % 4;
+    const Ray ray = view_ray(view, x + 0.5, y + 0.5);
+    seen.push_back(ray);
+    sets[0].rays.push_back({space.from_world(ray.origin), glm::normalize(ray.direction), kInfinity});
+    batch.push(sets[0].rays.back().origin, sets[0].rays.back().direction, kInfinity);
+  }
+  std::vector<std::uint32_t> hits(batch.size());
+  (void)rays.closest(batch, hits);
+
+  const Surfaces surfaces(scene, space);
+  const glm::dvec3 light = scene.lights.empty() ? view.eye + view.axes[1] : scene.lights.front().position;
+  WorldTriangle triangle;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (hits[i] == kNoSurface) continue;
+    surfaces.load(hits[i], triangle);
+    const SurfacePoint point = surfaces.meet(triangle, seen[i].origin, seen[i].direction);
+    const glm::dvec3& normal = point.geometric_normal;
+    const glm::dvec3 origin = space.from_world(point.position + point.offset * normal);
+    const glm::dvec3 to_light = space.from_world(light) - origin;
+    const double distance = glm::length(to_light);
+    if (glm::dot(to_light, normal) > 0.0) sets[1].rays.push_back({origin, to_light / distance, 0.999 * distance});
+    sets[2].rays.push_back({origin, glm::reflect(-point.to_viewer, normal), kInfinity});
+    // A point on the unit sphere about the normal's tip: distributed as the cosine.
+    const double turn = 2.0 * std::numbers::pi * std::fmod(0.6180339887498949 * static_cast<double>(i), 1.0);
+    const double z = 1.0 - 2.0 * std::fmod(0.7548776662466927 * static_cast<double>(i), 1.0);
+    const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
+    const glm::dvec3 diffuse = normal * 1.0000001 + glm::dvec3(r * std::cos(turn), r * std::sin(turn), z);
+    sets[3].rays.push_back({origin, glm::normalize(diffuse), kInfinity});
+  }
+  return sets;
+}
+
+}  // namespace
+
+std::vector<BenchRow> bench_rays(const Scene& scene, int side, const RayBuild& build) {
+  const RayScene rays(scene, RaySpace(scene.bounds), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
+  const Camera camera = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
+  return bench_rays(scene, rays, make_view(camera, {side, side}, scene.bounds));
+}
+
+std::vector<BenchRow> bench_rays(const Scene& scene, const RayScene& rays, const View& view) {
+  const DenormalsAsZero mode;
+  std::vector<BenchRow> rows;
+  for (const RaySet& set : make_sets(scene, rays, view)) {
+    if (!set.rays.empty()) rows.push_back(compare(rays, set));
+  }
+  return rows;
+}
+
+}  // namespace hpr

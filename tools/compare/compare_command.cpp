@@ -1,0 +1,231 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+
+#include "app/command.h"
+#include "app/launch/launcher.h"
+#include "app/launch/run_ranks.h"
+#include "app/launch/shell_line.h"
+#include "app/options/words.h"
+#include "app/trace_file.h"
+#include "cluster/transport/agreement.h"
+#include "compositing/model/synthetic.h"
+#include "compositing/plugin.h"
+#include "core/file.h"
+#include "core/job_environment.h"
+#include "core/units.h"
+#include "engine/output.h"
+#include "image/image_io.h"
+#include "scene/view.h"
+#include "tools/compare/compare.h"
+#include "tools/compare/compare_html.h"
+#include "tools/compare/compare_options.h"
+#include "tools/compare/compare_report.h"
+#include "tools/compare/compare_scene.h"
+#include "tools/compare/compare_threads.h"
+
+namespace hpr {
+namespace {
+
+/// Set for the MPI jobs `hpr compare` starts: rank 0 prints its runs as JSON for the process that started the job. Open
+/// MPI takes variables of this prefix to other hosts.
+constexpr const char* kHandOverVariable = "OMPI_HPR_COMPARE_HAND_OVER";
+
+bool hands_over() {
+  return std::getenv(kHandOverVariable) != nullptr;  // NOLINT(concurrency-mt-unsafe): nothing sets variables
+}
+
+class CompareCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "compare"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "measure compositing strategies against each other on the same layers, and check that they agree";
+  }
+
+  void declare(CLI::App& app) override { options_.declare(app); }
+
+  ExitCode run(const Globals& globals) override {
+    if (!options_.plugin.empty()) load_compositor_plugin(options_.plugin);
+    const CompareInput input = make_input(globals);
+    options_.settle();
+    // The process that started this job has looked already.
+    if (!hands_over()) options_.check_files(globals);
+    return inside_mpi_job() ? run_in_job(globals, input) : run_here(globals, input);
+  }
+
+ private:
+  [[nodiscard]] CompareInput make_input(const Globals& globals) const {
+    const Size screen = parse_size(options_.size, "--size", kRasterLimit);
+    const Size grid = parse_size(options_.tiles, "--tiles", kMostScreensASide);
+    check_size(screen, globals.picture_limits());
+    check_size({screen.width * grid.width, screen.height * grid.height}, globals.picture_limits());
+    if (options_.scene.empty() == options_.synthetic.empty()) {
+      throw Error(ExitCode::Usage,
+                  options_.scene.empty() ? "nothing to composite" : "a scene and --synthetic exclude each other",
+                  "name a scene, or --synthetic dense|half|sparse|scatter|checker");
+    }
+    if (!options_.scene.empty()) return scene_layers(options_.scene, screen, grid, options_.local_shading(), globals);
+    if (globals.seed > std::numeric_limits<std::uint32_t>::max()) {
+      throw Error(ExitCode::Usage, fmt::format("--seed: synthetic layers take 32 bits, {} has more", globals.seed),
+                  fmt::format("take one from 0 to {}", std::numeric_limits<std::uint32_t>::max()));
+    }
+    const SyntheticKind kind = parse_synthetic_kind(options_.synthetic);
+    const auto seed = static_cast<std::uint32_t>(globals.seed);
+    return {options_.synthetic, screen, grid, true,
+            [=](Communicator& comm) { return synthetic_wall(kind, comm.rank(), screen, grid, seed); }};
+  }
+
+  /// Inside an MPI job: its ranks are the one number of ranks compared.
+  [[nodiscard]] ExitCode run_in_job(const Globals& globals, const CompareInput& input) const {
+    Globals job = globals;
+    job.ranks = 0;
+    return run_ranks(job, [&](Communicator& comm) {
+      const std::vector<int> wanted = options_.rank_counts();
+      if (!wanted.empty() && wanted != std::vector<int>{comm.size()}) {
+        throw Error(ExitCode::Usage,
+                    fmt::format("--ranks {} inside an MPI job of {} ranks", options_.ranks, comm.size()),
+                    "leave --ranks away, or mpirun");
+      }
+      CompareResult result = compare_strategies(comm, input, options_.settings_for(comm.size()));
+      const auto verdict = on_root(comm, [&] {
+        if (!hands_over()) {
+          return std::vector{static_cast<std::byte>(finish(globals, input, std::move(result)))};
+        }
+        write_frame(result, input);
+        std::fputs(runs_to_json(result.runs).c_str(), stdout);
+        return std::vector{static_cast<std::byte>(verdict_on(result.runs))};
+      });
+      return static_cast<ExitCode>(verdict.at(0));
+    });
+  }
+
+  /// One process: ranks are threads, or MPI jobs of this program that hand over their runs.
+  [[nodiscard]] ExitCode run_here(const Globals& globals, const CompareInput& input) const {
+    if (options_.on_threads()) return traced_alone(globals, [&] { return measure_here(globals, input); });
+    return measure_here(globals, input);
+  }
+
+  [[nodiscard]] ExitCode measure_here(const Globals& globals, const CompareInput& input) const {
+    CompareResult result;
+    const std::vector<int> counts = options_.rank_counts();
+    for (const int ranks : counts) check_memory(globals, input, ranks);  // all before any is measured
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const int ranks = counts[i];
+      std::vector<CompareRun> runs;
+      if (options_.on_threads()) {
+        CompareResult here =
+            compare_on_threads(ranks, options_.simulate, globals.hang_limit(), input, options_.settings_for(ranks));
+        runs = std::move(here.runs);
+        result.frame = std::move(here.frame);
+        result.picture = std::move(here.picture);
+      } else {
+        std::string output;
+        const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()),
+                                     {.captured_stdout = &output,
+                                      .environment = {{kHandOverVariable, "1"}},
+                                      .hang_limit = globals.hang_limit()});
+        // Its ranks have said on stderr what went wrong.
+        if (code != static_cast<int>(ExitCode::Done) && code != static_cast<int>(ExitCode::CheckFailed)) {
+          return static_cast<ExitCode>(code);
+        }
+        runs = runs_from_json(output);
+      }
+      result.runs.insert(result.runs.end(), runs.begin(), runs.end());
+    }
+    return finish(globals, input, std::move(result));
+  }
+
+  /// Refuses what this host cannot hold, before ranks start to share it.
+  void check_memory(const Globals& globals, const CompareInput& input, int ranks) const {
+    const auto pages = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES));
+    const std::uint64_t physical = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    const std::uint64_t limit = parse_bytes(globals.limit_mem).value_or(physical);
+    // Every rank keeps its layer and two to work on; rank 0 also the expected frame, one that arrives and the image.
+    const std::uint64_t pixel =
+        options_.operation() == CompareOperator::OverFloat ? sizeof(RgbaPremultiplied) : sizeof(Key);
+    const std::uint64_t layer = grid_layout(input.screen, input.grid).tiles() * kTilePixels * pixel;
+    const std::uint64_t needed = layer * (3 * static_cast<std::uint64_t>(ranks) + 3);
+    if (needed <= limit) return;
+    throw Error(ExitCode::Limit,
+                fmt::format("{} ranks need about {} of memory, {} may be used", ranks, format_bytes(needed),
+                            format_bytes(limit)),
+                "take fewer ranks, fewer screens or smaller ones");
+  }
+
+  /// What a job needs to run `ranks` of the rank counts; `last`: it also writes the frame.
+  [[nodiscard]] std::vector<std::string> job_arguments(const Globals& globals, int ranks, bool last) const {
+    std::vector<std::string> arguments = options_.words(globals);
+    const auto add = [&](const std::string& option, const std::string& value) {
+      arguments.push_back(option);
+      arguments.push_back(value);
+    };
+    add("--ranks", std::to_string(ranks));
+    if (last && !options_.picture.empty()) add("-o", options_.picture);
+    if (last && !options_.raw.empty()) add("--raw", options_.raw);
+    if (last && !globals.trace.empty()) add("--trace", globals.trace);
+    if (!globals.limit_mem.empty()) add("--limit-mem", globals.limit_mem);
+    if (!globals.limit_image.empty()) add("--limit-image", globals.limit_image);
+    if (!globals.hang_timeout.empty()) add("--hang-timeout", globals.hang_timeout);
+    if (globals.force) arguments.emplace_back("--force");
+    for (int i = 0; i < globals.verbosity; ++i) arguments.emplace_back("-v");
+    if (globals.verbosity < 0) arguments.emplace_back("-q");
+    return arguments;
+  }
+
+  [[nodiscard]] static ExitCode verdict_on(const std::vector<CompareRun>& runs) {
+    const bool differ = std::ranges::any_of(runs, [](const CompareRun& run) { return run.differing_pixels > 0; });
+    return differ ? ExitCode::CheckFailed : ExitCode::Done;
+  }
+
+  /// Writes the files that were asked for; the result is without frames where a job has written them.
+  void write_frame(const CompareResult& result, const CompareInput& input) const {
+    if (!result.picture.pixels().empty() && !options_.picture.empty()) write_png(options_.picture, result.picture);
+    if (result.frame.pixels().empty()) return;
+    if (!options_.picture.empty()) write_png(options_.picture, frame_colors(result.frame, input.colors));
+    if (!options_.raw.empty()) write_file_atomically(options_.raw, std::as_bytes(result.frame.pixels()));
+  }
+
+  [[nodiscard]] ExitCode finish(const Globals& globals, const CompareInput& input, CompareResult result) const {
+    CompareReport report;
+    report.machine = this_machine();
+    report.screen = input.screen;
+    report.grid = input.grid;
+    report.input = input.name;
+    report.operation = options_.operator_name;
+    report.seed = globals.seed;
+    std::vector<int> counts;
+    for (const CompareRun& run : result.runs) {
+      if (counts.empty() || counts.back() != run.ranks) counts.push_back(run.ranks);
+    }
+    std::vector<std::string> words = options_.words(globals);
+    if (options_.simulate.empty()) {
+      words.insert(words.end(), {"--ranks", fmt::format("{}", fmt::join(counts, ","))});
+    }
+    report.command = "hpr " + shell_line(words);
+    report.runs = std::move(result.runs);
+    write_frame(result, input);
+    if (!options_.csv.empty()) write_file_atomically(options_.csv, compare_csv(report));
+    if (!options_.html.empty())
+      write_file_atomically(options_.html, compare_html(report, draw_strategies(report.runs)));
+    std::fputs((options_.json ? compare_json(report) : compare_table(report)).c_str(), stdout);
+    return verdict_on(report.runs);
+  }
+
+  CompareOptions options_;
+};
+
+}  // namespace
+
+/// `hpr compare SCENE|--synthetic KIND`.
+std::unique_ptr<Command> make_compare_command() {
+  return std::make_unique<CompareCommand>();
+}
+
+}  // namespace hpr

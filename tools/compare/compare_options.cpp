@@ -1,0 +1,240 @@
+#include "tools/compare/compare_options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+
+#include "app/options/words.h"
+#include "app/output_files.h"
+#include "compositing/blender.h"
+#include "compositing/compositor.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/job_environment.h"
+#include "core/names.h"
+#include "core/units.h"
+#include "engine/output.h"
+#include "tools/compare/simulate_option.h"
+
+namespace hpr {
+namespace {
+
+template <typename Strategies>
+std::vector<std::string> names_of(const Strategies& strategies) {
+  std::vector<std::string> names;
+  names.reserve(strategies.size());
+  for (const auto& strategy : strategies) names.emplace_back(strategy->name());
+  return names;
+}
+
+}  // namespace
+
+std::vector<std::string> split_strategies(std::string_view list) {
+  std::vector<std::string> names;
+  for (const std::string& item : split_commas(list)) {
+    const bool is_number = !item.empty() && item.find_first_not_of("0123456789") == std::string::npos;
+    if (is_number && !names.empty()) {
+      names.back() += "," + item;
+    } else {
+      names.push_back(item);
+    }
+  }
+  return names;
+}
+
+void CompareOptions::declare(CLI::App& app) {
+  app.add_option("scene", scene, "a scene to draw the layers from")->type_name("SCENE");
+  app.add_option("--shading", shading,
+                 "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--synthetic", synthetic, "made-up layers: dense, half, sparse, scatter or checker")
+      ->type_name("KIND");
+  app.add_option("--size", size, "pixels of one screen")->type_name("WxH")->capture_default_str();
+  app.add_option("--tiles", tiles, "screens of the wall")->type_name("CxR")->capture_default_str();
+  app.add_option("--ranks", ranks, "numbers of ranks to run on (2,4; inside an MPI job: that job's)")
+      ->type_name("LIST");
+  app.add_option(
+         "--operator", operator_name,
+         "nearest: the nearest surface; over8, overf: translucent layers, ranks from front to back, in 8 bits or "
+         "floats a channel")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--strategies", strategies, "all, or names of strategies")->type_name("LIST")->capture_default_str();
+  app.add_option("--plugin", plugin, "a shared object with one more strategy (docs/compositing.md)")
+      ->type_name("FILE.so");
+  frames_option_ = app.add_option("--frames", frames, "measured frames");
+  frames_option_->type_name("N")->check(CLI::Range(1, 1'000'000))->capture_default_str();
+  app.add_option("--warmup", warmup, "frames before the measured ones")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--simulate", simulate,
+                 "run on threads and reckon what a cluster would take: hosts=64,ranks=512,latency=2us,"
+                 "bandwidth=12.5GB/s[,cores=,overhead=,local-latency=,local-bandwidth=,merge=]")
+      ->type_name("CLUSTER");
+  app.add_option("--transport", transport, "mpi, or threads of one process")->type_name("NAME")->capture_default_str();
+  app.add_option("--csv", csv, "write one line per run to this file")->type_name("FILE");
+  app.add_option("--html", html, "write the result as one page with plots and drawings")->type_name("FILE");
+  app.add_flag("--json", json, "print the result as JSON (schema hpr.compare/1) instead of a table");
+  app.add_option("-o,--output", picture, "write the composited frame of the last number of ranks")
+      ->type_name("FILE.png");
+  app.add_option("--raw", raw, "write that frame's keys: per pixel uint64, row 0 at the top")->type_name("FILE");
+}
+
+void CompareOptions::settle() {
+  if (!simulate.empty() && frames_option_->count() == 0) frames = warmup = 1;  // simulated frames are all alike
+  check_transport();
+  check_operator();
+  check_shading();
+  for (const int count : rank_counts()) (void)strategies_for(count);
+  if (inside_mpi_job() && transport != "mpi") {
+    throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
+                "leave mpirun away, or --transport");
+  }
+}
+
+void CompareOptions::check_files(const Globals& globals) const {
+  if (!picture.empty() && !picture.ends_with(".png")) {
+    throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture)), "name a .png file");
+  }
+  const std::vector<std::string> results{csv, html, picture, raw};
+  check_distinct(results, globals.trace);
+  check_spared(scene, globals.scene_limits(), {}, results);
+  for (const std::string& path : results) {
+    if (!path.empty()) check_writable(path, globals.force);
+  }
+}
+
+void CompareOptions::check_transport() const {
+  const std::vector<std::string> transports{"mpi", "threads"};
+  if (std::ranges::find(transports, transport) == transports.end()) {
+    throw Error(ExitCode::Usage, fmt::format("no transport is named '{}'", printable(transport)),
+                unknown_name_hint(printable(transport), transports));
+  }
+  if (!simulate.empty() && (!ranks.empty() || transport != "mpi" || inside_mpi_job())) {
+    throw Error(ExitCode::Usage, "--simulate excludes --ranks, --transport and mpirun",
+                "the number of ranks is said by --simulate ranks=N; it runs on threads of one process");
+  }
+}
+
+CompareOperator CompareOptions::operation() const {
+  if (operator_name == "nearest") return CompareOperator::Nearest;
+  return operator_name == "over8" ? CompareOperator::Over8 : CompareOperator::OverFloat;
+}
+
+void CompareOptions::check_operator() const {
+  const std::vector<std::string> operators{"nearest", "over8", "overf"};
+  if (std::ranges::find(operators, operator_name) == operators.end()) {
+    throw Error(ExitCode::Usage, fmt::format("no operator is named '{}'", printable(operator_name)),
+                unknown_name_hint(printable(operator_name), operators));
+  }
+  if (operation() != CompareOperator::Nearest && !raw.empty()) {
+    throw Error(ExitCode::Usage, "--raw writes keys, and translucent layers have none", "take -o FILE.png");
+  }
+}
+
+void CompareOptions::check_shading() const {
+  const std::vector<std::string> shadings{"deferred", "local"};
+  if (std::ranges::find(shadings, shading) == shadings.end()) {
+    throw Error(ExitCode::Usage, fmt::format("unknown shading '{}'", printable(shading)),
+                unknown_name_hint(printable(shading), shadings));
+  }
+  if (local_shading() && scene.empty()) {
+    throw Error(ExitCode::Usage, "--shading local lights a scene, and there is none",
+                "leave it out: synthetic layers are colours already");
+  }
+}
+
+std::vector<int> CompareOptions::rank_counts() const {
+  if (!simulate.empty()) return {parse_simulation(simulate).ranks};
+  if (!ranks.empty()) return parse_counts(ranks, "--ranks");
+  return inside_mpi_job() ? std::vector<int>{} : std::vector<int>{2, 4};
+}
+
+std::vector<std::string> CompareOptions::all_strategies_for(int count) const {
+  std::vector<std::string> names;
+  const auto add_fitting = [&](const auto& candidates) {
+    for (const auto& strategy : candidates) {
+      if (strategy->fits(count)) names.emplace_back(strategy->name());
+    }
+  };
+  if (operation() == CompareOperator::Nearest) {
+    add_fitting(all_compositors());
+    if (!scene.empty()) names.emplace_back(kSortFirst);
+  } else {
+    add_fitting(all_blenders<RgbaPremultiplied>());
+  }
+  return names;
+}
+
+std::vector<std::string> CompareOptions::strategies_for(int count) const {
+  if (strategies == "all") return all_strategies_for(count);
+  std::vector<std::string> names;
+  for (const std::string& name : split_strategies(strategies)) {
+    check_strategy(name);
+    if (name != kSortFirst && !fits(name, count)) {
+      throw Error(ExitCode::Usage, fmt::format("strategy {} cannot run on {} ranks", name, count),
+                  "leave it out, or choose another number with --ranks");
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+void CompareOptions::check_strategy(const std::string& name) const {
+  if (name == "all") {
+    throw Error(ExitCode::Usage, fmt::format("--strategies {}: 'all' stands alone", printable(strategies)),
+                "write --strategies all, or leave it out of the list");
+  }
+  const bool nearest = operation() == CompareOperator::Nearest;
+  if (name == kSortFirst) {
+    if (!nearest) {
+      throw Error(ExitCode::Usage, fmt::format("sort-first does not go with --operator {}", operator_name),
+                  "leave it out, or take --operator nearest");
+    }
+    if (!scene.empty()) return;
+    throw Error(ExitCode::Usage, "sort-first draws a scene, and there is none", "name a scene instead of --synthetic");
+  }
+  std::vector<std::string> compositors = names_of(all_compositors());
+  if (name.starts_with("radix-k:") || std::ranges::find(compositors, name) != compositors.end()) return;
+  std::vector<std::string> choices = nearest ? std::move(compositors) : names_of(all_blenders<RgbaPremultiplied>());
+  if (nearest && !scene.empty()) choices.emplace_back(kSortFirst);
+  choices.emplace_back("all");
+  throw Error(ExitCode::Usage, fmt::format("no compositing strategy is named '{}'", printable(name)),
+              unknown_name_hint(printable(name), choices));
+}
+
+bool CompareOptions::fits(const std::string& name, int count) const {
+  if (operation() == CompareOperator::Nearest) return make_compositor(name)->fits(count);
+  return make_blender<RgbaPremultiplied>(name)->fits(count);
+}
+
+CompareSettings CompareOptions::settings_for(int count) const {
+  return {strategies_for(count), frames, warmup, operation()};
+}
+
+std::vector<std::string> CompareOptions::words(const Globals& globals) const {
+  std::vector<std::string> arguments{"compare"};
+  if (!scene.empty()) arguments.push_back(scene);
+  if (!synthetic.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic});
+  if (!plugin.empty()) arguments.insert(arguments.end(), {"--plugin", plugin});
+  arguments.insert(arguments.end(), {"--size", size, "--tiles", tiles, "--strategies", strategies});
+  if (local_shading()) arguments.insert(arguments.end(), {"--shading", shading});
+  if (operation() != CompareOperator::Nearest) arguments.insert(arguments.end(), {"--operator", operator_name});
+  arguments.insert(arguments.end(), {"--frames", std::to_string(frames), "--warmup", std::to_string(warmup)});
+  if (simulate.empty()) {
+    arguments.insert(arguments.end(), {"--transport", transport});
+  } else {
+    arguments.insert(arguments.end(), {"--simulate", simulate});
+  }
+  arguments.insert(arguments.end(), {"--seed", std::to_string(globals.seed)});
+  if (globals.backend != "auto") arguments.insert(arguments.end(), {"--backend", globals.backend});
+  if (globals.device >= 0) arguments.insert(arguments.end(), {"--device", std::to_string(globals.device)});
+  if (globals.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(globals.threads)});
+  return arguments;
+}
+
+}  // namespace hpr

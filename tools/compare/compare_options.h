@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/options/globals.h"
+#include "image/image.h"
+#include "tools/compare/compare.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+/// The options of `hpr compare`, and how their values are written. What is written otherwise throws Error (Usage).
+namespace hpr {
+
+/// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".
+[[nodiscard]] std::vector<std::string> split_strategies(std::string_view list);
+
+/// What the user said, and what follows from it alone.
+struct CompareOptions {
+  std::string scene;
+  std::string synthetic;
+  std::string size = "1920x1080";
+  std::string tiles = "1x1";
+  std::string ranks;
+  std::string shading = "deferred";
+  std::string operator_name = "nearest";
+  std::string strategies = "all";
+  std::string plugin;
+  int frames = 10;
+  int warmup = 2;
+  std::string transport = "mpi";
+  std::string simulate;
+  std::string csv;
+  std::string html;
+  bool json = false;
+  std::string picture;
+  std::string raw;
+
+  void declare(CLI::App& app);
+  /// What is left open is settled by what was said. Throws Error for what can be refused before any rank starts, but
+  /// for the names of files.
+  void settle();
+  void check_files(const Globals& globals) const;
+
+  [[nodiscard]] bool on_threads() const { return transport == "threads" || !simulate.empty(); }
+  [[nodiscard]] bool local_shading() const { return shading == "local"; }
+  [[nodiscard]] CompareOperator operation() const;
+  /// Empty inside an MPI job unless --ranks is given.
+  [[nodiscard]] std::vector<int> rank_counts() const;
+  [[nodiscard]] CompareSettings settings_for(int count) const;
+  /// The words after `hpr` that decide the result and on what it is measured, without the number of ranks.
+  [[nodiscard]] std::vector<std::string> words(const Globals& globals) const;
+
+ private:
+  void check_transport() const;
+  void check_operator() const;
+  void check_shading() const;
+  [[nodiscard]] std::vector<std::string> all_strategies_for(int count) const;
+  [[nodiscard]] std::vector<std::string> strategies_for(int count) const;
+  /// Throws Error (Usage) when no strategy of that name can do what is asked for, whatever the number of ranks.
+  void check_strategy(const std::string& name) const;
+  [[nodiscard]] bool fits(const std::string& name, int count) const;
+
+  CLI::Option* frames_option_ = nullptr;
+};
+
+}  // namespace hpr

@@ -1,0 +1,315 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <hpr/version.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <set>
+
+#include "app/command.h"
+#include "app/launch/run_ranks.h"
+#include "app/launch/shell_line.h"
+#include "app/options/words.h"
+#include "app/output_files.h"
+#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
+#include "core/cache_folder.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "core/progress.h"
+#include "core/stopwatch.h"
+#include "engine/output.h"
+#include "engine/signals.h"
+#include "scene/view.h"
+#include "tools/tradeoff/tradeoff_html.h"
+#include "tools/tradeoff/tradeoff_measure.h"
+#include "tools/tradeoff/tradeoff_report.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kCropSide = 128;
+constexpr double kQuickMs = 200.0;
+constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
+
+/// What the command line says that a frame of `hpr render` would take as well, but for what a sweep has of its own or
+/// varies, and what changes neither pictures nor times. The same for any order and spelling of the options.
+std::vector<std::string> base_words(const CLI::App& app, std::span<const std::string> varied) {
+  static const std::set<std::string> left_out{"vary",     "metric",       "reference", "reference-spp", "budget",
+                                              "frames",   "html",         "csv",       "size",          "json",
+                                              "progress", "hang-timeout", "limit-mem", "limit-image",   "trace",
+                                              "resume",   "force",        "strict",    "quiet",         "verbose"};
+  std::vector<std::string> words;
+  for (const CLI::App* level = &app; level != nullptr; level = level->get_parent()) {
+    for (const CLI::Option* option : level->get_options()) {
+      if (option->count() == 0 || option->get_lnames().empty()) continue;
+      const std::string& name = option->get_lnames().front();
+      if (left_out.contains(name) || std::ranges::find(varied, name) != varied.end()) continue;
+      const std::string value = fmt::format("{}", fmt::join(option->reduced_results(), ","));
+      const bool is_set_flag = option->get_expected_max() == 0 && value == "true";
+      words.push_back(is_set_flag ? "--" + name : fmt::format("--{}={}", name, value));
+    }
+  }
+  return words;
+}
+
+class TradeoffCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "tradeoff"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "what the knobs of a scene cost and lose: time against error, and the settings a budget allows";
+  }
+
+  void declare(CLI::App& app) override {
+    app_ = &app;
+    app.add_option("scene", scene_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
+    app.add_option("--vary", vary_, "a knob and its values, spp=1,4,16; again for another knob (see hpr help knobs)")
+        ->type_name("K=V,V,...")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->allow_extra_args(false)
+        ->required();
+    app.add_option("--metric", metrics_,
+                   "relmse, rmse, psnr, ssim, flip: which errors to measure; the first one decides the front")
+        ->delimiter(',');
+    app.add_option("--reference", how_.reference,
+                   "the truth: an .exr or .png, path (path tracing), passes (--quality best, many samples), or auto: "
+                   "passes where light of points is seen through mirrors and glass, which paths cannot find, else path")
+        ->type_name("FILE|auto")
+        ->capture_default_str();
+    app.add_option("--reference-spp", how_.reference_spp, "samples of a rendered truth")
+        ->check(CLI::Range(std::uint32_t{16}, std::uint32_t{1'000'000'000}))
+        ->capture_default_str();
+    app.add_option("--budget", budget_, "a time (33ms) or an error (flip=0.05) to find the best settings within");
+    app.add_option("--frames", how_.frames, "of each point; fewer where they take seconds")
+        ->check(CLI::Range(1, 1'000'000))
+        ->capture_default_str();
+    app.add_option("--size", size_, "pixels of the pictures")->capture_default_str()->type_name("WxH");
+    app.add_flag("--json", json_, "print the result as JSON (schema hpr.tradeoff/1) instead of a table");
+    app.add_option("--csv", csv_, "write one line per point to this file")->type_name("FILE");
+    app.add_option("--html", html_, "write the result as one page with plots and crops")->type_name("FILE");
+    app.add_flag("--resume", resume_, "go on with the points of this sweep that an earlier run measured");
+    options_.declare_frame(app);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    check_options(globals);
+    watch_requests();
+    return run_ranks(globals, [&](Communicator& comm) {
+      Session session(comm, globals.session(), [&] { return options_.load(scene_, globals); });
+      return sweep(session, globals);
+    });
+  }
+
+ private:
+  void check_options(const Globals& globals) {
+    how_.size = parse_size(size_, "--size", kRasterLimit);
+    check_size(how_.size, globals.picture_limits());
+    std::vector<KnobSweep> sweeps;
+    for (const std::string& text : vary_) sweeps.push_back(parse_knob_sweep(text));
+    for (const KnobSweep& sweep : sweeps) report_.knobs.push_back(sweep.knob);
+    all_ = combinations(sweeps);
+    for (const KnobValues& values : all_) {  // bad ones are found before any scene is loaded
+      const RenderOptions options = with_knobs(options_, values);
+      (void)options.settings(globals.seed);
+      (void)options.sampling();
+    }
+    if (metrics_.empty()) metrics_ = tradeoff_metrics();
+    for (const std::string& metric : metrics_) (void)PictureError{}.of(metric);
+    if (!budget_.empty()) report_.budget = parse_budget(budget_);
+    if (report_.budget && !report_.budget->ms && !asks_for(metrics_, report_.budget->metric)) {
+      metrics_.push_back(report_.budget->metric);
+    }
+    how_.metrics = metrics_;
+    const std::vector<std::string> results{csv_, html_};
+    check_distinct(results, globals.trace);
+    check_spared(scene_, globals.scene_limits(), std::vector{options_.environment, how_.reference}, results);
+    for (const std::string& path : results) {
+      if (!path.empty()) check_writable(path, globals.force);
+    }
+  }
+
+  ExitCode sweep(Session& session, const Globals& globals) {
+    const bool speaks = session.rank() == 0;
+    std::filesystem::path cache;
+    agree_on_failure(session.comm(), [&] {
+      if (speaks) cache = cache_folder();
+    });
+    const auto reference = find_reference(session, options_, how_, globals, cache);
+    if (!reference) {
+      if (speaks) log::info("stopped: the reference's samples are kept; the same command goes on with them");
+      return ExitCode::Stopped;
+    }
+    const Rect crop = speaks ? most_detail(reference->radiance, kCropSide) : Rect{};
+    const std::string identity = sweep_identity(session, *reference, globals);
+    const std::filesystem::path state =
+        cache / fmt::format("tradeoff-{}.json", hex16(xxh64(std::as_bytes(std::span(identity)))));
+    std::vector<TradeoffPoint> done = kept_points(session.comm(), state, identity);
+
+    const MeasuredPoint measure = [&](const KnobValues& values, bool first) {
+      done.push_back(measured_point(session, values, globals, *reference, crop, first));
+      agree_on_failure(session.comm(), [&] {
+        if (speaks) write_file_atomically(state, encode_points(identity, done));
+      });
+    };
+    if (!measure_all(session, globals, done, measure)) return ExitCode::Stopped;
+    agree_on_failure(session.comm(), [&] {
+      if (!speaks) return;
+      finish(session, *reference, crop, globals);
+      forget(state, identity, std::move(done));
+    });
+    const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
+    const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
+    return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
+  }
+
+  /// Collective: measures a point and puts it behind those that are done.
+  using MeasuredPoint = std::function<void(const KnobValues& values, bool first)>;
+
+  /// Collective: the report's points, those that are done already (on rank 0) and what is measured of the others. False
+  /// when it was asked to stop before the last one.
+  [[nodiscard]] bool measure_all(Session& session, const Globals& globals, const std::vector<TradeoffPoint>& done,
+                                 const MeasuredPoint& measure) {
+    const bool speaks = session.rank() == 0;
+    Progress progress(speaks ? globals.progress : "none", "point", all_.size());
+    const Stopwatch watch;
+    std::size_t measured = 0;
+    for (const KnobValues& values : all_) {
+      const auto known = std::ranges::find(done, values, &TradeoffPoint::knobs);
+      const bool skips = all_gather_value(session.comm(), known != done.end() ? 1 : 0).front() == 1;
+      if (skips) {
+        report_.points.push_back(speaks ? *known : TradeoffPoint{});
+      } else {
+        measure(values, measured++ == 0);
+        report_.points.push_back(done.back());
+      }
+      const std::size_t left = all_.size() - report_.points.size();
+      progress.step(describe(values) + time_left(left, measured, watch.ms()));
+      const std::vector<Request> requests = all_gather_value(session.comm(), take_request());
+      if (std::ranges::max(requests) != Request::Stop || left == 0) continue;
+      if (speaks) log::info("stopped after {} of {} points: --resume goes on", report_.points.size(), all_.size());
+      return false;
+    }
+    return true;
+  }
+
+  /// Those of such a sweep that an earlier run measured, on rank 0; without --resume this one measures its own anew.
+  [[nodiscard]] std::vector<TradeoffPoint> kept_points(Communicator& comm, const std::filesystem::path& state,
+                                                       const std::string& identity) const {
+    std::vector<TradeoffPoint> kept;
+    check_on_root(comm, [&] {
+      try {
+        std::error_code ignored;
+        if (std::filesystem::exists(state, ignored)) {
+          const auto bytes = read_file(state, kLargestState);
+          kept = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
+        }
+      } catch (const Error&) {
+        if (resume_) throw;
+      }
+      if (!resume_) std::erase_if(kept, [&](const TradeoffPoint& point) { return is_mine(point); });
+      if (resume_ && std::ranges::none_of(kept, [&](const TradeoffPoint& point) { return is_mine(point); })) {
+        log::warning("--resume: no points of this sweep are kept, so it begins anew");
+      }
+    });
+    return kept;
+  }
+
+  /// The first frames of a process are slower than all others: where that shows, they are drawn once more.
+  [[nodiscard]] TradeoffPoint measured_point(Session& session, const KnobValues& values, const Globals& globals,
+                                             const ReferencePicture& reference, const Rect& crop, bool first) const {
+    TradeoffPoint point = measure_point(session, options_, values, how_, globals, reference, crop);
+    const double took = all_gather_value(session.comm(), point.median_ms()).front();
+    if (!first || took >= kQuickMs) return point;
+    return measure_point(session, options_, values, how_, globals, reference, crop);
+  }
+
+  [[nodiscard]] std::string sweep_identity(Session& session, const ReferencePicture& reference,
+                                           const Globals& globals) const {
+    return fmt::format("{} {} {} {}x{} seed {} ranks {} threads {} truth {} metrics {} frames {} options {} varied {}",
+                       kVersion, kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height,
+                       globals.seed, session.comm().size(), session.threads(),
+                       hex16(xxh64(std::as_bytes(reference.radiance.pixels()))), fmt::join(metrics_, ","), how_.frames,
+                       fmt::join(base_words(*app_, report_.knobs), " "), fmt::join(report_.knobs, " "));
+  }
+
+  /// What is done needs no going on; what an earlier run of other values kept stays. The sweep is done all the same
+  /// where that cannot be written.
+  void forget(const std::filesystem::path& state, const std::string& identity, std::vector<TradeoffPoint> done) const {
+    std::erase_if(done, [&](const TradeoffPoint& point) { return is_mine(point); });
+    std::error_code ignored;
+    if (done.empty()) {
+      std::filesystem::remove(state, ignored);
+      return;
+    }
+    try {
+      write_file_atomically(state, encode_points(identity, done));
+    } catch (const Error& error) {
+      log::warning("{}", error.what());
+    }
+  }
+
+  /// Nothing before a point was measured.
+  [[nodiscard]] static std::string time_left(std::size_t points, std::size_t measured, double ms) {
+    if (measured == 0) return "";
+    return fmt::format(", about {:.0f} s left",
+                       1e-3 * ms * static_cast<double>(points) / static_cast<double>(measured));
+  }
+
+  [[nodiscard]] bool is_mine(const TradeoffPoint& point) const {
+    return std::ranges::find(all_, point.knobs) != all_.end();
+  }
+
+  void finish(Session& session, const ReferencePicture& reference, const Rect& crop, const Globals& globals) {
+    report_.scene = scene_;
+    report_.command = "hpr " + shell_line(globals.args);
+    report_.machine = this_machine();
+    report_.ranks = session.comm().size();
+    report_.threads = session.threads();
+    report_.size = how_.size;
+    report_.seed = globals.seed;
+    report_.reference = reference.about;
+    report_.metrics = metrics_;
+    report_.base_options = base_words(*app_, report_.knobs);
+    report_.reference_crop_png = crop_as_png(reference.radiance, crop, reference.linear);
+    mark_pareto(report_.points, metrics_.front());
+    if (report_.budget) report_.best = best_within(report_.points, *report_.budget, metrics_.front());
+    if (!csv_.empty()) write_file_atomically(csv_, tradeoff_csv(report_));
+    if (!html_.empty()) write_file_atomically(html_, tradeoff_html(report_));
+    std::fputs((json_ ? tradeoff_json(report_) : tradeoff_table(report_)).c_str(), stdout);
+    if (std::fflush(stdout) != 0) {
+      throw Error(ExitCode::Io, "the result could not be written to standard output",
+                  "--resume writes it without measuring again");
+    }
+    if (json_ && report_.budget) log::info("{}", answer(report_));
+  }
+
+  const CLI::App* app_ = nullptr;
+  std::string scene_;
+  std::vector<std::string> vary_;
+  std::vector<std::string> metrics_;
+  std::string budget_;
+  std::string size_ = "640x360";
+  std::string csv_;
+  std::string html_;
+  bool json_ = false;
+  bool resume_ = false;
+  TradeoffMeasurement how_;
+  RenderOptions options_;
+  std::vector<KnobValues> all_;
+  TradeoffReport report_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_tradeoff_command() {
+  return std::make_unique<TradeoffCommand>();
+}
+
+}  // namespace hpr

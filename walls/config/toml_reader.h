@@ -1,0 +1,73 @@
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "image/image.h"
+#include "walls/config/findings.h"
+
+namespace hpr {
+
+/// Reads one table key by key. What is wrong goes into the findings, and the key counts as absent; asking for a key
+/// makes it a known one, so that finish() can report the keys nobody asked for.
+class TableReader {
+ public:
+  /// `what` names the table in messages, e.g. "window". `table` must outlive this.
+  TableReader(const TomlValue& table, std::string what, Findings& findings)
+      : table_(table), what_(std::move(what)), findings_(findings) {}
+
+  [[nodiscard]] const std::string& what() const { return what_; }
+  [[nodiscard]] TextPlace place() const { return table_.place; }
+  /// Of the value, else of the table.
+  [[nodiscard]] TextPlace place(std::string_view key) const;
+  /// The value whatever its type; null when absent.
+  [[nodiscard]] const TomlValue* find(std::string_view key);
+  [[nodiscard]] bool has(std::string_view key) { return find(key) != nullptr; }
+  /// As find, and an error when absent.
+  const TomlValue* require(std::string_view key, std::string_view example);
+
+  [[nodiscard]] std::optional<std::string> text(std::string_view key);
+  /// A text that names something: letters, digits, dot, dash, underscore, at most 64.
+  [[nodiscard]] std::optional<std::string> id(std::string_view key);
+  /// One of `names`: its index.
+  [[nodiscard]] std::optional<std::size_t> choice(std::string_view key, const std::vector<std::string>& names);
+  [[nodiscard]] std::optional<bool> boolean(std::string_view key);
+  [[nodiscard]] std::optional<int> integer(std::string_view key, int low, int high);
+  /// Finite, in (low, high].
+  [[nodiscard]] std::optional<double> real(std::string_view key, double low, double high);
+  /// Finite, in [low, high].
+  [[nodiscard]] std::optional<double> real_from(std::string_view key, double low, double high);
+  [[nodiscard]] std::optional<glm::dvec3> point(std::string_view key);
+  /// `count` finite numbers of at most `limit` in size.
+  [[nodiscard]] std::optional<std::vector<double>> reals(std::string_view key, std::size_t count, double limit);
+  [[nodiscard]] std::optional<std::vector<int>> integers(std::string_view key, std::size_t count, int low, int high);
+  [[nodiscard]] std::optional<std::vector<std::string>> texts(std::string_view key);
+  /// [x, y, width, height] with a positive size.
+  [[nodiscard]] std::optional<Rect> rect(std::string_view key);
+  [[nodiscard]] const TomlValue* table(std::string_view key);
+  /// The tables of an array; empty when absent.
+  [[nodiscard]] std::vector<const TomlValue*> tables(std::string_view key);
+
+  /// Keys that are valid and not acted on.
+  void ignore(std::initializer_list<std::string_view> keys);
+  void error(std::string_view key, std::string_view problem, std::string hint);
+  /// Reports unknown keys; call once, when all known ones were asked for.
+  void finish();
+
+ private:
+  const TomlValue* typed(std::string_view key, TomlValue::Type type);
+  void wrong_type(const TomlValue& value, std::string_view key, std::string_view wanted);
+  [[nodiscard]] std::optional<double> number(std::string_view key);
+  bool check_count(const TomlValue& value, std::string_view key, std::size_t count, std::string_view of);
+
+  const TomlValue& table_;
+  std::string what_;
+  Findings& findings_;
+  std::vector<std::string> known_;
+};
+
+}  // namespace hpr

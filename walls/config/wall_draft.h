@@ -1,0 +1,127 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "walls/config/findings.h"
+#include "walls/config/toml_reader.h"
+#include "walls/config/wall.h"
+
+/// What the files that read a wall share among themselves.
+namespace hpr {
+
+struct DraftNode {
+  WallNode node;
+  TextPlace place;
+};
+
+struct DraftWindow {
+  WallWindow window;
+  TextPlace place;       ///< of the table
+  TextPlace node_place;  ///< of the node's name
+  TextPlace gpu_place;
+  TextPlace rank_place;
+};
+
+struct DraftScreen {
+  WallScreen screen;  ///< node, rank and viewport are settled by link_wall
+  TextPlace place;
+  TextPlace window_place;
+  TextPlace warp_place;
+  bool has_corners = false;  ///< and they are sound
+};
+
+struct DraftSurface {
+  std::string id;
+  TextPlace place;
+  std::string viewer;  ///< id; empty: the first
+  TextPlace viewer_place;
+};
+
+struct DraftViewer {
+  WallViewer viewer;
+  TextPlace place;
+  bool placed = false;  ///< has a position_m, sound or not
+};
+
+struct DraftMonitor {
+  WallMonitor monitor;
+  TextPlace place;
+  TextPlace surface_place;
+};
+
+struct WallDraft {
+  std::vector<DraftNode> nodes;
+  std::vector<DraftWindow> windows;
+  std::vector<DraftSurface> surfaces;
+  std::vector<DraftScreen> screens;
+  std::vector<DraftViewer> viewers;
+  std::vector<DraftMonitor> monitors;
+  StereoMode stereo = StereoMode::None;
+  TextPlace stereo_place;
+};
+
+/// Reads `surfaces`: grids are expanded, in order. Files are looked for in `folder`.
+void read_surfaces(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
+
+/// Reads what a panel is sent besides the picture: mirror, eye, colour, edge_blend_m, and its turn, which is called
+/// `turn` there.
+void read_look(TableReader& reader, std::string_view turn, WallScreen& screen, Findings& findings);
+
+/// Reads the `warp` of a screen, whose pixels are known, and its files.
+void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen, Findings& findings);
+
+/// Reads `viewers` and `stereo`, and `test` as far as it is about them and the gaps. Files are looked for in `folder`.
+void read_viewers(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
+void read_test(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Rgba8& gap_color,
+               Findings& findings);
+void read_monitors(TableReader& document, WallDraft& draft, Findings& findings);
+
+/// Metres a screen's sides have at least.
+inline constexpr double kSmallestSide_m = 1e-6;
+
+/// The screens of a grid with their corners; pure, so that the shorthand uses it as well.
+struct WallGrid {
+  int columns = 1;
+  int rows = 1;
+  Size tile_pixels;
+  double tile_width_m = 0.0;
+  double tile_height_m = 0.0;
+  std::vector<double> column_gaps_m;  ///< columns - 1, lit edge to lit edge; negative: overlap
+  std::vector<double> row_gaps_m;     ///< rows - 1, from the top
+  glm::dvec3 center{0.0};
+  /// Columns stand as chords on an arc around a vertical axis in front of the centre, gaps are measured along the arc;
+  /// 0: all in one plane.
+  double radius_m = 0.0;
+};
+/// The radius at which the columns and their gaps take `angle` radians of the arc; none when no arc does.
+[[nodiscard]] std::optional<double> radius_of_arc(const WallGrid& grid, double angle);
+/// The columns fit on a circle of this radius.
+[[nodiscard]] bool fits_arc(const WallGrid& grid, double radius);
+[[nodiscard]] std::vector<WallScreen> expand_grid(const WallGrid& grid, const std::string& surface);
+
+/// Checks what spans tables (references, doubles, overlaps) and settles who owns which screen. False: there is too much
+/// of something to check more.
+[[nodiscard]] bool link_wall(WallDraft& draft, Findings& findings);
+
+/// `id` is to be a picture's name.
+void check_file_name(const std::string& id, const TextPlace& place, Findings& findings);
+
+/// The same for viewers, stereo and monitors.
+void link_viewers(WallDraft& draft, Findings& findings);
+
+/// Of linked viewers: what they see of the points of position maps.
+void check_position_maps(const WallDraft& draft, Findings& findings);
+
+/// Warns about viewers who stand behind what they look at.
+void warn_about_viewers(const WallDraft& draft, Findings& findings);
+
+/// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
+void warn_about_neighbours(const WallDraft& draft, Findings& findings);
+
+/// Fills in a wall whose screens are sound: the default viewer and the hash.
+void finish_wall(Wall& wall);
+
+}  // namespace hpr

@@ -1,0 +1,236 @@
+#include "walls/config/wall_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <filesystem>
+#include <limits>
+
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "walls/config/wall_draft.h"
+#include "walls/config/wall_override.h"
+#include "walls/geometry/geometry.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kMostRanks = 1 << 20;
+
+void read_nodes(TableReader& document, WallDraft& draft, Findings& findings) {
+  for (const TomlValue* const table : document.tables("nodes")) {
+    TableReader reader(*table, "node", findings);
+    DraftNode draft_node{{}, table->place};
+    WallNode& node = draft_node.node;
+    reader.require("id", "\"n0\"");
+    node.id = reader.id("id").value_or("");
+    node.host = reader.text("host").value_or("localhost");
+    node.ranks = reader.integer("ranks", 1, kMostRanks).value_or(0);
+    for (const TomlValue* const gpu_table : reader.tables("gpus")) {
+      TableReader gpu(*gpu_table, "gpu", findings);
+      gpu.require("id", "\"g0\"");
+      if (auto id = gpu.id("id")) node.gpus.push_back(std::move(*id));
+      gpu.ignore({"backend", "egl_device", "cpu_affinity"});
+      gpu.finish();
+    }
+    reader.ignore({"nic"});
+    reader.finish();
+    draft.nodes.push_back(std::move(draft_node));
+  }
+}
+
+void read_windows(TableReader& document, WallDraft& draft, Findings& findings) {
+  for (const TomlValue* const table : document.tables("windows")) {
+    TableReader reader(*table, "window", findings);
+    DraftWindow draft_window{{}, table->place, reader.place("node"), reader.place("gpu"), reader.place("rank")};
+    WallWindow& window = draft_window.window;
+    reader.require("id", "\"w0\"");
+    window.id = reader.id("id").value_or("");
+    window.node = reader.text("node").value_or("");
+    window.gpu = reader.text("gpu").value_or("");
+    window.display = reader.text("display").value_or("");
+    window.monitor = reader.text("monitor").value_or("");
+    window.rank = reader.integer("rank", 0, kMostRanks - 1).value_or(-1);
+    window.rect = reader.rect("rect").value_or(Rect{});
+    window.fullscreen = reader.boolean("fullscreen").value_or(false);
+    reader.ignore({"swap_group"});
+    reader.finish();
+    draft.windows.push_back(std::move(draft_window));
+  }
+}
+
+void read_version(TableReader& document) {
+  const TomlValue* const version = document.require("hpr_wall", "1");
+  if (version == nullptr || (version->type == TomlValue::Type::Integer && version->integer == 1)) return;
+  document.error("hpr_wall", "is not 1", "this program reads version 1 of wall files: hpr_wall = 1");
+}
+
+/// The largest int for what is larger than that.
+int to_number(std::string_view digits) {
+  int number = 0;
+  const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  return result.ec == std::errc() && result.ptr == digits.data() + digits.size() ? number
+                                                                                 : std::numeric_limits<int>::max();
+}
+
+bool all_digits(std::string_view text) {
+  return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// The two numbers of "6x3", as to_number has them. None when the text is no such pair.
+std::optional<std::pair<int, int>> pair_of(std::string_view text) {
+  const std::size_t x = text.find('x');
+  if (x == std::string_view::npos) return std::nullopt;
+  const std::string_view a = text.substr(0, x);
+  const std::string_view b = text.substr(x + 1);
+  if (!all_digits(a) || !all_digits(b)) return std::nullopt;
+  return std::pair(to_number(a), to_number(b));
+}
+
+/// What neighbours' files and later versions may hold.
+constexpr std::array<std::string_view, 4> kNotActedOn{"sync", "render", "transport", "fault"};
+
+/// A file may hold more than is acted on; what is asked for on the command line must not be lost.
+void refuse_without_effect(const std::string& override, Findings& findings) {
+  const std::string section = override.substr(0, override.find_first_of(".="));
+  if (std::ranges::find(kNotActedOn, section) == kNotActedOn.end()) return;
+  findings.error({}, fmt::format("--set {}: this version acts on nothing of '{}'", printable(override), section),
+                 "hpr wall run has options for it: --strategy, --quality, --codec, --swap-timeout...");
+}
+
+}  // namespace
+
+bool WallReading::ok() const {
+  return std::ranges::none_of(findings, &WallFinding::error);
+}
+
+void finish_wall(Wall& wall) {
+  if (!wall.viewers.front().given) {
+    const WallExtent extent = wall_extent(wall);
+    wall.viewers.front().position = extent.middle + extent.axes[2] * extent.height;
+  }
+  Wall nameless = wall;
+  nameless.name.clear();
+  for (WallScreen& screen : nameless.screens) {
+    for (WarpFile* const file : {&screen.warp.mesh, &screen.warp.blend, &screen.warp.black}) {
+      if (!file->path.empty()) file->path = hex16(file->content);
+    }
+  }
+  const std::string text = expand_wall(nameless);
+  wall.hash = xxh64(std::as_bytes(std::span(text)));
+}
+
+WallReading parse_wall(std::string_view text, const std::string& name, const std::vector<std::string>& overrides,
+                       WallText kind) {
+  Findings findings(name, text, overrides, kind);
+  WallReading reading;
+  auto parsed = parse_toml(text);
+  if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
+    findings.error(failure->place, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
+    reading.findings = findings.take();
+    return reading;
+  }
+  Wall& wall = reading.wall;
+  WallDraft draft;
+  const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+  apply_overrides(std::get<TomlValue>(parsed), overrides, findings);
+  TableReader document(std::get<TomlValue>(parsed), "the wall", findings);
+  read_version(document);
+  wall.name = document.text("name").value_or(std::filesystem::path(name).stem().string());
+  read_nodes(document, draft, findings);
+  read_windows(document, draft, findings);
+  read_surfaces(document, folder, draft, findings);
+  read_viewers(document, folder, draft, findings);
+  read_test(document, folder, draft, wall.gap_color, findings);
+  read_monitors(document, draft, findings);
+  for (const std::string_view section : kNotActedOn) document.ignore({section});
+  document.finish();
+  for (const std::string& override : overrides) refuse_without_effect(override, findings);
+  if (link_wall(draft, findings)) {
+    link_viewers(draft, findings);
+    check_position_maps(draft, findings);
+  }
+  if (!findings.any_errors()) {
+    warn_about_viewers(draft, findings);
+    warn_about_neighbours(draft, findings);
+  }
+
+  const bool sound = !findings.any_errors();
+  reading.findings = findings.take();
+  if (!sound) return reading;
+  for (DraftNode& node : draft.nodes) wall.nodes.push_back(std::move(node.node));
+  for (DraftWindow& window : draft.windows) wall.windows.push_back(std::move(window.window));
+  for (DraftScreen& screen : draft.screens) wall.screens.push_back(std::move(screen.screen));
+  for (DraftMonitor& monitor : draft.monitors) wall.monitors.push_back(std::move(monitor.monitor));
+  if (!draft.viewers.empty()) wall.viewers.clear();
+  for (DraftViewer& viewer : draft.viewers) wall.viewers.push_back(std::move(viewer.viewer));
+  wall.stereo = draft.stereo;
+  finish_wall(wall);
+  return reading;
+}
+
+std::optional<Wall> wall_from_shorthand(std::string_view spec) {
+  constexpr double kTileHeight = 0.36;
+  constexpr double kGap = 0.006;
+  const std::size_t at = spec.find('@');
+  const auto grid_size = pair_of(spec.substr(0, at));
+  const auto pixels = at == std::string_view::npos ? std::pair(640, 360) : pair_of(spec.substr(at + 1));
+  if (!grid_size || !pixels) return std::nullopt;
+  const auto [columns, rows] = *grid_size;
+  const bool none = columns < 1 || rows < 1;
+  if (none || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
+    throw Error(none ? ExitCode::Usage : ExitCode::Limit,
+                fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
+                fmt::format("columns times rows must be from 1 to {}", kMostScreens));
+  }
+  const Size size{pixels->first, pixels->second};
+  const bool empty = size.width < 1 || size.height < 1;
+  if (empty || size.width > kMostScreenSide || size.height > kMostScreenSide) {
+    throw Error(empty ? ExitCode::Usage : ExitCode::Limit,
+                fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
+                fmt::format("sides must be from 1 to {} pixels", kMostScreenSide));
+  }
+  WallGrid grid;
+  grid.columns = columns;
+  grid.rows = rows;
+  grid.tile_pixels = size;
+  grid.tile_height_m = kTileHeight;
+  grid.tile_width_m = kTileHeight * size.width / size.height;
+  grid.column_gaps_m.assign(static_cast<std::size_t>(columns - 1), kGap);
+  grid.row_gaps_m.assign(static_cast<std::size_t>(rows - 1), kGap);
+  Wall wall;
+  wall.name = std::string(spec);
+  wall.screens = expand_grid(grid, "wall");
+  finish_wall(wall);
+  return wall;
+}
+
+WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides) {
+  constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 20;
+  if (auto wall = wall_from_shorthand(spec)) {
+    if (overrides.empty()) return {std::move(*wall), {}};
+    return parse_wall(expand_wall(*wall), spec, overrides, WallText::Expansion);
+  }
+  std::error_code error;
+  if (!std::filesystem::exists(spec, error)) {
+    throw Error(ExitCode::Io, fmt::format("there is no wall file '{}'", printable(spec)),
+                "a wall is a TOML file, or columns x rows such as 3x2 or 3x2@1920x1080");
+  }
+  const std::vector<std::byte> bytes = read_file(spec, kLargestFile);
+  return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec, overrides);
+}
+
+Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides, bool tells_warnings) {
+  WallReading reading = read_wall(spec, overrides);
+  const auto first = std::ranges::find_if(reading.findings, &WallFinding::error);
+  if (first != reading.findings.end()) throw Error(ExitCode::BadInput, first->what, first->hint, first->line);
+  if (!tells_warnings) return std::move(reading.wall);
+  for (const WallFinding& finding : reading.findings) log::warning("{} ({})", finding.what, finding.hint);
+  return std::move(reading.wall);
+}
+
+}  // namespace hpr

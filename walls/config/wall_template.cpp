@@ -1,0 +1,178 @@
+#include "walls/config/wall_template.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "walls/config/toml_document.h"
+#include "walls/config/wall_file.h"
+
+namespace hpr {
+namespace {
+
+/// The numbers of a wall with nothing left open.
+struct Numbers {
+  Size pixels;
+  glm::dvec2 size_m{0.0};
+  glm::dvec2 gap_m{0.0};
+  bool measured = false;  ///< size and gap are the user's
+};
+
+double to_tenths_of_mm(double metres) {
+  return std::round(metres * 1e4) / 1e4;
+}
+
+Numbers numbers_of(const WallTemplate& wall) {
+  constexpr double kDiagonal_m = 46.0 * 0.0254;
+  constexpr double kDesktopHeight_m = 0.36;
+  const bool here = wall.hosts.empty();
+  Numbers numbers{wall.tile_pixels.value_or(here ? Size{640, 360} : Size{1920, 1080}), {}, {}, true};
+  const glm::dvec2 shape(numbers.pixels.width, numbers.pixels.height);
+  const double metres_per_pixel = here ? kDesktopHeight_m / shape.y : kDiagonal_m / std::hypot(shape.x, shape.y);
+  const glm::dvec2 guess(to_tenths_of_mm(shape.x * metres_per_pixel), to_tenths_of_mm(shape.y * metres_per_pixel));
+  numbers.size_m = wall.tile_size_m.value_or(guess);
+  numbers.gap_m = wall.gap_m.value_or(here ? glm::dvec2(0.006) : glm::dvec2(0.0055));
+  numbers.measured = wall.tile_size_m && wall.gap_m;
+  return numbers;
+}
+
+void check(const WallTemplate& wall, const Numbers& numbers) {
+  const std::int64_t screens = std::int64_t{wall.columns} * wall.rows;
+  if (wall.columns < 1 || wall.rows < 1 || screens > kMostScreens) {
+    throw Error(ExitCode::Usage, fmt::format("a wall cannot have {} x {} screens", wall.columns, wall.rows),
+                fmt::format("columns times rows must be from 1 to {}", kMostScreens));
+  }
+  const auto [width, height] = numbers.pixels;
+  if (width < 1 || height < 1 || width > kMostScreenSide || height > kMostScreenSide) {
+    throw Error(ExitCode::Usage, fmt::format("a screen cannot have {} x {} pixels", width, height),
+                fmt::format("sides must be from 1 to {}", kMostScreenSide));
+  }
+  const auto possible = [&](double size, double gap) {
+    constexpr double kLargest_m = 1000.0;
+    return size > 0.0 && size <= kLargest_m && gap > -size && gap <= kLargest_m;
+  };
+  if (possible(numbers.size_m.x, numbers.gap_m.x) && possible(numbers.size_m.y, numbers.gap_m.y)) return;
+  throw Error(ExitCode::Usage,
+              fmt::format("screens of {:g} x {:g} m cannot stand {:g} and {:g} m apart", numbers.size_m.x,
+                          numbers.size_m.y, numbers.gap_m.x, numbers.gap_m.y),
+              "sizes and gaps are metres, e.g. --tile-size-m 1.018x0.573 --gap-m 0.0055; overlaps are negative gaps");
+}
+
+/// Per screen the index of its host.
+std::vector<std::size_t> share_out(const WallTemplate& wall) {
+  const auto screens = static_cast<std::size_t>(wall.columns) * static_cast<std::size_t>(wall.rows);
+  const std::size_t hosts = wall.hosts.size();
+  if (wall.tiles_per_host) {
+    const auto each = static_cast<std::size_t>(*wall.tiles_per_host);
+    const std::size_t needed = (screens + each - 1) / each;
+    if (needed != hosts) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("{} x {} screens, {} a host, take {} hosts, but {} {} named", wall.columns, wall.rows,
+                              each, needed, hosts, hosts == 1 ? "is" : "are"),
+                  "change --hosts or --tiles-per-host, or leave the latter out to share the screens out evenly");
+    }
+  } else if (hosts > screens) {
+    throw Error(ExitCode::Usage, fmt::format("{} hosts for {} screens", hosts, screens),
+                "name no more hosts than screens; add those that only render as nodes to the file");
+  }
+  std::vector<std::size_t> owners;
+  for (std::size_t screen = 0; screen < screens; ++screen) {
+    owners.push_back(wall.tiles_per_host ? screen / static_cast<std::size_t>(*wall.tiles_per_host)
+                                         : screen * hosts / screens);
+  }
+  return owners;
+}
+
+std::string window_id(const WallTemplate& wall, std::size_t screen) {
+  const auto columns = static_cast<std::size_t>(wall.columns);
+  return fmt::format("w{}-{}", screen / columns, screen % columns);
+}
+
+std::string tables_of_hosts(const WallTemplate& wall, Size pixels) {
+  constexpr std::int64_t kWidestDesktop = 32767;
+  std::string text =
+      "\n# One node per computer. host: its name, as `hostname` prints it there. ranks: render processes to run on "
+      "it.\n"
+      "nodes = [\n";
+  for (const std::string& host : wall.hosts) {
+    text += fmt::format("  {{ id = {0}, host = {0}, ranks = {1} }},\n", toml_quote(host), wall.ranks_per_host);
+  }
+  text +=
+      "]\n\n# One window per screen. rect: x, y, width, height on that X display; here the panels of a host lie side "
+      "by "
+      "side, as\n# xrandr should say. monitor = \"DP-1\" names an output instead.\nwindows = [\n";
+  const std::vector<std::size_t> owners = share_out(wall);
+  int beside = 0;
+  for (std::size_t screen = 0; screen < owners.size(); ++screen) {
+    beside = screen > 0 && owners[screen] == owners[screen - 1] ? beside + 1 : 0;
+    text += fmt::format(R"(  {{ id = "{}", node = {}, display = ":0")", window_id(wall, screen),
+                        toml_quote(wall.hosts[owners[screen]]));
+    // Beyond the largest X screen nobody can say where it stands.
+    const std::int64_t x = std::int64_t{beside} * pixels.width;
+    if (x + pixels.width <= kWidestDesktop) {
+      text += fmt::format(", rect = [{}, 0, {}, {}], fullscreen = true", x, pixels.width, pixels.height);
+    }
+    text += " },\n";
+  }
+  return text + "]\n";
+}
+
+/// `windows = [...]` of the grid, a line per row of screens.
+std::string windows_of_grid(const WallTemplate& wall) {
+  std::string text = "windows = [\n";
+  for (int row = 0; row < wall.rows; ++row) {
+    text += "  ";
+    for (int column = 0; column < wall.columns; ++column) {
+      const int place = row * wall.columns + column;
+      const auto screen = static_cast<std::size_t>(place);
+      text += fmt::format("\"{}\",{}", window_id(wall, screen), column + 1 < wall.columns ? " " : "\n");
+    }
+  }
+  return text + "]\n";
+}
+
+}  // namespace
+
+std::string write_wall_template(const WallTemplate& wall) {
+  const Numbers numbers = numbers_of(wall);
+  check(wall, numbers);
+  const bool here = wall.hosts.empty();
+  std::string text = fmt::format("# {} x {} screens", wall.columns, wall.rows);
+  text += here ? " on this machine.\n"
+               : fmt::format(" on {} host{}, row by row from the top left.\n", wall.hosts.size(),
+                             wall.hosts.size() == 1 ? "" : "s");
+  if (!wall.command.empty()) text += fmt::format("# Made by: {}\n", printable(wall.command, 400));
+  text +=
+      "# After a change: hpr wall check FILE; hpr wall plan FILE -o wall.svg draws it, hpr wall pattern FILE -o DIR "
+      "tests it.\n"
+      "hpr_wall = 1\n";
+  text += fmt::format("name = \"{}x{} wall\"\n", wall.columns, wall.rows);
+  if (!here) text += tables_of_hosts(wall, numbers.pixels);
+  text += "\n[[surfaces]]\nid = \"wall\"\n\n[surfaces.grid]\n";
+  text += fmt::format("columns = {}\nrows = {}\n", wall.columns, wall.rows);
+  text += fmt::format("tile_pixels = [{}, {}]\n", numbers.pixels.width, numbers.pixels.height);
+  if (!numbers.measured)
+    text += "# Guesses where they were not told: measure the lit area of a panel, and the gap between two.\n";
+  text += fmt::format("tile_size_m = [{}, {}]  # lit area of a panel, width and height\n",
+                      toml_number(numbers.size_m.x), toml_number(numbers.size_m.y));
+  text += fmt::format("gap_m = [{}, {}]  # lit edge to lit edge, between columns and between rows\n",
+                      toml_number(numbers.gap_m.x), toml_number(numbers.gap_m.y));
+  text += "centre_m = [0.0, 0.0, 0.0]  # of the wall; y is up\n";
+  if (!here) text += windows_of_grid(wall);
+  text +=
+      "# rotate = 90  # where all panels are mounted turned: clockwise turn of what they are sent\n"
+      "\n"
+      "# Without a viewer the wall shows what the scene's camera sees. With one it is a window into the scene: eyes "
+      "at\n"
+      "# position_m, the wall around centre_m, both in metres.\n"
+      "# [[viewers]]\n"
+      "# id = \"eye\"\n";
+  return text + fmt::format("# position_m = [0.0, 0.0, {}]\n",
+                            toml_number(to_tenths_of_mm(1.5 * wall.columns * numbers.size_m.x)));
+}
+
+}  // namespace hpr

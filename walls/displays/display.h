@@ -1,0 +1,133 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "image/color.h"
+#include "image/image.h"
+#include "walls/config/wall.h"
+
+namespace hpr {
+
+/// A screen's finished picture, upright; sRGB. A display sends its panel what ScanOut makes of it.
+struct ScreenPicture {
+  std::size_t screen = 0;  ///< index into Wall::screens
+  const Image<Rgba8>& image;
+};
+
+/// What an operator's monitor shows.
+struct MonitorPicture {
+  std::size_t monitor = 0;  ///< index into Wall::monitors
+  const Image<Rgba8>& image;
+};
+
+/// The pictures of one frame this process is to show: all screens, or those whose display it is.
+struct WallFrame {
+  std::uint64_t number = 0;
+  std::span<const ScreenPicture> screens;
+  std::span<const MonitorPicture> monitors = {};
+};
+
+/// What showing a screen took.
+struct ScreenCost {
+  std::size_t screen = 0;   ///< index into Wall::screens
+  double ms = 0.0;          ///< until it was handed over: encoding, writing
+  std::uint64_t bytes = 0;  ///< handed over
+};
+
+/// How the viewer moved the camera about what it looks at, summed over a while.
+struct OrbitInput {
+  double turn_right = 0.0;  ///< radians by which the scene turns to the right
+  double turn_up = 0.0;     ///< radians by which the scene turns up
+  double pan_right = 0.0;   ///< by which the picture is dragged to the right, in heights of the wall
+  double pan_up = 0.0;
+  double dolly = 0.0;  ///< natural logarithm of how many times nearer the camera comes
+
+  OrbitInput& operator+=(const OrbitInput& other);
+  bool operator==(const OrbitInput&) const = default;
+};
+
+/// What the viewer asked for.
+struct DisplayInput {
+  OrbitInput orbit;
+  bool stop = false;  ///< end the run after this frame, orderly
+};
+
+/// Shows pictures on the screens of a wall.
+class Display {
+ public:
+  virtual ~Display() = default;
+
+  /// The name used on the command line and in reports.
+  [[nodiscard]] virtual std::string_view name() const = 0;
+
+  /// Returns when the frame is handed over; its pictures may then change. Throws Error (Io, Lost).
+  virtual void show(const WallFrame& frame) = 0;
+
+  /// What the last frame's screens took; empty where it is not known.
+  [[nodiscard]] virtual std::vector<ScreenCost> costs() const { return {}; }
+
+  /// What the viewer asked for since this was last called; never waits.
+  [[nodiscard]] virtual DisplayInput take_input() { return {}; }
+
+  /// Called once, after the last frame of a run that ended well: what is shown is completed. Throws Error (Io).
+  virtual void finish() {}
+};
+
+enum class PipeFormat : std::uint8_t { Rgba, Y4m };
+
+/// "rgba" or "y4m". Throws Error (Usage).
+[[nodiscard]] PipeFormat parse_pipe_format(const std::string& name);
+
+/// Where the display `pipe` writes, and what.
+struct PipeOptions {
+  std::string command = {};         ///< run by /bin/sh, frames on its standard input; empty: `file`
+  std::filesystem::path file = {};  ///< a file, a FIFO, or "-" for standard output
+  PipeFormat format = PipeFormat::Y4m;
+  std::string screen = {};  ///< id; empty: the assembled wall
+  int frames_per_second = 30;
+  std::chrono::milliseconds time_limit{30'000};  ///< without the reader taking a byte
+};
+
+struct DisplayOptions {
+  std::filesystem::path folder = {};  ///< for `file`; made if missing
+  bool overwrite = false;             ///< replace files that were there before the run
+  bool keep_frames = false;           ///< for `file`: each frame into a folder of its own too
+  PipeOptions pipe = {};
+  std::optional<std::vector<std::size_t>> screens = {};  ///< for `window`: those this process shows; none: all
+  std::string web_address = {};                          ///< for `web`: ADDR:PORT; empty: loopback, a free port
+  std::function<void(const std::string& line)> announce = nullptr;  ///< told where `web` is found
+};
+
+/// One way to show a wall; all of them stand in one list.
+struct DisplayKind {
+  std::string_view name;
+  bool whole_wall = false;   ///< one process shows all screens, whichever rank the wall file names
+  bool interactive = false;  ///< has a viewer who moves the camera, and who ends the run
+  bool monitors = false;     ///< shows the operator's monitors too
+  bool stream = false;       ///< what it was given cannot be taken back: a job that is lost does not go on
+  /// Throws Error: Usage for options that do not fit, Io when what is to be written to cannot be or holds what may not
+  /// be overwritten, NoDevice without a desktop for windows. `wall` must outlive the display.
+  std::unique_ptr<Display> (*make)(const Wall& wall, const DisplayOptions& options) = nullptr;
+  /// Throws what `make` would, as far as that can be told without opening anything; asked before long work.
+  void (*check)(const Wall& wall, const DisplayOptions& options) = nullptr;
+};
+
+/// "file" (of the latest frame folder/<screen id>.png, where its panel is sent another picture also
+/// folder/<screen id>.panel.png, and folder/<monitor id>.png; each file complete or untouched), "window", "web", "pipe"
+/// and "none".
+[[nodiscard]] const std::vector<DisplayKind>& display_kinds();
+[[nodiscard]] const std::vector<std::string>& all_displays();
+
+/// Throws Error (Usage) for an unknown name, with the choices and `further` ones that the caller has.
+[[nodiscard]] const DisplayKind& find_display(std::string_view name, std::span<const std::string> further = {});
+
+}  // namespace hpr

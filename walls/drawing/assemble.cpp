@@ -1,0 +1,116 @@
+#include "walls/drawing/assemble.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "image/image_parts.h"
+
+namespace hpr {
+namespace {
+
+/// What one target pixel covers of a source axis.
+struct Taps {
+  int first = 0;
+  std::vector<float> weights;  ///< sum 1
+};
+
+std::vector<Taps> make_taps(int from, int to) {
+  std::vector<Taps> taps(static_cast<std::size_t>(to));
+  const double ratio = static_cast<double>(from) / to;
+  for (int i = 0; i < to; ++i) {
+    const double begin = i * ratio;
+    const double end = (i + 1) * ratio;
+    const int first = std::min(static_cast<int>(begin), from - 1);
+    const int last = std::clamp(static_cast<int>(std::ceil(end)) - 1, first, from - 1);
+    Taps& tap = taps[static_cast<std::size_t>(i)];
+    tap.first = first;
+    double sum = 0.0;
+    for (int x = first; x <= last; ++x) {
+      const double covered = std::min(end, x + 1.0) - std::max(begin, static_cast<double>(x));
+      tap.weights.push_back(static_cast<float>(std::max(covered, 0.0)));
+      sum += std::max(covered, 0.0);
+    }
+    for (float& weight : tap.weights) weight = sum > 0.0 ? weight / static_cast<float>(sum) : 1.0F;
+  }
+  return taps;
+}
+
+std::array<float, 256> linear_levels() {
+  std::array<float, 256> levels{};
+  for (std::size_t i = 0; i < levels.size(); ++i) levels[i] = srgb_to_linear(static_cast<std::uint8_t>(i));
+  return levels;
+}
+
+}  // namespace
+
+Image<Rgba8> resample(const Image<Rgba8>& image, Size size) {
+  HPR_CHECK(image.size().area() > 0 && size.area() > 0);
+  if (image.size() == size) return image;
+  const std::array<float, 256> linear = linear_levels();
+  const std::vector<Taps> across = make_taps(image.width(), size.width);
+  const std::vector<Taps> down = make_taps(image.height(), size.height);
+  Image<Rgba8> result(size);
+  std::vector<Rgb> sums(static_cast<std::size_t>(size.width));
+  for (int y = 0; y < size.height; ++y) {
+    std::ranges::fill(sums, Rgb{});
+    const Taps& rows = down[static_cast<std::size_t>(y)];
+    for (std::size_t j = 0; j < rows.weights.size(); ++j) {
+      const auto source = image.row(rows.first + static_cast<int>(j));
+      for (std::size_t x = 0; x < sums.size(); ++x) {
+        const Taps& columns = across[x];
+        for (std::size_t i = 0; i < columns.weights.size(); ++i) {
+          const Rgba8 pixel = source[static_cast<std::size_t>(columns.first) + i];
+          const float weight = rows.weights[j] * columns.weights[i];
+          sums[x].r += weight * linear[pixel.r];
+          sums[x].g += weight * linear[pixel.g];
+          sums[x].b += weight * linear[pixel.b];
+        }
+      }
+    }
+    std::ranges::transform(sums, result.row(y).begin(), to_srgb);
+  }
+  return result;
+}
+
+Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<const Image<Rgba8>> screens) {
+  std::vector<const Image<Rgba8>*> pointers;
+  pointers.reserve(screens.size());
+  for (const Image<Rgba8>& screen : screens) pointers.push_back(&screen);
+  return draw_wall(wall, picture, pointers);
+}
+
+Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<const Image<Rgba8>* const> screens) {
+  HPR_CHECK(screens.size() == wall.screens.size() && screens.size() == picture.screens.size());
+  Image<Rgba8> result(picture.size, wall.gap_color);
+  for (const bool right_eye : {true, false}) {
+    for (std::size_t i = 0; i < screens.size(); ++i) {
+      if ((wall.screens[i].eye == Eye::Right) != right_eye) continue;
+      const Rect place = picture.screens[i];
+      const Size size{place.width(), place.height()};
+      const bool there = screens[i] != nullptr && screens[i]->size().area() > 0;
+      const Image<Rgba8> shown = there ? resample(*screens[i], size) : Image<Rgba8>(size, {0, 0, 0, 255});
+      paste(shown, place.x0, place.y0, result);
+    }
+  }
+  return result;
+}
+
+Image<Rgba8> turn_clockwise(const Image<Rgba8>& image, int degrees) {
+  HPR_CHECK(degrees >= 0 && degrees < 360 && degrees % 90 == 0);
+  const int w = image.width();
+  const int h = image.height();
+  Image<Rgba8> result(degrees % 180 == 0 ? Size{w, h} : Size{h, w});
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const Rgba8 pixel = image.at(x, y);
+      if (degrees == 0) result.at(x, y) = pixel;
+      if (degrees == 90) result.at(h - 1 - y, x) = pixel;
+      if (degrees == 180) result.at(w - 1 - x, h - 1 - y) = pixel;
+      if (degrees == 270) result.at(y, w - 1 - x) = pixel;
+    }
+  }
+  return result;
+}
+
+}  // namespace hpr

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <span>
+
+#include "image/color.h"
+#include "image/image.h"
+#include "walls/config/wall.h"
+#include "walls/geometry/geometry.h"
+
+namespace hpr {
+
+/// The assembled wall: each screen's picture (upright, in the wall's order) at its place, and the wall's gap colour
+/// between them. A picture whose size differs from its place is resampled by area, in linear light; an empty one
+/// leaves its place black. Of two screens for different eyes in one place the left eye's is seen.
+[[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
+                                     std::span<const Image<Rgba8>> screens);
+/// The same; a null picture leaves its place black.
+[[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
+                                     std::span<const Image<Rgba8>* const> screens);
+
+/// `image` on `size` pixels: each the mean, in linear light, of the area it covers.
+[[nodiscard]] Image<Rgba8> resample(const Image<Rgba8>& image, Size size);
+
+/// `image` turned clockwise by 0, 90, 180 or 270 degrees: what is sent to a panel that is mounted turned.
+[[nodiscard]] Image<Rgba8> turn_clockwise(const Image<Rgba8>& image, int degrees);
+
+}  // namespace hpr

@@ -1,0 +1,102 @@
+#include "walls/manifest/manifest.h"
+
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "core/hash.h"
+#include "walls/manifest/budget_json.h"
+
+namespace hpr {
+namespace {
+
+// ordered_json keeps the order of insertion: a manifest reads from the general to the particular.
+using Json = nlohmann::ordered_json;
+
+Json json_of(const HeadRecord& head) {
+  const auto& [position, turn] = head.pose;
+  return Json{{"viewer", head.viewer},
+              {"position_m", {position.x, position.y, position.z}},
+              {"orientation", {turn.x, turn.y, turn.z, turn.w}}};
+}
+
+Json picture_json(const ScreenRecord& screen) {
+  return Json{
+      {"id", screen.id}, {"width", screen.size.width}, {"height", screen.size.height}, {"xxh64", hex16(screen.xxh64)}};
+}
+
+Json json_of(const FrameRecord& frame) {
+  Json screens = Json::array();
+  for (const ScreenRecord& screen : frame.screens) {
+    screens.push_back(picture_json(screen));
+    screens.back()["state"] = to_string(screen.state);
+  }
+  Json record{{"frame", frame.frame}, {"ms", frame.ms}, {"strategy", frame.strategy}, {"screens", std::move(screens)}};
+  if (frame.budget) record["budget"] = budget_json(*frame.budget);
+  // Apart from the screens: those are the same from run to run.
+  for (const ScreenRecord& screen : frame.screens) {
+    if (screen.rank < 0) continue;
+    Json cost{{"id", screen.id}, {"rank", screen.rank}};
+    if (screen.ms) cost["ms"] = *screen.ms;
+    if (screen.bytes) cost["bytes"] = *screen.bytes;
+    record["costs"].push_back(std::move(cost));
+  }
+  if (frame.slowest) {
+    record["slowest"] = Json{{"rank", frame.slowest->rank},
+                             {"host", frame.slowest->host},
+                             {"ms", frame.slowest->ms},
+                             {"pass", frame.slowest->pass},
+                             {"pass_ms", frame.slowest->pass_ms}};
+  }
+  for (const HeadRecord& head : frame.heads) record["heads"].push_back(json_of(head));
+  for (const ScreenRecord& monitor : frame.monitors) record["monitors"].push_back(picture_json(monitor));
+  if (frame.swap) {
+    record["swap"] = Json{{"skew_ms", frame.swap->skew_ms ? Json(*frame.swap->skew_ms) : Json(nullptr)}};
+  }
+  return record;
+}
+
+}  // namespace
+
+std::string_view to_string(ScreenState state) {
+  switch (state) {
+    case ScreenState::Fresh:
+      return "fresh";
+    case ScreenState::Stale:
+      return "stale";
+    case ScreenState::Lost:
+      break;
+  }
+  return "lost";
+}
+
+ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state) {
+  return {id, picture.size(), xxh64(std::as_bytes(picture.pixels())), state};
+}
+
+std::string to_json(const FrameRecord& frame) {
+  return json_of(frame).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string to_json(const RunManifest& manifest) {
+  Json frames = Json::array();
+  for (const std::string& frame : manifest.earlier) frames.push_back(Json::parse(frame));
+  for (const FrameRecord& frame : manifest.frames) frames.push_back(json_of(frame));
+  Json document{{"schema", "hpr.wall-run/1"},
+                {"scene_hash", hex16(manifest.scene_hash)},
+                {"wall_hash", hex16(manifest.wall_hash)},
+                {"seed", manifest.seed},
+                {"versions", manifest.versions},
+                {"frames", std::move(frames)}};
+  if (!manifest.restarts.empty()) {
+    document["restarts"] = Json::array();
+    for (const std::string& restart : manifest.restarts) document["restarts"].push_back(Json::parse(restart));
+  }
+  if (manifest.stopped_of) {
+    document["stopped"] =
+        Json{{"frames", manifest.earlier.size() + manifest.frames.size()}, {"of", *manifest.stopped_of}};
+  }
+  if (manifest.degraded_seconds) document["degraded_seconds"] = *manifest.degraded_seconds;
+  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace hpr
