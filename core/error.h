@@ -6,7 +6,7 @@
 
 namespace hpr {
 
-/// What the process leaves behind, the same on every rank (docs/cli.md).
+/// What the process leaves behind, the same on every rank (docs/commands.md).
 enum class ExitCode : int {
   Done = 0,
   CheckFailed = 1,  ///< a check said no: a difference, a finding, a regression

@@ -222,6 +222,25 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
   if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
 }
 
+void check_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::path there = std::filesystem::absolute(folder, error).lexically_normal();
+  while (there.has_relative_path() && !std::filesystem::exists(std::filesystem::symlink_status(there, error))) {
+    there = there.parent_path();
+  }
+  int problem = 0;
+  if (!std::filesystem::is_directory(there, error)) {
+    problem = ENOTDIR;
+  } else if (::access(there.c_str(), W_OK | X_OK) != 0) {
+    problem = errno;
+  }
+  if (problem == 0) return;
+  throw Error(ExitCode::Io,
+              fmt::format("cannot make the folder '{}': {}", printable(folder.string(), 300),
+                          std::generic_category().message(problem)),
+              "name a folder that can be written with -o");
+}
+
 FolderLock::FolderLock(const std::filesystem::path& folder)
     : folder_(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (folder_ < 0 && errno == EACCES) return;  // it may still be written to

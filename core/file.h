@@ -55,6 +55,10 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 /// writable: asked before long work.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
+/// Throws Error (Io) when `folder` is there and no folder that can be written to, or is not there and cannot be made:
+/// asked before long work; makes nothing.
+void check_folder(const std::filesystem::path& folder);
+
 /// Keeps other processes of this host from writing their results into a folder, if they ask for it in the same way.
 /// Where it cannot be locked it keeps nobody.
 class FolderLock {

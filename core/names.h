@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace hpr {
 
@@ -17,5 +18,10 @@ namespace hpr {
 /// `text` with control characters, invisible and direction-changing ones, and bytes that are no UTF-8 written as \xNN;
 /// at most `limit` bytes and then "...": for names that come out of files and reach a terminal.
 [[nodiscard]] std::string printable(std::string_view text, std::size_t limit = 80);
+
+/// The words between commas.
+[[nodiscard]] std::vector<std::string> split_commas(std::string_view list);
+/// The words between commas that are not empty.
+[[nodiscard]] std::vector<std::string> split_words(std::string_view list);
 
 }  // namespace hpr

@@ -35,6 +35,10 @@ std::string_view name_of(Aov aov) {
   return kNames.at(static_cast<std::size_t>(aov));
 }
 
+std::span<const std::string_view> aov_names() {
+  return kNames;
+}
+
 std::vector<Aov> parse_aovs(const std::string& list) {
   std::vector<Aov> aovs;
   for (std::size_t start = 0; start <= list.size();) {

@@ -32,6 +32,8 @@ enum class Aov : std::uint8_t {
 };
 
 [[nodiscard]] std::string_view name_of(Aov aov);
+/// Every name, in the order of the enumeration.
+[[nodiscard]] std::span<const std::string_view> aov_names();
 /// "depth,id": throws Error (Usage) for unknown names, with the choices. Sorted, each once.
 [[nodiscard]] std::vector<Aov> parse_aovs(const std::string& list);
 

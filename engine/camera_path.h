@@ -18,8 +18,9 @@ struct CameraKey {
   double fov_degrees = 45.0;
 };
 
-/// A recorded way of a camera, docs/cli.md has its format. Passes through its keys on a Catmull-Rom spline (Catmull,
-/// Rom, "A Class of Local Interpolating Splines", 1974), and rests between two equal keys that follow each other.
+/// A recorded way of a camera, docs/commands.md has its format. Passes through its keys on a Catmull-Rom spline
+/// (Catmull, Rom, "A Class of Local Interpolating Splines", 1974), and rests between two equal keys that follow each
+/// other.
 class CameraPath {
  public:
   /// Not empty.

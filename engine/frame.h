@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cluster/distribution/assignment.h"
@@ -20,6 +22,7 @@ enum class Shading {
   Deferred,  ///< keys are composited, then whoever owns a pixel lights it: no ray is spent on what is hidden
   Local,     ///< each rank lights what it drew, and colours are composited: the classic order
 };
+inline constexpr std::array<std::string_view, 2> kShadingNames{"deferred", "local"};
 
 /// What makes the keys.
 enum class Primary {
@@ -27,6 +30,7 @@ enum class Primary {
   Rays,    ///< Embree, one ray through each pixel's centre; other surfaces are seen at some edges
   Auto,    ///< whichever a measurement finds quicker
 };
+inline constexpr std::array<std::string_view, 3> kPrimaryNames{"raster", "rays", "auto"};
 
 /// How a frame is made; every choice gives the same picture, but for local shading: it has 8 bits a channel, and
 /// coplanar surfaces of different ranks show the brighter colour.

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "core/hash.h"
+#include "engine/settings_table.h"
 
 namespace hpr {
 namespace {
@@ -36,41 +37,30 @@ std::string describe(const View& view) {
 }  // namespace
 
 RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span<const View> views,
-                        const Sampling& sampling, bool keeps_keys) {
-  const RaySettings& rays = plan.rays;
+                        const RenderSettings& settings, bool keeps_keys) {
   RunIdentity identity{
       {"program", fmt::format("hpr {} ({})", kVersion, kCommit)},
       {"scene", hex16(content_hash(session.scene()))},
-      {"seed", fmt::format("{}", rays.seed)},
-      {"filter", std::string(name_of(sampling.filter.value_or(PixelFilter::Box)))},
-      {"shading", plan.shading == Shading::Local ? "local" : "deferred"},
+      {"seed", fmt::format("{}", plan.rays.seed)},
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     identity.emplace_back(fmt::format("view {}", i), describe(views[i]));
   }
   std::vector<std::string> passes;
-  for (const PassPlan& pass : plan_passes(session.requirements(), rays)) {
+  for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
     if (pass.runs) passes.push_back(pass.name);
   }
   identity.emplace_back("list of passes", fmt::format("'{}'", fmt::join(passes, ",")));
+  identity.emplace_back("number of photons", fmt::format("{}", plan.rays.photons));
   identity.emplace_back(kKeys, plan.primary == Primary::Rays ? kByRays : kByRaster);
-  identity.emplace_back("depth format", std::string(kDepthFormatNames.at(static_cast<std::size_t>(plan.depth_format))));
-  identity.emplace_back("light", rays.reference ? "the reference" : "passes");
-  identity.emplace_back("instructions of rays", rays.build.same_instructions ? "the same everywhere" : "the widest");
-  identity.emplace_back("depth", fmt::format("{}", rays.max_depth));
-  identity.emplace_back("samples of lights", fmt::format("{}", rays.light_samples));
-  identity.emplace_back("glossy cutoff", fmt::format("{}", rays.glossy_cutoff));
-  identity.emplace_back("photons", fmt::format("{}{} of radius {}", rays.photons, rays.global_photons ? " global" : "",
-                                               rays.photon_radius));
-  identity.emplace_back("ambient light", fmt::format("{} by {} rays", rays.ambient, rays.occlusion_rays));
-  identity.emplace_back("list at half resolution", fmt::format("'{}'", fmt::join(rays.half_resolution, ",")));
-  identity.emplace_back("denoiser", rays.denoise ? "on" : "off");
-  identity.emplace_back("terminator fix", rays.terminator_fix ? "on" : "off");
-  std::vector<std::string_view> aovs;
-  for (const Aov aov : plan.aovs) aovs.push_back(name_of(aov));
-  identity.emplace_back("list of AOVs", fmt::format("'{}'", fmt::join(aovs, ",")));
-  const std::string goal = sampling.goal.samples ? fmt::format("{}", *sampling.goal.samples) : "open";
-  identity.emplace_back("number of adaptive samples", sampling.adaptive ? goal : "none");
+  for (const Setting& setting : all_settings()) {
+    if (setting.decides_bits) {
+      identity.emplace_back(fmt::format("--{}", setting.name), fmt::format("'{}'", setting.value.write(settings)));
+    }
+  }
+  const SampleGoal& goal = settings.sampling.goal;
+  const std::string samples = goal.samples ? fmt::format("{}", *goal.samples) : "open";
+  identity.emplace_back("number of adaptive samples", settings.sampling.adaptive ? samples : "none");
   identity.emplace_back("--raw", keeps_keys ? "given" : "left out");
   return identity;
 }

@@ -111,9 +111,9 @@ def refusals(folder, state):
     scene, size = ["gen:gallery"], ["--size", "96x64"]
     foreign = {"scene": ["gen:cornell", *size], "seed": [*scene, *size, "--seed", "2"], "view": [*scene, "--size", "95x64"],
                "filter": [*scene, *size, "--filter", "gaussian"], "view 0": [*scene, *size, "--fov", "30"],
-               "passes": [*scene, *size, "--passes", "none"], "depth": [*scene, *size, "--max-depth", "3"],
-               "AOVs": [*scene, *size, "--aov", "id"], "adaptive": [*scene, *size, "--adaptive"],
-               "denoiser": [*scene, *size, "--denoise"], "--raw": [*scene, *size, "--raw", "c.keys"]}
+               "passes": [*scene, *size, "--passes", "none"], "--max-depth": [*scene, *size, "--max-depth", "3"],
+               "--aov": [*scene, *size, "--aov", "id"], "adaptive": [*scene, *size, "--adaptive"],
+               "--denoise": [*scene, *size, "--denoise"], "--raw": [*scene, *size, "--raw", "c.keys"]}
     for field, arguments in foreign.items():
         result = subprocess.run([HPR, "render", *arguments, *COMMON, "--spp", "20", *resume], cwd=folder,
                                 capture_output=True, text=True, timeout=300, check=False)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every way to leave hpr that docs/cli.md names and that can be brought about here.
+"""Every way to leave hpr that docs/commands.md names and that can be brought about here.
 
 usage: exit_codes_test.py HPR
 

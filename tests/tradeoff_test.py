@@ -48,8 +48,6 @@ def knobs(folder):
     render_text = hpr(folder, "render", "--help").stdout
     expect([name for name in names if name not in render_text] == ["--codec", "--codec-quality", "--codec-error"],
           "render lacks other knobs than those of pictures on their way")
-    table = hpr(folder, "help", "knobs", "--markdown").stdout
-    expect(table in (SOURCE / "docs" / "knobs.md").read_text(), "docs/knobs.md is not what hpr help knobs --markdown prints")
 
 
 def errors_are_those_of_diff(folder):

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <array>
 #include <filesystem>
 #include <fstream>
@@ -28,15 +27,12 @@ class DemoCommand final : public Command {
     return "a wall picture of a built-in scene: does this machine work?";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("--wall", wall_, "screens of the wall, e.g. 3x2 or 3x2@640x360")
-        ->capture_default_str()
-        ->type_name("CxR")
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    app.add_option("-o,--output", output_, "the assembled wall")
-        ->capture_default_str()
-        ->type_name("FILE.png")
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  void declare(const OptionSet& options) override {
+    options.option("--wall", wall_, "screens of the wall, e.g. 3x2 or 3x2@640x360")
+        .show_default()
+        .type("CxR")
+        .last_counts();
+    options.option("-o,--output", output_, "the assembled wall").show_default().type("FILE.png").last_counts();
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
@@ -48,7 +44,7 @@ class DemoCommand final : public Command {
     run.summary = true;
     // The quickest proof that a machine works: light that hardly varies from pixel to pixel is worked out for one in
     // four.
-    run.options.half_resolution = "shadow,photon";
+    set_setting(run.settings, "half-resolution", "shadow,photon");
     // The demo's own picture may be made again and again; a name the user chose is guarded as everywhere.
     Globals own = globals;
     std::error_code error;

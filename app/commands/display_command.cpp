@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <filesystem>
 
 #include "app/command.h"
-#include "app/commands/wall_run.h"
+#include "app/commands/wall_options.h"
 #include "app/options/display_flags.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -30,20 +29,19 @@ class DisplayCommand final : public Command {
     return "show the screens of one host of a wall, for wall run --display remote";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("--wall", wall_, "a wall file, or CxR, or CxR@WxH")->required();
-    app.add_option("--host", host_,
+  [[nodiscard]] bool opens_windows() const override { return true; }
+
+  void declare(const OptionSet& options) override {
+    options.option("--wall", wall_, "a wall file, or CxR, or CxR@WxH").required();
+    options.option("--host", host_,
                    "whose screens: a host of the wall file, or a node's id (not needed where there is one)");
-    show_.declare(app);
-    declare_overrides(app, overrides_);
-    app.add_option("--listen", listen_, "instead of the socket wall run looks for; again for another")
-        ->type_name("ADDR:PORT|PATH");
-    app.add_option("--stale-after", stale_after_, "a screen without a new frame for so long is marked")
-        ->capture_default_str();
-    app.add_option("--scale", scale_, "of the screens' pixels: the same as wall run's")
-        ->check(CLI::Range(1e-6, 1e6))
-        ->capture_default_str();
-    app.add_flag("--once", once_, "leave when the first run is over");
+    show_.declare(options);
+    declare_overrides(options, overrides_);
+    options.option("--listen", listen_, "instead of the socket wall run looks for; again for another")
+        .type("ADDR:PORT|PATH");
+    options.option("--stale-after", stale_after_, "a screen without a new frame for so long is marked").show_default();
+    options.option("--scale", scale_, "of the screens' pixels: the same as wall run's").range(1e-6, 1e6).show_default();
+    options.flag("--once", once_, "leave when the first run is over");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <limits>
 #include <optional>
@@ -33,18 +32,19 @@ class RenderCommand final : public Command {
   [[nodiscard]] std::string_view name() const override { return "render"; }
   [[nodiscard]] std::string_view summary() const override { return "draw a scene into a picture"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("-o,--output", files_.picture, "the picture: .png or .exr");
-    app.add_option("--size", size_, "pixels of the picture")->capture_default_str()->type_name("WxH");
-    app.add_option("--raw", files_.raw,
+  void declare(const OptionSet& options) override {
+    options.option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    options.option("-o,--output", files_.picture, "the picture: .png or .exr");
+    options.option("--size", size_, "pixels of the picture").show_default().type("WxH");
+    options.option("--raw", files_.raw,
                    "write the keys: per pixel a 64-bit word, depth above surface, row 0 at the top");
-    app.add_option(
-           "--checkpoint", checkpoint_,
-           "where SIGUSR1 (and stop) and SIGUSR2 (and go on) put the samples so far (default: OUTPUT.checkpoint)")
-        ->type_name("FILE");
-    app.add_flag("--resume", resume_, "go on with the samples of the checkpoint");
-    options_.declare(app);
+    options
+        .option("--checkpoint", checkpoint_,
+                "where SIGUSR1 (and stop) and SIGUSR2 (and go on) put the samples so far (default: OUTPUT.checkpoint)")
+        .type("FILE");
+    options.flag("--resume", resume_, "go on with the samples of the checkpoint");
+    declare_settings(options, settings_);
+    report_.declare(options);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
@@ -52,49 +52,39 @@ class RenderCommand final : public Command {
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
     const Size size{extent->first, extent->second};
     check_size(size, globals.picture_limits());
-    const FrameSettings settings = options_.settings(globals.seed);
-    const Sampling sampling = options_.sampling();
-    files_.aovs = settings.aovs;
-    files_.exposure = options_.exposure;
-    files_.colors = options_.wire.colors();
+    const RenderSettings settings = resolve(settings_, globals.seed);
+    files_.aovs = settings.frame.aovs;
+    files_.exposure = settings.exposure_stops;
+    files_.colors = settings.color_format;
     if (checkpoint_.empty() && !files_.picture.empty()) checkpoint_ = files_.picture + ".checkpoint";
-    if (!sampling.sums()) checkpoint_.clear();
+    if (!settings.sampling.sums()) checkpoint_.clear();
     if (!inside_mpi_job()) {
-      check_outputs(globals);
-      for (const std::string& option : options_.without_use()) {
-        log::warning("{} has no use for {}", options_.reference ? "--reference" : "--passes " + options_.passes,
-                     option);
+      check_outputs(settings, globals);
+      for (const std::string& sentence : unused_settings(settings)) log::warning("{}", sentence);
+      const int ranks = std::max(1, globals.ranks);
+      if (settings.frame.groups > ranks) {
+        log::warning("--groups {}: there are no more than {}, of one rank each", settings.frame.groups, ranks);
       }
-      warn_of_groups(settings, std::max(1, globals.ranks));
     }
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
-      if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(globals); });
-      Session session(comm, globals.session(), [&] { return options_.load(source_, globals); });
-      return draw(session, globals, settings, sampling, size);
+      if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(settings, globals); });
+      Session session(comm, globals.session(), [&] { return load_scene(source_, settings, globals); });
+      return draw(session, globals, settings, size);
     });
   }
 
  private:
-  /// Of any distribution but hybrid, which `auto` may choose, they are none of its business.
-  void warn_of_groups(const FrameSettings& settings, int ranks) const {
-    if (settings.distribution.value_or(Distribution::Hybrid) != Distribution::Hybrid && settings.groups > 0) {
-      log::warning("--distribute {} has no use for --groups", options_.distribute);
-    } else if (settings.groups > ranks) {
-      log::warning("--groups {}: there are no more than {}, of one rank each", settings.groups, ranks);
-    }
-  }
-
-  void check_outputs(const Globals& globals) const {
-    if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty() && !options_.explain) {
+  void check_outputs(const RenderSettings& settings, const Globals& globals) const {
+    if (files_.picture.empty() && files_.raw.empty() && report_.stats.empty() && !report_.explain) {
       throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");
     }
     if (!files_.picture.empty() && !files_.picture.ends_with(".png") && !files_.picture.ends_with(".exr")) {
       throw Error(ExitCode::Usage, fmt::format("cannot write '{}': unknown picture format", files_.picture),
                   "name a .png or .exr file");
     }
-    if (!files_.raw.empty()) check_raw(options_);
-    if (files_.picture.ends_with(".exr") && options_.shading == "local") {
+    if (!files_.raw.empty()) check_raw(settings);
+    if (files_.picture.ends_with(".exr") && settings.frame.shading == Shading::Local) {
       log::warning("--shading local composites 8-bit display colours: '{}' will hold no more than those",
                    files_.picture);
     }
@@ -106,9 +96,9 @@ class RenderCommand final : public Command {
                   "ask for more with --spp, and name the picture with -o or the file with --checkpoint");
     }
     const std::string beside = files_.is_png() ? files_.aov_file() : "";
-    const std::vector<std::string> results{files_.picture, files_.raw, options_.stats, beside, checkpoint_};
+    const std::vector<std::string> results{files_.picture, files_.raw, report_.stats, beside, checkpoint_};
     check_distinct(results, globals.trace);
-    check_spared(source_, globals.scene_limits(), std::span(&options_.environment, 1), results);
+    check_spared(source_, globals.scene_limits(), std::span(&settings.environment, 1), results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
     }
@@ -128,17 +118,17 @@ class RenderCommand final : public Command {
     if (files_.colors != ColorFormat::Float32) fmt::print("{}\n", files_.explain_colors());
   }
 
-  ExitCode draw(Session& session, const Globals& globals, const FrameSettings& settings, const Sampling& sampling,
-                Size size) {
-    const View view = make_view(options_.choose_camera(session.scene()), size, session.scene().bounds);
-    const Blocks blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.resolution_scale));
-    FrameSettings chosen = settings;
-    if (resume_ && settings.primary == Primary::Auto) chosen.primary = primary_before(session.comm());
+  ExitCode draw(Session& session, const Globals& globals, const RenderSettings& settings, Size size) {
+    const Sampling& sampling = settings.sampling;
+    const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
+    const Blocks blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.frame.resolution_scale));
+    FrameSettings chosen = settings.frame;
+    if (resume_ && chosen.primary == Primary::Auto) chosen.primary = primary_before(session.comm());
     FramePlan plan = plan_frame(session, chosen, blocks.views);
-    plan.lit = !files_.picture.empty() || !options_.stats.empty();
+    plan.lit = !files_.picture.empty() || !report_.stats.empty();
     const bool speaks = session.comm().rank() == 0;
-    if (options_.explain && speaks) print_plan(plan);
-    if (files_.picture.empty() && files_.raw.empty() && options_.stats.empty()) return ExitCode::Done;
+    if (report_.explain && speaks) print_plan(plan);
+    if (files_.picture.empty() && files_.raw.empty() && report_.stats.empty()) return ExitCode::Done;
 
     prepare(session, plan);
     const Stopwatch watch;
@@ -149,7 +139,7 @@ class RenderCommand final : public Command {
     const CheckpointSettings checkpoint{checkpoint_, resume_, [&] {
                                           if (!identity)
                                             identity =
-                                                identity_of(session, plan, blocks.views, sampling, !files_.raw.empty());
+                                                identity_of(session, plan, blocks.views, settings, !files_.raw.empty());
                                           return *identity;
                                         }};
     if (!sampler.draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
@@ -162,14 +152,14 @@ class RenderCommand final : public Command {
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;
       picture.write(session.scene().name);
-      if (!options_.stats.empty()) write_stats(options_.stats, stats);
+      if (!report_.stats.empty()) write_stats(report_.stats, stats);
     });
     if (speaks) {
       log::info("{} triangles, {}x{} pixels, {} rank{}: {:.1f} ms{}", session.scene().triangles, size.width,
                 size.height, stats.ranks, stats.ranks == 1 ? "" : "s", stats.ms,
                 sampling.sums() ? fmt::format(", {} samples", sampler.reached_so_far().samples) : "");
     }
-    return verdict(stats, options_.strict);
+    return verdict(stats, settings.strict);
   }
 
   std::string source_;
@@ -177,7 +167,8 @@ class RenderCommand final : public Command {
   PictureFiles files_;
   std::string checkpoint_;
   bool resume_ = false;
-  RenderOptions options_;
+  RenderSettings settings_;
+  ReportOptions report_;
 };
 
 }  // namespace

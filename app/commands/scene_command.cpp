@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -76,42 +75,17 @@ void log_warnings(const Scene& scene) {
   for (const std::string& warning : scene.warnings) log::warning("{}", printable(warning, 400));
 }
 
-/// Looks at scenes and makes them: what is in one, whether it can be drawn, and those HPR generates.
-class SceneCommand final : public Command {
+class SceneInfoCommand final : public Command {
  public:
-  [[nodiscard]] std::string_view name() const override { return "scene"; }
-  [[nodiscard]] std::string_view summary() const override {
-    return "what a scene holds, whether it loads, and new ones";
-  }
+  [[nodiscard]] std::string_view name() const override { return "info"; }
+  [[nodiscard]] std::string_view summary() const override { return "counts, bounds and the passes the scene requires"; }
 
-  void declare(CLI::App& app) override {
-    app.require_subcommand(1);
-    info_ = app.add_subcommand("info", "counts, bounds and the passes the scene requires");
-    validate_ = app.add_subcommand("validate", "findings; exit code 0 when the scene can be drawn");
-    for (CLI::App* const sub : {info_, validate_}) {
-      sub->add_option("SCENE", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-      sub->add_flag("--json", json_, "one JSON document");
-      sub->fallthrough();
-    }
-    make_ = app.add_subcommand("make", "writes a generated scene as binary glTF");
-    make_->add_option("NAME", source_, "one of `hpr scene list`, also as NAME?key=value")->required();
-    make_->add_option("--triangles", triangles_, "about this many, the nearest size the generator has")
-        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{4'294'967'294}));
-    make_->add_option("-o", output_, "the .glb file")->required();
-    make_->fallthrough();
-    list_ = app.add_subcommand("list", "the scenes HPR generates and their options");
-    list_->fallthrough();
+  void declare(const OptionSet& options) override {
+    options.option("SCENE", source_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    options.flag("--json", json_, "one JSON document");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
-    if (info_->parsed()) return info(globals);
-    if (validate_->parsed()) return validate(globals);
-    if (make_->parsed()) return make(globals);
-    return list();
-  }
-
- private:
-  [[nodiscard]] ExitCode info(const Globals& globals) const {
     const Scene scene = load_scene(source_, globals.scene_limits());
     if (json_) {
       fmt::print("{}\n", dump(info_json(scene)));
@@ -122,7 +96,24 @@ class SceneCommand final : public Command {
     return ExitCode::Done;
   }
 
-  [[nodiscard]] ExitCode validate(const Globals& globals) const {
+ private:
+  std::string source_;
+  bool json_ = false;
+};
+
+class SceneValidateCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "validate"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "findings; exit code 0 when the scene can be drawn";
+  }
+
+  void declare(const OptionSet& options) override {
+    options.option("SCENE", source_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    options.flag("--json", json_, "one JSON document");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
     Json json{{"schema", "hpr.scene-validate/1"}, {"scene", source_}};
     try {
       const Scene scene = load_scene(source_, globals.scene_limits());
@@ -147,7 +138,24 @@ class SceneCommand final : public Command {
     }
   }
 
-  [[nodiscard]] ExitCode make(const Globals& globals) const {
+ private:
+  std::string source_;
+  bool json_ = false;
+};
+
+class SceneMakeCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "make"; }
+  [[nodiscard]] std::string_view summary() const override { return "writes a generated scene as binary glTF"; }
+
+  void declare(const OptionSet& options) override {
+    options.option("NAME", source_, "one of `hpr scene list`, also as NAME?key=value").required();
+    options.option("--triangles", triangles_, "about this many, the nearest size the generator has")
+        .range(std::uint64_t{1}, std::uint64_t{4'294'967'294});
+    options.option("-o", output_, "the .glb file").required();
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
     constexpr std::string_view kPrefix = "gen:";  // as `list` names them
     std::string text = source_.starts_with(kPrefix) ? source_.substr(kPrefix.size()) : source_;
     const Generator& generator = find_generator(text.substr(0, text.find('?')));
@@ -179,22 +187,33 @@ class SceneCommand final : public Command {
     return ExitCode::Done;
   }
 
-  [[nodiscard]] static ExitCode list() {
+ private:
+  std::string source_;
+  std::string output_;
+  std::uint64_t triangles_ = 0;
+};
+
+class SceneListCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "list"; }
+  [[nodiscard]] std::string_view summary() const override { return "the scenes HPR generates and their options"; }
+
+  [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
     for (const Generator& generator : all_generators()) {
       fmt::print("gen:{}  {}\n", generator.name, generator.summary);
       for (const auto& [key, meaning] : generator.options) fmt::print("    {:<10} {}\n", key, meaning);
     }
     return ExitCode::Done;
   }
+};
 
-  CLI::App* info_ = nullptr;
-  CLI::App* validate_ = nullptr;
-  CLI::App* make_ = nullptr;
-  CLI::App* list_ = nullptr;
-  std::string source_;
-  std::string output_;
-  std::uint64_t triangles_ = 0;
-  bool json_ = false;
+/// Looks at scenes and makes them: what is in one, whether it can be drawn, and those that HPR generates.
+class SceneCommand final : public CommandGroup {
+ public:
+  SceneCommand() : CommandGroup("scene", "what a scene holds, whether it loads, and new ones") {}
+  [[nodiscard]] std::vector<std::unique_ptr<Command>> subcommands() const override {
+    return commands_of<SceneInfoCommand, SceneValidateCommand, SceneMakeCommand, SceneListCommand>();
+  }
 };
 
 }  // namespace

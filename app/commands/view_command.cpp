@@ -1,6 +1,6 @@
-#include <CLI/CLI.hpp>
 
 #include "app/command.h"
+#include "app/commands/wall_options.h"
 #include "app/commands/wall_run.h"
 #include "core/job_environment.h"
 #include "walls/displays/window_display.h"
@@ -14,15 +14,18 @@ class ViewCommand final : public Command {
   [[nodiscard]] std::string_view name() const override { return "view"; }
   [[nodiscard]] std::string_view summary() const override { return "look around in a scene: in windows or a browser"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("--wall", run_.wall, "a wall file, or CxR, or CxR@WxH")->capture_default_str();
-    app.add_flag("--web", address_, "=ADDR:PORT: in a browser instead of windows; by default on loopback, a free port");
-    app.add_option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
-        ->check(CLI::Range(1, 1'000'000));
-    declare_target_ms(app, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
-    run_.options.declare(app);
-    app.get_option("--aov")->group("");  // it writes no files, and refuses it
+  [[nodiscard]] bool opens_windows() const override { return true; }
+
+  void declare(const OptionSet& options) override {
+    options.option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    options.option("--wall", run_.wall, "a wall file, or CxR, or CxR@WxH").show_default();
+    options.flag("--web", address_, "=ADDR:PORT: in a browser instead of windows; by default on loopback, a free port");
+    options.option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
+        .range(1, 1'000'000);
+    declare_target_ms(options, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
+    declare_settings(options, run_.settings);
+    run_.report.declare(options);
+    options.declared("--aov").hidden();  // it writes no files, and refuses layers
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
@@ -31,7 +34,7 @@ class ViewCommand final : public Command {
   }
 
  private:
-  /// By the command line and, on rank 0, whether there is a desktop; the others will take its word.
+  /// By the command line and, on rank 0, whether there is a desktop; the other ranks take rank 0's.
   [[nodiscard]] std::string display() const {
     if (address_.empty()) return launched_rank() == 0 && has_desktop() ? "window" : "web";
     return address_ == "true" ? "web" : "web=" + address_;  // a flag without a value is true

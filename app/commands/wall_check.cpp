@@ -7,12 +7,14 @@
 #include <numeric>
 #include <set>
 
-#include "app/commands/wall_command.h"
+#include "app/command.h"
+#include "app/commands/wall_options.h"
 #include "app/report_error.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "image/key.h"
+#include "walls/config/wall_file.h"
 #include "walls/drawing/plan.h"
 #include "walls/geometry/geometry.h"
 #include "walls/geometry/stereo.h"
@@ -20,6 +22,12 @@
 
 namespace hpr {
 namespace {
+
+/// What `hpr wall check` reports about a wall.
+struct WallCheck {
+  std::string spec;  ///< as the user named it
+  WallReading reading;
+};
 
 /// What one wants to know about a sound wall.
 struct Figures {
@@ -198,8 +206,7 @@ double tenths(double value) {
   return std::round(10.0 * value) / 10.0;
 }
 
-}  // namespace
-
+/// Every finding on stderr: errors in their three lines, warnings in one.
 void report_findings(const WallCheck& check) {
   for (const WallFinding& finding : check.reading.findings) {
     if (finding.error) {
@@ -210,6 +217,7 @@ void report_findings(const WallCheck& check) {
   }
 }
 
+/// A sound wall's figures in words: pixels, hosts, gaps, seams, viewer.
 std::string describe_wall(const Wall& wall) {
   const Figures figures = figures_of(wall);
   std::string text = fmt::format("ok: {}, {}, ", plural(wall.screens.size(), "screen"), plural(figures.hosts, "host"));
@@ -226,6 +234,7 @@ std::string describe_wall(const Wall& wall) {
   return text + describe_first_viewer(wall, figures.flat) + describe_more(wall) + describe_memory(wall);
 }
 
+/// Findings and figures as JSON, schema hpr.wall-check/1.
 std::string check_json(const WallCheck& check) {
   Json findings = Json::array();
   for (const WallFinding& finding : check.reading.findings) {
@@ -262,6 +271,55 @@ std::string check_json(const WallCheck& check) {
     document["memory"] = memory_json(wall);
   }
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+/// `hpr wall check WALL`.
+class WallCheckCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "check"; }
+  [[nodiscard]] std::string_view summary() const override { return "every error and oddity in a wall file"; }
+
+  void declare(const OptionSet& options) override {
+    declare_wall(options, wall_);
+    options.flag("--json", json_, "print one JSON document (hpr.wall-check/1)");
+    declare_overrides(options, overrides_);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
+    const WallCheck check{wall_, read()};
+    if (json_) {
+      fmt::print("{}", check_json(check));
+    } else {
+      report_findings(check);
+      if (check.reading.ok()) fmt::print("{}", describe_wall(check.reading.wall));
+    }
+    return check.reading.ok() ? ExitCode::Done : ExitCode::BadInput;
+  }
+
+ private:
+  /// With --json, what cannot be read at all is a finding too.
+  [[nodiscard]] WallReading read() const {
+    try {
+      return read_wall(wall_, overrides_);
+    } catch (const Error& error) {
+      WallFinding finding;
+      finding.what = error.what();
+      finding.line = error.line();
+      finding.hint = error.hint();
+      if (json_) fmt::print("{}", check_json({wall_, {{}, {finding}}}));
+      throw;
+    }
+  }
+
+  std::string wall_;
+  std::vector<std::string> overrides_;
+  bool json_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_wall_check_command() {
+  return std::make_unique<WallCheckCommand>();
 }
 
 }  // namespace hpr

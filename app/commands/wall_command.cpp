@@ -1,119 +1,51 @@
-#include "app/commands/wall_command.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 
-#include "app/commands/wall_import.h"
-#include "app/commands/wall_init.h"
-#include "app/commands/wall_pattern.h"
-#include "app/commands/wall_remote.h"
-#include "app/commands/wall_run.h"
-#include "app/commands/wall_script.h"
+#include "app/command.h"
+#include "app/commands/wall_options.h"
 #include "core/file.h"
 #include "core/names.h"
-#include "engine/output.h"
 #include "image/image_io.h"
+#include "walls/config/wall_file.h"
 #include "walls/config/wall_schema.h"
 #include "walls/drawing/heat.h"
 #include "walls/drawing/plan.h"
+#include "walls/manifest/manifest_file.h"
 
 namespace hpr {
+
+// The commands of walls, in the order `hpr wall --help` lists them. Each is defined in a file of its own or below.
+#define HPR_FOR_EACH_WALL_COMMAND(visit)                                                                      \
+  visit(init) visit(check) visit(plan) visit(expand) visit(schema) visit(pattern) visit(import) visit(script) \
+      visit(run) visit(status) visit(ctl) visit(stop)
+
+#define HPR_DECLARE_WALL_COMMAND(name) std::unique_ptr<Command> make_wall_##name##_command();
+HPR_FOR_EACH_WALL_COMMAND(HPR_DECLARE_WALL_COMMAND)
+
 namespace {
 
-class WallCommand final : public Command {
+class WallPlanCommand final : public Command {
  public:
-  [[nodiscard]] std::string_view name() const override { return "wall"; }
-  [[nodiscard]] std::string_view summary() const override { return "describe, check, draw or drive a wall of screens"; }
-
-  void declare(CLI::App& app) override {
-    app.require_subcommand(1);
-    add(app, make_wall_init_command());
-    CLI::App& check = add(app, "check", "every error and oddity in a wall file");
-    check.add_flag("--json", json_, "print one JSON document (hpr.wall-check/1)");
-    declare_overrides(check, overrides_);
-    check.callback([this] { action_ = [this](const Globals&) { return this->check(); }; });
-
-    CLI::App& plan = add(app, "plan", "a picture of where the screens are and who drives them");
-    plan.add_option("-o,--output", output_, "the picture")->required()->type_name("FILE.(svg|png)");
-    plan.add_option("--heat", heat_, "colour screens by what a run measured: its manifest")
-        ->type_name("DIR/manifest.json");
-    plan.add_option("--by", heat_by_, fmt::format("of the manifest: {}", fmt::join(heat_names(), ", ")))
-        ->capture_default_str()
-        ->needs("--heat");
-    declare_overrides(plan, overrides_);
-    plan.callback([this] { action_ = [this](const Globals& globals) { return this->plan(globals); }; });
-
-    CLI::App& expand = add(app, "expand", "the same wall as TOML with its grids written out");
-    declare_overrides(expand, overrides_);
-    expand.callback([this] { action_ = [this](const Globals&) { return this->expand(); }; });
-
-    CLI::App& schema = *app.add_subcommand("schema", "what a wall file may hold, as a JSON Schema (draft 2020-12)");
-    schema.callback([this] {
-      action_ = [](const Globals&) {
-        fmt::print("{}", wall_schema());
-        return ExitCode::Done;
-      };
-    });
-
-    add(app, make_wall_pattern_command());
-    add(app, make_wall_import_command());
-    add(app, make_wall_script_command());
-    add(app, make_wall_run_command());
-    for (auto& command : make_wall_remote_commands()) add(app, std::move(command));
+  [[nodiscard]] std::string_view name() const override { return "plan"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "a picture of where the screens are and who drives them";
   }
 
-  /// As what is asked for is.
-  [[nodiscard]] bool collective() const override { return collective_; }
-  [[nodiscard]] ExitCode run(const Globals& globals) override { return action_(globals); }
-
- private:
-  /// A subcommand in a file of its own.
-  void add(CLI::App& app, std::unique_ptr<Command> command) {
-    Command* const its = command.get();
-    others_.push_back(std::move(command));
-    CLI::App& sub = *app.add_subcommand(std::string(its->name()), std::string(its->summary()));
-    its->declare(sub);
-    sub.callback([this, its] {
-      collective_ = its->collective();
-      action_ = [its](const Globals& globals) { return its->run(globals); };
-    });
+  void declare(const OptionSet& options) override {
+    declare_wall(options, wall_);
+    options.option("-o,--output", output_, "the picture").required().type("FILE.(svg|png)");
+    const Option heat = options.option("--heat", heat_, "colour screens by what a run measured: its manifest")
+                            .type("DIR/manifest.json");
+    options.option("--by", heat_by_, fmt::format("of the manifest: {}", fmt::join(heat_names(), ", ")))
+        .show_default()
+        .needs(heat);
+    declare_overrides(options, overrides_);
   }
 
-  CLI::App& add(CLI::App& app, const std::string& name, const std::string& summary) {
-    CLI::App& sub = *app.add_subcommand(name, summary);
-    sub.add_option("wall", wall_, "a wall file, or CxR, or CxR@WxH")->required()->type_name("WALL");
-    return sub;
-  }
-
-  /// With --json, what cannot be read at all is a finding too.
-  [[nodiscard]] WallReading read() const {
-    try {
-      return read_wall(wall_, overrides_);
-    } catch (const Error& error) {
-      WallFinding finding;
-      finding.what = error.what();
-      finding.line = error.line();
-      finding.hint = error.hint();
-      if (json_) fmt::print("{}", check_json({wall_, {{}, {finding}}}));
-      throw;
-    }
-  }
-
-  [[nodiscard]] ExitCode check() const {
-    const WallCheck check{wall_, read()};
-    if (json_) {
-      fmt::print("{}", check_json(check));
-    } else {
-      report_findings(check);
-      if (check.reading.ok()) fmt::print("{}", describe_wall(check.reading.wall));
-    }
-    return check.reading.ok() ? ExitCode::Done : ExitCode::BadInput;
-  }
-
-  [[nodiscard]] ExitCode plan(const Globals& globals) const {
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
     const std::string extension = std::filesystem::path(output_).extension().string();
     if (extension != ".svg" && extension != ".png") {
       throw Error(ExitCode::Usage, fmt::format("cannot write a plan as '{}'", printable(output_)),
@@ -136,23 +68,71 @@ class WallCommand final : public Command {
     return ExitCode::Done;
   }
 
-  [[nodiscard]] ExitCode expand() const {
-    fmt::print("{}", expand_wall(load_wall(wall_, overrides_)));
-    return ExitCode::Done;
-  }
-
+ private:
   std::string wall_;
   std::vector<std::string> overrides_;
   std::string output_;
   std::string heat_;
   std::string heat_by_ = "ms";
-  bool json_ = false;
-  std::vector<std::unique_ptr<Command>> others_;
-  bool collective_ = false;
-  std::function<ExitCode(const Globals&)> action_;
+};
+
+class WallExpandCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "expand"; }
+  [[nodiscard]] std::string_view summary() const override { return "the same wall as TOML with its grids written out"; }
+
+  void declare(const OptionSet& options) override {
+    declare_wall(options, wall_);
+    declare_overrides(options, overrides_);
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
+    fmt::print("{}", expand_wall(load_wall(wall_, overrides_)));
+    return ExitCode::Done;
+  }
+
+ private:
+  std::string wall_;
+  std::vector<std::string> overrides_;
+};
+
+class WallSchemaCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "schema"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "what a wall file may hold, as a JSON Schema (draft 2020-12)";
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
+    fmt::print("{}", wall_schema());
+    return ExitCode::Done;
+  }
+};
+
+class WallCommand final : public CommandGroup {
+ public:
+  WallCommand() : CommandGroup("wall", "describe, check, draw or drive a wall of screens") {}
+  [[nodiscard]] std::vector<std::unique_ptr<Command>> subcommands() const override {
+    std::vector<std::unique_ptr<Command>> all;
+#define HPR_ADD_WALL_COMMAND(name) all.push_back(make_wall_##name##_command());
+    HPR_FOR_EACH_WALL_COMMAND(HPR_ADD_WALL_COMMAND)
+    return all;
+  }
 };
 
 }  // namespace
+
+std::unique_ptr<Command> make_wall_plan_command() {
+  return std::make_unique<WallPlanCommand>();
+}
+
+std::unique_ptr<Command> make_wall_expand_command() {
+  return std::make_unique<WallExpandCommand>();
+}
+
+std::unique_ptr<Command> make_wall_schema_command() {
+  return std::make_unique<WallSchemaCommand>();
+}
 
 std::unique_ptr<Command> make_wall_command() {
   return std::make_unique<WallCommand>();

@@ -1,10 +1,8 @@
-#include "app/commands/wall_import.h"
-
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "app/command.h"
 #include "core/file.h"
 #include "core/units.h"
 #include "walls/config/import/importer.h"
@@ -28,16 +26,14 @@ class WallImportCommand final : public Command {
   [[nodiscard]] std::string_view name() const override { return "import"; }
   [[nodiscard]] std::string_view summary() const override { return "another system's wall file as one of ours"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("file", file_, "the other system's file")->required()->type_name("FILE");
-    app.add_option("--from", kind_, kinds())->required()->type_name("KIND");
-    app.add_option("--pixels", pixels_, "of a screen, where the file does not tell")
-        ->capture_default_str()
-        ->type_name("WxH");
-    app.add_option("--pitch", pitch_mm_, "millimetres from pixel to pixel, where the file counts in pixels only")
-        ->check(CLI::Range(1e-3, 1e3))
-        ->capture_default_str()
-        ->type_name("MM");
+  void declare(const OptionSet& options) override {
+    options.option("file", file_, "the other system's file").required().type("FILE");
+    options.option("--from", kind_, kinds()).required().type("KIND");
+    options.option("--pixels", pixels_, "of a screen, where the file does not tell").show_default().type("WxH");
+    options.option("--pitch", pitch_mm_, "millimetres from pixel to pixel, where the file counts in pixels only")
+        .range(1e-3, 1e3)
+        .show_default()
+        .type("MM");
   }
 
   [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
@@ -62,6 +58,7 @@ class WallImportCommand final : public Command {
 
 }  // namespace
 
+/// `hpr wall import FILE --from KIND`: another system's wall file as one of ours, on stdout.
 std::unique_ptr<Command> make_wall_import_command() {
   return std::make_unique<WallImportCommand>();
 }

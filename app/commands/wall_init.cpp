@@ -1,11 +1,9 @@
-#include "app/commands/wall_init.h"
-
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
 
+#include "app/command.h"
 #include "app/launch/shell_line.h"
 #include "app/output_files.h"
 #include "core/log.h"
@@ -41,23 +39,19 @@ class WallInitCommand final : public Command {
   [[nodiscard]] std::string_view name() const override { return "init"; }
   [[nodiscard]] std::string_view summary() const override { return "a wall file to begin with"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("--cols", wall_.columns, "screens beside each other")->required();
-    app.add_option("--rows", wall_.rows, "screens above each other")->required();
-    app.add_option("--hosts", hosts_, "as Slurm writes them: wall0[1-9] or a[01-03,07],b2 (default: this machine)")
-        ->type_name("LIST");
-    app.add_option("--tiles-per-host", wall_.tiles_per_host, "neighbours each drives (default: shared out evenly)")
-        ->check(CLI::Range(1, kMostScreens));
-    app.add_option("--ranks-per-host", wall_.ranks_per_host, "render processes on each")
-        ->check(CLI::Range(1, 4096))
-        ->capture_default_str();
-    app.add_option("--tile-pixels", pixels_, "of a screen (default: 1920x1080; on this machine 640x360)")
-        ->type_name("WxH");
-    app.add_option("--tile-size-m", size_, "a screen's lit area in metres (default: of a 46 inch panel)")
-        ->type_name("WxH");
-    app.add_option("--gap-m", gap_, "metres from lit edge to lit edge (default: 0.0055; negative: overlap)")
-        ->type_name("GAP|XxY");
-    app.add_option("-o,--output", output_, "instead of standard output")->type_name("FILE");
+  void declare(const OptionSet& options) override {
+    options.option("--cols", wall_.columns, "screens beside each other").required();
+    options.option("--rows", wall_.rows, "screens above each other").required();
+    options.option("--hosts", hosts_, "as Slurm writes them: wall0[1-9] or a[01-03,07],b2 (default: this machine)")
+        .type("LIST");
+    options.option("--tiles-per-host", wall_.tiles_per_host, "neighbours each drives (default: shared out evenly)")
+        .range(1, kMostScreens);
+    options.option("--ranks-per-host", wall_.ranks_per_host, "render processes on each").range(1, 4096).show_default();
+    options.option("--tile-pixels", pixels_, "of a screen (default: 1920x1080; on this machine 640x360)").type("WxH");
+    options.option("--tile-size-m", size_, "a screen's lit area in metres (default: of a 46 inch panel)").type("WxH");
+    options.option("--gap-m", gap_, "metres from lit edge to lit edge (default: 0.0055; negative: overlap)")
+        .type("GAP|XxY");
+    options.option("-o,--output", output_, "instead of standard output").type("FILE");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
@@ -97,6 +91,7 @@ class WallInitCommand final : public Command {
 
 }  // namespace
 
+/// `hpr wall init --cols C --rows R [--hosts LIST] ...`: a commented wall file to begin with, on stdout or in a file.
 std::unique_ptr<Command> make_wall_init_command() {
   return std::make_unique<WallInitCommand>();
 }

@@ -1,19 +1,18 @@
-#include "app/commands/wall_pattern.h"
-
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <numeric>
 #include <optional>
 #include <span>
 #include <thread>
 
-#include "app/commands/remote_wall.h"
-#include "app/commands/wall_run.h"
+#include "app/command.h"
+#include "app/commands/wall_options.h"
 #include "app/options/display_flags.h"
+#include "app/options/link_options.h"
 #include "cluster/transport/local_communicator.h"
 #include "core/progress.h"
 #include "engine/output.h"
 #include "engine/signals.h"
+#include "engine/wall/remote_displays.h"
 #include "walls/config/wall_file.h"
 #include "walls/drawing/frame_counter.h"
 #include "walls/drawing/pattern.h"
@@ -27,12 +26,12 @@ namespace {
 class PatternShow {
  public:
   PatternShow(const Wall& wall, std::span<const std::size_t> screens, Communicator& comm, const DisplayFlags& flags,
-              const RemoteOptions& remote, const Globals& globals)
+              const std::optional<SenderSettings>& link, const Globals& globals)
       : comm_(comm) {
     for (const std::size_t screen : screens) patterns_.push_back(wall_pattern(wall, screen));
     for (std::size_t i = 0; i < screens.size(); ++i) pictures_.push_back({screens[i], patterns_[i]});
-    if (flags.remote()) {
-      sender_ = connect_displays(comm, wall, std::vector<int>(wall.screens.size(), 0), remote);
+    if (link) {
+      sender_ = connect_displays(comm, wall, std::vector<int>(wall.screens.size(), 0), *link);
       return;
     }
     DisplayOptions options = flags.options(globals);
@@ -76,20 +75,18 @@ class WallPatternCommand final : public Command {
   [[nodiscard]] std::string_view name() const override { return "pattern"; }
   [[nodiscard]] std::string_view summary() const override { return "calibration pictures: in files, or on the wall"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("wall", wall_, "a wall file, or CxR, or CxR@WxH")->required()->type_name("WALL");
-    declare_overrides(app, overrides_);
-    app.add_option("--host", host_, "only the screens of this host of the wall file, or node's id")->type_name("NAME");
-    display_.declare(app);
-    app.add_option("--frames", frames_, "how many (default: 1; window, web and remote: until they are closed)")
-        ->check(CLI::Range(1, 1'000'000));
-    app.add_option("--fps", frames_per_second_, "how many a second, at most")
-        ->check(CLI::Range(1e-3, 1e3))
-        ->capture_default_str();
-    app.add_option("--scale", scale_, "of the screens' pixels, e.g. 0.25")
-        ->check(CLI::Range(1e-6, 1e6))
-        ->capture_default_str();
-    remote_.declare(app);
+  [[nodiscard]] bool opens_windows() const override { return true; }
+
+  void declare(const OptionSet& options) override {
+    declare_wall(options, wall_);
+    declare_overrides(options, overrides_);
+    options.option("--host", host_, "only the screens of this host of the wall file, or node's id").type("NAME");
+    display_.declare(options);
+    options.option("--frames", frames_, "how many (default: 1; window, web and remote: until they are closed)")
+        .range(1, 1'000'000);
+    options.option("--fps", frames_per_second_, "how many a second, at most").range(1e-3, 1e3).show_default();
+    options.option("--scale", scale_, "of the screens' pixels, e.g. 0.25").range(1e-6, 1e6).show_default();
+    link_.declare(options, settings_);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
@@ -103,10 +100,11 @@ class WallPatternCommand final : public Command {
     if (!host_.empty()) (void)find_host(wall, host_);
     const bool endless = !frames_ && (display_.kind().interactive || display_.remote());
     const DisplayOptions options = display_.options(globals);
+    std::optional<SenderSettings> link;
     if (display_.remote()) {
-      (void)remote_.settings(wall);
+      link = link_.settings(wall, settings_.codec);
     } else {
-      remote_.refuse();
+      link_.refuse();
     }
     if (display_.remote() && !display_.output.empty()) {
       throw Error(ExitCode::Usage, "patterns that other processes show leave no files", "leave -o out");
@@ -116,18 +114,19 @@ class WallPatternCommand final : public Command {
     ExitCode code = ExitCode::Done;
     // Which process draws what is no question here: one does.
     run_local_ranks(
-        1, [&](Communicator& comm) { code = show(wall, comm, endless, globals); }, globals.hang_limit());
+        1, [&](Communicator& comm) { code = show(wall, comm, link, endless, globals); }, globals.hang_limit());
     return code;
   }
 
  private:
-  [[nodiscard]] ExitCode show(const Wall& wall, Communicator& comm, bool endless, const Globals& globals) const {
+  [[nodiscard]] ExitCode show(const Wall& wall, Communicator& comm, const std::optional<SenderSettings>& link,
+                              bool endless, const Globals& globals) const {
     using Clock = std::chrono::steady_clock;
     const std::uint64_t frames = endless ? 0 : static_cast<std::uint64_t>(frames_.value_or(1));
     std::vector<std::size_t> screens(wall.screens.size());
     std::iota(screens.begin(), screens.end(), std::size_t{0});
     if (!host_.empty()) screens = find_host(wall, host_).screens;
-    PatternShow patterns(wall, screens, comm, display_, remote_, globals);
+    PatternShow patterns(wall, screens, comm, display_, link, globals);
     const auto pace =
         std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / frames_per_second_));
     Progress progress(globals.verbosity < 0 ? "none" : globals.progress, "frame", frames, Progress::Pace{});
@@ -147,7 +146,8 @@ class WallPatternCommand final : public Command {
   std::vector<std::string> overrides_;
   std::string host_;
   DisplayFlags display_;
-  RemoteOptions remote_;
+  LinkOptions link_;
+  RenderSettings settings_;  ///< of which the codec counts
   std::optional<int> frames_;
   double frames_per_second_ = 30.0;
   double scale_ = 1.0;
@@ -155,6 +155,7 @@ class WallPatternCommand final : public Command {
 
 }  // namespace
 
+/// `hpr wall pattern WALL -o DIR`, or `--display NAME`: calibration pictures in files, or on the wall with a counter.
 std::unique_ptr<Command> make_wall_pattern_command() {
   return std::make_unique<WallPatternCommand>();
 }

@@ -1,16 +1,15 @@
-#include "app/commands/wall_remote.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
 #include <chrono>
 #include <iomanip>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
+#include "app/command.h"
 #include "core/error.h"
 #include "core/names.h"
 #include "core/units.h"
@@ -22,11 +21,9 @@ namespace {
 /// What they share: which run is meant, and how long it may take to answer.
 class WallRemoteCommand : public Command {
  public:
-  void declare(CLI::App& app) override {
-    app.add_option("--run", run_, "which one, where several run: its number in wall status");
-    app.add_option("--wait", wait_, "how long the run may take to answer")
-        ->capture_default_str()
-        ->type_name("DURATION");
+  void declare(const OptionSet& options) override {
+    options.option("--run", run_, "which one, where several run: its number in wall status");
+    options.option("--wait", wait_, "how long the run may take to answer").show_default().type("DURATION");
   }
 
  protected:
@@ -68,9 +65,9 @@ class WallStatusCommand final : public WallRemoteCommand {
  public:
   [[nodiscard]] std::string_view name() const override { return "status"; }
   [[nodiscard]] std::string_view summary() const override { return "what a running wall shows, and how fast"; }
-  void declare(CLI::App& app) override {
-    WallRemoteCommand::declare(app);
-    app.add_flag("--json", json_, "print one JSON document (hpr.wall-status/1)");
+  void declare(const OptionSet& options) override {
+    WallRemoteCommand::declare(options);
+    options.flag("--json", json_, "print one JSON document (hpr.wall-status/1)");
   }
   [[nodiscard]] ExitCode run(const Globals&) override {
     const std::string told = say("status");
@@ -99,15 +96,14 @@ class WallCtlCommand final : public WallRemoteCommand {
   [[nodiscard]] std::string_view summary() const override {
     return "tell a running wall what to do, as in a console: 'ctl help' lists it";
   }
-  void declare(CLI::App& app) override {
-    WallRemoteCommand::declare(app);
-    app.prefix_command();  // what is told may look like an option: -1,0,0
-    app.fallthrough(false);
-    app_ = &app;
+  void declare(const OptionSet& options) override {
+    WallRemoteCommand::declare(options);
+    options.keep_remaining();  // a command's words may look like an option: -1,0,0
+    options_.emplace(options);
   }
   [[nodiscard]] ExitCode run(const Globals&) override {
     std::ostringstream line;
-    const std::vector<std::string> words = app_->remaining();
+    const std::vector<std::string> words = options_->remaining();
     if (words.empty())
       throw Error(ExitCode::Usage, "there is nothing to tell", "write e.g. hpr wall ctl quality draft");
     for (const std::string& word : words) {
@@ -124,7 +120,7 @@ class WallCtlCommand final : public WallRemoteCommand {
   }
 
  private:
-  const CLI::App* app_ = nullptr;
+  std::optional<OptionSet> options_;
 };
 
 class WallStopCommand final : public WallRemoteCommand {
@@ -139,12 +135,16 @@ class WallStopCommand final : public WallRemoteCommand {
 
 }  // namespace
 
-std::vector<std::unique_ptr<Command>> make_wall_remote_commands() {
-  std::vector<std::unique_ptr<Command>> commands;
-  commands.push_back(std::make_unique<WallStatusCommand>());
-  commands.push_back(std::make_unique<WallCtlCommand>());
-  commands.push_back(std::make_unique<WallStopCommand>());
-  return commands;
+std::unique_ptr<Command> make_wall_status_command() {
+  return std::make_unique<WallStatusCommand>();
+}
+
+std::unique_ptr<Command> make_wall_ctl_command() {
+  return std::make_unique<WallCtlCommand>();
+}
+
+std::unique_ptr<Command> make_wall_stop_command() {
+  return std::make_unique<WallStopCommand>();
 }
 
 }  // namespace hpr

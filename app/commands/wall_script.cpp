@@ -1,11 +1,9 @@
-#include "app/commands/wall_script.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "app/command.h"
 #include "app/launch/shell_line.h"
 #include "app/output_files.h"
 #include "core/names.h"
@@ -17,6 +15,16 @@
 
 namespace hpr {
 namespace {
+
+/// What a batch script runs.
+struct WallScript {
+  std::string wall;              ///< the file, as the job's folder finds it
+  std::string scene = {};        ///< empty: named when the script is submitted
+  std::string show = "window";   ///< what `hpr display` shows with
+  int frames = 0;                ///< 0: until the job is stopped
+  std::string time = "1:00:00";  ///< of the job, as Slurm has it
+  std::string command = {};      ///< that made it, for the first comment; may be empty
+};
 
 constexpr std::string_view kHead = R"(#!/bin/bash
 # {name}: {screens} screens on {shown} hosts.{command}
@@ -122,48 +130,8 @@ std::vector<std::string> hosts_of_ranks(const Wall& wall) {
   return hosts;
 }
 
-class WallScriptCommand final : public Command {
- public:
-  [[nodiscard]] std::string_view name() const override { return "script"; }
-  [[nodiscard]] std::string_view summary() const override { return "a batch script that runs a scene on the wall"; }
-
-  void declare(CLI::App& app) override {
-    app.add_option("wall", script_.wall, "a wall file whose nodes name hosts")->required()->type_name("WALL");
-    app.add_option("scene", script_.scene, "a .gltf or .glb file, or gen:NAME (default: named to sbatch)");
-    app.add_flag("--slurm", slurm_, "for Slurm's sbatch")->required();
-    app.add_option("--show", script_.show, "what the display processes show with, see hpr display")
-        ->capture_default_str();
-    app.add_option("--frames", script_.frames, "how many (default: until the job is stopped)")
-        ->check(CLI::Range(1, 1'000'000));
-    app.add_option("--time", script_.time, "of the job, as Slurm has it")->capture_default_str();
-    app.add_option("-o,--output", output_, "instead of standard output")->type_name("FILE");
-  }
-
-  [[nodiscard]] ExitCode run(const Globals& globals) override {
-    WallScript script = script_;
-    const bool plain = script.time.find_first_not_of("0123456789:-") == std::string::npos && !script.time.empty();
-    if (!plain) {
-      throw Error(ExitCode::Usage, fmt::format("--time: '{}' is no time of Slurm's", printable(script.time)),
-                  "write e.g. 90 (minutes), 8:00:00 or 2-00:00:00");
-    }
-    if (find_display(script.show).stream) {
-      throw Error(ExitCode::Usage, "the displays of a script have no command to pipe to",
-                  "use --show window, web, file or none");
-    }
-    script.command = "hpr " + shell_line(globals.args);
-    const std::string text = write_slurm_script(load_wall(script.wall), script);
-    write_or_print(text, output_, globals.force);
-    return ExitCode::Done;
-  }
-
- private:
-  WallScript script_;
-  bool slurm_ = false;
-  std::string output_;
-};
-
-}  // namespace
-
+/// A script for sbatch: a display process on every host with screens, and `hpr wall run` with one task per rank of each
+/// node, on its host. Throws Error (Usage) for a wall whose nodes or screens have no hosts Slurm could know.
 std::string write_slurm_script(const Wall& wall, const WallScript& script) {
   using fmt::arg;
   const std::vector<std::string> ranks = hosts_of_ranks(wall);
@@ -194,6 +162,47 @@ std::string write_slurm_script(const Wall& wall, const WallScript& script) {
   return text + "exit \"$code\"\n";
 }
 
+class WallScriptCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "script"; }
+  [[nodiscard]] std::string_view summary() const override { return "a batch script that runs a scene on the wall"; }
+
+  void declare(const OptionSet& options) override {
+    options.option("wall", script_.wall, "a wall file whose nodes name hosts").required().type("WALL");
+    options.option("scene", script_.scene, "a .gltf or .glb file, or gen:NAME (default: named to sbatch)");
+    options.flag("--slurm", slurm_, "for Slurm's sbatch").required();
+    options.option("--show", script_.show, "what the display processes show with, see hpr display").show_default();
+    options.option("--frames", script_.frames, "how many (default: until the job is stopped)").range(1, 1'000'000);
+    options.option("--time", script_.time, "of the job, as Slurm has it").show_default();
+    options.option("-o,--output", output_, "instead of standard output").type("FILE");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    WallScript script = script_;
+    const bool plain = script.time.find_first_not_of("0123456789:-") == std::string::npos && !script.time.empty();
+    if (!plain) {
+      throw Error(ExitCode::Usage, fmt::format("--time: '{}' is no time of Slurm's", printable(script.time)),
+                  "write e.g. 90 (minutes), 8:00:00 or 2-00:00:00");
+    }
+    if (find_display(script.show).stream) {
+      throw Error(ExitCode::Usage, "the displays of a script have no command to pipe to",
+                  "use --show window, web, file or none");
+    }
+    script.command = "hpr " + shell_line(globals.args);
+    const std::string text = write_slurm_script(load_wall(script.wall), script);
+    write_or_print(text, output_, globals.force);
+    return ExitCode::Done;
+  }
+
+ private:
+  WallScript script_;
+  bool slurm_ = false;
+  std::string output_;
+};
+
+}  // namespace
+
+/// `hpr wall script WALL [SCENE] --slurm`.
 std::unique_ptr<Command> make_wall_script_command() {
   return std::make_unique<WallScriptCommand>();
 }

@@ -18,12 +18,15 @@
 
 namespace hpr {
 
-Console::Console(Session& session, const Globals& globals, RenderOptions options, Size size)
+Console::Console(Session& session, const Globals& globals, RenderSettings settings, Size size)
     : session_(session),
       globals_(globals),
-      options_(std::move(options)),
+      settings_(std::move(settings)),
       size_(size),
-      controls_(session, globals, options_, table_) {
+      controls_(
+          session, settings_, globals.seed,
+          [this](const std::string& source, const RenderSettings& its) { return load_scene(source, its, globals_); },
+          table_) {
   table_.add({"size", "WxH", "pixels of the picture", [this](Words words) { return set_size(words); }});
   table_.add({"render", "", "draw the picture", [this](Words) { return render(); }});
   table_.add({"save", "FILE.(png|exr)", "write the last picture", [this](Words words) { return save(words); }});
@@ -37,7 +40,7 @@ Console::Console(Session& session, const Globals& globals, RenderOptions options
 }
 
 View Console::view() const {
-  return make_view(options_.choose_camera(session_.scene()), size_, session_.scene().bounds);
+  return make_view(choose_camera(settings_.camera, session_.scene()), size_, session_.scene().bounds);
 }
 
 std::string Console::set_size(Words words) {
@@ -49,23 +52,22 @@ std::string Console::set_size(Words words) {
 }
 
 std::string Console::render() {
-  const FrameSettings settings = options_.settings(globals_.seed);
-  const Sampling sampling = options_.sampling();
+  const RenderSettings settings = resolve(settings_, globals_.seed);
   const View seen = view();
   auto picture = std::make_unique<Picture>();
   picture->size = size_;
-  picture->exposure = options_.exposure;
-  picture->colors = options_.wire.colors();
+  picture->exposure = settings.exposure_stops;
+  picture->colors = settings.color_format;
   picture->scene_name = session_.scene().name;
-  picture->blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.resolution_scale));
-  picture->plan = plan_frame(session_, settings, picture->blocks.views);
+  picture->blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.frame.resolution_scale));
+  picture->plan = plan_frame(session_, settings.frame, picture->blocks.views);
   picture_.reset();  // frees its memory before the next one takes some
 
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
-  picture->sampler = std::make_unique<FrameSampler>(session_, picture->plan, sampling, 0, false);
+  picture->sampler = std::make_unique<FrameSampler>(session_, picture->plan, settings.sampling, 0, false);
   Progress progress(session_.comm().rank() == 0 ? globals_.progress : "none", "sample",
-                    sampling.goal.samples.value_or(0));
+                    settings.sampling.goal.samples.value_or(0));
   drawing_ = true;
   (void)picture->sampler->draw(picture->blocks.views, {}, progress);  // without a checkpoint it does not stop early
   drawing_ = false;
@@ -113,10 +115,10 @@ std::string Console::write_stats_of(Words words) const {
 }
 
 std::string Console::explain() {
-  const FrameSettings settings = options_.settings(globals_.seed);
+  const RenderSettings settings = resolve(settings_, globals_.seed);
   const View seen = view();
-  const Blocks blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.resolution_scale));
-  return fmt::format("{}", fmt::join(plan_frame(session_, settings, blocks.views).explained, "\n"));
+  const Blocks blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.frame.resolution_scale));
+  return fmt::format("{}", fmt::join(plan_frame(session_, settings.frame, blocks.views).explained, "\n"));
 }
 
 }  // namespace hpr

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "app/options/render_options.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/wall/controls.h"
@@ -14,7 +15,7 @@ namespace hpr {
 class Console {
  public:
   /// All outlive this.
-  Console(Session& session, const Globals& globals, RenderOptions options, Size size);
+  Console(Session& session, const Globals& globals, RenderSettings settings, Size size);
 
   /// Collective. What the line has to tell. Throws Error where nothing was done: the session stays as it was.
   [[nodiscard]] std::string run(const std::string& line) { return table_.run(line); }
@@ -45,7 +46,7 @@ class Console {
 
   Session& session_;
   const Globals& globals_;
-  RenderOptions options_;
+  RenderSettings settings_;
   Size size_;
   CommandTable table_;
   Controls controls_;

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <optional>
 #include <utility>
@@ -17,8 +16,8 @@
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/units.h"
-#include "engine/wall/forgivable.h"
 #include "engine/wall/hearing.h"
+#include "engine/wall/recoverable.h"
 #include "walls/link/token.h"
 
 namespace hpr {
@@ -35,28 +34,29 @@ class ConsoleCommand final : public Command {
     return "a resident scene, told what to do line by line; 'help' lists the commands";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("--listen", listen_, "also take lines from a Unix socket (a path) or from TCP (ADDRESS:PORT)")
-        ->type_name("ADDRESS");
-    app.add_flag("--keep-going", keeps_going_, "a command that fails in a script does not end it");
-    app.add_option("--size", size_, "pixels of the picture")->capture_default_str()->type_name("WxH");
-    options_.declare(app);
+  void declare(const OptionSet& options) override {
+    options.option("scene", source_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    options.option("--listen", listen_, "also take lines from a Unix socket (a path) or from TCP (ADDRESS:PORT)")
+        .type("ADDRESS");
+    options.flag("--keep-going", keeps_going_, "a command that fails in a script does not end it");
+    options.option("--size", size_, "pixels of the picture").show_default().type("WxH");
+    declare_settings(options, settings_);
+    report_.declare(options);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const auto extent = parse_extent(size_);
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
     check_size({extent->first, extent->second}, globals.picture_limits());
-    if (!options_.stats.empty() || options_.explain) {
+    if (!report_.stats.empty() || report_.explain) {
       throw Error(ExitCode::Usage, "--stats and --explain are commands here", "say stats FILE.json, or explain");
     }
-    (void)options_.settings(globals.seed);
-    (void)options_.sampling();
+    (void)resolve(settings_, globals.seed);
     return run_ranks(globals,
                      [&](Communicator& comm) {
-                       Session session(comm, globals.session(), [&] { return options_.load(source_, globals); });
-                       Console console(session, globals, options_, {extent->first, extent->second});
+                       Session session(comm, globals.session(),
+                                       [&] { return load_scene(source_, settings_, globals); });
+                       Console console(session, globals, settings_, {extent->first, extent->second});
                        return converse(session.comm(), console);
                      },
                      {.input = StandardInput::OfRank0});
@@ -109,7 +109,7 @@ class ConsoleCommand final : public Command {
       if (line.source != nullptr) line.source->answer(line.from, answer_of(told, line.from));
       return ExitCode::Done;
     } catch (const Error& error) {
-      if (!is_forgivable(error) || (console.drawing() && comm.size() > 1)) throw;
+      if (!is_recoverable(error) || (console.drawing() && comm.size() > 1)) throw;
       const bool ends = line.scripted && !keeps_going_;
       if (ends && line.source != nullptr) throw in_line(error, line.from);
       if (ends) throw;
@@ -151,7 +151,8 @@ class ConsoleCommand final : public Command {
   std::string listen_;
   std::string size_ = "1280x720";
   bool keeps_going_ = false;
-  RenderOptions options_;
+  RenderSettings settings_;
+  ReportOptions report_;
 };
 
 }  // namespace

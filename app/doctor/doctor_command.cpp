@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -27,7 +26,7 @@ class DoctorCommand final : public Command {
     return "what this machine can do, and the command that mends what it cannot";
   }
 
-  void declare(CLI::App& app) override { app.add_flag("--json", json_, "print the findings as JSON"); }
+  void declare(const OptionSet& options) override { options.flag("--json", json_, "print the findings as JSON"); }
 
   [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
     std::vector<Check> checks = machine_checks();

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <vector>
@@ -35,25 +34,21 @@ void say(const std::string& line) {
 
 }  // namespace
 
-void DisplayFlags::declare(CLI::App& app) {
+void DisplayFlags::declare(const OptionSet& options) {
   const char* const remote_too = outside_job ? " or none" : ", none, or remote: display processes, see hpr display";
-  app.add_option(flag, display, fmt::format("file, window, web, web=ADDR:PORT, pipe{}", remote_too))
-      ->capture_default_str();
-  app.add_option("-o,--output", output,
-                 outside_job
-                     ? "folder for display.json, and the pictures of the file display"
-                     : "folder for the file display's pictures and the manifest; file or - for the pipe display")
-      ->type_name(outside_job ? "DIR" : "PATH");
-  app.add_flag("--keep-frames", keep_frames, "the file display keeps every frame, in DIR/frame-000042/");
-  app.add_option("--pipe-to", pipe_to, "the pipe display's frames go to this command's standard input")
-      ->type_name("COMMAND");
-  app.add_option("--pipe-format", pipe_format, "of the pipe display: y4m or rgba")->capture_default_str();
-  app.add_option("--pipe-screen", pipe_screen, "the pipe display sends this screen instead of the assembled wall")
-      ->type_name("ID");
-  app.add_option("--pipe-fps", pipe_fps, "frames per second as Y4M says it")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  app.add_option("--pipe-timeout", pipe_timeout, "how long the pipe's reader may read nothing")->capture_default_str();
+  options.option(flag, display, fmt::format("file, window, web, web=ADDR:PORT, pipe{}", remote_too)).show_default();
+  options
+      .option("-o,--output", output,
+              outside_job ? "folder for display.json, and the pictures of the file display"
+                          : "folder for the file display's pictures and the manifest; file or - for the pipe display")
+      .type(outside_job ? "DIR" : "PATH");
+  options.flag("--keep-frames", keep_frames, "the file display keeps every frame, in DIR/frame-000042/");
+  options.option("--pipe-to", pipe_to, "the pipe display's frames go to this command's standard input").type("COMMAND");
+  options.option("--pipe-format", pipe_format, "of the pipe display: y4m or rgba").show_default();
+  options.option("--pipe-screen", pipe_screen, "the pipe display sends this screen instead of the assembled wall")
+      .type("ID");
+  options.option("--pipe-fps", pipe_fps, "frames per second as Y4M says it").range(1, 1000).show_default();
+  options.option("--pipe-timeout", pipe_timeout, "how long the pipe's reader may read nothing").show_default();
 }
 
 const DisplayKind& DisplayFlags::kind() const {

@@ -6,10 +6,6 @@
 #include "app/options/globals.h"
 #include "walls/displays/display.h"
 
-namespace CLI {
-class App;
-}  // namespace CLI
-
 namespace hpr {
 
 /// What --display calls the display processes outside the job.
@@ -28,13 +24,14 @@ struct DisplayFlags {
   int pipe_fps = 30;
   std::string pipe_timeout = "30s";
 
-  void declare(CLI::App& app);
+  void declare(const OptionSet& options);
 
   /// Throws Error (Usage) for what does not fit together.
   [[nodiscard]] DisplayOptions options(const Globals& globals) const;
   /// Throws Error (Usage) where there is none of the name. That of remote displays shows nothing here.
   [[nodiscard]] const DisplayKind& kind() const;
   [[nodiscard]] bool remote() const { return display == kRemoteDisplay; }
+  [[nodiscard]] bool writes_files() const { return kind().name == "file"; }
   /// Whether stdout carries frames, and nothing else.
   [[nodiscard]] bool frames_on_stdout() const;
 };

@@ -3,12 +3,55 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 
 #include "cluster/transport/communicator.h"
 #include "core/error.h"
+#include "core/names.h"
 #include "core/units.h"
 
 namespace hpr {
+namespace {
+
+/// CLI11 takes -1 for the largest number.
+std::string whole_number_problem(const std::string& text) {
+  std::uint64_t number = 0;
+  const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (failed == std::errc() && end == text.data() + text.size()) return "";
+  return fmt::format("'{}' is no whole number from 0 to 2^64 - 1", printable(text));
+}
+
+}  // namespace
+
+void Globals::declare(const OptionSet& options) {
+  const std::string everywhere = "Everywhere";
+  options
+      .flag(
+          "-q,--quiet", [this](bool is_set) { verbosity = is_set ? -1 : verbosity; }, "errors only")
+      .group(everywhere);
+  options.flag("-v,--verbose", verbosity, "say more; twice: from all ranks").group(everywhere);
+  options.option("--ranks", ranks, "MPI ranks; hpr starts mpiexec itself")
+      .range(1, 4096)
+      .last_counts()
+      .group(everywhere);
+  options.option("--threads", threads, "threads of one rank (default: cores / ranks of a host)")
+      .range(1, 1024)
+      .group(everywhere);
+  options.option("--seed", seed, "of everything random").check(whole_number_problem).show_default().group(everywhere);
+  options.option("--backend", backend, "OpenGL by: auto, egl, osmesa").show_default().group(everywhere);
+  options.option("--device", device, "EGL device (default: by local rank)").range(0, 1023).group(everywhere);
+  options.option("--progress", progress, "auto, bar, line or none")
+      .choices({"auto", "bar", "line", "none"})
+      .show_default()
+      .group(everywhere);
+  options.option("--limit-mem", limit_mem, "refuse scenes larger than this, e.g. 4GiB").group(everywhere);
+  options.option("--limit-image", limit_image, "refuse pictures larger than this, e.g. 8192x8192").group(everywhere);
+  options.option("--hang-timeout", hang_timeout, "longest wait for another rank, e.g. 30s").group(everywhere);
+  options.flag("--force", force, "overwrite files").group(everywhere);
+  options.option("--trace", trace, "write what ranks and threads did when, as chrome://tracing and Perfetto show it")
+      .type("FILE.json")
+      .group(everywhere);
+}
 
 SceneLimits Globals::scene_limits() const {
   SceneLimits limits;

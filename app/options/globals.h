@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/options/option_set.h"
 #include "engine/session_settings.h"
 #include "image/image_io.h"
 #include "scene/load_scene.h"
@@ -26,6 +27,8 @@ struct Globals {
   int ranks = 0;                  ///< 0: as many as the launcher started, else 1
   int threads = 0;                ///< of one rank; 0: the machine's cores divided among the ranks of a host
   std::vector<std::string> args;  ///< this process's command line after the program's name
+
+  void declare(const OptionSet& options);
 
   /// Throws Error (Usage) for malformed sizes.
   [[nodiscard]] SceneLimits scene_limits() const;

@@ -15,26 +15,6 @@ constexpr int kMostRanks = 4096;
 
 }  // namespace
 
-std::vector<std::string> split_commas(std::string_view list) {
-  std::vector<std::string> items;
-  while (true) {
-    const auto comma = list.find(',');
-    items.emplace_back(list.substr(0, comma));
-    if (comma == std::string_view::npos) return items;
-    list.remove_prefix(comma + 1);
-  }
-}
-
-std::vector<std::string> split_words(std::string_view list) {
-  std::vector<std::string> words;
-  for (std::size_t start = 0; start <= list.size();) {
-    const std::size_t end = std::min(list.find(',', start), list.size());
-    if (end > start) words.emplace_back(list.substr(start, end - start));
-    start = end + 1;
-  }
-  return words;
-}
-
 Size parse_size(const std::string& text, const std::string& option, int most) {
   const auto extent = parse_extent(text);
   if (!extent) {

@@ -11,12 +11,6 @@ namespace hpr {
 
 inline constexpr int kMostScreensASide = 256;
 
-/// The words between commas.
-[[nodiscard]] std::vector<std::string> split_commas(std::string_view list);
-
-/// The same without the empty ones.
-[[nodiscard]] std::vector<std::string> split_words(std::string_view list);
-
 /// "3x2"; throws Error: Usage for what is no size, Limit past `most` a side.
 [[nodiscard]] Size parse_size(const std::string& text, const std::string& option, int most);
 

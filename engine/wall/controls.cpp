@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <glm/vector_relational.hpp>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "engine/settings_table.h"
 
 namespace hpr {
 namespace {
@@ -38,11 +38,13 @@ std::string type_of(const Light& light) {
 
 }  // namespace
 
-Controls::Controls(Session& session, const Globals& globals, RenderOptions& options, CommandTable& table)
+Controls::Controls(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load,
+                   CommandTable& table)
     : session_(session),
-      globals_(globals),
-      options_(options),
-      initial_fov_degrees_(options.fov_degrees),
+      settings_(settings),
+      seed_(seed),
+      load_(std::move(load)),
+      initial_fov_degrees_(settings.camera.fov_degrees),
       edits_(session.scene()) {
   add_scene_commands(table);
   add_light_commands(table);
@@ -96,10 +98,10 @@ std::string Controls::scene_changed() {
 
 std::string Controls::load(Words words) {
   expect(words, 1, 1, "load FILE.glb");
-  session_.load([&] { return options_.load(words[0], globals_); });
+  session_.load([&] { return load_(words[0], settings_); });
   edits_ = SceneEdits(session_.scene());
   // What names a camera of the old scene names none of this one.
-  options_.camera.clear();
+  reset_setting(settings_, "camera");
   ++changes_;
   const Scene& scene = session_.scene();
   return fmt::format("{}: {} triangles, {} nodes, {} lights", printable(scene.name), scene.triangles,
@@ -149,37 +151,28 @@ std::string Controls::change_light(Words words) {
 std::string Controls::set_camera(Words words) {
   expect(words, 1, 7, "camera 0,1,5 at 0,1,0");
   refuse_kept("camera");
-  RenderOptions tried = options_;
-  tried.camera.clear();
-  tried.eye.clear();
-  tried.at.clear();
-  tried.up = RenderOptions().up;
-  tried.fov_degrees = initial_fov_degrees_;
-  const auto triple = [](const std::string& word) {
-    const glm::dvec3 point = point_of(word);
-    return std::vector<double>{point.x, point.y, point.z};
-  };
+  CameraChoice choice{.fov_degrees = initial_fov_degrees_};
   if (words.size() == 1) {
-    tried.camera = words[0];
+    choice.name = words[0];
   } else {
-    tried.eye = triple(words[0]);
+    choice.eye = point_of(words[0]);
     for (std::size_t i = 1; i < words.size(); i += 2) {
       if (i + 1 == words.size()) refuse(fmt::format("nothing follows '{}'", printable(words[i])), "at 0,1,0");
       if (words[i] == "at") {
-        tried.at = triple(words[i + 1]);
+        choice.at = point_of(words[i + 1]);
       } else if (words[i] == "up") {
-        tried.up = triple(words[i + 1]);
+        choice.up = point_of(words[i + 1]);
       } else if (words[i] == "fov") {
-        tried.fov_degrees = number_of(words[i + 1]);
-        if (!(tried.fov_degrees > 0.0 && tried.fov_degrees < 179.0)) refuse("fov is from 0 to 179 degrees", "fov 45");
+        choice.fov_degrees = number_of(words[i + 1]);
+        if (!(choice.fov_degrees > 0.0 && choice.fov_degrees < 179.0)) refuse("fov is from 0 to 179 degrees", "fov 45");
       } else {
         refuse(fmt::format("'{}' is none of at, up and fov", printable(words[i])), "camera 0,1,5 at 0,1,0 fov 40");
       }
     }
-    if (tried.at.empty()) refuse("what does the eye look at?", "camera 0,1,5 at 0,1,0");
+    if (!choice.at) refuse("what does the eye look at?", "camera 0,1,5 at 0,1,0");
   }
-  (void)tried.choose_camera(session_.scene());  // a camera there is not is refused, and the old one stays
-  options_ = tried;
+  (void)choose_camera(choice, session_.scene());  // a camera there is not is refused, and the old one stays
+  settings_.camera = choice;
   ++changes_;
   return "";
 }
@@ -189,27 +182,17 @@ void Controls::refuse_kept(const std::string& name) const {
   if (found != kept_.end()) refuse(fmt::format("'{}' stays as it is: {}", name, found->second), "quality draft");
 }
 
-std::string Controls::set(const std::string& option, Words words) {
-  expect(words, 1, 1, option + " VALUE");
-  for (const char* own : {"stats", "explain", "environment", "camera", "eye", "at", "up", "strict"}) {
-    if (option == own) refuse(fmt::format("--{} is not set from here", option), "set photons 200000");
+std::string Controls::set(const std::string& name, Words words) {
+  expect(words, 1, 1, name + " VALUE");
+  const Setting* const setting = find_setting(name);
+  if (setting != nullptr && (setting->fixed_in_session || setting->scope == SettingScope::Wall)) {
+    refuse(fmt::format("--{} is not set from here", name), "set photons 200000");
   }
-  refuse_kept(option);
-  const std::vector<std::string> options = option_names();
-  if (std::ranges::find(options, option) == options.end()) {
-    throw Error(ExitCode::Usage, fmt::format("render has no option --{}", printable(option)),
-                unknown_name_hint(option, options));
-  }
-  RenderOptions tried = options_;
-  try {
-    set_option(tried, option, words[0]);
-  } catch (const CLI::ParseError& error) {
-    throw Error(ExitCode::Usage, error.what(), "hpr help knobs and hpr render --help list what can be set");
-  }
-  (void)tried.settings(globals_.seed);
-  (void)tried.sampling();
-  (void)tried.wire.colors();
-  options_ = tried;
+  refuse_kept(name);
+  RenderSettings tried = settings_;
+  set_setting(tried, name, words[0]);
+  (void)resolve(tried, seed_);
+  settings_ = tried;
   ++changes_;
   return "";
 }

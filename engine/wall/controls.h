@@ -1,21 +1,25 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 
-#include "app/options/render_options.h"
+#include "engine/render_settings.h"
 #include "engine/session.h"
 #include "engine/wall/command_table.h"
 #include "engine/wall/scene_edits.h"
 
 namespace hpr {
 
+/// Loads a scene and lights it as the settings say.
+using SceneLoader = std::function<Scene(const std::string& source, const RenderSettings& settings)>;
+
 /// What can be changed about a resident scene and how it is drawn, by the same commands wherever they come from. Every
 /// rank has one and is told the same lines: a change travels as its command, not as the scene.
 class Controls {
  public:
   /// All outlive this. Adds its commands to `table`.
-  Controls(Session& session, const Globals& globals, RenderOptions& options, CommandTable& table);
+  Controls(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load, CommandTable& table);
 
   /// Raised by every change: whoever keeps a plan or a picture sees by it that it is of an earlier state.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
@@ -38,8 +42,9 @@ class Controls {
   void refuse_kept(const std::string& name) const;
 
   Session& session_;
-  const Globals& globals_;
-  RenderOptions& options_;
+  RenderSettings& settings_;
+  std::uint64_t seed_;
+  SceneLoader load_;
   double initial_fov_degrees_;
   std::map<std::string, std::string> kept_;
   SceneEdits edits_;

@@ -13,8 +13,8 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
-#include "engine/wall/forgivable.h"
 #include "engine/wall/hearing.h"
+#include "engine/wall/recoverable.h"
 #include "walls/link/bytes.h"
 #include "walls/link/hosts.h"
 #include "walls/link/socket.h"
@@ -89,12 +89,12 @@ std::filesystem::path control_folder() {
   return socket_folder();
 }
 
-RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& options,
+RunControl::RunControl(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load,
                        std::function<std::string()> status, std::function<void()> apply,
                        std::function<void(const std::string&)> remember)
     : session_(session),
-      controls_(session, globals, options, table_),
-      options_(options),
+      controls_(session, settings, seed, std::move(load), table_),
+      settings_(settings),
       apply_(std::move(apply)),
       remember_(std::move(remember)) {
   table_.add(
@@ -113,21 +113,21 @@ RunControl::RunControl(Session& session, const Globals& globals, RenderOptions& 
   }
 }
 
-std::string RunControl::obey(const std::string& line) {
+std::string RunControl::apply_command(const std::string& line) {
   const std::uint64_t before = controls_.changes();
-  const RenderOptions options = options_;
-  std::string told = table_.run(line);
-  if (controls_.changes() == before) return told;
+  const RenderSettings settings = settings_;
+  std::string answer = table_.run(line);
+  if (controls_.changes() == before) return answer;
   try {
     apply_();
   } catch (const Error& error) {
-    if (!is_forgivable(error)) throw;
-    options_ = options;
+    if (!is_recoverable(error)) throw;
+    settings_ = settings;
     apply_();
     throw;
   }
   remember_(line);
-  return told;
+  return answer;
 }
 
 void RunControl::replay(std::span<const std::string> lines) {
@@ -135,21 +135,21 @@ void RunControl::replay(std::span<const std::string> lines) {
     try {
       (void)table_.run(line);
     } catch (const Error& error) {
-      if (!is_forgivable(error)) throw;
+      if (!is_recoverable(error)) throw;
       log::warning("'{}' cannot be done again: {}", printable(line), error.what());
     }
   }
 }
 
-void RunControl::attend() {
+void RunControl::poll() {
   std::optional<InputLine> from;
   while (const auto line = hear_line(session_.comm(), source_ ? &*source_ : nullptr, {}, from).line) {
     std::string answer;
     try {
-      const std::string told = obey(*line);
-      answer = told.empty() ? "ok\n" : told + "\nok\n";
+      const std::string result = apply_command(*line);
+      answer = result.empty() ? "ok\n" : result + "\nok\n";
     } catch (const Error& error) {
-      if (!is_forgivable(error)) throw;
+      if (!is_recoverable(error)) throw;
       answer = fmt::format("{}{} {} ({})\n", kRefused, static_cast<int>(error.code()), error.what(), error.hint());
     }
     if (from) source_->answer(*from, answer);

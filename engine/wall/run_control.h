@@ -20,28 +20,30 @@ namespace hpr {
 /// and `status` and `stop`.
 class RunControl {
  public:
-  /// Collective. All outlive this. `options`: what the commands change. `status`: one JSON document; called on rank 0.
-  /// `apply`: called on all ranks after every line that changed something; where it throws what is_forgivable, the
-  /// options are put back and it is called again. `remember`: told every such line that could be applied.
-  RunControl(Session& session, const Globals& globals, RenderOptions& options, std::function<std::string()> status,
-             std::function<void()> apply, std::function<void(const std::string& line)> remember);
+  /// Collective. Session and settings outlive this. `settings`: what the commands change. `status`: one JSON document;
+  /// called on rank 0. `apply`: called on all ranks after every line that changed something; where it throws what
+  /// is_recoverable, the settings are put back and it is called again. `remember`: called with every line that could be
+  /// applied.
+  RunControl(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load,
+             std::function<std::string()> status, std::function<void()> apply,
+             std::function<void(const std::string& line)> remember);
 
   /// See Controls::keep().
   void keep(const std::string& name, const std::string& why) { controls_.keep(name, why); }
-  /// Collective. Does once more what an earlier job of this run was told, without telling anybody.
+  /// Collective. Carries out the commands that an earlier job of this run carried out, and answers nobody.
   void replay(std::span<const std::string> lines);
 
-  /// Collective. Carries out what was said by now; never waits.
-  void attend();
+  /// Collective. Carries out the commands that have arrived; never waits.
+  void poll();
   [[nodiscard]] bool stops() const { return stops_; }
 
  private:
-  [[nodiscard]] std::string obey(const std::string& line);
+  [[nodiscard]] std::string apply_command(const std::string& line);
 
   Session& session_;
   CommandTable table_;
   Controls controls_;
-  RenderOptions& options_;
+  RenderSettings& settings_;
   std::function<void()> apply_;
   std::function<void(const std::string&)> remember_;
   std::optional<LineSource> source_;  ///< on rank 0

@@ -1,15 +1,15 @@
 #include "engine/wall/wall_driver.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <hpr/version.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
-#include <nlohmann/json.hpp>
+#include <sstream>
 
-#include "app/commands/remote_wall.h"
 #include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/texts.h"
@@ -19,6 +19,7 @@
 #include "core/stopwatch.h"
 #include "core/trace.h"
 #include "engine/signals.h"
+#include "engine/wall/remote_displays.h"
 #include "engine/wall/screen_owners.h"
 #include "engine/wall/wall_status.h"
 #include "walls/geometry/geometry.h"
@@ -48,80 +49,69 @@ FrameSettings settings_for(const Wall& wall, FrameSettings settings) {
 }
 
 /// A viewer who moves the camera waits no longer for a frame, unless told otherwise.
-std::optional<double> target_of(const WallRun& run) {
+std::optional<double> target_of(const WallJob& job) {
   constexpr double kResponsive_ms = 50.0;
-  if (run.target_ms || !run.open_ended()) return run.target_ms;
+  if (job.target_ms || !job.open_ended()) return job.target_ms;
   return kResponsive_ms;
 }
 
 /// While nobody moves the camera, the picture of an open-ended run gets better.
-std::optional<SampleGoal> resting_of(const WallRun& run) {
+std::optional<SampleGoal> resting_of(const WallJob& job, const RenderSettings& settings) {
   constexpr std::uint32_t kSamplesAtRest = 64;
-  const Sampling sampling = sampling_of(run);
-  if (!run.open_ended() || !sampling.goal.one() || run.options.spp) return std::nullopt;
+  if (!job.open_ended() || !sampling_of(job, settings).goal.one() || settings.is_given("spp")) return std::nullopt;
   return SampleGoal{.samples = kSamplesAtRest, .seconds = {}, .relmse = {}};
 }
 
 }  // namespace
 
-Sampling sampling_of(const WallRun& run) {
-  Sampling sampling = run.options.sampling();
-  if (!run.target_error) return sampling;
-  sampling.goal.relmse = run.target_error;
-  if (!run.options.spp) sampling.goal.samples.reset();
-  return sampling;
-}
-
-WallDriver::WallDriver(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
-                       Session& session)
-    : run_(run),
-      wall_(wall),
+WallDriver::WallDriver(const WallJob& job, Session& session)
+    : job_(job),
+      wall_(job.wall),
       session_(session),
-      path_(run.path.empty() ? std::optional<CameraPath>() : load_camera_path(run.path)),
-      heads_(wall, session.comm()),
-      monitors_(wall),
-      globals_(globals),
-      options_(run.options),
-      start_(run.options.choose_camera(session.scene())),
-      fov_degrees_(run.options.fov_degrees),
+      heads_(wall_, session.comm()),
+      monitors_(wall_),
+      settings_(job.settings),
+      start_(choose_camera(settings_.camera, session.scene())),
+      fov_degrees_(settings_.camera.fov_degrees),
       orbit_(start_, session.scene().bounds),
       control_(
-          session, globals, options_, [this] { return status(); }, [this] { plan_frames(); },
+          session, settings_, job.seed, job.load, [this] { return status(); }, [this] { plan_frames(); },
           [this](const std::string& line) {
             if (journal_) journal_->add_command(line);
           }),
       hosts_(all_gather_texts(session.comm(), session.host())),
-      owners_(owners_of(wall, hosts_, run.display.remote())) {
+      owners_(owners_of(wall_, hosts_, job.link.has_value())) {
   control_.keep("aov", "its files are named before a wall starts");
-  if (path_) control_.keep("camera", "it follows --path");
-  if (run.display.kind().whole_wall) std::ranges::fill(owners_, 0);
-  start_frames(settings, run);
-  if (run.display.remote()) remote_ = connect_displays(session_.comm(), wall, owners_, run.remote);
+  if (job_.path) control_.keep("camera", "it follows --path");
+  if (job_.display->whole_wall) std::ranges::fill(owners_, 0);
+  start_frames();
+  if (job_.link) remote_ = connect_displays(session_.comm(), wall_, owners_, *job_.link);
   agree_on_failure(session_.comm(), [&] {
-    DisplayOptions options = run.display.options(globals);
+    DisplayOptions options = job_.display_options;
     options.screens.emplace();
     for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
       if (owners_[screen] == session_.comm().rank()) options.screens->push_back(screen);
     }
-    if (shows_any() && !remote_) display_ = run.display.kind().make(wall, options);
+    if (shows_any() && !remote_) display_ = job_.display->make(wall_, options);
   });
   manifest_.scene_hash = content_hash(session.scene());
-  manifest_.wall_hash = wall.hash;
-  manifest_.seed = globals.seed;
+  manifest_.wall_hash = wall_.hash;
+  manifest_.seed = job_.seed;
   manifest_.versions = {
       {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
   take_over();
 }
 
-/// `run`: with its options as they are now.
-void WallDriver::start_frames(const FrameSettings& settings, const WallRun& run) {
+/// With the settings as they are now.
+void WallDriver::start_frames() {
+  const RenderSettings settings = resolve(settings_, job_.seed);
   const std::vector<View> views = screens_in(0, resting_heads(wall_));
-  const FrameSettings used = settings_for(wall_, settings);
+  const FrameSettings used = settings_for(wall_, settings.frame);
   curved_.emplace(views, used.primary == Primary::Rays);
-  for (const Size& size : curved_->sizes()) check_size(size, globals_.picture_limits());
-  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), run.options.exposure};
-  frames_.emplace(session_, used, sampling_of(run), curved_->drawn(views), target_of(run), resting_of(run),
-                  !run.raw.empty());
+  for (const Size& size : curved_->sizes()) check_size(size, job_.picture_limits);
+  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), settings.exposure_stops};
+  frames_.emplace(session_, used, sampling_of(job_, settings), curved_->drawn(views), target_of(job_),
+                  resting_of(job_, settings), !job_.outputs.layers.raw.empty());
 }
 
 std::vector<std::string> WallDriver::explained() const {
@@ -143,7 +133,7 @@ std::vector<std::string> WallDriver::explained() const {
 
 /// What an earlier job of this run did before it was lost, or stopped.
 void WallDriver::take_over() {
-  std::string told = "[]";
+  std::string commands;
   agree_on_failure(session_.comm(), [&] {
     if (session_.comm().rank() != 0) return;
     RunJournal::Entries entries;
@@ -151,35 +141,36 @@ void WallDriver::take_over() {
       journal_.emplace(std::move(*journal));
       entries = journal_->read();
     }
-    told = nlohmann::json(entries.commands).dump();
-    if (run_.resume && entries.frames.empty()) resume(entries.frames);
-    if (!run_.open_ended()) {
+    commands = fmt::format("{}", fmt::join(entries.commands, "\n"));
+    if (job_.resume && entries.frames.empty()) resume(entries.frames);
+    if (!job_.open_ended()) {
       // The last picture is needed for what is written at the end.
-      const auto most = static_cast<std::size_t>(run_.frames.value_or(1) - 1);
-      entries.frames.resize(std::min(entries.frames.size(), most));
+      entries.frames.resize(std::min(entries.frames.size(), static_cast<std::size_t>(job_.frame_count() - 1)));
       first_frame_ = entries.frames.size();
       manifest_.earlier = std::move(entries.frames);
     }
     std::ranges::move(entries.restarts, std::back_inserter(manifest_.restarts));
   });
   first_frame_ = all_gather_value(session_.comm(), first_frame_)[0];
-  replay(told);
+  replay(commands);
 }
 
-/// `told`: on rank 0, a JSON array of the lines the run was told before.
-void WallDriver::replay(const std::string& told) {
-  const auto lines = nlohmann::json::parse(broadcast_text(session_.comm(), told)).get<std::vector<std::string>>();
-  if (lines.empty()) return;
-  control_.replay(lines);
+/// `lines`: on rank 0, the commands that the run carried out before, one a line.
+void WallDriver::replay(const std::string& lines) {
+  std::istringstream text(broadcast_text(session_.comm(), lines));
+  std::vector<std::string> commands;
+  for (std::string line; std::getline(text, line);) commands.push_back(line);
+  if (commands.empty()) return;
+  control_.replay(commands);
   plan_frames();
 }
 
 /// Goes on after what the folder's manifest has, where there is one.
 void WallDriver::resume(std::vector<std::string>& frames) {
   std::error_code error;
-  if (!std::filesystem::exists(run_.manifest(), error)) return;
-  ManifestFile before = load_manifest(run_.manifest().string());
-  const int asked = run_.frames.value_or(1);
+  if (!std::filesystem::exists(job_.outputs.manifest, error)) return;
+  ManifestFile before = load_manifest(job_.outputs.manifest.string());
+  const int asked = job_.frame_count();
   std::string other;
   if (before.wall_hash != manifest_.wall_hash) other = "another wall";
   if (before.scene_hash != manifest_.scene_hash) other = "another scene";
@@ -188,10 +179,10 @@ void WallDriver::resume(std::vector<std::string>& frames) {
   if (of != asked) other = fmt::format("{} frames", of);
   if (!other.empty()) {
     throw Error(ExitCode::BadInput,
-                fmt::format("'{}' is of a run with {}", printable(run_.manifest().string(), 200), other),
+                fmt::format("'{}' is of a run with {}", printable(job_.outputs.manifest.string(), 200), other),
                 "go on with the same command line, or begin anew with --force in place of --resume");
   }
-  check_records(before, wall_.screens, run_.manifest().string());
+  check_records(before, wall_.screens, job_.outputs.manifest.string());
   log::info("going on after {} of {} frames", before.frames.size(), asked);
   frames = std::move(before.frames);
   manifest_.restarts = std::move(before.restarts);
@@ -201,45 +192,34 @@ void WallDriver::resume(std::vector<std::string>& frames) {
   for (const std::string& restart : manifest_.restarts) journal_->keep_restart(restart);
 }
 
-bool WallDriver::obey() {
-  control_.attend();
+bool WallDriver::apply_commands() {
+  control_.poll();
   return !control_.stops();
 }
 
 void WallDriver::plan_frames() {
-  WallRun changed = run_;
-  changed.options = options_;
-  const Camera start = options_.choose_camera(session_.scene());
-  if (start.eye != start_.eye || start.axes != start_.axes || options_.fov_degrees != fov_degrees_) {
+  const Camera start = choose_camera(settings_.camera, session_.scene());
+  if (start.eye != start_.eye || start.axes != start_.axes || settings_.camera.fov_degrees != fov_degrees_) {
     orbit_ = OrbitCamera(start, session_.scene().bounds);
     start_ = start;
-    fov_degrees_ = options_.fov_degrees;
+    fov_degrees_ = settings_.camera.fov_degrees;
   }
-  start_frames(options_.settings(globals_.seed), changed);
+  start_frames();
 }
 
 std::string WallDriver::status() const {
-  using Json = nlohmann::ordered_json;
-  Json screens = Json::array();
-  Json restarts = Json::array();
-  const bool drawn = !manifest_.frames.empty();
-  if (drawn) {
+  WallStatusRecord record{.run = ::getpid(),
+                          .wall = wall_.name,
+                          .scene = session_.scene().name,
+                          .ranks = session_.comm().size(),
+                          .restarts = manifest_.restarts};
+  if (!manifest_.frames.empty()) {
+    record.frame = manifest_.frames.back().frame;
+    record.ms = manifest_.frames.back().ms;
     const std::vector<ScreenState> now = states();
-    for (std::size_t i = 0; i < now.size(); ++i) {
-      screens.push_back(Json{{"id", wall_.screens[i].id}, {"state", to_string(now[i])}});
-    }
+    for (std::size_t i = 0; i < now.size(); ++i) record.screens.emplace_back(wall_.screens[i].id, now[i]);
   }
-  for (const std::string& restart : manifest_.restarts) restarts.push_back(Json::parse(restart));
-  const Json document{{"schema", "hpr.wall-status/1"},
-                      {"run", ::getpid()},
-                      {"wall", wall_.name},
-                      {"scene", session_.scene().name},
-                      {"ranks", session_.comm().size()},
-                      {"frame", drawn ? manifest_.frames.back().frame : 0},
-                      {"ms", drawn ? manifest_.frames.back().ms : 0.0},
-                      {"screens", std::move(screens)},
-                      {"restarts", std::move(restarts)}};
-  return document.dump(2, ' ', false, Json::error_handler_t::replace);
+  return to_json(record);
 }
 
 WallDriver::~WallDriver() = default;
@@ -279,7 +259,7 @@ bool WallDriver::follow_viewers() {
 
 bool WallDriver::settled() {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
-  if (path_ || heads_.plays_on(last)) return false;
+  if (job_.path || heads_.plays_on(last)) return false;
   return frames_->refined(curved_->drawn(screens_in(0, heads_.at(last + 1))));
 }
 
@@ -306,13 +286,13 @@ std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
 }
 
 std::vector<View> WallDriver::screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const {
-  const auto frames = static_cast<std::size_t>(run_.frames.value_or(1));
-  const Camera camera = path_ ? camera_of(path_->at_frame(frame, frames)) : orbit_.camera();
+  const auto frames = static_cast<std::size_t>(job_.frame_count());
+  const Camera camera = job_.path ? camera_of(job_.path->at_frame(frame, frames)) : orbit_.camera();
   return wall_views(wall_, heads, camera, session_.scene().bounds);
 }
 
 bool WallDriver::shows_any() const {
-  const bool shows_monitors = run_.display.kind().monitors && monitors_.any() && session_.comm().rank() == 0;
+  const bool shows_monitors = job_.display->monitors && monitors_.any() && session_.comm().rank() == 0;
   return shows_monitors || std::ranges::find(owners_, session_.comm().rank()) != owners_.end();
 }
 
@@ -370,10 +350,10 @@ void WallDriver::record(std::uint64_t number) {
   }
   // Of an open-ended run only now and then: that it gets on is all that counts.
   constexpr std::uint64_t kSignOfLife = 1000;
-  if (journal_ && (run_.frames || number % kSignOfLife == 0)) journal_->add_frame(to_json(frame));
+  if (journal_ && (job_.frames || number % kSignOfLife == 0)) journal_->add_frame(to_json(frame));
   // An open-ended run keeps its last frames only.
   constexpr std::size_t kMostRecords = 10'000;
-  if (!run_.frames && manifest_.frames.size() == kMostRecords) {
+  if (!job_.frames && manifest_.frames.size() == kMostRecords) {
     manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMostRecords / 2);
     if (remote_ && session_.comm().rank() == 0) remote_->forget_before(manifest_.frames.front().frame);
   }
@@ -383,8 +363,8 @@ void WallDriver::record(std::uint64_t number) {
 std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
   // Of the latest frames displays have not said anything yet.
-  const auto awaited = static_cast<std::uint64_t>(run_.remote.in_flight) + 1;
-  std::vector<ScreenState> unheard(owners_.size(), ScreenState::Fresh);
+  const std::uint64_t awaited = job_.link ? static_cast<std::uint64_t>(job_.link->in_flight) + 1 : 0;
+  const std::vector<ScreenState> unheard(owners_.size(), ScreenState::Fresh);
   if (!remote_ || last < first_frame_ + awaited) return unheard;
   return remote_->outcome(last - awaited).screens;
 }

@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "app/commands/wall_run.h"
 #include "core/progress.h"
 #include "engine/camera_path.h"
 #include "engine/frame_maker.h"
@@ -15,6 +14,7 @@
 #include "engine/wall/orbit.h"
 #include "engine/wall/run_control.h"
 #include "engine/wall/wall_heads.h"
+#include "engine/wall/wall_job.h"
 #include "engine/wall/wall_monitors.h"
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
@@ -26,15 +26,11 @@ namespace hpr {
 
 class WallSender;
 
-/// As the run's options say, until its target error where there is one.
-[[nodiscard]] Sampling sampling_of(const WallRun& run);
-
 /// Drives one wall: what stays the same from frame to frame.
 class WallDriver {
  public:
-  /// Collective. All outlive this.
-  WallDriver(const WallRun& run, const Wall& wall, const FrameSettings& settings, const Globals& globals,
-             Session& session);
+  /// Collective. Both outlive this.
+  WallDriver(const WallJob& job, Session& session);
   ~WallDriver();
   WallDriver(const WallDriver&) = delete;
   WallDriver& operator=(const WallDriver&) = delete;
@@ -54,7 +50,7 @@ class WallDriver {
   /// The frame to begin with: past 0 where an earlier job of this run was lost or stopped.
   [[nodiscard]] std::uint64_t first_frame() const { return first_frame_; }
   /// Collective. Does what others told the run since the last frame; false when they ended it.
-  [[nodiscard]] bool obey();
+  [[nodiscard]] bool apply_commands();
 
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
   void draw(std::uint64_t number, Progress& progress);
@@ -75,12 +71,12 @@ class WallDriver {
   [[nodiscard]] std::vector<Image<Rgba8>> collect_pictures();
 
  private:
-  void start_frames(const FrameSettings& settings, const WallRun& run);
+  void start_frames();
   [[nodiscard]] std::vector<View> screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const;
   [[nodiscard]] bool shows_any() const;
   void plan_frames();
   void take_over();
-  void replay(const std::string& told);
+  void replay(const std::string& lines);
   void resume(std::vector<std::string>& frames);
   [[nodiscard]] std::string status() const;
   void show(std::uint64_t number);
@@ -88,15 +84,13 @@ class WallDriver {
   [[nodiscard]] std::vector<ScreenRecord> record_screens();
   [[nodiscard]] std::string strategy() const;
 
-  const WallRun& run_;
+  const WallJob& job_;
   const Wall& wall_;
   Session& session_;
-  std::optional<CameraPath> path_;
   WallHeads heads_;
   WallMonitors monitors_;
-  const Globals& globals_;
-  RenderOptions options_;  ///< as changed while it runs
-  Camera start_;           ///< of the orbit, with that angle of view
+  RenderSettings settings_;  ///< as changed while it runs; see WallJob::settings
+  Camera start_;             ///< of the orbit, with that angle of view
   double fov_degrees_;
   OrbitCamera orbit_;  ///< where there is no path
   RunControl control_;

@@ -5,7 +5,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
-#include "tools/bench/bench_raster.h"
+#include "tools/bench/bench_rows.h"
 
 namespace hpr {
 

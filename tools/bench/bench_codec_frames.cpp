@@ -23,13 +23,13 @@ Camera turned(Camera camera, int steps) {
 CodecFrames draw_codec_frames(const std::string& scene, Size size, int count, const Globals& globals) {
   CodecFrames frames;
   frames.scene = scene;
-  const RenderOptions options;
+  const RenderSettings settings = resolve({}, globals.seed);
   run_local_ranks(1, [&](Communicator& comm) {
-    Session session(comm, globals.session(), [&] { return options.load(scene, globals); });
-    const Camera camera = options.choose_camera(session.scene());
+    Session session(comm, globals.session(), [&] { return load_scene(scene, settings, globals); });
+    const Camera camera = choose_camera(settings.camera, session.scene());
     const auto seen = [&](int steps) { return make_view(turned(camera, steps), size, session.scene().bounds); };
     const View first = seen(0);
-    FrameMaker maker(session, options.settings(globals.seed), options.sampling(), std::span(&first, 1), std::nullopt);
+    FrameMaker maker(session, settings.frame, settings.sampling, std::span(&first, 1), std::nullopt);
     prepare(session, maker.plan());
     Progress progress(globals.progress, scene + ": frame", static_cast<std::size_t>(2 * count));
     Progress silent("none", "sample", 0);

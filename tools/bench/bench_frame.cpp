@@ -1,12 +1,12 @@
-#include "tools/bench/bench_frame.h"
-
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstring>
 #include <map>
 
+#include "app/command.h"
+#include "app/doctor/machine.h"
+#include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "cluster/transport/local_communicator.h"
 #include "core/check.h"
@@ -16,6 +16,7 @@
 #include "engine/screens.h"
 #include "tools/bench/bench_bare_gl.h"
 #include "tools/bench/bench_rays.h"
+#include "tools/bench/bench_rows.h"
 #include "tools/bench/bench_times.h"
 
 namespace hpr {
@@ -112,15 +113,15 @@ double ms_of(const FrameTimes& times, std::string_view pass) {
 /// A frame, drawn again and again, and the floors of its steps.
 class Bench {
  public:
-  Bench(Session& session, const Globals& globals, const RenderOptions& options, Size size)
-      : session_(session), sampling_(options.sampling()), exposure_(options.exposure) {
-    const FrameSettings settings = options.settings(globals.seed);
+  /// `settings` are resolved.
+  Bench(Session& session, const RenderSettings& settings, Size size)
+      : session_(session), sampling_(settings.sampling), exposure_(settings.exposure_stops) {
     const Scene& scene = session.scene();
-    camera_ = options.choose_camera(scene);
+    camera_ = choose_camera(settings.camera, scene);
     view_ = make_view(camera_, size, scene.bounds);
-    blocks_ = cut_blocks(at_resolution(std::span(&view_, 1), settings.resolution_scale));
+    blocks_ = cut_blocks(at_resolution(std::span(&view_, 1), settings.frame.resolution_scale));
     HPR_CHECK(blocks_.views.size() == 1);
-    plan_ = plan_frame(session, settings, blocks_.views);
+    plan_ = plan_frame(session, settings.frame, blocks_.views);
     prepare(session, plan_);
   }
 
@@ -197,36 +198,67 @@ class Bench {
   std::vector<Measured> frames_;
 };
 
+/// `hpr bench frame`: a whole frame of one rank, step by step, beside what bare libraries need for as much.
+class BenchFrameCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "frame"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "a whole frame of one rank, step by step, against bare GL, bare Embree and a copy";
+  }
+
+  void declare(const OptionSet& options) override {
+    options.option("scene", scene_, "what is drawn").show_default().type("SCENE");
+    options.option("--size", size_, "pixels of the frame").show_default().type("WxH");
+    options.option("--reps", frames_, "measured frames").range(1, 10'000).show_default();
+    (void)declare_settings(options, settings_, SettingScope::Pictures);
+    options.flag("--json", json_, "one JSON document");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    print_bench(measure(globals), this_machine().cpu, json_);
+    return ExitCode::Done;
+  }
+
+ private:
+  /// Rows in ms of all threads together. Keys: against BareGl with the same triangles, or bare Embree's primary rays
+  /// where rays make them. A pass: against bare Embree tracing as many rays of its kind, on the same scene. To the
+  /// screen: against a copy of the picture's bytes. The frame: against the sum of these floors; shading and what else
+  /// has none lowers the ratio.
+  [[nodiscard]] std::vector<BenchRow> measure(const Globals& globals) const {
+    const Size size = parse_size(size_, "--size", kRasterLimit);
+    check_size(size, globals.picture_limits());
+    const RenderSettings settings = resolve(settings_, globals.seed);
+    if (!settings.sampling.goal.samples) {
+      throw Error(ExitCode::Usage, "bench frame draws the same frame again and again: --spp takes a number here",
+                  "write e.g. --spp 16");
+    }
+    if (globals.ranks > 1) {
+      throw Error(ExitCode::Usage, "bench frame draws on one rank", "leave --ranks out, or see hpr bench scale");
+    }
+    std::vector<BenchRow> rows;
+    run_local_ranks(1, [&](Communicator& comm) {
+      Session session(comm, globals.session(), [&] { return load_scene(scene_, settings, globals); });
+      Bench bench(session, settings, size);
+      bench.draw(frames_);
+      const bool draws = !bench.by_rays() && session.scene().triangles <= kMostBareTriangles;
+      rows = bench.rows(
+          draws ? bare_gl_ms(globals, session.threads(), WorldMesh(session.scene()), bench.drawn_view(), frames_)
+                : 0.0);
+    });
+    return rows;
+  }
+
+  std::string scene_ = "gen:gallery";
+  std::string size_ = "1280x720";
+  int frames_ = 5;
+  bool json_ = false;
+  RenderSettings settings_;
+};
+
 }  // namespace
 
-void FrameBench::declare(CLI::App& app) {
-  app.add_option("scene", scene_, "what is drawn")->capture_default_str()->type_name("SCENE");
-  app.add_option("--size", size_, "pixels of the frame")->capture_default_str()->type_name("WxH");
-  app.add_option("--reps", frames_, "measured frames")->check(CLI::Range(1, 10'000))->capture_default_str();
-  options_.declare_frame(app);
-}
-
-std::vector<BenchRow> FrameBench::run(const Globals& globals) const {
-  const Size size = parse_size(size_, "--size", kRasterLimit);
-  check_size(size, globals.picture_limits());
-  (void)options_.settings(globals.seed);
-  if (!options_.sampling().goal.samples) {
-    throw Error(ExitCode::Usage, "bench frame draws the same frame again and again: --spp takes a number here",
-                "write e.g. --spp 16");
-  }
-  if (globals.ranks > 1) {
-    throw Error(ExitCode::Usage, "bench frame draws on one rank", "leave --ranks out, or see hpr bench scale");
-  }
-  std::vector<BenchRow> rows;
-  run_local_ranks(1, [&](Communicator& comm) {
-    Session session(comm, globals.session(), [&] { return options_.load(scene_, globals); });
-    Bench bench(session, globals, options_, size);
-    bench.draw(frames_);
-    const bool draws = !bench.by_rays() && session.scene().triangles <= kMostBareTriangles;
-    rows = bench.rows(
-        draws ? bare_gl_ms(globals, session.threads(), WorldMesh(session.scene()), bench.drawn_view(), frames_) : 0.0);
-  });
-  return rows;
+std::unique_ptr<Command> make_bench_frame_command() {
+  return std::make_unique<BenchFrameCommand>();
 }
 
 }  // namespace hpr

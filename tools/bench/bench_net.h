@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
-#include "tools/bench/bench_raster.h"
+#include "tools/bench/bench_rows.h"
 
 namespace hpr {
 

@@ -6,7 +6,7 @@
 #include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 #include "scene/view.h"
-#include "tools/bench/bench_raster.h"
+#include "tools/bench/bench_rows.h"
 
 namespace hpr {
 

@@ -30,15 +30,14 @@ using Json = nlohmann::ordered_json;
 class WallBench {
  public:
   /// Collective.
-  WallBench(Session& session, const ScaleInput& input, Size grid, const std::vector<std::string>& hosts,
-            std::uint64_t seed)
-      : session_(session), input_(input), sampling_(input.options.sampling()) {
+  WallBench(Session& session, const ScaleInput& input, Size grid, const std::vector<std::string>& hosts)
+      : session_(session), input_(input), sampling_(input.settings.sampling) {
     const Wall wall = load_wall(wall_of(grid, input.size));
     const Scene& scene = session.scene();
-    const std::vector<View> screens = wall_views(wall, input.options.choose_camera(scene), scene.bounds);
-    const FrameSettings settings = input.options.settings(seed);
+    const std::vector<View> screens = wall_views(wall, choose_camera(input.settings.camera, scene), scene.bounds);
+    const FrameSettings& settings = input.settings.frame;
     blocks_ = cut_blocks(at_resolution(screens, settings.resolution_scale));
-    showing_.exposure_stops = input.options.exposure;
+    showing_.exposure_stops = input.settings.exposure_stops;
     showing_.shown_by = owners_of(wall, hosts, false);
     for (const View& screen : screens) showing_.sizes.push_back(screen.screen);
     plan_ = plan_frame(session, settings, blocks_.views);
@@ -128,11 +127,11 @@ ScaleRun run_from(const Json& json) {
 
 std::vector<ScaleRun> measure_scale(Communicator& comm, const Globals& globals, const ScaleInput& input, int frames) {
   HPR_CHECK(frames > 0);
-  Session session(comm, globals.session(), [&] { return input.options.load(input.scene, globals); });
+  Session session(comm, globals.session(), [&] { return load_scene(input.scene, input.settings, globals); });
   const std::vector<std::string> hosts = all_gather_texts(comm, session.host());
   std::vector<ScaleRun> runs;
   for (const Size grid : input.grids) {
-    runs.push_back(WallBench(session, input, grid, hosts, globals.seed).draw(frames));
+    runs.push_back(WallBench(session, input, grid, hosts).draw(frames));
   }
   if (comm.rank() != 0) runs.clear();
   return runs;

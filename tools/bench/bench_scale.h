@@ -15,7 +15,7 @@ namespace hpr {
 /// What is drawn, whoever draws it.
 struct ScaleInput {
   std::string scene;
-  RenderOptions options;
+  RenderSettings settings;  ///< resolved
   Size size;                ///< pixels of a screen
   std::vector<Size> grids;  ///< walls: screens side by side and one above the other
   int warmup = 1;           ///< frames before those that are measured

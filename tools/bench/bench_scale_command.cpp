@@ -1,9 +1,6 @@
-#include "tools/bench/bench_scale_command.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -12,20 +9,26 @@
 #include <optional>
 #include <random>
 
+#include "app/command.h"
+#include "app/doctor/machine.h"
 #include "app/launch/launcher.h"
 #include "app/launch/run_ranks.h"
 #include "app/launch/shell_line.h"
+#include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "app/output_files.h"
 #include "cluster/transport/agreement.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "engine/output.h"
 #include "scene/view.h"
+#include "tools/bench/bench_scale.h"
 #include "tools/bench/bench_scale_html.h"
+#include "tools/bench/bench_scale_report.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
@@ -71,39 +74,77 @@ std::vector<int> doubled_up_to(int most) {
   return counts;
 }
 
-}  // namespace
+/// `hpr bench scale`: the same frames by jobs of several sizes, as MPI jobs of this program.
+class BenchScaleCommand final : public Command {
+ public:
+  [[nodiscard]] bool collective() const override { return true; }
+  [[nodiscard]] std::string_view name() const override { return "scale"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "the same frames by more and more ranks and cores, in the shape of table 6.1";
+  }
+  void declare(const OptionSet& options) override;
+  [[nodiscard]] ExitCode run(const Globals& globals) override;
 
-void ScaleBench::declare(CLI::App& app) {
-  app.add_option("scene", scene_, "what is drawn")->capture_default_str()->type_name("SCENE");
-  app.add_option("--size", size_, "pixels of a screen")->capture_default_str()->type_name("WxH");
-  app.add_option("--tiles", tiles_, "walls: screens side by side and one above the other")
-      ->capture_default_str()
-      ->type_name("LIST of CxR");
-  app.add_option("--ranks", ranks_, "numbers of ranks (default: 1, 2, 4 .. as many as there are cores)")
-      ->type_name("LIST");
-  app.add_option("--threads", threads_,
-                 "numbers of cores of each rank (default: 1; without --ranks all that the machine's cores suffice for)")
-      ->type_name("LIST");
-  app.add_option("--reps", frames_, "measured frames of each")->check(CLI::Range(1, 100'000))->capture_default_str();
-  app.add_option("--warmup", warmup_, "frames of each job before those")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
-  app.add_option("--csv", csv_, "write one line per frame")->type_name("FILE");
-  app.add_option("--html", html_, "write the result as one page with a plot")->type_name("FILE");
-  options_.declare_frame(app);
+ private:
+  /// One job's size.
+  struct Job {
+    int ranks = 1;
+    int threads = 1;
+  };
+
+  [[nodiscard]] ScaleInput make_input(const Globals& globals) const;
+  void check_files(const Globals& globals) const;
+  /// Empty: nothing was said.
+  [[nodiscard]] std::vector<int> ranks_said(const Globals& globals) const;
+  [[nodiscard]] std::vector<int> threads_said(const Globals& globals) const;
+  [[nodiscard]] std::vector<Job> jobs(const Globals& globals) const;
+  [[nodiscard]] ExitCode run_in_job(const Globals& globals, const ScaleInput& input) const;
+  [[nodiscard]] ExitCode run_jobs(const Globals& globals, const ScaleInput& input) const;
+  [[nodiscard]] ExitCode finish(const Globals& globals, const ScaleInput& input, std::vector<ScaleRun> runs) const;
+
+  std::string scene_ = "gen:gallery";
+  std::string size_ = "1280x1024";
+  std::string tiles_ = "1x1";
+  std::string ranks_;
+  std::string threads_;
+  int frames_ = 5;
+  int warmup_ = 1;
+  std::string csv_;
+  std::string html_;
+  bool json_ = false;
+  RenderSettings settings_;
+};
+
+void BenchScaleCommand::declare(const OptionSet& options) {
+  options.option("scene", scene_, "what is drawn").show_default().type("SCENE");
+  options.option("--size", size_, "pixels of a screen").show_default().type("WxH");
+  options.option("--tiles", tiles_, "walls: screens side by side and one above the other")
+      .show_default()
+      .type("LIST of CxR");
+  options.option("--ranks", ranks_, "numbers of ranks (default: 1, 2, 4 .. as many as there are cores)").type("LIST");
+  options
+      .option("--threads", threads_,
+              "numbers of cores of each rank (default: 1; without --ranks all that the machine's cores suffice for)")
+      .type("LIST");
+  options.option("--reps", frames_, "measured frames of each").range(1, 100'000).show_default();
+  options.option("--warmup", warmup_, "frames of each job before those").range(0, 1000).show_default();
+  options.option("--csv", csv_, "write one line per frame").type("FILE");
+  options.option("--html", html_, "write the result as one page with a plot").type("FILE");
+  (void)declare_settings(options, settings_, SettingScope::Pictures);
+  options.flag("--json", json_, "one JSON document");
 }
 
-std::vector<int> ScaleBench::ranks_said(const Globals& globals) const {
+std::vector<int> BenchScaleCommand::ranks_said(const Globals& globals) const {
   if (!ranks_.empty()) return each_once(parse_counts(ranks_, "--ranks"));
   return globals.ranks > 0 ? std::vector{globals.ranks} : std::vector<int>{};
 }
 
-std::vector<int> ScaleBench::threads_said(const Globals& globals) const {
+std::vector<int> BenchScaleCommand::threads_said(const Globals& globals) const {
   if (!threads_.empty()) return each_once(parse_counts(threads_, "--threads"));
   return globals.threads > 0 ? std::vector{globals.threads} : std::vector<int>{};
 }
 
-std::vector<ScaleBench::Job> ScaleBench::jobs(const Globals& globals) const {
+std::vector<BenchScaleCommand::Job> BenchScaleCommand::jobs(const Globals& globals) const {
   const int cores = usable_cores();
   const std::vector<int> said_ranks = ranks_said(globals);
   const std::vector<int> said_threads = threads_said(globals);
@@ -121,8 +162,8 @@ std::vector<ScaleBench::Job> ScaleBench::jobs(const Globals& globals) const {
   return jobs;
 }
 
-ScaleInput ScaleBench::make_input(const Globals& globals) const {
-  ScaleInput input{scene_, options_, parse_size(size_, "--size", kRasterLimit), {}, warmup_};
+ScaleInput BenchScaleCommand::make_input(const Globals& globals) const {
+  ScaleInput input{scene_, resolve(settings_, globals.seed), parse_size(size_, "--size", kRasterLimit), {}, warmup_};
   check_size(input.size, globals.picture_limits());
   for (const std::string& tiles : split_commas(tiles_)) {
     const Size grid = parse_size(tiles, "--tiles", kMostScreensASide);
@@ -130,12 +171,11 @@ ScaleInput ScaleBench::make_input(const Globals& globals) const {
     check_size({grid.width * input.size.width, grid.height * input.size.height}, globals.picture_limits());
     if (std::ranges::find(input.grids, grid) == input.grids.end()) input.grids.push_back(grid);
   }
-  (void)options_.settings(globals.seed);
-  if (options_.sampling().goal.seconds) {
+  if (input.settings.sampling.goal.seconds) {
     throw Error(ExitCode::Usage, "bench scale draws the same frame at every size: --spp until a time makes others",
                 "write e.g. --spp 16");
   }
-  if (options_.primary == "auto") {
+  if (input.settings.frame.primary == Primary::Auto) {
     throw Error(ExitCode::Usage,
                 "bench scale draws the same frame at every size: --primary auto may choose another way",
                 "say --primary raster or --primary rays");
@@ -143,23 +183,23 @@ ScaleInput ScaleBench::make_input(const Globals& globals) const {
   return input;
 }
 
-void ScaleBench::check_files(const Globals& globals) const {
+void BenchScaleCommand::check_files(const Globals& globals) const {
   const std::vector<std::string> results{csv_, html_};
   check_distinct(results, globals.trace);
-  check_spared(scene_, globals.scene_limits(), std::span(&options_.environment, 1), results);
+  check_spared(scene_, globals.scene_limits(), std::span(&settings_.environment, 1), results);
   for (const std::string& path : results) {
     if (!path.empty()) check_writable(path, globals.force);
   }
 }
 
-ExitCode ScaleBench::run(const Globals& globals, bool json) const {
+ExitCode BenchScaleCommand::run(const Globals& globals) {
   const ScaleInput input = make_input(globals);
   (void)jobs(globals);  // refuses what is no list
   if (!job_order()) check_files(globals);
-  return inside_mpi_job() ? run_in_job(globals, input, json) : run_jobs(globals, input, json);
+  return inside_mpi_job() ? run_in_job(globals, input) : run_jobs(globals, input);
 }
 
-ExitCode ScaleBench::run_in_job(const Globals& globals, const ScaleInput& input, bool json) const {
+ExitCode BenchScaleCommand::run_in_job(const Globals& globals, const ScaleInput& input) const {
   const std::optional<JobOrder> order = job_order();
   Globals job = globals;
   job.ranks = 0;
@@ -185,7 +225,7 @@ ExitCode ScaleBench::run_in_job(const Globals& globals, const ScaleInput& input,
       }
     }
     const auto verdict = on_root(comm, [&] {
-      if (!order) return std::vector{static_cast<std::byte>(finish(globals, input, std::move(runs), json))};
+      if (!order) return std::vector{static_cast<std::byte>(finish(globals, input, std::move(runs)))};
       std::fputs(scale_runs_to_json(runs).c_str(), stdout);
       return std::vector{static_cast<std::byte>(ExitCode::Done)};
     });
@@ -193,7 +233,7 @@ ExitCode ScaleBench::run_in_job(const Globals& globals, const ScaleInput& input,
   });
 }
 
-ExitCode ScaleBench::run_jobs(const Globals& globals, const ScaleInput& input, bool json) const {
+ExitCode BenchScaleCommand::run_jobs(const Globals& globals, const ScaleInput& input) const {
   const std::vector<Job> sizes = jobs(globals);
   const int rounds = std::min(kRounds, frames_);
   std::vector<std::vector<ScaleRun>> of_size(sizes.size());
@@ -225,24 +265,29 @@ ExitCode ScaleBench::run_jobs(const Globals& globals, const ScaleInput& input, b
   for (std::size_t grid = 0; grid < input.grids.size(); ++grid) {
     for (std::vector<ScaleRun>& size : of_size) runs.push_back(std::move(size.at(grid)));
   }
-  return finish(globals, input, std::move(runs), json);
+  return finish(globals, input, std::move(runs));
 }
 
-ExitCode ScaleBench::finish(const Globals& globals, const ScaleInput& input, std::vector<ScaleRun> runs,
-                            bool json) const {
+ExitCode BenchScaleCommand::finish(const Globals& globals, const ScaleInput& input, std::vector<ScaleRun> runs) const {
   const ScaleReport report{
       "hpr " + shell_line(globals.args), this_machine(), scene_, input.size, globals.seed, std::move(runs)};
   if (!csv_.empty()) write_file_atomically(csv_, scale_csv(report));
   if (!html_.empty()) write_file_atomically(html_, scale_html(report));
-  std::fputs((json ? scale_json(report) : scale_table(report)).c_str(), stdout);
+  std::fputs((json_ ? scale_json(report) : scale_table(report)).c_str(), stdout);
   for (const std::string& sentence : slow_ranks(report)) log::warning("{}", sentence);
   if (pictures_agree(report)) return ExitCode::Done;
-  if (options_.shading == "local") {
+  if (settings_.frame.shading == Shading::Local) {
     log::warning("not all runs of a wall made the same picture: with --shading local coplanar surfaces may differ");
     return ExitCode::Done;
   }
   log::error("not all runs of a wall made the same picture: compare their frame hashes");
   return ExitCode::CheckFailed;
+}
+
+}  // namespace
+
+std::unique_ptr<Command> make_bench_scale_command() {
+  return std::make_unique<BenchScaleCommand>();
 }
 
 }  // namespace hpr

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -49,7 +48,7 @@ class CompareCommand final : public Command {
     return "measure compositing strategies against each other on the same layers, and check that they agree";
   }
 
-  void declare(CLI::App& app) override { options_.declare(app); }
+  void declare(const OptionSet& options) override { options_.declare(options); }
 
   ExitCode run(const Globals& globals) override {
     if (!options_.plugin.empty()) load_compositor_plugin(options_.plugin);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 
@@ -44,48 +43,42 @@ std::vector<std::string> split_strategies(std::string_view list) {
   return names;
 }
 
-void CompareOptions::declare(CLI::App& app) {
-  app.add_option("scene", scene, "a scene to draw the layers from")->type_name("SCENE");
-  app.add_option("--shading", shading,
-                 "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app.add_option("--synthetic", synthetic, "made-up layers: dense, half, sparse, scatter or checker")
-      ->type_name("KIND");
-  app.add_option("--size", size, "pixels of one screen")->type_name("WxH")->capture_default_str();
-  app.add_option("--tiles", tiles, "screens of the wall")->type_name("CxR")->capture_default_str();
-  app.add_option("--ranks", ranks, "numbers of ranks to run on (2,4; inside an MPI job: that job's)")
-      ->type_name("LIST");
-  app.add_option(
-         "--operator", operator_name,
-         "nearest: the nearest surface; over8, overf: translucent layers, ranks from front to back, in 8 bits or "
-         "floats a channel")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app.add_option("--strategies", strategies, "all, or names of strategies")->type_name("LIST")->capture_default_str();
-  app.add_option("--plugin", plugin, "a shared object with one more strategy (docs/compositing.md)")
-      ->type_name("FILE.so");
-  frames_option_ = app.add_option("--frames", frames, "measured frames");
-  frames_option_->type_name("N")->check(CLI::Range(1, 1'000'000))->capture_default_str();
-  app.add_option("--warmup", warmup, "frames before the measured ones")
-      ->type_name("N")
-      ->check(CLI::Range(0, 1'000'000))
-      ->capture_default_str();
-  app.add_option("--simulate", simulate,
-                 "run on threads and reckon what a cluster would take: hosts=64,ranks=512,latency=2us,"
-                 "bandwidth=12.5GB/s[,cores=,overhead=,local-latency=,local-bandwidth=,merge=]")
-      ->type_name("CLUSTER");
-  app.add_option("--transport", transport, "mpi, or threads of one process")->type_name("NAME")->capture_default_str();
-  app.add_option("--csv", csv, "write one line per run to this file")->type_name("FILE");
-  app.add_option("--html", html, "write the result as one page with plots and drawings")->type_name("FILE");
-  app.add_flag("--json", json, "print the result as JSON (schema hpr.compare/1) instead of a table");
-  app.add_option("-o,--output", picture, "write the composited frame of the last number of ranks")
-      ->type_name("FILE.png");
-  app.add_option("--raw", raw, "write that frame's keys: per pixel uint64, row 0 at the top")->type_name("FILE");
+void CompareOptions::declare(const OptionSet& options) {
+  options.option("scene", scene, "a scene to draw the layers from").type("SCENE");
+  options
+      .option("--shading", shading,
+              "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
+      .type("NAME")
+      .show_default();
+  options.option("--synthetic", synthetic, "made-up layers: dense, half, sparse, scatter or checker").type("KIND");
+  options.option("--size", size, "pixels of one screen").type("WxH").show_default();
+  options.option("--tiles", tiles, "screens of the wall").type("CxR").show_default();
+  options.option("--ranks", ranks, "numbers of ranks to run on (2,4; inside an MPI job: that job's)").type("LIST");
+  options
+      .option("--operator", operator_name,
+              "nearest: the nearest surface; over8, overf: translucent layers, ranks from front to back, in 8 bits or "
+              "floats a channel")
+      .type("NAME")
+      .show_default();
+  options.option("--strategies", strategies, "all, or names of strategies").type("LIST").show_default();
+  options.option("--plugin", plugin, "a shared object with one more strategy (docs/compositing.md)").type("FILE.so");
+  frames_option_ = options.option("--frames", frames, "measured frames").type("N").range(1, 1'000'000).show_default();
+  options.option("--warmup", warmup, "frames before the measured ones").type("N").range(0, 1'000'000).show_default();
+  options
+      .option("--simulate", simulate,
+              "run on threads and reckon what a cluster would take: hosts=64,ranks=512,latency=2us,"
+              "bandwidth=12.5GB/s[,cores=,overhead=,local-latency=,local-bandwidth=,merge=]")
+      .type("CLUSTER");
+  options.option("--transport", transport, "mpi, or threads of one process").type("NAME").show_default();
+  options.option("--csv", csv, "write one line per run to this file").type("FILE");
+  options.option("--html", html, "write the result as one page with plots and drawings").type("FILE");
+  options.flag("--json", json, "print the result as JSON (schema hpr.compare/1) instead of a table");
+  options.option("-o,--output", picture, "write the composited frame of the last number of ranks").type("FILE.png");
+  options.option("--raw", raw, "write that frame's keys: per pixel uint64, row 0 at the top").type("FILE");
 }
 
 void CompareOptions::settle() {
-  if (!simulate.empty() && frames_option_->count() == 0) frames = warmup = 1;  // simulated frames are all alike
+  if (!simulate.empty() && !frames_option_->given()) frames = warmup = 1;  // simulated frames are all alike
   check_transport();
   check_operator();
   check_shading();

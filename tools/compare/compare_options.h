@@ -5,13 +5,9 @@
 #include <vector>
 
 #include "app/options/globals.h"
+#include "app/options/option_set.h"
 #include "image/image.h"
 #include "tools/compare/compare.h"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
 
 /// The options of `hpr compare`, and how their values are written. What is written otherwise throws Error (Usage).
 namespace hpr {
@@ -40,7 +36,7 @@ struct CompareOptions {
   std::string picture;
   std::string raw;
 
-  void declare(CLI::App& app);
+  void declare(const OptionSet& options);
   /// What is left open is settled by what was said. Throws Error for what can be refused before any rank starts, but
   /// for the names of files.
   void settle();
@@ -65,7 +61,7 @@ struct CompareOptions {
   void check_strategy(const std::string& name) const;
   [[nodiscard]] bool fits(const std::string& name, int count) const;
 
-  CLI::Option* frames_option_ = nullptr;
+  std::optional<Option> frames_option_;
 };
 
 }  // namespace hpr

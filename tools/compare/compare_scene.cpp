@@ -1,8 +1,8 @@
 #include "tools/compare/compare_scene.h"
 
-#include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "engine/frame.h"
+#include "engine/render_settings.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/geometry.h"
 
@@ -14,7 +14,7 @@ DrawnTiles draw_share(Communicator& comm, const std::string& scene, const Wall& 
                       const FrameSettings& settings) {
   Session session(comm, globals.session(), [&] { return load_scene(scene, globals.scene_limits()); });
   const std::vector<View> views =
-      wall_views(wall, RenderOptions{}.choose_camera(session.scene()), session.scene().bounds);
+      wall_views(wall, choose_camera(CameraChoice{}, session.scene()), session.scene().bounds);
   FramePlan plan = plan_frame(session, settings, views);
   plan.lit = false;
   TileLayer<Key> layer(plan.layout);
@@ -32,7 +32,7 @@ CompareInput scene_layers(const std::string& scene, Size screen, Size grid, bool
   input.screen = screen;
   input.grid = grid;
   input.colors = local_shading;
-  FrameSettings settings = RenderOptions{}.settings(globals.seed);
+  FrameSettings settings = resolve(RenderSettings{}, globals.seed).frame;
   settings.shading = local_shading ? Shading::Local : Shading::Deferred;
   settings.distribution = Distribution::SortLast;
   input.layer = [=](Communicator& comm) { return draw_share(comm, scene, wall, globals, settings).layer; };

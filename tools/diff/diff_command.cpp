@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -22,18 +21,18 @@ class DiffCommand final : public Command {
     return "how far two pictures (PNG, JPEG, EXR) or two files of keys are apart";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("A", a_, "the reference: a picture, or a .keys file of hpr render --raw")->required();
-    app.add_option("B", b_, "what is compared with it")->required();
-    app.add_option(
-           "--metric", metrics_,
-           "rmse, psnr, max, differing, mean, relmse, ssim, flip: which to print (default: all but the last two, "
-           "which take longer)")
-        ->delimiter(',');
-    app.add_option("--fail", tolerance_.value, "largest allowed absolute difference of a value, 1 = white (default 0)");
-    app.add_option("--fail-percent", tolerance_.percent, "share of pixels that may exceed it (default 0)");
-    app.add_option("-o,--output", heat_, "write where and how much they differ as a PNG");
-    app.add_flag("--json", json_, "print the result as JSON");
+  void declare(const OptionSet& options) override {
+    options.option("A", a_, "the reference: a picture, or a .keys file of hpr render --raw").required();
+    options.option("B", b_, "what is compared with it").required();
+    options
+        .option("--metric", metrics_,
+                "rmse, psnr, max, differing, mean, relmse, ssim, flip: which to print (default: all but the last two, "
+                "which take longer)")
+        .list();
+    options.option("--fail", tolerance_.value, "largest allowed absolute difference of a value, 1 = white (default 0)");
+    options.option("--fail-percent", tolerance_.percent, "share of pixels that may exceed it (default 0)");
+    options.option("-o,--output", heat_, "write where and how much they differ as a PNG");
+    options.flag("--json", json_, "print the result as JSON");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -26,11 +25,11 @@ class StabilityCommand final : public Command {
     return "drive everything to its extremes: each case's limit, what was measured, where it breaks";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("--case", names_, "only these cases")->delimiter(',')->type_name("NAME,...");
-    app.add_flag("--list", list_, "print the cases and measure nothing");
-    app.add_option("--html", html_, "write the report as one page with plots")->type_name("FILE");
-    app.add_flag("--json", json_, "print the findings as JSON");
+  void declare(const OptionSet& options) override {
+    options.option("--case", names_, "only these cases").list().type("NAME,...");
+    options.flag("--list", list_, "print the cases and measure nothing");
+    options.option("--html", html_, "write the report as one page with plots").type("FILE");
+    options.flag("--json", json_, "print the findings as JSON");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {

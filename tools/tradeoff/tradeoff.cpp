@@ -7,11 +7,11 @@
 #include <cmath>
 #include <map>
 
-#include "app/options/knobs.h"
 #include "core/check.h"
 #include "core/error.h"
 #include "core/names.h"
 #include "core/units.h"
+#include "engine/settings_table.h"
 
 namespace hpr {
 namespace {
@@ -93,10 +93,20 @@ std::vector<KnobValues> combinations(std::span<const KnobSweep> sweeps) {
   return all;
 }
 
-RenderOptions with_knobs(const RenderOptions& base, const KnobValues& values) {
-  RenderOptions options = base;
-  for (const auto& [knob, value] : values) set_knob(options, knob, value);
-  return options;
+RenderSettings with_knobs(const RenderSettings& base, const KnobValues& values) {
+  RenderSettings settings = base;
+  for (const auto& [knob, value] : values) {
+    std::string written = value;
+    std::ranges::replace(written, '+', ',');
+    const Setting& setting = find_knob(knob);
+    try {
+      set_setting(settings, knob, written);
+    } catch (const Error& error) {
+      throw Error(ExitCode::Usage, fmt::format("--vary {}={}: {}", knob, printable(value), error.what()),
+                  fmt::format("it takes {}", setting.value.takes));
+    }
+  }
+  return settings;
 }
 
 const std::vector<std::string>& tradeoff_metrics() {

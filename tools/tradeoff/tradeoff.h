@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/doctor/machine.h"
-#include "app/options/render_options.h"
+#include "engine/render_settings.h"
 #include "image/image.h"
 #include "rt/lighter.h"
 #include "tools/diff/diff_colors.h"
@@ -30,8 +30,8 @@ struct KnobSweep {
 /// Every combination, the last sweep's values varying fastest. Throws Error (Usage) for a knob named twice.
 [[nodiscard]] std::vector<KnobValues> combinations(std::span<const KnobSweep> sweeps);
 
-/// `base` with these knobs set.
-[[nodiscard]] RenderOptions with_knobs(const RenderOptions& base, const KnobValues& values);
+/// `base` with these knobs set; a list within a value has + in place of its commas. Throws Error (Usage).
+[[nodiscard]] RenderSettings with_knobs(const RenderSettings& base, const KnobValues& values);
 
 /// How far a picture is from the reference; what was not asked for, or is not defined, is NaN.
 struct PictureError {

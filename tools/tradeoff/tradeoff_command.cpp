@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 #include <hpr/version.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "app/command.h"
 #include "app/launch/run_ranks.h"
 #include "app/launch/shell_line.h"
+#include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "app/output_files.h"
 #include "cluster/transport/agreement.h"
@@ -40,21 +40,16 @@ constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
 
 /// What the command line says that a frame of `hpr render` would take as well, but for what a sweep has of its own or
 /// varies, and what changes neither pictures nor times. The same for any order and spelling of the options.
-std::vector<std::string> base_words(const CLI::App& app, std::span<const std::string> varied) {
+std::vector<std::string> base_words(const OptionSet& options, std::span<const std::string> varied) {
   static const std::set<std::string> left_out{"vary",     "metric",       "reference", "reference-spp", "budget",
                                               "frames",   "html",         "csv",       "size",          "json",
                                               "progress", "hang-timeout", "limit-mem", "limit-image",   "trace",
                                               "resume",   "force",        "strict",    "quiet",         "verbose"};
   std::vector<std::string> words;
-  for (const CLI::App* level = &app; level != nullptr; level = level->get_parent()) {
-    for (const CLI::Option* option : level->get_options()) {
-      if (option->count() == 0 || option->get_lnames().empty()) continue;
-      const std::string& name = option->get_lnames().front();
-      if (left_out.contains(name) || std::ranges::find(varied, name) != varied.end()) continue;
-      const std::string value = fmt::format("{}", fmt::join(option->reduced_results(), ","));
-      const bool is_set_flag = option->get_expected_max() == 0 && value == "true";
-      words.push_back(is_set_flag ? "--" + name : fmt::format("--{}={}", name, value));
-    }
+  for (const GivenOption& option : options.given()) {
+    if (left_out.contains(option.name) || std::ranges::find(varied, option.name) != varied.end()) continue;
+    const bool is_set_flag = option.is_flag && option.value == "true";
+    words.push_back(is_set_flag ? "--" + option.name : fmt::format("--{}={}", option.name, option.value));
   }
   return words;
 }
@@ -67,42 +62,43 @@ class TradeoffCommand final : public Command {
     return "what the knobs of a scene cost and lose: time against error, and the settings a budget allows";
   }
 
-  void declare(CLI::App& app) override {
-    app_ = &app;
-    app.add_option("scene", scene_, "a .gltf or .glb file, or gen:NAME?key=value")->required();
-    app.add_option("--vary", vary_, "a knob and its values, spp=1,4,16; again for another knob (see hpr help knobs)")
-        ->type_name("K=V,V,...")
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->allow_extra_args(false)
-        ->required();
-    app.add_option("--metric", metrics_,
-                   "relmse, rmse, psnr, ssim, flip: which errors to measure; the first one decides the front")
-        ->delimiter(',');
-    app.add_option("--reference", how_.reference,
-                   "the truth: an .exr or .png, path (path tracing), passes (--quality best, many samples), or auto: "
-                   "passes where light of points is seen through mirrors and glass, which paths cannot find, else path")
-        ->type_name("FILE|auto")
-        ->capture_default_str();
-    app.add_option("--reference-spp", how_.reference_spp, "samples of a rendered truth")
-        ->check(CLI::Range(std::uint32_t{16}, std::uint32_t{1'000'000'000}))
-        ->capture_default_str();
-    app.add_option("--budget", budget_, "a time (33ms) or an error (flip=0.05) to find the best settings within");
-    app.add_option("--frames", how_.frames, "of each point; fewer where they take seconds")
-        ->check(CLI::Range(1, 1'000'000))
-        ->capture_default_str();
-    app.add_option("--size", size_, "pixels of the pictures")->capture_default_str()->type_name("WxH");
-    app.add_flag("--json", json_, "print the result as JSON (schema hpr.tradeoff/1) instead of a table");
-    app.add_option("--csv", csv_, "write one line per point to this file")->type_name("FILE");
-    app.add_option("--html", html_, "write the result as one page with plots and crops")->type_name("FILE");
-    app.add_flag("--resume", resume_, "go on with the points of this sweep that an earlier run measured");
-    options_.declare_frame(app);
+  void declare(const OptionSet& options) override {
+    options_.emplace(options);
+    options.option("scene", scene_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    options.option("--vary", vary_, "a knob and its values, spp=1,4,16; again for another knob (see hpr help knobs)")
+        .type("K=V,V,...")
+        .repeats()
+        .required();
+    options
+        .option("--metric", metrics_,
+                "relmse, rmse, psnr, ssim, flip: which errors to measure; the first one decides the front")
+        .list();
+    options
+        .option("--reference", how_.reference,
+                "the truth: an .exr or .png, path (path tracing), passes (--quality best, many samples), or auto: "
+                "passes where light of points is seen through mirrors and glass, which paths cannot find, else path")
+        .type("FILE|auto")
+        .show_default();
+    options.option("--reference-spp", how_.reference_spp, "samples of a rendered truth")
+        .range(std::uint32_t{16}, std::uint32_t{1'000'000'000})
+        .show_default();
+    options.option("--budget", budget_, "a time (33ms) or an error (flip=0.05) to find the best settings within");
+    options.option("--frames", how_.frames, "of each point; fewer where they take seconds")
+        .range(1, 1'000'000)
+        .show_default();
+    options.option("--size", size_, "pixels of the pictures").show_default().type("WxH");
+    options.flag("--json", json_, "print the result as JSON (schema hpr.tradeoff/1) instead of a table");
+    options.option("--csv", csv_, "write one line per point to this file").type("FILE");
+    options.option("--html", html_, "write the result as one page with plots and crops").type("FILE");
+    options.flag("--resume", resume_, "go on with the points of this sweep that an earlier run measured");
+    (void)declare_settings(options, settings_, SettingScope::Pictures);
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     check_options(globals);
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
-      Session session(comm, globals.session(), [&] { return options_.load(scene_, globals); });
+      Session session(comm, globals.session(), [&] { return load_scene(scene_, settings_, globals); });
       return sweep(session, globals);
     });
   }
@@ -116,9 +112,7 @@ class TradeoffCommand final : public Command {
     for (const KnobSweep& sweep : sweeps) report_.knobs.push_back(sweep.knob);
     all_ = combinations(sweeps);
     for (const KnobValues& values : all_) {  // bad ones are found before any scene is loaded
-      const RenderOptions options = with_knobs(options_, values);
-      (void)options.settings(globals.seed);
-      (void)options.sampling();
+      (void)resolve(with_knobs(settings_, values), globals.seed);
     }
     if (metrics_.empty()) metrics_ = tradeoff_metrics();
     for (const std::string& metric : metrics_) (void)PictureError{}.of(metric);
@@ -129,7 +123,7 @@ class TradeoffCommand final : public Command {
     how_.metrics = metrics_;
     const std::vector<std::string> results{csv_, html_};
     check_distinct(results, globals.trace);
-    check_spared(scene_, globals.scene_limits(), std::vector{options_.environment, how_.reference}, results);
+    check_spared(scene_, globals.scene_limits(), std::vector{settings_.environment, how_.reference}, results);
     for (const std::string& path : results) {
       if (!path.empty()) check_writable(path, globals.force);
     }
@@ -141,7 +135,7 @@ class TradeoffCommand final : public Command {
     agree_on_failure(session.comm(), [&] {
       if (speaks) cache = cache_folder();
     });
-    const auto reference = find_reference(session, options_, how_, globals, cache);
+    const auto reference = find_reference(session, settings_, how_, globals, cache);
     if (!reference) {
       if (speaks) log::info("stopped: the reference's samples are kept; the same command goes on with them");
       return ExitCode::Stopped;
@@ -165,7 +159,7 @@ class TradeoffCommand final : public Command {
       forget(state, identity, std::move(done));
     });
     const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
-    const int fails = options_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
+    const int fails = settings_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
     return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
   }
 
@@ -224,10 +218,10 @@ class TradeoffCommand final : public Command {
   /// The first frames of a process are slower than all others: where that shows, they are drawn once more.
   [[nodiscard]] TradeoffPoint measured_point(Session& session, const KnobValues& values, const Globals& globals,
                                              const ReferencePicture& reference, const Rect& crop, bool first) const {
-    TradeoffPoint point = measure_point(session, options_, values, how_, globals, reference, crop);
+    TradeoffPoint point = measure_point(session, settings_, values, how_, globals, reference, crop);
     const double took = all_gather_value(session.comm(), point.median_ms()).front();
     if (!first || took >= kQuickMs) return point;
-    return measure_point(session, options_, values, how_, globals, reference, crop);
+    return measure_point(session, settings_, values, how_, globals, reference, crop);
   }
 
   [[nodiscard]] std::string sweep_identity(Session& session, const ReferencePicture& reference,
@@ -236,7 +230,7 @@ class TradeoffCommand final : public Command {
                        kVersion, kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height,
                        globals.seed, session.comm().size(), session.threads(),
                        hex16(xxh64(std::as_bytes(reference.radiance.pixels()))), fmt::join(metrics_, ","), how_.frames,
-                       fmt::join(base_words(*app_, report_.knobs), " "), fmt::join(report_.knobs, " "));
+                       fmt::join(base_words(*options_, report_.knobs), " "), fmt::join(report_.knobs, " "));
   }
 
   /// What is done needs no going on; what an earlier run of other values kept stays. The sweep is done all the same
@@ -276,7 +270,7 @@ class TradeoffCommand final : public Command {
     report_.seed = globals.seed;
     report_.reference = reference.about;
     report_.metrics = metrics_;
-    report_.base_options = base_words(*app_, report_.knobs);
+    report_.base_options = base_words(*options_, report_.knobs);
     report_.reference_crop_png = crop_as_png(reference.radiance, crop, reference.linear);
     mark_pareto(report_.points, metrics_.front());
     if (report_.budget) report_.best = best_within(report_.points, *report_.budget, metrics_.front());
@@ -290,7 +284,7 @@ class TradeoffCommand final : public Command {
     if (json_ && report_.budget) log::info("{}", answer(report_));
   }
 
-  const CLI::App* app_ = nullptr;
+  std::optional<OptionSet> options_;
   std::string scene_;
   std::vector<std::string> vary_;
   std::vector<std::string> metrics_;
@@ -301,7 +295,7 @@ class TradeoffCommand final : public Command {
   bool json_ = false;
   bool resume_ = false;
   TradeoffMeasurement how_;
-  RenderOptions options_;
+  RenderSettings settings_;
   std::vector<KnobValues> all_;
   TradeoffReport report_;
 };

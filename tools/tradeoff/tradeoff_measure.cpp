@@ -19,6 +19,7 @@
 #include "engine/picture_files.h"
 #include "engine/resolution.h"
 #include "engine/run_identity.h"
+#include "engine/settings_table.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/ssim.h"
@@ -37,18 +38,16 @@ constexpr std::uint64_t kOtherSeed = 0x5EEDULL << 32U;
 struct Setup {
   Blocks blocks;
   FramePlan plan;
-  Sampling sampling;
-  ColorFormat colors = ColorFormat::Float32;
+  RenderSettings settings;  ///< resolved
 };
 
-Setup set_up(Session& session, const RenderOptions& options, Size size, std::uint64_t seed) {
+Setup set_up(Session& session, const RenderSettings& given, Size size, std::uint64_t seed) {
   Setup setup;
-  const View view = make_view(options.choose_camera(session.scene()), size, session.scene().bounds);
-  const FrameSettings settings = options.settings(seed);
-  setup.blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.resolution_scale));
-  setup.plan = plan_frame(session, settings, setup.blocks.views);
-  setup.sampling = options.sampling();
-  setup.colors = options.wire.colors();
+  setup.settings = resolve(given, seed);
+  const RenderSettings& settings = setup.settings;
+  const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
+  setup.blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.frame.resolution_scale));
+  setup.plan = plan_frame(session, settings.frame, setup.blocks.views);
   return setup;
 }
 
@@ -169,7 +168,7 @@ std::string png_of(const Image<Pixel>& picture, const Rect& part, const Convert&
 
 }  // namespace
 
-std::optional<ReferencePicture> find_reference(Session& session, const RenderOptions& options,
+std::optional<ReferencePicture> find_reference(Session& session, const RenderSettings& settings,
                                                const TradeoffMeasurement& how, const Globals& globals,
                                                const std::filesystem::path& cache) {
   const bool rendered = how.reference == "auto" || how.reference == "path" || how.reference == "passes";
@@ -179,27 +178,17 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
     return reference;
   }
   const bool passes = how.reference == "passes" || (how.reference == "auto" && caught_by_photons_alone(session));
-  RenderOptions best = options;
-  best.quality = "best";
-  best.passes = "auto";
-  best.shading = "deferred";
-  best.spp = std::to_string(how.reference_spp);
-  best.max_depth.reset();
-  best.light_samples.reset();
-  best.glossy_cutoff.reset();
-  best.photons.reset();
-  best.photon_radius = 0.0;
-  best.resolution_scale = 1.0;
-  best.half_resolution.clear();
-  best.adaptive = false;
-  best.denoise = false;
-  best.wire = {};
-  best.indirect.reset();
-  best.reference = !passes;
+  RenderSettings best = settings;
+  for (const Setting& setting : all_settings()) {
+    if (setting.limits_reference) reset_setting(best, setting.name);
+  }
+  set_setting(best, "quality", "best");
+  set_setting(best, "spp", std::to_string(how.reference_spp));
+  set_setting(best, "reference", passes ? "false" : "true");
   const Setup setup = set_up(session, best, how.size, globals.seed ^ kOtherSeed);
 
   CheckpointSettings kept;
-  RunIdentity identity = identity_of(session, setup.plan, setup.blocks.views, setup.sampling, false);
+  RunIdentity identity = identity_of(session, setup.plan, setup.blocks.views, setup.settings, false);
   kept.identity = [&] { return identity; };
   std::string name;
   for (const auto& [key, value] : identity) name += fmt::format("{}={}\n", key, value);
@@ -214,14 +203,14 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderOpt
     return sampler.draw(setup.blocks.views, checkpoint, progress);
   };
   prepare(session, setup.plan);
-  std::optional<FrameSampler> sampler(std::in_place, session, setup.plan, setup.sampling, 0, false);
+  std::optional<FrameSampler> sampler(std::in_place, session, setup.plan, setup.settings.sampling, 0, false);
   try {
     if (!draw(kept, *sampler)) return std::nullopt;
   } catch (const Error& error) {
     if (!kept.resume || error.code() != ExitCode::BadInput) throw;
     if (speaks) log::warning("{}: it is rendered again", error.what());
     kept.resume = false;
-    sampler.emplace(session, setup.plan, setup.sampling, 0, false);
+    sampler.emplace(session, setup.plan, setup.settings.sampling, 0, false);
     if (!draw(kept, *sampler)) return std::nullopt;
   }
   const SampleProgress reached = sampler->reached_so_far();
@@ -269,10 +258,10 @@ std::string crop_as_png(const Image<Rgb>& picture, const Rect& part, bool linear
   });
 }
 
-TradeoffPoint measure_point(Session& session, const RenderOptions& options, const KnobValues& knobs,
+TradeoffPoint measure_point(Session& session, const RenderSettings& settings, const KnobValues& knobs,
                             const TradeoffMeasurement& how, const Globals& globals, const ReferencePicture& reference,
                             const Rect& crop) {
-  const Setup setup = set_up(session, with_knobs(options, knobs), how.size, globals.seed);
+  const Setup setup = set_up(session, with_knobs(settings, knobs), how.size, globals.seed);
   prepare(session, setup.plan);
   TradeoffPoint point;
   point.knobs = knobs;
@@ -285,9 +274,9 @@ TradeoffPoint measure_point(Session& session, const RenderOptions& options, cons
     const std::size_t sent_before = session.comm().bytes_sent();
     const Stopwatch watch;
     Progress silent("none", "sample", 0);
-    FrameSampler sampler(session, setup.plan, setup.sampling, 0, false);
+    FrameSampler sampler(session, setup.plan, setup.settings.sampling, 0, false);
     (void)sampler.draw(setup.blocks.views, {}, silent);  // without a checkpoint it does not stop early
-    picture = collect(session, sampler.frame(), setup.blocks, how.size, setup.colors);
+    picture = collect(session, sampler.frame(), setup.blocks, how.size, setup.settings.color_format);
     const RunStats stats =
         gather_stats(session, setup.plan, sampler.times(), {watch.ms(), session.comm().bytes_sent() - sent_before});
     spent += stats.ms;
@@ -301,7 +290,7 @@ TradeoffPoint measure_point(Session& session, const RenderOptions& options, cons
   agree_on_failure(session.comm(), [&] {
     if (session.rank() != 0) return;
     Image<float> flip;
-    point.error = compare(picture, reference, options.exposure, how.metrics, session.threads(), &flip);
+    point.error = compare(picture, reference, settings.exposure_stops, how.metrics, session.threads(), &flip);
     point.crop_png = crop_as_png(picture, crop, true);
     if (flip.size() == picture.size()) {
       point.flip_png = png_of(flip, crop, [](float value) { return heat_color(static_cast<double>(value)); });

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/options/globals.h"
 #include "engine/session.h"
 #include "image/image.h"
 #include "tools/tradeoff/tradeoff.h"
@@ -31,7 +32,7 @@ struct ReferencePicture {
 /// Collective. Reads or renders the truth. Rendered ones are kept in `cache` under a name that says what they are of,
 /// and gone on with where they have too few samples; where they have more, all count. None when a signal stopped it:
 /// its samples are in `cache` then. Throws Error: Usage, Io, BadInput for a picture of another size.
-[[nodiscard]] std::optional<ReferencePicture> find_reference(Session& session, const RenderOptions& options,
+[[nodiscard]] std::optional<ReferencePicture> find_reference(Session& session, const RenderSettings& settings,
                                                              const TradeoffMeasurement& how, const Globals& globals,
                                                              const std::filesystem::path& cache);
 
@@ -40,7 +41,7 @@ struct ReferencePicture {
 
 /// Collective. Draws a point of the sweep, several times, and compares it. On rank 0 everything is filled in, on the
 /// others only what they took.
-[[nodiscard]] TradeoffPoint measure_point(Session& session, const RenderOptions& options, const KnobValues& knobs,
+[[nodiscard]] TradeoffPoint measure_point(Session& session, const RenderSettings& settings, const KnobValues& knobs,
                                           const TradeoffMeasurement& how, const Globals& globals,
                                           const ReferencePicture& reference, const Rect& crop);
 

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/options/knobs.h"
 #include "core/error.h"
+#include "engine/settings_table.h"
 #include "walls/codecs/codec.h"
 
 namespace hpr {
@@ -25,59 +25,21 @@ TradeoffPoint point(double ms, double flip, KnobValues knobs = {}) {
   return made;
 }
 
-TEST(Knobs, EachIsAnOptionThatTakesWhatItSays) {
-  for (const Knob& knob : all_knobs()) {
-    EXPECT_NE(knobs_text().find("--" + std::string(knob.name)), std::string::npos);
-    if (knob.on_the_way) continue;
-    RenderOptions options;
-    const std::string range(knob.range);
-    const std::string first = range.substr(0, range.find_first_of(",: "));
-    EXPECT_NO_THROW(set_knob(options, std::string(knob.name), first)) << knob.name;
-  }
-}
-
-TEST(Knobs, ThoseOfPicturesOnTheirWayAreNotVaried) {
-  EXPECT_EQ(std::ranges::find(all_knobs(), "codec", &Knob::name)->range,
-            fmt::format("{}", fmt::join(all_codecs(), ", ")));
-  try {
-    (void)find_knob("codec");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(error.hint().find("bench codec"), std::string::npos);
-  }
-}
-
-TEST(Knobs, AValueSetsItsOptionAlone) {
-  RenderOptions options;
-  options.quality = "best";
-  set_knob(options, "spp", "7");
-  set_knob(options, "passes", "shadow+photon");
-  set_knob(options, "reference", "true");
-  EXPECT_EQ(options.spp, "7");
-  EXPECT_EQ(options.passes, "shadow,photon");
-  EXPECT_TRUE(options.reference);
-  EXPECT_EQ(options.quality, "best");
-  set_knob(options, "reference", "false");
-  EXPECT_FALSE(options.reference);
-}
-
-TEST(Knobs, IndirectLightIsTheQualitysUnlessSet) {
-  RenderOptions options;
-  EXPECT_FALSE(options.settings(1).rays.global_photons);
-  set_knob(options, "quality", "best");
-  EXPECT_TRUE(options.settings(1).rays.global_photons);
-  set_knob(options, "indirect", "false");
-  EXPECT_FALSE(options.settings(1).rays.global_photons);
-  set_knob(options, "indirect", "true");
-  set_knob(options, "quality", "good");
-  EXPECT_TRUE(options.settings(1).rays.global_photons);
+TEST(Knobs, AreSetOnTopOfOtherSettings) {
+  RenderSettings base;
+  set_setting(base, "quality", "best");
+  const RenderSettings settings = with_knobs(base, {{"spp", "7"}, {"passes", "shadow+photon"}, {"reference", "true"}});
+  EXPECT_EQ(settings.sampling.goal.samples, 7U);
+  EXPECT_EQ(find_setting("passes")->value.write(settings), "shadow,photon");
+  EXPECT_TRUE(settings.frame.rays.reference);
+  EXPECT_EQ(settings.quality, Quality::Best);
+  EXPECT_FALSE(with_knobs(settings, {{"reference", "false"}}).frame.rays.reference);
 }
 
 TEST(Knobs, UnknownOnesAndBadValuesAreRefused) {
-  RenderOptions options;
-  EXPECT_THROW(set_knob(options, "ssp", "1"), Error);
-  EXPECT_THROW(set_knob(options, "max-depth", "0"), Error);
-  EXPECT_THROW(set_knob(options, "max-depth", "many"), Error);
+  for (const auto& [knob, value] : KnobValues{{"ssp", "1"}, {"max-depth", "0"}, {"max-depth", "many"}}) {
+    EXPECT_THROW((void)with_knobs({}, {{knob, value}}), Error) << knob;
+  }
 }
 
 TEST(KnobSweep, ListsAreSplit) {

@@ -113,8 +113,12 @@ std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOption
 }
 
 void check_file_display(const Wall& wall, const DisplayOptions& options) {
-  const FileDisplay made(wall, options);
-  if (options.keep_frames && !options.overwrite) refuse_kept_frames(options.folder.empty() ? "." : options.folder);
+  const std::filesystem::path folder = options.folder.empty() ? "." : options.folder;
+  check_folder(folder);
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) return;  // it will be made
+  for (const auto& file : files_of_display(wall, folder)) check_writable(file, options.overwrite);
+  if (options.keep_frames && !options.overwrite) refuse_kept_frames(folder);
 }
 
 }  // namespace hpr

@@ -10,7 +10,7 @@ namespace hpr {
 /// The files of the latest frame.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_display(const Wall& wall,
                                                                   const std::filesystem::path& folder);
-/// Makes the folder.
+/// Throws what making the display would; makes nothing.
 void check_file_display(const Wall& wall, const DisplayOptions& options);
 
 }  // namespace hpr

@@ -99,4 +99,17 @@ std::string to_json(const RunManifest& manifest) {
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+std::string to_json(const WallStatusRecord& status) {
+  using Json = nlohmann::ordered_json;
+  Json screens = Json::array();
+  Json restarts = Json::array();
+  for (const auto& [id, state] : status.screens) screens.push_back(Json{{"id", id}, {"state", to_string(state)}});
+  for (const std::string& restart : status.restarts) restarts.push_back(Json::parse(restart));
+  const Json document{
+      {"schema", "hpr.wall-status/1"},  {"run", status.run},     {"wall", status.wall}, {"scene", status.scene},
+      {"ranks", status.ranks},          {"frame", status.frame}, {"ms", status.ms},     {"screens", std::move(screens)},
+      {"restarts", std::move(restarts)}};
+  return document.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
 }  // namespace hpr

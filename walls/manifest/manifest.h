@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "image/color.h"
@@ -83,10 +84,25 @@ struct RunManifest {
   std::optional<double> degraded_seconds = {};
 };
 
+/// What a wall shows while it runs.
+struct WallStatusRecord {
+  int run = 0;  ///< process id of rank 0
+  std::string wall;
+  std::string scene;
+  int ranks = 1;
+  std::uint64_t frame = 0;  ///< the last one
+  double ms = 0.0;
+  std::vector<std::pair<std::string, ScreenState>> screens = {};  ///< ids; empty before the first frame
+  std::vector<std::string> restarts = {};                         ///< as RunManifest has them
+};
+
 [[nodiscard]] ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state);
 
 /// One frame's record, as the manifest has it, on one line.
 [[nodiscard]] std::string to_json(const FrameRecord& frame);
+
+/// One JSON document, schema hpr.wall-status/1.
+[[nodiscard]] std::string to_json(const WallStatusRecord& status);
 
 /// One JSON document, schema hpr.wall-run/1; hashes are 16 hex digits, a NaN becomes null.
 [[nodiscard]] std::string to_json(const RunManifest& manifest);

@@ -1,0 +1,211 @@
+#include "engine/render_settings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <glm/trigonometric.hpp>
+#include <iterator>
+#include <variant>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "engine/settings_table.h"
+#include "image/pixel_filter.h"
+#include "scene/environment.h"
+#include "scene/view.h"
+
+namespace hpr {
+namespace {
+
+constexpr int kReferenceDepth = 64;
+
+/// The first camera of that name, else the one at that index.
+const Camera& find_camera(const Scene& scene, const std::string& wanted) {
+  const auto named = std::ranges::find(scene.cameras, wanted, &Camera::name);
+  if (named != scene.cameras.end()) return *named;
+  std::size_t index = 0;
+  const char* const last = wanted.data() + wanted.size();
+  if (std::from_chars(wanted.data(), last, index).ptr == last && index < scene.cameras.size()) {
+    return scene.cameras[index];
+  }
+  std::vector<std::string> names;
+  names.reserve(scene.cameras.size());
+  for (const Camera& camera : scene.cameras) names.push_back(printable(camera.name));
+  throw Error(ExitCode::Usage, fmt::format("the scene has no camera '{}'", printable(wanted)),
+              names.empty() ? "it has none at all: use --eye and --at" : unknown_name_hint(wanted, names));
+}
+
+/// Adds what the scene's environment had replaced to the scene's own warnings.
+void note_not_finite(const std::string& name, Scene& scene) {
+  const Environment& environment = *scene.environment;
+  if (environment.not_finite == 0) return;
+  const auto width = static_cast<std::size_t>(environment.image.width());
+  scene.not_finite += environment.not_finite;
+  scene.warnings.push_back(fmt::format("{}: {} values are no finite numbers, the first in pixel {},{}; replaced", name,
+                                       environment.not_finite, environment.first_not_finite % width,
+                                       environment.first_not_finite / width));
+}
+
+bool names_photons(const RaySettings& rays) {
+  return std::ranges::find(rays.passes, "photon") != rays.passes.end();
+}
+
+/// What of the settings of photons depends on others.
+void resolve_photons(RenderSettings& settings) {
+  RaySettings& rays = settings.frame.rays;
+  const bool asks_for_indirect = settings.is_given("indirect") && rays.global_photons;
+  const bool asks_for_photons = names_photons(rays) || asks_for_indirect;
+  if (!settings.is_given("indirect")) rays.global_photons = rays.global_photons || names_photons(rays);
+  if (settings.is_given("photons") && rays.photons == 0 && asks_for_photons) {
+    throw Error(ExitCode::Usage,
+                fmt::format("{}, and --photons 0 sends none",
+                            names_photons(rays) ? "--passes names photon" : "--indirect is the light of photons"),
+                "leave one of them out, or send some");
+  }
+  // A quality without photons sends those of the next where it must send some.
+  if (!settings.is_given("photons") && rays.photons == 0 && (asks_for_photons || rays.all_passes)) {
+    const Setting& photons = *find_setting("photons");
+    photons.value.parse(settings, std::string(photons.by_quality.at(static_cast<std::size_t>(Quality::Good))));
+  }
+  settings.frame.photons_fit_frame = !settings.is_given("photons");
+}
+
+void check_camera(const CameraChoice& camera) {
+  if (camera.eye && !camera.name.empty()) throw Error(ExitCode::Usage, "--eye excludes --camera", "use one of them");
+  if (camera.eye && !camera.at) throw Error(ExitCode::Usage, "--eye requires --at", "name what the eye looks at");
+  if (camera.at && !camera.eye) throw Error(ExitCode::Usage, "--at requires --eye", "name where the eye is");
+  if (camera.up && !camera.eye) throw Error(ExitCode::Usage, "--up requires --eye", "cameras of scenes have their own");
+}
+
+/// What of the settings excludes each other.
+void check_combination(const RenderSettings& settings) {
+  const FrameSettings& frame = settings.frame;
+  const bool is_local = frame.shading == Shading::Local;
+  const bool shares_light = !frame.rays.half_resolution.empty();
+  const auto refuse = [](const std::string& what, const std::string& hint) {
+    throw Error(ExitCode::Usage, what, hint);
+  };
+  if (frame.depth_format != DepthFormat::Float32 && frame.primary != Primary::Raster) {
+    refuse("--depth-format rounds depths before OpenGL compares them; rays compare their own",
+           "use it with --primary raster");
+  }
+  if (frame.partitioned && frame.distribution.value_or(Distribution::SortLast) != Distribution::SortLast) {
+    refuse(fmt::format("--data partitioned gives each rank its own objects, of which --distribute {} draws others",
+                       name_of(*frame.distribution)),
+           "use --distribute sort-last, or leave it out");
+  }
+  const bool splits = std::ranges::any_of(
+      frame.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
+  if (frame.rays.reference && (splits || is_local)) {
+    refuse("--reference has no light of its own passes to show or to composite",
+           "with it, use --shading deferred and of --aov only depth, id and rank");
+  }
+  if (settings.sampling.adaptive && (is_local || shares_light)) {
+    refuse("--adaptive lights pixels one by one, as --shading local and --half-resolution do not",
+           "use it without them");
+  }
+  if (!frame.aovs.empty() && is_local) {
+    refuse("--aov needs surfaces, which --shading local replaces by colours", "use --shading deferred");
+  }
+  if (frame.resolution_scale != 1.0 && !frame.aovs.empty()) {
+    refuse("--aov has a value for every pixel, of which --resolution-scale makes fewer",
+           "draw a smaller picture with --size");
+  }
+  if (shares_light && (frame.rays.reference || is_local)) {
+    refuse("--half-resolution is about passes over what is seen in the end",
+           "use it without --reference and with --shading deferred");
+  }
+  if (!frame.rays.denoise) return;
+  if (frame.rays.reference || is_local || shares_light) {
+    refuse("--denoise is about the light of passes at all that is seen in the end",
+           "use it without --reference and --half-resolution, and with --shading deferred");
+  }
+  if (settings.sampling.filter && least_samples(*settings.sampling.filter) > 1) {
+    refuse(fmt::format("--denoise looks at more places, whose weights --filter {} makes negative",
+                       name_of(*settings.sampling.filter)),
+           "use another filter, e.g. b-spline");
+  }
+}
+
+}  // namespace
+
+RenderSettings resolve(RenderSettings settings, std::uint64_t seed) {
+  for (const Setting& setting : all_settings()) {
+    const std::string_view value = setting.by_quality.at(static_cast<std::size_t>(settings.quality));
+    if (!value.empty() && !settings.is_given(setting.name)) setting.value.parse(settings, std::string(value));
+  }
+  RaySettings& rays = settings.frame.rays;
+  rays.seed = seed;
+  if (rays.reference && !settings.is_given("max-depth")) rays.max_depth = kReferenceDepth;
+  resolve_photons(settings);
+  if (rays.denoise && settings.sampling.filter) rays.filter = *settings.sampling.filter;
+  check_camera(settings.camera);
+  check_combination(settings);
+  check_sampling(settings.sampling);
+  return settings;
+}
+
+Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
+  if (choice.eye) {
+    return look_at(*choice.eye, choice.at.value_or(glm::dvec3(0.0)), choice.up.value_or(glm::dvec3(0.0, 1.0, 0.0)),
+                   glm::radians(choice.fov_degrees > 0.0 ? choice.fov_degrees : kDefaultFovDegrees));
+  }
+  Camera chosen;
+  if (!choice.name.empty()) {
+    chosen = find_camera(scene, choice.name);
+  } else {
+    chosen = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
+  }
+  auto* const lens = std::get_if<PerspectiveLens>(&chosen.lens);
+  if (choice.fov_degrees > 0.0 && lens != nullptr) lens->vertical_fov_radians = glm::radians(choice.fov_degrees);
+  return chosen;
+}
+
+Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
+                 const ImageLimits& pictures) {
+  Scene scene = load_scene(source, limits);
+  if (!settings.environment.empty()) {
+    scene.environment = load_environment(settings.environment, pictures);
+    note_not_finite(printable(settings.environment), scene);
+  }
+  if (settings.strict && scene.not_finite > 0) {
+    const auto named = std::ranges::find_if(
+        scene.warnings, [](const std::string& text) { return text.find("no finite numbers") != std::string::npos; });
+    throw Error(
+        ExitCode::BadInput,
+        fmt::format("{}: {}", printable(source),
+                    named != scene.warnings.end() ? printable(*named, 400)
+                                                  : fmt::format("{} values are no finite numbers", scene.not_finite)),
+        "repair the file, or draw without --strict: they are replaced");
+  }
+  return scene;
+}
+
+void check_raw(const RenderSettings& settings) {
+  if (settings.frame.shading == Shading::Local) {
+    throw Error(ExitCode::Usage, "--raw writes surfaces, which --shading local replaces by colours",
+                "use --shading deferred");
+  }
+  if (settings.frame.resolution_scale != 1.0) {
+    throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
+                "draw a smaller picture with --size");
+  }
+}
+
+std::vector<std::string> unused_settings(const RenderSettings& settings) {
+  std::vector<std::string> sentences;
+  for (const Setting& setting : all_settings()) {
+    if (!settings.is_given(setting.name)) continue;
+    for (const Dependency& dependency : setting.used_with) {
+      if (dependency.is_met(settings)) continue;
+      const SettingValue& other = find_setting(dependency.on)->value;
+      sentences.push_back(fmt::format("--{}{} has no use for --{}", dependency.on,
+                                      other.is_flag ? "" : " " + other.write(settings), setting.name));
+      break;
+    }
+  }
+  return sentences;
+}
+
+}  // namespace hpr

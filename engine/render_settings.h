@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/frame.h"
+#include "engine/samples.h"
+#include "image/color_format.h"
+#include "image/image_io.h"
+#include "scene/load_scene.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// Which camera sees the scene. By default the scene's first, else one that frames the scene.
+struct CameraChoice {
+  std::string name = {};               ///< or index of one of the scene's cameras; empty: see above
+  std::optional<glm::dvec3> eye = {};  ///< a camera here, in place of the scene's
+  std::optional<glm::dvec3> at = {};   ///< what it looks at
+  std::optional<glm::dvec3> up = {};   ///< none: +y
+  double fov_degrees = 0.0;            ///< vertical angle of view; 0: the camera's own, or kDefaultFovDegrees
+
+  bool operator==(const CameraChoice&) const = default;
+};
+inline constexpr double kDefaultFovDegrees = 45.0;
+
+/// What the settings that are not given stand for.
+enum class Quality : std::uint8_t { Draft, Good, Best };
+inline constexpr std::array<std::string_view, 3> kQualityNames{"draft", "good", "best"};
+
+/// How pictures are encoded on their way to displays outside the job.
+struct LinkCodec {
+  std::string name = "auto";
+  int quality = 90;  ///< of lossy codecs, 1 to 100
+  int error = 0;     ///< levels of 255 a color may be off
+};
+
+/// How a scene is drawn: everything that a user may choose about a picture. engine/settings_table.cpp lists each
+/// setting once; the command line, the console, sweeps, checkpoints and docs come from that table.
+struct RenderSettings {
+  CameraChoice camera;
+  Quality quality = Quality::Good;
+  Sampling sampling;
+  FrameSettings frame;
+  std::string environment;                          ///< see load_environment; empty: the scene's own
+  double exposure_stops = 0.0;                      ///< of display colors
+  ColorFormat color_format = ColorFormat::Float32;  ///< of radiance on its way to the rank that writes it
+  LinkCodec codec;
+  bool strict = false;  ///< values that are not finite are errors, not replaced
+
+  std::set<std::string_view> given = {};  ///< names of the settings that have a value of their own
+
+  [[nodiscard]] bool is_given(std::string_view name) const { return given.contains(name); }
+};
+
+/// Fills in what was not given, by the quality and by what goes together, and checks the whole. `seed`: of everything
+/// random. Throws Error (Usage) for settings that exclude each other.
+[[nodiscard]] RenderSettings resolve(RenderSettings settings, std::uint64_t seed);
+
+/// The camera that the settings choose in a scene. Throws Error (Usage) with the choices for a camera there is not.
+[[nodiscard]] Camera choose_camera(const CameraChoice& choice, const Scene& scene);
+
+/// Loads a scene and lights it as the settings say. `pictures`: how large an environment may be. Throws Error as
+/// load_scene and load_environment do, and BadInput for values that are not finite where the settings are strict.
+[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
+                               const ImageLimits& pictures);
+
+/// Throws Error (Usage) where the settings leave no surface for every pixel of a file of keys.
+void check_raw(const RenderSettings& settings);
+
+/// Settings that were given and change nothing beside the others, each as a sentence: "--reference has no use for
+/// --photons".
+[[nodiscard]] std::vector<std::string> unused_settings(const RenderSettings& settings);
+
+}  // namespace hpr

@@ -1,0 +1,634 @@
+#include "engine/settings_table.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+#include <type_traits>
+#include <utility>
+
+#include "compositing/compositor.h"
+#include "core/check.h"
+#include "core/error.h"
+#include "core/names.h"
+#include "engine/aov.h"
+#include "image/pixel_filter.h"
+#include "rt/passes/half_resolution.h"
+
+namespace hpr {
+namespace {
+
+using Settings = RenderSettings;
+
+template <typename Number>
+std::optional<Number> parse_number(const std::string& text) {
+  Number number{};
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return number;
+}
+
+/// The member that `at` returns a reference to.
+template <typename At>
+const auto& member(const Settings& settings, At at) {
+  return at(const_cast<Settings&>(settings));  // nothing is written to it
+}
+
+/// A value that is written in a way of its own: `parse` makes a value of text, `write` text of a value. `at` returns a
+/// reference to where it is.
+template <typename At, typename Parse, typename Write>
+SettingValue text(std::string type, std::string takes, At at, Parse parse, Write write) {
+  return {.type = std::move(type),
+          .takes = std::move(takes),
+          .parse = [=](Settings& settings, const std::string& written) { at(settings) = parse(written); },
+          .write = [=](const Settings& settings) -> std::string { return write(member(settings, at)); },
+          .copy = [=](const Settings& from, Settings& to) { at(to) = member(from, at); }};
+}
+
+/// A text that stands for itself.
+template <typename At>
+SettingValue plain_text(std::string type, std::string takes, At at) {
+  const auto same = [](const std::string& written) { return written; };
+  return text(std::move(type), std::move(takes), at, same, same);
+}
+
+/// A number from `low` to `high`, both included; a default outside of them stands for a choice that is left open.
+template <typename Number, typename At>
+SettingValue number(Number low, Number high, At at, std::string takes = {}) {
+  constexpr bool kReal = std::is_floating_point_v<Number>;
+  const std::string words = kReal ? fmt::format("{:g} to {:g}", static_cast<double>(low), static_cast<double>(high))
+                                  : fmt::format("{} to {}", low, high);
+  const auto parse = [=](const std::string& written) {
+    const auto parsed = parse_number<Number>(written);
+    // Written so that a NaN is refused.
+    if (parsed && *parsed >= low && *parsed <= high) return *parsed;
+    throw Error(ExitCode::Usage, fmt::format("'{}' is no number from {}", printable(written), words),
+                fmt::format("write one from {}", words));
+  };
+  return text(fmt::format("{} {}", kReal ? "FLOAT" : "INT", words), takes.empty() ? words : std::move(takes), at, parse,
+              [=](Number value) { return value >= low && value <= high ? fmt::format("{}", value) : std::string(); });
+}
+
+bool parse_bool(const std::string& written) {
+  if (written == "true" || written == "false") return written == "true";
+  throw Error(ExitCode::Usage, fmt::format("'{}' is neither true nor false", printable(written)),
+              "write true or false");
+}
+
+/// True or false.
+template <typename At>
+SettingValue flag(At at) {
+  SettingValue value =
+      text({}, "false, true", at, parse_bool, [](bool is_set) { return std::string(is_set ? "true" : "false"); });
+  value.is_flag = true;
+  return value;
+}
+
+/// True turns the member off.
+template <typename At>
+SettingValue off_flag(At at) {
+  SettingValue value = text(
+      {}, "false, true", at, [](const std::string& written) { return !parse_bool(written); },
+      [](bool is_set) { return std::string(is_set ? "false" : "true"); });
+  value.is_flag = true;
+  return value;
+}
+
+/// Where `name` stands among `names`. Throws Error (Usage) with the choices and the nearest one.
+std::size_t index_of(const std::string& name, std::span<const std::string_view> names) {
+  const auto found = std::ranges::find(names, name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  const std::vector<std::string> choices(names.begin(), names.end());
+  throw Error(ExitCode::Usage, fmt::format("there is no '{}'", printable(name)),
+              unknown_name_hint(printable(name), choices));
+}
+
+/// One of an enumeration's values, whose names stand in their order.
+template <std::size_t kCount, typename At>
+SettingValue choice(const std::array<std::string_view, kCount>& names, At at) {
+  using Value = std::remove_reference_t<decltype(at(std::declval<Settings&>()))>;
+  return text(
+      fmt::format("{}", fmt::join(names, "|")), fmt::format("{}", fmt::join(names, ", ")), at,
+      [names](const std::string& name) { return static_cast<Value>(index_of(name, names)); },
+      [names](Value value) { return std::string(names.at(static_cast<std::size_t>(value))); });
+}
+
+/// "X,Y,Z", finite numbers whose squares are finite too.
+std::optional<glm::dvec3> parse_point(const std::string& written) {
+  const std::vector<std::string> parts = split_commas(written);
+  glm::dvec3 point(0.0);
+  bool good = parts.size() == 3;
+  for (std::size_t i = 0; good && i < 3; ++i) {
+    const auto parsed = parse_number<double>(parts[i]);
+    good = parsed && std::abs(*parsed) <= 1e18;
+    if (good) point[static_cast<int>(i)] = *parsed;
+  }
+  if (good) return point;
+  throw Error(ExitCode::Usage, fmt::format("'{}' is no point: three finite numbers up to 1e18", printable(written)),
+              "write e.g. 0,1.7,5");
+}
+
+SettingValue point(std::optional<glm::dvec3> CameraChoice::*which) {
+  return text(
+      "X,Y,Z", "three numbers",
+      [which](Settings& settings) -> std::optional<glm::dvec3>& { return settings.camera.*which; }, parse_point,
+      [](const std::optional<glm::dvec3>& value) {
+        return value ? fmt::format("{},{},{}", value->x, value->y, value->z) : std::string();
+      });
+}
+
+constexpr std::array<std::string_view, 2> kOffOn{"off", "on"};
+constexpr std::array<std::string_view, 2> kDataNames{"replicated", "partitioned"};
+
+/// Throws Error (Usage) for what is no list of passes.
+void parse_passes(Settings& settings, const std::string& list) {
+  RaySettings& rays = settings.frame.rays;
+  const std::vector<std::string> named = split_words(list);
+  if (named.empty()) {
+    throw Error(ExitCode::Usage, "names no pass", "write auto, all, none, or a list such as shadow,reflection");
+  }
+  const std::vector<std::string> words{"auto", "all", "none"};
+  const bool one_word = named.size() == 1 && std::ranges::find(words, named.front()) != words.end();
+  std::vector<std::string> choices = words;
+  std::ranges::copy(all_pass_names(), std::back_inserter(choices));
+  for (const std::string& name : named) {
+    if (!one_word && std::ranges::find(words, name) != words.end()) {
+      throw Error(ExitCode::Usage, fmt::format("'{}' goes with no other word", name), "leave it or the others out");
+    }
+    if (std::ranges::find(choices, name) != choices.end()) continue;
+    throw Error(ExitCode::Usage, fmt::format("no ray pass is called '{}'", printable(name)),
+                unknown_name_hint(name, choices));
+  }
+  rays.auto_passes = one_word && named.front() == "auto";
+  rays.all_passes = one_word && named.front() == "all";
+  rays.passes = one_word ? std::vector<std::string>() : named;
+}
+
+SettingValue passes() {
+  return {.type = "LIST",
+          .takes = fmt::format("auto, all, none, or a list of {}", fmt::join(all_pass_names(), ", ")),
+          .parse = parse_passes,
+          .write =
+              [](const Settings& settings) {
+                const RaySettings& rays = settings.frame.rays;
+                if (!rays.passes.empty()) return fmt::format("{}", fmt::join(rays.passes, ","));
+                return std::string(rays.auto_passes ? "auto" : rays.all_passes ? "all" : "none");
+              },
+          .copy =
+              [](const Settings& from, Settings& to) {
+                to.frame.rays.auto_passes = from.frame.rays.auto_passes;
+                to.frame.rays.all_passes = from.frame.rays.all_passes;
+                to.frame.rays.passes = from.frame.rays.passes;
+              }};
+}
+
+std::vector<std::string> parse_half_resolution(const std::string& list) {
+  RaySettings rays;
+  if (list != "none") rays.half_resolution = split_words(list);
+  (void)shared_components(rays);  // refuses unknown passes
+  return rays.half_resolution;
+}
+
+std::optional<Distribution> parse_distribution_or_auto(const std::string& name) {
+  const std::string automatic = "auto";
+  if (name == automatic) return std::nullopt;
+  return parse_distribution(name, std::span(&automatic, 1));
+}
+
+std::string write_samples(const SampleGoal& goal) {
+  if (goal.relmse) return fmt::format("until:relmse={}", *goal.relmse);
+  if (goal.seconds) return fmt::format("until:{}s", *goal.seconds);
+  return fmt::format("{}", goal.samples.value_or(0));
+}
+
+int parse_codec_error(std::string levels) {
+  if (levels.ends_with("/255")) levels.resize(levels.size() - 4);
+  const auto parsed = parse_number<int>(levels);
+  if (parsed && *parsed >= 0 && *parsed <= 255) return *parsed;
+  throw Error(ExitCode::Usage, fmt::format("'{}' is no number of levels", printable(levels)), "write e.g. 3/255, or 3");
+}
+
+bool sends_photons(const Settings& settings) {
+  const RaySettings& rays = settings.frame.rays;
+  const bool named = std::ranges::find(rays.passes, "photon") != rays.passes.end();
+  return named || (rays.passes.empty() && (rays.auto_passes || rays.all_passes));
+}
+
+bool traces_passes(const Settings& settings) {
+  return !settings.frame.rays.reference;
+}
+
+bool forms_groups(const Settings& settings) {
+  return settings.frame.distribution.value_or(Distribution::Hybrid) == Distribution::Hybrid;
+}
+
+std::vector<Setting> make_table() {
+  std::vector<std::string_view> filters;
+  for (const PixelFilter filter : all_pixel_filters()) filters.push_back(name_of(filter));
+  const std::vector<Dependency> on_photons{{"reference", traces_passes}, {"passes", sends_photons}};
+  return {
+      // What is seen.
+      {.name = "camera",
+       .help = "name or index of a camera of the scene",
+       .value = plain_text("NAME|INDEX", "a camera", [](Settings& s) -> std::string& { return s.camera.name; }),
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "eye",
+       .help = "where the eye is, in place of a camera of the scene; with --at",
+       .value = point(&CameraChoice::eye),
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "at",
+       .help = "what the eye looks at",
+       .value = point(&CameraChoice::at),
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "up",
+       .help = "which way is up for the eye (default: 0,1,0)",
+       .value = point(&CameraChoice::up),
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "fov",
+       .help = "vertical angle of view in degrees",
+       .value = number(0.001, 179.0, [](Settings& s) -> double& { return s.camera.fov_degrees; }),
+       .decides_bits = false},
+      {.name = "environment",
+       .help = "light from all around: a latitude-longitude picture, or one radiance R,G,B; replaces the scene's own",
+       .value = plain_text("FILE|R,G,B", "a picture or a radiance",
+                           [](Settings& s) -> std::string& { return s.environment; }),
+       .decides_bits = false,
+       .fixed_in_session = true},
+
+      // How light is computed, the settings that move most first.
+      {.name = "quality",
+       .help = "what the settings of light are that are not given",
+       .value = choice(kQualityNames, [](Settings& s) -> Quality& { return s.quality; }),
+       .initial = "good",
+       .costs = "all of the below that are not given",
+       .loses = "all of the below that are not given",
+       .decides_bits = false,
+       .limits_reference = true},
+      {.name = "spp",
+       .help = "samples of a pixel: a number, until:60s or until:relmse=1e-3",
+       .value = text(
+           "N", "1, 2, 3 ...; until:60s; until:relmse=1e-3", [](Settings& s) -> SampleGoal& { return s.sampling.goal; },
+           parse_sample_goal, write_samples),
+       .by_quality = {"1", "1", "64"},
+       .costs = "time in proportion",
+       .loses = "noise: its squared error falls as 1 / spp, faster where it is only edges",
+       .decides_bits = false,
+       .limits_reference = true},
+      {.name = "adaptive",
+       .help = "more samples for pixels whose samples differ more, --spp of them on average",
+       .value = flag([](Settings& s) -> bool& { return s.sampling.adaptive; }),
+       .costs = "a tenth of the time for as many samples, in more rounds of fewer pixels",
+       .loses = "false: noise of the pixels whose samples differ most; true: a little of the mean, as pixels that look "
+                "calm by chance get fewer samples",
+       .limits_reference = true},
+      {.name = "denoise",
+       .help = "pixels that see similar surfaces share light, and pixels on edges are resampled, in the first samples",
+       .value = flag([](Settings& s) -> bool& { return s.frame.rays.denoise; }),
+       .costs = "a sixth to one and a quarter times as much again of a frame's first 16 samples",
+       .loses = "false: noise, and steps at edges; true: detail of light finer than a pixel or two, less with more "
+                "samples",
+       .limits_reference = true},
+      {.name = "passes",
+       .help = "ray passes: auto, what the scene requires; all, those it does not too; none; or a list",
+       .value = passes(),
+       .initial = "auto",
+       .costs = "the rays of each pass",
+       .loses = "the light a pass carries is missing, or there where it is blocked",
+       .decides_bits = false,
+       .limits_reference = true,
+       .used_with = {{"reference", traces_passes}}},
+      {.name = "indirect",
+       .help = "all indirect light, not caustics alone: by photons, or under an even sky by rays (default: with "
+               "--quality best, or where --passes names photon)",
+       .value = flag([](Settings& s) -> bool& { return s.frame.rays.global_photons; }),
+       .by_quality = {"false", "false", "true"},
+       .costs =
+           "photons wherever light meets rough surfaces, and a gather at every point; in the open under an even sky "
+           "a ray at every point instead",
+       .loses = "false: light that rough surfaces scatter on to others: a quarter of what a closed room shows",
+       .limits_reference = true,
+       .negated = "no-indirect",
+       .used_with = on_photons},
+      {.name = "photons",
+       .help = "sent per sample, where the scene requires any",
+       .value = number(
+           std::uint32_t{0}, std::uint32_t{1'000'000'000},
+           [](Settings& s) -> std::uint32_t& { return s.frame.rays.photons; }, "0 to 1000000000 a sample"),
+       .by_quality = {"0", "100000", "200000"},
+       .costs = "time in proportion, past the frame's pixels without use",
+       .loses = "fewer photons gather from further away: caustics and indirect light blur; 0 leaves them out",
+       .limits_reference = true,
+       .used_with = on_photons},
+      {.name = "photon-radius",
+       .help = "metres about a point in which photons count, in a frame's first sample (default: from their density)",
+       .value = number(
+           0.0, 1e30, [](Settings& s) -> double& { return s.frame.rays.photon_radius; },
+           "0 (from the photons' density) or metres"),
+       .costs = "nothing, but for gathers that meet more photons",
+       .loses = "wide: caustics blur, corners darken; narrow: noise. It shrinks from sample to sample",
+       .limits_reference = true,
+       .used_with = on_photons},
+      {.name = "resolution-scale",
+       .help = "the frame is made of so many of the pixels a side, and shown at full size by a filter",
+       .value = number(0.1, 1.0, [](Settings& s) -> double& { return s.frame.resolution_scale; }),
+       .initial = "1",
+       .costs = "time in proportion to its square, but for what triangles take",
+       .loses = "detail smaller than the pixels that are left, edges first",
+       .decides_bits = false,
+       .limits_reference = true},
+      {.name = "half-resolution",
+       .help = "passes whose light is computed for one pixel in four where its neighbors see similar surfaces",
+       .value = text(
+           "LIST", fmt::format("none, or a list of {}", fmt::join(half_resolution_passes(), ", ")),
+           [](Settings& s) -> std::vector<std::string>& { return s.frame.rays.half_resolution; }, parse_half_resolution,
+           [](const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ",")); }),
+       .costs = "four times the points of those passes",
+       .loses = "detail of that light where neighbors see similar surfaces",
+       .limits_reference = true},
+      {.name = "max-depth",
+       .help = "reflections and refractions in a row; of the reference: segments of a path, the first from the eye",
+       .value = number(1, 64, [](Settings& s) -> int& { return s.frame.rays.max_depth; }),
+       .by_quality = {"2", "8", "16"},
+       .costs = "rays between mirrors and through glass",
+       .loses = "what is seen by more bounces is black",
+       .limits_reference = true},
+      {.name = "glossy-cutoff",
+       .help = "specular surfaces at least this rough are not followed by rays",
+       .value = number(
+           0.0, 1.0, [](Settings& s) -> double& { return s.frame.rays.glossy_cutoff; }, "0 to 1: a roughness"),
+       .by_quality = {"0.1", "0.3", "1"},
+       .costs = "a ray for every smoother surface in view, and what it meets",
+       .loses = "rougher surfaces reflect lights only, not the scene",
+       .limits_reference = true},
+      {.name = "light-samples",
+       .help = "rays to surfaces that emit and the environment, per point",
+       .value = number(
+           1, 4096, [](Settings& s) -> int& { return s.frame.rays.light_samples; }, "1 to 4096 a point"),
+       .by_quality = {"1", "1", "2"},
+       .costs = "shadow rays in proportion",
+       .loses = "noise in soft shadows",
+       .limits_reference = true,
+       .used_with = {{"reference", traces_passes}}},
+      {.name = "depth-format",
+       .help = "bits of a depth where layers are composited",
+       .value = choice(kDepthFormatNames, [](Settings& s) -> DepthFormat& { return s.frame.depth_format; }),
+       .initial = "32f",
+       .costs = "8, 7 or 6 bytes of a key sent between ranks",
+       .loses = "order of surfaces closer than a step of depth; then the lower surface is seen",
+       .limits_reference = true},
+      {.name = "color-format",
+       .help = "how the colors of an .exr are sent to rank 0",
+       .value = choice(kColorFormatNames, [](Settings& s) -> ColorFormat& { return s.color_format; }),
+       .initial = "32f",
+       .costs = "12, 6 or 4 bytes of a color sent to where an .exr is written",
+       .loses = "16f: 11 bits of a color; 8: what a display shows",
+       .decides_bits = false,
+       .limits_reference = true},
+      {.name = "embree-quality",
+       .help = "what Embree spends on building its trees",
+       .value = choice(kBuildQualityNames, [](Settings& s) -> BuildQuality& { return s.frame.rays.build.quality; }),
+       .initial = "medium",
+       .costs = "time to build the ray scene, at the start",
+       .loses = "low: rays take longer; no bit of a picture",
+       .decides_bits = false},
+      {.name = "deterministic",
+       .help = "on: rays have the same bits on every machine; off: each rank traces by its widest instructions",
+       .value = choice(kOffOn, [](Settings& s) -> bool& { return s.frame.rays.build.same_instructions; }),
+       .initial = "on",
+       .costs = "10 to 56 % of the rays a second where a processor has wider instructions than AVX2",
+       .loses = "off: the same bits on machines of different instruction sets"},
+      {.name = "filter",
+       .help = "how samples make up a pixel (default: the center for one sample, box for more)",
+       .value = text(
+           fmt::format("{}", fmt::join(filters, "|")), fmt::format("{}", fmt::join(filters, ", ")),
+           [](Settings& s) -> std::optional<PixelFilter>& { return s.sampling.filter; },
+           [](const std::string& name) { return std::optional(parse_pixel_filter(name)); },
+           [](const auto& filter) { return std::string(name_of(filter.value_or(PixelFilter::Box))); }),
+       .costs = "nothing",
+       .loses = "sharpness for smoothness, and the noise of wide filters"},
+      {.name = "primary",
+       .help = "what finds the visible surfaces; auto measures both",
+       .value = choice(kPrimaryNames, [](Settings& s) -> Primary& { return s.frame.primary; }),
+       .initial = "raster",
+       .costs = "rasterising many triangles, or rays through many pixels",
+       .loses = "at edges, 0.0025 to 0.045 % of pixels see another surface",
+       .decides_bits = false},
+      {.name = "shading",
+       .help = "deferred: light once after compositing; local: each rank before it",
+       .value = choice(kShadingNames, [](Settings& s) -> Shading& { return s.frame.shading; }),
+       .initial = "deferred",
+       .costs = "rays for what later turns out to be hidden",
+       .loses =
+           "local: colors of 8 bits are composited, and coplanar surfaces of different ranks show the brighter one",
+       .limits_reference = true},
+      {.name = "data",
+       .help = "what rays meet on a rank: replicated, all of the scene, or partitioned, what the rank draws itself, "
+               "while the rays of the others come to it",
+       .value = choice(kDataNames, [](Settings& s) -> bool& { return s.frame.partitioned; }),
+       .initial = "replicated",
+       .costs =
+           "partitioned: time and messages, as rays travel; replicated: the memory of a whole ray scene on each rank",
+       .loses = "nothing: no bit of a picture",
+       .decides_bits = false},
+      {.name = "no-terminator-fix",
+       .help = "shadow rays leave from the triangles, not the smooth surface they stand for",
+       .value = off_flag([](Settings& s) -> bool& { return s.frame.rays.terminator_fix; }),
+       .costs = "nothing",
+       .loses = "true: smooth surfaces of few triangles show their triangles where light grazes them"},
+      {.name = "reference",
+       .help = "path tracing in place of the passes: slow, and the ground truth",
+       .value = flag([](Settings& s) -> bool& { return s.frame.rays.reference; }),
+       .costs = "path tracing in place of the passes: many more samples for the same noise",
+       .loses = "false: what the passes leave out, caught by photons of some width",
+       .limits_reference = true,
+       .scope = SettingScope::Single},
+
+      // Who does what.
+      {.name = "distribute",
+       .help = "how the work is shared: sort-first, sort-last, hybrid or auto",
+       .value = text(
+           "NAME", "sort-first, sort-last, hybrid, auto",
+           [](Settings& s) -> std::optional<Distribution>& { return s.frame.distribution; }, parse_distribution_or_auto,
+           [](const std::optional<Distribution>& value) { return std::string(value ? name_of(*value) : "auto"); }),
+       .initial = "auto",
+       .decides_bits = false},
+      {.name = "groups",
+       .help = "groups of ranks for hybrid (default: about the square root of the ranks)",
+       .value = number(1, 1 << 20, [](Settings& s) -> int& { return s.frame.groups; }),
+       .decides_bits = false,
+       .used_with = {{"distribute", forms_groups}}},
+      {.name = "strategy",
+       .help = "how layers are composited: a strategy's name or auto",
+       .value = text(
+           "NAME", "a strategy, auto", [](Settings& s) -> std::string& { return s.frame.strategy; },
+           [](const std::string& name) { return std::string(name == "auto" ? "" : make_compositor(name)->name()); },
+           [](const std::string& name) { return name.empty() ? std::string("auto") : name; }),
+       .initial = "auto",
+       .decides_bits = false},
+
+      // What is made of the picture.
+      {.name = "exposure",
+       .help = "brightens (or darkens) display colors by so many stops; EXR files stay as lit",
+       .value = number(-30.0, 30.0, [](Settings& s) -> double& { return s.exposure_stops; }),
+       .initial = "0",
+       .decides_bits = false},
+      {.name = "aov",
+       .help =
+           fmt::format("layers of the .exr, of FILE.aov.exr beside a .png, or of a wall (SCREEN.aov.exr): a list of {}",
+                       fmt::join(aov_names(), ", ")),
+       .value = text(
+           "LIST", "layers", [](Settings& s) -> std::vector<Aov>& { return s.frame.aovs; }, parse_aovs,
+           [](const std::vector<Aov>& aovs) {
+             std::vector<std::string_view> names;
+             for (const Aov aov : aovs) names.push_back(name_of(aov));
+             return fmt::format("{}", fmt::join(names, ","));
+           }),
+       .scope = SettingScope::Single},
+      {.name = "strict",
+       .help = "values that are not finite are errors, not replaced: of files (exit code 3), of the picture (1)",
+       .value = flag([](Settings& s) -> bool& { return s.strict; }),
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "codec",
+       .help = "of pictures on their way to displays: auto, or one of hpr bench codec",
+       .value =
+           plain_text("NAME", "raw, lz4, zstd, jpeg, auto", [](Settings& s) -> std::string& { return s.codec.name; }),
+       .initial = "auto",
+       .costs = "time to encode and decode, against time on the link",
+       .loses = "jpeg: see --codec-quality; the others only what --codec-error allows",
+       .decides_bits = false,
+       .fixed_in_session = true,
+       .scope = SettingScope::Wall},
+      {.name = "codec-quality",
+       .help = "of jpeg",
+       .value = number(1, 100, [](Settings& s) -> int& { return s.codec.quality; }),
+       .initial = "90",
+       .costs = "bytes",
+       .loses = "low: blocks and ringing at edges, colors first",
+       .decides_bits = false,
+       .fixed_in_session = true,
+       .scope = SettingScope::Wall},
+      {.name = "codec-error",
+       .help = "levels of 255 that a shown color may be off, e.g. 3/255",
+       .value = text(
+           "N", "0 to 255 levels of 255, written 3 or 3/255", [](Settings& s) -> int& { return s.codec.error; },
+           parse_codec_error, [](int levels) { return fmt::format("{}/255", levels); }),
+       .initial = "0",
+       .costs = "0: up to twice the bytes of an error of 2",
+       .loses = "so many levels at most, in every pixel and channel, whatever the codec",
+       .decides_bits = false,
+       .fixed_in_session = true,
+       .scope = SettingScope::Wall},
+  };
+}
+
+}  // namespace
+
+std::span<const Setting> all_settings() {
+  static const std::vector<Setting> table = make_table();
+  return table;
+}
+
+const Setting* find_setting(std::string_view name) {
+  const auto settings = all_settings();
+  const auto found = std::ranges::find(settings, name, &Setting::name);
+  return found == settings.end() ? nullptr : &*found;
+}
+
+void set_setting(RenderSettings& settings, std::string_view name, const std::string& value) {
+  const Setting* const setting = find_setting(name);
+  if (setting == nullptr) {
+    std::vector<std::string> names;
+    for (const Setting& one : all_settings()) names.emplace_back(one.name);
+    throw Error(ExitCode::Usage, fmt::format("there is no setting '{}'", printable(name)),
+                unknown_name_hint(name, names));
+  }
+  try {
+    setting->value.parse(settings, value);
+  } catch (const Error& error) {
+    const std::string what = error.what();
+    throw Error(error.code(), what.starts_with("--") ? what : fmt::format("--{}: {}", name, what), error.hint());
+  }
+  settings.given.insert(setting->name);
+}
+
+void reset_setting(RenderSettings& settings, std::string_view name) {
+  const Setting* const setting = find_setting(name);
+  HPR_CHECK(setting != nullptr);
+  setting->value.copy(RenderSettings(), settings);
+  settings.given.erase(setting->name);
+}
+
+const Setting& find_knob(const std::string& name) {
+  const Setting* const setting = find_setting(name);
+  const bool is_knob = setting != nullptr && setting->is_knob();
+  if (is_knob && setting->scope != SettingScope::Wall) return *setting;
+  if (is_knob) {
+    throw Error(ExitCode::Usage, fmt::format("'{}' changes no picture before it is sent", name),
+                "hpr bench codec SCENE measures what it costs and loses");
+  }
+  std::vector<std::string> choices;
+  for (const Setting& knob : all_settings()) {
+    if (knob.is_knob() && knob.scope != SettingScope::Wall) choices.emplace_back(knob.name);
+  }
+  throw Error(ExitCode::Usage, fmt::format("there is no knob '{}'", printable(name)), unknown_name_hint(name, choices));
+}
+
+std::string knobs_text() {
+  std::string text =
+      "Settings that trade speed for accuracy, options of `hpr render` and `hpr wall run` alike.\n"
+      "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene;\n"
+      "for those of pictures on their way to displays (`hpr wall run`) `hpr bench codec SCENE` does.\n";
+  for (const Setting& knob : all_settings()) {
+    if (!knob.is_knob()) continue;
+    text += fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", knob.name, knob.value.takes, knob.costs,
+                        knob.loses);
+  }
+  return text;
+}
+
+std::string knobs_markdown() {
+  std::string text = "| Option | takes | costs | loses |\n|---|---|---|---|\n";
+  for (const Setting& knob : all_settings()) {
+    if (!knob.is_knob()) continue;
+    text += fmt::format("| `--{}` | {} | {} | {} |\n", knob.name, knob.value.takes, knob.costs, knob.loses);
+  }
+  return text;
+}
+
+std::string settings_markdown() {
+  const auto cell = [](std::string text) {
+    for (std::size_t at = text.find('|'); at != std::string::npos; at = text.find('|', at + 2)) {
+      text.insert(at, 1, '\\');
+    }
+    return text;
+  };
+  std::string text = "| Setting | Value | Default | Meaning |\n|---|---|---|---|\n";
+  for (const Setting& setting : all_settings()) {
+    std::string initial(setting.initial);
+    if (!setting.by_quality.front().empty()) initial = fmt::format("{}", fmt::join(setting.by_quality, ", "));
+    const std::string names = setting.negated.empty() ? fmt::format("--{}", setting.name)
+                                                      : fmt::format("--{}, --{}", setting.name, setting.negated);
+    text += fmt::format("| `{}` | {} | {} | {} |\n", names, cell(setting.value.type), initial, cell(setting.help));
+  }
+  return text;
+}
+
+std::string qualities_markdown() {
+  std::string text = fmt::format("| Option | {} |\n|---|---|---|---|\n", fmt::join(kQualityNames, " | "));
+  for (const Setting& setting : all_settings()) {
+    if (setting.by_quality.front().empty()) continue;
+    text += fmt::format("| `--{}` | {} |\n", setting.name, fmt::join(setting.by_quality, " | "));
+  }
+  return text;
+}
+
+}  // namespace hpr
