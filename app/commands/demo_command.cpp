@@ -50,7 +50,7 @@ class DemoCommand final : public Command {
     std::error_code error;
     own.force =
         globals.force || (output_ == kPicture && (!std::filesystem::exists(kPicture, error) || holds_png(kPicture)));
-    return run_wall(run, own);
+    return run_wall(make_wall_job(run, own), own);
   }
 
  private:

@@ -30,7 +30,7 @@ class ViewCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     run_.display.display = display();
-    return run_wall(run_, globals);
+    return run_wall(make_wall_job(run_, globals), globals);
   }
 
  private:

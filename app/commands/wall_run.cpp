@@ -138,14 +138,13 @@ bool draw_frames(const WallJob& job, WallDriver& driver, const std::string& mode
 }
 
 /// What a run prints at its end: what was done, if asked, and where its result is. `stopped`: before its last frame.
-void print_end(const WallRun& run, const WallJob& job, const WallDriver& driver, bool stopped, const RunStats& stats,
-               const Scene& scene) {
+void print_end(const WallJob& job, const WallDriver& driver, bool stopped, const RunStats& stats, const Scene& scene) {
   const WallOutputs& outputs = job.outputs;
   if (stopped) {
     log::info("stopped after frame {} of {}{}", driver.manifest().frames.back().frame + 1, job.frame_count(),
               outputs.manifest.empty() ? "" : "; --resume goes on");
   }
-  if (run.summary) print_summary(stats, job.wall, scene);
+  if (job.summary) print_summary(stats, job.wall, scene);
   for (const auto& result : {outputs.picture, outputs.assembled, outputs.manifest}) {
     if (result.empty()) continue;
     fmt::print("{}\n", result.string());
@@ -153,11 +152,11 @@ void print_end(const WallRun& run, const WallJob& job, const WallDriver& driver,
   }
 }
 
-ExitCode drive(const WallRun& run, const WallJob& job, const Globals& globals, Session& session) {
+ExitCode drive(const WallJob& job, const Globals& globals, Session& session) {
   const bool reports = session.comm().rank() == 0;
   check_same_wall(session.comm(), job.wall, job.wall_file);
   WallDriver driver(job, session);
-  if (run.report.explain && reports) fmt::print("{}\n", fmt::join(driver.explained(), "\n"));
+  if (job.explain && reports) fmt::print("{}\n", fmt::join(driver.explained(), "\n"));
   prepare(session, driver.plan());
   const bool ended_early = draw_frames(job, driver, reports && globals.verbosity >= 0 ? globals.progress : "none");
   if (ended_early) driver.note_stop(job.frame_count());
@@ -174,7 +173,7 @@ ExitCode drive(const WallRun& run, const WallJob& job, const Globals& globals, S
     if (reports) write_results(job, driver, stats, pictures);
   });
   if (!seen) return ExitCode::Lost;
-  if (reports) print_end(run, job, driver, stopped, stats, session.scene());
+  if (reports) print_end(job, driver, stopped, stats, session.scene());
   return stopped && !job.outputs.manifest.empty() ? ExitCode::Stopped : verdict(stats, job.settings.strict);
 }
 
@@ -199,27 +198,19 @@ void check_result(const std::filesystem::path& file, bool overwrite) {
 }
 
 /// Throws Error where a result cannot be written, or would take the place of a file that is read or of another result.
-void check_outputs(const WallRun& run, const WallJob& job, const Globals& globals) {
+void check_outputs(const WallJob& job, const Globals& globals) {
   const WallOutputs& outputs = job.outputs;
-  if (run.display.frames_on_stdout() && run.report.explain) {
-    throw Error(ExitCode::Usage, "--explain writes to standard output, where the frames go",
-                "leave it out, or send the frames elsewhere");
-  }
-  if (!run.picture.empty() && !run.picture.ends_with(".png")) {
-    throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),
-                "name a .png file");
-  }
   std::vector<std::string> results{outputs.picture.string(), outputs.stats.string(), outputs.manifest.string(),
                                    outputs.assembled.string()};
-  if (job.display->stream && run.display.output != "-") results.push_back(run.display.output);
-  if (run.display.writes_files()) {
-    for (const auto& file : files_of_display(job.wall, run.display.output)) results.push_back(file.string());
+  const std::string stream = job.display_options.pipe.file.string();
+  if (job.display->stream && stream != "-") results.push_back(stream);
+  if (!outputs.assembled.empty()) {
+    for (const auto& file : files_of_display(job.wall, job.display_options.folder)) results.push_back(file.string());
   }
-  std::vector<std::string> layers = outputs.layers.aov;
-  layers.insert(layers.end(), outputs.layers.raw.begin(), outputs.layers.raw.end());
-  results.insert(results.end(), layers.begin(), layers.end());
+  results.insert(results.end(), outputs.layers.aov.begin(), outputs.layers.aov.end());
+  results.insert(results.end(), outputs.layers.raw.begin(), outputs.layers.raw.end());
   check_distinct(results, globals.trace);
-  check_spared(run.scene, globals.scene_limits(), files_read(run, job.wall), results);
+  check_spared(job.scene, globals.scene_limits(), job.inputs, results);
 
   for (const auto& file : {outputs.picture, outputs.stats}) {
     if (!file.empty()) check_writable(file, globals.force);
@@ -254,6 +245,22 @@ void check_targets(const WallRun& run) {
   if (run.target_error && !(*run.target_error >= 1e-12 && *run.target_error <= 1e12)) {
     throw Error(ExitCode::Usage, fmt::format("--target-error {:g} is not from 1e-12 to 1e12", *run.target_error),
                 "write e.g. --target-error 1e-3");
+  }
+}
+
+/// Throws Error (Usage) for options that exclude each other.
+void check_together(const WallRun& run, const WallJob& job) {
+  if (run.display.frames_on_stdout() && job.explain) {
+    throw Error(ExitCode::Usage, "--explain writes to standard output, where the frames go",
+                "leave it out, or send the frames elsewhere");
+  }
+  if (!run.picture.empty() && !run.picture.ends_with(".png")) {
+    throw Error(ExitCode::Usage, fmt::format("cannot write '{}': the assembled wall is a PNG", run.picture),
+                "name a .png file");
+  }
+  if (job.resume && (job.open_ended() || job.outputs.manifest.empty())) {
+    throw Error(ExitCode::Usage, "--resume needs to know how many frames it goes on to, and which run with",
+                "use it with --frames N, --display file or remote, and -o DIR");
   }
 }
 
@@ -292,6 +299,7 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
   const bool starts_job = globals.ranks > 1 && !inside_mpi_job();  // whose rank 0 reports the same findings
   WallJob job{.wall = load_wall(run.wall, run.overrides, !starts_job),
               .wall_file = run.wall,
+              .scene = run.scene,
               .settings = run.settings,
               .seed = globals.seed,
               .picture_limits = globals.picture_limits()};
@@ -316,38 +324,37 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
     run.link.refuse();
   }
   job.outputs = outputs_of(run, job, resolve(run.settings, globals.seed));
-  if (run.resume && (job.open_ended() || job.outputs.manifest.empty())) {
-    throw Error(ExitCode::Usage, "--resume needs to know how many frames it goes on to, and which run with",
-                "use it with --frames N, --display file or remote, and -o DIR");
-  }
+  job.inputs = files_read(run, job.wall);
+  job.explain = run.report.explain;
+  job.summary = run.summary;
+  job.restarts = run.restarts;
+  check_together(run, job);
   return job;
 }
 
-ExitCode run_wall(const WallRun& run, const Globals& given) {
-  Globals globals = given;
+ExitCode run_wall(WallJob job, Globals globals) {
   // What stands there is what the job that was lost had written.
   if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
-  globals.force |= run.resume;
-  const WallJob job = make_wall_job(run, globals);
+  globals.force |= job.resume;
+  job.display_options.overwrite |= globals.force;
   const EmptyFolders tidy(folder_of(job));
   job.open_ended() ? watch_interrupts() : watch_requests();
   std::optional<FolderLock> lock;
-  const auto claim_outputs = [&](const WallRun& chosen, const WallJob& its_job) {
-    check_outputs(chosen, its_job, globals);
-    claim_folder(its_job, lock);
+  const auto claim_outputs = [&] {
+    check_outputs(job, globals);
+    claim_folder(job, lock);
   };
-  if (!inside_mpi_job()) claim_outputs(run, job);
+  if (!inside_mpi_job()) claim_outputs();
   const auto body = [&](Communicator& comm) {
     const EmptyFolders tidy_in_job(folder_of(job));  // a rank that fails leaves run_ranks only to end the job
     // Where the display was chosen by what there is, hosts may differ: all ranks take rank 0's.
-    WallRun agreed = run;
-    agreed.display.display = broadcast_text(comm, run.display.display);
-    const WallJob its_job = agreed.display.display == run.display.display ? job : make_wall_job(agreed, globals);
-    if (inside_mpi_job()) check_on_root(comm, [&] { claim_outputs(agreed, its_job); });
-    Session session(comm, globals.session(), [&] { return its_job.load(run.scene, run.settings); });
-    return drive(agreed, its_job, globals, session);
+    WallJob agreed = job;
+    if (!agreed.link) agreed.display = &find_display(broadcast_text(comm, std::string(job.display->name)));
+    if (inside_mpi_job()) check_on_root(comm, claim_outputs);
+    Session session(comm, globals.session(), [&] { return job.load(job.scene, job.settings); });
+    return drive(agreed, globals, session);
   };
-  const int restarts = job.display->stream ? 0 : run.restarts;
+  const int restarts = job.display->stream ? 0 : job.restarts;
   return run_supervised(globals, restarts, job.open_ended() ? Interrupts::Stop : Interrupts::End, body);
 }
 
@@ -384,7 +391,9 @@ class WallRunCommand final : public Command {
   }
 
   [[nodiscard]] bool opens_windows() const override { return true; }
-  [[nodiscard]] ExitCode run(const Globals& globals) override { return run_wall(run_, globals); }
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    return run_wall(make_wall_job(run_, globals), globals);
+  }
 
  private:
   WallRun run_;

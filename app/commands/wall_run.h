@@ -37,7 +37,7 @@ struct WallRun {
 /// What the command line means, typed and checked. Creates nothing. Throws Error.
 [[nodiscard]] WallJob make_wall_job(const WallRun& run, const Globals& globals);
 
-/// Makes the job, then draws it on all ranks.
-[[nodiscard]] ExitCode run_wall(const WallRun& run, const Globals& globals);
+/// Draws a job on all ranks. Throws Error, before any rank draws, where its results cannot be written.
+[[nodiscard]] ExitCode run_wall(WallJob job, Globals globals);
 
 }  // namespace hpr

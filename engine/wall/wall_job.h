@@ -37,6 +37,7 @@ struct WallOutputs {
 struct WallJob {
   Wall wall;
   std::string wall_file = {};    ///< as the user named it, for errors
+  std::string scene = {};        ///< as `load` takes it
   RenderSettings settings = {};  ///< as they were given; those of each frame are resolve(settings, seed)
   std::uint64_t seed = 1;
   ImageLimits picture_limits = {};
@@ -54,6 +55,10 @@ struct WallJob {
   std::optional<double> target_ms = {};      ///< of a frame
   std::optional<double> target_relmse = {};  ///< estimated, at which a frame has enough samples
   WallOutputs outputs = {};
+  std::vector<std::string> inputs = {};  ///< files that are read beside the scene's
+  bool explain = false;                  ///< print the plan of the frames
+  bool summary = false;                  ///< print what each pass did
+  int restarts = 0;                      ///< of a job of several ranks that was lost
 
   /// Whether it goes on until a viewer, SIGINT or SIGTERM ends it.
   [[nodiscard]] bool open_ended() const { return !frames && (until_stopped || display->interactive); }
