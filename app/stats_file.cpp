@@ -24,10 +24,12 @@ nlohmann::ordered_json not_finite_json(const RayCounts& rays) {
 void write_stats(const std::filesystem::path& path, const RunStats& stats) {
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassTime& time : stats.times) {
-    const auto plan = std::ranges::find(stats.passes, time.name, &PassPlan::name);
+    const auto plan = std::ranges::find(stats.passes, time.pass, &PassPlan::pass);
     passes.push_back(
         {{"name", time.name}, {"ms", time.ms}, {"why", plan == stats.passes.end() ? "every frame" : plan->why}});
   }
+  nlohmann::ordered_json rays{{"primary", stats.rays.primary}};
+  for (const PassInfo& pass : all_passes()) rays[pass.name] = stats.rays[pass.id];
   nlohmann::ordered_json json{
       {"schema", "hpr.stats/1"},
       {"ms", stats.ms},
@@ -37,14 +39,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
       {"estimated_relmse", stats.relmse ? nlohmann::ordered_json(*stats.relmse) : nlohmann::ordered_json(nullptr)},
       {"plan", stats.plan},
       {"passes", passes},
-      {"rays",
-       {{"primary", stats.rays.primary},
-        {"shadow", stats.rays.shadow},
-        {"reflection", stats.rays.reflection},
-        {"refraction", stats.rays.refraction},
-        {"ambient-occlusion", stats.rays.ambient_occlusion},
-        {"photon", stats.rays.photon},
-        {"gather", stats.rays.gather}}},
+      {"rays", rays},
       {"rays_cut", stats.rays.cut},
       {"rays_invalid", stats.rays.invalid},
       {"not_finite", not_finite_json(stats.rays)},

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/check.h"
-#include "rt/passes/half_resolution.h"
+#include "rt/passes/pass_list.h"
 
 namespace hpr {
 namespace {
@@ -15,16 +15,25 @@ constexpr const char* kLessGlossy = "glossy-cutoff";
 constexpr double kCheapCutoff = 0.1;
 constexpr int kCheapDepth = 2;
 
+/// Whether it brings light that surfaces scattered on to others.
+bool is_indirect(const PassInfo& pass) {
+  return pass.component == Component::Photon;
+}
+
 }  // namespace
 
 std::vector<std::string> economies_of(const FrameSettings& settings, std::span<const PassPlan> passes) {
   std::vector<std::string> names;
   if (settings.rays.reference) return names;
-  const bool shares_otherwise = runs_pass(passes, "gather") || settings.rays.denoise;
+  const bool shares_otherwise = settings.rays.denoise || runs_pass(passes, [](const PassInfo& pass) {
+                                  return pass.half_resolution.components == 0;
+                                });
   if (settings.shading == Shading::Deferred && !shares_otherwise) names.emplace_back(kHalfResolution);
-  if (runs_pass(passes, "photon") || runs_pass(passes, "gather")) names.emplace_back(kNoPhotons);
+  if (runs_pass(passes, is_indirect)) names.emplace_back(kNoPhotons);
   const bool costly = settings.rays.glossy_cutoff > kCheapCutoff || settings.rays.max_depth > kCheapDepth;
-  if (costly && (runs_pass(passes, "reflection") || runs_pass(passes, "refraction"))) names.emplace_back(kLessGlossy);
+  if (costly && runs_pass(passes, [](const PassInfo& pass) { return pass.lobe.has_value(); })) {
+    names.emplace_back(kLessGlossy);
+  }
   return names;
 }
 
@@ -36,7 +45,7 @@ FrameSettings economize(FrameSettings settings, std::span<const std::string> eco
     } else if (name == kNoPhotons) {
       rays.photons = 0;
       rays.global_photons = false;
-      const std::size_t given_up = std::erase(rays.passes, "photon") + std::erase(rays.passes, "gather");
+      const std::size_t given_up = std::erase_if(rays.passes, [](PassId pass) { return is_indirect(info_of(pass)); });
       if (given_up > 0 && rays.passes.empty()) rays.auto_passes = false;
     } else {
       HPR_CHECK(name == kLessGlossy);

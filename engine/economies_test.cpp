@@ -7,7 +7,8 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-const std::vector<PassPlan> kAllRun{{"shadow", true, ""}, {"reflection", true, ""}, {"photon", true, ""}};
+const std::vector<PassPlan> kAllRun{
+    {PassId::Shadow, true, ""}, {PassId::Reflection, true, ""}, {PassId::Photon, true, ""}};
 
 TEST(Economies, AreThoseThatSaveSomething) {
   EXPECT_EQ(economies_of({}, kAllRun), (Names{"half-resolution", "photons", "glossy-cutoff"}));
@@ -26,7 +27,7 @@ TEST(Economies, AreThoseThatSaveSomething) {
 
 TEST(Economies, WithoutPhotonsNoOtherPassStarts) {
   FrameSettings settings;
-  settings.rays.passes = {"photon"};
+  settings.rays.passes = {PassId::Photon};
   settings.rays.photons = 5;
   settings.rays.global_photons = true;
   const FrameSettings less = economize(settings, Names{"photons"});

@@ -86,7 +86,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
   stats.times.push_back({"composite", slowest(comm, times.composite_ms)});
   // The lighter adds up what its threads took; a frame waits for them side by side.
   for (const PassTime& pass : times.passes) {
-    stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads())});
+    stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads()), pass.pass});
   }
   for (const RayCounts& counts : all_gather_value(comm, times.rays)) stats.rays += counts;
   if (stats.rays.not_finite > 0 && comm.rank() == 0) {

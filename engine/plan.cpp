@@ -118,7 +118,8 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
     lines.emplace_back("light: none (what the scene has of lights is black)");
   }
   if (!plan.rays.half_resolution.empty()) {
-    lines.push_back(fmt::format("half resolution: {} (as asked)", fmt::join(plan.rays.half_resolution, ", ")));
+    lines.push_back(
+        fmt::format("half resolution: {} (as asked)", fmt::join(names_of(plan.rays.half_resolution), ", ")));
   }
   if (plan.rays.denoise) {
     lines.push_back(fmt::format("denoiser: in the first {} samples (as asked)", kDenoisedSamples));
@@ -143,8 +144,8 @@ void choose_indirect(Session& session, const FrameSettings& settings, FramePlan&
 
 void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan& plan) {
   auto& lines = plan.explained;
-  lines.push_back(fmt::format("pass {}: {} ({})", pass.name, pass.runs ? "on" : "off", pass.why));
-  if (!pass.runs || pass.name != "photon") return;
+  lines.push_back(fmt::format("pass {}: {} ({})", name_of(pass.pass), pass.runs ? "on" : "off", pass.why));
+  if (!pass.runs || !info_of(pass.pass).needs_photons) return;
   lines.push_back(
       fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
                   settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <glm/trigonometric.hpp>
 #include <iterator>
+#include <optional>
 #include <variant>
 
 #include "core/error.h"
@@ -47,20 +48,23 @@ void note_not_finite(const std::string& name, Scene& scene) {
                                        environment.first_not_finite / width));
 }
 
-bool names_photons(const RaySettings& rays) {
-  return std::ranges::find(rays.passes, "photon") != rays.passes.end();
+/// The pass that needs photons, if it is named.
+std::optional<PassId> named_photon_pass(const RaySettings& rays) {
+  const auto found = std::ranges::find_if(rays.passes, [](PassId pass) { return info_of(pass).needs_photons; });
+  return found == rays.passes.end() ? std::nullopt : std::optional(*found);
 }
 
 /// What of the settings of photons depends on others.
 void resolve_photons(RenderSettings& settings) {
   RaySettings& rays = settings.frame.rays;
   const bool asks_for_indirect = settings.is_given("indirect") && rays.global_photons;
-  const bool asks_for_photons = names_photons(rays) || asks_for_indirect;
-  if (!settings.is_given("indirect")) rays.global_photons = rays.global_photons || names_photons(rays);
+  const std::optional<PassId> named = named_photon_pass(rays);
+  const bool asks_for_photons = named || asks_for_indirect;
+  if (!settings.is_given("indirect")) rays.global_photons = rays.global_photons || named;
   if (settings.is_given("photons") && rays.photons == 0 && asks_for_photons) {
     throw Error(ExitCode::Usage,
-                fmt::format("{}, and --photons 0 sends none",
-                            names_photons(rays) ? "--passes names photon" : "--indirect is the light of photons"),
+                fmt::format("{}, and --photons 0 sends none", named ? fmt::format("--passes names {}", name_of(*named))
+                                                                    : "--indirect is the light of photons"),
                 "leave one of them out, or send some");
   }
   // A quality without photons sends those of the next where it must send some.

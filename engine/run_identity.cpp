@@ -46,9 +46,9 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   for (std::size_t i = 0; i < views.size(); ++i) {
     identity.emplace_back(fmt::format("view {}", i), describe(views[i]));
   }
-  std::vector<std::string> passes;
+  std::vector<std::string_view> passes;
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) {
-    if (pass.runs) passes.push_back(pass.name);
+    if (pass.runs) passes.push_back(name_of(pass.pass));
   }
   identity.emplace_back("list of passes", fmt::format("'{}'", fmt::join(passes, ",")));
   identity.emplace_back("number of photons", fmt::format("{}", plan.rays.photons));

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <iterator>
+#include <ranges>
 #include <type_traits>
 #include <utility>
 
@@ -16,7 +16,7 @@
 #include "core/names.h"
 #include "engine/aov.h"
 #include "image/pixel_filter.h"
-#include "rt/passes/half_resolution.h"
+#include "rt/passes/pass_list.h"
 
 namespace hpr {
 namespace {
@@ -153,29 +153,27 @@ void parse_passes(Settings& settings, const std::string& list) {
   }
   const std::vector<std::string> words{"auto", "all", "none"};
   const bool one_word = named.size() == 1 && std::ranges::find(words, named.front()) != words.end();
-  std::vector<std::string> choices = words;
-  std::ranges::copy(all_pass_names(), std::back_inserter(choices));
+  std::vector<PassId> passes;
   for (const std::string& name : named) {
     if (!one_word && std::ranges::find(words, name) != words.end()) {
       throw Error(ExitCode::Usage, fmt::format("'{}' goes with no other word", name), "leave it or the others out");
     }
-    if (std::ranges::find(choices, name) != choices.end()) continue;
-    throw Error(ExitCode::Usage, fmt::format("no ray pass is called '{}'", printable(name)),
-                unknown_name_hint(name, choices));
+    if (!one_word) passes.push_back(parse_pass(name, words));
   }
   rays.auto_passes = one_word && named.front() == "auto";
   rays.all_passes = one_word && named.front() == "all";
-  rays.passes = one_word ? std::vector<std::string>() : named;
+  rays.passes = std::move(passes);
 }
 
 SettingValue passes() {
   return {.type = "LIST",
-          .takes = fmt::format("auto, all, none, or a list of {}", fmt::join(all_pass_names(), ", ")),
+          .takes = fmt::format("auto, all, none, or a list of {}",
+                               fmt::join(all_passes() | std::views::transform(&PassInfo::name), ", ")),
           .parse = parse_passes,
           .write =
               [](const Settings& settings) {
                 const RaySettings& rays = settings.frame.rays;
-                if (!rays.passes.empty()) return fmt::format("{}", fmt::join(rays.passes, ","));
+                if (!rays.passes.empty()) return fmt::format("{}", fmt::join(names_of(rays.passes), ","));
                 return std::string(rays.auto_passes ? "auto" : rays.all_passes ? "all" : "none");
               },
           .copy =
@@ -186,11 +184,11 @@ SettingValue passes() {
               }};
 }
 
-std::vector<std::string> parse_half_resolution(const std::string& list) {
-  RaySettings rays;
-  if (list != "none") rays.half_resolution = split_words(list);
-  (void)shared_components(rays);  // refuses unknown passes
-  return rays.half_resolution;
+std::vector<PassId> parse_half_resolution(const std::string& list) {
+  std::vector<PassId> passes;
+  if (list == "none") return passes;
+  for (const std::string& name : split_words(list)) passes.push_back(parse_half_resolution_pass(name));
+  return passes;
 }
 
 std::optional<Distribution> parse_distribution_or_auto(const std::string& name) {
@@ -214,7 +212,7 @@ int parse_codec_error(std::string levels) {
 
 bool sends_photons(const Settings& settings) {
   const RaySettings& rays = settings.frame.rays;
-  const bool named = std::ranges::find(rays.passes, "photon") != rays.passes.end();
+  const bool named = std::ranges::any_of(rays.passes, [](PassId pass) { return info_of(pass).needs_photons; });
   return named || (rays.passes.empty() && (rays.auto_passes || rays.all_passes));
 }
 
@@ -347,9 +345,9 @@ std::vector<Setting> make_table() {
       {.name = "half-resolution",
        .help = "passes whose light is computed for one pixel in four where its neighbors see similar surfaces",
        .value = text(
-           "LIST", fmt::format("none, or a list of {}", fmt::join(half_resolution_passes(), ", ")),
-           [](Settings& s) -> std::vector<std::string>& { return s.frame.rays.half_resolution; }, parse_half_resolution,
-           [](const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ",")); }),
+           "LIST", fmt::format("none, or a list of {}", fmt::join(names_of(half_resolution_passes()), ", ")),
+           [](Settings& s) -> std::vector<PassId>& { return s.frame.rays.half_resolution; }, parse_half_resolution,
+           [](const std::vector<PassId>& passes) { return fmt::format("{}", fmt::join(names_of(passes), ",")); }),
        .costs = "four times the points of those passes",
        .loses = "detail of that light where neighbors see similar surfaces",
        .limits_reference = true},

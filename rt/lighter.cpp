@@ -38,6 +38,15 @@ constexpr std::size_t kSurfaceStep = 0;
 constexpr std::size_t kDirectStep = 1;
 constexpr std::size_t kFirstPassStep = 2;
 
+struct RunningPass {
+  const PassInfo& info;
+  std::unique_ptr<Pass> pass;
+};
+
+bool gathers_all_lobes(std::span<const PassPlan> plan) {
+  return runs_pass(plan, [](const PassInfo& pass) { return pass.gathers_all_lobes; });
+}
+
 }  // namespace
 
 struct Lighter::State {
@@ -48,10 +57,10 @@ struct Lighter::State {
   Surfaces surfaces;
   LightSet lights;
   MediumFinder media;
-  std::vector<std::unique_ptr<Pass>> passes;  ///< those that run
-  std::uint8_t shared = 0;                    ///< components, see SharedLight
+  std::vector<RunningPass> passes;
+  ComponentSet shared = 0;  ///< see SharedLight
   std::array<bool, kLobes.size()> followed_lobes{};
-  bool gathers = false;
+  bool gathers;
   std::optional<RayScene> own_opaque;
   const RayScene* opaque = nullptr;
   std::optional<RayScene> holed;
@@ -97,21 +106,21 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
       plan(plan_passes(requirements, settings)),
       space(lit.bounds),
       surfaces(lit, space, lifts_origins(plan, settings)),
-      lights(lit, runs_pass(plan, "gather") ? EvenSky::LeftToRays : EvenSky::Sampled),
+      lights(lit, gathers_all_lobes(plan) ? EvenSky::LeftToRays : EvenSky::Sampled),
       media(lit),
+      shared(shared_components(settings)),
+      gathers(gathers_all_lobes(plan)),
       travelling(others) {
-  shared = shared_components(settings);
-  std::vector<std::unique_ptr<Pass>> all = make_all_passes();
-  bool needs_rays = settings.reference || settings.denoise || !covering_surfaces(lit, true).empty();
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!plan[i].runs) continue;
-    needs_rays = needs_rays || all[i]->needs_rays();
-    if (const Lobe* lobe = all[i]->follows()) followed_lobes[static_cast<std::size_t>(*lobe)] = true;
-    gathers = gathers || all[i]->follows_the_rest();
-    passes.push_back(std::move(all[i]));
+  for (const PassPlan& planned : plan) {
+    if (!planned.runs) continue;
+    const PassInfo& info = info_of(planned.pass);
+    if (info.lobe) followed_lobes.at(static_cast<std::size_t>(*info.lobe)) = true;
+    passes.push_back({info, info.make()});
   }
-  if (needs_rays) build_rays(source);
-  if (std::ranges::any_of(passes, [](const auto& pass) { return pass->gathers_photons(); })) build_photons();
+  if (!passes.empty() || settings.reference || settings.denoise || !covering_surfaces(lit, true).empty()) {
+    build_rays(source);
+  }
+  if (runs_pass(plan, [](const PassInfo& pass) { return pass.needs_photons; })) build_photons();
   if (settings.reference) build_reference();
 }
 
@@ -169,9 +178,9 @@ void Lighter::State::trace_reference(const LitSample& sample, std::span<const st
   const PathCounts& traced = reference->counts();
   counts = {};
   counts.primary = traced.primary;
-  counts.shadow = traced.shadow;
-  counts.reflection = traced.diffuse + traced.reflection;
-  counts.refraction = traced.transmission;
+  counts[PassId::Shadow] = traced.shadow;
+  counts[PassId::Reflection] = traced.diffuse + traced.reflection;
+  counts[PassId::Refraction] = traced.transmission;
   counts.invalid = traced.invalid;
   counts.cut = traced.cut;
   counts.not_finite = traced.not_finite;
@@ -222,7 +231,7 @@ void Lighter::State::light_wave(Scratch& scratch) const {
   };
   const auto for_each_pass = [&](const auto& body) {
     for (std::size_t i = 0; i < passes.size(); ++i) {
-      body(*passes[i]);
+      body(*passes[i].pass);
       charge(kFirstPassStep + i);
     }
   };
@@ -312,7 +321,9 @@ void Lighter::State::tell(double spent_ms) {
   if (travelling != nullptr) share_out(spent_ms, ms);
   if (photons) {
     const PhotonCounts sent = photons->take_counts();
-    counts.photon = sent.rays;
+    for (const RunningPass& running : passes) {
+      if (running.info.needs_photons) counts[running.info.id] = sent.rays;
+    }
     counts.invalid += sent.invalid;
     counts.cut += sent.cut;
   }
@@ -321,8 +332,9 @@ void Lighter::State::tell(double spent_ms) {
   for (std::size_t i = 0; i < passes.size(); ++i) {
     double& spent = ms[kFirstPassStep + i];
     // Threads send together what they gather one by one: times are summed over threads.
-    if (passes[i]->gathers_photons()) spent += std::exchange(photon_ms, 0.0) * settings.threads;
-    times.push_back({std::string(passes[i]->name()), spent});
+    const PassInfo& info = passes[i].info;
+    if (info.needs_photons) spent += std::exchange(photon_ms, 0.0) * settings.threads;
+    times.push_back({std::string(info.name), spent, info.id});
   }
   if (settings.denoise) times.push_back({"denoise", ms.back()});
 }

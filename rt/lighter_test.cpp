@@ -50,7 +50,7 @@ TEST(Lighter, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
       ASSERT_NEAR(lit.image.at(x, y).g / expected, 1.0, 1e-6) << x << ',' << y;
     }
   }
-  EXPECT_EQ(lit.counts.shadow, 65U * 33U);
+  EXPECT_EQ(lit.counts[PassId::Shadow], 65U * 33U);
   EXPECT_EQ(lit.counts.not_finite, 0U);
 }
 
@@ -79,7 +79,7 @@ TEST(Lighter, ABlockersShadowEndsWhereGeometrySays) {
     }
   }
   EXPECT_GT(dark, 20);
-  EXPECT_EQ(unshadowed.counts.shadow, 0U);
+  EXPECT_EQ(unshadowed.counts[PassId::Shadow], 0U);
 }
 
 TEST(Lighter, ALightThatLiesOnASurfaceIsNotHiddenByIt) {
@@ -98,7 +98,7 @@ TEST(Lighter, ALightNearerThanRoundingCastsNoImpossibleRay) {
   // Where rays of this floor start: 4 * 2^-23 of 4 + 8 metres above it.
   scene.lights = {point_light({0, 5.7e-6, 0}, 1e-10F)};
   const test::Lit lit = test::light(scene, test::view_from({0, 3, 0}, {0, 0, 0}, {3, 3}, scene, 1e-4, {0, 0, -1}));
-  EXPECT_GT(lit.counts.shadow, 0U);
+  EXPECT_GT(lit.counts[PassId::Shadow], 0U);
   EXPECT_EQ(lit.counts.invalid, 0U);
   EXPECT_GT(lit.image.at(1, 1).r, 0.0F);
 }
@@ -197,8 +197,8 @@ TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
   Lighter one(scene, {.threads = 1});
   one.light(views, keys, tiles, {.radiance = &whole});
   const RayCounts counts = one.counts();
-  EXPECT_GT(counts.reflection, 100U);
-  EXPECT_GT(counts.shadow, 100U);
+  EXPECT_GT(counts[PassId::Reflection], 100U);
+  EXPECT_GT(counts[PassId::Shadow], 100U);
   Lighter two(scene, {.threads = 2});
   two.light(views, keys, tiles, {.radiance = &threaded});
   EXPECT_EQ(two.counts(), counts);

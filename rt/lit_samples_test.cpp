@@ -83,7 +83,7 @@ TEST(LitSamples, OnlyPixelsThatAreWanted) {
     TileLayer<Rgb> some(layout);
     const LitSample sample{views, &keys, {.radiance = &some}, {7, 3}, &wanted};
     lighter.light(std::span(&sample, 1), tiles);
-    EXPECT_LT(lighter.counts().shadow, of_all.shadow / 2);
+    EXPECT_LT(lighter.counts()[PassId::Shadow], of_all[PassId::Shadow] / 2);
     for (const std::size_t tile : tiles) {
       for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
         if (wanted.active(tile) && wanted.tile(tile)[pixel] == 0) continue;

@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "rt/passes/pass_list.h"
 #include "scene/generators/generated.h"
 #include "scene/gltf/writer.h"
 #include "scene/load_scene.h"
@@ -32,6 +33,10 @@ Json requirement_json(const Requirement& requirement) {
 
 Json info_json(const Scene& scene) {
   const Requirements required = requirements_of(scene);
+  Json needed;
+  for (const PassInfo& pass : all_passes()) {
+    if (pass.required_by != nullptr) needed[pass.name] = requirement_json(required.*pass.required_by);
+  }
   Json cameras = Json::array();
   for (const Camera& camera : scene.cameras) cameras.push_back(camera.name);
   return {{"schema", "hpr.scene-info/1"},
@@ -43,11 +48,7 @@ Json info_json(const Scene& scene) {
           {"lights", scene.lights.size()},
           {"cameras", cameras},
           {"bounds", Json::array({corner(scene.bounds.low), corner(scene.bounds.high)})},
-          {"requires",
-           {{"shadow", requirement_json(required.shadow)},
-            {"reflection", requirement_json(required.reflection)},
-            {"refraction", requirement_json(required.refraction)},
-            {"photon", requirement_json(required.photon)}}},
+          {"requires", needed},
           {"warnings", scene.warnings}};
 }
 
@@ -62,13 +63,11 @@ void print_info(const Scene& scene) {
   fmt::print("  bounds     {:g} {:g} {:g} to {:g} {:g} {:g} m\n", low.x, low.y, low.z, high.x, high.y, high.z);
   for (const Camera& camera : scene.cameras) fmt::print("  camera     {}\n", printable(camera.name));
   const Requirements required = requirements_of(scene);
-  const auto line = [](const char* name, const Requirement& requirement) {
-    fmt::print("  {:<10} {}: {}\n", name, requirement.needed ? "needed" : "not needed", requirement.why);
-  };
-  line("shadow", required.shadow);
-  line("reflection", required.reflection);
-  line("refraction", required.refraction);
-  line("photon", required.photon);
+  for (const PassInfo& pass : all_passes()) {
+    if (pass.required_by == nullptr) continue;
+    const Requirement& requirement = required.*pass.required_by;
+    fmt::print("  {:<10} {}: {}\n", pass.name, requirement.needed ? "needed" : "not needed", requirement.why);
+  }
 }
 
 void log_warnings(const Scene& scene) {

@@ -73,10 +73,10 @@ void print_summary(const RunStats& stats, const Wall& wall, const Scene& scene) 
              static_cast<double>(pixels) * 1e-6, stats.ranks, stats.ranks == 1 ? "" : "s");
   for (const PassTime& time : stats.times) fmt::print("{:<10} {:7.1f} ms\n", time.name, time.ms);
   for (const PassPlan& pass : stats.passes) {
-    if (!pass.runs) fmt::print("{:<10} off: {}\n", pass.name, pass.why);
+    if (!pass.runs) fmt::print("{:<10} off: {}\n", name_of(pass.pass), pass.why);
   }
-  fmt::print("frame      {:7.1f} ms, {} shadow and {} reflection rays\n", stats.ms, stats.rays.shadow,
-             stats.rays.reflection);
+  fmt::print("frame      {:7.1f} ms, {} shadow and {} reflection rays\n", stats.ms, stats.rays[PassId::Shadow],
+             stats.rays[PassId::Reflection]);
 }
 
 /// Rank 0's files of a finished run: the assembled wall and what was done.

@@ -19,7 +19,7 @@ TEST(Denoiser, MatteLightOfSmoothSurfacesIsSharedAsWidely) {
     finish_scene(scene);
     const View view = look(scene, {70, 52});
     RaySettings settings = kGathered;
-    settings.passes.emplace_back("reflection");
+    settings.passes.push_back(PassId::Reflection);
     const Image<Rgb> truth = mean_picture(scene, view, settings, 96);
     const Image<Rgb> plain = mean_picture(scene, view, settings, 1);
     const Image<Rgb> smooth = mean_picture(scene, view, denoised(settings), 1);
@@ -74,7 +74,7 @@ TEST(Denoiser, NothingIsSharedAcrossTheGlossyCutoff) {
   finish_scene(scene);
   const View view = view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
   RaySettings settings = kGathered;
-  settings.passes.emplace_back("reflection");
+  settings.passes.push_back(PassId::Reflection);
   settings.glossy_cutoff = 0.3;
   const Image<Rgb> plain = mean_picture(scene, view, settings, 8);
   const Image<Rgb> smooth = mean_picture(scene, view, denoised(settings), 8);

@@ -109,7 +109,7 @@ TEST(Denoiser, NoLightCrossesToAnotherMaterial) {
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene, 0.5);
   RaySettings settings = kGathered;
-  settings.passes.emplace_back("reflection");
+  settings.passes.push_back(PassId::Reflection);
   const Image<Rgb> smooth = test::light(scene, view, denoised(settings)).image;
   float beside = 0.0F;
   for (int y = 0; y < 64; ++y) {
@@ -137,7 +137,7 @@ TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
   const FrameLayout& layout = keys.front().layout();
   const std::vector<std::size_t> tiles = all_tiles(layout);
   RaySettings settings = denoised(kGathered);
-  settings.passes = {"gather", "shadow", "reflection"};
+  settings.passes = {PassId::Gather, PassId::Shadow, PassId::Reflection};
   Lighter one(scene, settings);
   settings.threads = 3;
   Lighter three(scene, settings);
@@ -177,7 +177,8 @@ TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
     }
   }
   const RayCounts& counts = three.counts();
-  const double traced = static_cast<double>(counts.primary + counts.shadow + counts.reflection + counts.gather);
+  const double traced = static_cast<double>(counts.primary + counts[PassId::Shadow] + counts[PassId::Reflection] +
+                                            counts[PassId::Gather]);
   EXPECT_LT(rays, traced);  // those that find outlines are no pixel's
   EXPECT_GT(rays, 0.5 * traced);
 }
@@ -202,7 +203,7 @@ TEST(Denoiser, ShadowsOfSmallLightsKeepTheirEdges) {
   light.intensity = glm::vec3(20.0F);
   finish_scene(scene);
   const View view = test::view_from({4, 1.5, 0}, {2, 0, 0}, {64, 64}, scene);
-  const RaySettings settings{.passes = {"shadow"}};
+  const RaySettings settings{.passes = {PassId::Shadow}};
   const Image<Rgb> plain = test::light(scene, view, settings).image;
   const Image<Rgb> smooth = test::light(scene, view, denoised(settings)).image;
   EXPECT_GT(std::ranges::count(plain.pixels(), Rgb{}), 100);
@@ -248,7 +249,7 @@ TEST(Denoiser, LooksSeeWhatGlowsInPart) {
   }
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
-  const RaySettings settings{.passes = {"shadow"}};
+  const RaySettings settings{.passes = {PassId::Shadow}};
   const double truth = mean(mean_picture(scene, view, settings, 256));
   EXPECT_NEAR(mean(mean_picture(scene, view, denoised(settings), kDenoisedSamples)) / truth, 1.0, 0.02);
 }
@@ -274,7 +275,7 @@ TEST(Denoiser, LooksEndAtTheFarPlane) {
   TileLayer<Rgb> with(keys.layout());
   TileLayer<Rgb> without(keys.layout());
   for (const auto& [shown, layer] : {std::pair(&scene, &with), std::pair(&near, &without)}) {
-    Lighter lighter(*shown, denoised({.passes = {"shadow"}}));
+    Lighter lighter(*shown, denoised({.passes = {PassId::Shadow}}));
     lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = layer});
   }
   EXPECT_TRUE(std::ranges::equal(with.tile(0), without.tile(0)));

@@ -55,7 +55,7 @@ inline double mean(const Image<Rgb>& image) {
   return sum / static_cast<double>(image.pixels().size());
 }
 
-inline const RaySettings kGathered{.passes = {"gather"}, .max_depth = 4};
+inline const RaySettings kGathered{.passes = {PassId::Gather}, .max_depth = 4};
 
 /// A sheet alone under an even sky, which sends back its base colour.
 inline Scene painted_floor() {

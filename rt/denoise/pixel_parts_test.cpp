@@ -22,7 +22,7 @@ using test::add_mesh;
 using test::place;
 using test::quad;
 
-const RaySettings kDenoised{.passes = {"gather"}, .max_depth = 2, .denoise = true};
+const RaySettings kDenoised{.passes = {PassId::Gather}, .max_depth = 2, .denoise = true};
 
 /// Black things before a white sky: so a pixel is the share of the sky in it.
 Scene before_the_sky() {

@@ -13,7 +13,6 @@ constexpr double kReach = 0.25;
 /// (Zhukov, Iones, Kronin 1998). Runs only where it is asked for; photons do it right.
 class AmbientOcclusionPass final : public Pass {
  public:
-  [[nodiscard]] std::string_view name() const override { return "ambient-occlusion"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
     return scene.ambient_occlusion;
   }
@@ -42,7 +41,7 @@ class AmbientOcclusionPass final : public Pass {
       }
     }
     std::vector<float> passed(tile.requests.size());
-    tile.counts.ambient_occlusion += tile.requests.size();
+    tile.counts[PassId::AmbientOcclusion] += tile.requests.size();
     tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
     for (std::size_t i = 0; i < passed.size(); ++i) {
       const PathPoint& point = wave.points[tile.requests[i].owner];

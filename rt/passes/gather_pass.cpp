@@ -9,7 +9,6 @@ namespace {
 /// the scene. What photons do where lights are small, without their blur; an even sky's own light comes the same way.
 class GatherPass final : public Pass {
  public:
-  [[nodiscard]] std::string_view name() const override { return "gather"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     if (!scene.indirect.needed || gathers_by_rays(scene, settings)) return scene.indirect;
     return {false, "photons are to bring what light surfaces scatter on, if anything is"};
@@ -17,19 +16,16 @@ class GatherPass final : public Pass {
   [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
     return gathers_by_rays(scene, settings);
   }
-  [[nodiscard]] bool follows_the_rest() const override { return true; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    for (const Lobe lobe : kLobes) {
-      follow_lobe(tile, wave, {lobe, Component::Photon, true}, tile.counts.gather, next);
-    }
+    for (const Lobe lobe : kLobes) follow_lobe(tile, wave, info_of(PassId::Gather), lobe, next);
   }
 };
 
 }  // namespace
 
 bool gathers_by_rays(const Requirements& scene, const RaySettings& settings) {
-  if (std::ranges::find(settings.passes, "gather") != settings.passes.end()) return true;
+  if (std::ranges::find(settings.passes, PassId::Gather) != settings.passes.end()) return true;
   return settings.photons > 0 && settings.passes.empty() && (settings.auto_passes || settings.all_passes) &&
          settings.global_photons && settings.gather && scene.even_sky && settings.half_resolution.empty();
 }

@@ -46,7 +46,7 @@ TEST(Gather, RaysBringTheLightOfAnEvenSky) {
     const RaySettings best{
         .max_depth = 24, .photons = 1000, .global_photons = true, .gather = true, .terminator_fix = false};
     const std::vector<PassPlan> plan = plan_passes(requirements_of(scene), best);
-    ASSERT_TRUE(runs_pass(plan, "gather"));
+    ASSERT_TRUE(runs_pass(plan, PassId::Gather));
     const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
     const glm::dvec3 reference =
         mean_of(scene, view, {.max_depth = 25, .terminator_fix = false, .reference = true}, 512);
@@ -65,14 +65,15 @@ TEST(Gather, RaysBringWhatNoOtherPassFollows) {
   const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
   const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 25, .terminator_fix = false, .reference = true}, 512);
   for (const double cutoff : {0.1, 0.3}) {
-    const glm::dvec3 gathered = mean_of(
-        scene, view, {.passes = {"gather"}, .max_depth = 1, .glossy_cutoff = cutoff, .terminator_fix = false}, 512);
+    const glm::dvec3 gathered =
+        mean_of(scene, view,
+                {.passes = {PassId::Gather}, .max_depth = 1, .glossy_cutoff = cutoff, .terminator_fix = false}, 512);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(gathered[c] / reference[c], 1.0, 0.002) << cutoff << " channel " << c;
   }
   // Where nothing scatters light it does not run, and lights find the sky.
   scene.materials.assign(3, polished);
   const glm::dvec3 lit =
-      mean_of(scene, view, {.passes = {"gather"}, .glossy_cutoff = 0.1, .terminator_fix = false}, 64);
+      mean_of(scene, view, {.passes = {PassId::Gather}, .glossy_cutoff = 0.1, .terminator_fix = false}, 64);
   EXPECT_GT(lit.g, 0.3);
 }
 
@@ -82,7 +83,7 @@ TEST(Gather, RaysBringNothingFromABackdrop) {
   scene.environment.reset();
   scene.background = {5.0F, 5.0F, 5.0F};
   const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
-  const RaySettings asked{.passes = {"gather"}, .terminator_fix = false};
+  const RaySettings asked{.passes = {PassId::Gather}, .terminator_fix = false};
   const glm::dvec3 gathered = mean_of(scene, view, asked, 64);
   const glm::dvec3 none = mean_of(scene, view, {.auto_passes = false, .terminator_fix = false}, 64);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(gathered[c] / none[c], 1.0, 1e-6) << "channel " << c;
@@ -95,7 +96,8 @@ TEST(Gather, RaysBringTheLightOfALamp) {
   const glm::dvec3 reference =
       mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 1500);
   const glm::dvec3 hybrid = mean_of(
-      scene, view, {.passes = {"shadow", "reflection", "gather"}, .max_depth = 64, .terminator_fix = false}, 1500);
+      scene, view,
+      {.passes = {PassId::Shadow, PassId::Reflection, PassId::Gather}, .max_depth = 64, .terminator_fix = false}, 1500);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.015) << "channel " << c;
 }
 

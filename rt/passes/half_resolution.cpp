@@ -5,12 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <span>
-#include <string_view>
 
 #include "core/check.h"
-#include "core/error.h"
-#include "core/names.h"
-#include "rt/photons/photon_gather.h"
 
 namespace hpr {
 namespace {
@@ -32,10 +28,6 @@ constexpr double kMostApart = 0.1;
 /// How many times as much of the light a borrower may scatter.
 constexpr float kMostBrighter = 4.0F;
 
-constexpr std::uint8_t bit(Component component) {
-  return static_cast<std::uint8_t>(1U << static_cast<unsigned>(component));
-}
-
 std::size_t block_of(std::uint32_t pixel) {
   const std::uint32_t x = pixel % kTileSide / kBlockSide;
   const std::uint32_t y = pixel / kTileSide / kBlockSide;
@@ -47,41 +39,9 @@ glm::dvec3 made_up_for(const glm::vec3& borrower, const glm::vec3& lender) {
   return {ratio(borrower.r, lender.r), ratio(borrower.g, lender.g), ratio(borrower.b, lender.b)};
 }
 
-struct Shareable {
-  std::string_view name;
-  std::uint8_t bits;
-};
-constexpr std::array<Shareable, 5> kShareable{{
-    {"shadow", static_cast<std::uint8_t>(bit(Component::Direct) | bit(Component::Shadow))},
-    {"reflection", bit(Component::Reflection)},
-    {"refraction", bit(Component::Refraction)},
-    {"ambient-occlusion", bit(Component::AmbientOcclusion)},
-    {"photon", bit(Component::Photon)},
-}};
-
 }  // namespace
 
-std::vector<std::string> half_resolution_passes() {
-  std::vector<std::string> names;
-  names.reserve(kShareable.size());
-  for (const Shareable& each : kShareable) names.emplace_back(each.name);
-  return names;
-}
-
-std::uint8_t shared_components(const RaySettings& settings) {
-  std::uint8_t bits = 0;
-  for (const std::string& name : settings.half_resolution) {
-    const auto found = std::ranges::find(kShareable, name, &Shareable::name);
-    if (found == kShareable.end()) {
-      throw Error(ExitCode::Usage, "no pass called '" + printable(name) + "' runs at half resolution",
-                  unknown_name_hint(name, half_resolution_passes()));
-    }
-    bits |= found->bits;
-  }
-  return bits;
-}
-
-void SharedLight::start(std::uint8_t shared, const TileWork& tile, const TileJob& job) {
+void SharedLight::start(ComponentSet shared, const TileWork& tile, const TileJob& job) {
   shared_ = shared;
   glossy_cutoff_ = tile.settings.glossy_cutoff;
   const std::size_t turn = job.number.sample % kLenderX.size();
@@ -98,19 +58,13 @@ SharedLight::Seen SharedLight::look_at(const PathPoint& point) const {
             .normal = point.material.normal,
             .material = point.surface.material,
             .pixel = point.pixel};
-  const Bsdf& bsdf = point.bsdf;
-  const glm::dvec3 diffuse = bsdf.weight(Lobe::Diffuse);
-  const glm::dvec3 mirrored = bsdf.weight(Lobe::Reflection);
-  const auto set = [&](Component component, const glm::dvec3& weight) {
-    seen.weights.at(static_cast<std::size_t>(component)) = weight;
-  };
-  set(Component::Direct, diffuse + mirrored);
-  set(Component::Shadow, diffuse + mirrored);
-  set(Component::Reflection, mirrored);
-  set(Component::Refraction, bsdf.weight(Lobe::Transmission));
-  set(Component::AmbientOcclusion, diffuse * point.material.occlusion);
-  const bool followed = is_followed(bsdf, Lobe::Reflection, glossy_cutoff_);
-  set(Component::Photon, followed ? diffuse : diffuse + mirrored);
+  for (const PassInfo& pass : all_passes()) {
+    if ((pass.half_resolution.components & shared_) == 0) continue;
+    const glm::vec3 scattered = pass.half_resolution.scattered(point, glossy_cutoff_);
+    for (std::size_t i = 0; i < kComponents; ++i) {
+      if (contains(pass.half_resolution.components, static_cast<Component>(i))) seen.weights.at(i) = scattered;
+    }
+  }
   return seen;
 }
 
@@ -122,7 +76,7 @@ bool SharedLight::alike(const Seen& lender, const Seen& borrower) const {
   if (std::abs(glm::dot(apart, lender.normal)) > kMostBent * distance) return false;
   if (distance > kMostApart * glm::distance(borrower.position, eye_)) return false;
   for (std::size_t i = 0; i < kComponents; ++i) {
-    if (((shared_ >> i) & 1U) == 0) continue;
+    if (!contains(shared_, static_cast<Component>(i))) continue;
     if (glm::any(glm::greaterThan(borrower.weights[i], kMostBrighter * lender.weights[i]))) return false;
   }
   return true;
@@ -158,8 +112,9 @@ void SharedLight::borrow(const Seen& lender, PathPoint& point) {
   if (!alike(lender, seen)) return;
   borrowers_.push_back(seen);
   point.borrows = shared_;
-  if (point.borrows_light(Component::Reflection)) point.follows[static_cast<std::size_t>(Lobe::Reflection)] = 0.0F;
-  if (point.borrows_light(Component::Refraction)) point.follows[static_cast<std::size_t>(Lobe::Transmission)] = 0.0F;
+  for (const PassInfo& pass : all_passes()) {
+    if (pass.lobe && point.borrows_light(pass.component)) point.follows.at(static_cast<std::size_t>(*pass.lobe)) = 0.0F;
+  }
 }
 
 SharedLight::Lenders SharedLight::lenders_about(const Seen& borrower) const {
@@ -184,7 +139,7 @@ void SharedLight::spread(TileWork& tile) const {
   for (const Seen& borrower : borrowers_) {
     const Lenders about = lenders_about(borrower);
     for (std::size_t part = 0; part < kComponents; ++part) {
-      if (((shared_ >> part) & 1U) == 0) continue;
+      if (!contains(shared_, static_cast<Component>(part))) continue;
       glm::dvec3 sum(0.0);
       for (const Seen* const lender : std::span(about.at).first(about.count)) {
         sum += made_up_for(borrower.weights[part], lender->weights[part]) * tile.components[part][lender->pixel];

@@ -4,20 +4,12 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "rt/passes/first_points.h"
 #include "rt/passes/pass.h"
 
 namespace hpr {
-
-/// The names RaySettings::half_resolution may hold: passes, "shadow" standing for the light of lights.
-[[nodiscard]] std::vector<std::string> half_resolution_passes();
-
-/// The components of passes that RaySettings::half_resolution names, one bit each. Throws Error (Usage) for a name that
-/// is no pass, or one whose light cannot be shared among pixels.
-[[nodiscard]] std::uint8_t shared_components(const RaySettings& settings);
 
 /// Light of the first surface that is worked out for one pixel of each 2 x 2 block of a tile, the lender, and spread to
 /// those of its block that see the like: the same material, turned and placed alike, about as bright. All others work
@@ -26,7 +18,7 @@ namespace hpr {
 class SharedLight {
  public:
   /// Starts a tile. `shared`: see shared_components.
-  void start(std::uint8_t shared, const TileWork& tile, const TileJob& job);
+  void start(ComponentSet shared, const TileWork& tile, const TileJob& job);
 
   /// Decides who borrows among the first generation of points of some rows, whole blocks of them: those have
   /// PathPoint::borrows set and follow no ray of a shared pass.
@@ -58,7 +50,7 @@ class SharedLight {
   void borrow(const Seen& lender, PathPoint& point);
   [[nodiscard]] Lenders lenders_about(const Seen& borrower) const;
 
-  std::uint8_t shared_ = 0;
+  ComponentSet shared_ = 0;
   double glossy_cutoff_ = 0.0;
   int lender_x_ = 0;  ///< in its block
   int lender_y_ = 0;

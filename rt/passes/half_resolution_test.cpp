@@ -17,14 +17,15 @@ using test::corner;
 using test::place;
 using test::quad;
 
-const std::vector<std::string> kAll{"shadow", "reflection", "refraction", "ambient-occlusion", "photon"};
+const std::vector<PassId> kAll{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion,
+                               PassId::Photon};
 constexpr Size kOdd{139, 71};
 
 View look(const Scene& scene, Size size = kOdd) {
   return test::view_from({0.5, 2, 7}, {0, 1, 0}, size, scene);
 }
 
-RaySettings halved(RaySettings settings, std::vector<std::string> passes) {
+RaySettings halved(RaySettings settings, std::vector<PassId> passes) {
   settings.half_resolution = std::move(passes);
   return settings;
 }
@@ -37,17 +38,18 @@ double mean(const Image<Rgb>& image) {
 
 TEST(HalfResolution, OneRayInFourFollowsWhatIsShared) {
   const Scene shiny = corner(test::mirror(0.9F));
-  const RaySettings settings{.passes = {"shadow", "reflection", "ambient-occlusion"}};
+  const RaySettings settings{.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}};
   const View view = look(shiny);
   const test::Lit full = test::light(shiny, view, settings);
   const test::Lit half = test::light(shiny, view, halved(settings, kAll));
   const auto share = [](std::uint64_t few, std::uint64_t all) {
     return static_cast<double>(few) / static_cast<double>(all);
   };
-  EXPECT_GE(share(half.counts.shadow, full.counts.shadow), 0.25);
-  EXPECT_LT(share(half.counts.shadow, full.counts.shadow), 0.4);
-  EXPECT_LT(share(half.counts.ambient_occlusion, full.counts.ambient_occlusion), 0.35);
-  EXPECT_LT(share(half.counts.reflection, full.counts.reflection), 0.7);  // the ball is small and round
+  EXPECT_GE(share(half.counts[PassId::Shadow], full.counts[PassId::Shadow]), 0.25);
+  EXPECT_LT(share(half.counts[PassId::Shadow], full.counts[PassId::Shadow]), 0.4);
+  EXPECT_LT(share(half.counts[PassId::AmbientOcclusion], full.counts[PassId::AmbientOcclusion]), 0.35);
+  EXPECT_LT(share(half.counts[PassId::Reflection], full.counts[PassId::Reflection]),
+            0.7);  // the ball is small and round
   EXPECT_NEAR(mean(half.image) / mean(full.image), 1.0, 0.02);
   EXPECT_NE(half.image, full.image);
 }
@@ -61,9 +63,9 @@ TEST(HalfResolution, RefractionIsShared) {
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
-  const std::uint64_t full = test::light(scene, view).counts.refraction;
+  const std::uint64_t full = test::light(scene, view).counts[PassId::Refraction];
   EXPECT_EQ(full, 64U * 64U);
-  EXPECT_EQ(test::light(scene, view, halved({}, {"refraction"})).counts.refraction, full / 4);
+  EXPECT_EQ(test::light(scene, view, halved({}, {PassId::Refraction})).counts[PassId::Refraction], full / 4);
 }
 
 TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
@@ -77,10 +79,10 @@ TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
   place(scene, add_mesh(scene, floor));
   finish_scene(scene);
   const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
-  const RaySettings settings{.passes = {"ambient-occlusion"}};
+  const RaySettings settings{.passes = {PassId::AmbientOcclusion}};
   const test::Lit full = test::light(scene, view, settings);
-  const test::Lit half = test::light(scene, view, halved(settings, {"ambient-occlusion"}));
-  EXPECT_LT(half.counts.ambient_occlusion, full.counts.ambient_occlusion * 3 / 10);
+  const test::Lit half = test::light(scene, view, halved(settings, {PassId::AmbientOcclusion}));
+  EXPECT_LT(half.counts[PassId::AmbientOcclusion], full.counts[PassId::AmbientOcclusion] * 3 / 10);
   for (std::size_t i = 0; i < full.image.pixels().size(); ++i) {
     ASSERT_NEAR(half.image.pixels()[i].r, full.image.pixels()[i].r, 1e-5) << i;
     ASSERT_NEAR(half.image.pixels()[i].g, full.image.pixels()[i].g, 1e-5) << i;
@@ -97,18 +99,18 @@ TEST(HalfResolution, AnotherMaterialIsNotTheLike) {
   place(scene, add_mesh(scene, quad({border, -4, 0}, {4 - border, 0, 0}, {0, 8, 0}, 1)));
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
-  const RaySettings settings{.passes = {"ambient-occlusion"}, .occlusion_rays = 1};
-  const test::Lit half = test::light(scene, view, halved(settings, {"ambient-occlusion"}));
-  EXPECT_EQ(half.counts.ambient_occlusion, 32U * 32U + 64U);
+  const RaySettings settings{.passes = {PassId::AmbientOcclusion}, .occlusion_rays = 1};
+  const test::Lit half = test::light(scene, view, halved(settings, {PassId::AmbientOcclusion}));
+  EXPECT_EQ(half.counts[PassId::AmbientOcclusion], 32U * 32U + 64U);
 }
 
 TEST(HalfResolution, NoLightCrossesAnEdge) {
   // White before black: a pixel that borrowed from the other side would be far off.
   const Scene scene = corner(test::matte(glm::vec3(0.0F)), glm::vec3(1.0F), glm::vec3(0.0F));
   const View view = look(scene);
-  const RaySettings settings{.passes = {"ambient-occlusion"}};
+  const RaySettings settings{.passes = {PassId::AmbientOcclusion}};
   const Image<Rgb> full = test::light(scene, view, settings).image;
-  const Image<Rgb> half = test::light(scene, view, halved(settings, {"ambient-occlusion", "shadow"})).image;
+  const Image<Rgb> half = test::light(scene, view, halved(settings, {PassId::AmbientOcclusion, PassId::Shadow})).image;
   for (std::size_t i = 0; i < full.pixels().size(); ++i) {
     const bool black = full.pixels()[i].g == 0.0F;
     ASSERT_EQ(half.pixels()[i].g == 0.0F, black) << i;
@@ -119,7 +121,7 @@ TEST(HalfResolution, HasTheSameBitsHoweverTilesAreSpread) {
   const Scene scene = corner(test::mirror(0.9F));
   const View view = look(scene);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-  RaySettings settings = halved({.passes = {"shadow", "reflection", "ambient-occlusion"}}, kAll);
+  RaySettings settings = halved({.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}}, kAll);
   for (const std::uint32_t sample : {0U, 3U}) {
     TileLayer<Rgb> whole(keys.layout());
     Lighter one(scene, settings);
@@ -138,7 +140,7 @@ TEST(HalfResolution, ComponentsStillSumToTheColor) {
   const Scene scene = corner(test::mirror(0.9F));
   const View view = look(scene);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-  Lighter lighter(scene, halved({.passes = {"shadow", "reflection", "ambient-occlusion"}}, kAll));
+  Lighter lighter(scene, halved({.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}}, kAll));
   TileLayer<Rgb> color(keys.layout());
   std::vector<TileLayer<Rgb>> parts(kComponents);
   LightOutput output{.radiance = &color};
@@ -156,10 +158,11 @@ TEST(HalfResolution, ComponentsStillSumToTheColor) {
   }
 }
 
-TEST(HalfResolution, RefusesWhatIsNoPass) {
-  for (const char* const name : {"light", "", "Reflection"}) {
-    EXPECT_THROW((void)shared_components({.half_resolution = {name}}), Error) << name;
+TEST(HalfResolution, RefusesWhatIsNoPassOrCannotBeShared) {
+  for (const char* const name : {"light", "", "Reflection", "gather"}) {
+    EXPECT_THROW((void)parse_half_resolution_pass(name), Error) << name;
   }
+  EXPECT_EQ(parse_half_resolution_pass("reflection"), PassId::Reflection);
   EXPECT_EQ(shared_components({}), 0);
 }
 

@@ -7,7 +7,6 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "rt/lighter.h"
@@ -40,12 +39,10 @@ struct PathPoint {
   std::uint16_t depth = 0;                  ///< bounces from the eye
   std::uint16_t followed = 0;               ///< of those, by lobes that passes follow one by one
   Component component = Component::Direct;  ///< where its light counts
-  std::uint8_t borrows = 0;                 ///< a bit per component that comes from neighbours, see SharedLight
+  ComponentSet borrows = 0;                 ///< that come from neighbours, see SharedLight
   bool gathered = false;  ///< reached by rays that gather: what is to be looked at only lights nothing
 
-  [[nodiscard]] bool borrows_light(Component which) const {
-    return ((borrows >> static_cast<unsigned>(which)) & 1U) != 0;
-  }
+  [[nodiscard]] bool borrows_light(Component which) const { return contains(borrows, which); }
 };
 
 /// Light that would fall on a point if nothing stood between.
@@ -109,7 +106,7 @@ struct TileWork {
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
-    add(pixel, component, light, component == Component::Photon || component == Component::AmbientOcclusion);
+    add(pixel, component, light, contains(kDiffuseComponents, component));
   }
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
     radiance[pixel] += light;
@@ -136,8 +133,6 @@ class Pass {
  public:
   virtual ~Pass() = default;
 
-  [[nodiscard]] virtual std::string_view name() const = 0;
-
   /// Whether the scene can show what this pass adds.
   [[nodiscard]] virtual Requirement requirement(const Requirements& scene, const RaySettings& settings) const = 0;
 
@@ -146,36 +141,12 @@ class Pass {
     return true;
   }
 
-  [[nodiscard]] virtual bool needs_rays() const { return true; }
-
-  /// The lobe of a surface whose light this pass brings by following it; none for other passes.
-  [[nodiscard]] virtual const Lobe* follows() const { return nullptr; }
-
-  /// Whether it follows all lobes that no other pass could.
-  [[nodiscard]] virtual bool follows_the_rest() const { return false; }
-
-  /// Whether it needs TileWork::photons.
-  [[nodiscard]] virtual bool gathers_photons() const { return false; }
-
   /// Once per wave: reads its points; may add to the tile's radiance and put the points its rays reach into `next`.
   virtual void spread(TileWork& /*tile*/, const Wave& /*wave*/, std::vector<PathPoint>& /*next*/) const {}
 
   /// Once per handful of lights: may hide direct samples of `wave`.
   virtual void hide(TileWork& /*tile*/, Wave& /*wave*/) const {}
 };
-
-/// All passes there are, in the order they run.
-[[nodiscard]] std::vector<std::unique_ptr<Pass>> make_all_passes();
-
-/// Whether a pass that runs sends rays from lifted origins, see SurfacePoint::lift.
-[[nodiscard]] bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings);
-
-[[nodiscard]] std::unique_ptr<Pass> make_shadow_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_reflection_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_refraction_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_ambient_occlusion_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_photon_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_gather_pass();
 
 /// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
 /// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
@@ -199,17 +170,9 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 /// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
 void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
 
-/// What a pass follows.
-struct Follows {
-  Lobe lobe = Lobe::Reflection;
-  Component component = Component::Reflection;  ///< where what it brings to the first surface counts
-  /// The lobe where no pass follows it for itself: the sky that such rays find from the first surface counts as direct
-  /// light, and what hides it as shadow.
-  bool rest = false;
-};
-
-/// What passes that follow a lobe do: a ray per point that follows it, and the points those rays reach.
-void follow_lobe(TileWork& tile, const Wave& wave, const Follows& what, std::uint64_t& counter,
-                 std::vector<PathPoint>& next);
+/// What passes that follow lobes do: a ray per point of the wave that follows `lobe`, and the points those rays reach.
+/// A pass that gathers all lobes sends rays where no other pass follows the lobe for itself: the sky that such rays
+/// find from the first surface counts as direct light, and what hides it as shadow.
+void follow_lobe(TileWork& tile, const Wave& wave, const PassInfo& pass, Lobe lobe, std::vector<PathPoint>& next);
 
 }  // namespace hpr

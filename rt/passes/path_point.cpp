@@ -46,25 +46,26 @@ void choose_among_all_lobes(const TileWork& tile, PathPoint& point) {
 }
 
 /// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
-glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction, const Follows& what) {
+glm::dvec3 sky_along(const TileWork& tile, const Following& ray, const glm::dvec3& direction, const PassInfo& pass) {
   const PathPoint& from = *ray.from;
-  if (!tile.scene.environment && (what.rest || from.gathered)) return glm::dvec3(0.0);  // a backdrop is no light
+  if (!tile.scene.environment && (pass.gathers_all_lobes || from.gathered))
+    return glm::dvec3(0.0);  // a backdrop is no light
   const double light_pdf =
       ray.pdf > 0.0 ? tile.lights.environment_pdf_one(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
   return share_of_ray(tile, ray.pdf, light_pdf) * ray.throughput * tile.lights.environment(direction);
 }
 
 /// A ray per point of the wave that follows the lobe, into tile.following and tile.requests.
-void aim_rays(TileWork& tile, const Wave& wave, const Follows& what) {
+void aim_rays(TileWork& tile, const Wave& wave, const PassInfo& pass, Lobe lobe) {
   std::vector<Following>& rays = tile.following;
   rays.clear();
   tile.requests.clear();
   for (const PathPoint& point : wave.points) {
-    const double factor = point.follows[static_cast<std::size_t>(what.lobe)];
+    const double factor = point.follows[static_cast<std::size_t>(lobe)];
     if (factor == 0.0) continue;
-    if (tile.gathers && tile.follows_for_itself(point.bsdf, what.lobe) == what.rest) continue;
-    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(what.lobe));
-    const auto sample = point.bsdf.sample(what.lobe, next_two(sampler, point.depth));
+    if (tile.gathers && tile.follows_for_itself(point.bsdf, lobe) == pass.gathers_all_lobes) continue;
+    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
+    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
     if (!sample) continue;
     glm::dvec3 throughput = factor * point.throughput * sample->weight;
     throughput *= survival(brightness(throughput), sampler);
@@ -79,20 +80,20 @@ void aim_rays(TileWork& tile, const Wave& wave, const Follows& what) {
 
 /// What ray i finds of the sky; of rays that gather from the first surface also what it would have found, as direct
 /// light less its shadow.
-void add_sky(TileWork& tile, std::size_t i, const Follows& what) {
+void add_sky(TileWork& tile, std::size_t i, const PassInfo& pass) {
   const Following& ray = tile.following[i];
   const PathPoint& from = *ray.from;
   const bool leaves = tile.hits[i] == kNoSurface;
-  const bool shows_sky = what.rest && from.depth == 0;
+  const bool shows_sky = pass.gathers_all_lobes && from.depth == 0;
   if (!leaves && !(shows_sky && tile.wants_components)) return;
-  const glm::dvec3 sky = sky_along(tile, ray, tile.requests[i].direction, what);
-  if (!shows_sky) return tile.add(from.pixel, component_after(from, what.component), sky);
+  const glm::dvec3 sky = sky_along(tile, ray, tile.requests[i].direction, pass);
+  if (!shows_sky) return tile.add(from.pixel, component_after(from, pass.component), sky);
   if (leaves) return tile.add(from.pixel, Component::Direct, sky, true);
   tile.add_hidden(from.pixel, sky);
 }
 
 /// Sets the point that ray i reaches, but for what finish_point does.
-void reach(TileWork& tile, std::size_t i, const Follows& what, PathPoint& reached) {
+void reach(TileWork& tile, std::size_t i, const PassInfo& pass, PathPoint& reached) {
   const Following& ray = tile.following[i];
   const RayRequest& request = tile.requests[i];
   const PathPoint& from = *ray.from;
@@ -106,9 +107,9 @@ void reach(TileWork& tile, std::size_t i, const Follows& what, PathPoint& reache
   reached.sampler = ray.sampler;
   reached.pixel = from.pixel;
   reached.depth = static_cast<std::uint16_t>(from.depth + 1);
-  reached.followed = static_cast<std::uint16_t>(from.followed + (what.rest ? 0 : 1));
-  reached.gathered = from.gathered || what.rest;
-  reached.component = component_after(from, what.component);
+  reached.followed = static_cast<std::uint16_t>(from.followed + (pass.gathers_all_lobes ? 0 : 1));
+  reached.gathered = from.gathered || pass.gathers_all_lobes;
+  reached.component = component_after(from, pass.component);
 }
 
 }  // namespace
@@ -147,18 +148,17 @@ void finish_point(const TileWork& tile, PathPoint& point, double metres) {
   point.follows[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - share));
 }
 
-void follow_lobe(TileWork& tile, const Wave& wave, const Follows& what, std::uint64_t& counter,
-                 std::vector<PathPoint>& next) {
-  aim_rays(tile, wave, what);
+void follow_lobe(TileWork& tile, const Wave& wave, const PassInfo& pass, Lobe lobe, std::vector<PathPoint>& next) {
+  aim_rays(tile, wave, pass, lobe);
   tile.hits.resize(tile.following.size());
-  counter += tile.following.size();
+  tile.counts[pass.id] += tile.following.size();
   tile.counts.invalid += tile.rays->closest(tile.requests, tile.hits, tile.scratch);
 
   const std::size_t before = next.size();
   for (std::size_t i = 0; i < tile.following.size(); ++i) {
-    add_sky(tile, i, what);
+    add_sky(tile, i, pass);
     if (tile.hits[i] == kNoSurface) continue;
-    reach(tile, i, what, next.emplace_back());
+    reach(tile, i, pass, next.emplace_back());
     prefetch_material(tile.scene, next.back().surface);
   }
   // By now the memory has what materials read.

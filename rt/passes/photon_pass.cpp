@@ -9,7 +9,6 @@ namespace {
 /// all of it where settings ask for global photons.
 class PhotonPass final : public Pass {
  public:
-  [[nodiscard]] std::string_view name() const override { return "photon"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     if (gathers_by_rays(scene, settings)) return {false, "rays gather what surfaces scatter on to others"};
     const bool bundled =
@@ -25,7 +24,6 @@ class PhotonPass final : public Pass {
   [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
     return settings.photons > 0 && !gathers_by_rays(scene, settings);
   }
-  [[nodiscard]] bool gathers_photons() const override { return true; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
     if (tile.photons == nullptr) return;

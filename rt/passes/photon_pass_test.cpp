@@ -59,14 +59,14 @@ TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
   TileLayer<Rgb> alone(keys.layout());
   Lighter one(scene, settings);
   one.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &alone}, number);
-  EXPECT_GT(one.counts().photon, 5'000U);
+  EXPECT_GT(one.counts()[PassId::Photon], 5'000U);
   for (const int ranks : {2, 3, 7}) {
     run_local_ranks(ranks, [&](Communicator& comm) {
       Lighter lighter(scene, settings);
       TileLayer<Rgb> lit(keys.layout());
       lighter.send_photons(comm, number);
       lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit}, number);
-      EXPECT_LT(lighter.counts().photon, one.counts().photon);
+      EXPECT_LT(lighter.counts()[PassId::Photon], one.counts()[PassId::Photon]);
       EXPECT_TRUE(std::ranges::equal(lit.tile(0), alone.tile(0)));
     });
   }
@@ -136,10 +136,11 @@ TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
 TEST(PhotonPass, SendsNothingWhereNobodyAsksAndNoCausticsWhereNothingBundlesLight) {
   const Scene scene = furnace(0.5F, 1.0F);
   const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {4, 4}, scene, 0.5);
-  EXPECT_EQ(test::light(scene, view).counts.photon, 0U);
-  EXPECT_EQ(test::light(scene, view, {.photons = 1'000}).counts.photon, 0U);
-  EXPECT_GT(test::light(scene, view, {.photons = 1'000, .global_photons = true}).counts.photon, 1'000U);
-  EXPECT_EQ(test::light(scene, view, {.passes = {"photon"}}).counts.photon, 0U) << "no caustics in a matte box";
+  EXPECT_EQ(test::light(scene, view).counts[PassId::Photon], 0U);
+  EXPECT_EQ(test::light(scene, view, {.photons = 1'000}).counts[PassId::Photon], 0U);
+  EXPECT_GT(test::light(scene, view, {.photons = 1'000, .global_photons = true}).counts[PassId::Photon], 1'000U);
+  EXPECT_EQ(test::light(scene, view, {.passes = {PassId::Photon}}).counts[PassId::Photon], 0U)
+      << "no caustics in a matte box";
 }
 
 }  // namespace

@@ -7,7 +7,6 @@ namespace {
 /// Mirror images, sharp and blurred: one ray per point along its specular reflection.
 class ReflectionPass final : public Pass {
  public:
-  [[nodiscard]] std::string_view name() const override { return "reflection"; }
   /// Settings may follow rougher surfaces than those that mirror to the eye, or smoother ones alone; what is followed
   /// takes no photons.
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
@@ -16,14 +15,11 @@ class ReflectionPass final : public Pass {
     return {followed, followed ? "materials are smoother than the glossy cutoff"
                                : "no material is smoother than the glossy cutoff"};
   }
-  [[nodiscard]] const Lobe* follows() const override { return &kLobe; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    follow_lobe(tile, wave, {kLobe, Component::Reflection}, tile.counts.reflection, next);
+    const PassInfo& pass = info_of(PassId::Reflection);
+    follow_lobe(tile, wave, pass, *pass.lobe, next);
   }
-
- private:
-  static constexpr Lobe kLobe = Lobe::Reflection;
 };
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(Reflection, AMirrorShowsTheColourOfWhatItReflectsTimesItsReflectance) {
   EXPECT_NEAR(lit.image.at(2, 2).r, 0.75F, 1e-6F);
   EXPECT_NEAR(lit.image.at(2, 2).g, 0.125F, 1e-6F);
   EXPECT_NEAR(lit.image.at(2, 2).b, 0.03125F, 1e-6F);
-  const test::Lit off = test::light(scene, view, {.passes = {"shadow"}});
+  const test::Lit off = test::light(scene, view, {.passes = {PassId::Shadow}});
   EXPECT_EQ(off.image.at(2, 2), Rgb{});
 }
 
@@ -53,7 +53,7 @@ double reflected_by_half(double cosine) {
 TEST(Reflection, AMirrorImageThatASmoothNormalSendsInsideIsBentBackAbove) {
   const glm::dvec3 to_viewer = glm::normalize(glm::dvec3(-0.5, 0.866, 0.0));
   const test::Lit lit = leaning_mirror(to_viewer);
-  EXPECT_EQ(lit.counts.reflection, 9U) << "one ray a pixel: none of them meets the mirror again";
+  EXPECT_EQ(lit.counts[PassId::Reflection], 9U) << "one ray a pixel: none of them meets the mirror again";
   const double cosine = glm::dot(to_viewer, glm::dvec3(std::sin(0.7), std::cos(0.7), 0.0));
   EXPECT_NEAR(lit.image.at(1, 1).r, reflected_by_half(cosine), 1e-4);
 }
@@ -61,7 +61,7 @@ TEST(Reflection, AMirrorImageThatASmoothNormalSendsInsideIsBentBackAbove) {
 TEST(Reflection, AMirrorWhoseSmoothNormalTurnsAwayReflectsByItsGeometricOne) {
   const glm::dvec3 to_viewer = glm::normalize(glm::dvec3(-0.94, 0.342, 0.0));
   const test::Lit lit = leaning_mirror(to_viewer);
-  EXPECT_EQ(lit.counts.reflection, 9U);
+  EXPECT_EQ(lit.counts[PassId::Reflection], 9U);
   EXPECT_NEAR(lit.image.at(1, 1).r, reflected_by_half(to_viewer.y), 1e-4);
 }
 
@@ -135,8 +135,9 @@ TEST(Reflection, TwoFacingMirrorsSumTheirGeometricSeriesUpToTheDepth) {
     const test::Lit lit = test::light(scene, view, {.max_depth = depth});
     const double expected = (1.0 - std::pow(kRho, depth + 1)) / (1.0 - kRho);
     EXPECT_NEAR(lit.image.at(1, 1).r, expected, 1e-4) << depth;
-    EXPECT_GE(lit.counts.reflection, 9U * static_cast<unsigned>(std::min(depth, 38))) << depth;
-    EXPECT_LE(lit.counts.reflection, 9U * static_cast<unsigned>(depth)) << depth;  // 0.75^39 leaves it to roulette
+    EXPECT_GE(lit.counts[PassId::Reflection], 9U * static_cast<unsigned>(std::min(depth, 38))) << depth;
+    EXPECT_LE(lit.counts[PassId::Reflection], 9U * static_cast<unsigned>(depth))
+        << depth;  // 0.75^39 leaves it to roulette
   }
 }
 

@@ -6,18 +6,14 @@ namespace {
 /// What is seen through surfaces, bent by solids and straight through sheets, clear and frosted: one ray per point.
 class RefractionPass final : public Pass {
  public:
-  [[nodiscard]] std::string_view name() const override { return "refraction"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
     return scene.refraction;
   }
-  [[nodiscard]] const Lobe* follows() const override { return &kLobe; }
 
   void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    follow_lobe(tile, wave, {kLobe, Component::Refraction}, tile.counts.refraction, next);
+    const PassInfo& pass = info_of(PassId::Refraction);
+    follow_lobe(tile, wave, pass, *pass.lobe, next);
   }
-
- private:
-  static constexpr Lobe kLobe = Lobe::Transmission;
 };
 
 }  // namespace

@@ -69,7 +69,7 @@ TEST(Refraction, AVolumeAbsorbsByItsThickness) {
 }
 
 TEST(Refraction, OffLetsNothingThrough) {
-  EXPECT_EQ(seen_through(pane(test::clear_glass(1.5F, 1.0F), 1.0F), {.passes = {"shadow"}}), 0.0);
+  EXPECT_EQ(seen_through(pane(test::clear_glass(1.5F, 1.0F), 1.0F), {.passes = {PassId::Shadow}}), 0.0);
 }
 
 TEST(Refraction, AGlassBallUnderAnEvenSkyIsAsBrightAsTheSky) {
@@ -104,8 +104,9 @@ TEST(Refraction, CountsItsRaysAndItsShareOfTheColour) {
   output.components[static_cast<std::size_t>(Component::Reflection)] = &reflection;
   Lighter lighter(scene, {});
   lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), output);
-  EXPECT_GE(lighter.counts().refraction, 128U) << "into the slab and out of it, in every pixel";
-  const auto rays = lighter.counts().shadow + lighter.counts().reflection + lighter.counts().refraction;
+  EXPECT_GE(lighter.counts()[PassId::Refraction], 128U) << "into the slab and out of it, in every pixel";
+  const auto rays =
+      lighter.counts()[PassId::Shadow] + lighter.counts()[PassId::Reflection] + lighter.counts()[PassId::Refraction];
   double charged = 0.0;
   for (int y = 0; y < 8; ++y) {
     for (int x = 0; x < 8; ++x) {

@@ -11,7 +11,6 @@ namespace {
 /// their shadows soften.
 class ShadowPass final : public Pass {
  public:
-  [[nodiscard]] std::string_view name() const override { return "shadow"; }
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     if (scene.even_sky && gathers_by_rays(scene, settings)) {
       return {false, "rays that gather light find an even sky, and what hides it"};
@@ -30,7 +29,7 @@ class ShadowPass final : public Pass {
       tile.charge_ray(point.pixel);
     }
     std::vector<float> passed(tile.requests.size());
-    tile.counts.shadow += tile.requests.size();
+    tile.counts[PassId::Shadow] += tile.requests.size();
     tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
     for (std::size_t i = 0; i < passed.size(); ++i) wave.samples[tile.requests[i].owner].visible = passed[i];
   }

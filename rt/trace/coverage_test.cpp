@@ -110,7 +110,7 @@ TEST(Coverage, AVeilCastsAShadowOfItsAlpha) {
   finish_scene(scene);
   const double full = std::cos(std::numbers::pi / 4.0) / std::numbers::pi;
   EXPECT_NEAR(seen(scene).g, 0.25 * full, 1e-4);
-  EXPECT_NEAR(seen(scene, {.passes = {"reflection"}}).g, full, 1e-4);
+  EXPECT_NEAR(seen(scene, {.passes = {PassId::Reflection}}).g, full, 1e-4);
 }
 
 TEST(Coverage, AMirrorShowsAVeilByItsAlphaInTheMean) {

@@ -6,12 +6,7 @@ namespace hpr {
 
 RayCounts& RayCounts::operator+=(const RayCounts& other) {
   primary += other.primary;
-  shadow += other.shadow;
-  reflection += other.reflection;
-  refraction += other.refraction;
-  gather += other.gather;
-  ambient_occlusion += other.ambient_occlusion;
-  photon += other.photon;
+  for (std::size_t i = 0; i < kPasses; ++i) passes[i] += other.passes[i];
   invalid += other.invalid;
   cut += other.cut;
   not_finite += other.not_finite;

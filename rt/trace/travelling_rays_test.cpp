@@ -141,9 +141,9 @@ TEST(TravellingRays, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
         if (!reference) lighter.send_photons(comm);
         lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &lit});
         for (const std::size_t tile : tiles) EXPECT_TRUE(std::ranges::equal(lit.tile(tile), alone.tile(tile))) << tile;
-        shadow_rays += lighter.counts().shadow;
+        shadow_rays += lighter.counts()[PassId::Shadow];
       });
-      EXPECT_EQ(shadow_rays, one.counts().shadow);
+      EXPECT_EQ(shadow_rays, one.counts()[PassId::Shadow]);
     }
   }
 }

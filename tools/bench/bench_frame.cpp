@@ -85,22 +85,6 @@ double copy_ms(std::size_t bytes) {
   return median(std::move(times));
 }
 
-/// The rays of a pass, and which of bench_rays they are like.
-struct PassRays {
-  std::uint64_t count = 0;
-  std::string_view like;
-};
-
-PassRays rays_of(std::string_view pass, const RayCounts& counts) {
-  if (pass == "shadow") return {counts.shadow, "shadow"};
-  if (pass == "reflection") return {counts.reflection, "mirror"};
-  if (pass == "refraction") return {counts.refraction, "mirror"};
-  if (pass == "ambient-occlusion") return {counts.ambient_occlusion, "diffuse"};
-  if (pass == "photon") return {counts.photon, "diffuse"};
-  if (pass == "gather") return {counts.gather, "diffuse"};
-  return {};
-}
-
 BenchRow row_of(std::string name, double ours, double floor) {
   return {std::move(name), ours, floor, "ms", ours > 0.0 ? floor / ours : 0.0};
 }
@@ -142,9 +126,9 @@ class Bench {
   [[nodiscard]] std::vector<BenchRow> rows(double bare_keys_ms) {
     const auto rates = embree_rates();
     const double samples = frames_.front().times.samples;
-    std::vector<BenchRow> rows{
-        keys_row(by_rays() ? static_cast<double>(drawn_view().size().area()) / rates.at("primary") : bare_keys_ms)};
-    for (const PassTime& pass : frames_.front().times.passes) rows.push_back(pass_row(pass.name, rates));
+    const auto pixels = static_cast<double>(drawn_view().size().area());
+    std::vector<BenchRow> rows{keys_row(by_rays() ? pixels / rate_of(rates, RayPattern::Primary) : bare_keys_ms)};
+    for (const PassTime& pass : frames_.front().times.passes) rows.push_back(pass_row(pass, rates));
     rows.push_back(row_of("to the screen", middle(frames_, [](const Measured& frame) { return frame.screen_ms; }),
                           copy_ms(view_.screen.area() * sizeof(Rgba8))));
     double floor = 0.0;
@@ -172,20 +156,26 @@ class Bench {
     return rates;
   }
 
+  /// 0 where no such rays were measured.
+  [[nodiscard]] static double rate_of(const Rates& rates, RayPattern pattern) {
+    const auto found = rates.find(name_of(pattern));
+    return found == rates.end() ? 0.0 : found->second;
+  }
+
   [[nodiscard]] BenchRow keys_row(double floor_ms_of_sample) const {
     return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles, by_rays() ? " by rays" : ""),
                   middle(frames_, [](const Measured& frame) { return frame.times.primary_ms; }),
                   floor_ms_of_sample * frames_.front().times.samples);
   }
 
-  [[nodiscard]] BenchRow pass_row(const std::string& pass, const Rates& rates) const {
+  [[nodiscard]] BenchRow pass_row(const PassTime& step, const Rates& rates) const {
     const double ours =
-        middle(frames_, [&](const Measured& frame) { return ms_of(frame.times, pass) / session_.threads(); });
-    const PassRays traced = rays_of(pass, frames_.front().times.rays);
-    const auto rate = rates.find(traced.like);
-    if (traced.count == 0 || rate == rates.end()) return row_of(pass, ours, 0.0);
-    const auto count = static_cast<double>(traced.count);
-    return row_of(fmt::format("{}: {:.3g} M rays", pass, count / 1e6), ours, count / rate->second);
+        middle(frames_, [&](const Measured& frame) { return ms_of(frame.times, step.name) / session_.threads(); });
+    if (!step.pass) return row_of(step.name, ours, 0.0);
+    const auto rays = static_cast<double>(frames_.front().times.rays[*step.pass]);
+    const double rate = rate_of(rates, info_of(*step.pass).pattern);
+    if (rays == 0.0 || rate == 0.0) return row_of(step.name, ours, 0.0);
+    return row_of(fmt::format("{}: {:.3g} M rays", step.name, rays / 1e6), ours, rays / rate);
   }
 
   Session& session_;

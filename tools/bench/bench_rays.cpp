@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "image/tiles.h"
+#include "rt/passes/pass_list.h"
 #include "rt/trace/denormals.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/ray_scene.h"
@@ -39,7 +40,7 @@ struct BenchRay {
 enum class Question { Closest, Occluded };
 
 struct RaySet {
-  std::string name;
+  RayPattern pattern;
   Question question;
   embree::Rays kind;
   std::vector<BenchRay> rays;
@@ -159,24 +160,24 @@ BenchRow compare(const RayScene& scene, const RaySet& set) {
       our_best = std::min(our_best, middle - start);
       floor_best = std::min(floor_best, thread_ms() - middle);
       if (answers != expected) {
-        throw Error(ExitCode::CheckFailed,
-                    fmt::format("{} rays: {} met something, but {} in Embree alone", set.name, answers, expected));
+        throw Error(ExitCode::CheckFailed, fmt::format("{} rays: {} met something, but {} in Embree alone",
+                                                       name_of(set.pattern), answers, expected));
       }
     }
     our_ms += our_best;
     floor_ms += floor_best;
   }
   const double rate = static_cast<double>(set.rays.size()) * 1e-3;  // a thousand per ms is a million per second
-  return {set.name, rate / our_ms, rate / floor_ms, "M/s", floor_ms / our_ms};
+  return {std::string(name_of(set.pattern)), rate / our_ms, rate / floor_ms, "M/s", floor_ms / our_ms};
 }
 
 /// What primary rays meet, and the rays that go on from there, in the order of the primary ones.
 std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const View& view) {
   const RaySpace& space = rays.space();
-  std::vector<RaySet> sets{{"primary", Question::Closest, embree::Rays::Coherent, {}},
-                           {"shadow", Question::Occluded, embree::Rays::Incoherent, {}},
-                           {"mirror", Question::Closest, embree::Rays::Incoherent, {}},
-                           {"diffuse", Question::Closest, embree::Rays::Incoherent, {}}};
+  std::vector<RaySet> sets{{RayPattern::Primary, Question::Closest, embree::Rays::Coherent, {}},
+                           {RayPattern::Shadow, Question::Occluded, embree::Rays::Incoherent, {}},
+                           {RayPattern::Mirror, Question::Closest, embree::Rays::Incoherent, {}},
+                           {RayPattern::Diffuse, Question::Closest, embree::Rays::Incoherent, {}}};
   RayBatch batch;
   std::vector<Ray> seen;
   const Size size = view.size();

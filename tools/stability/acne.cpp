@@ -67,7 +67,7 @@ std::size_t shadowed_pixels(Scene scene, const Placement& at, int threads) {
   const View view = view_of(scene, at, {1.5, 1.0, 6.0});
   RaySettings settings;
   settings.threads = threads;
-  settings.passes = {"shadow"};
+  settings.passes = {PassId::Shadow};
   const LitPicture shadowed = lit_picture(scene, view, settings);
   settings.passes = {};
   settings.auto_passes = false;
@@ -107,7 +107,7 @@ class SunnyFloor {
     view_ = view_of(floor_, {size, {}}, {0.2, 0.1, 2.5});
     settings_.threads = threads;
     keys_ = lit_picture(floor_, view_, settings_).keys;
-    settings_.passes = {"shadow"};
+    settings_.passes = {PassId::Shadow};
     shows_light_ = 4 * lit_pixels(floor_) > kPicture.area();
   }
 

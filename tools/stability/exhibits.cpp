@@ -96,7 +96,7 @@ View exhibits_view(double steps_per_metre) {
 
 RaySettings exhibits_light() {
   RaySettings settings;
-  settings.passes = {"shadow", "reflection", "refraction", "photon"};
+  settings.passes = {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::Photon};
   settings.photons = 20'000;
   return settings;
 }

@@ -99,7 +99,7 @@ double glanced(const Scene& scene, const View& view, const RaySettings& settings
   return static_cast<double>(lit_picture(scene, view, settings).image.at(0, 0).r);
 }
 
-RaySettings only(std::vector<std::string> passes, int threads) {
+RaySettings only(std::vector<PassId> passes, int threads) {
   RaySettings settings;
   settings.auto_passes = false;
   settings.passes = std::move(passes);

@@ -82,7 +82,7 @@ struct LitPicture {
 /// Red of the pixel of such a view.
 [[nodiscard]] double glanced(const Scene& scene, const View& view, const RaySettings& settings);
 /// Settings that run these passes and no others.
-[[nodiscard]] RaySettings only(std::vector<std::string> passes, int threads = 1);
+[[nodiscard]] RaySettings only(std::vector<PassId> passes, int threads = 1);
 
 /// The worse of two measured numbers, of which larger is worse: a NaN is the worst there is.
 [[nodiscard]] double worse(double a, double b);

@@ -23,7 +23,7 @@ Scene floor_under(const Light& light) {
   return scene;
 }
 
-double floors_radiance(const Scene& scene, const std::vector<std::string>& passes) {
+double floors_radiance(const Scene& scene, const std::vector<PassId>& passes) {
   return glanced(scene, glance(scene, {0.3, 1.0, 0.5}, {0.0, 0.0, 0.0}), only(passes));
 }
 
@@ -44,7 +44,7 @@ StabilityFinding near_surface() {
     light.position = {0.0, height, 0.0};
     light.intensity = glm::vec3(1e-6F);
     const double intensity = light.intensity.r;
-    return relative(floors_radiance(floor_under(light), {"shadow"}), intensity / (kPi * height * height));
+    return relative(floors_radiance(floor_under(light), {PassId::Shadow}), intensity / (kPi * height * height));
   };
   for (const double height : {1e-9, 1e-8, 1e-7, kNearest, 1e-5, 1e-4, 1e-2, 1.0}) {
     const double off = error(height);
@@ -68,7 +68,7 @@ StabilityFinding on_surface(int threads) {
       light.radius = radius;
       const Scene scene = floor_under(light);
       const View view = make_view(look_at({0.0, 0.5, 0.0}, {0.0, 0.0, 0.0}, {0, 0, 1}, 0.8), {65, 65}, scene.bounds);
-      on.measured += static_cast<double>(lit_picture(scene, view, only({"shadow"}, threads)).counts.not_finite);
+      on.measured += static_cast<double>(lit_picture(scene, view, only({PassId::Shadow}, threads)).counts.not_finite);
     }
   }
   return on;

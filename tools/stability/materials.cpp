@@ -156,7 +156,7 @@ double difference(double ior, int threads) {
   View view = make_view(look_at({0.0, 0.0, 4.0}, {0.0, 0.0, 0.0}, {0, 1, 0}, 0.33), kPicture, without.bounds);
   view.near_distance = 0.1;
   const LitPicture bare = lit_picture(without, view, only({}, threads));
-  const LitPicture seen = lit_picture(with, view, only({"reflection", "refraction"}, threads));
+  const LitPicture seen = lit_picture(with, view, only({PassId::Reflection, PassId::Refraction}, threads));
   double worst = 0.0;
   for (int y = 0; y < kPicture.height; ++y) {
     for (int x = 0; x < kPicture.width; ++x) {
@@ -164,7 +164,7 @@ double difference(double ior, int threads) {
       worst = worse(worst, std::abs(static_cast<double>(seen.image.at(x, y).r) - expected) / expected);
     }
   }
-  return seen.counts.refraction > 0 ? worst : std::numeric_limits<double>::infinity();
+  return seen.counts[PassId::Refraction] > 0 ? worst : std::numeric_limits<double>::infinity();
 }
 
 std::vector<StabilityFinding> indices(int threads) {

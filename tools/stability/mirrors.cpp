@@ -35,7 +35,7 @@ struct Seen {
 /// From half way between the mirrors, by so many reflections: reflection k lies at x = (k - 1/2) / reflections.
 Seen look(const Scene& scene, int reflections, int max_depth) {
   const double slope = 1.0 / reflections;
-  RaySettings settings = only({"reflection"});
+  RaySettings settings = only({PassId::Reflection});
   settings.max_depth = max_depth;
   const View view = glance(scene, {0.0, 0.0, 0.5}, {0.5 * slope, 0.0, 1.0});
   const double cosine = 1.0 / std::sqrt(1.0 + slope * slope);

@@ -225,7 +225,7 @@ StabilityFinding few(const Globals& globals) {
   const View view = make_view(scene.cameras.front(), {64, 64}, scene.bounds);
   RaySettings settings;
   settings.threads = threads_of(globals);
-  settings.passes = {"shadow", "photon"};
+  settings.passes = {PassId::Shadow, PassId::Photon};
   settings.global_photons = true;
   for (const std::uint32_t photons : {1U, 2U, 3U}) {
     settings.photons = photons;
@@ -235,7 +235,7 @@ StabilityFinding few(const Globals& globals) {
   for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
   scene.lights.clear();
   const LitPicture none = lit_picture(scene, view, settings);
-  settings.passes = {"shadow"};
+  settings.passes = {PassId::Shadow};
   const LitPicture without = lit_picture(scene, view, settings);
   for (int y = 0; y < 64; ++y) {
     for (int x = 0; x < 64; ++x) odd.measured += none.image.at(x, y) == without.image.at(x, y) ? 0.0 : 1.0;

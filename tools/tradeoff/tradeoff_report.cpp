@@ -64,6 +64,8 @@ Json error_json(const PictureError& error, std::size_t width) {
 Json point_json(const TradeoffPoint& point, std::size_t width) {
   Json passes = Json::array();
   for (const PassTime& time : point.times) passes.push_back({{"name", time.name}, {"ms", time.ms}});
+  Json rays{{"primary", point.rays.primary}};
+  for (const PassInfo& pass : all_passes()) rays[pass.name] = point.rays[pass.id];
   return {{"knobs", knobs_json(point.knobs)},
           {"ms",
            {{"median", point.median_ms()},
@@ -74,14 +76,7 @@ Json point_json(const TradeoffPoint& point, std::size_t width) {
           {"pareto", point.pareto},
           {"samples", point.samples},
           {"passes", passes},
-          {"rays",
-           {{"primary", point.rays.primary},
-            {"shadow", point.rays.shadow},
-            {"reflection", point.rays.reflection},
-            {"refraction", point.rays.refraction},
-            {"ambient-occlusion", point.rays.ambient_occlusion},
-            {"photon", point.rays.photon},
-            {"gather", point.rays.gather}}},
+          {"rays", rays},
           {"not_finite", point.rays.not_finite},
           {"bytes_sent", point.bytes_sent}};
 }
@@ -278,12 +273,7 @@ std::vector<TradeoffPoint> decode_points(const std::string& text, const std::str
       for (const Json& time : from.at("passes")) point.times.push_back({time.at("name"), time.at("ms")});
       const Json& rays = from.at("rays");
       point.rays.primary = rays.at("primary");
-      point.rays.shadow = rays.at("shadow");
-      point.rays.reflection = rays.at("reflection");
-      point.rays.refraction = rays.at("refraction");
-      point.rays.ambient_occlusion = rays.at("ambient-occlusion");
-      point.rays.photon = rays.at("photon");
-      point.rays.gather = rays.value("gather", std::uint64_t{0});
+      for (const PassInfo& pass : all_passes()) point.rays[pass.id] = rays.at(std::string(pass.name));
       point.rays.not_finite = from.at("not_finite");
       point.bytes_sent = from.at("bytes_sent");
       point.samples = from.at("samples");

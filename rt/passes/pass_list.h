@@ -1,0 +1,135 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "scene/requirements.h"
+
+/// Which ray passes there are. To add one: its file beside this one, its PassId here (a Component too, where its light
+/// has a layer of its own), its row in pass_list.cpp and its line in rt/CMakeLists.txt.
+namespace hpr {
+
+class Pass;
+enum class Lobe : std::uint8_t;
+struct PathPoint;
+struct RaySettings;
+
+/// The ray passes, in the order in which they run and in which reports list them.
+enum class PassId : std::uint8_t { Shadow, Reflection, Refraction, AmbientOcclusion, Photon, Gather };
+inline constexpr std::size_t kPasses = static_cast<std::size_t>(PassId::Gather) + 1;
+
+/// Parts of a pixel's color; they sum to it. Apart from Direct each one belongs to a pass.
+enum class Component : std::uint8_t {
+  Direct,            ///< emission, and light as if nothing stood in its way
+  Shadow,            ///< what of that is blocked: never above 0
+  Reflection,        ///< all that arrives by the first surface's specular reflection
+  Refraction,        ///< all that arrives through the first surface
+  AmbientOcclusion,  ///< of the first surface
+  Photon,            ///< of the first surface: indirect light, by photons or by rays that gather it
+};
+inline constexpr std::size_t kComponents = static_cast<std::size_t>(Component::Photon) + 1;
+
+/// A set of components: bit i stands for component i.
+using ComponentSet = std::uint8_t;
+static_assert(kComponents <= 8);
+
+template <typename... Components>
+[[nodiscard]] constexpr ComponentSet set_of(Components... components) {
+  return static_cast<ComponentSet>(((1U << static_cast<unsigned>(components)) | ... | 0U));
+}
+[[nodiscard]] constexpr bool contains(ComponentSet set, Component component) {
+  return (set & set_of(component)) != 0;
+}
+
+/// Components that count as diffuse where the denoiser filters diffuse and specular light apart.
+inline constexpr ComponentSet kDiffuseComponents = set_of(Component::AmbientOcclusion, Component::Photon);
+
+/// How the rays of a batch lie to each other, as `hpr bench rays` measures bare Embree: from one eye; to a light, any
+/// hit; mirrored by surfaces; scattered by them.
+enum class RayPattern : std::uint8_t { Primary, Shadow, Mirror, Diffuse };
+
+/// When the rays of a pass leave from lifted origins, see SurfacePoint::lift.
+enum class OriginLift : std::uint8_t { Never, WithTerminatorFix, Always };
+
+/// What a pass shares among pixels at half resolution (RaySettings::half_resolution).
+struct HalfResolution {
+  ComponentSet components = 0;  ///< of the first surface; empty: its light belongs to single pixels
+  /// How much of such light a point scatters towards the eye.
+  glm::dvec3 (*scattered)(const PathPoint& point, double glossy_cutoff) = nullptr;
+};
+
+/// What there is to know about a pass without running it.
+struct PassInfo {
+  PassId id = PassId::Shadow;
+  std::string_view name;                     ///< on the command line and in reports, of its rays as well
+  Component component = Component::Shadow;   ///< where its light of the first surface counts
+  RayPattern pattern = RayPattern::Diffuse;  ///< `hpr bench frame` compares its rays with such rays
+  std::optional<Lobe> lobe = {};             ///< whose light it brings by a ray that follows it
+  bool gathers_all_lobes = false;            ///< whether it follows all lobes that no other pass follows
+  bool needs_photons = false;                ///< its rays are those of photons
+  OriginLift lift = OriginLift::Never;       ///< of the rays it traces
+  HalfResolution half_resolution = {};
+  Requirement Requirements::*required_by = nullptr;  ///< `hpr scene info` reports it; null: no scene requires the pass
+  std::unique_ptr<Pass> (*make)() = nullptr;
+};
+
+/// All passes, in the order of PassId.
+[[nodiscard]] std::span<const PassInfo, kPasses> all_passes();
+[[nodiscard]] const PassInfo& info_of(PassId pass);
+[[nodiscard]] std::string_view name_of(PassId pass);
+[[nodiscard]] std::vector<std::string_view> names_of(std::span<const PassId> passes);
+/// "direct", or the name of the first pass whose light counts there.
+[[nodiscard]] std::string_view name_of(Component component);
+[[nodiscard]] std::string_view name_of(RayPattern pattern);
+
+[[nodiscard]] std::optional<PassId> find_pass(std::string_view name);
+/// Throws Error (Usage) for a name that is no pass, with the nearest of the passes and the `other_words`, which a
+/// caller takes in their place.
+[[nodiscard]] PassId parse_pass(std::string_view name, std::span<const std::string> other_words = {});
+/// Throws Error (Usage) for a name that is no pass whose light can be shared among pixels.
+[[nodiscard]] PassId parse_half_resolution_pass(std::string_view name);
+
+/// The passes whose light can be shared among pixels.
+[[nodiscard]] std::vector<PassId> half_resolution_passes();
+/// The components that passes of RaySettings::half_resolution share.
+[[nodiscard]] ComponentSet shared_components(const RaySettings& settings);
+
+/// Whether a pass runs for a scene, for --explain and --stats.
+struct PassPlan {
+  PassId pass = PassId::Shadow;
+  bool runs = false;
+  std::string why;
+};
+
+/// Every pass, in the order they run, for a scene that requires so much. Throws Error (Usage) where passes that
+/// `settings` name do not go together.
+[[nodiscard]] std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& settings);
+
+[[nodiscard]] bool runs_pass(std::span<const PassPlan> plan, PassId pass);
+/// Whether a pass runs whose row `matches`.
+[[nodiscard]] bool runs_pass(std::span<const PassPlan> plan, bool (*matches)(const PassInfo& pass));
+
+/// Whether a pass that runs sends rays from lifted origins.
+[[nodiscard]] bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings);
+
+/// Whether indirect light comes along rays (PassId::Gather) in place of photons: where that is asked for, and where
+/// settings prefer it and do not forbid photons, all indirect light is asked for and an even sky is all the light there
+/// is.
+[[nodiscard]] bool gathers_by_rays(const Requirements& scene, const RaySettings& settings);
+
+// Each in the pass's own file.
+[[nodiscard]] std::unique_ptr<Pass> make_shadow_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_reflection_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_refraction_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_ambient_occlusion_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_photon_pass();
+[[nodiscard]] std::unique_ptr<Pass> make_gather_pass();
+
+}  // namespace hpr
