@@ -13,14 +13,6 @@
 namespace hpr {
 namespace {
 
-constexpr std::array<std::string_view, 12> kNames{
-    "depth",  "id",   "normal", "albedo", "direct", "shadow", "reflection", "refraction", "ambient-occlusion",
-    "photon", "rank", "cost"};
-
-// Components stand in the lighter's order.
-static_assert(static_cast<std::size_t>(Aov::Photon) - static_cast<std::size_t>(Aov::Direct) ==
-              static_cast<std::size_t>(Component::Photon));
-
 constexpr std::uint32_t kNothingSeen = 0xFFFFFFFFU;
 
 std::vector<std::string> channels(Aov aov, std::string_view letters) {
@@ -32,26 +24,36 @@ std::vector<std::string> channels(Aov aov, std::string_view letters) {
 }  // namespace
 
 std::string_view name_of(Aov aov) {
-  return kNames.at(static_cast<std::size_t>(aov));
+  if (is_part(aov)) {
+    return name_of(static_cast<Component>(static_cast<std::size_t>(aov) - static_cast<std::size_t>(Aov::Direct)));
+  }
+  constexpr std::array<std::string_view, 4> kFirst{"depth", "id", "normal", "albedo"};
+  constexpr std::array<std::string_view, 2> kLast{"rank", "cost"};
+  if (aov < Aov::Direct) return kFirst.at(static_cast<std::size_t>(aov));
+  return kLast.at(static_cast<std::size_t>(aov) - static_cast<std::size_t>(Aov::Rank));
 }
 
-std::span<const std::string_view> aov_names() {
-  return kNames;
+std::vector<std::string_view> aov_names() {
+  std::vector<std::string_view> names;
+  names.reserve(kAovs);
+  for (std::size_t i = 0; i < kAovs; ++i) names.push_back(name_of(static_cast<Aov>(i)));
+  return names;
 }
 
 std::vector<Aov> parse_aovs(const std::string& list) {
+  const std::vector<std::string_view> names = aov_names();
   std::vector<Aov> aovs;
   for (std::size_t start = 0; start <= list.size();) {
     const std::size_t end = std::min(list.find(',', start), list.size());
     const std::string word = list.substr(start, end - start);
     start = end + 1;
     if (word.empty()) continue;
-    const auto found = std::ranges::find(kNames, word);
-    if (found == kNames.end()) {
-      const std::vector<std::string> choices(kNames.begin(), kNames.end());
+    const auto found = std::ranges::find(names, word);
+    if (found == names.end()) {
+      const std::vector<std::string> choices(names.begin(), names.end());
       throw Error(ExitCode::Usage, fmt::format("unknown AOV '{}'", printable(word)), unknown_name_hint(word, choices));
     }
-    aovs.push_back(static_cast<Aov>(found - kNames.begin()));
+    aovs.push_back(static_cast<Aov>(found - names.begin()));
   }
   std::ranges::sort(aovs);
   aovs.erase(std::unique(aovs.begin(), aovs.end()), aovs.end());
@@ -76,7 +78,7 @@ LightOutput AovLayers::output(TileLayer<Rgb>& radiance) {
     return found == rgb.end() ? nullptr : &found->second;
   };
   for (std::size_t i = 0; i < kComponents; ++i) {
-    out.components.at(i) = find(static_cast<Aov>(static_cast<std::size_t>(Aov::Direct) + i));
+    out.components.at(i) = find(aov_of(static_cast<Component>(i)));
   }
   out.normal = find(Aov::Normal);
   out.albedo = find(Aov::Albedo);

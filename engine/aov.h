@@ -10,6 +10,7 @@
 #include "image/image_io.h"
 #include "image/tiles.h"
 #include "rt/lighter.h"
+#include "rt/passes/pass_list.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -21,29 +22,30 @@ enum class Aov : std::uint8_t {
   Id,      ///< id.X: the surface id, an unsigned integer; 2^32 - 1 where nothing is seen
   Normal,  ///< normal.X, Y, Z: world, unit length
   Albedo,  ///< albedo.R, G, B: the base colour
-  Direct,  ///< from here to Photon: parts of the radiance, which add up to it but for rounding (Component)
-  Shadow,
-  Reflection,
-  Refraction,
-  AmbientOcclusion,
-  Photon,
-  Rank,  ///< rank.X: which rank lit the pixel
-  Cost,  ///< cost.X: rays traced for the pixel
+  Direct,  ///< the first of kComponents parts of the radiance (Component), which add up to it but for rounding
+  Rank = Direct + kComponents,  ///< rank.X: which rank lit the pixel
+  Cost,                         ///< cost.X: rays traced for the pixel
 };
+
+inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Cost) + 1;
+
+[[nodiscard]] constexpr Aov aov_of(Component component) {
+  return static_cast<Aov>(static_cast<std::size_t>(Aov::Direct) + static_cast<std::size_t>(component));
+}
 
 [[nodiscard]] std::string_view name_of(Aov aov);
 /// Every name, in the order of the enumeration.
-[[nodiscard]] std::span<const std::string_view> aov_names();
+[[nodiscard]] std::vector<std::string_view> aov_names();
 /// "depth,id": throws Error (Usage) for unknown names, with the choices. Sorted, each once.
 [[nodiscard]] std::vector<Aov> parse_aovs(const std::string& list);
 
 /// Whether it is one of the parts that add up to the colour.
 [[nodiscard]] constexpr bool is_part(Aov aov) {
-  return aov >= Aov::Direct && aov <= Aov::Photon;
+  return aov >= Aov::Direct && aov < Aov::Rank;
 }
 /// Whether the lighter fills a layer of three floats for it.
 [[nodiscard]] constexpr bool has_rgb(Aov aov) {
-  return aov >= Aov::Normal && aov <= Aov::Photon;
+  return aov >= Aov::Normal && aov < Aov::Rank;
 }
 /// Whether it comes from the keys.
 [[nodiscard]] constexpr bool needs_keys(Aov aov) {
