@@ -102,6 +102,7 @@ TEST(Passes, AreFoundByTheirNames) {
     EXPECT_EQ(find_pass(pass.name), pass.id) << pass.name;
     EXPECT_EQ(parse_pass(pass.name), pass.id) << pass.name;
     EXPECT_EQ(&info_of(pass.id), &pass) << pass.name;
+    EXPECT_NE(pass.make, nullptr) << pass.name;
   }
   EXPECT_EQ(find_pass("Shadow"), std::nullopt);
   EXPECT_EQ(find_pass(""), std::nullopt);
