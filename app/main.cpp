@@ -17,10 +17,9 @@
 #include "app/command.h"
 #include "app/report_error.h"
 #include "app/trace_file.h"
-#include "core/host_name.h"
 #include "core/job_environment.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "engine/settings_table.h"
 #include "raster/gl_context.h"
 

@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/scene_files.h"
 
 namespace hpr {

@@ -24,11 +24,10 @@
 #include "cluster/transport/tracing_communicator.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/host_name.h"
 #include "core/job_environment.h"
 #include "core/log.h"
-#include "core/names.h"
-#include "core/trace.h"
+#include "core/text.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {

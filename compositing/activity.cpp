@@ -1,7 +1,7 @@
 #include "compositing/activity.h"
 
 #include "cluster/transport/collectives.h"
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "cluster/transport/communicator.h"
 #include "compositing/tile_codec.h"
-#include "core/check.h"
 #include "core/error.h"
 #include "image/tiles.h"
 

@@ -14,7 +14,7 @@
 #include "compositing/strategies/shared_memory.h"
 #include "compositing/strategies/tree.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "core/check.h"
+#include "core/error.h"
 
 // Highway compiles this file once per instruction set by including it again.
 #undef HWY_TARGET_INCLUDE

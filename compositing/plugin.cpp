@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 

@@ -8,7 +8,6 @@
 #include "compositing/merge.h"
 #include "compositing/narrow_keys.h"
 #include "compositing/sparse.h"
-#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {

@@ -8,7 +8,7 @@
 
 #include "cluster/transport/communicator.h"
 #include "compositing/sparse.h"
-#include "core/byte_buffer.h"
+#include "core/bytes.h"
 #include "image/key.h"
 #include "image/premultiplied.h"
 #include "image/tiles.h"

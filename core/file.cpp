@@ -8,13 +8,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <string>
 #include <system_error>
 #include <utility>
 
-#include "core/check.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {
@@ -105,6 +105,41 @@ int create_unnamed(const std::filesystem::path& folder) {
   if (file < 0 || ::access(link_of(file).c_str(), F_OK) == 0) return file;
   ::close(file);
   return -1;
+}
+
+constexpr const char* kTemporaryVariable = "TMPDIR";
+
+/// None where it is not set, or empty.
+const char* named_folder() {
+  const char* const folder =
+      std::getenv(kTemporaryVariable);  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
+  return folder != nullptr && *folder != '\0' ? folder : nullptr;
+}
+
+int create_in(const std::filesystem::path& folder) {
+  int file = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0600);
+  if (file >= 0) return file;
+  // Not every file system has files that never had a name.
+  std::string name = (folder / "hpr-XXXXXX").string();
+  file = ::mkostemp(name.data(), O_CLOEXEC);
+  if (file >= 0) ::unlink(name.c_str());
+  return file;
+}
+
+std::string environment(const char* name) {
+  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets variables
+  return value == nullptr ? std::string() : std::string(value);
+}
+
+std::filesystem::path chosen_folder() {
+  if (const std::string own = environment("HPR_CACHE"); !own.empty()) return own;
+  if (const std::string shared = environment("XDG_CACHE_HOME"); !shared.empty()) {
+    return std::filesystem::path(shared) / "hpr";
+  }
+  if (const std::string home = environment("HOME"); !home.empty())
+    return std::filesystem::path(home) / ".cache" / "hpr";
+  throw Error(ExitCode::Io, "there is no folder to keep things in: neither HPR_CACHE nor HOME is set",
+              "set HPR_CACHE to a folder");
 }
 
 }  // namespace
@@ -265,6 +300,40 @@ EmptyFolders::EmptyFolders(const std::filesystem::path& folder) {
 
 EmptyFolders::~EmptyFolders() {
   for (const std::filesystem::path& path : missing_) ::rmdir(path.c_str());  // refuses what is not empty
+}
+
+std::filesystem::path temporary_folder() {
+  const char* const named = named_folder();
+  return named == nullptr ? "/tmp" : named;
+}
+
+TemporaryFile::TemporaryFile() : descriptor_(create_in(temporary_folder())) {
+  if (descriptor_ < 0) {
+    throw Error(ExitCode::Io,
+                fmt::format("cannot write temporary files in '{}'{}: {}", printable(temporary_folder().string(), 300),
+                            named_folder() == nullptr ? "" : fmt::format(", which {} names", kTemporaryVariable),
+                            std::generic_category().message(errno)),
+                fmt::format("set {} to a folder that can be written", kTemporaryVariable));
+  }
+  path_ = fmt::format("/proc/{}/fd/{}", ::getpid(), descriptor_);
+}
+
+TemporaryFile::~TemporaryFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), path_(std::move(other.path_)) {}
+
+std::filesystem::path cache_folder() {
+  std::filesystem::path folder = chosen_folder();
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) {
+    throw Error(ExitCode::Io, fmt::format("cannot make '{}': {}", folder.string(), failed.message()),
+                "set HPR_CACHE to a folder that can be written to");
+  }
+  return folder;
 }
 
 }  // namespace hpr

@@ -1,7 +1,9 @@
 #include "core/job_environment.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdlib>
 
 // NOLINTBEGIN(concurrency-mt-unsafe): nobody writes the environment
@@ -31,6 +33,16 @@ bool input_is_typed() {
 
 bool stderr_is_terminal() {
   return ::isatty(STDERR_FILENO) == 1 || (inside_mpi_job() && std::getenv(kTerminalVariable) != nullptr);
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+std::string said_by(int rank) {
+  return rank == 0 ? "" : fmt::format("rank {} on {}: ", rank, host_name());
 }
 
 }  // namespace hpr

@@ -1,6 +1,9 @@
 #pragma once
 
-/// What the environment of this process says about the MPI job it belongs to, before MPI starts.
+#include <string>
+
+/// What this process knows of itself before MPI starts: its host, and what its environment says about the MPI job it
+/// belongs to.
 namespace hpr {
 
 /// Set for rank 0, whose standard input is a pipe, when its launcher reads from a terminal.
@@ -25,5 +28,11 @@ inline constexpr const char* kReportStartVariable = "OMPI_HPR_SAY_START";
 
 /// Whether stderr of this process, or of the launcher of its job, is a terminal: a progress bar may redraw itself.
 [[nodiscard]] bool stderr_is_terminal();
+
+/// As this machine calls itself.
+[[nodiscard]] std::string host_name();
+
+/// What stands before the words of a rank: "rank 3 on wall02: ", nothing for rank 0.
+[[nodiscard]] std::string said_by(int rank);
 
 }  // namespace hpr

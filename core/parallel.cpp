@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/trace.h"
+#include "core/timing.h"
 
 namespace hpr {
 

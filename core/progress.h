@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-#include "core/stopwatch.h"
+#include "core/timing.h"
 
 namespace hpr {
 

@@ -6,9 +6,8 @@
 #include <array>
 #include <limits>
 
-#include "core/check.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -10,10 +10,9 @@
 #include <optional>
 #include <sstream>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/view.h"
 
 namespace hpr {

@@ -8,9 +8,9 @@
 #include <cstring>
 #include <type_traits>
 
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "rt/passes/pass_list.h"
 
 namespace hpr {

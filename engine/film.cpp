@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "cluster/transport/collectives.h"
-#include "core/check.h"
+#include "core/error.h"
 #include "core/parallel.h"
 
 namespace hpr {

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "core/stopwatch.h"
-#include "core/trace.h"
+#include "core/timing.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
 //

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "engine/signals.h"
 
 namespace hpr {

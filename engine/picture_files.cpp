@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <utility>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/parallel.h"
-#include "core/trace.h"
+#include "core/timing.h"
 #include "engine/screens.h"
 #include "image/enlarge.h"
 

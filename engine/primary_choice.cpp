@@ -7,7 +7,7 @@
 
 #include "cluster/transport/collectives.h"
 #include "core/log.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {

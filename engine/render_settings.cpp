@@ -10,7 +10,7 @@
 #include <variant>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "engine/settings_table.h"
 #include "image/pixel_filter.h"
 #include "scene/environment.h"

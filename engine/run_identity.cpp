@@ -6,7 +6,7 @@
 
 #include <array>
 
-#include "core/hash.h"
+#include "core/bytes.h"
 #include "engine/settings_table.h"
 
 namespace hpr {

@@ -9,8 +9,7 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/names.h"
-#include "core/units.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -1,6 +1,6 @@
 #include "engine/screens.h"
 
-#include "core/trace.h"
+#include "core/timing.h"
 #include "image/enlarge.h"
 
 namespace hpr {

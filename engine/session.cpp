@@ -10,11 +10,11 @@
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/texts.h"
 #include "core/error.h"
-#include "core/host_name.h"
+#include "core/job_environment.h"
 #include "core/log.h"
-#include "core/names.h"
 #include "core/parallel.h"
-#include "core/trace.h"
+#include "core/text.h"
+#include "core/timing.h"
 #include "scene/surface_ranges.h"
 
 namespace hpr {

@@ -11,9 +11,8 @@
 #include <utility>
 
 #include "compositing/compositor.h"
-#include "core/check.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "engine/aov.h"
 #include "image/pixel_filter.h"
 #include "rt/passes/pass_list.h"

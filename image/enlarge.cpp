@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/parallel.h"
 
 namespace hpr {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 

@@ -5,7 +5,6 @@
 
 #include <system_error>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "image/image_codec.h"

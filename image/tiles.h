@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/peer_memory.h"
 #include "image/depth_format.h"
 #include "image/image.h"

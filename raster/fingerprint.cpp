@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/hash.h"
+#include "core/bytes.h"
 #include "raster/rasterizer.h"
 
 namespace hpr {

@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "raster/egl_context.h"
 #include "raster/osmesa_context.h"
 

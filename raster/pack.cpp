@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/parallel.h"
 
 namespace hpr {

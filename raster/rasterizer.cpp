@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <string_view>
 
-#include "core/check.h"
-#include "core/stopwatch.h"
+#include "core/error.h"
+#include "core/timing.h"
 #include "raster/geometry.h"
 #include "raster/gl_functions.h"
 #include "raster/gl_objects.h"

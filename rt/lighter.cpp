@@ -7,11 +7,10 @@
 #include <optional>
 #include <utility>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/log.h"
 #include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "core/trace.h"
+#include "core/timing.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/first_points.h"
 #include "rt/passes/half_resolution.h"

@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "scene/boxes.h"
 
 namespace hpr {

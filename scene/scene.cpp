@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "scene/boxes.h"
 

@@ -8,7 +8,7 @@
 #include <ostream>
 #include <streambuf>
 
-#include "core/hash.h"
+#include "core/bytes.h"
 #include "scene/scene.h"
 
 // Every struct of scene.h, field by field: what stands here is what reaches the other ranks and what the content hash

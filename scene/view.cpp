@@ -5,7 +5,6 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "raster/rasterizer.h"
 #include "rt/trace/primary_rays.h"
 #include "rt/trace/surfaces.h"

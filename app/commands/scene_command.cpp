@@ -6,7 +6,7 @@
 #include "app/command.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "rt/passes/pass_list.h"
 #include "scene/generators/generated.h"
 #include "scene/gltf/writer.h"

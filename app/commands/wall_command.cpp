@@ -7,7 +7,7 @@
 #include "app/command.h"
 #include "app/commands/wall_options.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
 #include "walls/config/wall_schema.h"

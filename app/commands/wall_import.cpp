@@ -4,7 +4,7 @@
 
 #include "app/command.h"
 #include "core/file.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "walls/config/import/importer.h"
 #include "walls/config/wall_file.h"
 

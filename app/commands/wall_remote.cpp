@@ -11,8 +11,7 @@
 
 #include "app/command.h"
 #include "core/error.h"
-#include "core/names.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "engine/wall/run_control.h"
 
 namespace hpr {

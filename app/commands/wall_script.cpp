@@ -6,7 +6,7 @@
 #include "app/command.h"
 #include "app/launch/shell_line.h"
 #include "app/output_files.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "engine/output.h"
 #include "walls/config/host_list.h"
 #include "walls/config/wall_file.h"

@@ -9,10 +9,9 @@
 #include "cluster/transport/agreement.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
 #include "core/progress.h"
-#include "core/stopwatch.h"
-#include "core/units.h"
+#include "core/text.h"
+#include "core/timing.h"
 #include "engine/picture_files.h"
 #include "engine/resolution.h"
 

@@ -15,7 +15,7 @@
 #include "cluster/transport/collectives.h"
 #include "core/job_environment.h"
 #include "core/log.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "engine/wall/hearing.h"
 #include "engine/wall/recoverable.h"
 #include "walls/link/token.h"

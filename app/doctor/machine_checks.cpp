@@ -21,10 +21,10 @@
 #include "app/doctor/machine.h"
 #include "app/launch/launcher.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/file.h"
 #include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "core/temporary.h"
+#include "core/text.h"
+#include "core/timing.h"
 #include "image/image_io.h"
 #include "rt/trace/embree_compat.h"
 

@@ -18,7 +18,6 @@
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/mpi_communicator.h"
-#include "core/host_name.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 

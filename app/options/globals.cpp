@@ -7,8 +7,7 @@
 
 #include "cluster/transport/communicator.h"
 #include "core/error.h"
-#include "core/names.h"
-#include "core/units.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "app/command.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 

@@ -5,8 +5,7 @@
 #include <charconv>
 
 #include "core/error.h"
-#include "core/names.h"
-#include "core/units.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

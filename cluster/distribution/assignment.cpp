@@ -8,9 +8,8 @@
 #include <numeric>
 #include <span>
 
-#include "core/check.h"
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

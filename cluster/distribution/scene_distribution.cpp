@@ -6,8 +6,8 @@
 
 #include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 
 namespace hpr {
 

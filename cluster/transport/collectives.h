@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
-#include "core/check.h"
+#include "core/error.h"
 
 /// Collectives over any Communicator, built from its messages: every rank of `comm` calls them together.
 namespace hpr {

@@ -14,9 +14,8 @@
 #include <system_error>
 #include <thread>
 
-#include "core/check.h"
 #include "core/error.h"
-#include "core/trace.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {

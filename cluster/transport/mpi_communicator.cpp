@@ -10,7 +10,6 @@
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/mpi_error.h"
 #include "cluster/transport/window_memory.h"
-#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cluster/transport/communicator.h"
-#include "core/byte_buffer.h"
+#include "core/bytes.h"
 
 namespace hpr {
 

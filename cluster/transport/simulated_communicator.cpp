@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "cluster/transport/collectives.h"
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cluster/transport/forwarding_communicator.h"
-#include "core/trace.h"
+#include "core/timing.h"
 
 namespace hpr {
 

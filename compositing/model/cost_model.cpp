@@ -11,7 +11,6 @@
 #include "compositing/model/synthetic.h"
 #include "compositing/sparse.h"
 #include "compositing/tile_codec.h"
-#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <vector>
 
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 
 namespace hpr {
 namespace {

@@ -10,7 +10,7 @@
 #include "compositing/activity.h"
 #include "compositing/merge.h"
 #include "compositing/piece_merger.h"
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include <glm/vector_relational.hpp>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "engine/settings_table.h"
 
 namespace hpr {

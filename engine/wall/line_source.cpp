@@ -10,8 +10,8 @@
 #include <cerrno>
 #include <vector>
 
+#include "core/bytes.h"
 #include "core/log.h"
-#include "core/secrets.h"
 #include "walls/link/token.h"
 
 namespace hpr {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "walls/link/socket.h"
 
 namespace hpr {

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "core/log.h"
-#include "core/names.h"
-#include "core/stopwatch.h"
+#include "core/text.h"
+#include "core/timing.h"
 #include "engine/wall/hearing.h"
 #include "engine/wall/recoverable.h"
 #include "walls/link/bytes.h"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "walls/config/wall.h"
 #include "walls/manifest/manifest.h"
 #include "walls/tracking/head.h"

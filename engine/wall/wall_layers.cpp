@@ -4,7 +4,7 @@
 
 #include "cluster/transport/agreement.h"
 #include "core/file.h"
-#include "core/trace.h"
+#include "core/timing.h"
 #include "engine/picture_files.h"
 
 namespace hpr {

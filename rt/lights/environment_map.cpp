@@ -5,7 +5,7 @@
 #include <numbers>
 #include <span>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "rt/sampling/pick.h"
 
 namespace hpr {

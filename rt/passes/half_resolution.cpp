@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <span>
 
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <ranges>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "rt/passes/pass.h"
 #include "rt/photons/photon_gather.h"
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/check.h"
-#include "core/trace.h"
+#include "core/error.h"
+#include "core/timing.h"
 #include "rt/passes/path_wave.h"
 #include "rt/trace/denormals.h"
 

@@ -10,9 +10,9 @@
 #include <mutex>
 #include <vector>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/parallel.h"
-#include "core/trace.h"
+#include "core/timing.h"
 #include "rt/trace/denormals.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/occupied_pixels.h"

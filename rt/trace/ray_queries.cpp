@@ -4,7 +4,7 @@
 #include <cstring>
 #include <limits>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/travelling_rays.h"

@@ -13,7 +13,6 @@
 #include <tuple>
 #include <utility>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "rt/trace/embree_compat.h"

@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numeric>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "rt/materials/bsdf.h"
 
 namespace hpr {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "rt/materials/texture.h"
 #include "rt/trace/mesh_parts.h"
 #include "rt/trace/on_triangle.h"

@@ -8,10 +8,9 @@
 #include <thread>
 
 #include "cluster/transport/collectives.h"
-#include "core/check.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/trace.h"
+#include "core/timing.h"
 #include "rt/trace/denormals.h"
 
 namespace hpr {

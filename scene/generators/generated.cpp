@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/generators/generators.h"
 #include "scene/generators/sphereflake.h"
 #include "scene/view.h"

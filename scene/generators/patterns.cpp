@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "scene/generators/portable_math.h"
 
 namespace hpr::patterns {

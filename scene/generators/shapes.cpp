@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "scene/generators/portable_math.h"
 
 namespace hpr::shapes {

@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "scene/generators/generators.h"
 #include "scene/generators/portable_math.h"
 #include "scene/generators/shapes.h"

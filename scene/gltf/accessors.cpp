@@ -8,7 +8,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

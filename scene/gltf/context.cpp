@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 

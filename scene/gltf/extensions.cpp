@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/gltf/json.h"
 #include "scene/gltf/schema_check.h"
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/gltf/accessors.h"
 #include "scene/gltf/buffers.h"
 #include "scene/gltf/json.h"

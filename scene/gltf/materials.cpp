@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/gltf/mesh.h"
 
 namespace hpr {

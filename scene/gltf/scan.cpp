@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "scene/gltf/json.h"
 
 namespace hpr {

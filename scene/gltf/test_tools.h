@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base64.h"
+#include "core/bytes.h"
 #include "core/error.h"
 #include "scene/gltf/loader.h"
 

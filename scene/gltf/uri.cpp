@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include "app/options/render_options.h"
 #include "core/job_environment.h"
 #include "core/parallel.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "image/image_io.h"
 #include "raster/gl_context.h"
 #include "tools/bench/bench_codec.h"

@@ -9,7 +9,7 @@
 #include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "cluster/transport/local_communicator.h"
-#include "core/check.h"
+#include "core/error.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/resolution.h"

@@ -11,7 +11,7 @@
 #include "compositing/merge.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/tile_codec.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "image/tiles.h"
 #include "tools/bench/bench_times.h"
 

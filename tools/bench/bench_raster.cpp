@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "raster/rasterizer.h"
 #include "scene/view.h"
 #include "tools/bench/bench_bare_gl.h"

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "app/options/words.h"
-#include "core/check.h"
+#include "core/error.h"
 #include "tools/compare/compare_measure.h"
 
 namespace hpr {

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "compositing/compositor.h"
-#include "core/check.h"
-#include "core/hash.h"
+#include "core/bytes.h"
+#include "core/error.h"
 #include "tools/compare/compare_measure.h"
 #include "tools/compare/compare_over.h"
 

@@ -18,7 +18,7 @@
 #include "compositing/plugin.h"
 #include "core/file.h"
 #include "core/job_environment.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "engine/output.h"
 #include "image/image_io.h"
 #include "scene/view.h"

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "cluster/transport/collectives.h"
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 

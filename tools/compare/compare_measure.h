@@ -9,7 +9,7 @@
 #include "cluster/transport/counting_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
-#include "core/trace.h"
+#include "core/timing.h"
 #include "image/image_parts.h"
 #include "tools/compare/compare.h"
 

@@ -12,8 +12,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/job_environment.h"
-#include "core/names.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "engine/output.h"
 #include "tools/compare/simulate_option.h"
 

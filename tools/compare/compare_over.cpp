@@ -11,7 +11,7 @@
 
 #include "compositing/blender.h"
 #include "compositing/over.h"
-#include "core/hash.h"
+#include "core/bytes.h"
 #include "image/premultiplied.h"
 #include "tools/compare/compare_measure.h"
 

@@ -13,8 +13,8 @@
 #include "compositing/compositor.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/over.h"
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 #include "tools/compare/compare_measure.h"
 #include "tools/compare/compare_report.h"
 

@@ -11,7 +11,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "tools/diff/diff_values.h"

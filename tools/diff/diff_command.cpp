@@ -6,8 +6,8 @@
 
 #include "app/command.h"
 #include "core/file.h"
-#include "core/names.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "engine/output.h"
 #include "tools/diff/diff.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "image/metrics.h"
 
 namespace hpr {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "core/temporary.h"
+#include "core/file.h"
 #include "scene/load_scene.h"
 #include "tools/stability/cases.h"
 

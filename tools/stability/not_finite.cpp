@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/base64.h"
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/temporary.h"
+#include "core/file.h"
 #include "image/image_codec.h"
 #include "image/image_io.h"
 #include "scene/environment.h"

@@ -8,7 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

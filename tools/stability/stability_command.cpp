@@ -11,8 +11,8 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/names.h"
 #include "core/progress.h"
+#include "core/text.h"
 #include "tools/stability/stability.h"
 
 namespace hpr {

@@ -7,10 +7,8 @@
 #include <cmath>
 #include <map>
 
-#include "core/check.h"
 #include "core/error.h"
-#include "core/names.h"
-#include "core/units.h"
+#include "core/text.h"
 #include "engine/settings_table.h"
 
 namespace hpr {

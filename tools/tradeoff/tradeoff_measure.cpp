@@ -9,11 +9,10 @@
 
 #include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
-#include "core/base64.h"
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 #include "core/log.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/picture_files.h"

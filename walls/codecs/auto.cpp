@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "core/log.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "walls/codecs/coder.h"
 
 namespace hpr {

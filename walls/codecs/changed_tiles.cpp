@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "walls/codecs/coder.h"
 #include "walls/codecs/pixel_planes.h"
 

@@ -6,7 +6,7 @@
 #include <array>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/codecs/auto.h"
 #include "walls/codecs/coder.h"
 #include "walls/codecs/stream_codec.h"

@@ -4,9 +4,8 @@
 
 #include <cstring>
 
-#include "core/check.h"
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 #include "walls/codecs/coder.h"
 
 namespace hpr {

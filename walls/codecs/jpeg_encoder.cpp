@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <new>
 
-#include "core/check.h"
 #include "core/error.h"
 
 namespace hpr {

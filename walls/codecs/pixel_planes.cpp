@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "core/check.h"
+#include "core/error.h"
 
 // Highway compiles this file once per instruction set by including it again.
 #undef HWY_TARGET_INCLUDE

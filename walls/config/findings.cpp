@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

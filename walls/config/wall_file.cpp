@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <limits>
 
+#include "core/bytes.h"
 #include "core/file.h"
-#include "core/hash.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_draft.h"
 #include "walls/config/wall_override.h"
 #include "walls/geometry/geometry.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_draft.h"
 
 namespace hpr {

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <set>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_draft.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/stereo.h"

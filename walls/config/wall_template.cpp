@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/toml_document.h"
 #include "walls/config/wall_file.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_draft.h"
 #include "walls/geometry/geometry.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_draft.h"
 #include "walls/config/wall_file.h"
 #include "walls/tracking/head_path.h"

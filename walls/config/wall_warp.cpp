@@ -6,9 +6,9 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "core/bytes.h"
 #include "core/file.h"
-#include "core/hash.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "image/image_io.h"
 #include "walls/config/wall_draft.h"
 #include "walls/geometry/curved.h"

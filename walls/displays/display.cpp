@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/displays/file_display.h"
 #include "walls/displays/no_display.h"
 #include "walls/displays/pipe_display.h"

@@ -7,9 +7,9 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/bytes.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/hash.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
 #include "walls/manifest/manifest.h"

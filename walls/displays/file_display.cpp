@@ -6,11 +6,10 @@
 #include <string>
 #include <system_error>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
-#include "core/stopwatch.h"
+#include "core/text.h"
+#include "core/timing.h"
 #include "image/image_io.h"
 #include "walls/drawing/scan_out.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/displays/sink.h"
 #include "walls/displays/y4m.h"
 #include "walls/drawing/assemble.h"

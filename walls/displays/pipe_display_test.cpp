@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "walls/config/wall_file.h"
 #include "walls/displays/display.h"
 

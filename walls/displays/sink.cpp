@@ -18,8 +18,8 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
-#include "core/stopwatch.h"
+#include "core/text.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/stopwatch.h"
+#include "core/timing.h"
 #include "walls/codecs/jpeg_encoder.h"
 #include "walls/displays/display.h"
 #include "walls/geometry/geometry.h"

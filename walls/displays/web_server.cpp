@@ -11,9 +11,9 @@
 #include <thread>
 #include <utility>
 
+#include "core/bytes.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "core/secrets.h"
 #include "walls/displays/web_page.h"
 #include "walls/link/socket.h"
 

@@ -7,10 +7,9 @@
 #include <cstdlib>
 #include <map>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/displays/window_thread.h"
 #include "walls/drawing/scan_out.h"
 

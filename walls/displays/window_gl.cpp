@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/displays/x_server.h"
 
 namespace hpr {

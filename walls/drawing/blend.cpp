@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "walls/geometry/planar.h"
 
 namespace hpr {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "image/enlarge.h"
 #include "image/image_parts.h"
 #include "walls/drawing/assemble.h"

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "walls/geometry/geometry.h"
 

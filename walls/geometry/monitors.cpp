@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "image/image_parts.h"
 #include "walls/drawing/assemble.h"
 #include "walls/geometry/geometry.h"

@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

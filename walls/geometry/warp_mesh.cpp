@@ -12,10 +12,9 @@
 #include <span>
 #include <tuple>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/check.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "walls/drawing/level_table.h"
 

@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

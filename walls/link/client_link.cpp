@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/link/token.h"
 
 namespace hpr {

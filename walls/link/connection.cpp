@@ -7,7 +7,7 @@
 #include <string>
 #include <system_error>
 
-#include "core/hash.h"
+#include "core/bytes.h"
 
 namespace hpr {
 namespace {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "core/byte_buffer.h"
+#include "core/bytes.h"
 #include "walls/link/protocol.h"
 #include "walls/link/socket.h"
 

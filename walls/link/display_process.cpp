@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 #include "core/log.h"
 #include "image/image_parts.h"
 #include "walls/drawing/canvas.h"

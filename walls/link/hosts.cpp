@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

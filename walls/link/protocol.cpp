@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "core/hash.h"
+#include "core/bytes.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

@@ -7,11 +7,10 @@
 #include <chrono>
 #include <cmath>
 
-#include "core/check.h"
+#include "core/bytes.h"
 #include "core/error.h"
-#include "core/hash.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/link/token.h"
 
 namespace hpr {

@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "core/stopwatch.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <cstdlib>
 
-#include "core/check.h"
-#include "core/secrets.h"
+#include "core/bytes.h"
+#include "core/error.h"
 
 namespace hpr {
 

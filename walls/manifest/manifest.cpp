@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "core/hash.h"
+#include "core/bytes.h"
 #include "walls/manifest/budget_json.h"
 
 namespace hpr {

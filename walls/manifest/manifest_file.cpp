@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {

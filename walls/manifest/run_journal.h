@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/temporary.h"
+#include "core/file.h"
 
 namespace hpr {
 

@@ -9,10 +9,9 @@
 #include <optional>
 #include <utility>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/toml_document.h"
 
 namespace hpr {

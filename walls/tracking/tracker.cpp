@@ -1,6 +1,6 @@
 #include "walls/tracking/tracker.h"
 
-#include "core/check.h"
+#include "core/error.h"
 
 namespace hpr {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/tracking/head_path.h"
 #include "walls/tracking/tracker.h"
 

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/wall_draft.h"
 
 namespace hpr {

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/error.h"
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/import/importer.h"
 #include "walls/config/wall_file.h"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/import/foreign_wall.h"
 #include "walls/config/import/xml_file.h"
 #include "walls/config/wall_file.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "core/names.h"
+#include "core/text.h"
 #include "walls/config/import/foreign_wall.h"
 
 namespace hpr {

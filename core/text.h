@@ -1,11 +1,15 @@
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+/// Text that people write and read: names, numbers with units, what is safe to print.
 namespace hpr {
 
 /// The choice that differs from `name` by the fewest insertions, deletions, substitutions and swaps of neighbours
@@ -23,5 +27,17 @@ namespace hpr {
 [[nodiscard]] std::vector<std::string> split_commas(std::string_view list);
 /// The words between commas that are not empty.
 [[nodiscard]] std::vector<std::string> split_words(std::string_view list);
+
+/// "512", "64KiB", "1.5GB", "2G" in bytes (K, M, G, T are binary with or without "i", decimal with a plain "B" suffix).
+[[nodiscard]] std::optional<std::uint64_t> parse_bytes(std::string_view text);
+
+/// "512 B", "288 KiB", "1.5 GiB": in the largest binary unit of which it is one or more, rounded to a tenth.
+[[nodiscard]] std::string format_bytes(std::uint64_t bytes);
+
+/// "2us", "33ms", "1.5s", "2min"; a bare number is seconds.
+[[nodiscard]] std::optional<std::chrono::nanoseconds> parse_duration(std::string_view text);
+
+/// "1920x1080": two positive integers.
+[[nodiscard]] std::optional<std::pair<int, int>> parse_extent(std::string_view text);
 
 }  // namespace hpr

@@ -1,4 +1,4 @@
-#include "core/trace.h"
+#include "core/timing.h"
 
 #include <gtest/gtest.h>
 

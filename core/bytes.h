@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <memory>
 #include <span>
+#include <string>
+#include <string_view>
 
-#include "core/check.h"
+#include "core/error.h"
 
+/// Bytes: a buffer of them, their hash, and the text they are written as.
 namespace hpr {
 
 /// Bytes that grow at their end and are meant to be used again and again: clearing keeps the memory, and new bytes are
@@ -52,5 +56,37 @@ class ByteBuffer {
   std::size_t size_ = 0;
   std::size_t capacity_ = 0;
 };
+
+/// XXH64 of `bytes` with seed 0: what manifests, reports and content comparisons use.
+[[nodiscard]] std::uint64_t xxh64(std::span<const std::byte> bytes);
+
+/// 16 lower-case hex digits.
+[[nodiscard]] std::string hex16(std::uint64_t hash);
+
+/// XXH64 of content that comes in parts.
+class ContentHash {
+ public:
+  ContentHash();
+  void add(std::span<const std::byte> bytes);
+  [[nodiscard]] std::uint64_t value() const;
+
+ private:
+  struct Free {
+    void operator()(void* state) const;
+  };
+  std::unique_ptr<void, Free> state_;
+};
+
+/// RFC 4648, section 4, with padding.
+[[nodiscard]] std::string base64(std::span<const std::byte> bytes);
+
+/// From the system's source of random numbers. Throws Error (Io).
+void fill_random(std::span<std::byte> bytes);
+
+/// 32 hexadecimal digits. Throws Error (Io).
+[[nodiscard]] std::string random_token();
+
+/// In a time that does not tell how much of it is right.
+[[nodiscard]] bool same_token(std::string_view given, std::string_view token);
 
 }  // namespace hpr
