@@ -9,7 +9,7 @@
 
 #include "cluster/transport/communicator.h"
 #include "compositing/compositor.h"
-#include "image/premultiplied.h"
+#include "image/color.h"
 #include "image/tiles.h"
 
 namespace hpr {

@@ -1,5 +1,3 @@
-#include "image/depth_format.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,6 +14,7 @@
 #include "compositing/model/synthetic.h"
 #include "compositing/narrow_keys.h"
 #include "compositing/test_layers.h"
+#include "image/key.h"
 
 namespace hpr {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include "image/depth_format.h"
+#include "image/key.h"
 
 /// Runs of quantized keys as they are sent: sent_bytes(format) bytes each, the surface before the depth, the lowest
 /// byte first.

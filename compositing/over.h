@@ -3,7 +3,7 @@
 #include <span>
 #include <type_traits>
 
-#include "image/premultiplied.h"
+#include "image/color.h"
 
 namespace hpr {
 

@@ -8,8 +8,8 @@
 #include "cluster/transport/communicator.h"
 #include "compositing/tile_codec.h"
 #include "core/bytes.h"
+#include "image/color.h"
 #include "image/key.h"
-#include "image/premultiplied.h"
 #include "image/tiles.h"
 
 /// What a schedule of messages does with the pieces that come: the one place where the operators differ. The kind of

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
+#include "image/color.h"
 #include "image/key.h"
-#include "image/premultiplied.h"
 #include "image/tiles.h"
 
 /// Tiles that are partly drawn: which pixels are, and those alone.

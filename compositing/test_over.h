@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "image/premultiplied.h"
+#include "image/color.h"
 #include "image/tiles.h"
 
 /// Translucent layers for tests, and what blending them must give: written without the kernels, pixel by pixel.

@@ -9,8 +9,8 @@
 #include "cluster/transport/communicator.h"
 #include "compositing/sparse.h"
 #include "core/bytes.h"
+#include "image/color.h"
 #include "image/key.h"
-#include "image/premultiplied.h"
 #include "image/tiles.h"
 
 /// Tiles as messages between ranks of one run of HPR (never as files: the byte order is the machine's). A message says

@@ -9,7 +9,7 @@
 #include "cluster/transport/collectives.h"
 #include "engine/economies.h"
 #include "engine/resolution.h"
-#include "image/pixel_filter.h"
+#include "image/filter.h"
 
 namespace hpr {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "engine/frame.h"
 #include "engine/frame_budget.h"
-#include "image/image_parts.h"
+#include "image/image.h"
 
 namespace hpr {
 

@@ -9,7 +9,7 @@
 #include "core/parallel.h"
 #include "core/timing.h"
 #include "engine/screens.h"
-#include "image/enlarge.h"
+#include "image/filter.h"
 
 namespace hpr {
 

@@ -6,7 +6,7 @@
 
 #include "engine/frame.h"
 #include "engine/output.h"
-#include "image/color_format.h"
+#include "image/color.h"
 
 namespace hpr {
 

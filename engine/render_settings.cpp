@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "engine/settings_table.h"
-#include "image/pixel_filter.h"
+#include "image/filter.h"
 #include "scene/environment.h"
 #include "scene/view.h"
 

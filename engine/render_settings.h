@@ -11,7 +11,7 @@
 
 #include "engine/frame.h"
 #include "engine/samples.h"
-#include "image/color_format.h"
+#include "image/color.h"
 #include "image/image_io.h"
 #include "scene/load_scene.h"
 #include "scene/scene.h"

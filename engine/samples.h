@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "image/pixel_filter.h"
+#include "image/filter.h"
 #include "rt/lighter.h"
 #include "rt/sampling/sampler.h"
 

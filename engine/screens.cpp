@@ -1,7 +1,7 @@
 #include "engine/screens.h"
 
 #include "core/timing.h"
-#include "image/enlarge.h"
+#include "image/filter.h"
 
 namespace hpr {
 namespace {

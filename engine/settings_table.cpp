@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "engine/aov.h"
-#include "image/pixel_filter.h"
+#include "image/filter.h"
 #include "rt/passes/pass_list.h"
 
 namespace hpr {

@@ -13,7 +13,7 @@
 
 #include "core/parallel.h"
 #include "image/color.h"
-#include "image/convolve.h"
+#include "image/filter.h"
 #include "image/metrics.h"
 
 namespace hpr {

@@ -12,8 +12,8 @@
 
 #include "core/error.h"
 #include "core/peer_memory.h"
-#include "image/depth_format.h"
 #include "image/image.h"
+#include "image/key.h"
 
 namespace hpr {
 

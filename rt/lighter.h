@@ -12,8 +12,8 @@
 
 #include "cluster/transport/communicator.h"
 #include "image/color.h"
+#include "image/filter.h"
 #include "image/key.h"
-#include "image/pixel_filter.h"
 #include "image/tiles.h"
 #include "rt/passes/pass_list.h"
 #include "rt/sampling/sampler.h"

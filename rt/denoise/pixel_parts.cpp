@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
-#include "image/pixel_filter.h"
+#include "image/filter.h"
 
 namespace hpr {
 namespace {

@@ -10,7 +10,7 @@
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
 #include "core/timing.h"
-#include "image/image_parts.h"
+#include "image/image.h"
 #include "tools/compare/compare.h"
 
 /// Measuring one strategy on one frame, whatever its pixels are.

@@ -12,7 +12,7 @@
 #include "compositing/blender.h"
 #include "compositing/over.h"
 #include "core/bytes.h"
-#include "image/premultiplied.h"
+#include "image/color.h"
 #include "tools/compare/compare_measure.h"
 
 namespace hpr {

@@ -6,7 +6,7 @@
 
 #include "image/color.h"
 #include "image/flip.h"
-#include "image/ssim.h"
+#include "image/metrics.h"
 
 namespace hpr {
 namespace {

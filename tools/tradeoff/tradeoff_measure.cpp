@@ -21,7 +21,7 @@
 #include "engine/settings_table.h"
 #include "image/flip.h"
 #include "image/image_io.h"
-#include "image/ssim.h"
+#include "image/metrics.h"
 #include "tools/diff/diff.h"
 
 namespace hpr {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "image/image_parts.h"
+#include "image/image.h"
 
 namespace hpr {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "image/image_parts.h"
+#include "image/image.h"
 #include "walls/drawing/canvas.h"
 
 namespace hpr {

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "core/error.h"
-#include "image/enlarge.h"
-#include "image/image_parts.h"
+#include "image/filter.h"
+#include "image/image.h"
 #include "walls/drawing/assemble.h"
 #include "walls/drawing/blend.h"
 #include "walls/geometry/stereo.h"

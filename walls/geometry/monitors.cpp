@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "image/image_parts.h"
+#include "image/image.h"
 #include "walls/drawing/assemble.h"
 #include "walls/geometry/geometry.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "image/image_parts.h"
+#include "image/image.h"
 
 namespace hpr {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "image/image_parts.h"
+#include "image/image.h"
 #include "walls/drawing/canvas.h"
 
 namespace hpr {

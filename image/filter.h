@@ -5,7 +5,36 @@
 #include <span>
 #include <string_view>
 
+#include "image/color.h"
+#include "image/image.h"
+
+/// Filters: convolution of pictures, enlargement, and the filter by which samples make up a pixel.
 namespace hpr {
+
+/// The rows of a separable filter over one channel: out(x, y) = sum over i of weights[i] in(x + i, y), summed in the
+/// order of the weights. Only positions where the filter lies whole inside `in` are kept, so the result is narrower by
+/// weights.size() - 1, and the caller decides how a picture continues beyond its border. `in` must be at least as wide
+/// as the filter. Real is float or double.
+template <typename Real>
+[[nodiscard]] Image<Real> filter_rows(const Image<Real>& in, std::span<const Real> weights);
+
+/// The columns of a separable filter: out(x, y) = sum over i of weights[i] in(x, y + i); the result is lower by
+/// weights.size() - 1. See filter_rows for the rest.
+template <typename Real>
+[[nodiscard]] Image<Real> filter_columns(const Image<Real>& in, std::span<const Real> weights);
+
+/// Pictures are filtered in bands of so many rows, each with the rows above and below that its filter needs: what lies
+/// between two filters stays in the cache, and threads take bands.
+inline constexpr int kBandRows = 64;
+
+[[nodiscard]] constexpr std::size_t band_count(int rows) {
+  return static_cast<std::size_t>((rows + kBandRows - 1) / kBandRows);
+}
+
+/// `image` on `size` pixels, neither empty: bilinear in linear light, so that every new pixel is a mean of the four
+/// pixels whose centres lie about its own, and of the nearest ones beyond the centres of the outermost. An even picture
+/// stays as it is, nothing gets brighter than the brightest pixel. The bits depend on the picture and the size alone.
+[[nodiscard]] Image<Rgb> enlarge(const Image<Rgb>& image, Size size, int threads);
 
 /// How the samples of a pixel and its surroundings make up the pixel. Separable; widths in pixels.
 enum class PixelFilter : std::uint8_t {
