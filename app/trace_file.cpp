@@ -18,10 +18,9 @@
 #include <vector>
 
 #include "app/launch/shell_line.h"
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
-#include "cluster/transport/tracing_communicator.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/job_environment.h"

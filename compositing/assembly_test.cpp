@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
 #include "compositing/test_layers.h"

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "cluster/transport/renumbered_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "compositing/strategies/binary_swap.h"
 #include "compositing/strategies/direct_send.h"
 #include "compositing/strategies/radix_k.h"

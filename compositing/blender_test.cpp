@@ -12,7 +12,7 @@
 #include <string>
 #include <tuple>
 
-#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "compositing/over.h"
 #include "compositing/test_blenders.h"

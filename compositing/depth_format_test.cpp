@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"

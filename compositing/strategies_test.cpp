@@ -4,7 +4,7 @@
 #include <bit>
 #include <string>
 
-#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/strategies/binary_swap.h"

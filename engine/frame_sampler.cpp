@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/error.h"
 #include "core/file.h"

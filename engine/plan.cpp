@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "engine/frame.h"
 #include "engine/open_sky.h"

@@ -6,9 +6,7 @@
 #include <thread>
 
 #include "cluster/distribution/scene_distribution.h"
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
-#include "cluster/transport/texts.h"
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/log.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cluster/distribution/assignment.h"
-#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
 #include "engine/session_settings.h"

@@ -13,7 +13,7 @@
 #include "cluster/distribution/scene_distribution.h"
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/mpi_communicator.h"
-#include "cluster/transport/test_exchange.h"
+#include "cluster/transport/test_communicator.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -22,12 +22,6 @@ namespace {
 using Bytes = std::vector<std::byte>;
 constexpr std::size_t kSmallPart = 1024;
 
-Bytes message_of(int rank, std::size_t size) {
-  Bytes bytes(size);
-  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + static_cast<std::size_t>(rank) * 7);
-  return bytes;
-}
-
 TEST(Mpi, MessagesOfOddSizesGoRoundTheRing) {
   MpiCommunicator comm(MPI_COMM_WORLD);
   const int next = (comm.rank() + 1) % comm.size();
@@ -35,21 +29,21 @@ TEST(Mpi, MessagesOfOddSizesGoRoundTheRing) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{4097}, std::size_t{3'000'001}}) {
     // Ranks take turns: a large send ends only when it is received.
     if (comm.size() == 1) {
-      EXPECT_EQ(test::exchange_with(comm, message_of(0, size), 0), message_of(0, size));
+      EXPECT_EQ(test::exchange_with(comm, test::message_of(0, size), 0), test::message_of(0, size));
       continue;
     }
     for (int sender = 0; sender < comm.size(); ++sender) {
-      if (comm.rank() == sender) comm.send(message_of(sender, size), next);
+      if (comm.rank() == sender) comm.send(test::message_of(sender, size), next);
       if (previous == sender) {
-        EXPECT_TRUE(comm.receive(sender) == message_of(sender, size));
+        EXPECT_TRUE(comm.receive(sender) == test::message_of(sender, size));
       }
     }
     for (int sender = 0; sender < comm.size(); ++sender) {
-      if (comm.rank() == sender) comm.send(message_of(sender, size), next);
+      if (comm.rank() == sender) comm.send(test::message_of(sender, size), next);
       if (previous == sender) {
         Bytes known(size);
         comm.receive(known, sender);
-        EXPECT_TRUE(known == message_of(sender, size));
+        EXPECT_TRUE(known == test::message_of(sender, size));
       }
     }
   }
@@ -60,15 +54,16 @@ TEST(Mpi, MessagesInPartsArriveWholeAndInOrder) {
   const int peer = comm.rank() ^ 1;
   if (peer >= comm.size()) return;
   for (const std::size_t size : {kSmallPart - 1, kSmallPart, kSmallPart + 1, 2 * kSmallPart, 10 * kSmallPart + 3}) {
-    EXPECT_TRUE(test::exchange_with(comm, message_of(comm.rank(), size), peer) == message_of(peer, size)) << size;
+    EXPECT_TRUE(test::exchange_with(comm, test::message_of(comm.rank(), size), peer) == test::message_of(peer, size))
+        << size;
     if (comm.rank() < peer) {
-      comm.send(message_of(1, size), peer);
-      comm.send(message_of(2, 5), peer);
+      comm.send(test::message_of(1, size), peer);
+      comm.send(test::message_of(2, 5), peer);
     } else {
       Bytes known(size);
       comm.receive(known, peer);
-      EXPECT_TRUE(known == message_of(1, size)) << size;
-      EXPECT_TRUE(comm.receive(peer) == message_of(2, 5));
+      EXPECT_TRUE(known == test::message_of(1, size)) << size;
+      EXPECT_TRUE(comm.receive(peer) == test::message_of(2, 5));
     }
   }
 }
@@ -80,8 +75,8 @@ TEST(Mpi, ExchangeMayHaveTwoSizes) {
       if (comm.rank() != peer && comm.rank() != other) continue;
       const int partner = comm.rank() == peer ? other : peer;
       const auto size_of = [](int rank) { return static_cast<std::size_t>(rank) * 700'001; };
-      EXPECT_TRUE(test::exchange_with(comm, message_of(comm.rank(), size_of(comm.rank())), partner) ==
-                  message_of(partner, size_of(partner)));
+      EXPECT_TRUE(test::exchange_with(comm, test::message_of(comm.rank(), size_of(comm.rank())), partner) ==
+                  test::message_of(partner, size_of(partner)));
     }
   }
 }
@@ -117,27 +112,29 @@ TEST(Mpi, SubsetsNumberTheirMembersAndKeepTheirMessagesApart) {
   EXPECT_EQ(members[static_cast<std::size_t>(first->rank())], comm.rank());
   EXPECT_EQ(all_gather_value(*first, comm.rank()), members);
   if (first->size() > 1 && first->rank() == 0) {
-    first->send(message_of(1, 3000), 1);
-    second->send(message_of(2, 10), 1);
-    comm.send(message_of(3, 10), members[1]);
+    first->send(test::message_of(1, 3000), 1);
+    second->send(test::message_of(2, 10), 1);
+    comm.send(test::message_of(3, 10), members[1]);
   } else if (first->rank() == 1) {
     // A large message may wait for its receiver, so the first one is taken first; the small ones in the other order.
-    EXPECT_TRUE(first->receive(0) == message_of(1, 3000));
-    EXPECT_TRUE(comm.receive(members[0]) == message_of(3, 10));
-    EXPECT_TRUE(second->receive(0) == message_of(2, 10));
+    EXPECT_TRUE(first->receive(0) == test::message_of(1, 3000));
+    EXPECT_TRUE(comm.receive(members[0]) == test::message_of(3, 10));
+    EXPECT_TRUE(second->receive(0) == test::message_of(2, 10));
   }
 }
 
 TEST(Mpi, CollectivesWorkFromEveryRoot) {
   MpiCommunicator comm(MPI_COMM_WORLD);
   for (int root = 0; root < comm.size(); ++root) {
-    Bytes bytes = comm.rank() == root ? message_of(root, 100'003) : Bytes{};
+    Bytes bytes = comm.rank() == root ? test::message_of(root, 100'003) : Bytes{};
     broadcast(comm, bytes, root);
-    EXPECT_TRUE(bytes == message_of(root, 100'003));
-    const auto parts = gather(comm, message_of(comm.rank(), static_cast<std::size_t>(comm.rank()) * 50'000), root);
+    EXPECT_TRUE(bytes == test::message_of(root, 100'003));
+    const auto parts =
+        gather(comm, test::message_of(comm.rank(), static_cast<std::size_t>(comm.rank()) * 50'000), root);
     if (comm.rank() == root) {
       for (int rank = 0; rank < comm.size(); ++rank) {
-        EXPECT_TRUE(parts[static_cast<std::size_t>(rank)] == message_of(rank, static_cast<std::size_t>(rank) * 50'000));
+        EXPECT_TRUE(parts[static_cast<std::size_t>(rank)] ==
+                    test::message_of(rank, static_cast<std::size_t>(rank) * 50'000));
       }
     }
     barrier(comm);
@@ -162,7 +159,7 @@ TEST(Mpi, AMessageOfAnotherSizeIsAnInternalError) {
   MpiCommunicator comm(MPI_COMM_WORLD);
   if (comm.rank() > 1 || comm.size() == 1) return;
   if (comm.rank() == 0) {
-    comm.send(message_of(0, 3), 1);
+    comm.send(test::message_of(0, 3), 1);
     return;
   }
   Bytes two(2);
@@ -202,8 +199,8 @@ TEST(Mpi, TheLongestTimeLimitIsNotTakenForAPassedOne) {
 TEST(Mpi, AnExchangeOfManyTakesEachMessageWithItsBodies) {
   MpiCommunicator comm(MPI_COMM_WORLD, kHangTimeout, kSmallPart);
   for (const std::size_t size : {std::size_t{0}, std::size_t{5}, kSmallPart, 3 * kSmallPart + 1}) {
-    const Bytes head = message_of(comm.rank(), size);
-    const Bytes part = message_of(comm.rank() + 50, size / 2);
+    const Bytes head = test::message_of(comm.rank(), size);
+    const Bytes part = test::message_of(comm.rank() + 50, size / 2);
     const std::array<std::span<const std::byte>, 2> bodies{part, head};
     std::vector<Outgoing> out;
     std::vector<int> from;
@@ -215,11 +212,11 @@ TEST(Mpi, AnExchangeOfManyTakesEachMessageWithItsBodies) {
     std::vector<int> came;
     comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
       came.push_back(peer);
-      EXPECT_TRUE(std::ranges::equal(message, message_of(peer, size)));
+      EXPECT_TRUE(std::ranges::equal(message, test::message_of(peer, size)));
       Bytes body(size / 2);
       comm.receive(body, peer);
-      EXPECT_TRUE(body == message_of(peer + 50, size / 2));
-      EXPECT_TRUE(comm.receive(peer) == message_of(peer, size));
+      EXPECT_TRUE(body == test::message_of(peer + 50, size / 2));
+      EXPECT_TRUE(comm.receive(peer) == test::message_of(peer, size));
     });
     std::ranges::sort(came);
     EXPECT_EQ(came, from);

@@ -9,7 +9,6 @@
 #include "app/options/render_options.h"
 #include "app/output_files.h"
 #include "app/stats_file.h"
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/file.h"
 #include "core/job_environment.h"

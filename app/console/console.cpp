@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "app/stats_file.h"
-#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/progress.h"

@@ -11,7 +11,6 @@
 #include "app/launch/run_ranks.h"
 #include "app/options/render_options.h"
 #include "app/report_error.h"
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/job_environment.h"
 #include "core/log.h"

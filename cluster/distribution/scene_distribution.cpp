@@ -4,7 +4,6 @@
 
 #include <optional>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/error.h"

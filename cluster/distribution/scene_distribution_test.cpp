@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "cluster/transport/forwarding_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
-#include "cluster/transport/test_failures.h"
+#include "cluster/transport/test_communicator.h"
 #include "core/error.h"
 
 namespace hpr {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
+#include <functional>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -27,7 +30,7 @@ void barrier(Communicator& comm);
 /// 1997; each part brings its size along.
 [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes);
 
-/// Collective: per rank the first rank of the host it shares `memory` with.
+/// Per rank the first rank of the host it shares `memory` with.
 [[nodiscard]] std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory);
 
 /// Each rank's value, in order of rank, on every rank.
@@ -42,5 +45,21 @@ template <typename Value>
   }
   return values;
 }
+
+/// The text of rank 0, on every rank.
+[[nodiscard]] std::string broadcast_text(Communicator& comm, const std::string& text);
+
+/// Each rank's text, in order of rank, on every rank.
+[[nodiscard]] std::vector<std::string> all_gather_texts(Communicator& comm, const std::string& text);
+
+/// Runs `work` on rank 0 alone and returns its bytes on every rank; an Error it throws is thrown on every rank, so that
+/// no rank waits for one that gave up.
+[[nodiscard]] std::vector<std::byte> on_root(Communicator& comm, const std::function<std::vector<std::byte>()>& work);
+
+/// Runs `check` on rank 0 alone; when it fails, every rank throws its Error.
+void check_on_root(Communicator& comm, const std::function<void()>& check);
+
+/// Runs `work` on every rank; when it fails on any, all throw the lowest rank's Error.
+void agree_on_failure(Communicator& comm, const std::function<void()>& work);
 
 }  // namespace hpr

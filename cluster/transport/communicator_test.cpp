@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
 #include "cluster/transport/collectives.h"
-#include "cluster/transport/counting_communicator.h"
 #include "cluster/transport/local_communicator.h"
-#include "cluster/transport/test_exchange.h"
+#include "cluster/transport/test_communicator.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -19,13 +17,6 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 constexpr std::chrono::milliseconds kSoon{50};
-
-/// `size` bytes that tell who wrote them.
-Bytes message_of(int rank, std::size_t size) {
-  Bytes bytes(size);
-  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + static_cast<std::size_t>(rank) * 7);
-  return bytes;
-}
 
 Bytes letter(char c) {
   return Bytes{static_cast<std::byte>(c)};
@@ -48,11 +39,11 @@ TEST(LocalRanks, MessagesOfAnySizeArriveWholeAndInOrder) {
     const int next = (comm.rank() + 1) % 3;
     const int previous = (comm.rank() + 2) % 3;
     for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{5'000'000}}) {
-      comm.send(message_of(comm.rank(), size), next);
+      comm.send(test::message_of(comm.rank(), size), next);
       comm.send(letter('z'), next);
       Bytes got(size);
       comm.receive(got, previous);
-      EXPECT_EQ(got, message_of(previous, size));
+      EXPECT_EQ(got, test::message_of(previous, size));
       EXPECT_EQ(comm.receive(previous), letter('z'));
     }
   });
@@ -61,8 +52,8 @@ TEST(LocalRanks, MessagesOfAnySizeArriveWholeAndInOrder) {
 TEST(LocalRanks, ExchangeMayHaveTwoSizesAndAPeerMayBeOneself) {
   run_local_ranks(2, [](Communicator& comm) {
     const std::size_t mine = comm.rank() == 0 ? 0 : 1000;
-    EXPECT_EQ(test::exchange_with(comm, message_of(comm.rank(), mine), 1 - comm.rank()),
-              message_of(1 - comm.rank(), 1000 - mine));
+    EXPECT_EQ(test::exchange_with(comm, test::message_of(comm.rank(), mine), 1 - comm.rank()),
+              test::message_of(1 - comm.rank(), 1000 - mine));
     EXPECT_EQ(test::exchange_with(comm, letter('m'), comm.rank()), letter('m'));
   });
 }
@@ -71,7 +62,7 @@ TEST(LocalRanks, AMessageOfAnotherSizeIsAnInternalError) {
   try {
     run_local_ranks(2, [](Communicator& comm) {
       if (comm.rank() == 0) {
-        comm.send(message_of(0, 3), 1);
+        comm.send(test::message_of(0, 3), 1);
       } else {
         Bytes four(4);
         comm.receive(four, 0);
@@ -104,11 +95,11 @@ TEST(LocalRanks, ReduceMaxLeavesTheLargestOfEachOnTheRoot) {
 TEST(LocalRanks, AReductionDoesNotTakeAMessageSentBefore) {
   run_local_ranks(2, [](Communicator& comm) {
     std::vector<std::uint64_t> values{static_cast<std::uint64_t>(comm.rank()) + 5};
-    if (comm.rank() == 1) comm.send(message_of(1, 8), 0);
+    if (comm.rank() == 1) comm.send(test::message_of(1, 8), 0);
     comm.reduce_max(values, 0);
     if (comm.rank() == 0) {
       EXPECT_EQ(values[0], 6U);
-      EXPECT_EQ(comm.receive(1), message_of(1, 8));
+      EXPECT_EQ(comm.receive(1), test::message_of(1, 8));
     }
   });
 }
@@ -220,94 +211,6 @@ TEST(LocalRanksDeathTest, APeerThatDoesNotExistBreaksTheContract) {
   EXPECT_DEATH(run_local_ranks(1, [](Communicator& comm) { (void)comm.receive(-1); }), "broken contract");
 }
 
-TEST(Collectives, BroadcastReachesAllRanksFromEveryRoot) {
-  for (int size = 1; size <= 17; ++size) {
-    run_local_ranks(size, [&](Communicator& comm) {
-      for (int root = 0; root < size; ++root) {
-        for (const std::size_t length : {0U, 1U, 1000U}) {
-          Bytes bytes = comm.rank() == root ? message_of(root, length) : message_of(99, 5);
-          broadcast(comm, bytes, root);
-          EXPECT_EQ(bytes, message_of(root, length));
-        }
-      }
-    });
-  }
-}
-
-TEST(Collectives, GatherHoldsEveryRanksBytesInOrderOnEveryRoot) {
-  for (int size = 1; size <= 17; ++size) {
-    run_local_ranks(size, [&](Communicator& comm) {
-      for (int root = 0; root < size; ++root) {
-        const auto parts = gather(comm, message_of(comm.rank(), static_cast<std::size_t>(comm.rank())), root);
-        if (comm.rank() != root) {
-          EXPECT_TRUE(parts.empty());
-          continue;
-        }
-        ASSERT_EQ(parts.size(), static_cast<std::size_t>(size));
-        for (int rank = 0; rank < size; ++rank) {
-          EXPECT_EQ(parts[static_cast<std::size_t>(rank)], message_of(rank, static_cast<std::size_t>(rank)));
-        }
-      }
-    });
-  }
-}
-
-TEST(Collectives, AllGatherGivesEveryRankTheSame) {
-  for (int size = 1; size <= 17; ++size) {
-    run_local_ranks(size, [&](Communicator& comm) {
-      // Rank 0 sends nothing: an empty part must not vanish.
-      const auto parts = all_gather(comm, message_of(comm.rank(), static_cast<std::size_t>(comm.rank()) * 3));
-      ASSERT_EQ(parts.size(), static_cast<std::size_t>(size));
-      for (int rank = 0; rank < size; ++rank) {
-        EXPECT_EQ(parts[static_cast<std::size_t>(rank)], message_of(rank, static_cast<std::size_t>(rank) * 3));
-      }
-      std::vector<double> expected(static_cast<std::size_t>(size));
-      std::iota(expected.begin(), expected.end(), 0.5);
-      EXPECT_EQ(all_gather_value(comm, comm.rank() + 0.5), expected);
-    });
-  }
-}
-
-TEST(Collectives, NobodyLeavesABarrierBeforeAllHaveCome) {
-  for (int size = 1; size <= 17; ++size) {
-    std::atomic<int> arrived = 0;
-    run_local_ranks(size, [&](Communicator& comm) {
-      for (int round = 1; round <= 5; ++round) {
-        ++arrived;
-        barrier(comm);
-        EXPECT_GE(arrived, round * size);
-        barrier(comm);
-      }
-    });
-  }
-}
-
-TEST(Counting, CountsWhatThisRankSendsAlsoThroughSubsets) {
-  run_local_ranks(3, [](Communicator& comm) {
-    CountingCommunicator counting(comm);
-    EXPECT_EQ(counting.rank(), comm.rank());
-    EXPECT_EQ(counting.size(), 3);
-    const int next = (comm.rank() + 1) % 3;
-    const int previous = (comm.rank() + 2) % 3;
-    counting.send(message_of(0, 10), next);
-    (void)counting.receive(previous);
-    EXPECT_EQ(counting.messages_sent(), 1U);
-    EXPECT_EQ(counting.bytes_sent(), 10U);
-
-    std::vector<std::uint64_t> values(4);
-    counting.reduce_max(values, 0);
-    const std::size_t reduced = comm.rank() == 0 ? 0 : 1;
-    EXPECT_EQ(counting.messages_sent(), 1 + reduced);
-    EXPECT_EQ(counting.bytes_sent(), 10 + 32 * reduced);
-
-    if (comm.rank() == 2) return;
-    const auto part = counting.subset(std::vector<int>{0, 1});
-    (void)test::exchange_with(*part, message_of(0, 7), 1 - part->rank());
-    EXPECT_EQ(counting.messages_sent(), 2 + reduced);
-    EXPECT_EQ(counting.bytes_sent(), 17 + 32 * reduced);
-  });
-}
-
 TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
   for (const std::uint64_t disorder : {0U, 1U, 2U}) {
     run_local_ranks({.size = 5, .disorder = disorder}, [](Communicator& comm) {
@@ -317,8 +220,8 @@ TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
         std::vector<Outgoing> out;
         std::vector<int> from;
         for (int peer = 0; peer < comm.size(); ++peer) {
-          heads.push_back(message_of(comm.rank() + round, 3 + static_cast<std::size_t>(peer)));
-          parts.push_back(message_of(comm.rank() + 7, 100));
+          heads.push_back(test::message_of(comm.rank() + round, 3 + static_cast<std::size_t>(peer)));
+          parts.push_back(test::message_of(comm.rank() + 7, 100));
           if (peer != comm.rank()) from.push_back(peer);
         }
         const std::array<std::span<const std::byte>, 2> bodies{parts[0], parts[1]};
@@ -326,8 +229,9 @@ TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
         std::vector<int> came;
         comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
           came.push_back(peer);
-          EXPECT_TRUE(std::ranges::equal(message, message_of(peer + round, 3 + static_cast<std::size_t>(comm.rank()))));
-          for (int body = 0; body < 2; ++body) EXPECT_EQ(comm.receive(peer), message_of(peer + 7, 100));
+          EXPECT_TRUE(
+              std::ranges::equal(message, test::message_of(peer + round, 3 + static_cast<std::size_t>(comm.rank()))));
+          for (int body = 0; body < 2; ++body) EXPECT_EQ(comm.receive(peer), test::message_of(peer + 7, 100));
         });
         std::ranges::sort(came);
         EXPECT_EQ(came, from);

@@ -2,11 +2,16 @@
 
 #include <mpi.h>
 
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <memory>
 #include <string>
 
 #include "cluster/transport/communicator.h"
 #include "core/bytes.h"
+#include "core/peer_memory.h"
 
 namespace hpr {
 

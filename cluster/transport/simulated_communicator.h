@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "cluster/transport/forwarding_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 
 namespace hpr {
 

@@ -7,7 +7,7 @@
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
-#include "cluster/transport/test_exchange.h"
+#include "cluster/transport/test_communicator.h"
 
 namespace hpr {
 namespace {

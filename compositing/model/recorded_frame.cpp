@@ -1,6 +1,6 @@
 #include "compositing/model/recorded_frame.h"
 
-#include "cluster/transport/recording_communicator.h"
+#include "cluster/transport/schedule.h"
 #include "compositing/assembly.h"
 #include "compositing/model/synthetic.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "cluster/transport/forwarding_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/simulated_communicator.h"
 #include "compositing/model/synthetic.h"

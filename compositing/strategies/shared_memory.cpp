@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "cluster/transport/collectives.h"
-#include "cluster/transport/renumbered_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "compositing/activity.h"
 #include "compositing/merge.h"
 #include "compositing/piece_merger.h"

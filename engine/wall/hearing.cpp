@@ -1,6 +1,6 @@
 #include "engine/wall/hearing.h"
 
-#include "cluster/transport/texts.h"
+#include "cluster/transport/collectives.h"
 
 namespace hpr {
 namespace {

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/error.h"
 #include "core/log.h"

@@ -10,9 +10,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
-#include "cluster/transport/texts.h"
 #include "core/bytes.h"
 #include "core/log.h"
 #include "core/text.h"

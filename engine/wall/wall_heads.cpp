@@ -4,7 +4,6 @@
 #include <cstring>
 #include <type_traits>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "walls/geometry/geometry.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
 #include "core/file.h"
 #include "core/timing.h"
 #include "engine/picture_files.h"

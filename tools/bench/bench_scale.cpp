@@ -9,7 +9,6 @@
 
 #include "app/options/words.h"
 #include "cluster/transport/collectives.h"
-#include "cluster/transport/texts.h"
 #include "core/bytes.h"
 #include "core/error.h"
 #include "engine/frame_sampler.h"

@@ -17,7 +17,7 @@
 #include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "app/output_files.h"
-#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/log.h"

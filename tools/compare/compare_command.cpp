@@ -13,7 +13,7 @@
 #include "app/launch/shell_line.h"
 #include "app/options/words.h"
 #include "app/trace_file.h"
-#include "cluster/transport/agreement.h"
+#include "cluster/transport/collectives.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/plugin.h"
 #include "core/file.h"

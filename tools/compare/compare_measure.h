@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "cluster/transport/counting_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
 #include "core/timing.h"

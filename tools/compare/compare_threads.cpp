@@ -2,9 +2,9 @@
 
 #include <utility>
 
+#include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/simulated_communicator.h"
-#include "cluster/transport/tracing_communicator.h"
 #include "tools/compare/simulate_option.h"
 
 namespace hpr {

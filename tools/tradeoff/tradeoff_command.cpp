@@ -15,7 +15,6 @@
 #include "app/options/render_options.h"
 #include "app/options/words.h"
 #include "app/output_files.h"
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/file.h"

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "cluster/transport/agreement.h"
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/error.h"

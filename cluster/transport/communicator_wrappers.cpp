@@ -1,4 +1,4 @@
-#include "cluster/transport/renumbered_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 
 #include "core/error.h"
 

@@ -1,4 +1,4 @@
-#include "cluster/transport/renumbered_communicator.h"
+#include "cluster/transport/communicator_wrappers.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,37 @@
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
+#include "cluster/transport/test_communicator.h"
 #include "core/error.h"
 
 namespace hpr {
 namespace {
+
+TEST(Counting, CountsWhatThisRankSendsAlsoThroughSubsets) {
+  run_local_ranks(3, [](Communicator& comm) {
+    CountingCommunicator counting(comm);
+    EXPECT_EQ(counting.rank(), comm.rank());
+    EXPECT_EQ(counting.size(), 3);
+    const int next = (comm.rank() + 1) % 3;
+    const int previous = (comm.rank() + 2) % 3;
+    counting.send(test::message_of(0, 10), next);
+    (void)counting.receive(previous);
+    EXPECT_EQ(counting.messages_sent(), 1U);
+    EXPECT_EQ(counting.bytes_sent(), 10U);
+
+    std::vector<std::uint64_t> values(4);
+    counting.reduce_max(values, 0);
+    const std::size_t reduced = comm.rank() == 0 ? 0 : 1;
+    EXPECT_EQ(counting.messages_sent(), 1 + reduced);
+    EXPECT_EQ(counting.bytes_sent(), 10 + 32 * reduced);
+
+    if (comm.rank() == 2) return;
+    const auto part = counting.subset(std::vector<int>{0, 1});
+    (void)test::exchange_with(*part, test::message_of(0, 7), 1 - part->rank());
+    EXPECT_EQ(counting.messages_sent(), 2 + reduced);
+    EXPECT_EQ(counting.bytes_sent(), 17 + 32 * reduced);
+  });
+}
 
 TEST(RenumberedCommunicator, RanksAreReachedUnderTheirNewNumbers) {
   const std::vector<int> ranks{2, 0, 3, 1};
@@ -68,4 +95,5 @@ TEST(RenumberedCommunicator, RefusesListsThatDoNotHoldEveryRankOnce) {
 }
 
 }  // namespace
+
 }  // namespace hpr

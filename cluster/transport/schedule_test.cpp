@@ -1,4 +1,4 @@
-#include "cluster/transport/recording_communicator.h"
+#include "cluster/transport/schedule.h"
 
 #include <gtest/gtest.h>
 
@@ -128,4 +128,5 @@ TEST(RecordingCommunicator, TakenDeedsAreNotToldAgain) {
 }
 
 }  // namespace
+
 }  // namespace hpr
