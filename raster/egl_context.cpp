@@ -1,5 +1,3 @@
-#include "raster/egl_context.h"
-
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <fmt/format.h>
@@ -14,9 +12,8 @@
 
 #include "core/error.h"
 #include "core/log.h"
-#include "raster/gl_functions.h"
-#include "raster/gl_info.h"
-#include "raster/osmesa_context.h"
+#include "raster/gl.h"
+#include "raster/gl_backends.h"
 
 namespace hpr {
 namespace {

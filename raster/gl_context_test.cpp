@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "raster/gl_functions.h"
+#include "raster/gl.h"
 #include "raster/raster_test_scenes.h"
 
 namespace hpr {

@@ -2,10 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "image/image.h"
-#include "raster/gl_objects.h"
+#include "image/key.h"
+#include "image/tiles.h"
+#include "raster/gl.h"
 
 namespace hpr {
 
@@ -36,5 +39,11 @@ class KeyTarget {
   std::vector<float> depths_;
   std::vector<std::uint32_t> words_;
 };
+
+/// Merges (maximum) the keys of a rectangle into the tiles of `screen` and marks those tiles active where anything was
+/// drawn. `depths` and `words` (the keys' halves) are [height][width] of `pixels`, the last row first, as GL reads
+/// them; 0 in both where nothing was drawn.
+void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> words, const Rect& pixels,
+               std::size_t screen, TileLayer<Key>& layer, int threads);
 
 }  // namespace hpr

@@ -1,5 +1,3 @@
-#include "raster/osmesa_context.h"
-
 #include <dlfcn.h>
 #include <fmt/format.h>
 
@@ -8,9 +6,8 @@
 #include <utility>
 
 #include "core/error.h"
-#include "raster/egl_context.h"
-#include "raster/gl_functions.h"
-#include "raster/gl_info.h"
+#include "raster/gl.h"
+#include "raster/gl_backends.h"
 
 namespace hpr {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "raster/gl_functions.h"
+#include "raster/gl.h"
 
 namespace hpr {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "image/image.h"
+#include "raster/gl.h"
 #include "raster/gl_context.h"
-#include "raster/gl_objects.h"
 
 namespace hpr {
 

@@ -1,11 +1,10 @@
-#include "raster/culling.h"
+#include "raster/draw_list.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "raster/draw_list.h"
 #include "raster/raster_test_scenes.h"
 
 namespace hpr {
@@ -145,4 +144,5 @@ TEST(DrawList, IsTheSameForAnyNumberOfThreads) {
 }
 
 }  // namespace
+
 }  // namespace hpr

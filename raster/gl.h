@@ -3,8 +3,14 @@
 #include <GL/glcorearb.h>
 
 #include <functional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 
+#include "raster/gl_context.h"
+
+/// OpenGL as HPR calls it: the table of functions of a context, its errors, and objects that delete themselves.
 namespace hpr {
 
 /// Every OpenGL 4.5 core function HPR calls: its name without "gl", and its type in <GL/glcorearb.h>.
@@ -84,5 +90,41 @@ using GlProc = void (*)();
 /// Throws Error when GL reports one since it was last asked: Limit for GL_OUT_OF_MEMORY, else NoDevice. `where` ends
 /// "... while", as in "uploading the scene".
 void check_gl(const GlFunctions& gl, const std::string& where);
+
+/// One GL name, deleted in the context it came from.
+class GlObject {
+ public:
+  using Delete = void (*)(const GlFunctions& gl, GLuint name);
+
+  GlObject() = default;
+  GlObject(GlContext& context, GLuint name, Delete free) : context_(&context), name_(name), free_(free) {}
+  GlObject(GlObject&& other) noexcept
+      : context_(std::exchange(other.context_, nullptr)), name_(std::exchange(other.name_, 0)), free_(other.free_) {}
+  GlObject& operator=(GlObject&& other) noexcept {
+    std::swap(context_, other.context_);
+    std::swap(name_, other.name_);
+    std::swap(free_, other.free_);
+    return *this;
+  }
+  GlObject(const GlObject&) = delete;
+  GlObject& operator=(const GlObject&) = delete;
+  ~GlObject();
+
+  [[nodiscard]] GLuint name() const { return name_; }
+
+ private:
+  GlContext* context_ = nullptr;
+  GLuint name_ = 0;
+  Delete free_ = nullptr;
+};
+
+/// All of them expect the context to be current.
+[[nodiscard]] GlObject make_buffer(GlContext& context);
+[[nodiscard]] GlObject make_vertex_array(GlContext& context);
+[[nodiscard]] GlObject make_renderbuffer(GlContext& context);
+[[nodiscard]] GlObject make_framebuffer(GlContext& context);
+/// Throws Error (NoDevice) with the driver's log when a shader is refused.
+[[nodiscard]] GlObject make_program(GlContext& context, std::string_view vertex_source,
+                                    std::string_view fragment_source);
 
 }  // namespace hpr

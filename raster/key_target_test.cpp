@@ -1,4 +1,4 @@
-#include "raster/pack.h"
+#include "raster/key_target.h"
 
 #include <gtest/gtest.h>
 
@@ -63,4 +63,5 @@ TEST(PackKeys, OfNothingLeavesTheTilesInactive) {
 }
 
 }  // namespace
+
 }  // namespace hpr
