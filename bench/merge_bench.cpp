@@ -4,9 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "compositing/merge.h"
-#include "compositing/over.h"
-#include "compositing/sparse.h"
+#include "compositing/kernels.h"
 
 // How close the key merge comes to memory speed. A merge of n keys reads two streams and writes one, 3 n words; a copy
 // of n keys reads one and writes one. So the same traffic as a merge is a copy of 1.5 n keys, and both are measured.

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
-#include "compositing/sparse.h"
+#include "compositing/kernels.h"
 #include "image/tiles.h"
 
 namespace hpr {

@@ -11,8 +11,8 @@
 #include "cluster/transport/local_communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
+#include "compositing/kernels.h"
 #include "compositing/model/synthetic.h"
-#include "compositing/narrow_keys.h"
 #include "compositing/test_layers.h"
 #include "image/key.h"
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "cluster/transport/local_communicator.h"
-#include "compositing/sparse.h"
+#include "compositing/kernels.h"
 #include "compositing/test_layers.h"
 #include "core/error.h"
 #include "image/color.h"

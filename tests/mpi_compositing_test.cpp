@@ -6,11 +6,9 @@
 
 #include "cluster/transport/mpi_communicator.h"
 #include "compositing/assembly.h"
-#include "compositing/blender.h"
 #include "compositing/compositor.h"
-#include "compositing/over.h"
+#include "compositing/kernels.h"
 #include "compositing/test_layers.h"
-#include "compositing/test_over.h"
 
 // Run by ctest under mpiexec with 1 to 5 ranks. Every rank checks its own piece, so no gather can hide a fault.
 // EXPECT, never ASSERT, between collectives: a rank that returns early leaves its peers waiting.

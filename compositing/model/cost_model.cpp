@@ -7,9 +7,8 @@
 #include <vector>
 
 #include "cluster/transport/collectives.h"
-#include "compositing/merge.h"
+#include "compositing/kernels.h"
 #include "compositing/model/synthetic.h"
-#include "compositing/sparse.h"
 #include "compositing/tile_codec.h"
 #include "core/error.h"
 

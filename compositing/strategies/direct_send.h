@@ -2,7 +2,6 @@
 
 #include "compositing/activity.h"
 #include "compositing/compositor.h"
-#include "compositing/piece_merger.h"
 #include "compositing/tile_codec.h"
 
 namespace hpr {

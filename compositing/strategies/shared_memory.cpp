@@ -8,8 +8,8 @@
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/communicator_wrappers.h"
 #include "compositing/activity.h"
-#include "compositing/merge.h"
-#include "compositing/piece_merger.h"
+#include "compositing/kernels.h"
+#include "compositing/tile_codec.h"
 #include "core/error.h"
 
 namespace hpr {

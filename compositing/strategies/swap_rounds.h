@@ -6,7 +6,6 @@
 
 #include "cluster/transport/communicator.h"
 #include "compositing/activity.h"
-#include "compositing/piece_merger.h"
 #include "compositing/tile_codec.h"
 #include "image/tiles.h"
 

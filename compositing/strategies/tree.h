@@ -1,7 +1,6 @@
 #pragma once
 
 #include "compositing/compositor.h"
-#include "compositing/piece_merger.h"
 #include "compositing/tile_codec.h"
 
 namespace hpr {

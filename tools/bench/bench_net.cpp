@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "cluster/transport/collectives.h"
-#include "compositing/merge.h"
+#include "compositing/kernels.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/tile_codec.h"
 #include "core/timing.h"

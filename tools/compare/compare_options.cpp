@@ -7,7 +7,6 @@
 
 #include "app/options/words.h"
 #include "app/output_files.h"
-#include "compositing/blender.h"
 #include "compositing/compositor.h"
 #include "core/error.h"
 #include "core/file.h"

@@ -9,8 +9,8 @@
 #include <numeric>
 #include <type_traits>
 
-#include "compositing/blender.h"
-#include "compositing/over.h"
+#include "compositing/compositor.h"
+#include "compositing/kernels.h"
 #include "core/bytes.h"
 #include "image/color.h"
 #include "tools/compare/compare_measure.h"

@@ -9,10 +9,9 @@
 
 #include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
-#include "compositing/blender.h"
 #include "compositing/compositor.h"
+#include "compositing/kernels.h"
 #include "compositing/model/synthetic.h"
-#include "compositing/over.h"
 #include "core/bytes.h"
 #include "core/error.h"
 #include "tools/compare/compare_measure.h"

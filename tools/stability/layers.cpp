@@ -6,8 +6,8 @@
 #include <random>
 
 #include "cluster/transport/local_communicator.h"
-#include "compositing/blender.h"
-#include "compositing/over.h"
+#include "compositing/compositor.h"
+#include "compositing/kernels.h"
 #include "tools/stability/cases.h"
 #include "tools/stability/tools.h"
 
