@@ -88,9 +88,16 @@ void register_compositor(MakeCompositor make);
 /// One of every strategy, in the order reports list them; registered ones are the last.
 [[nodiscard]] std::vector<std::unique_ptr<Compositor>> all_compositors();
 
+/// Whether make_compositor knows a strategy of this name; parameters after a colon are not checked.
+[[nodiscard]] bool has_compositor(std::string_view name);
+
 /// `name` may carry what a strategy is to be set to after a colon: "radix-k:4,2". Throws Error (Usage) with the choices
 /// and the nearest one when there is no strategy of that name.
 [[nodiscard]] std::unique_ptr<Compositor> make_compositor(std::string_view name);
+
+/// The name of the strategy that predicts the least time; strategies that choose among others are left out. `collects`:
+/// to have the frame on one rank. `in_place`: layers live where strategies that merge in place can do so.
+[[nodiscard]] std::string cheapest_compositor(const Costs& costs, const Load& load, bool collects, bool in_place);
 
 /// Combines one translucent layer per rank into one frame: `over`, in a given order of visibility. Pixel is
 /// Rgba8Premultiplied or RgbaPremultiplied.

@@ -24,8 +24,14 @@ extern "C" const hpr::CompositorPlugin* hpr_compositor_plugin() {
 }
 """
 TAKEN = """#include "compositing/plugin.h"
-#include "compositing/strategies/serial.h"
-HPR_COMPOSITOR_PLUGIN(hpr::Serial)
+struct Taken final : hpr::Compositor {
+  std::string_view name() const override { return "serial"; }
+  hpr::Composited composite(hpr::Communicator&, hpr::TileLayer<hpr::Key>&, std::span<const std::size_t>,
+                            std::span<const int>) override {
+    return {};
+  }
+};
+HPR_COMPOSITOR_PLUGIN(Taken)
 """
 failures = []
 

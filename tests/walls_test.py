@@ -9,6 +9,7 @@ Prints what differs or is missing and leaves with 1. With --full every strategy 
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -17,7 +18,6 @@ HPR = os.path.abspath(sys.argv[1])
 EXAMPLES = sorted((pathlib.Path(sys.argv[2]) / "walls" / "examples").glob("*.toml"))
 FULL = "--full" in sys.argv[3:]
 SCENE = "gen:gallery"
-SORT_LAST = ["serial", "tree", "binary-swap", "radix-k", "direct-send", "ring", "shared-memory", "mpi-reduce"]
 
 
 def screens_of(wall, folder, *options):
@@ -30,9 +30,16 @@ def screens_of(wall, folder, *options):
     return {screen["id"]: (screen["width"], screen["height"], screen["xxh64"]) for screen in manifest["frames"][0]["screens"]}
 
 
+def strategies():
+    """Every strategy the program has, as its error lists them, but for the one that chooses among the others."""
+    result = subprocess.run([HPR, "compare", "--synthetic", "dense", "--strategies", "?"], capture_output=True, text=True,
+                            timeout=60, check=False)
+    return [name for name in re.search("choices: (.*)", result.stderr)[1].split(", ") if name not in ("auto", "all")]
+
+
 def ways():
     """Options of the runs that must all show the same."""
-    every = [["--distribute", "sort-last", "--strategy", name] for name in SORT_LAST]
+    every = [["--distribute", "sort-last", "--strategy", name] for name in strategies()]
     every += [["--distribute", "sort-first"], ["--distribute", "hybrid", "--groups", "2"], ["--distribute", "auto"]]
     return every
 

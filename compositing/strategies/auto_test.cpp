@@ -1,5 +1,3 @@
-#include "compositing/strategies/auto.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/simulated_communicator.h"
+#include "compositing/compositor.h"
 #include "compositing/model/synthetic.h"
 #include "core/error.h"
 
@@ -73,7 +72,7 @@ TEST(Auto, TakesWhatPredictsTheLeast) {
       for (const bool collects : {false, true}) {
         for (const bool in_place : {false, true}) {
           const Load load = load_of(costs.ranks, drawn);
-          const std::string name = Auto::best(costs, load, collects, in_place);
+          const std::string name = cheapest_compositor(costs, load, collects, in_place);
           taken.push_back(name);
           const double least = seconds(*make_compositor(name), costs, load, collects);
           for (const auto& other : all_compositors()) {
@@ -97,12 +96,12 @@ TEST(Auto, LooksAgainAsTheLoadChanges) {
   std::vector<std::string> chosen;
   run_local_ranks(LocalRanks{.size = 4, .ranks_per_host = 1}, [&](Communicator& comm) {
     SimulatedCommunicator simulated(comm, cluster);
-    Auto strategy;
+    const auto strategy = make_compositor("auto");
     for (int i = 0; i < 40; ++i) {
       TileLayer<Key> layer =
           synthetic_layer(i == 0 ? SyntheticKind::Sparse : SyntheticKind::Dense, comm.rank(), frame, 1);
-      (void)strategy.composite(simulated, layer, all_tiles(layer.layout()));
-      if (comm.rank() == 0) chosen.emplace_back(strategy.chosen());
+      (void)strategy->composite(simulated, layer, all_tiles(layer.layout()));
+      if (comm.rank() == 0) chosen.emplace_back(strategy->chosen());
     }
   });
   EXPECT_EQ(chosen[1], chosen[0]) << "looks cost messages, so not every frame has one";
@@ -121,10 +120,10 @@ class NoRoomToShare final : public ForwardingCommunicator {
 TEST(Auto, SendsMessagesWhereThereIsNoRoomToShareMemory) {
   run_local_ranks(3, [&](Communicator& comm) {
     NoRoomToShare alone(comm);
-    Auto strategy;
+    const auto strategy = make_compositor("auto");
     TileLayer<Key> layer = synthetic_layer(SyntheticKind::Dense, comm.rank(), {256, 128}, 1);
-    (void)strategy.composite(alone, layer, all_tiles(layer.layout()));
-    EXPECT_NE(strategy.chosen(), "shared-memory");
+    (void)strategy->composite(alone, layer, all_tiles(layer.layout()));
+    EXPECT_NE(strategy->chosen(), "shared-memory");
   });
 }
 

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <numeric>
 
+#include "compositing/activity.h"
+#include "compositing/strategies/strategy.h"
+
 namespace hpr {
 namespace {
 
 /// How much more than an equal share the busiest rank may have to merge for tiles to go straight to their screens.
-constexpr double kMostImbalance = 1.25;
+constexpr double kMaxImbalance = 1.25;
 
 /// Positions in the list of tiles, per rank that owns them.
 using Pieces = std::vector<std::vector<std::size_t>>;
@@ -40,7 +43,7 @@ bool balanced(const Pieces& pieces, const Activity& activity) {
     most = std::max(most, weight);
     all += weight;
   }
-  return static_cast<double>(most) * static_cast<double>(pieces.size()) <= kMostImbalance * static_cast<double>(all);
+  return static_cast<double>(most) * static_cast<double>(pieces.size()) <= kMaxImbalance * static_cast<double>(all);
 }
 
 std::vector<std::size_t> tiles_at(std::span<const std::size_t> tiles, const std::vector<std::size_t>& positions) {
@@ -53,8 +56,8 @@ std::vector<std::size_t> tiles_at(std::span<const std::size_t> tiles, const std:
 }  // namespace
 
 template <typename Pixel>
-Composited DirectSendSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer,
-                                          std::span<const std::size_t> tiles, std::span<const int> shown_by) {
+Composited DirectSend<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                                  std::span<const int> shown_by) {
   const int ranks = comm.size();
   const int rank = comm.rank();
   const Activity activity = share_activity(comm, layer, tiles);
@@ -67,7 +70,7 @@ Composited DirectSendSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& 
     return std::ranges::any_of(pieces[static_cast<std::size_t>(owner)],
                                [&](std::size_t position) { return activity.active(who, position); });
   };
-  given_.resize(static_cast<std::size_t>(ranks));
+  sent_.resize(static_cast<std::size_t>(ranks));
   std::vector<Outgoing> out;
   std::vector<int> from;
   // Everyone starts with the rank after it, so that not all send to the same one first.
@@ -76,9 +79,9 @@ Composited DirectSendSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& 
     const int sender = (rank + ranks - step) % ranks;
     const auto index = static_cast<std::size_t>(to);
     if (draws_into(rank, to)) {
-      given_[index].start();
-      given_[index].add(layer, tiles_at(tiles, pieces[index]));
-      out.push_back(given_[index].to(to));
+      sent_[index].start();
+      sent_[index].add(layer, tiles_at(tiles, pieces[index]));
+      out.push_back(sent_[index].to(to));
     }
     if (draws_into(sender, rank)) from.push_back(sender);
   }
@@ -87,18 +90,18 @@ Composited DirectSendSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& 
   return {std::move(mine), straight};
 }
 
-template class DirectSendSchedule<Key>;
-template class DirectSendSchedule<Rgba8Premultiplied>;
-template class DirectSendSchedule<RgbaPremultiplied>;
-
-Composited DirectSend::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                                 std::span<const int> shown_by) {
-  return schedule_.run(comm, layer, tiles, shown_by);
-}
-
-std::optional<Prediction> DirectSend::predict(const Costs& costs, const Load& load) const {
+template <typename Pixel>
+std::optional<Prediction> DirectSend<Pixel>::predict(const Costs& costs, const Load& load) const {
   const int ranks = load.ranks;
   return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, {&ranks, 1})};
+}
+
+template class DirectSend<Key>;
+template class DirectSend<Rgba8Premultiplied>;
+template class DirectSend<RgbaPremultiplied>;
+
+Strategy direct_send_strategy() {
+  return scheduled_strategy<DirectSend>("direct-send");
 }
 
 }  // namespace hpr

@@ -1,22 +1,13 @@
 #pragma once
 
-#include "compositing/activity.h"
+#include <optional>
+#include <span>
+#include <vector>
+
 #include "compositing/compositor.h"
 #include "compositing/tile_codec.h"
 
 namespace hpr {
-
-/// The messages of direct send, for any kind of pixel.
-template <typename Pixel>
-class DirectSendSchedule {
- public:
-  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
-                 std::span<const int> shown_by);
-
- private:
-  std::vector<TileMessage> given_;  ///< per rank
-  PieceMerger<Pixel> merger_;
-};
 
 /// Every rank owns a piece of the frame and gets it from all others at once. Hsu, "Segmented Ray Casting for Data
 /// Parallel Volume Rendering", 1993; Neumann, "Communication Costs for Parallel Volume-Rendering Algorithms", 1994.
@@ -26,16 +17,16 @@ class DirectSendSchedule {
 ///
 /// Cost: one round; at most P - 1 messages and N (1 - 1/P) keys sent per rank, after ceil(log2 P) messages of one bit
 /// per tile and rank.
-class DirectSend final : public Compositor {
+template <typename Pixel>
+class DirectSend {
  public:
-  [[nodiscard]] std::string_view name() const override { return "direct-send"; }
-  using Compositor::composite;
-  Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                       std::span<const int> shown_by) override;
-  [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override;
+  [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const;
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> shown_by);
 
  private:
-  DirectSendSchedule<Key> schedule_;
+  std::vector<TileMessage> sent_;  ///< per rank
+  PieceMerger<Pixel> merger_;
 };
 
 }  // namespace hpr

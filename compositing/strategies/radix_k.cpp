@@ -5,17 +5,17 @@
 #include <algorithm>
 #include <charconv>
 
+#include "compositing/strategies/strategy.h"
 #include "core/error.h"
 #include "core/text.h"
 
 namespace hpr {
 namespace {
 
-constexpr int kLargestGroup = 8;
+constexpr int kMaxGroup = 8;
 
-}  // namespace
-
-std::vector<int> parse_radix_factors(std::string_view list) {
+/// "4,2" as numbers.
+std::vector<int> parse_factors(std::string_view list) {
   std::vector<int> factors;
   for (std::string_view rest = list;; rest.remove_prefix(1)) {
     int factor = 0;
@@ -31,23 +31,39 @@ std::vector<int> parse_radix_factors(std::string_view list) {
   }
 }
 
-RadixK::RadixK(std::string_view factors)
-    : name_(fmt::format("radix-k:{}", factors)), schedule_(parse_radix_factors(factors)) {}
+}  // namespace
 
 template <typename Pixel>
-bool RadixKSchedule<Pixel>::fits(int ranks) const {
-  if (factors_.empty()) return ranks >= 1;
-  std::int64_t product = 1;
-  for (const int factor : factors_) product = std::min<std::int64_t>(product * factor, std::int64_t{1} << 31U);
-  return product == ranks;
+TileRun SwapRounds<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                               const Activity& activity, std::span<const int> factors, int member,
+                               const std::function<int(int)>& rank_of) {
+  TileRun mine{0, tiles.size()};
+  int stride = 1;
+  for (const int factor : factors) {
+    const int digit = member / stride % factor;
+    const std::vector<TileRun> parts = activity.cut(mine, factor);
+    if (sent_.size() < static_cast<std::size_t>(factor)) sent_.resize(static_cast<std::size_t>(factor));
+    std::vector<Outgoing> out;
+    std::vector<int> from;
+    // Everyone starts with the member after it, so that not all send to the same one first.
+    for (int step = 1; step < factor; ++step) {
+      const int other = (digit + step) % factor;
+      const int peer = rank_of(member + (other - digit) * stride);
+      const auto index = static_cast<std::size_t>(other);
+      const TileRun part = parts[index];
+      sent_[index].start();
+      sent_[index].add(layer, tiles.subspan(part.first, part.count));
+      out.push_back(sent_[index].to(peer));
+      from.push_back(peer);
+    }
+    mine = parts[static_cast<std::size_t>(digit)];
+    merger_.exchange(comm, out, from, layer, tiles.subspan(mine.first, mine.count));
+    stride *= factor;
+  }
+  return mine;
 }
 
-template <typename Pixel>
-std::vector<int> RadixKSchedule<Pixel>::factors(int ranks) const {
-  return factors_.empty() ? RadixK::factors_for(ranks) : factors_;
-}
-
-std::vector<int> RadixK::factors_for(int ranks) {
+std::vector<int> radix_factors(int ranks) {
   std::vector<int> primes;
   for (int prime = 2; ranks > 1; ++prime) {
     for (; ranks % prime == 0; ranks /= prime) primes.push_back(prime);
@@ -56,7 +72,7 @@ std::vector<int> RadixK::factors_for(int ranks) {
   std::ranges::reverse(primes);
   std::vector<int> factors;
   for (const int prime : primes) {
-    const auto room = std::ranges::find_if(factors, [&](int factor) { return factor * prime <= kLargestGroup; });
+    const auto room = std::ranges::find_if(factors, [&](int factor) { return factor * prime <= kMaxGroup; });
     if (room == factors.end()) {
       factors.push_back(prime);
     } else {
@@ -68,24 +84,41 @@ std::vector<int> RadixK::factors_for(int ranks) {
 }
 
 template <typename Pixel>
-Composited RadixKSchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
-                                      std::span<const int> /*shown_by*/) {
+RadixK<Pixel>::RadixK(std::string_view written_name) {
+  const std::size_t colon = written_name.find(':');
+  if (colon != std::string_view::npos) factors_ = parse_factors(written_name.substr(colon + 1));
+}
+
+template <typename Pixel>
+bool RadixK<Pixel>::fits(int ranks) const {
+  if (factors_.empty()) return ranks >= 1;
+  std::int64_t product = 1;
+  for (const int factor : factors_) product = std::min<std::int64_t>(product * factor, std::int64_t{1} << 31U);
+  return product == ranks;
+}
+
+template <typename Pixel>
+std::optional<Prediction> RadixK<Pixel>::predict(const Costs& costs, const Load& load) const {
+  return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, factors(load.ranks))};
+}
+
+template <typename Pixel>
+Composited RadixK<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                              std::span<const int> /*shown_by*/) {
   const Activity activity = share_activity(comm, layer, tiles);
   return owning(tiles, rounds_.run(comm, layer, tiles, activity, factors(comm.size()), comm.rank(),
                                    [](int member) { return member; }));
 }
 
-template class RadixKSchedule<Key>;
-template class RadixKSchedule<Rgba8Premultiplied>;
-template class RadixKSchedule<RgbaPremultiplied>;
+template class SwapRounds<Key>;
+template class SwapRounds<Rgba8Premultiplied>;
+template class SwapRounds<RgbaPremultiplied>;
+template class RadixK<Key>;
+template class RadixK<Rgba8Premultiplied>;
+template class RadixK<RgbaPremultiplied>;
 
-Composited RadixK::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                             std::span<const int> shown_by) {
-  return schedule_.run(comm, layer, tiles, shown_by);
-}
-
-std::optional<Prediction> RadixK::predict(const Costs& costs, const Load& load) const {
-  return Prediction{sharing_cost(costs) + swap_rounds_cost(costs, load, schedule_.factors(load.ranks))};
+Strategy radix_k_strategy() {
+  return scheduled_strategy<RadixK>("radix-k");
 }
 
 }  // namespace hpr

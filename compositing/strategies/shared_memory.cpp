@@ -1,5 +1,3 @@
-#include "compositing/strategies/shared_memory.h"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -9,6 +7,9 @@
 #include "cluster/transport/communicator_wrappers.h"
 #include "compositing/activity.h"
 #include "compositing/kernels.h"
+#include "compositing/strategies/direct_send.h"
+#include "compositing/strategies/radix_k.h"
+#include "compositing/strategies/strategy.h"
 #include "compositing/tile_codec.h"
 #include "core/error.h"
 
@@ -18,8 +19,7 @@ namespace {
 /// Tiles a rank takes at a time: few enough that the last ones end together, enough to seldom meet at the counter.
 constexpr std::size_t kTilesATurn = 4;
 
-}  // namespace
-
+/// Which ranks are on which host, and the counter by which those of this host share their work.
 class HostRanks {
  public:
   explicit HostRanks(Communicator& comm) : comm_(comm), control_(comm.share(sizeof(Control))) {
@@ -110,8 +110,6 @@ class HostRanks {
   bool took_share_ = false;
 };
 
-namespace {
-
 /// Which tiles the ranks of this host have drawn into.
 template <typename Pixel>
 Activity look_at(std::span<const TileLayer<Pixel>> layers, std::span<const std::size_t> tiles) {
@@ -198,12 +196,24 @@ std::vector<std::size_t> places_of(std::span<const int> order, std::span<const i
   return places;
 }
 
-}  // namespace
+/// The messages and merges of the strategy, for any kind of pixel.
+template <typename Pixel>
+class SharedMemorySchedule {
+ public:
+  /// `order`: the ranks from front to back, which only colours ask for; keys have none.
+  Composited run(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                 std::span<const int> order, std::span<const int> shown_by);
 
-template <typename Pixel>
-SharedMemorySchedule<Pixel>::SharedMemorySchedule() = default;
-template <typename Pixel>
-SharedMemorySchedule<Pixel>::~SharedMemorySchedule() = default;
+ private:
+  Composited merge_on_host(Communicator& comm, TileLayer<Pixel>& shared, std::span<const std::size_t> tiles,
+                           std::span<const int> order, std::span<const int> shown_by);
+  Composited merge_between_hosts(TileLayer<Pixel>& shared, const Composited& of_host, std::span<const int> order);
+
+  std::unique_ptr<HostRanks> host_;  ///< of the communicator of the last call
+  TileLayer<Pixel> copy_;            ///< of layers that live elsewhere
+  RadixK<Pixel> between_hosts_;      ///< of a run of the order on each
+  DirectSend<Pixel> out_of_order_;   ///< where the order runs to and fro between hosts
+};
 
 template <typename Pixel>
 Composited SharedMemorySchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>& layer,
@@ -288,24 +298,66 @@ Composited SharedMemorySchedule<Pixel>::merge_between_hosts(TileLayer<Pixel>& sh
   return between_hosts_.run(ordered, shared, of_host.tiles, {});
 }
 
-template class SharedMemorySchedule<Key>;
-template class SharedMemorySchedule<Rgba8Premultiplied>;
-template class SharedMemorySchedule<RgbaPremultiplied>;
+/// The ranks of a host merge each other's layers where they lie, without a message: whoever is free takes the next
+/// tiles, reads them in all layers and writes the nearest keys into the layer of the rank that is to own them, straight
+/// where they are shown when that rank is on this host. Between hosts, the ranks of like number on each host then
+/// composite what they own by radix-k: two levels, each as fast as its medium.
+///
+/// In place when the layers of all ranks live in the memory of `comm`'s share(); else, also on all ranks, through a
+/// copy that does.
+///
+/// Cost on one host: two barriers; every drawn tile is read once and every tile of the result written once, shared
+/// among the ranks as they find time, so that ranks that wait for a core hold nobody up.
+class SharedMemory final : public Compositor {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "shared-memory"; }
+  [[nodiscard]] bool merges_in_place() const override { return true; }
 
-Composited SharedMemory::composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                                   std::span<const int> shown_by) {
-  return schedule_.run(comm, layer, tiles, {}, shown_by);
-}
+  [[nodiscard]] std::optional<Prediction> predict(const Costs& costs, const Load& load) const override {
+    if (!costs.read_byte) return std::nullopt;
+    const double per_host = load.drawn_tiles / costs.hosts * *costs.read_byte;
+    double seconds = 2.0 * costs.meet + per_host;
+    if (costs.hosts == 1) return Prediction{seconds, false};
+    const int columns = std::max(1, load.ranks / costs.hosts);
+    seconds +=
+        2.0 * sharing_cost(costs) + swap_rounds_cost(costs, load, radix_factors(costs.hosts), columns, 1.0 / columns);
+    return Prediction{seconds};
+  }
 
-std::optional<Prediction> SharedMemory::predict(const Costs& costs, const Load& load) const {
-  if (!costs.read_byte) return std::nullopt;
-  const double per_host = load.drawn_tiles / costs.hosts * *costs.read_byte;
-  double seconds = 2.0 * costs.meet + per_host;
-  if (costs.hosts == 1) return Prediction{seconds, false};
-  const int columns = std::max(1, load.ranks / costs.hosts);
-  seconds += 2.0 * sharing_cost(costs) +
-             swap_rounds_cost(costs, load, RadixK::factors_for(costs.hosts), columns, 1.0 / columns);
-  return Prediction{seconds};
+  using Compositor::composite;
+  Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                       std::span<const int> shown_by) override {
+    return schedule_.run(comm, layer, tiles, {}, shown_by);
+  }
+
+ private:
+  SharedMemorySchedule<Key> schedule_;
+};
+
+/// The strategy for colours. The schedule looks after the order itself: where ranks are does not change with it.
+template <typename Pixel>
+class SharedMemoryBlender final : public Blender<Pixel> {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "shared-memory"; }
+  [[nodiscard]] bool fits(int ranks) const override { return ranks >= 1; }
+  [[nodiscard]] bool merges_in_place() const override { return true; }
+
+  Composited blend(Communicator& comm, TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                   std::span<const int> order, std::span<const int> shown_by) override {
+    (void)RenumberedCommunicator(comm, order);  // refuses what is no order
+    return schedule_.run(comm, layer, tiles, order, shown_by);
+  }
+
+ private:
+  SharedMemorySchedule<Pixel> schedule_;
+};
+
+}  // namespace
+
+Strategy shared_memory_strategy() {
+  return {"shared-memory", make_implementation<Compositor, SharedMemory>,
+          make_implementation<Blender<Rgba8Premultiplied>, SharedMemoryBlender<Rgba8Premultiplied>>,
+          make_implementation<Blender<RgbaPremultiplied>, SharedMemoryBlender<RgbaPremultiplied>>};
 }
 
 }  // namespace hpr

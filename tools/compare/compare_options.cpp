@@ -189,9 +189,9 @@ void CompareOptions::check_strategy(const std::string& name) const {
     if (!scene.empty()) return;
     throw Error(ExitCode::Usage, "sort-first draws a scene, and there is none", "name a scene instead of --synthetic");
   }
-  std::vector<std::string> compositors = names_of(all_compositors());
-  if (name.starts_with("radix-k:") || std::ranges::find(compositors, name) != compositors.end()) return;
-  std::vector<std::string> choices = nearest ? std::move(compositors) : names_of(all_blenders<RgbaPremultiplied>());
+  if (has_compositor(name)) return;
+  std::vector<std::string> choices =
+      nearest ? names_of(all_compositors()) : names_of(all_blenders<RgbaPremultiplied>());
   if (nearest && !scene.empty()) choices.emplace_back(kSortFirst);
   choices.emplace_back("all");
   throw Error(ExitCode::Usage, fmt::format("no compositing strategy is named '{}'", printable(name)),
