@@ -1,8 +1,7 @@
 #include "scene/scene_files.h"
 
-#include <nlohmann/json.hpp>
-
 #include "core/error.h"
+#include "core/json.h"
 #include "scene/gltf/scan.h"
 #include "scene/gltf/uri.h"
 
@@ -10,12 +9,11 @@ namespace hpr {
 namespace {
 
 /// The file a buffer or picture says it lies in, if any.
-void add_named(const nlohmann::json& item, const std::filesystem::path& folder,
-               std::vector<std::filesystem::path>& files) {
-  const auto uri = item.is_object() ? item.find("uri") : item.end();
-  if (uri == item.end() || !uri->is_string() || is_data_uri(uri->get_ref<const std::string&>())) return;
+void add_named(const Json& item, const std::filesystem::path& folder, std::vector<std::filesystem::path>& files) {
+  const Json& uri = item["uri"];
+  if (!uri.is_string() || is_data_uri(uri.string())) return;
   try {
-    files.push_back(folder / jailed_path(uri->get_ref<const std::string&>(), ""));
+    files.push_back(folder / jailed_path(uri.string(), ""));
   } catch (const Error&) {  // load_scene tells
   }
 }
@@ -29,11 +27,10 @@ std::vector<std::filesystem::path> files_of_scene(const std::string& source, con
   try {
     GltfContext context(source, limits);
     const GltfFile file = open_gltf(path, context);
-    const nlohmann::json root = nlohmann::json::parse(file.parts.json, nullptr, false);
-    if (!root.is_object()) return files;
+    const Json root = Json::try_parse(file.parts.json).value_or(Json());
     for (const char* const list : {"buffers", "images"}) {
-      if (!root.contains(list) || !root[list].is_array()) continue;
-      for (const nlohmann::json& item : root[list]) add_named(item, path.parent_path(), files);
+      if (!root[list].is_array()) continue;
+      for (const Json& item : root[list].elements()) add_named(item, path.parent_path(), files);
     }
   } catch (const Error&) {  // load_scene tells
   }

@@ -21,12 +21,12 @@ std::vector<std::byte> GltfBuffers::resolve(const std::string& uri, const std::s
   return bytes;
 }
 
-void GltfBuffers::load(const nlohmann::json& root, GltfContext& context) {
-  const auto found = root.find("buffers");
-  if (found == root.end()) return;
+void GltfBuffers::load(const Json& root, GltfContext& context) {
+  const Json* const found = root.find("buffers");
+  if (found == nullptr) return;
   owned_.resize(found->size());
   for (std::size_t i = 0; i < found->size(); ++i) {
-    const nlohmann::json& buffer = (*found)[i];
+    const Json& buffer = (*found)[i];
     const std::string where = fmt::format("buffers[{}]", i);
     std::span<const std::byte> bytes;
     if (buffer.contains("uri")) {

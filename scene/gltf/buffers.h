@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/json.h"
 #include "scene/gltf/context.h"
 #include "scene/gltf/scan.h"
 
@@ -19,7 +19,7 @@ class GltfBuffers {
   GltfBuffers(std::filesystem::path folder, const GltfParts& parts) : folder_(std::move(folder)), parts_(&parts) {}
 
   /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength. Throws Error.
-  void load(const nlohmann::json& root, GltfContext& context);
+  void load(const Json& root, GltfContext& context);
 
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   [[nodiscard]] std::span<const std::byte> operator[](std::size_t buffer) const { return bytes_[buffer]; }

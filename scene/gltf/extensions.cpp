@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/text.h"
+#include "scene/gltf/item.h"
 #include "scene/gltf/json.h"
 #include "scene/gltf/schema_check.h"
 
@@ -37,9 +38,9 @@ bool contains(const auto& names, std::string_view name) {
 std::set<std::string> names_in(const GltfItem& root, const char* key) {
   std::set<std::string> names;
   if (!root.has(key)) return names;
-  const nlohmann::json& list = root.value()[key];
+  const Json& list = root.value()[key];
   if (!list.is_array()) root.fail(key, "must be an array of names");
-  for (const auto& entry : list) {
+  for (const Json& entry : list.elements()) {
     if (!entry.is_string()) root.fail(key, "must be an array of names");
     const auto name = entry.get<std::string>();
     if (!names.insert(name).second) root.warn(key, fmt::format("names {} twice", printable(name)));
@@ -52,7 +53,9 @@ void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& decla
   root.each("materials", Presence::Optional, [&](const GltfItem& material) {
     const auto extensions = material.object("extensions");
     if (!extensions) return;
-    for (const auto& [name, value] : extensions->value().items()) {
+    std::set<std::string> names;
+    for (const auto& [name, value] : extensions->value().members()) names.insert(name);
+    for (const std::string& name : names) {
       if (declared.contains(name) || contains(kSupported, name) || name == kStandsIn) continue;
       root.warn("materials", fmt::format("{} is ignored", printable(name)));  // once, however many have it
     }
@@ -61,7 +64,7 @@ void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& decla
 
 }  // namespace
 
-void check_extensions(nlohmann::json& document, GltfContext& context) {
+void check_extensions(Json& document, GltfContext& context) {
   const GltfItem root(context, document);
   const std::set<std::string> used = names_in(root, "extensionsUsed");
   const std::set<std::string> required = names_in(root, "extensionsRequired");

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/json.h"
 #include "core/text.h"
 #include "scene/gltf/accessors.h"
 #include "scene/gltf/buffers.h"
-#include "scene/gltf/json.h"
+#include "scene/gltf/item.h"
 #include "scene/gltf/materials.h"
 #include "scene/gltf/mesh.h"
 #include "scene/gltf/nodes.h"
@@ -24,14 +24,14 @@ namespace {
 
 /// tinygltf's model of the document, without its buffers and pictures: those are read by us alone, so that the library
 /// never opens a file or decodes anything.
-tinygltf::Model parse_model(nlohmann::json root, const GltfContext& context) {
+tinygltf::Model parse_model(Json root, const GltfContext& context) {
   root.erase("buffers");
   root.erase("images");
   // tinygltf refuses indices without a bufferView (zeros, or sparse ones); it does not get to see any.
   std::vector<int> indices;
-  if (root.contains("meshes")) {
-    for (nlohmann::json& mesh : root["meshes"]) {
-      for (nlohmann::json& primitive : mesh["primitives"]) {
+  if (Json* const meshes = root.find("meshes")) {
+    for (Json& mesh : meshes->elements()) {
+      for (Json& primitive : mesh["primitives"].elements()) {
         indices.push_back(primitive.contains("indices") ? primitive["indices"].get<int>() : -1);
         primitive.erase("indices");
       }
@@ -220,14 +220,14 @@ void check_skins(const GltfData& data) {
 Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
   GltfContext context(path.string(), limits);
   const GltfFile file = open_gltf(path, context);
-  nlohmann::json root = parse_json(file.parts.json, context);
+  Json root = parse_json(file.parts.json, context);
   if (!root.is_object()) context.fail("", "this is no glTF: the JSON is not an object");
   check_extensions(root, context);
   check_shape(root, context);
 
   GltfBuffers buffers(path.parent_path(), file.parts);
   buffers.load(root, context);
-  const nlohmann::json images = root.contains("images") ? std::move(root["images"]) : nlohmann::json();
+  const Json images = root.contains("images") ? std::move(root["images"]) : Json();
   const tinygltf::Model model = parse_model(std::move(root), context);
   const GltfData data(model, buffers, context);
   check_meshes(data);

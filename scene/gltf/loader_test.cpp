@@ -11,7 +11,6 @@
 namespace hpr {
 namespace {
 
-using nlohmann::json;
 using test::load;
 using test::square;
 using test::triangle;
@@ -100,8 +99,11 @@ TEST(GltfLoader, SparseAccessorsReplaceElementsAlsoOfZeros) {
 TEST(GltfLoader, TransformsComposeFromTheRootDown) {
   auto document = triangle();
   const double h = std::numbers::sqrt2 / 2.0;  // a quarter turn about z
-  document.json["nodes"] = {{{"children", {1}}, {"translation", {10, 0, 0}}, {"rotation", {0, 0, h, h}}},
-                            {{"mesh", 0}, {"scale", {2, 3, 4}}, {"translation", {1, 0, 0}}}};
+  document.json["nodes"] =
+      Json::array({{{"children", Json::array({1})},
+                    {"translation", Json::array({10, 0, 0})},
+                    {"rotation", Json::array({0, 0, h, h})}},
+                   {{"mesh", 0}, {"scale", Json::array({2, 3, 4})}, {"translation", Json::array({1, 0, 0})}}});
   const Scene scene = load(document.json);
   ASSERT_EQ(scene.instances.size(), 1U);
   const glm::dvec3 p = world_position(scene.instances[0], glm::vec3(1, 1, 1));
@@ -110,7 +112,7 @@ TEST(GltfLoader, TransformsComposeFromTheRootDown) {
 
 TEST(GltfLoader, ARotationThatIsNoUnitQuaternionTurnsAndDoesNotScale) {
   auto document = triangle();
-  document.node()["rotation"] = {0, 2, 0, 2};
+  document.node()["rotation"] = Json::array({0, 2, 0, 2});
   const Scene scene = load(document.json);
   EXPECT_TRUE(test::warns_of(scene, "no unit quaternion"));
   EXPECT_NEAR(glm::distance(glm::dvec3(scene.instances[0].to_world[0]), glm::dvec3(0, 0, -1)), 0.0, 1e-12);
@@ -118,8 +120,8 @@ TEST(GltfLoader, ARotationThatIsNoUnitQuaternionTurnsAndDoesNotScale) {
 
 TEST(GltfLoader, NodesThatShareAMeshAreInstances) {
   auto document = triangle();
-  document.json["nodes"] = {{{"mesh", 0}}, {{"mesh", 0}, {"translation", {1, 2, 3}}}};
-  document.json["scenes"][0]["nodes"] = {0, 1};
+  document.json["nodes"].push_back({{"mesh", 0}, {"translation", Json::array({1, 2, 3})}});
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   const Scene scene = load(document.json);
   EXPECT_EQ(scene.meshes.size(), 1U);
   ASSERT_EQ(scene.instances.size(), 2U);
@@ -134,8 +136,10 @@ constexpr int kChainDepth = 100'000;
 
 TEST(GltfLoader, AVeryLongChainOfNodesLoads) {
   auto document = triangle();
-  auto& nodes = document.json["nodes"] = json::array();
-  for (int i = 0; i < kChainDepth; ++i) nodes.push_back({{"children", {i + 1}}, {"translation", {1, 0, 0}}});
+  auto& nodes = document.json["nodes"] = Json::array();
+  for (int i = 0; i < kChainDepth; ++i) {
+    nodes.push_back({{"children", Json::array({i + 1})}, {"translation", Json::array({1, 0, 0})}});
+  }
   nodes.push_back({{"mesh", 0}});
   const Scene scene = load(document.json);
   EXPECT_EQ(scene.instances.at(0).to_world[3].x, kChainDepth);
@@ -143,16 +147,16 @@ TEST(GltfLoader, AVeryLongChainOfNodesLoads) {
 
 TEST(GltfLoader, LightsAndCamerasStandWhereTheirNodesPutThem) {
   auto document = triangle();
-  document.json["extensions"]["KHR_lights_punctual"]["lights"] = {
-      {{"type", "spot"}, {"intensity", 5}, {"color", {1, 0.5, 0}}, {"spot", {{"outerConeAngle", 0.5}}}}};
-  document.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
+  document.json["extensions"]["KHR_lights_punctual"]["lights"].push_back(
+      {{"type", "spot"}, {"intensity", 5}, {"color", Json::array({1, 0.5, 0})}, {"spot", {{"outerConeAngle", 0.5}}}});
+  document.json["cameras"].push_back({{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}});
   const double h = std::numbers::sqrt2 / 2.0;  // a quarter turn about y: -z becomes -x
   document.json["nodes"].push_back({{"camera", 0},
-                                    {"translation", {1, 2, 3}},
-                                    {"rotation", {0, h, 0, h}},
-                                    {"scale", {2, 3, 4}},
+                                    {"translation", Json::array({1, 2, 3})},
+                                    {"rotation", Json::array({0, h, 0, h})},
+                                    {"scale", Json::array({2, 3, 4})},
                                     {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
-  document.json["scenes"][0]["nodes"] = {0, 1};
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   const Scene scene = load(document.json);
   ASSERT_EQ(scene.lights.size(), 1U);
   EXPECT_EQ(scene.lights[0].type, LightType::Spot);
@@ -167,11 +171,11 @@ TEST(GltfLoader, LightsAndCamerasStandWhereTheirNodesPutThem) {
 }
 
 /// A document whose one node has this light.
-Scene load_light(const json& light) {
+Scene load_light(const Json& light) {
   auto document = triangle();
-  document.json["extensions"]["KHR_lights_punctual"]["lights"] = {light};
+  document.json["extensions"]["KHR_lights_punctual"]["lights"].push_back(light);
   document.json["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
-  document.json["scenes"][0]["nodes"] = {0, 1};
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   return load(document.json);
 }
 
@@ -182,7 +186,7 @@ TEST(GltfLoader, ExtrasGiveLightsAnExtent) {
   EXPECT_EQ(sun.lights.at(0).angular_radius_radians, 0.25F);
   EXPECT_EQ(sun.lights.at(0).radius, 0.0);
   EXPECT_TRUE(sun.warnings.empty());
-  for (const json& radius : {json(-1.0), json("wide"), json(1e300), json(nullptr)}) {
+  for (const Json& radius : {Json(-1.0), Json("wide"), Json(1e300), Json(nullptr)}) {
     const Scene scene = load_light({{"type", "point"}, {"extras", {{"radius", radius}}}});
     EXPECT_EQ(scene.lights.at(0).radius, 0.0) << radius;
     ASSERT_EQ(scene.warnings.size(), 1U) << radius;
@@ -192,7 +196,7 @@ TEST(GltfLoader, ExtrasGiveLightsAnExtent) {
 
 TEST(GltfLoader, MaterialsKeepTheirFactorsAndExtensions) {
   auto document = triangle();
-  document.json["materials"] = json::parse(R"([{"name": "glass", "doubleSided": true, "alphaMode": "MASK",
+  document.json["materials"] = Json::parse(R"([{"name": "glass", "doubleSided": true, "alphaMode": "MASK",
     "alphaCutoff": 0.25, "emissiveFactor": [1, 0.5, 0],
     "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.5, "roughnessFactor": 7},
     "extensions": {"KHR_materials_ior": {"ior": 1.3}, "KHR_materials_transmission": {"transmissionFactor": 0.9},
@@ -216,7 +220,7 @@ TEST(GltfLoader, MaterialsKeepTheirFactorsAndExtensions) {
 
 TEST(GltfLoader, PrimitivesWithoutAMaterialGetTheDefaultOne) {
   auto document = triangle();
-  document.json["materials"] = {{{"name", "unused"}}};
+  document.json["materials"].push_back({{"name", "unused"}});
   const Scene scene = load(document.json);
   ASSERT_EQ(scene.materials.size(), 2U);
   EXPECT_EQ(scene.meshes[0].material, 1U);
@@ -225,10 +229,10 @@ TEST(GltfLoader, PrimitivesWithoutAMaterialGetTheDefaultOne) {
 TEST(GltfLoader, MorphTargetsMoveVerticesByTheNodesWeights) {
   auto document = triangle();
   const int deltas = document.add_vec3({0, 0, 1, 0, 0, 1, 0, 0, 1});
-  document.primitive()["targets"] = {{{"POSITION", deltas}}};
-  document.json["meshes"][0]["weights"] = {0.5};
+  document.primitive()["targets"].push_back({{"POSITION", deltas}});
+  document.json["meshes"][0]["weights"] = Json::array({0.5});
   EXPECT_EQ(load(document.json).meshes[0].positions[0], glm::vec3(0, 0, 0.5F));
-  document.node()["weights"] = {2};
+  document.node()["weights"] = Json::array({2});
   EXPECT_EQ(load(document.json).meshes[0].positions[0], glm::vec3(0, 0, 2));
 }
 
@@ -239,15 +243,15 @@ TEST(GltfLoader, MorphTargetsMoveColoursAndTextureCoordinatesToo) {
   attributes["COLOR_0"] = document.add_vec3({1, 0, 0, 1, 0, 0, 1, 0, 0});
   const int shift = document.add_vec2({0.5F, 2, 0, 0, 0, 0});
   const int green = document.add_vec3({-1, 1, 0, 0, 0, 5, 0, 0, 0});
-  document.primitive()["targets"] = {{{"TEXCOORD_1", shift}, {"COLOR_0", green}, {"JOINTS_0", shift}}};
-  document.json["meshes"][0]["weights"] = {1};
+  document.primitive()["targets"].push_back({{"TEXCOORD_1", shift}, {"COLOR_0", green}, {"JOINTS_0", shift}});
+  document.json["meshes"][0]["weights"] = Json::array({1});
   const Scene scene = load(document.json);
   EXPECT_EQ(scene.meshes[0].uvs[1][0], glm::vec2(0.5F, 2));
   EXPECT_EQ(scene.meshes[0].uvs[1][1], glm::vec2(1, 0));
   EXPECT_EQ(scene.meshes[0].colors[0], glm::vec4(0, 1, 0, 1));
   EXPECT_EQ(scene.meshes[0].colors[1], glm::vec4(1, 0, 1, 1)) << "brought into 0 to 1";
   EXPECT_TRUE(test::warns_of(scene, "JOINTS_0")) << "no attribute that targets move";
-  document.primitive()["targets"] = {{{"TEXCOORD_1", green}}};
+  document.primitive()["targets"] = Json::array({{{"TEXCOORD_1", green}}});
   EXPECT_THROW((void)load(document.json), Error);
 }
 
@@ -257,11 +261,11 @@ TEST(GltfLoader, SkinsPutVerticesWhereTheirJointsAre) {
       document.add(std::vector<std::uint8_t>{0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, "VEC4", 5121, 3);
   document.primitive()["attributes"]["WEIGHTS_0"] =
       document.add(std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 0.5F, 0.5F, 0, 0}, "VEC4", 5126, 3);
-  document.json["nodes"] = {{{"mesh", 0}, {"skin", 0}, {"translation", {100, 100, 100}}},
-                            {{"translation", {0, 0, 1}}},
-                            {{"translation", {0, 0, 3}}}};
-  document.json["scenes"][0]["nodes"] = {0, 1, 2};
-  document.json["skins"] = {{{"joints", {1, 2}}}};
+  document.json["nodes"] = Json::array({{{"mesh", 0}, {"skin", 0}, {"translation", Json::array({100, 100, 100})}},
+                                        {{"translation", Json::array({0, 0, 1})}},
+                                        {{"translation", Json::array({0, 0, 3})}}});
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1, 2});
+  document.json["skins"].push_back({{"joints", Json::array({1, 2})}});
   const Scene scene = load(document.json);
   EXPECT_EQ(scene.instances.at(0).to_world, glm::dmat4(1.0));
   const auto& positions = scene.meshes.at(0).positions;
@@ -276,9 +280,11 @@ TEST(GltfLoader, WeightsOfASkinThatDoNotAddUpToOneAreScaled) {
       document.add(std::vector<std::uint8_t>{0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0}, "VEC4", 5121, 3);
   document.primitive()["attributes"]["WEIGHTS_0"] =
       document.add(std::vector<float>{1, 3, 0, 0, 0.25F, 0.25F, 0, 0, 0, 0.5F, 0, 0}, "VEC4", 5126, 3);
-  document.json["nodes"] = {{{"mesh", 0}, {"skin", 0}}, {{"translation", {0, 0, 0}}}, {{"translation", {0, 0, 4}}}};
-  document.json["scenes"][0]["nodes"] = {0, 1, 2};
-  document.json["skins"] = {{{"joints", {1, 2}}}};
+  document.json["nodes"] = Json::array({{{"mesh", 0}, {"skin", 0}},
+                                        {{"translation", Json::array({0, 0, 0})}},
+                                        {{"translation", Json::array({0, 0, 4})}}});
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1, 2});
+  document.json["skins"].push_back({{"joints", Json::array({1, 2})}});
   const Scene scene = load(document.json);
   const auto& positions = scene.meshes.at(0).positions;
   EXPECT_EQ(positions[0], glm::vec3(0, 0, 3));
@@ -298,7 +304,7 @@ TEST(GltfLoader, TheLeastNormalizedIntegerIsMinusOne) {
       document.add(std::vector<std::int8_t>{0, 0, -128, 0, 0, 0, -127, 0, 0, 0, 127, 0}, "VEC3", 5120, 3);
   document.json["accessors"][static_cast<std::size_t>(normals)]["normalized"] = true;
   document.json["bufferViews"][static_cast<std::size_t>(normals)]["byteStride"] = 4;
-  document.json["extensionsUsed"] = {"KHR_mesh_quantization"};
+  document.json["extensionsUsed"] = Json::array({"KHR_mesh_quantization"});
   document.primitive()["attributes"]["NORMAL"] = normals;
   const int uv = document.add(std::vector<std::int8_t>{-128, 127, 0, 0, 0, 127, 0, 0, -127, 0, 0, 0}, "VEC2", 5120, 3);
   document.json["accessors"][static_cast<std::size_t>(uv)]["normalized"] = true;
@@ -312,9 +318,10 @@ TEST(GltfLoader, TheLeastNormalizedIntegerIsMinusOne) {
 
 TEST(GltfLoader, ACameraUnderAShearStillHasAxesAtRightAngles) {
   auto document = triangle();
-  document.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
-  document.json["nodes"].push_back({{"camera", 0}, {"matrix", {1, 0, 0, 0, 0.5, 2, 1, 0, 0, 0, 3, 0, 0, 0, 0, 1}}});
-  document.json["scenes"][0]["nodes"] = {0, 1};
+  document.json["cameras"].push_back({{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}});
+  document.json["nodes"].push_back(
+      {{"camera", 0}, {"matrix", Json::array({1, 0, 0, 0, 0.5, 2, 1, 0, 0, 0, 3, 0, 0, 0, 0, 1})}});
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   const glm::dmat3 axes = load(document.json).cameras.at(0).axes;
   EXPECT_NEAR(glm::distance(axes[2], glm::dvec3(0, 0, 1)), 0.0, 1e-12) << "where it looks stays";
   for (int i = 0; i < 3; ++i) {
@@ -326,13 +333,13 @@ TEST(GltfLoader, ACameraUnderAShearStillHasAxesAtRightAngles) {
 TEST(GltfLoader, TextureTransformsFollowTheExampleOfTheExtension) {
   auto document = triangle();
   // A 1 x 1 picture: an 8-bit RGB PNG.
-  document.json["images"] = {
+  document.json["images"].push_back(
       {{"uri",
         "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElF"
-        "TkSuQmCC"}}};
-  document.json["textures"] = {{{"source", 0}}};
+        "TkSuQmCC"}});
+  document.json["textures"].push_back({{"source", 0}});
   document.primitive()["attributes"]["TEXCOORD_0"] = document.add_vec2({0, 0, 1, 0, 0, 1});
-  document.json["materials"] = json::parse(R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions":
+  document.json["materials"] = Json::parse(R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions":
     {"KHR_texture_transform": {"offset": [0, 1], "rotation": 1.57079632679, "scale": [0.5, 0.5]}}}}}])");
   document.primitive()["material"] = 0;
   const Scene scene = load(document.json);
@@ -351,10 +358,10 @@ TEST(GltfLoader, TextureTransformsFollowTheExampleOfTheExtension) {
 
 TEST(GltfLoader, ABrokenPictureIsLeftOutWithAWarning) {
   auto document = triangle();
-  document.json["images"] = {{{"uri", "data:image/png;base64,AAAA"}}};
-  document.json["textures"] = {{{"source", 0}}};
+  document.json["images"].push_back({{"uri", "data:image/png;base64,AAAA"}});
+  document.json["textures"].push_back({{"source", 0}});
   document.primitive()["attributes"]["TEXCOORD_0"] = document.add_vec2({0, 0, 1, 0, 0, 1});
-  document.json["materials"] = {{{"emissiveTexture", {{"index", 0}}}}};
+  document.json["materials"].push_back({{"emissiveTexture", {{"index", 0}}}});
   document.primitive()["material"] = 0;
   const Scene scene = load(document.json);
   EXPECT_FALSE(scene.materials[0].emissive_texture.present());
@@ -363,7 +370,7 @@ TEST(GltfLoader, ABrokenPictureIsLeftOutWithAWarning) {
 
 TEST(GltfLoader, WhatLiesTooFarOutIsLeftOutWithAWarning) {
   auto document = triangle();
-  document.node()["scale"] = {1e30, 1e30, 1e30};
+  document.node()["scale"] = Json::array({1e30, 1e30, 1e30});
   const Scene scene = load(document.json);
   EXPECT_TRUE(scene.instances.empty());
   EXPECT_TRUE(test::warns_of(scene, "1e18"));

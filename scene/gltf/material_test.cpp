@@ -9,33 +9,32 @@
 namespace hpr {
 namespace {
 
-using nlohmann::json;
 using test::load;
 using test::refusal;
 using test::triangle;
 
 /// A triangle with texture coordinates of both sets, one picture of 1 x 1 texels as texture 0, and `material`.
-test::Document dressed(const json& material) {
+test::Document dressed(const Json& material) {
   auto document = triangle();
-  document.json["images"] = {
+  document.json["images"].push_back(
       {{"uri",
         "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElF"
-        "TkSuQmCC"}}};
-  document.json["textures"] = {{{"source", 0}}};
+        "TkSuQmCC"}});
+  document.json["textures"].push_back({{"source", 0}});
   document.primitive()["attributes"]["TEXCOORD_0"] = document.add_vec2({0, 0, 1, 0, 0, 1});
   document.primitive()["attributes"]["TEXCOORD_1"] = document.add_vec2({0, 0, 2, 0, 0, 2});
-  document.json["materials"] = {material};
+  document.json["materials"].push_back(material);
   document.primitive()["material"] = 0;
   return document;
 }
 
 Material material_of(const char* text) {
-  const Scene scene = load(dressed(json::parse(text)).json);
+  const Scene scene = load(dressed(Json::parse(text)).json);
   EXPECT_EQ(scene.warnings, std::vector<std::string>{});
   return scene.materials.at(0);
 }
 
-void expect_refused(const json& document, const std::string& place) {
+void expect_refused(const Json& document, const std::string& place) {
   const test::Refusal found = refusal(document);
   EXPECT_EQ(found.code, ExitCode::BadInput) << place << ": " << found.message;
   EXPECT_NE(found.message.find(place), std::string::npos) << found.message;
@@ -87,8 +86,9 @@ TEST(GltfMaterial, UnlitIsAnExtensionWithoutMembers) {
 
 TEST(GltfMaterial, SupportedExtensionsAreNotWarnedOf) {
   auto document = triangle();
-  document.json["extensionsUsed"] = {"KHR_materials_unlit", "KHR_materials_volume", "KHR_materials_transmission"};
-  document.json["extensionsRequired"] = document.json["extensionsUsed"];
+  const Json names = Json::array({"KHR_materials_unlit", "KHR_materials_volume", "KHR_materials_transmission"});
+  document.json["extensionsUsed"] = names;
+  document.json["extensionsRequired"] = names;
   EXPECT_EQ(load(document.json).warnings, std::vector<std::string>{});
 }
 
@@ -108,11 +108,11 @@ TEST(GltfMaterial, WrongTypesAreRefusedByName) {
       {R"({"extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 1}}}})",
        "transmissionTexture.index"},
   };
-  for (const auto& [material, place] : cases) expect_refused(dressed(json::parse(material)).json, place);
+  for (const auto& [material, place] : cases) expect_refused(dressed(Json::parse(material)).json, place);
 }
 
 TEST(GltfMaterial, NumbersOutOfRangeAreBroughtIntoItWithAWarning) {
-  const Scene scene = load(dressed(json::parse(R"({"occlusionTexture": {"index": 0, "strength": 3},
+  const Scene scene = load(dressed(Json::parse(R"({"occlusionTexture": {"index": 0, "strength": 3},
     "extensions": {"KHR_materials_volume": {"thicknessFactor": -1, "attenuationDistance": 0,
                                             "attenuationColor": [2, -1, 0.5]}}})"))
                                .json);
@@ -176,10 +176,10 @@ TEST(GltfMaterial, TangentsAreKeptMadeUnitOrLeftOut) {
 
 TEST(GltfMaterial, SpecularGlossinessAloneIsTakenAsADielectric) {
   auto document = triangle();
-  const nlohmann::json glossy{{"diffuseFactor", {1, 0.5, 0, 0.75}}, {"glossinessFactor", 0.25}};
-  document.json["materials"] = {{{"extensions", {{"KHR_materials_pbrSpecularGlossiness", glossy}}}}};
-  document.json["extensionsUsed"] = {"KHR_materials_pbrSpecularGlossiness"};
-  document.json["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
+  const Json glossy{{"diffuseFactor", Json::array({1, 0.5, 0, 0.75})}, {"glossinessFactor", 0.25}};
+  document.json["materials"].push_back({{"extensions", {{"KHR_materials_pbrSpecularGlossiness", glossy}}}});
+  document.json["extensionsUsed"] = Json::array({"KHR_materials_pbrSpecularGlossiness"});
+  document.json["extensionsRequired"] = Json::array({"KHR_materials_pbrSpecularGlossiness"});
   document.primitive()["material"] = 0;
   const Scene scene = load(document.json);
   EXPECT_EQ(scene.materials[0].base_color, glm::vec4(1, 0.5F, 0, 0.75F));
@@ -195,17 +195,17 @@ TEST(GltfMaterial, SpecularGlossinessAloneIsTakenAsADielectric) {
 
 TEST(GltfMaterial, TangentsMoveWithMorphTargetsAndJoints) {
   auto document = with_floats("TANGENT", "VEC4", {1, 0, 0, -1, 1, 0, 0, -1, 1, 0, 0, -1});
-  document.primitive()["targets"] = {{{"TANGENT", document.add_vec3({-1, 1, 0, 0, 0, 0, 0, 0, 0})}}};
-  document.json["meshes"][0]["weights"] = {1};
+  document.primitive()["targets"].push_back({{"TANGENT", document.add_vec3({-1, 1, 0, 0, 0, 0, 0, 0, 0})}});
+  document.json["meshes"][0]["weights"] = Json::array({1});
   EXPECT_EQ(load(document.json).meshes[0].tangents[0], glm::vec4(0, 1, 0, -1));
 
   document = with_floats("TANGENT", "VEC4", {1, 0, 0, -1, 1, 0, 0, -1, 1, 0, 0, -1});
   document.primitive()["attributes"]["JOINTS_0"] = document.add(std::vector<std::uint8_t>(12, 0), "VEC4", 5121, 3);
   document.primitive()["attributes"]["WEIGHTS_0"] =
       document.add(std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4", 5126, 3);
-  document.json["nodes"] = {{{"mesh", 0}, {"skin", 0}}, {{"scale", {-3, 2, 2}}}};
-  document.json["scenes"][0]["nodes"] = {0, 1};
-  document.json["skins"] = {{{"joints", {1}}}};
+  document.json["nodes"] = Json::array({{{"mesh", 0}, {"skin", 0}}, {{"scale", Json::array({-3, 2, 2})}}});
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
+  document.json["skins"].push_back({{"joints", Json::array({1})}});
   EXPECT_EQ(load(document.json).meshes[0].tangents[0], glm::vec4(-1, 0, 0, -1));
 }
 

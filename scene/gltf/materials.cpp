@@ -188,7 +188,7 @@ std::int32_t GltfLook::texture(int index, const std::string& where, Scene& scene
       return -1;
     }
     made.image = *std::move(image);
-    const nlohmann::json& entry = images_[GltfData::to_size(from.source)];
+    const Json& entry = images_[GltfData::to_size(from.source)];
     made.name = entry.contains("name") && entry["name"].is_string() ? entry["name"].get<std::string>()
                                                                     : fmt::format("image {}", from.source);
   }
@@ -201,7 +201,7 @@ std::int32_t GltfLook::texture(int index, const std::string& where, Scene& scene
 
 std::optional<Image<Rgba8>> GltfLook::picture(int image) {
   GltfContext& context = data_.context();
-  const nlohmann::json& entry = images_[GltfData::to_size(image)];
+  const Json& entry = images_[GltfData::to_size(image)];
   const std::string where = fmt::format("images[{}]", image);
   const bool has_uri = entry.contains("uri");
   const bool has_view = entry.contains("bufferView");

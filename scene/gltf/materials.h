@@ -2,12 +2,12 @@
 
 #include <glm/mat4x4.hpp>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "core/json.h"
 #include "scene/gltf/accessors.h"
 #include "scene/scene.h"
 
@@ -18,7 +18,7 @@ namespace hpr {
 class GltfLook {
  public:
   /// `images` is the document's section of that name (or null): tinygltf never sees pictures.
-  GltfLook(const GltfData& data, const GltfBuffers& buffers, const nlohmann::json& images)
+  GltfLook(const GltfData& data, const GltfBuffers& buffers, const Json& images)
       : data_(data), buffers_(buffers), images_(images) {}
 
   /// Fills scene.materials, one per material of the document, and scene.textures.
@@ -42,7 +42,7 @@ class GltfLook {
 
   const GltfData& data_;
   const GltfBuffers& buffers_;
-  const nlohmann::json& images_;
+  const Json& images_;
   std::map<SamplerKey, std::int32_t> textures_;
   std::map<int, std::int32_t> pictures_;  ///< image -> first texture that holds it, -1: cannot be drawn
 };

@@ -9,12 +9,11 @@
 namespace hpr {
 namespace {
 
-using nlohmann::json;
 using test::refusal;
 using test::triangle;
 
 /// Expects exit code 3 and that the message names the place.
-void expect_refused(const json& document, const std::string& place) {
+void expect_refused(const Json& document, const std::string& place) {
   const test::Refusal found = refusal(document);
   EXPECT_EQ(found.code, ExitCode::BadInput) << place << ": " << found.message;
   EXPECT_NE(found.message.find(place), std::string::npos) << found.message;
@@ -42,8 +41,8 @@ TEST(GltfRefusal, AccessorsThatLeaveTheirViewByOneByteAreRefused) {
 
 TEST(GltfRefusal, SumsThatWrapAroundAreRefused) {
   // 12 * (2^62 / 3 + 1) wraps to a small number in 64 bits, so JSON's exact integers end before.
-  for (const json& count : {json(std::uint64_t{1} << 52), json(std::numeric_limits<std::uint64_t>::max()), json(1e30),
-                            json(-1), json(0), json(2.5), json("3"), json(true), json(nullptr)}) {
+  for (const Json& count : {Json(std::uint64_t{1} << 52), Json(std::numeric_limits<std::uint64_t>::max()), Json(1e30),
+                            Json(-1), Json(0), Json(2.5), Json("3"), Json(true), Json(nullptr)}) {
     auto document = triangle();
     document.json["accessors"][0]["count"] = count;
     expect_refused(document.json, "accessors[0]");
@@ -64,7 +63,7 @@ TEST(GltfRefusal, IndicesPastTheVerticesAreRefused) {
 }
 
 TEST(GltfRefusal, ReferencesToNothingAreRefused) {
-  for (const json& bad : {json(1), json(-1), json("0"), json(1e9), json(nullptr), json(0.5)}) {
+  for (const Json& bad : {Json(1), Json(-1), Json("0"), Json(1e9), Json(nullptr), Json(0.5)}) {
     auto document = triangle();
     document.json["nodes"][0]["mesh"] = bad;
     expect_refused(document.json, "nodes[0].mesh");
@@ -82,11 +81,11 @@ TEST(GltfRefusal, ReferencesToNothingAreRefused) {
 
 TEST(GltfRefusal, NodesFormTrees) {
   auto document = triangle();
-  document.json["nodes"] = json::parse(R"([{"mesh": 0}, {"children": [2]}, {"children": [1]}])");
+  document.json["nodes"] = Json::parse(R"([{"mesh": 0}, {"children": [2]}, {"children": [1]}])");
   expect_refused(document.json, "nodes[1]");
-  document.json["nodes"] = json::parse(R"([{"children": [0]}])");
+  document.json["nodes"] = Json::parse(R"([{"children": [0]}])");
   expect_refused(document.json, "nodes[0]");
-  document.json["nodes"] = json::parse(R"([{"children": [1, 2]}, {"children": [2]}, {"mesh": 0}])");
+  document.json["nodes"] = Json::parse(R"([{"children": [1, 2]}, {"children": [2]}, {"mesh": 0}])");
   expect_refused(document.json, "nodes[1].children");
 }
 
@@ -100,35 +99,35 @@ TEST(GltfRefusal, PositionsThatAreNotFiniteAreRefused) {
 
 TEST(GltfRefusal, ProjectiveMatricesAreRefused) {
   auto document = triangle();
-  document.node()["matrix"] = {1, 0, 0, 0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  document.node()["matrix"] = Json::array({1, 0, 0, 0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
   expect_refused(document.json, "nodes[0].matrix");
 }
 
 TEST(GltfRefusal, UnknownRequiredExtensionsAreNamed) {
   auto document = triangle();
-  document.json["extensionsUsed"] = {"XYZ_unheard_of"};
+  document.json["extensionsUsed"] = Json::array({"XYZ_unheard_of"});
   EXPECT_TRUE(test::warns_of(test::load(document.json), "XYZ_unheard_of"));
-  document.json["extensionsRequired"] = {"XYZ_unheard_of"};
+  document.json["extensionsRequired"] = Json::array({"XYZ_unheard_of"});
   expect_refused(document.json, "XYZ_unheard_of");
 }
 
 TEST(GltfRefusal, MaterialsTellOfExtensionsThatAreNotDrawnDeclaredOrNot) {
   auto document = triangle();
-  document.json["materials"] = {{{"extensions", {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}}}}}};
+  document.json["materials"].push_back({{"extensions", {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}}}}});
   document.json["materials"].push_back(document.json["materials"][0]);
   EXPECT_TRUE(test::warns_of(test::load(document.json), "materials: KHR_materials_sheen"));
   EXPECT_EQ(test::load(document.json).warnings.size(), 1U) << "once for all materials";
-  document.json["materials"] = {{{"extensions", {{"KHR_materials_ior", {{"ior", 1.4}}}}}}};
+  document.json["materials"] = Json::array({{{"extensions", {{"KHR_materials_ior", {{"ior", 1.4}}}}}}});
   EXPECT_TRUE(test::load(document.json).warnings.empty());
-  document.json["extensionsUsed"] = {"KHR_materials_ior"};
+  document.json["extensionsUsed"] = Json::array({"KHR_materials_ior"});
   EXPECT_TRUE(test::load(document.json).warnings.empty());
 }
 
 TEST(GltfRefusal, CompressedMeshesAreRefusedWithTheToolThatUnpacksThem) {
   for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}) {
     auto document = triangle();
-    document.json["extensionsUsed"] = {name};
-    document.json["extensionsRequired"] = {name};
+    document.json["extensionsUsed"] = Json::array({name});
+    document.json["extensionsRequired"] = Json::array({name});
     expect_refused(document.json, name);
     EXPECT_NE(refusal(document.json).hint.find("gltf-transform"), std::string::npos);
   }

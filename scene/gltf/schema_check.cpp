@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -9,6 +10,7 @@
 #include <string_view>
 
 #include "core/text.h"
+#include "scene/gltf/item.h"
 #include "scene/gltf/json.h"
 
 namespace hpr {
@@ -94,7 +96,7 @@ void check_compression(const GltfItem& primitive) {
   constexpr const char* kDraco = "KHR_draco_mesh_compression";
   const auto extensions = primitive.object("extensions");
   if (!extensions || !extensions->has(kDraco)) return;
-  for (const auto& [name, accessor] : primitive.value()["attributes"].items()) {
+  for (const auto& [name, accessor] : primitive.value()["attributes"].members()) {
     if (!primitive.top("accessors", accessor.get<std::size_t>()).contains("bufferView")) {
       primitive.fail("", fmt::format("is compressed with {}, which HPR cannot read", kDraco), kDecompressHint);
     }
@@ -113,10 +115,10 @@ void check_meshes(const GltfItem& root) {
       primitive.index("material", "materials");
       primitive.whole("mode", kOptional, 0, 6);
       if (primitive.has("targets")) {
-        nlohmann::json& targets = primitive.value()["targets"];
+        const Json& targets = primitive.value()["targets"];
         if (!targets.is_array()) primitive.fail("targets", "must be an array");
         primitive.each("targets", kOptional, [](const GltfItem& target) {
-          for (const auto& [name, value] : target.value().items()) {
+          for (const auto& [name, value] : target.value().members()) {
             target.index(name.c_str(), "accessors", kRequired);
           }
         });
@@ -247,7 +249,7 @@ void stand_in_for_glossiness(const GltfItem& material) {
   if (!glossy || material.has("pbrMetallicRoughness")) return;
   double glossiness = glossy->clamped("glossinessFactor", 0.0, 1.0).value_or(1.0);
   if (glossy->has("specularGlossinessTexture")) glossiness *= 0.5;  // its alpha is seldom all white
-  nlohmann::json stand_in{{"metallicFactor", 0.0}, {"roughnessFactor", 1.0 - glossiness}};
+  Json stand_in{{"metallicFactor", 0.0}, {"roughnessFactor", 1.0 - glossiness}};
   if (glossy->has("diffuseFactor")) stand_in["baseColorFactor"] = glossy->value()["diffuseFactor"];
   if (glossy->has("diffuseTexture")) stand_in["baseColorTexture"] = glossy->value()["diffuseTexture"];
   material.warn("extensions.KHR_materials_pbrSpecularGlossiness",
@@ -321,9 +323,9 @@ void check_cameras(const GltfItem& root) {
 /// out with a warning instead of refused.
 void check_extent(const GltfItem& light, const char* key, double high) {
   if (!light.has("extras")) return;
-  nlohmann::json& extras = light.value()["extras"];
+  Json& extras = light.value()["extras"];
   if (!extras.is_object() || !extras.contains(key)) return;
-  nlohmann::json& value = extras[key];
+  Json& value = extras[key];
   const double number = value.is_number() ? value.get<double>() : -1.0;
   if (number >= 0.0 && number <= high) {
     value = number;  // tinygltf keeps integers in 32 bits
@@ -365,7 +367,7 @@ void check_lights(const GltfItem& root) {
 
 }  // namespace
 
-void check_shape(nlohmann::json& document, GltfContext& context) {
+void check_shape(Json& document, GltfContext& context) {
   const GltfItem root(context, document);
   check_asset(root);
   check_buffers(root);

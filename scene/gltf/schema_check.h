@@ -1,7 +1,6 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
-
+#include "core/json.h"
 #include "scene/gltf/context.h"
 
 namespace hpr {
@@ -10,9 +9,9 @@ namespace hpr {
 /// ones, and that every index points into its section. Values of materials and lights outside of what the
 /// specification allows are brought inside, with a warning. What depends on several members (ranges of bytes, the
 /// node hierarchy) is checked on the model, see gltf_data.h, gltf_mesh.h and gltf_nodes.h. Throws Error (BadInput).
-void check_shape(nlohmann::json& root, GltfContext& context);
+void check_shape(Json& root, GltfContext& context);
 
 /// Refuses documents that require extensions HPR does not have, by name, and warns once of each one it ignores.
-void check_extensions(nlohmann::json& root, GltfContext& context);
+void check_extensions(Json& root, GltfContext& context);
 
 }  // namespace hpr

@@ -8,13 +8,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "scene/gltf/loader.h"
 
 namespace hpr::test {
@@ -44,7 +44,7 @@ class TemporaryFolder {
 /// A glTF document that grows: every call adds a buffer, view and accessor of its own.
 class Document {
  public:
-  nlohmann::json json = nlohmann::json::parse(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+  Json json = Json::parse(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
       "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {}}]}]})");
 
   /// Adds an accessor of `count` elements over `values`; returns its index.
@@ -64,16 +64,16 @@ class Document {
   int add_vec2(const std::vector<float>& values) { return add(values, "VEC2", 5126, values.size() / 2); }
   int add_indices(const std::vector<std::uint16_t>& values) { return add(values, "SCALAR", 5123, values.size()); }
 
-  nlohmann::json& primitive() { return json["meshes"][0]["primitives"][0]; }
-  nlohmann::json& node() { return json["nodes"][0]; }
+  Json& primitive() { return json["meshes"][0]["primitives"][0]; }
+  Json& node() { return json["nodes"][0]; }
 };
 
 /// The triangle (0 0 0) (1 0 0) (0 1 0), without indices and normals.
 inline Document triangle() {
   Document document;
   document.primitive()["attributes"]["POSITION"] = document.add_vec3({0, 0, 0, 1, 0, 0, 0, 1, 0});
-  document.json["accessors"][0]["min"] = {0, 0, 0};
-  document.json["accessors"][0]["max"] = {1, 1, 0};
+  document.json["accessors"][0]["min"] = Json::array({0, 0, 0});
+  document.json["accessors"][0]["max"] = Json::array({1, 1, 0});
   return document;
 }
 
@@ -81,12 +81,12 @@ inline Document triangle() {
 inline Document square() {
   Document document;
   document.primitive()["attributes"]["POSITION"] = document.add_vec3({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0});
-  document.json["accessors"][0]["min"] = {0, 0, 0};
-  document.json["accessors"][0]["max"] = {1, 1, 0};
+  document.json["accessors"][0]["min"] = Json::array({0, 0, 0});
+  document.json["accessors"][0]["max"] = Json::array({1, 1, 0});
   return document;
 }
 
-inline Scene load(const nlohmann::json& json, const SceneLimits& limits = {}) {
+inline Scene load(const Json& json, const SceneLimits& limits = {}) {
   const TemporaryFolder folder;
   return load_gltf(folder.write("scene.gltf", json.dump()), limits);
 }
@@ -97,7 +97,7 @@ struct Refusal {
   std::string message;
   std::string hint;
 };
-inline Refusal refusal(const nlohmann::json& json, const SceneLimits& limits = {}) {
+inline Refusal refusal(const Json& json, const SceneLimits& limits = {}) {
   try {
     (void)load(json, limits);
   } catch (const Error& error) {

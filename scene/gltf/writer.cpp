@@ -8,21 +8,19 @@
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
 #include <span>
 #include <string>
 
 #include "core/error.h"
+#include "core/json.h"
 #include "image/image_io.h"
 
 // Numbers are written so that they read back to the same bits: the JSON library prints the shortest decimal that does,
 // and colours that glTF splits into a factor and a strength are split by a power of two.
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 static_assert(std::endian::native == std::endian::little, "glTF buffers are little-endian");
 static_assert(sizeof(glm::vec2) == 8 && sizeof(glm::vec3) == 12 && sizeof(glm::vec4) == 16 && sizeof(glm::uvec3) == 12);
@@ -119,14 +117,14 @@ Json texture_info(const TextureRef& reference, Document& document) {
   if (reference.uv_set != 0) info["texCoord"] = reference.uv_set;
   if (reference.transform != TextureRef{}.transform) {
     const auto& [a, b, c, d, e, f] = reference.transform;
-    Json transform{{"offset", {e, f}}};
+    Json transform{{"offset", Json::array({e, f})}};
     if (b == 0.0F && c == 0.0F) {
-      transform["scale"] = {a, d};
+      transform["scale"] = Json::array({a, d});
     } else {
       const double rotation = std::atan2(-static_cast<double>(b), static_cast<double>(a));
       transform["rotation"] = rotation;
-      transform["scale"] = {std::hypot(static_cast<double>(a), static_cast<double>(b)),
-                            c * std::sin(rotation) + d * std::cos(rotation)};
+      transform["scale"] = Json::array({std::hypot(static_cast<double>(a), static_cast<double>(b)),
+                                        c * std::sin(rotation) + d * std::cos(rotation)});
     }
     info["extensions"]["KHR_texture_transform"] = std::move(transform);
     document.extensions.insert("KHR_texture_transform");
@@ -240,7 +238,7 @@ std::vector<std::size_t> write_meshes(const Scene& scene, Document& document) {
                                                            {"count", 3 * mesh.triangles.size()},
                                                            {"type", "SCALAR"}});
     Json primitive{{"attributes", std::move(attributes)}, {"indices", indices}, {"material", mesh.material}};
-    written.push_back(document.add("meshes", {{"name", mesh.name}, {"primitives", {std::move(primitive)}}}));
+    written.push_back(document.add("meshes", {{"name", mesh.name}, {"primitives", Json::array({primitive})}}));
   }
   return written;
 }
@@ -351,10 +349,10 @@ std::vector<std::byte> encode_glb(const Scene& scene) {
   }
   document.json["scenes"].push_back(std::move(root));
   if (!document.extensions.empty()) document.json["extensionsUsed"] = document.extensions;
-  if (!document.buffer.empty()) document.json["buffers"] = {{{"byteLength", document.buffer.size()}}};
+  if (!document.buffer.empty()) document.json["buffers"].push_back({{"byteLength", document.buffer.size()}});
 
   // Names are ours or came out of a file; bytes that are no UTF-8 are replaced rather than refused.
-  const std::string text = document.json.dump(-1, ' ', false, nlohmann::detail::error_handler_t::replace);
+  const std::string text = document.json.dump();
   const std::uint64_t total = 12 + 8 + (text.size() + 3) / 4 * 4 + 8 + (document.buffer.size() + 3) / 4 * 4;
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ExitCode::Limit, fmt::format("the scene needs {} bytes, a .glb file holds 4 GiB", total),

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cstring>
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "core/error.h"
+#include "core/json.h"
 #include "image/image_io.h"
 #include "scene/generators/generated.h"
 
@@ -16,7 +16,7 @@ namespace hpr {
 namespace {
 
 struct Parts {
-  nlohmann::json json;
+  Json json;
   std::vector<std::byte> buffer;
 };
 
@@ -35,7 +35,7 @@ Parts parts_of(const std::vector<std::byte>& glb) {
   EXPECT_EQ(word_at(glb, 16), 0x4E4F534AU);
   EXPECT_EQ(json_bytes % 4, 0U);
   const char* const text = reinterpret_cast<const char*>(glb.data()) + 20;
-  Parts parts{nlohmann::json::parse(text, text + json_bytes), {}};
+  Parts parts{Json::parse({text, json_bytes}), {}};
   if (20 + json_bytes < glb.size()) {
     EXPECT_EQ(word_at(glb, 24 + json_bytes), 0x004E4942U);
     EXPECT_EQ(28 + json_bytes + word_at(glb, 20 + json_bytes), glb.size());
@@ -64,13 +64,13 @@ TEST(GltfWriter, KeepsEveryMeshAndMatrixToTheBit) {
     const Mesh& mesh = scene.meshes[i];
     const auto& primitive = parts.json["meshes"][i]["primitives"][0];
     const auto& attributes = primitive["attributes"];
-    EXPECT_EQ(values_of<glm::vec3>(parts, attributes["POSITION"]), mesh.positions);
-    EXPECT_EQ(values_of<glm::vec3>(parts, attributes["NORMAL"]), mesh.normals);
+    EXPECT_EQ(values_of<glm::vec3>(parts, attributes["POSITION"].get<std::size_t>()), mesh.positions);
+    EXPECT_EQ(values_of<glm::vec3>(parts, attributes["NORMAL"].get<std::size_t>()), mesh.normals);
     EXPECT_EQ(attributes.contains("TEXCOORD_0"), !mesh.uvs[0].empty());
     if (!mesh.uvs[0].empty()) {
-      EXPECT_EQ(values_of<glm::vec2>(parts, attributes["TEXCOORD_0"]), mesh.uvs[0]);
+      EXPECT_EQ(values_of<glm::vec2>(parts, attributes["TEXCOORD_0"].get<std::size_t>()), mesh.uvs[0]);
     }
-    EXPECT_EQ(values_of<glm::uvec3>(parts, primitive["indices"], 3), mesh.triangles);
+    EXPECT_EQ(values_of<glm::uvec3>(parts, primitive["indices"].get<std::size_t>(), 3), mesh.triangles);
     EXPECT_EQ(primitive["material"].get<std::uint32_t>(), mesh.material);
   }
   ASSERT_EQ(parts.json["nodes"].size(), scene.instances.size() + scene.lights.size() + scene.cameras.size());
@@ -93,15 +93,16 @@ TEST(GltfWriter, KeepsTexturesMaterialsLightsAndCameras) {
   for (std::size_t i = 0; i < scene.textures.size(); ++i) {
     const auto& image = parts.json["images"][parts.json["textures"][i]["source"].get<std::size_t>()];
     const auto& view = parts.json["bufferViews"][image["bufferView"].get<std::size_t>()];
-    const auto bytes = std::span(parts.buffer).subspan(view["byteOffset"], view["byteLength"]);
+    const auto bytes =
+        std::span(parts.buffer).subspan(view["byteOffset"].get<std::size_t>(), view["byteLength"].get<std::size_t>());
     EXPECT_EQ(decode_image(bytes, "texture", {}), scene.textures[i].image);
   }
   const auto material_named = [&](const char* name) {
-    const auto& all = parts.json["materials"];
-    return *std::ranges::find_if(all, [&](const auto& m) { return m["name"] == name; });
+    const auto& all = parts.json["materials"].elements();
+    return *std::ranges::find_if(all, [&](const Json& m) { return m["name"] == name; });
   };
   const auto panel = material_named("panel");
-  const double strength = panel["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"];
+  const auto strength = panel["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"].get<double>();
   EXPECT_EQ(panel["emissiveFactor"][0].get<double>() * strength, 12.0);
   EXPECT_LE(panel["emissiveFactor"][0].get<double>(), 1.0);
   EXPECT_EQ(material_named("glass")["extensions"]["KHR_materials_transmission"]["transmissionFactor"], 1.0);
@@ -116,7 +117,7 @@ TEST(GltfWriter, KeepsTexturesMaterialsLightsAndCameras) {
   EXPECT_EQ(parts.json["cameras"][0]["perspective"]["yfov"].get<double>(),
             std::get<PerspectiveLens>(scene.cameras[0].lens).vertical_fov_radians);
   EXPECT_GT(parts.json["cameras"][0]["perspective"]["znear"].get<double>(), 0.0);
-  const std::vector<std::string> used = parts.json["extensionsUsed"];
+  const auto used = parts.json["extensionsUsed"].get<std::vector<std::string>>();
   for (const char* extension :
        {"KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_transmission"}) {
     EXPECT_NE(std::ranges::find(used, extension), used.end()) << extension;

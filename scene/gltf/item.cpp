@@ -1,4 +1,4 @@
-#include "scene/gltf/json.h"
+#include "scene/gltf/item.h"
 
 #include <fmt/format.h>
 
@@ -10,21 +10,19 @@
 namespace hpr {
 namespace {
 
-using nlohmann::json;
-
-std::string shown(const json& value) {
-  return printable(value.dump(-1, ' ', true, json::error_handler_t::replace), 40);
+std::string shown(const Json& value) {
+  return printable(value.dump_ascii(), 40);
 }
 
 /// A whole number as JSON may write it, 3.0 included; none for anything else.
-std::optional<std::int64_t> whole_value(const json& value) {
-  if (value.is_number_unsigned()) {
+std::optional<std::int64_t> whole_value(const Json& value) {
+  if (value.is_unsigned()) {
     const auto number = value.get<std::uint64_t>();
     if (number > GltfItem::kMostWhole) return std::nullopt;
     return static_cast<std::int64_t>(number);
   }
-  if (value.is_number_integer()) return value.get<std::int64_t>();
-  if (!value.is_number_float()) return std::nullopt;
+  if (value.is_integer()) return value.get<std::int64_t>();
+  if (!value.is_number()) return std::nullopt;
   const auto number = value.get<double>();
   if (std::abs(number) > static_cast<double>(GltfItem::kMostWhole) || number != std::floor(number)) return std::nullopt;
   return static_cast<std::int64_t>(number);
@@ -50,44 +48,41 @@ void GltfItem::warn(std::string_view key, std::string_view what) const {
   context_->warn(above.empty() ? std::string(key) : key.empty() ? above : fmt::format("{}.{}", above, key), what);
 }
 
-json* GltfItem::find(const char* key, Presence presence) const {
-  const auto found = value_->find(key);
-  if (found == value_->end()) {
-    if (presence == Presence::Required) fail(key, "is missing");
-    return nullptr;
-  }
-  return &*found;
+Json* GltfItem::find(const char* key, Presence presence) const {
+  Json* const found = value_->find(key);
+  if (found == nullptr && presence == Presence::Required) fail(key, "is missing");
+  return found;
 }
 
-json* GltfItem::array(const char* key, Presence presence) const {
-  json* const value = find(key, presence);
+Json* GltfItem::array(const char* key, Presence presence) const {
+  Json* const value = find(key, presence);
   if (value != nullptr && !value->is_array()) fail(key, fmt::format("must be an array, not {}", value->type_name()));
   return value;
 }
 
 GltfItem GltfItem::element(const char* key, std::size_t position) const {
-  json& value = (*value_)[key][position];
+  Json& value = (*value_)[key][position];
   GltfItem item(*this, key, position, value);
   if (!value.is_object()) item.fail("", fmt::format("must be an object, not {}", value.type_name()));
   return item;
 }
 
 std::optional<GltfItem> GltfItem::object(const char* key, Presence presence) const {
-  json* const value = find(key, presence);
+  Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
   if (!value->is_object()) fail(key, fmt::format("must be an object, not {}", value->type_name()));
   return GltfItem(*this, key, kNone, *value);
 }
 
 std::optional<std::string> GltfItem::text(const char* key, Presence presence) const {
-  const json* const value = find(key, presence);
+  const Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
   if (!value->is_string()) fail(key, fmt::format("must be text, not {}", value->type_name()));
   return value->get<std::string>();
 }
 
 std::optional<bool> GltfItem::flag(const char* key) const {
-  const json* const value = find(key, Presence::Optional);
+  const Json* const value = find(key, Presence::Optional);
   if (value == nullptr) return std::nullopt;
   if (!value->is_boolean()) fail(key, fmt::format("must be true or false, not {}", shown(*value)));
   return value->get<bool>();
@@ -95,7 +90,7 @@ std::optional<bool> GltfItem::flag(const char* key) const {
 
 std::optional<std::uint64_t> GltfItem::whole(const char* key, Presence presence, std::uint64_t low,
                                              std::uint64_t high) const {
-  json* const value = find(key, presence);
+  Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
   const auto number = whole_value(*value);
   if (!number || *number < 0 || static_cast<std::uint64_t>(*number) < low ||
@@ -106,7 +101,7 @@ std::optional<std::uint64_t> GltfItem::whole(const char* key, Presence presence,
   return static_cast<std::uint64_t>(*number);
 }
 
-void GltfItem::check_index(json& value, std::string_view where, std::size_t count) const {
+void GltfItem::check_index(Json& value, std::string_view where, std::size_t count) const {
   const auto number = whole_value(value);
   if (!number || *number < 0) fail(where, fmt::format("must be an index, not {}", shown(value)));
   if (static_cast<std::uint64_t>(*number) >= count) {
@@ -116,7 +111,7 @@ void GltfItem::check_index(json& value, std::string_view where, std::size_t coun
 }
 
 std::optional<std::size_t> GltfItem::index_below(const char* key, std::size_t count, Presence presence) const {
-  json* const value = find(key, presence);
+  Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
   check_index(*value, key, count);
   return value->get<std::size_t>();
@@ -127,11 +122,11 @@ std::optional<std::size_t> GltfItem::index(const char* key, const char* section,
 }
 
 std::size_t GltfItem::indices(const char* key, const char* section, Presence presence) const {
-  json* const list = array(key, presence);
+  Json* const list = array(key, presence);
   if (list == nullptr) return 0;
   const std::size_t count = section_size(section);
   for (std::size_t i = 0; i < list->size(); ++i) {
-    json& value = (*list)[i];
+    Json& value = (*list)[i];
     const auto number = whole_value(value);
     if (!number || *number < 0 || static_cast<std::uint64_t>(*number) >= count) {
       check_index(value, fmt::format("{}[{}]", key, i), count);
@@ -145,12 +140,12 @@ std::size_t GltfItem::index_map(const char* key, const char* section, Presence p
   const auto map = object(key, presence);
   if (!map) return 0;
   const std::size_t count = section_size(section);
-  for (auto& [name, value] : map->value().items()) map->check_index(value, printable(name), count);
+  for (auto& [name, value] : map->value().members()) map->check_index(value, printable(name), count);
   return map->value().size();
 }
 
 std::optional<double> GltfItem::number(const char* key, Presence presence, double low, double high) const {
-  const json* const value = find(key, presence);
+  const Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
   if (!value->is_number()) fail(key, fmt::format("must be a number, not {}", shown(*value)));
   const auto number = value->get<double>();
@@ -160,7 +155,7 @@ std::optional<double> GltfItem::number(const char* key, Presence presence, doubl
   return number;
 }
 
-bool GltfItem::clamp_value(json& value, double low, double high) const {
+bool GltfItem::clamp_value(Json& value, double low, double high) const {
   const auto number = value.get<double>();
   if (number >= low && number <= high) return false;
   value = std::clamp(number, low, high);
@@ -168,7 +163,7 @@ bool GltfItem::clamp_value(json& value, double low, double high) const {
 }
 
 std::optional<double> GltfItem::clamped(const char* key, double low, double high) const {
-  json* const value = find(key, Presence::Optional);
+  Json* const value = find(key, Presence::Optional);
   if (value == nullptr) return std::nullopt;
   if (!value->is_number()) fail(key, fmt::format("must be a number, not {}", shown(*value)));
   const std::string before = shown(*value);
@@ -178,29 +173,32 @@ std::optional<double> GltfItem::clamped(const char* key, double low, double high
 }
 
 bool GltfItem::numbers(const char* key, std::size_t count, double low, double high) const {
-  json* const list = array(key, Presence::Optional);
+  Json* const list = array(key, Presence::Optional);
   if (list == nullptr) return false;
   if (count > 0 && list->size() != count) {
     fail(key, fmt::format("must have {} numbers, not {}", count, list->size()));
   }
-  for (json& value : *list) {
+  for (Json& value : list->elements()) {
     if (!value.is_number()) fail(key, fmt::format("must hold numbers, not {}", shown(value)));
-    const json before = value;
+    const Json before = value;
     if (clamp_value(value, low, high)) warn(key, fmt::format("has {}; taken as {}", shown(before), shown(value)));
   }
   return true;
 }
 
 std::size_t GltfItem::section_size(const char* section) const {
-  const auto found = root_->find(section);
-  return found != root_->end() && found->is_array() ? found->size() : 0;
+  const Json* const found = root_->find(section);
+  return found != nullptr && found->is_array() ? found->size() : 0;
 }
 
-json parse_json(std::string_view text, const GltfContext& context) {
+Json parse_json(std::string_view text, const GltfContext& context) {
   try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    const std::size_t offset = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
+    return Json::parse(text);
+  } catch (const JsonError& error) {
+    if (!error.offset()) {
+      context.fail("", "the JSON holds a number that no computer holds", "look for exponents above 308");
+    }
+    const std::size_t offset = *error.offset();
     const std::size_t before = offset > 0 ? text.rfind('\n', offset - 1) : std::string_view::npos;
     const std::size_t start = before == std::string_view::npos ? 0 : before + 1;
     const std::size_t end = std::min(text.find('\n', offset), text.size());
@@ -211,9 +209,6 @@ json parse_json(std::string_view text, const GltfContext& context) {
                 fmt::format("{}:{}:{}: the JSON is broken{}", context.name(), line, offset - start + 1,
                             offset >= text.size() ? ": it ends too early" : ""),
                 "export the scene again, or repair the file", printable(text.substr(from, end - from), 120));
-  } catch (const json::exception&) {
-    // A number beyond double, e.g. 1e999; the library gives no position.
-    context.fail("", "the JSON holds a number that no computer holds", "look for exponents above 308");
   }
 }
 

@@ -2,11 +2,11 @@
 
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "core/json.h"
 #include "scene/gltf/context.h"
 
 namespace hpr {
@@ -20,10 +20,10 @@ class GltfItem {
   static constexpr double kLargest = std::numeric_limits<float>::max();
   static constexpr std::uint64_t kMostWhole = std::uint64_t{1} << 53;  ///< what JSON numbers hold exactly
 
-  GltfItem(GltfContext& context, nlohmann::json& root) : context_(&context), root_(&root), value_(&root) {}
+  GltfItem(GltfContext& context, Json& root) : context_(&context), root_(&root), value_(&root) {}
 
   [[nodiscard]] GltfContext& context() const { return *context_; }
-  [[nodiscard]] nlohmann::json& value() const { return *value_; }
+  [[nodiscard]] Json& value() const { return *value_; }
   [[nodiscard]] std::string path() const;
   [[nodiscard]] bool has(const char* key) const { return value_->contains(key); }
 
@@ -36,7 +36,7 @@ class GltfItem {
   /// Calls body(item) for every object of the array `key`; returns how many there are.
   template <typename Body>
   std::size_t each(const char* key, Presence presence, const Body& body) const {
-    const nlohmann::json* const list = array(key, presence);
+    const Json* const list = array(key, presence);
     if (list == nullptr) return 0;
     for (std::size_t i = 0; i < list->size(); ++i) body(element(key, i));
     return list->size();
@@ -65,31 +65,29 @@ class GltfItem {
   /// Entries of the top-level array `section`.
   [[nodiscard]] std::size_t section_size(const char* section) const;
   /// Entry `index` of the top-level array `section`; it must be there.
-  [[nodiscard]] const nlohmann::json& top(const char* section, std::size_t index) const {
-    return (*root_)[section][index];
-  }
+  [[nodiscard]] const Json& top(const char* section, std::size_t index) const { return (*root_)[section][index]; }
 
  private:
-  GltfItem(const GltfItem& parent, const char* key, std::size_t position, nlohmann::json& value)
+  GltfItem(const GltfItem& parent, const char* key, std::size_t position, Json& value)
       : context_(parent.context_), root_(parent.root_), value_(&value), parent_(&parent), key_(key), index_(position) {}
 
-  [[nodiscard]] nlohmann::json* find(const char* key, Presence presence) const;
-  [[nodiscard]] nlohmann::json* array(const char* key, Presence presence) const;
+  [[nodiscard]] Json* find(const char* key, Presence presence) const;
+  [[nodiscard]] Json* array(const char* key, Presence presence) const;
   [[nodiscard]] GltfItem element(const char* key, std::size_t position) const;
-  void check_index(nlohmann::json& value, std::string_view where, std::size_t count) const;
-  bool clamp_value(nlohmann::json& value, double low, double high) const;
+  void check_index(Json& value, std::string_view where, std::size_t count) const;
+  bool clamp_value(Json& value, double low, double high) const;
 
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
   GltfContext* context_;
-  nlohmann::json* root_;
-  nlohmann::json* value_;
+  Json* root_;
+  Json* value_;
   const GltfItem* parent_ = nullptr;  ///< outlives this: items are made on the way down
   const char* key_ = "";
   std::size_t index_ = kNone;
 };
 
 /// The text as JSON. Throws Error (BadInput) with line, column and the offending line. Call scan_json first.
-[[nodiscard]] nlohmann::json parse_json(std::string_view text, const GltfContext& context);
+[[nodiscard]] Json parse_json(std::string_view text, const GltfContext& context);
 
 }  // namespace hpr
