@@ -4,7 +4,8 @@
 #include <hpr/version.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
+
+#include "core/json.h"
 
 namespace hpr {
 
@@ -23,10 +24,9 @@ void print_bench(const std::vector<BenchRow>& rows, const std::string& machine, 
     }
     return;
   }
-  nlohmann::ordered_json document{
-      {"schema", "hpr.bench/1"}, {"machine", machine}, {"commit", kCommit}, {"rows", nlohmann::json::array()}};
+  Json document{{"schema", "hpr.bench/1"}, {"machine", machine}, {"commit", kCommit}, {"rows", Json::array()}};
   for (const BenchRow& row : rows) {
-    const auto known = [&](double value) { return row.floor > 0.0 ? nlohmann::json(value) : nlohmann::json(); };
+    const auto known = [&](double value) { return row.floor > 0.0 ? Json(value) : Json(); };
     document["rows"].push_back({{"name", row.name},
                                 {"ours", row.ours},
                                 {"floor", known(row.floor)},

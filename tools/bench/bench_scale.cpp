@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "app/options/words.h"
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "engine/frame_sampler.h"
 #include "engine/resolution.h"
 #include "engine/screens.h"
@@ -22,8 +22,6 @@
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// A wall on its way through one job.
 class WallBench {
@@ -155,9 +153,10 @@ std::string scale_runs_to_json(const std::vector<ScaleRun>& runs) {
 std::vector<ScaleRun> scale_runs_from_json(std::string_view text) {
   try {
     std::vector<ScaleRun> runs;
-    for (const Json& run : Json::parse(text)) runs.push_back(run_from(run));
+    const Json list = Json::parse(text);
+    for (const Json& run : list.elements()) runs.push_back(run_from(run));
     return runs;
-  } catch (const Json::exception& failure) {
+  } catch (const JsonError& failure) {
     throw Error(ExitCode::Internal, fmt::format("an MPI job did not hand over its runs: {}", failure.what()));
   }
 }

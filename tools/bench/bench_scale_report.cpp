@@ -5,17 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "app/options/words.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "tools/compare/compare_measure.h"
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 int cores_of(const ScaleRun& run) {
   return run.ranks * run.threads;
@@ -124,7 +122,7 @@ std::string scale_json(const ScaleReport& report) {
                             {"oversubscribed", report.oversubscribed(run)},
                             {"frames", run.ms.size()},
                             {"ms", {{"min", ms.min}, {"median", ms.median}, {"p95", ms.p95}, {"max", ms.max}}},
-                            {"median_interval", {figures.low_ms, figures.high_ms}},
+                            {"median_interval", Json::array({figures.low_ms, figures.high_ms})},
                             {"speed_up", figures.speed_up},
                             {"efficiency", figures.efficiency},
                             {"imbalance", figures.imbalance},
@@ -132,7 +130,7 @@ std::string scale_json(const ScaleReport& report) {
                             {"bytes_sent", run.bytes_sent},
                             {"frame_xxh64", run.frame_xxh64 == kDiffering ? Json() : Json(run.frame_xxh64)}});
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 std::string scale_csv(const ScaleReport& report) {

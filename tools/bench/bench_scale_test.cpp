@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "tools/bench/bench_scale_html.h"
 #include "tools/bench/bench_scale_report.h"
 
@@ -93,7 +93,7 @@ TEST(BenchScale, FramesOfSeveralJobsAreOneRun) {
   other.frame_xxh64 = "0";
   append_frames(runs, {other});
   EXPECT_FALSE(pictures_agree(report_of(runs)));
-  EXPECT_TRUE(nlohmann::json::parse(scale_json(report_of(runs)))["runs"][0]["frame_xxh64"].is_null());
+  EXPECT_TRUE(Json::parse(scale_json(report_of(runs)))["runs"][0]["frame_xxh64"].is_null());
 }
 
 TEST(BenchScale, MoreThreadsThanCoresAreTold) {
@@ -108,7 +108,7 @@ TEST(BenchScale, MoreThreadsThanCoresAreTold) {
 
 TEST(BenchScale, ReportsHoldEveryRunAndEveryFrame) {
   const ScaleReport report = example();
-  const auto json = nlohmann::json::parse(scale_json(report));
+  const auto json = Json::parse(scale_json(report));
   EXPECT_EQ(json["schema"], "hpr.bench-scale/1");
   EXPECT_EQ(json["runs"].size(), 5U);
   EXPECT_EQ(json["runs"][0]["speed_up"], 4.0);

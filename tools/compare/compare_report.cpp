@@ -4,15 +4,13 @@
 #include <hpr/version.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "app/options/words.h"
 #include "core/error.h"
+#include "core/json.h"
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;  // keys stay in the order the schema lists them
 
 Json to_json(const CompareRun& run) {
   Json json{{"strategy", run.strategy},
@@ -28,7 +26,7 @@ Json to_json(const CompareRun& run) {
             {"imbalance", run.imbalance},
             {"differing_pixels", run.differing_pixels},
             {"frame_xxh64", run.frame_xxh64},
-            {"predicted_ms", run.predicted_ms ? Json(*run.predicted_ms) : Json()}};
+            {"predicted_ms", run.predicted_ms}};
   if (!run.chosen.empty()) json["chosen"] = run.chosen;
   if (run.max_error) json["max_error"] = *run.max_error;
   return json;
@@ -52,7 +50,7 @@ CompareRun run_from(const Json& json) {
   run.differing_pixels = json.at("differing_pixels").get<std::uint64_t>();
   run.frame_xxh64 = json.at("frame_xxh64").get<std::string>();
   if (!json.at("predicted_ms").is_null()) run.predicted_ms = json.at("predicted_ms").get<double>();
-  run.chosen = json.value("chosen", "");
+  run.chosen = json.value("chosen", std::string());
   if (json.contains("max_error")) run.max_error = json.at("max_error").get<double>();
   return run;
 }
@@ -110,8 +108,7 @@ std::string compare_json(const CompareReport& report) {
       {"operator", report.operation},
       {"seed", report.seed},
       {"runs", to_json(report.runs)}};
-  // Names may come from the command line in any bytes; what is no UTF-8 is replaced.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 std::string compare_csv(const CompareReport& report) {
@@ -138,9 +135,9 @@ std::vector<CompareRun> runs_from_json(std::string_view text) {
   try {
     std::vector<CompareRun> runs;
     const Json document = Json::parse(text);
-    for (const Json& json : document.at("runs")) runs.push_back(run_from(json));
+    for (const Json& json : document.at("runs").elements()) runs.push_back(run_from(json));
     return runs;
-  } catch (const Json::exception& failure) {
+  } catch (const JsonError& failure) {
     throw Error(ExitCode::Internal, fmt::format("an MPI job did not hand over its runs: {}", failure.what()));
   }
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
-#include <nlohmann/json.hpp>
 
 #include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
@@ -14,6 +13,7 @@
 #include "compositing/model/synthetic.h"
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "tools/compare/compare_measure.h"
 #include "tools/compare/compare_report.h"
 
@@ -259,7 +259,7 @@ CompareReport example_report() {
 }
 
 TEST(CompareReport, JsonHasEveryKeyOfTheSchema) {
-  const auto json = nlohmann::json::parse(compare_json(example_report()));
+  const auto json = Json::parse(compare_json(example_report()));
   EXPECT_EQ(json.at("schema"), "hpr.compare/1");
   EXPECT_EQ(json.at("command"), "hpr compare --synthetic dense");
   EXPECT_FALSE(json.at("commit").get<std::string>().empty());
@@ -267,10 +267,10 @@ TEST(CompareReport, JsonHasEveryKeyOfTheSchema) {
   EXPECT_EQ(json.at("machine").at("cores"), 4);
   EXPECT_EQ(json.at("machine").at("mpi"), "Open MPI v4.1.4");
   EXPECT_EQ(json.at("machine").at("oversubscribed"), true);
-  EXPECT_EQ(json.at("image"), (nlohmann::json{{"width", 64}, {"height", 48}, {"tiles", "3x2"}}));
+  EXPECT_EQ(json.at("image"), (Json{{"width", 64}, {"height", 48}, {"tiles", "3x2"}}));
   EXPECT_EQ(json.at("input"), "dense");
   EXPECT_EQ(json.at("seed"), 9);
-  const auto expected = nlohmann::json::parse(R"([{"strategy": "tree", "ranks": 5, "transport": "mpi", "frames": 7,
+  const auto expected = Json::parse(R"([{"strategy": "tree", "ranks": 5, "transport": "mpi", "frames": 7,
       "ms": {"min": 1.0, "median": 2.0, "p95": 3.0, "max": 4.0}, "ms_composite": {"median": 1.5},
       "ms_collect": {"median": 0.5}, "bytes_total": 5000000000, "bytes_max_rank": 11, "messages_total": 12,
       "imbalance": 1.25, "differing_pixels": 13, "frame_xxh64": "0123456789abcdef", "predicted_ms": null}])");
@@ -279,12 +279,12 @@ TEST(CompareReport, JsonHasEveryKeyOfTheSchema) {
 
 TEST(CompareReport, JsonHasTheErrorOfTranslucentFrames) {
   CompareReport report = example_report();
-  EXPECT_FALSE(nlohmann::json::parse(compare_json(report)).at("runs").at(0).contains("max_error"));
+  EXPECT_FALSE(Json::parse(compare_json(report)).at("runs")[0].contains("max_error"));
   report.operation = "over8";
   report.runs.front().max_error = 0.25;
-  const auto json = nlohmann::json::parse(compare_json(report));
+  const auto json = Json::parse(compare_json(report));
   EXPECT_EQ(json.at("operator"), "over8");
-  EXPECT_EQ(json.at("runs").at(0).at("max_error"), 0.25);
+  EXPECT_EQ(json.at("runs")[0].at("max_error"), 0.25);
 }
 
 TEST(CompareReport, RunsSurviveTheWayFromAJobToItsStarter) {

@@ -9,10 +9,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "tools/diff/diff_values.h"
 
 namespace hpr {
@@ -60,13 +60,13 @@ std::size_t worst_y(const DiffReport& report) {
 }
 
 /// Null for equal pictures.
-nlohmann::ordered_json worst_pixel(const DiffReport& report) {
+Json worst_pixel(const DiffReport& report) {
   if (report.difference.differing == 0) return nullptr;
   return {{"x", worst_x(report)}, {"y", worst_y(report)}, {"value", report.difference.max}};
 }
 
 /// What only pictures have. JSON has no infinity and no NaN: null.
-void add_picture(nlohmann::ordered_json& json, const DiffReport& report, std::span<const std::string> metrics) {
+void add_picture(Json& json, const DiffReport& report, std::span<const std::string> metrics) {
   const Difference& d = report.difference;
   json["width"] = report.size.width;
   json["height"] = report.size.height;
@@ -256,7 +256,7 @@ std::string diff_table(const DiffReport& report, std::span<const std::string> me
 std::string diff_json(const DiffReport& report, std::span<const std::string> metrics, const std::string& name_a,
                       const std::string& name_b, const DiffTolerance& tolerance) {
   const Difference& d = report.difference;
-  nlohmann::ordered_json json{{"schema", "hpr.diff/1"}, {"a", name_a}, {"b", name_b}};
+  Json json{{"schema", "hpr.diff/1"}, {"a", name_a}, {"b", name_b}};
   json["kind"] = report.keys ? "keys" : "picture";
   json["pixels"] = d.pixels;
   if (report.keys) {
@@ -271,7 +271,7 @@ std::string diff_json(const DiffReport& report, std::span<const std::string> met
   json["fail_percent"] = tolerance.percent;
   json["beyond"] = report.beyond;
   json["passed"] = report.passed;
-  return json.dump(2, ' ', false, nlohmann::detail::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 }  // namespace hpr

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 
 namespace hpr {
 namespace {
@@ -150,14 +150,14 @@ TEST(Diff, TheTableAndTheJsonHoldWhatWasAskedFor) {
   EXPECT_NE(table.find("1 of 1 pixels (100 %)"), std::string::npos) << table;
   EXPECT_EQ(table.find("rmse"), std::string::npos) << table;
   EXPECT_NE(table.find("different"), std::string::npos) << table;
-  const auto json = nlohmann::json::parse(diff_json(report, some, "a.png", "b.png", {}));
+  const auto json = Json::parse(diff_json(report, some, "a.png", "b.png", {}));
   EXPECT_EQ(json["schema"], "hpr.diff/1");
   EXPECT_EQ(json["differing"], 1);
   EXPECT_EQ(json["max"], 0.5);
   EXPECT_EQ(json["passed"], false);
   EXPECT_FALSE(json.contains("psnr"));
-  const auto equal = nlohmann::json::parse(
-      diff_json(diff(picture({1, 1, 1}), picture({1, 1, 1})), diff_metrics(), "a.png", "b.png", {}));
+  const auto equal =
+      Json::parse(diff_json(diff(picture({1, 1, 1}), picture({1, 1, 1})), diff_metrics(), "a.png", "b.png", {}));
   EXPECT_TRUE(equal["psnr"].is_null()) << "infinite";
   EXPECT_EQ(equal["passed"], true);
 }
@@ -167,13 +167,13 @@ TEST(Diff, TheWorstPixelAndTheErrorOfTheMeanAreReported) {
   FloatImage b = a;
   b.values[7] = -0.5F;
   const DiffReport report = diff(a, b);
-  const auto json = nlohmann::json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
-  EXPECT_EQ(json["worst"], nlohmann::json::parse(R"({"x": 0, "y": 1, "value": 0.5})"));
+  const auto json = Json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
+  EXPECT_EQ(json["worst"], Json::parse(R"({"x": 0, "y": 1, "value": 0.5})"));
   EXPECT_NEAR(json["mean_error"].get<double>(), 0.5 / 3.0 / 4.0, 1e-12);
   const std::string table = diff_table(report, diff_metrics());
   EXPECT_NE(table.find("max        0.5 at 0,1\n"), std::string::npos) << table;
   EXPECT_NE(table.find("mean       -0.0416667 +- 0.042\n"), std::string::npos) << table;
-  EXPECT_TRUE(nlohmann::json::parse(diff_json(diff(a, a), diff_metrics(), "a", "a", {}))["worst"].is_null());
+  EXPECT_TRUE(Json::parse(diff_json(diff(a, a), diff_metrics(), "a", "a", {}))["worst"].is_null());
 }
 
 TEST(Diff, ColorsAreComparedAsFarAsAskedFor) {
@@ -190,7 +190,7 @@ TEST(Diff, ColorsAreComparedAsFarAsAskedFor) {
   const DiffReport report = diff(a, b);
   EXPECT_NEAR(report.colors->relative.trimmed, 0.0625 / 0.26, 1e-6);
   EXPECT_GT(report.colors->flip, 0.1);
-  const auto json = nlohmann::json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
+  const auto json = Json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
   EXPECT_EQ(json["relmse"], report.colors->relative.trimmed);
   EXPECT_EQ(json["relmse_untrimmed"], report.colors->relative.all);
   EXPECT_EQ(json["ssim"], report.colors->ssim);
@@ -203,7 +203,7 @@ TEST(Diff, ColorsAreComparedAsFarAsAskedFor) {
   const FloatImage black = picture(std::vector<float>(3000, 0.0F));
   FloatImage firefly = black;
   firefly.values[99] = 1000.0F;
-  const auto trimmed = nlohmann::json::parse(diff_json(diff(black, firefly), diff_metrics(), "a", "b", {}));
+  const auto trimmed = Json::parse(diff_json(diff(black, firefly), diff_metrics(), "a", "b", {}));
   EXPECT_EQ(trimmed["relmse"], 0.0);
   EXPECT_NEAR(trimmed["relmse_untrimmed"].get<double>(), 1e6 / 0.01 / 3000.0, 1e-3);
 
@@ -232,7 +232,7 @@ TEST(Diff, WhereColorsAreNotFiniteThereIsNoNumber) {
   FloatImage a = picture({0, 0, 0, 1, 1, 1});
   a.values[4] = std::numeric_limits<float>::quiet_NaN();
   const DiffReport report = diff(a, a);
-  const auto json = nlohmann::json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
+  const auto json = Json::parse(diff_json(report, diff_metrics(), "a", "b", {}));
   for (const char* metric : {"relmse", "relmse_untrimmed", "ssim", "flip"})
     EXPECT_TRUE(json[metric].is_null()) << metric;
   EXPECT_EQ(json["not_finite"], 1);
@@ -251,7 +251,7 @@ TEST(Diff, ColorsAreThoseOfRgbOrGreyAndNothingElse) {
   const DiffReport none = diff(depth, depth);
   EXPECT_FALSE(none.colors.has_value());
   EXPECT_NE(diff_table(none, diff_metrics()).find("ssim       none: the pictures have no channels"), std::string::npos);
-  EXPECT_TRUE(nlohmann::json::parse(diff_json(none, diff_metrics(), "a", "b", {}))["ssim"].is_null());
+  EXPECT_TRUE(Json::parse(diff_json(none, diff_metrics(), "a", "b", {}))["ssim"].is_null());
   const FloatImage grey{{1, 1}, {"Y"}, {0.5F}};
   const FloatImage light{{1, 1}, {"Y"}, {0.6F}};
   const DiffReport of_grey = diff(grey, light);

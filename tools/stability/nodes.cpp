@@ -2,38 +2,30 @@
 #include <cmath>
 #include <fstream>
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 #include <random>
+#include <utility>
 
 #include "core/file.h"
+#include "core/json.h"
 #include "scene/load_scene.h"
 #include "tools/stability/cases.h"
 
 namespace hpr::stability {
 namespace {
 
-using Json = nlohmann::json;
-
 /// The placement of one triangle below a chain of nodes, as the loader composes it.
 glm::dmat4 placed_below(Json nodes) {
-  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) nodes[i]["children"] = {i + 1};
-  nodes.back()["mesh"] = 0;
-  // (0, 0, 0), (1, 0, 0), (0, 1, 0)
-  const std::string data = "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
-  const Json document{{"asset", {{"version", "2.0"}}},
-                      {"scene", 0},
-                      {"scenes", {{{"nodes", {0}}}}},
-                      {"nodes", std::move(nodes)},
-                      {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}}},
-                      {"buffers", {{{"uri", data}, {"byteLength", 36}}}},
-                      {"bufferViews", {{{"buffer", 0}, {"byteLength", 36}}}},
-                      {"accessors",
-                       {{{"bufferView", 0},
-                         {"componentType", 5126},
-                         {"count", 3},
-                         {"type", "VEC3"},
-                         {"min", {0, 0, 0}},
-                         {"max", {1, 1, 0}}}}}};
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) nodes[i]["children"] = Json::array({i + 1});
+  nodes.elements().back()["mesh"] = 0;
+  // The corners are (0, 0, 0), (1, 0, 0) and (0, 1, 0).
+  Json document = Json::parse(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+      "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+      "buffers": [{"uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA",
+                   "byteLength": 36}],
+      "bufferViews": [{"buffer": 0, "byteLength": 36}],
+      "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                     "min": [0, 0, 0], "max": [1, 1, 0]}]})");
+  document["nodes"] = std::move(nodes);
   const TemporaryFile file;
   std::ofstream(file.path()) << document.dump();
   return load_scene(file.path().string()).instances.at(0).to_world;
@@ -59,8 +51,9 @@ StabilityFinding scales_that_cancel() {
   finding.curve.x = "outer scale";
   for (int power = 1; power <= 6; ++power) {
     const double factor = std::pow(10.0, power);
-    const Json nodes{{{"scale", {factor, factor, factor}}}, {{"scale", {1.0 / factor, 1.0 / factor, 1.0 / factor}}}};
-    const Json turned{{{"scale", {1.0 / factor, 1.0 / factor, 1.0 / factor}}}, {{"scale", {factor, factor, factor}}}};
+    const auto scaled = [](double by) { return Json{{"scale", Json::array({by, by, by})}}; };
+    const Json nodes = Json::array({scaled(factor), scaled(1.0 / factor)});
+    const Json turned = Json::array({scaled(1.0 / factor), scaled(factor)});
     const double error =
         std::max(farthest_from_identity(placed_below(nodes)), farthest_from_identity(placed_below(turned)));
     finding.curve.points.emplace_back(factor, error);
@@ -87,8 +80,8 @@ StabilityFinding rotations_that_cancel() {
       glm::dvec4 q;
       for (int k = 0; k < 4; ++k) q[k] = static_cast<double>(random() >> 11U) * 0x1p-52 - 1.0;
       q = glm::normalize(q);
-      there.push_back({{"rotation", {q.x, q.y, q.z, q.w}}});
-      back.push_back({{"rotation", {-q.x, -q.y, -q.z, q.w}}});
+      there.push_back(Json{{"rotation", Json::array({q.x, q.y, q.z, q.w})}});
+      back.push_back(Json{{"rotation", Json::array({-q.x, -q.y, -q.z, q.w})}});
     }
     there.insert(there.end(), back.rbegin(), back.rend());
     const double drift = farthest_from_identity(placed_below(Json(there)));

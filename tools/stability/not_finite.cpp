@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "image/image_codec.h"
 #include "image/image_io.h"
 #include "scene/environment.h"
@@ -37,17 +37,21 @@ std::string write_triangle(const TemporaryFile& file, const std::string& attribu
   own.resize(3 * width);
   own[width] = bad;
   values.insert(values.end(), own.begin(), own.end());
-  nlohmann::json json = nlohmann::json::parse(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+  Json json = Json::parse(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
     "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1}}]}],
     "accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]},
                  {"bufferView":1,"componentType":5126,"type":"VEC3","count":3}],
     "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":36}]})");
-  json["buffers"] = {{{"uri", "data:application/octet-stream;base64," + base64(std::as_bytes(std::span(values)))},
-                      {"byteLength", values.size() * sizeof(float)}}};
+  json["buffers"].push_back(
+      {{"uri", "data:application/octet-stream;base64," + base64(std::as_bytes(std::span(values)))},
+       {"byteLength", values.size() * sizeof(float)}});
   json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 72}, {"byteLength", own.size() * sizeof(float)}});
   json["accessors"].push_back(
       {{"bufferView", 2}, {"componentType", 5126}, {"type", width == 2 ? "VEC2" : "VEC3"}, {"count", 3}});
-  if (position) json["accessors"][2].update({{"min", {0, 0, 0}}, {"max", {1, 1, 0}}});
+  if (position) {
+    json["accessors"][2]["min"] = Json::array({0, 0, 0});
+    json["accessors"][2]["max"] = Json::array({1, 1, 0});
+  }
   json["meshes"][0]["primitives"][0]["attributes"][attribute] = 2;
   std::ofstream(file.path()) << json.dump();
   return file.path().string();

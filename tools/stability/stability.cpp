@@ -6,14 +6,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/json.h"
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;  // keys stay in the order the schema lists them
 
 /// JSON has no infinity: the largest number stands for it.
 double finite(double value) {
@@ -54,7 +52,7 @@ std::string stability_json(std::span<const StabilityFinding> findings) {
                              {"breaks_at", finding.breaks_at ? Json(finite(*finding.breaks_at)) : Json()},
                              {"why", finding.why}});
   }
-  return json.dump(2, ' ', false, nlohmann::detail::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 std::string stability_table(std::span<const StabilityFinding> findings) {

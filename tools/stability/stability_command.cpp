@@ -5,11 +5,11 @@
 #include <exception>
 #include <iterator>
 #include <new>
-#include <nlohmann/json.hpp>
 
 #include "app/command.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/text.h"
@@ -35,9 +35,9 @@ class StabilityCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const std::vector<StabilityCase> cases = chosen_cases();
     if (list_ && json_) {
-      nlohmann::ordered_json list = nlohmann::ordered_json::array();
+      Json list = Json::array();
       for (const StabilityCase& one : cases) list.push_back({{"name", one.name}, {"about", one.about}});
-      fmt::print("{}\n", nlohmann::ordered_json{{"schema", "hpr.stability-cases/1"}, {"cases", list}}.dump(2));
+      fmt::print("{}\n", Json{{"schema", "hpr.stability-cases/1"}, {"cases", list}}.dump(2));
       return ExitCode::Done;
     }
     if (list_) {

@@ -4,8 +4,9 @@
 
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <set>
+
+#include "core/json.h"
 
 namespace hpr {
 namespace {
@@ -59,7 +60,7 @@ TEST(StabilityJson, HasWhatTheSchemaSays) {
   std::vector<StabilityFinding> findings{finding_of(0.5, 0.25),
                                          finding_of(0.5, std::numeric_limits<double>::infinity())};
   findings[0].breaks_at = 3e8;
-  const auto json = nlohmann::json::parse(stability_json(findings));
+  const auto json = Json::parse(stability_json(findings));
   EXPECT_EQ(json.at("schema"), "hpr.stability/1");
   ASSERT_EQ(json.at("cases").size(), 2U);
   const auto& first = json.at("cases")[0];

@@ -7,20 +7,18 @@
 #include <charconv>
 #include <cmath>
 #include <iterator>
-#include <nlohmann/json.hpp>
 
 #include "app/launch/shell_line.h"
 #include "app/options/words.h"
 #include "core/error.h"
+#include "core/json.h"
 
 namespace hpr {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 /// JSON has no NaN and no infinity: null.
 Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
+  return std::isfinite(value) ? Json(value) : Json();
 }
 
 double number_of(const Json& json, double otherwise) {
@@ -196,7 +194,7 @@ std::string tradeoff_json(const TradeoffReport& report) {
                       {"spread", slope.spread},
                       {"points", slope.points}});
   }
-  Json best = nullptr;
+  Json best;
   if (report.best) {
     best = point_json(report.points[*report.best], width);
     best["command"] = command_for(report, report.points[*report.best]);
@@ -213,7 +211,7 @@ std::string tradeoff_json(const TradeoffReport& report) {
       {"seed", report.seed},
       {"reference",
        {{"how", report.reference.how},
-        {"spp", report.reference.spp > 0 ? Json(report.reference.spp) : Json(nullptr)},
+        {"spp", report.reference.spp > 0 ? Json(report.reference.spp) : Json()},
         {"estimated_relmse", number(report.reference.relmse)},
         {"mean", number(report.reference.mean)},
         {"cached", report.reference.cached}}},
@@ -222,7 +220,7 @@ std::string tradeoff_json(const TradeoffReport& report) {
       {"points", points},
       {"slopes", slopes},
       {"best_under_budget", best}};
-  return json.dump(2, ' ', false, nlohmann::detail::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 std::string tradeoff_csv(const TradeoffReport& report) {
@@ -246,7 +244,7 @@ std::string encode_points(const std::string& identity, const std::vector<Tradeof
   for (const TradeoffPoint& point : points) {
     Json json = point_json(point, 1);
     Json values = Json::array();
-    for (const auto& [knob, value] : point.knobs) values.push_back({knob, value});
+    for (const auto& [knob, value] : point.knobs) values.push_back(Json::array({knob, value}));
     json["values"] = values;
     json["all_ms"] = point.ms;
     json["worst_pixel"] = point.error.worst_pixel;
@@ -265,18 +263,22 @@ std::vector<TradeoffPoint> decode_points(const std::string& text, const std::str
       throw Error(ExitCode::BadInput, name + ": these are the points of another sweep", "leave out --resume");
     }
     std::vector<TradeoffPoint> points;
-    for (const Json& from : json.at("points")) {
+    for (const Json& from : json.at("points").elements()) {
       TradeoffPoint point;
-      for (const Json& value : from.at("values")) point.knobs.emplace_back(value.at(0), value.at(1));
+      for (const Json& value : from.at("values").elements()) {
+        point.knobs.emplace_back(value[0].string(), value[1].string());
+      }
       point.ms = from.at("all_ms").get<std::vector<double>>();
       if (point.ms.empty()) throw Error(ExitCode::BadInput, name + ": a point without times", "leave out --resume");
-      for (const Json& time : from.at("passes")) point.times.push_back({time.at("name"), time.at("ms")});
+      for (const Json& time : from.at("passes").elements()) {
+        point.times.push_back({time.at("name").string(), time.at("ms").get<double>()});
+      }
       const Json& rays = from.at("rays");
-      point.rays.primary = rays.at("primary");
-      for (const PassInfo& pass : all_passes()) point.rays[pass.id] = rays.at(std::string(pass.name));
-      point.rays.not_finite = from.at("not_finite");
-      point.bytes_sent = from.at("bytes_sent");
-      point.samples = from.at("samples");
+      point.rays.primary = rays.at("primary").get<std::uint64_t>();
+      for (const PassInfo& pass : all_passes()) point.rays[pass.id] = rays.at(pass.name).get<std::uint64_t>();
+      point.rays.not_finite = from.at("not_finite").get<std::uint64_t>();
+      point.bytes_sent = from.at("bytes_sent").get<std::uint64_t>();
+      point.samples = from.at("samples").get<double>();
       const Json& error = from.at("error");
       const auto value = [&](const char* metric) { return number_of(error.at(metric), std::nan("")); };
       // Of equal pictures psnr is infinite, which JSON does not have.
@@ -290,13 +292,13 @@ std::vector<TradeoffPoint> decode_points(const std::string& text, const std::str
                      value("mean"),
                      value("mean_error"),
                      number_of(error.at("worst").at("value"), std::nan("")),
-                     from.at("worst_pixel")};
-      point.crop_png = from.at("crop");
-      point.flip_png = from.at("flip_crop");
+                     from.at("worst_pixel").get<std::size_t>()};
+      point.crop_png = from.at("crop").string();
+      point.flip_png = from.at("flip_crop").string();
       points.push_back(std::move(point));
     }
     return points;
-  } catch (const nlohmann::json::exception&) {
+  } catch (const JsonError&) {
     throw Error(ExitCode::BadInput, name + ": this is no file of a sweep's points", "leave out --resume");
   }
 }
