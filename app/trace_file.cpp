@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <span>
 #include <string>
@@ -24,14 +23,13 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/job_environment.h"
+#include "core/json.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "core/timing.h"
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// When the ranks met, by this rank's clock. Ranks of rank 0's host have its clock: times so close are no chance.
 std::int64_t meet(Communicator& comm) {
@@ -97,8 +95,7 @@ std::string document(const std::vector<std::vector<std::byte>>& lines, const std
                    {"version", fmt::format("{} ({})", kVersion, kCommit)},
                    {"dropped", dropped}};
   std::string text(kBeginning);
-  text += fmt::format(": \"ms\", \"otherData\": {},\n\"traceEvents\": [\n",
-                      about.dump(-1, ' ', false, Json::error_handler_t::replace));
+  text += fmt::format(": \"ms\", \"otherData\": {},\n\"traceEvents\": [\n", about.dump());
   for (std::size_t rank = 0; rank < lines.size(); ++rank) {
     if (rank > 0) text += ",\n";
     text.append(reinterpret_cast<const char*>(lines[rank].data()), lines[rank].size());

@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "app/command.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "rt/passes/pass_list.h"
@@ -15,13 +15,6 @@
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-/// Names from files may hold anything; JSON wants UTF-8.
-std::string dump(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
-}
 
 Json corner(const glm::dvec3& p) {
   return Json::array({p.x, p.y, p.z});
@@ -87,7 +80,7 @@ class SceneInfoCommand final : public Command {
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const Scene scene = load_scene(source_, globals.scene_limits());
     if (json_) {
-      fmt::print("{}\n", dump(info_json(scene)));
+      fmt::print("{}\n", info_json(scene).dump(2));
     } else {
       print_info(scene);
       log_warnings(scene);
@@ -120,7 +113,7 @@ class SceneValidateCommand final : public Command {
       if (json_) {
         json["verdict"] = scene.warnings.empty() ? "ok" : "warn";
         json["warnings"] = scene.warnings;
-        fmt::print("{}\n", dump(json));
+        fmt::print("{}\n", json.dump(2));
       } else {
         fmt::print("{}: can be drawn: {} triangles, {} warnings\n", printable(source_, 300), scene.triangles,
                    scene.warnings.size());
@@ -131,7 +124,7 @@ class SceneValidateCommand final : public Command {
         json["verdict"] = "error";
         json["error"] = error.what();
         json["exit_code"] = static_cast<int>(error.code());
-        fmt::print("{}\n", dump(json));
+        fmt::print("{}\n", json.dump(2));
       }
       throw;
     }

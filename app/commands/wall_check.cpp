@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <set>
 
@@ -11,6 +10,7 @@
 #include "app/commands/wall_options.h"
 #include "app/report_error.h"
 #include "core/bytes.h"
+#include "core/json.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "image/key.h"
@@ -168,18 +168,16 @@ std::string describe_more(const Wall& wall) {
   return text;
 }
 
-using Json = nlohmann::ordered_json;
-
 Json memory_json(const Wall& wall) {
   const std::vector<RankNeed> needs = needs_of(wall);
   Json ranks = Json::array();
   for (const RankNeed& need : needs) {
-    ranks.push_back(Json{{"rank", need.rank >= 0 ? Json(need.rank) : Json(nullptr)},
-                         {"node", need.node.empty() ? Json(nullptr) : Json(need.node)},
-                         {"screens", need.screens},
-                         {"bytes", need.bytes}});
+    ranks.push_back({{"rank", need.rank >= 0 ? Json(need.rank) : Json()},
+                     {"node", need.node.empty() ? Json() : Json(need.node)},
+                     {"screens", need.screens},
+                     {"bytes", need.bytes}});
   }
-  return Json{{"bytes_per_pixel", kBytesPerPixel}, {"bytes", sum_of(needs)}, {"ranks", std::move(ranks)}};
+  return {{"bytes_per_pixel", kBytesPerPixel}, {"bytes", sum_of(needs)}, {"ranks", ranks}};
 }
 
 Json warps_json(const Wall& wall) {
@@ -188,14 +186,14 @@ Json warps_json(const Wall& wall) {
     const WallScreen& screen = wall.screens[figures.screen];
     const char* const kind = figures.curve ? "positions" : "mesh";
     Json warp{{"screen", screen.id},
-              {"mesh", figures.mesh_size > 0 ? Json(kind) : Json(nullptr)},
+              {"mesh", figures.mesh_size > 0 ? Json(kind) : Json()},
               {"mesh_size", figures.mesh_size},
               {"lit_percent", std::round(10'000.0 * figures.lit) / 100.0},
               {"blend", screen.warp.light != nullptr},
               {"black", screen.warp.floor != nullptr}};
     if (figures.curve) {
-      warp["degrees"] = Json{figures.curve->width_degrees, figures.curve->height_degrees};
-      warp["flat_pixels"] = Json{figures.curve->flat_pixels.width, figures.curve->flat_pixels.height};
+      warp["degrees"] = Json::array({figures.curve->width_degrees, figures.curve->height_degrees});
+      warp["flat_pixels"] = Json::array({figures.curve->flat_pixels.width, figures.curve->flat_pixels.height});
     }
     warps.push_back(std::move(warp));
   }
@@ -238,17 +236,15 @@ std::string describe_wall(const Wall& wall) {
 std::string check_json(const WallCheck& check) {
   Json findings = Json::array();
   for (const WallFinding& finding : check.reading.findings) {
-    findings.push_back(Json{{"severity", finding.error ? "error" : "warning"},
-                            {"line", finding.place.line},
-                            {"column", finding.place.column},
-                            {"what", finding.what},
-                            {"text", finding.line},
-                            {"hint", finding.hint}});
+    findings.push_back({{"severity", finding.error ? "error" : "warning"},
+                        {"line", finding.place.line},
+                        {"column", finding.place.column},
+                        {"what", finding.what},
+                        {"text", finding.line},
+                        {"hint", finding.hint}});
   }
-  Json document{{"schema", "hpr.wall-check/1"},
-                {"wall", check.spec},
-                {"ok", check.reading.ok()},
-                {"findings", std::move(findings)}};
+  Json document{
+      {"schema", "hpr.wall-check/1"}, {"wall", check.spec}, {"ok", check.reading.ok()}, {"findings", findings}};
   if (check.reading.ok()) {
     const Wall& wall = check.reading.wall;
     const Figures figures = figures_of(wall);
@@ -258,11 +254,11 @@ std::string check_json(const WallCheck& check) {
     document["hosts"] = figures.hosts;
     document["visible_pixels"] = figures.visible_pixels;
     document["flat"] = figures.flat;
-    document["extent_px"] = figures.flat ? Json{figures.width_px, figures.height_px} : Json(nullptr);
-    document["gap_percent"] = figures.flat ? Json(figures.gap_percent) : Json(nullptr);
-    document["seams"] = Json{{"count", figures.seams.count},
-                             {"whole_pixel_error_px", figures.seams.largest_error_px},
-                             {"accumulated_error_px", figures.seams.accumulated_error_px}};
+    document["extent_px"] = figures.flat ? Json::array({figures.width_px, figures.height_px}) : Json();
+    document["gap_percent"] = figures.flat ? Json(figures.gap_percent) : Json();
+    document["seams"] = {{"count", figures.seams.count},
+                         {"whole_pixel_error_px", figures.seams.largest_error_px},
+                         {"accumulated_error_px", figures.seams.accumulated_error_px}};
     document["viewer_given"] = wall.viewers.front().given;
     document["viewers"] = wall.viewers.size();
     document["stereo"] = stereo_names().at(static_cast<std::size_t>(wall.stereo));
@@ -270,7 +266,7 @@ std::string check_json(const WallCheck& check) {
     document["warps"] = warps_json(wall);
     document["memory"] = memory_json(wall);
   }
-  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return document.dump(2) + "\n";
 }
 
 /// `hpr wall check WALL`.

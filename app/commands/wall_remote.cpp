@@ -5,12 +5,12 @@
 #include <cctype>
 #include <chrono>
 #include <iomanip>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 
 #include "app/command.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "core/text.h"
 #include "engine/wall/run_control.h"
 
@@ -74,12 +74,12 @@ class WallStatusCommand final : public WallRemoteCommand {
       fmt::print("{}", told);
       return ExitCode::Done;
     }
-    const auto status = nlohmann::json::parse(told);
+    const auto status = Json::parse(told);
     fmt::print("run {}: {} on {}, frame {}, {:.1f} ms a frame, {} rank{}, {} restart{}\n", status["run"].get<int>(),
                printable(status["scene"].get<std::string>()), printable(status["wall"].get<std::string>()),
                status["frame"].get<std::uint64_t>(), status["ms"].get<double>(), status["ranks"].get<int>(),
                status["ranks"] == 1 ? "" : "s", status["restarts"].size(), status["restarts"].size() == 1 ? "" : "s");
-    for (const auto& screen : status["screens"]) {
+    for (const Json& screen : status["screens"].elements()) {
       fmt::print("screen {}: {}\n", screen["id"].get<std::string>(), screen["state"].get<std::string>());
     }
     return ExitCode::Done;

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <exception>
-#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "core/error.h"
+#include "core/json.h"
 
 namespace hpr {
 namespace {
@@ -68,15 +68,14 @@ std::string findings_text(std::span<const Finding> findings, bool colors) {
 }
 
 std::string findings_json(std::span<const Finding> findings) {
-  nlohmann::ordered_json json{{"schema", "hpr.doctor/1"}, {"healthy", healthy(findings)}};
-  json["findings"] = nlohmann::ordered_json::array();
+  Json json{{"schema", "hpr.doctor/1"}, {"healthy", healthy(findings)}, {"findings", Json::array()}};
   for (const Finding& finding : findings) {
     json["findings"].push_back({{"name", finding.name},
                                 {"status", look_of(finding.status).word},
                                 {"detail", finding.detail},
                                 {"remedy", finding.remedy}});
   }
-  return json.dump(2, ' ', false, nlohmann::detail::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 }  // namespace hpr

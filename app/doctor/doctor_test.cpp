@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
 #include <string>
 
 #include "core/error.h"
+#include "core/json.h"
 
 namespace hpr {
 namespace {
@@ -60,7 +60,7 @@ TEST(Doctor, TextIsAlignedAndColoredOnlyWhenAsked) {
 }
 
 TEST(Doctor, JsonHoldsEveryFinding) {
-  const auto json = nlohmann::json::parse(findings_json(some_findings()));
+  const auto json = Json::parse(findings_json(some_findings()));
   EXPECT_EQ(json["schema"], "hpr.doctor/1");
   EXPECT_EQ(json["healthy"], false);
   ASSERT_EQ(json["findings"].size(), 4U);
