@@ -277,8 +277,8 @@ std::vector<TradeoffPoint> decode_points(const std::string& text, const std::str
       point.rays.primary = rays.at("primary").get<std::uint64_t>();
       for (const PassInfo& pass : all_passes()) point.rays[pass.id] = rays.at(pass.name).get<std::uint64_t>();
       point.rays.not_finite = from.at("not_finite").get<std::uint64_t>();
-      point.bytes_sent = from.at("bytes_sent").get<std::uint64_t>();
-      point.samples = from.at("samples").get<double>();
+      point.bytes_sent = from.at("bytes_sent").get<std::size_t>();
+      point.samples = from.at("samples").get<int>();
       const Json& error = from.at("error");
       const auto value = [&](const char* metric) { return number_of(error.at(metric), std::nan("")); };
       // Of equal pictures psnr is infinite, which JSON does not have.

@@ -1,10 +1,10 @@
 #include "walls/config/wall_schema.h"
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
+#include "core/json.h"
 #include "walls/config/wall.h"
 #include "walls/config/wall_draft.h"
 #include "walls/config/wall_file.h"
@@ -12,7 +12,6 @@
 namespace hpr {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Properties = std::vector<std::pair<std::string, Json>>;
 
 constexpr double kMetresLimit = 1e6;
@@ -85,7 +84,7 @@ Json pixels() {
 Json rect() {
   constexpr int kFar = 1 << 20;
   Json schema{{"type", "array"}, {"minItems", 4}, {"maxItems", 4}};
-  schema["prefixItems"] = {whole(-kFar, kFar), whole(-kFar, kFar), whole(1, kFar), whole(1, kFar)};
+  schema["prefixItems"] = Json::array({whole(-kFar, kFar), whole(-kFar, kFar), whole(1, kFar), whole(1, kFar)});
   return schema;
 }
 
@@ -103,9 +102,7 @@ Json table(const Properties& properties, const std::vector<std::string>& require
 /// Exactly one of two keys.
 Json with_either(Json schema, const char* first, const char* second) {
   for (const char* const key : {first, second}) {
-    Json only = Json::object();
-    only["required"] = Json::array({key});
-    schema["oneOf"].push_back(only);
+    schema["oneOf"].push_back({{"required", Json::array({key})}});
   }
   return schema;
 }
@@ -136,7 +133,7 @@ Json window() {
 }
 
 Json channels(double low, double high) {
-  return {{"anyOf", {number(low, high), list(number(low, high), 3)}}};
+  return {{"anyOf", Json::array({number(low, high), list(number(low, high), 3)})}};
 }
 
 Json edge_blend() {
@@ -147,13 +144,13 @@ Json edge_blend() {
                            {"top", width},
                            {"auto", truth()},
                            {"gamma", positive(20)}});
-  return {{"anyOf", {Json{{"const", "auto"}}, positive(kMetresLimit), told}}};
+  return {{"anyOf", Json::array({{{"const", "auto"}}, positive(kMetresLimit), told})}};
 }
 
 /// What a panel is sent besides the picture.
 Properties look(Properties properties) {
   const Properties more{
-      {"rotate", {{"enum", {0, 90, 180, 270}}}},
+      {"rotate", {{"enum", Json::array({0, 90, 180, 270})}}},
       {"mirror", one_of(mirror_names())},
       {"eye", one_of(eye_names())},
       {"colour",
@@ -176,7 +173,7 @@ Json grid() {
             {"row_gaps_m", list(metres)},
             {"centre_m", point()},
             {"windows", list(text())},
-            {"panel_rotate", {{"enum", {0, 90, 180, 270}}}},
+            {"panel_rotate", {{"enum", Json::array({0, 90, 180, 270})}}},
             {"curve", with_either(table({{"radius_m", positive(kMetresLimit)}, {"angle_degrees", positive(360.0)}}),
                                   "radius_m", "angle_degrees")}}),
       {"columns", "rows", "tile_pixels", "tile_size_m"});
@@ -187,9 +184,7 @@ Json grid() {
 Json warp() {
   Json schema = table({{"mesh", file()}, {"blend", file()}, {"black", file()}});
   for (const char* const key : {"mesh", "blend", "black"}) {
-    Json only = Json::object();
-    only["required"] = Json::array({key});
-    schema["anyOf"].push_back(only);
+    schema["anyOf"].push_back({{"required", Json::array({key})}});
   }
   return schema;
 }
@@ -214,9 +209,10 @@ Json tracker() {
   };
   const Json lost = table({{"after_ms", whole(1, 3'600'000)}, {"then", one_of({"freeze", "rest"})}});
   Json schema;
-  schema["oneOf"] = {of_type("file", {{"path", text()}, {"rate_hz", positive(1e6)}}, {"path"}),
-                     of_type("udp", {{"address", text()}, {"port", whole(1, 65535)}, {"lost", lost}}, {"port"}),
-                     of_type("vrpn", {{"address", anything()}, {"lost", anything()}}, {})};
+  schema["oneOf"] =
+      Json::array({of_type("file", {{"path", text()}, {"rate_hz", positive(1e6)}}, {"path"}),
+                   of_type("udp", {{"address", text()}, {"port", whole(1, 65535)}, {"lost", lost}}, {"port"}),
+                   of_type("vrpn", {{"address", anything()}, {"lost", anything()}}, {})});
   return schema;
 }
 
@@ -270,7 +266,7 @@ std::string wall_schema() {
   Json document{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                 {"title", "HPR wall file"},
                 {"description", "The same data as a wall file's TOML; docs/walls.md says what the keys mean."}};
-  document.update(wall);
+  for (const auto& [key, value] : wall.members()) document[key] = value;
   return document.dump(2) + "\n";
 }
 

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
 #include "walls/manifest/manifest.h"
@@ -136,7 +136,7 @@ TEST(Manifest, HoldsWhatTheContractNames) {
        {record_screen("a", image, ScreenState::Fresh), record_screen("b", image, ScreenState::Stale),
         record_screen("c", {}, ScreenState::Lost)}});
   manifest.frames.push_back({4, std::numeric_limits<double>::quiet_NaN(), "tree", {}});
-  const auto json = nlohmann::json::parse(to_json(manifest));
+  const auto json = Json::parse(to_json(manifest));
   EXPECT_EQ(json["schema"], "hpr.wall-run/1");
   EXPECT_EQ(json["scene_hash"], "0000000000000abc");
   EXPECT_EQ(json["wall_hash"], "0000000000000123");

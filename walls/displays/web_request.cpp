@@ -7,9 +7,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/json.h"
 #include "core/text.h"
 
 namespace hpr {
@@ -27,9 +27,9 @@ bool is_number(const std::string& host) {
   return ::inet_pton(AF_INET, host.c_str(), &four) == 1 || ::inet_pton(AF_INET6, host.c_str(), &six) == 1;
 }
 
-bool read_pair(const nlohmann::json& document, const char* name, double& right, double& up) {
-  const auto found = document.find(name);
-  if (found == document.end()) return true;
+bool read_pair(const Json& document, const char* name, double& right, double& up) {
+  const Json* const found = document.find(name);
+  if (found == nullptr) return true;
   if (!found->is_array() || found->size() != 2 || !(*found)[0].is_number() || !(*found)[1].is_number()) return false;
   right = (*found)[0].get<double>();
   up = (*found)[1].get<double>();
@@ -84,12 +84,12 @@ std::string_view cookie_in(std::string_view header, std::string_view name) {
 
 std::optional<OrbitInput> parse_motion(std::string_view body) {
   constexpr double kLargest = 100.0;
-  const nlohmann::json document = nlohmann::json::parse(body, nullptr, false);
-  if (!document.is_object()) return std::nullopt;
+  const auto document = Json::try_parse(body);
+  if (!document || !document->is_object()) return std::nullopt;
   OrbitInput motion;
-  if (!read_pair(document, "turn", motion.turn_right, motion.turn_up)) return std::nullopt;
-  if (!read_pair(document, "pan", motion.pan_right, motion.pan_up)) return std::nullopt;
-  if (const auto dolly = document.find("dolly"); dolly != document.end()) {
+  if (!read_pair(*document, "turn", motion.turn_right, motion.turn_up)) return std::nullopt;
+  if (!read_pair(*document, "pan", motion.pan_right, motion.pan_up)) return std::nullopt;
+  if (const Json* const dolly = document->find("dolly")) {
     if (!dolly->is_number()) return std::nullopt;
     motion.dolly = dolly->get<double>();
   }

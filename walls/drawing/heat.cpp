@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "core/text.h"
 
 namespace hpr {
 namespace {
-
-using Json = nlohmann::json;
 
 /// Of one screen, over all frames.
 struct Sums {
@@ -24,7 +22,7 @@ struct Sums {
   std::size_t lost = 0;
   std::vector<double> ms{};  ///< of the frames that tell it
   double bytes = 0.0;        ///< of those
-  std::set<int> ranks{};
+  std::set<std::uint64_t> ranks{};
 };
 
 /// Not the mean: the first picture pays for what is loaded to write it.
@@ -66,19 +64,20 @@ const Measure& find_measure(std::string_view name) {
 }
 
 void add_state(const Json& screen, Sums& sums) {
-  const Json state = screen.value("state", Json());
+  const Json& state = screen["state"];
   ++sums.frames;
   sums.stale += state == "stale" ? 1U : 0U;
   sums.lost += state == "lost" ? 1U : 0U;
 }
 
 void add_cost(const Json& cost, Sums& sums) {
-  if (cost.value("rank", Json()).is_number_integer()) sums.ranks.insert(cost["rank"].get<int>());
-  const Json ms = cost.value("ms", Json());
-  const Json bytes = cost.value("bytes", Json());
-  if (!ms.is_number() || !bytes.is_number() || ms < 0.0 || bytes < 0.0) return;
-  sums.ms.push_back(ms.get<double>());
-  sums.bytes += bytes.get<double>();
+  if (cost["rank"].is_unsigned()) sums.ranks.insert(cost["rank"].get<std::uint64_t>());
+  if (!cost["ms"].is_number() || !cost["bytes"].is_number()) return;
+  const auto ms = cost["ms"].get<double>();
+  const auto bytes = cost["bytes"].get<double>();
+  if (ms < 0.0 || bytes < 0.0) return;
+  sums.ms.push_back(ms);
+  sums.bytes += bytes;
 }
 
 std::map<std::string, Sums> sums_of(const ManifestFile& manifest) {
@@ -86,11 +85,9 @@ std::map<std::string, Sums> sums_of(const ManifestFile& manifest) {
   for (const std::string& record : manifest.frames) {
     const Json frame = Json::parse(record);
     for (const auto& [key, add] : {std::pair("screens", &add_state), std::pair("costs", &add_cost)}) {
-      const Json entries = frame.value(key, Json::array());
-      if (!entries.is_array()) continue;
-      for (const Json& entry : entries) {
-        if (!entry.is_object() || !entry.value("id", Json()).is_string()) continue;
-        add(entry, sums[entry["id"].get<std::string>()]);
+      if (!frame[key].is_array()) continue;
+      for (const Json& entry : frame[key].elements()) {
+        if (entry["id"].is_string()) add(entry, sums[entry["id"].string()]);
       }
     }
   }

@@ -6,11 +6,11 @@
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "core/log.h"
 #include "image/image.h"
 #include "walls/drawing/canvas.h"
@@ -143,25 +143,24 @@ void DisplayProcess::show_again(std::size_t screen, const Image<Rgba8>& picture)
 }
 
 std::string DisplayProcess::status() const {
-  using Json = nlohmann::ordered_json;
   const ReceiverReport report = receiver_.report();
   Json screens = Json::array();
   const std::lock_guard lock(mutex_);
   for (std::size_t i = 0; i < screens_.size(); ++i) {
     const ScreenReport& of = report.screens[i];
-    screens.push_back(Json{{"id", wall_.screens[i].id},
-                           {"frame", of.frame ? Json(*of.frame) : Json(nullptr)},
-                           {"state", to_string(screens_[i].state)},
-                           {"dropped", of.dropped},
-                           {"late", of.late},
-                           {"skew_ms", of.frame ? Json(of.skew_s * 1000.0) : Json(nullptr)}});
+    screens.push_back({{"id", wall_.screens[i].id},
+                       {"frame", of.frame},
+                       {"state", to_string(screens_[i].state)},
+                       {"dropped", of.dropped},
+                       {"late", of.late},
+                       {"skew_ms", of.frame ? Json(of.skew_s * 1000.0) : Json()}});
   }
   const Json document{{"schema", "hpr.display/1"},
                       {"host", host_},
                       {"wall_hash", hex16(wall_.hash)},
                       {"connected", report.connected},
-                      {"screens", std::move(screens)}};
-  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+                      {"screens", screens}};
+  return document.dump(2) + "\n";
 }
 
 void DisplayProcess::write_status() {

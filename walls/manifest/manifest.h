@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/json.h"
 #include "image/color.h"
 #include "image/image.h"
 #include "walls/tracking/head.h"
@@ -97,6 +98,9 @@ struct WallStatusRecord {
 };
 
 [[nodiscard]] ScreenRecord record_screen(const std::string& id, const Image<Rgba8>& picture, ScreenState state);
+
+/// The member "budget" of a frame's record and of --stats.
+[[nodiscard]] Json budget_json(const BudgetRecord& budget);
 
 /// One frame's record, as the manifest has it, on one line.
 [[nodiscard]] std::string to_json(const FrameRecord& frame);

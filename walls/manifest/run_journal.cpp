@@ -7,9 +7,9 @@
 #include <cerrno>
 #include <cstdlib>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/json.h"
 #include "core/log.h"
 
 namespace hpr {
@@ -43,7 +43,7 @@ void RunJournal::add_frame(const std::string& record) {
 }
 
 void RunJournal::add_restart(const std::string& why) {
-  const nlohmann::ordered_json record{{"frame", read().frames.size()}, {"why", why}};
+  const Json record{{"frame", read().frames.size()}, {"why", why}};
   keep_restart(record.dump());
 }
 
@@ -52,8 +52,7 @@ void RunJournal::keep_restart(const std::string& record) {
 }
 
 void RunJournal::add_command(const std::string& line) {
-  append(fmt::format("{}{}\n", kCommand,
-                     nlohmann::json(line).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)));
+  append(fmt::format("{}{}\n", kCommand, Json(line).dump_ascii()));
 }
 
 void RunJournal::add_end() {
@@ -69,10 +68,11 @@ RunJournal::Entries RunJournal::read() const {
     const std::size_t space = line.find(' ');
     if (!whole || space == std::string::npos) continue;
     const std::string record = line.substr(space + 1);
-    if (!nlohmann::json::accept(record)) continue;
+    const std::optional<Json> json = Json::try_parse(record);
+    if (!json) continue;
     if (line.starts_with(kFrame)) entries.frames.push_back(record);
     if (line.starts_with(kRestart)) entries.restarts.push_back(record);
-    if (line.starts_with(kCommand)) entries.commands.push_back(nlohmann::json::parse(record).get<std::string>());
+    if (line.starts_with(kCommand)) entries.commands.push_back(json->string());
     entries.ended = entries.ended || line == kEnd;
   }
   return entries;

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "core/text.h"
 #include "walls/config/toml_document.h"
 
@@ -45,17 +45,17 @@ std::optional<std::vector<double>> csv_row(std::string_view line) {
 
 /// {"time": t, "position": [x, y, z], "orientation": [qx, qy, qz, qw]}, or "heading_pitch_roll", or neither.
 std::optional<std::vector<double>> json_row(std::string_view line) {
-  const auto json = nlohmann::json::parse(line, nullptr, false);
-  if (!json.is_object() || !json.contains("time") || !json["time"].is_number()) return std::nullopt;
+  const Json json = Json::try_parse(line).value_or(Json());
+  if (!json["time"].is_number()) return std::nullopt;
   std::vector<double> numbers{json["time"].get<double>()};
   if (!json.contains("position")) return std::nullopt;
   const bool turned = json.contains("orientation");
   const bool angled = json.contains("heading_pitch_roll");
   if (turned && angled) return std::nullopt;
   const auto add = [&](const char* key, std::size_t count) {
-    const auto& list = json[key];
+    const Json& list = json[key];
     if (!list.is_array() || list.size() != count) return false;
-    for (const auto& item : list) {
+    for (const Json& item : list.elements()) {
       if (!item.is_number()) return false;
       numbers.push_back(item.get<double>());
     }

@@ -1,9 +1,11 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "core/json.h"
 
 namespace hpr {
 
@@ -11,13 +13,11 @@ namespace hpr {
 /// line of what is no JSON.
 class JsonFile {
  public:
-  using Json = nlohmann::json;
-
   JsonFile(std::string_view text, std::string name);
 
   [[nodiscard]] const Json& root() const { return root_; }
-  /// The array under `key` of `object`, which is at `path`; empty when absent.
-  [[nodiscard]] const Json& array(const Json& object, const std::string& path, const char* key) const;
+  /// The elements of the array under `key` of `object`, which is at `path`; none when it is absent.
+  [[nodiscard]] const std::vector<Json>& array(const Json& object, const std::string& path, const char* key) const;
   [[nodiscard]] std::string text(const Json& object, const std::string& path, const char* key,
                                  const std::string& otherwise) const;
   [[nodiscard]] bool boolean(const Json& object, const std::string& path, const char* key) const;

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 
 #include "walls/config/import/foreign_wall.h"
@@ -9,14 +10,11 @@
 namespace hpr {
 namespace {
 
-using Json = JsonFile::Json;
-
 constexpr double kMetresLimit = 1e6;
 
 glm::dvec3 read_point(const JsonFile& file, const Json& entry, const std::string& path, const char* key) {
-  const Json& values = file.array(entry, path, key);
-  const auto is_number = [](const Json& value) { return value.is_number(); };
-  if (values.size() != 3 || !std::ranges::all_of(values, is_number)) {
+  const std::vector<Json>& values = file.array(entry, path, key);
+  if (values.size() != 3 || !std::ranges::all_of(values, &Json::is_number)) {
     file.fail(path + "/" + key, "it is not three numbers", "write e.g. [-1.0, 0.5, 2.0], in metres");
   }
   return {values[0].get<double>(), values[1].get<double>(), values[2].get<double>()};

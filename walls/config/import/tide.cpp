@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <map>
 #include <set>
@@ -10,8 +11,6 @@
 namespace hpr {
 namespace {
 
-using Json = JsonFile::Json;
-
 /// Tide (Blue Brain Project): grids of screens, each of one or several displays in one window, bezels in pixels.
 class TideReader {
  public:
@@ -21,11 +20,11 @@ class TideReader {
   ImportedWall read() {
     const Json& root = file_.object(file_.root(), "");
     imported_.wall.name = "Tide wall";
-    const Json& surfaces = file_.array(root, "", "surfaces");
+    const std::vector<Json>& surfaces = file_.array(root, "", "surfaces");
     if (surfaces.empty()) file_.fail("", "it has no \"surfaces\"", "is it Tide's configuration.json?");
     for (const Json& surface : surfaces) read_surface(surface);
     tiles_.resize(grids_.size());
-    const Json& processes = file_.array(root, "", "processes");
+    const std::vector<Json>& processes = file_.array(root, "", "processes");
     for (std::size_t i = 0; i < processes.size(); ++i) read_process(processes[i], fmt::format("/processes/{}", i));
     for (std::size_t i = 0; i < grids_.size(); ++i) add_grid(grids_[i], tiles_[i], imported_);
     write_remarks(root);
@@ -58,7 +57,7 @@ class TideReader {
     grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMostScreenSide, 0);
     grid.pitch_m = 1.0;
     const double width_pixels = grid_width(grid);
-    const Json& metres = file_.array(surface, path, "dimensions");
+    const std::vector<Json>& metres = file_.array(surface, path, "dimensions");
     if (metres.size() == 2 && metres[0].is_number() && metres[0].get<double>() > 0.0) {
       grid.pitch_m = metres[0].get<double>() / width_pixels;
     } else {
@@ -73,7 +72,7 @@ class TideReader {
   void read_process(const Json& process, const std::string& path) {
     (void)file_.object(process, path);
     const std::string node = node_of_host(imported_.wall, file_.text(process, path, "host", "localhost"));
-    const Json& screens = file_.array(process, path, "screens");
+    const std::vector<Json>& screens = file_.array(process, path, "screens");
     for (std::size_t i = 0; i < screens.size(); ++i) {
       read_screen(screens[i], fmt::format("{}/screens/{}", path, i), node);
     }
@@ -110,12 +109,12 @@ class TideReader {
     if (right_eyes_ > 0) {
       imported_.remarks.push_back(fmt::format("{} screens of the right eye were left out.", right_eyes_));
     }
-    const std::set<std::string> used{"surfaces", "processes"};
-    std::string unused;
-    for (const auto& [key, value] : root.items()) {
-      if (!used.contains(key)) unused += (unused.empty() ? "" : ", ") + key;
+    std::set<std::string> unused;
+    for (const auto& [key, value] : root.members()) {
+      if (key != "surfaces" && key != "processes") unused.insert(key);
     }
-    if (!unused.empty()) imported_.remarks.push_back("Of no use to a wall and left out: " + unused + ".");
+    if (unused.empty()) return;
+    imported_.remarks.push_back(fmt::format("Of no use to a wall and left out: {}.", fmt::join(unused, ", ")));
   }
 
   JsonFile file_;
