@@ -8,7 +8,6 @@
 
 #include "core/text.h"
 #include "scene/gltf/item.h"
-#include "scene/gltf/json.h"
 #include "scene/gltf/schema_check.h"
 
 namespace hpr {

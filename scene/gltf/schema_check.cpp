@@ -11,7 +11,6 @@
 
 #include "core/text.h"
 #include "scene/gltf/item.h"
-#include "scene/gltf/json.h"
 
 namespace hpr {
 namespace {

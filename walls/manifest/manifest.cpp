@@ -3,7 +3,6 @@
 #include <span>
 
 #include "core/bytes.h"
-#include "walls/manifest/budget_json.h"
 
 namespace hpr {
 namespace {
