@@ -134,7 +134,7 @@ ExitCode traced(Communicator& comm, const Globals& globals, const std::function<
     }
     write_file_atomically(globals.trace, document(lines, globals.args, dropped));
     if (dropped > 0) {
-      log::warning("--trace: {} spans past the first {} of a rank are left out", dropped, trace::kMostEvents);
+      log::warning("--trace: {} spans past the first {} of a rank are left out", dropped, trace::kMaxEvents);
     }
   });
   return code;

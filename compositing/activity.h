@@ -28,7 +28,7 @@ class Activity {
   [[nodiscard]] std::uint32_t weight(std::size_t position) const { return weights_[position]; }
 
   /// Cuts a run of the list into `parts` runs of as equal work as whole tiles allow. A tile costs by the pixels drawn
-  /// into it, and a share for being looked at, so that lists nobody drew into are cut evenly. The same on every rank.
+  /// into it, and a constant for being read, so that lists nobody drew into are cut evenly. The same on every rank.
   [[nodiscard]] std::vector<TileRun> cut(TileRun run, int parts) const;
 
   static constexpr std::size_t kTilesAWord = 16;
@@ -43,7 +43,7 @@ class Activity {
   std::size_t words_;  ///< per rank
   std::vector<std::uint64_t> fills_;
   std::vector<std::uint32_t> weights_;  ///< per tile of the list
-  std::vector<std::uint64_t> costs_;    ///< likewise
+  std::vector<std::uint64_t> costs_;    ///< per tile of the list
 };
 
 /// Four bits per tile of a list, the lowest first, in whole words: how much `layer` holds there. Where work is not
@@ -56,8 +56,8 @@ template <typename Pixel>
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (!layer.active(tiles[i])) continue;
     // A thin shape may be missed, which costs balance and nothing else.
-    const double share = counts ? sampled_share<Pixel>(layer.tile(tiles[i])) : 1.0;
-    const auto fill = 1 + static_cast<std::uint64_t>(share * static_cast<double>(kFullTile - 1));
+    const double fraction = counts ? sampled_share<Pixel>(layer.tile(tiles[i])) : 1.0;
+    const auto fill = 1 + static_cast<std::uint64_t>(fraction * static_cast<double>(kFullTile - 1));
     fills[i / kTiles] |= fill << (4 * (i % kTiles));
   }
   return fills;

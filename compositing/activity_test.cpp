@@ -60,8 +60,8 @@ TEST(Activity, CutsAreInOrderCoverTheRunAndAreAsEvenAsTilesAllow) {
         std::uint64_t weight = 0;
         for (std::size_t i = cut.first; i < cut.end(); ++i) weight += activity.weight(i);
         // A tile too many at either end, and what empty tiles weigh.
-        const double share = static_cast<double>(all) / parts + static_cast<double>(run.count) / 64.0;
-        EXPECT_LE(static_cast<double>(weight), share + ranks + 1.0);
+        const double limit = static_cast<double>(all) / parts + static_cast<double>(run.count) / 64.0;
+        EXPECT_LE(static_cast<double>(weight), limit + ranks + 1.0);
       }
       EXPECT_EQ(next, run.end());
     }

@@ -28,7 +28,7 @@ std::vector<int> random_owners(int ranks, std::uint64_t seed) {
   return owners;
 }
 
-/// A pixel that names its place, so that a misplaced one tells where it came from. Every third tile is empty.
+/// A pixel that encodes its position, so that a misplaced one shows where it came from. Every third tile is empty.
 template <typename Pixel>
 Pixel marked(std::size_t tile, std::size_t pixel) {
   if (tile % 3 == 1) return Pixel{};

@@ -261,8 +261,8 @@ TEST(Blenders, BrightColorsKeepTheBoundTimesTheirBrightness) {
     return layer;
   };
   std::vector<RgbaPremultiplied> expected = test::pixels_of(bright(order.front()));
-  for (std::size_t place = 1; place < order.size(); ++place) {
-    const auto back = test::pixels_of(bright(order[place]));
+  for (std::size_t position = 1; position < order.size(); ++position) {
+    const auto back = test::pixels_of(bright(order[position]));
     for (std::size_t i = 0; i < expected.size(); ++i) expected[i] = test::over_by_definition(expected[i], back[i]);
   }
   double largest = 0.0;

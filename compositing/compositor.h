@@ -20,7 +20,7 @@ namespace hpr {
 /// What compositing leaves a rank with.
 struct Composited {
   std::vector<std::size_t> tiles;  ///< the frame's tiles it owns, ascending
-  /// The same on all ranks: every tile is owned by the rank that shows it, there is nothing left to assemble.
+  /// Whether every tile is owned by the rank that shows it, so that nothing is left to assemble; equal on all ranks.
   bool assembled = false;
 };
 
@@ -63,7 +63,7 @@ class Compositor {
   [[nodiscard]] virtual Composited composite(Communicator& comm, TileLayer<Key>& layer,
                                              std::span<const std::size_t> tiles, std::span<const int> shown_by) = 0;
 
-  /// The same, the tiles staying wherever that costs least.
+  /// Collective: composites and leaves every tile on the rank where that costs least.
   [[nodiscard]] Composited composite(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> tiles) {
     return composite(comm, layer, tiles, {});
   }

@@ -119,12 +119,12 @@ std::size_t pack_bytes(const std::uint32_t* tile, const std::uint64_t* mask, std
   return pack_by(tile, mask, packed, reinterpret_cast<const std::int32_t*>(sources));
 }
 
-/// Brings packed pixels to their places: `combine` makes the new vector of those in place, the packed ones brought to
+/// Brings packed pixels to their lanes: `combine` makes the new vector of those in place, the packed ones brought to
 /// their lanes, and which lanes those are. Returns how many words of the mask are done: the last few pixels, which no
 /// whole vector can be loaded of, are left.
 template <typename Index, typename Lane, typename Combine>
 HWY_INLINE std::size_t spread_runs(Lane* tile, const std::uint64_t* mask, const Lane*& packed, const Lane* end,
-                                   const Lane* places, const Combine& combine) {
+                                   const Lane* index_table, const Combine& combine) {
   const LanesOf<Lane> lanes;
   const std::size_t step = hn::Lanes(lanes);
   for (std::size_t word = 0; word < kTilePixels / 64; ++word) {
@@ -134,8 +134,9 @@ HWY_INLINE std::size_t spread_runs(Lane* tile, const std::uint64_t* mask, const 
       const auto bits = static_cast<std::uint8_t>((mask[word] >> i) & ((1U << step) - 1U));
       if (bits == 0) continue;
       // Lane n takes the packed pixel that as many drawn lanes precede.
-      const auto place = hn::SetTableIndices(lanes, reinterpret_cast<const Index*>(places + std::size_t{bits} * 8));
-      const auto pixels = hn::TableLookupLanes(hn::LoadU(lanes, packed), place);
+      const auto indices =
+          hn::SetTableIndices(lanes, reinterpret_cast<const Index*>(index_table + std::size_t{bits} * 8));
+      const auto pixels = hn::TableLookupLanes(hn::LoadU(lanes, packed), indices);
       Lane* const into = tile + word * 64 + i;
       hn::StoreU(combine(hn::LoadU(lanes, into), pixels, hn::LoadMaskBits(lanes, &bits)), lanes, into);
       packed += std::popcount(bits);
@@ -146,16 +147,16 @@ HWY_INLINE std::size_t spread_runs(Lane* tile, const std::uint64_t* mask, const 
 
 /// Packed pixels replace what stands there.
 std::size_t unpack_runs(std::uint32_t* tile, const std::uint64_t* mask, const std::uint32_t*& packed,
-                        const std::uint32_t* end, const std::uint32_t* places) {
-  return spread_runs<std::int32_t>(tile, mask, packed, end, places, [](auto in_place, auto pixels, auto drawn) {
+                        const std::uint32_t* end, const std::uint32_t* indices) {
+  return spread_runs<std::int32_t>(tile, mask, packed, end, indices, [](auto in_place, auto pixels, auto drawn) {
     return hn::IfThenElse(drawn, pixels, in_place);
   });
 }
 
 /// The larger key stays.
 std::size_t merge_runs(Key* tile, const std::uint64_t* mask, const Key*& packed, const Key* end,
-                       const std::uint64_t* places) {
-  return spread_runs<std::int64_t>(tile, mask, packed, end, places, [](auto in_place, auto keys, auto drawn) {
+                       const std::uint64_t* indices) {
+  return spread_runs<std::int64_t>(tile, mask, packed, end, indices, [](auto in_place, auto keys, auto drawn) {
     return hn::Max(in_place, hn::IfThenElseZero(drawn, keys));
   });
 }
@@ -305,24 +306,24 @@ using LaneTable = std::array<Lane, std::size_t{256} * 8>;
 
 /// Per lane: how many drawn lanes stand before it, where its key stands among the packed ones.
 template <typename Lane>
-constexpr LaneTable<Lane> kPlaces = [] {
-  LaneTable<Lane> places{};
+constexpr LaneTable<Lane> kIndices = [] {
+  LaneTable<Lane> indices{};
   for (std::size_t bits = 0; bits < 256; ++bits) {
     for (std::size_t lane = 0; lane < 8; ++lane) {
-      places[bits * 8 + lane] = static_cast<Lane>(std::popcount(bits & ((std::size_t{1} << lane) - 1)));
+      indices[bits * 8 + lane] = static_cast<Lane>(std::popcount(bits & ((std::size_t{1} << lane) - 1)));
     }
   }
-  return places;
+  return indices;
 }();
 
-/// Per place among the packed ones: the lane its key comes from; 0 past the last.
+/// Per index among the packed ones: the lane its key comes from; 0 past the last.
 template <typename Lane>
 constexpr LaneTable<Lane> kSources = [] {
   LaneTable<Lane> sources{};
   for (std::size_t bits = 0; bits < 256; ++bits) {
-    std::size_t place = 0;
+    std::size_t index = 0;
     for (std::size_t lane = 0; lane < 8; ++lane) {
-      if ((bits >> lane & 1U) != 0) sources[bits * 8 + place++] = static_cast<Lane>(lane);
+      if ((bits >> lane & 1U) != 0) sources[bits * 8 + index++] = static_cast<Lane>(lane);
     }
   }
   return sources;
@@ -352,7 +353,7 @@ void merge_packed(std::span<Key, kTilePixels> tile, const TileMask& mask, std::s
   const Key* next = packed.data();
   const Key* const end = next + packed.size();
   std::size_t word =
-      HWY_DYNAMIC_DISPATCH(merge_runs)(tile.data(), mask.data(), next, end, kPlaces<std::uint64_t>.data());
+      HWY_DYNAMIC_DISPATCH(merge_runs)(tile.data(), mask.data(), next, end, kIndices<std::uint64_t>.data());
   for (; word < mask.size(); ++word) {
     for (std::uint64_t rest = mask[word]; rest != 0; rest &= rest - 1) {
       Key& key = tile[word * 64 + static_cast<std::size_t>(std::countr_zero(rest))];
@@ -390,7 +391,7 @@ void unpack_drawn(std::span<const Rgba8Premultiplied> packed, const TileMask& ma
   const auto* const first = next;
   const std::size_t word =
       HWY_DYNAMIC_DISPATCH(unpack_runs)(reinterpret_cast<std::uint32_t*>(tile.data()), mask.data(), next,
-                                        first + packed.size(), kPlaces<std::uint32_t>.data());
+                                        first + packed.size(), kIndices<std::uint32_t>.data());
   unpack_from(word, packed.data() + (next - first), mask, tile);
 }
 void unpack_drawn(std::span<const RgbaPremultiplied> packed, const TileMask& mask,

@@ -82,7 +82,7 @@ void unpack_drawn(std::span<const Rgba8Premultiplied> packed, const TileMask& ma
 void unpack_drawn(std::span<const RgbaPremultiplied> packed, const TileMask& mask,
                   std::span<RgbaPremultiplied, kTilePixels> tile);
 
-/// About the share of a tile that is drawn, from every eighth run of 64 pixels: enough to share work by.
+/// About the fraction of a tile that is drawn, from every eighth run of 64 pixels: enough to share work by.
 template <typename Pixel>
 [[nodiscard]] double sampled_share(std::span<const Pixel> tile) {
   std::size_t drawn = 0;

@@ -34,9 +34,9 @@ inline TileLayer<Key> random_layer(int rank, const FrameLayout& layout, std::uin
   for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
     if (random() % 3 == 0) continue;
     layer.set_active(tile);
-    const Rect place = layout.place(tile).pixels;
-    for (int y = 0; y < place.height(); ++y) {
-      for (int x = 0; x < place.width(); ++x) {
+    const Rect rect = layout.place(tile).pixels;
+    for (int y = 0; y < rect.height(); ++y) {
+      for (int x = 0; x < rect.width(); ++x) {
         if (random() % 3 == 0) continue;
         const auto surface = static_cast<std::uint32_t>(random() % 5 == 0 ? random() % 0xFFFFFFFFU : random() % 4);
         layer.tile(tile)[static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x)] =
@@ -129,7 +129,7 @@ Pixel random_color(std::mt19937_64& random) {
   return {up_to(a), up_to(a), up_to(a), a};
 }
 
-/// About a third of the tiles is empty, and a share of the pixels of the others that differs from tile to tile.
+/// About a third of the tiles is empty, and a fraction of the pixels of the others that differs from tile to tile.
 template <typename Pixel>
 TileLayer<Pixel> random_colors(int rank, const FrameLayout& layout, std::uint64_t seed = 1) {
   std::mt19937_64 random(seed * 1000 + static_cast<std::uint64_t>(rank) + 77);
@@ -138,9 +138,9 @@ TileLayer<Pixel> random_colors(int rank, const FrameLayout& layout, std::uint64_
     if (random() % 3 == 0) continue;
     layer.set_active(tile);
     const std::uint64_t drawn = std::array<std::uint64_t, 4>{1, 30, 90, 100}.at(random() % 4);  // percent
-    const Rect place = layout.place(tile).pixels;
-    for (int y = 0; y < place.height(); ++y) {
-      for (int x = 0; x < place.width(); ++x) {
+    const Rect rect = layout.place(tile).pixels;
+    for (int y = 0; y < rect.height(); ++y) {
+      for (int x = 0; x < rect.width(); ++x) {
         if (random() % 100 >= drawn) continue;
         layer.tile(tile)[static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x)] =
             random_color<Pixel>(random);

@@ -31,7 +31,7 @@ constexpr std::size_t count_bytes(std::size_t active) {
 /// Whether a tile is surely full enough to travel whole: most are, or hold little.
 template <typename Pixel>
 bool looks_full(std::span<const Pixel, kTilePixels> tile) {
-  return sampled_share<Pixel>(tile) * kTilePixels > static_cast<double>(kMostPackedPixels) * 9.0 / 8.0;
+  return sampled_share<Pixel>(tile) * kTilePixels > static_cast<double>(kMaxPackedPixels) * 9.0 / 8.0;
 }
 
 /// Masks and pixels of packed tiles, one after the other, merged where they lie.
@@ -88,7 +88,7 @@ std::vector<std::uint16_t> choose_packed(const TileLayer<Pixel>& layer, std::spa
     if (looks_full(tile)) continue;
     TileMask mask;
     const std::size_t pixels = find_drawn(tile, mask);
-    if (pixels > kMostPackedPixels) continue;
+    if (pixels > kMaxPackedPixels) continue;
     drawn[i] = static_cast<std::uint16_t>(pixels);
     if (pixels > 0) masks.push_back(mask);
   }
@@ -97,25 +97,25 @@ std::vector<std::uint16_t> choose_packed(const TileLayer<Pixel>& layer, std::spa
 
 }  // namespace
 
-std::vector<Body> bodies_of(std::span<const std::uint16_t> drawn, std::span<const std::size_t> tiles) {
-  std::vector<Body> bodies;
+std::vector<Segment> segments_of(std::span<const std::uint16_t> drawn, std::span<const std::size_t> tiles) {
+  std::vector<Segment> segments;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (drawn[i] != kWholeTile) continue;
-    const bool joins = !bodies.empty() && bodies.back().end == i && tiles[i] == tiles[i - 1] + 1 &&
-                       i - bodies.back().first < kTilesOfABody;
+    const bool joins = !segments.empty() && segments.back().end == i && tiles[i] == tiles[i - 1] + 1 &&
+                       i - segments.back().first < kMaxSegmentTiles;
     if (joins) {
-      bodies.back().end = i + 1;
+      segments.back().end = i + 1;
     } else {
-      bodies.push_back({i, i + 1});
+      segments.push_back({i, i + 1});
     }
   }
-  return bodies;
+  return segments;
 }
 
 void TileMessage::start(std::span<const std::byte> prefix) {
   HPR_CHECK(prefix.size() % alignof(Key) == 0);
   head_.clear();
-  bodies_.clear();
+  segments_.clear();
   head_.append(prefix);
 }
 
@@ -141,7 +141,7 @@ void TileMessage::add_packed(const TileLayer<Pixel>& layer, std::span<const std:
   const DepthFormat depths = kHasDepth ? layer.depth_format() : DepthFormat::Float32;
   const std::size_t pixel_bytes = depths == DepthFormat::Float32 ? sizeof(Pixel) : sent_bytes(depths);
   add_head(drawn, depths);
-  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMostPackedPixels * pixel_bytes) +
+  head_.reserve(head_.size() + masks.size() * (sizeof(TileMask) + kMaxPackedPixels * pixel_bytes) +
                 kTilePixels * sizeof(Pixel));
   auto mask = masks.begin();
   for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -161,21 +161,21 @@ void TileMessage::add_packed(const TileLayer<Pixel>& layer, std::span<const std:
     ++mask;
   }
   if constexpr (kHasDepth) {
-    if (depths != DepthFormat::Float32) return add_narrow_bodies(layer, tiles, drawn);
+    if (depths != DepthFormat::Float32) return add_narrow_segments(layer, tiles, drawn);
   }
-  add_bodies(layer, tiles, drawn);
+  add_segments(layer, tiles, drawn);
 }
 
-void TileMessage::add_narrow_bodies(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                                    std::span<const std::uint16_t> drawn) {
+void TileMessage::add_narrow_segments(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                                      std::span<const std::uint16_t> drawn) {
   const std::size_t tile_bytes = kTilePixels * sent_bytes(layer.depth_format());
   narrow_.clear();
   narrow_.reserve(static_cast<std::size_t>(std::ranges::count(drawn, kWholeTile)) * tile_bytes);  // so it stays put
-  for (const Body body : bodies_of(drawn, tiles)) {
-    const std::size_t count = body.end - body.first;
+  for (const Segment segment : segments_of(drawn, tiles)) {
+    const std::size_t count = segment.end - segment.first;
     const std::span<std::byte> room = narrow_.extend(count * tile_bytes);
-    narrow_keys(layer.run({tiles[body.first], count}), layer.depth_format(), room.data());
-    bodies_.emplace_back(room);
+    narrow_keys(layer.run({tiles[segment.first], count}), layer.depth_format(), room.data());
+    segments_.emplace_back(room);
   }
 }
 
@@ -212,7 +212,7 @@ TileHead parse_head(std::span<const std::byte> message, std::size_t tiles, bool 
     std::uint16_t& drawn = parsed.drawn[i];
     std::memcpy(&drawn, count, sizeof drawn);
     count += sizeof drawn;
-    if (drawn != kWholeTile && !(packs && drawn <= kMostPackedPixels)) {
+    if (drawn != kWholeTile && !(packs && drawn <= kMaxPackedPixels)) {
       malformed(fmt::format("tile {} of {} is said to have {} pixels", i, tiles, drawn));
     }
     expected += packed_bytes(drawn, pixel_bytes);
@@ -241,15 +241,15 @@ std::size_t TileReader::merge_tiles(Communicator& comm, int from, const TileHead
     bytes += kTilePixels * sizeof(Key);  // it goes through all of the tile
   }
   const bool narrow = head.depths != DepthFormat::Float32;
-  for (const Body body : bodies_of(head.drawn, tiles)) {
-    const auto part = tiles.subspan(body.first, body.end - body.first);
+  for (const Segment segment : segments_of(head.drawn, tiles)) {
+    const auto part = tiles.subspan(segment.first, segment.end - segment.first);
     const std::span<Key> into = layer.run({part.front(), part.size()});
     const bool fresh = std::ranges::none_of(part, [&](std::size_t tile) { return layer.active(tile); });
     if (fresh && !narrow) {
       comm.receive(std::as_writable_bytes(into), from);
     } else {
-      body_.clear();
-      const std::span<std::byte> arrived = body_.extend(into.size() * sent_bytes(head.depths));
+      segment_.clear();
+      const std::span<std::byte> arrived = segment_.extend(into.size() * sent_bytes(head.depths));
       comm.receive(arrived, from);
       if (fresh) {
         widen_keys(arrived.data(), head.depths, into);
@@ -337,21 +337,21 @@ template <typename Pixel>
 void HeldTiles<Pixel>::take(Communicator& comm, int from, std::span<const std::byte> message,
                             std::span<const std::size_t> tiles) {
   TileHead head = parse_head(message, tiles.size(), true, sizeof(Pixel));
-  places_.assign(tiles.size(), 0);
+  offsets_.assign(tiles.size(), 0);
   drawn_.assign(tiles.size(), false);
   bytes_.clear();
-  for (const Body body : bodies_of(head.drawn, tiles)) {
-    for (std::size_t i = body.first; i < body.end; ++i) {
-      places_[i] = bytes_.size() + (i - body.first) * kTilePixels * sizeof(Pixel);
+  for (const Segment segment : segments_of(head.drawn, tiles)) {
+    for (std::size_t i = segment.first; i < segment.end; ++i) {
+      offsets_[i] = bytes_.size() + (i - segment.first) * kTilePixels * sizeof(Pixel);
     }
-    comm.receive(bytes_.extend((body.end - body.first) * kTilePixels * sizeof(Pixel)), from);
+    comm.receive(bytes_.extend((segment.end - segment.first) * kTilePixels * sizeof(Pixel)), from);
   }
-  std::size_t place = bytes_.size();
+  std::size_t offset = bytes_.size();
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     drawn_[i] = head.drawn[i] != TileHead::kInactive && head.drawn[i] != 0;
     const std::size_t packed = packed_bytes(head.drawn[i], sizeof(Pixel));
-    if (packed > 0) places_[i] = place;
-    place += packed;
+    if (packed > 0) offsets_[i] = offset;
+    offset += packed;
   }
   bytes_.append(head.packed);
   counts_ = std::move(head.drawn);
@@ -359,10 +359,10 @@ void HeldTiles<Pixel>::take(Communicator& comm, int from, std::span<const std::b
 
 template <typename Pixel>
 std::span<const Pixel> HeldTiles<Pixel>::pixels(std::size_t position, std::span<Pixel> room) const {
-  const std::byte* const place = bytes_.bytes().data() + places_[position];
-  if (counts_[position] == kWholeTile) return {reinterpret_cast<const Pixel*>(place), kTilePixels};
+  const std::byte* const start = bytes_.bytes().data() + offsets_[position];
+  if (counts_[position] == kWholeTile) return {reinterpret_cast<const Pixel*>(start), kTilePixels};
   std::ranges::fill(room, Pixel{});
-  unpack_tile(place, counts_[position], room);
+  unpack_tile(start, counts_[position], room);
   return room;
 }
 
@@ -371,11 +371,11 @@ void PieceMerger<Pixel>::exchange(Communicator& comm, std::span<const Outgoing> 
                                   TileLayer<Pixel>& layer, std::span<const std::size_t> tiles) {
   std::vector<int> front_to_back(from.begin(), from.end());
   std::ranges::sort(front_to_back);
-  const auto place_of = [&](int rank) {
+  const auto index_of = [&](int rank) {
     return static_cast<std::size_t>(std::ranges::lower_bound(front_to_back, rank) - front_to_back.begin());
   };
-  const std::size_t own = place_of(comm.rank());
-  // Who is in front of all it hears from, and has nobody waiting for what it sends, takes one after the other: so one
+  const std::size_t own = index_of(comm.rank());
+  // A rank in front of all it receives from, which sends nothing, takes one message after the other: so one
   // layer's memory is enough for the rank that collects all layers.
   if (out.empty() && own == 0) {
     held_.resize(std::max<std::size_t>(held_.size(), 1));
@@ -389,7 +389,7 @@ void PieceMerger<Pixel>::exchange(Communicator& comm, std::span<const Outgoing> 
   }
   if (held_.size() < from.size()) held_.resize(from.size());
   comm.exchange(out, from, [&](int sender, std::span<const std::byte> message) {
-    held_[place_of(sender)].take(comm, sender, message, tiles);
+    held_[index_of(sender)].take(comm, sender, message, tiles);
   });
   fold(comm, std::span(held_).first(from.size()), own, layer, tiles);
 }
@@ -401,10 +401,10 @@ void PieceMerger<Pixel>::fold(Communicator& comm, std::span<const HeldTiles<Pixe
     const bool among = layer.active(tiles[i]);
     const std::span<Pixel> into = layer.tile(tiles[i]);
     fold_.start(into, among);
-    for (std::size_t place = 0; place <= arrived.size(); ++place) {
-      if (place == own && among) fold_.add(into);
-      if (place == arrived.size() || !arrived[place].drawn(i)) continue;
-      fold_.add(arrived[place].pixels(i, fold_.room()));
+    for (std::size_t layer_index = 0; layer_index <= arrived.size(); ++layer_index) {
+      if (layer_index == own && among) fold_.add(into);
+      if (layer_index == arrived.size() || !arrived[layer_index].drawn(i)) continue;
+      fold_.add(arrived[layer_index].pixels(i, fold_.room()));
     }
     if (fold_.finish()) layer.set_active(tiles[i]);
   }

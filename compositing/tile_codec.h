@@ -14,8 +14,8 @@
 #include "image/tiles.h"
 
 /// Tiles as messages between ranks of one run of HPR (never as files: the byte order is the machine's). A message says
-/// what follows and carries the tiles that are only partly drawn; whole tiles follow it as bodies, which leave from the
-/// layer they lie in and arrive, where they can, in the one they go to.
+/// what follows and carries the tiles that are only partly drawn; whole tiles follow it as segments, which are sent
+/// from the layer they lie in and are received, where possible, in the one they go to.
 ///
 ///   8 bytes            kTileFormat, and above 32 bits the format of depths
 ///   8 ceil(n / 64)     one bit per tile of the list, the lowest first: is it active? The bits past the last are 0
@@ -23,8 +23,8 @@
 ///   then per active tile that is not whole, in order of the list, unless it has no pixels:
 ///     512 bytes        one bit per pixel of the tile: is it drawn?
 ///     8 bytes each     the drawn pixels in order (keys; others take their size), up to a multiple of 8 bytes
-///   bodies             the whole tiles in order of the list, keys of fewer than 32 bits of depth as narrow_keys writes
-///                      them; tiles that are neighbours in the frame share one body, up to kTilesOfABody of them
+///   segments           the whole tiles in order of the list, keys of fewer than 32 bits of depth as narrow_keys writes
+///                      them; tiles that are neighbours in the frame share one segment, up to kMaxSegmentTiles of them
 ///
 /// The list of tiles itself does not travel: sender and receiver both know it. Scattered pixels cost 8 bytes and a bit
 /// each, however they lie; a tile so full that packing saves little travels whole, since that is sent and merged
@@ -34,13 +34,13 @@ namespace hpr {
 inline constexpr std::uint64_t kTileFormat = 4;
 inline constexpr std::uint16_t kWholeTile = 0xFFFF;
 /// Of 4096 pixels. At 3/4 the packed tile takes 77 % of the whole one's bytes.
-inline constexpr std::size_t kMostPackedPixels = kTilePixels * 3 / 4;
+inline constexpr std::size_t kMaxPackedPixels = kTilePixels * 3 / 4;
 /// So many tiles of keys, half a megabyte, stay in a core's cache between arriving and being merged.
-inline constexpr std::size_t kTilesOfABody = 16;
+inline constexpr std::size_t kMaxSegmentTiles = 16;
 
 /// What follows the head of a message for one tile of which so many pixels are packed; nothing for the others.
 [[nodiscard]] constexpr std::size_t packed_bytes(std::uint16_t drawn, std::size_t pixel_bytes) {
-  if (drawn == 0 || drawn > kMostPackedPixels) return 0;
+  if (drawn == 0 || drawn > kMaxPackedPixels) return 0;
   return sizeof(TileMask) + (drawn * pixel_bytes + 7) / 8 * 8;
 }
 
@@ -64,13 +64,14 @@ struct TileHead {
   [[nodiscard]] bool whole(std::size_t position) const { return drawn[position] == kWholeTile; }
 };
 
-/// The whole tiles of a list that travel in one body: positions [first, end), neighbours in the frame.
-struct Body {
+/// The whole tiles of a list that are sent in one segment: positions [first, end), neighbours in the frame.
+struct Segment {
   std::size_t first = 0;
   std::size_t end = 0;
 };
 /// `drawn` as in TileHead.
-[[nodiscard]] std::vector<Body> bodies_of(std::span<const std::uint16_t> drawn, std::span<const std::size_t> tiles);
+[[nodiscard]] std::vector<Segment> segments_of(std::span<const std::uint16_t> drawn,
+                                               std::span<const std::size_t> tiles);
 
 /// A message of tiles in the making; keeps its memory from frame to frame. What it sends of a layer must stay as it is
 /// until the exchange returns.
@@ -90,7 +91,7 @@ class TileMessage {
       if (layer.active(tiles[i])) drawn[i] = kWholeTile;
     }
     add_head(drawn, DepthFormat::Float32);
-    add_bodies(layer, tiles, drawn);
+    add_segments(layer, tiles, drawn);
   }
 
   /// Sends `tiles` of `layer` as a message of their own.
@@ -102,25 +103,25 @@ class TileMessage {
     comm.exchange({&out, 1}, {}, {});
   }
 
-  [[nodiscard]] Outgoing to(int rank) const { return {rank, head_.bytes(), bodies_}; }
+  [[nodiscard]] Outgoing to(int rank) const { return {rank, head_.bytes(), segments_}; }
   [[nodiscard]] std::span<const std::byte> head() const { return head_.bytes(); }
 
  private:
   template <typename Pixel>
   void add_packed(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles);
   void add_head(std::span<const std::uint16_t> drawn, DepthFormat depths);
-  void add_narrow_bodies(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
-                         std::span<const std::uint16_t> drawn);
+  void add_narrow_segments(const TileLayer<Key>& layer, std::span<const std::size_t> tiles,
+                           std::span<const std::uint16_t> drawn);
   template <typename Pixel>
-  void add_bodies(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
-                  std::span<const std::uint16_t> drawn) {
-    for (const Body body : bodies_of(drawn, tiles))
-      bodies_.push_back(std::as_bytes(layer.run({tiles[body.first], body.end - body.first})));
+  void add_segments(const TileLayer<Pixel>& layer, std::span<const std::size_t> tiles,
+                    std::span<const std::uint16_t> drawn) {
+    for (const Segment segment : segments_of(drawn, tiles))
+      segments_.push_back(std::as_bytes(layer.run({tiles[segment.first], segment.end - segment.first})));
   }
 
   ByteBuffer head_;
-  std::vector<std::span<const std::byte>> bodies_;
-  ByteBuffer narrow_;  ///< the bodies where they do not leave from the layer
+  std::vector<std::span<const std::byte>> segments_;
+  ByteBuffer narrow_;  ///< the segments where they are not sent from the layer
 };
 
 /// Checks the format, the bits, the counts and the length of a message for a list of `tiles` tiles. `packs`: whether
@@ -132,7 +133,7 @@ class TileMessage {
 /// Reads messages of tiles inside the call an exchange makes for each; keeps its memory from frame to frame.
 class TileReader {
  public:
-  /// Merges the tiles of a message of keys into `layer`: the nearer surface stays. Tells `comm` of the work.
+  /// Merges the tiles of a message of keys into `layer`: the nearer surface stays. Reports the work to `comm`.
   void merge(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Key>& layer,
              std::span<const std::size_t> tiles);
 
@@ -154,12 +155,12 @@ class TileReader {
   static void replace_packed(Communicator& comm, int from, std::span<const std::byte> message, TileLayer<Pixel>& layer,
                              std::span<const std::size_t> tiles);
 
-  /// Receives the bodies into the layer and empties the tiles that were empty at the sender.
+  /// Receives the segments into the layer and empties the tiles that were empty at the sender.
   template <typename Pixel>
   static void receive_whole(Communicator& comm, int from, const TileHead& head, TileLayer<Pixel>& layer,
                             std::span<const std::size_t> tiles) {
-    for (const Body body : bodies_of(head.drawn, tiles)) {
-      comm.receive(std::as_writable_bytes(layer.run({tiles[body.first], body.end - body.first})), from);
+    for (const Segment segment : segments_of(head.drawn, tiles)) {
+      comm.receive(std::as_writable_bytes(layer.run({tiles[segment.first], segment.end - segment.first})), from);
     }
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (head.whole(i)) {
@@ -170,11 +171,11 @@ class TileReader {
     }
   }
 
-  /// Merges packed tiles and bodies of keys into a layer; returns the bytes it went through.
+  /// Merges packed tiles and segments of keys into a layer; returns the bytes it went through.
   std::size_t merge_tiles(Communicator& comm, int from, const TileHead& head, TileLayer<Key>& layer,
                           std::span<const std::size_t> tiles);
 
-  ByteBuffer body_;
+  ByteBuffer segment_;
   std::vector<Key> wide_;
 };
 
@@ -188,7 +189,7 @@ class TileFold {
   void add(std::span<const Pixel> content);
   /// 4096 pixels of room to unpack the next content in.
   [[nodiscard]] std::span<Pixel> room() { return front_.empty() ? blended_ : next_; }
-  /// Leaves the result in its place. False when nothing was added.
+  /// Leaves the result in `into`. False when nothing was added.
   bool finish();
 
  private:
@@ -203,7 +204,7 @@ class TileFold {
 template <typename Pixel>
 class HeldTiles {
  public:
-  /// Inside the call an exchange makes for a message: takes it with its bodies.
+  /// Inside the call an exchange makes for a message: takes it with its segments.
   void take(Communicator& comm, int from, std::span<const std::byte> message, std::span<const std::size_t> tiles);
 
   [[nodiscard]] std::size_t bytes() const { return bytes_.size(); }
@@ -212,10 +213,10 @@ class HeldTiles {
   [[nodiscard]] std::span<const Pixel> pixels(std::size_t position, std::span<Pixel> room) const;
 
  private:
-  ByteBuffer bytes_;                   ///< bodies, then packed tiles
+  ByteBuffer bytes_;                   ///< segments, then packed tiles
   std::vector<std::uint16_t> counts_;  ///< as in TileHead
   std::vector<bool> drawn_;
-  std::vector<std::size_t> places_;  ///< per tile of the list where it starts
+  std::vector<std::size_t> offsets_;  ///< per tile of the list where it starts
 };
 
 /// Sends and merges what layers hold of some tiles; keeps its memory from frame to frame. This is the one place where

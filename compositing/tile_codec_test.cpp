@@ -33,7 +33,7 @@ bool refused(Parse parse) {
 
 /// Every tile drawn to another degree: nothing, one pixel, few, just packed, just whole, all.
 TileLayer<Key> graded_layer(std::uint64_t seed) {
-  constexpr std::array<std::size_t, 8> kDrawn{0, 1, 7, 63, 2000, kMostPackedPixels, kMostPackedPixels + 1, kTilePixels};
+  constexpr std::array<std::size_t, 8> kDrawn{0, 1, 7, 63, 2000, kMaxPackedPixels, kMaxPackedPixels + 1, kTilePixels};
   std::mt19937_64 random(seed);
   TileLayer<Key> layer(kLayout);
   for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
@@ -131,7 +131,7 @@ TEST(TileCodec, AnEmptyTileTakesOneBitAndAnEmptyListOneWord) {
 }
 
 TEST(TileCodec, ScatteredPixelsCostABitOfTheirTileAndEightBytesEach) {
-  for (const std::size_t drawn : {std::size_t{1}, std::size_t{500}, kMostPackedPixels}) {
+  for (const std::size_t drawn : {std::size_t{1}, std::size_t{500}, kMaxPackedPixels}) {
     TileLayer<Key> layer(FrameLayout({{64, 64}}));
     layer.set_active(0);
     for (std::size_t i = 0; i < drawn; ++i) layer.tile(0)[i * 5 % kTilePixels] = 7 + i;  // 5 and 4096 share no factor
@@ -148,10 +148,11 @@ TEST(TileCodec, WholeNeighboursShareABodyUpToItsSize) {
   std::vector<std::uint16_t> drawn(tiles.size(), kWholeTile);
   drawn[2] = 9;
   drawn[3] = TileHead::kInactive;
-  const std::vector<Body> bodies = bodies_of(drawn, tiles);
-  ASSERT_EQ(bodies.size(), 4U);
+  const std::vector<Segment> segments = segments_of(drawn, tiles);
+  ASSERT_EQ(segments.size(), 4U);
   const std::vector<std::pair<std::size_t, std::size_t>> expected{{0, 2}, {4, 20}, {20, 30}, {30, 40}};
-  for (std::size_t i = 0; i < bodies.size(); ++i) EXPECT_EQ(std::pair(bodies[i].first, bodies[i].end), expected[i]);
+  for (std::size_t i = 0; i < segments.size(); ++i)
+    EXPECT_EQ(std::pair(segments[i].first, segments[i].end), expected[i]);
 }
 
 TEST(TileCodec, EveryTruncatedOrLengthenedMessageIsRefused) {

@@ -60,12 +60,12 @@ std::string random_token() {
   return hex16(words[0]) + hex16(words[1]);
 }
 
-bool same_token(std::string_view given, std::string_view token) {
-  if (given.size() != token.size()) return false;
+bool same_token(std::string_view candidate, std::string_view token) {
+  if (candidate.size() != token.size()) return false;
   unsigned difference = 0;
   for (std::size_t i = 0; i < token.size(); ++i) {
     const auto each = [](char c) { return static_cast<unsigned>(static_cast<unsigned char>(c)); };
-    difference |= each(given[i]) ^ each(token[i]);
+    difference |= each(candidate[i]) ^ each(token[i]);
   }
   return difference == 0;
 }

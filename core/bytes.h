@@ -86,7 +86,7 @@ void fill_random(std::span<std::byte> bytes);
 /// 32 hexadecimal digits. Throws Error (Io).
 [[nodiscard]] std::string random_token();
 
-/// In a time that does not tell how much of it is right.
-[[nodiscard]] bool same_token(std::string_view given, std::string_view token);
+/// Whether `candidate` equals `token`, compared in a time that does not depend on where they differ.
+[[nodiscard]] bool same_token(std::string_view candidate, std::string_view token);
 
 }  // namespace hpr

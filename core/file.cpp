@@ -42,9 +42,9 @@ class Descriptor {
 }
 
 void write_all(int file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
-  constexpr std::size_t kMost = std::size_t{1} << 30;
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
   while (!bytes.empty()) {
-    const ssize_t written = ::write(file, bytes.data(), std::min(bytes.size(), kMost));
+    const ssize_t written = ::write(file, bytes.data(), std::min(bytes.size(), kMaxBytes));
     if (written < 0) {
       if (errno == EINTR) continue;
       fail("cannot write", path, errno);

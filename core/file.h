@@ -59,7 +59,7 @@ void check_writable(const std::filesystem::path& path, bool overwrite);
 /// asked before long work; makes nothing.
 void check_folder(const std::filesystem::path& folder);
 
-/// Keeps other processes of this host from writing their results into a folder, if they ask for it in the same way.
+/// Keeps other processes of this host from writing their results into a folder, if they call this too.
 /// Where it cannot be locked it keeps nobody.
 class FolderLock {
  public:

@@ -95,8 +95,8 @@ class Json {
   Json(Json&& other) noexcept { swap(other); }
   Json& operator=(const Json& other) { return *this = Json(other); }
   Json& operator=(Json&& other) noexcept {
-    Json taken(std::move(other));
-    swap(taken);
+    Json moved(std::move(other));
+    swap(moved);
     return *this;
   }
   ~Json();
@@ -160,7 +160,7 @@ class Json {
   /// Removes a member if there is one.
   void erase(std::string_view key);
 
-  /// Reads a whole text, UTF-8. Of members with the same key the last one's value counts, at the place of the first.
+  /// Reads a whole text, UTF-8. Of members with the same key the last one's value counts, at the position of the first.
   /// Throws JsonError: with an offset for what is no JSON, without one for numbers beyond double and for arrays and
   /// objects that nest deeper than `max_depth`.
   [[nodiscard]] static Json parse(std::string_view text, int max_depth = kMaxDepth);

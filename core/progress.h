@@ -8,10 +8,10 @@
 
 namespace hpr {
 
-/// Tells on stderr how far long work has come: a bar that redraws itself on a terminal, a line per step, or nothing.
+/// Reports on stderr how far long work has come: a bar that redraws itself on a terminal, a line per step, or nothing.
 class Progress {
  public:
-  /// How often work that may go on for hours is told of.
+  /// How often work that may take hours is reported.
   struct Pace {
     std::chrono::duration<double> terminal{1.0};
     std::chrono::duration<double> log{10.0};
@@ -20,20 +20,21 @@ class Progress {
   /// `mode`: auto (a bar on a terminal, else nothing), bar, line or none. `what` names a step: "frame". `steps`: 0 when
   /// nobody knows how many.
   Progress(const std::string& mode, std::string what, std::size_t steps);
-  /// The same, but redraws the bar only so often, and where stderr is no terminal `auto` is a line every now and then.
+  /// Reports at the rate of `pace`: how often the bar is redrawn and, where stderr is no terminal, how often `auto`
+  /// writes a line.
   Progress(const std::string& mode, std::string what, std::size_t steps, const Pace& pace);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void step(const std::string& detail) { show(done_ + 1, detail); }
-  /// False: nothing is ever told.
-  [[nodiscard]] bool tells() const { return mode_ != Mode::None; }
-  /// Whether show(done) would tell: what it takes to describe a step may be saved otherwise.
+  /// False: nothing is ever reported.
+  [[nodiscard]] bool enabled() const { return mode_ != Mode::None; }
+  /// Whether show(done) would report: otherwise the description of a step need not be made.
   [[nodiscard]] bool due(std::size_t done) const;
   /// `done` steps in all are done. A bar is redrawn at most every 50 ms, but for the last step.
   void show(std::size_t done, const std::string& detail);
-  /// Leaves the bar as it stands: what is told next has a line of its own.
+  /// Leaves the bar as it stands: what is written next has a line of its own.
   void end();
 
  private:

@@ -46,8 +46,8 @@ std::pair<std::size_t, std::uint32_t> decode_utf8(std::string_view text) {
     if ((byte(i) & 0xC0U) != 0x80U) return {0, 0};
     code = code << 6U | (byte(i) & 0x3FU);
   }
-  constexpr std::array<std::uint32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
-  if (code < kSmallest[length] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000)) return {0, 0};
+  constexpr std::array<std::uint32_t, 5> kMinCode{0, 0, 0x80, 0x800, 0x10000};
+  if (code < kMinCode[length] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000)) return {0, 0};
   return {length, code};
 }
 
@@ -100,12 +100,12 @@ std::optional<std::string> nearest_name(std::string_view name, std::span<const s
 }
 
 std::string unknown_name_hint(std::string_view name, std::span<const std::string> choices) {
-  constexpr std::size_t kMost = 40;
+  constexpr std::size_t kMaxShown = 40;
   const auto nearest = nearest_name(name, choices);
-  const auto shown = choices.first(std::min(choices.size(), kMost));
+  const auto shown = choices.first(std::min(choices.size(), kMaxShown));
   return fmt::format("{}choices: {}{}", nearest ? fmt::format("did you mean '{}'? ", *nearest) : "",
                      fmt::join(shown, ", "),
-                     choices.size() > kMost ? fmt::format(" and {} more", choices.size() - kMost) : "");
+                     choices.size() > kMaxShown ? fmt::format(" and {} more", choices.size() - kMaxShown) : "");
 }
 
 std::string printable(std::string_view text, std::size_t limit) {

@@ -47,7 +47,7 @@ Span::~Span() {
   event_.end_ns = now_ns();
   const std::lock_guard lock(mutex);
   if (!on.load()) return;
-  if (record.events.size() >= kMostEvents) {
+  if (record.events.size() >= kMaxEvents) {
     ++record.dropped;
   } else {
     record.events.push_back(event_);

@@ -21,8 +21,8 @@ class Stopwatch {
 
 }  // namespace hpr
 
-/// Where the time goes: spans of what this process does, as trace viewers show them. Costs a look at a flag where
-/// nobody records.
+/// Spans of what this process does, as trace viewers show them. Costs the read of one flag while nothing
+/// records.
 namespace hpr::trace {
 
 /// Something that was done. Texts are literals.
@@ -38,9 +38,9 @@ struct Event {
 
 struct Record {
   std::vector<Event> events;  ///< in the order they ended
-  std::uint64_t dropped = 0;  ///< past kMostEvents
+  std::uint64_t dropped = 0;  ///< past kMaxEvents
 };
-inline constexpr std::size_t kMostEvents = 1'000'000;
+inline constexpr std::size_t kMaxEvents = 1'000'000;
 
 /// Records what ends from now on; an earlier record is lost.
 void start();
@@ -57,8 +57,8 @@ class Span {
   Span(const Span&) = delete;
   Span& operator=(const Span&) = delete;
 
-  /// For what is known at the end only.
-  void tell(const char* detail, std::uint64_t amount) {
+  /// Sets what is known at the end only. `detail` is a literal: what `amount` counts.
+  void set_detail(const char* detail, std::uint64_t amount) {
     event_.detail = detail;
     event_.amount = amount;
   }

@@ -19,7 +19,7 @@ TEST(Trace, RecordsWhatEndsWhileItRecords) {
   {
     trace::Span outer("outer", "tile", 7);
     { const trace::Span inner("inner"); }
-    outer.tell("bytes", 11);
+    outer.set_detail("bytes", 11);
   }
   const trace::Record record = trace::finish();
   EXPECT_FALSE(trace::recording());
@@ -71,9 +71,9 @@ TEST(Trace, ThreadsOfALoopHaveRowsOfTheirOwn) {
 
 TEST(Trace, MoreThanItHoldsIsCounted) {
   trace::start();
-  for (std::size_t i = 0; i < trace::kMostEvents + 5; ++i) const trace::Span span("x");
+  for (std::size_t i = 0; i < trace::kMaxEvents + 5; ++i) const trace::Span span("x");
   const trace::Record record = trace::finish();
-  EXPECT_EQ(record.events.size(), trace::kMostEvents);
+  EXPECT_EQ(record.events.size(), trace::kMaxEvents);
   EXPECT_EQ(record.dropped, 5U);
 }
 

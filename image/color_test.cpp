@@ -106,12 +106,13 @@ TEST(Half, BetweenEachTwoTheNearerIsTakenAndTheEvenOneInTheMiddle) {
   for (std::uint32_t bits = 0; bits < 0x7BFF; ++bits) {
     const auto low = static_cast<HalfBits>(bits);
     const auto high = static_cast<HalfBits>(bits + 1);
-    const auto middle = static_cast<float>((value_of(low) + value_of(high)) / 2);  // exact: one bit more than a half's
+    const auto midpoint =
+        static_cast<float>((value_of(low) + value_of(high)) / 2);  // exact: one bit more than a half's
     const HalfBits even = bits % 2 == 0 ? low : high;
-    EXPECT_EQ(to_half(middle), even) << bits;
-    EXPECT_EQ(to_half(std::nextafter(middle, 0.0F)), low) << bits;
-    EXPECT_EQ(to_half(std::nextafter(middle, 1e9F)), high) << bits;
-    EXPECT_EQ(to_half(-middle), even | 0x8000U) << bits;
+    EXPECT_EQ(to_half(midpoint), even) << bits;
+    EXPECT_EQ(to_half(std::nextafter(midpoint, 0.0F)), low) << bits;
+    EXPECT_EQ(to_half(std::nextafter(midpoint, 1e9F)), high) << bits;
+    EXPECT_EQ(to_half(-midpoint), even | 0x8000U) << bits;
   }
 }
 

@@ -36,33 +36,35 @@ void weighted_sums(std::span<const Real> in, std::size_t step, std::span<const R
   }
 }
 
-/// Two neighbours in a row or column, and how far a place is on its way from the first to the second.
+/// Two neighbours in a row or column, and the fraction of the distance from the first to the second at which a position
+/// lies.
 struct Between {
   std::size_t first = 0;
   std::size_t second = 0;
-  float way = 0.0F;
+  float fraction = 0.0F;
 };
 
-/// Where the centres of `to` pixels lie among those of `from`, on a side of equal length.
-std::vector<Between> places(int from, int to) {
+/// The positions of the centres of `to` pixels among those of `from`, on a side of equal length.
+std::vector<Between> sample_positions(int from, int to) {
   std::vector<Between> all;
   all.reserve(static_cast<std::size_t>(to));
   for (int i = 0; i < to; ++i) {
-    const double place = std::clamp((i + 0.5) * from / to - 0.5, 0.0, from - 1.0);
-    const double below = std::floor(place);
+    const double position = std::clamp((i + 0.5) * from / to - 0.5, 0.0, from - 1.0);
+    const double below = std::floor(position);
     const auto first = static_cast<std::size_t>(below);
-    all.push_back({first, std::min(first + 1, static_cast<std::size_t>(from) - 1), static_cast<float>(place - below)});
+    all.push_back(
+        {first, std::min(first + 1, static_cast<std::size_t>(from) - 1), static_cast<float>(position - below)});
   }
   return all;
 }
 
 /// Exactly `a` where both are equal.
-float mix(float a, float b, float way) {
-  return a + (b - a) * way;
+float mix(float a, float b, float fraction) {
+  return a + (b - a) * fraction;
 }
 
-Rgb mix(const Rgb& a, const Rgb& b, float way) {
-  return {mix(a.r, b.r, way), mix(a.g, b.g, way), mix(a.b, b.b, way)};
+Rgb mix(const Rgb& a, const Rgb& b, float fraction) {
+  return {mix(a.r, b.r, fraction), mix(a.g, b.g, fraction), mix(a.b, b.b, fraction)};
 }
 
 constexpr std::array kAll{PixelFilter::Box, PixelFilter::Triangle, PixelFilter::Gaussian, PixelFilter::BSpline,
@@ -134,8 +136,8 @@ double inverse(PixelFilter filter, double u) {
   double low = 0.0;
   double high = radius;
   for (int step = 0; step < 64; ++step) {
-    const double middle = 0.5 * (low + high);
-    (absolute_integral(filter, middle) < wanted ? low : high) = middle;
+    const double midpoint = 0.5 * (low + high);
+    (absolute_integral(filter, midpoint) < wanted ? low : high) = midpoint;
   }
   return u < 0.5 ? -low : low;
 }
@@ -172,8 +174,8 @@ template Image<double> filter_columns(const Image<double>&, std::span<const doub
 Image<Rgb> enlarge(const Image<Rgb>& image, Size size, int threads) {
   HPR_CHECK(image.width() > 0 && image.height() > 0 && size.width > 0 && size.height > 0);
   constexpr int kRowsAtOnce = 16;
-  const std::vector<Between> columns = places(image.width(), size.width);
-  const std::vector<Between> rows = places(image.height(), size.height);
+  const std::vector<Between> columns = sample_positions(image.width(), size.width);
+  const std::vector<Between> rows = sample_positions(image.height(), size.height);
   Image<Rgb> large(size);
   const auto bands = static_cast<std::size_t>((size.height + kRowsAtOnce - 1) / kRowsAtOnce);
   parallel_for(threads, bands, [&](std::size_t band) {
@@ -182,9 +184,9 @@ Image<Rgb> enlarge(const Image<Rgb>& image, Size size, int threads) {
     for (int y = first; y < std::min(first + kRowsAtOnce, size.height); ++y) {
       const Between& row = rows[static_cast<std::size_t>(y)];
       std::ranges::transform(image.row(static_cast<int>(row.first)), image.row(static_cast<int>(row.second)),
-                             between.begin(), [&](const Rgb& a, const Rgb& b) { return mix(a, b, row.way); });
+                             between.begin(), [&](const Rgb& a, const Rgb& b) { return mix(a, b, row.fraction); });
       std::ranges::transform(columns, large.row(y).begin(), [&](const Between& column) {
-        return mix(between[column.first], between[column.second], column.way);
+        return mix(between[column.first], between[column.second], column.fraction);
       });
     }
   });

@@ -50,7 +50,7 @@ enum class PixelFilter : std::uint8_t {
 /// Throws Error (Usage) with the choices and the nearest one.
 [[nodiscard]] PixelFilter parse_pixel_filter(std::string_view name);
 
-/// A place to look through, and what the radiance seen there counts.
+/// A position to sample, and the weight of its radiance.
 struct FilterSample {
   glm::dvec2 offset{0.0};  ///< pixels from the centre
   double weight = 1.0;     ///< 1, or -1 where the filter is negative

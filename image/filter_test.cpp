@@ -178,9 +178,9 @@ TEST_P(PixelFilterTest, WeightedSamplesHaveTheMomentsOfTheFilter) {
       const FilterSample x = sample_filter(GetParam(), {u, 0.5});
       sampled += x.weight * std::pow(x.offset.x, power);
       weights += x.weight;
-      const double place = -2.5 + 5.0 * u;
-      integral += value(GetParam(), place) * std::pow(place, power);
-      whole += value(GetParam(), place);
+      const double position = -2.5 + 5.0 * u;
+      integral += value(GetParam(), position) * std::pow(position, power);
+      whole += value(GetParam(), position);
       ASSERT_EQ(x.offset.y, 0.0);
     }
     EXPECT_NEAR(sampled / weights, integral / whole, 3e-5) << power;

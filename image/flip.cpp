@@ -158,8 +158,8 @@ Filters make_filters(double pixels_per_degree) {
   return filters;
 }
 
-/// What one picture shows in some of its rows.
-struct Seen {
+/// The filtered rows of one picture that are compared.
+struct FilteredRows {
   std::array<Image<float>, 3> opponent;  ///< after the eye's blur
   Image<float> edges, points;            ///< how strong
 };
@@ -207,26 +207,27 @@ Image<float> feature(const Image<float>& luminance, const Image<float>& smooth_r
   return strength;
 }
 
-Seen look_at(std::span<const float> picture, Size size, int top, int rows, const Filters& f) {
+FilteredRows filter_picture(std::span<const float> picture, Size size, int top, int rows, const Filters& f) {
   const auto planes = opponent_of(picture, size, top - f.radius, rows + 2 * f.radius, f.radius);
-  Seen seen;
-  seen.opponent[0] = filtered(planes[0], f.luminance, f.luminance);
-  seen.opponent[1] = filtered(planes[1], f.red_green, f.red_green);
-  seen.opponent[2] = filtered(planes[2], f.yellow_blue_narrow, f.yellow_blue_narrow_share);
+  FilteredRows filtered_rows;
+  filtered_rows.opponent[0] = filtered(planes[0], f.luminance, f.luminance);
+  filtered_rows.opponent[1] = filtered(planes[1], f.red_green, f.red_green);
+  filtered_rows.opponent[2] = filtered(planes[2], f.yellow_blue_narrow, f.yellow_blue_narrow_share);
   const Image<float> wide = filtered(planes[2], f.yellow_blue_wide, f.yellow_blue_wide_share);
-  for (std::size_t i = 0; i < wide.pixels().size(); ++i) seen.opponent[2].pixels()[i] += wide.pixels()[i];
+  for (std::size_t i = 0; i < wide.pixels().size(); ++i) filtered_rows.opponent[2].pixels()[i] += wide.pixels()[i];
   const Image<float> smooth_rows = filter_rows<float>(planes[0], f.smooth);
-  seen.edges = feature(planes[0], smooth_rows, f.edge, f.smooth);
-  seen.points = feature(planes[0], smooth_rows, f.point, f.smooth);
-  return seen;
+  filtered_rows.edges = feature(planes[0], smooth_rows, f.edge, f.smooth);
+  filtered_rows.points = feature(planes[0], smooth_rows, f.point, f.smooth);
+  return filtered_rows;
 }
 
-glm::vec3 blurred_color(const Seen& seen, std::size_t i) {
-  const glm::vec3 opponent{seen.opponent[0].pixels()[i], seen.opponent[1].pixels()[i], seen.opponent[2].pixels()[i]};
+glm::vec3 blurred_color(const FilteredRows& filtered_rows, std::size_t i) {
+  const glm::vec3 opponent{filtered_rows.opponent[0].pixels()[i], filtered_rows.opponent[1].pixels()[i],
+                           filtered_rows.opponent[2].pixels()[i]};
   return glm::clamp(xyz_to_rgb() * opponent_to_xyz(opponent), 0.0F, 1.0F);
 }
 
-float error_at(const Seen& a, const Seen& b, std::size_t i) {
+float error_at(const FilteredRows& a, const FilteredRows& b, std::size_t i) {
   const float edges = std::abs(a.edges.pixels()[i] - b.edges.pixels()[i]);
   const float points = std::abs(a.points.pixels()[i] - b.points.pixels()[i]);
   const float features = std::sqrt(std::max(edges, points) / std::numbers::sqrt2_v<float>);
@@ -249,8 +250,8 @@ FlipError flip_error(std::span<const float> image, std::span<const float> refere
   parallel_for(threads, band_count(size.height), [&](std::size_t band) {
     const int top = static_cast<int>(band) * kBandRows;
     const int rows = std::min(kBandRows, size.height - top);
-    const Seen a = look_at(image, size, top, rows, filters);
-    const Seen b = look_at(reference, size, top, rows, filters);
+    const FilteredRows a = filter_picture(image, size, top, rows, filters);
+    const FilteredRows b = filter_picture(reference, size, top, rows, filters);
     const std::size_t first = static_cast<std::size_t>(top) * static_cast<std::size_t>(size.width);
     for (std::size_t i = 0; i < a.edges.pixels().size(); ++i) result.map.pixels()[first + i] = error_at(a, b, i);
   });

@@ -6,7 +6,7 @@
 
 namespace hpr {
 
-/// Of a screen 0.7 m wide with 3840 pixels a row, seen from 0.7 m.
+/// Pixels per degree of a screen 0.7 m wide with 3840 pixels a row, seen from 0.7 m.
 inline constexpr double kFlipPixelsPerDegree = 67.0206432765823;
 
 /// What a viewer sees who flips between two pictures.
@@ -20,7 +20,7 @@ struct FlipError {
 /// Symmetric; 0 for equal pictures. Beyond their borders pictures go on as they are there.
 ///
 /// Both [height][width][3] display values in [0, 1]. The mean is NaN where a value is not finite and 0 without pixels.
-/// The same bits for any number of threads.
+/// Any number of threads gives the same bits.
 [[nodiscard]] FlipError flip_error(std::span<const float> image, std::span<const float> reference, Size size,
                                    int threads, double pixels_per_degree = kFlipPixelsPerDegree);
 

@@ -69,12 +69,12 @@ class Image {
   std::vector<Pixel> pixels_;
 };
 
-/// A copy of what stands at `place`, which lies within `image`.
+/// A copy of what stands at `rect`, which lies within `image`.
 template <typename Pixel>
-[[nodiscard]] Image<Pixel> cut(const Image<Pixel>& image, const Rect& place) {
-  Image<Pixel> part({place.width(), place.height()});
+[[nodiscard]] Image<Pixel> cut(const Image<Pixel>& image, const Rect& rect) {
+  Image<Pixel> part({rect.width(), rect.height()});
   for (int y = 0; y < part.height(); ++y) {
-    std::ranges::copy_n(image.row(place.y0 + y).begin() + place.x0, part.width(), part.row(y).begin());
+    std::ranges::copy_n(image.row(rect.y0 + y).begin() + rect.x0, part.width(), part.row(y).begin());
   }
   return part;
 }

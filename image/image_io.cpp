@@ -12,7 +12,7 @@
 namespace hpr {
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30U;
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{4} << 30U;
 
 /// Opens the module from lib/ beside the program's folder, where build and installation put it, else from wherever the
 /// loader searches. The path comes first because a sanitizer's dlopen does not see the program's own search path.
@@ -72,7 +72,7 @@ Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& n
 }
 
 FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits) {
-  return codec().decode_float(read_file(path, kLargestFile), path.string(), limits);
+  return codec().decode_float(read_file(path, kMaxFileBytes), path.string(), limits);
 }
 
 void write_image(const std::filesystem::path& path, const Image<Rgb>& image,

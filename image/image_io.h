@@ -33,7 +33,7 @@ struct FloatImage {
   std::vector<float> values;
   bool linear = false;       ///< radiance, not display values
   std::uint32_t levels = 0;  ///< values are whole multiples of 1 / levels; 0: any numbers
-  /// Channels stored as unsigned integers, [height][width], bit by bit; `values` has them as shares of 2^32 - 1.
+  /// Channels stored as unsigned integers, [height][width], bit by bit; `values` has them as fractions of 2^32 - 1.
   std::map<std::string, std::vector<std::uint32_t>> integers = {};
 };
 
@@ -41,7 +41,7 @@ struct FloatImage {
 struct ExrLayer {
   std::vector<std::string> channels;         ///< e.g. {"normal.X", "normal.Y", "normal.Z"}
   std::vector<float> values;                 ///< [height][width][channels]
-  std::vector<std::uint32_t> integers = {};  ///< in place of `values`: the channels are unsigned integers
+  std::vector<std::uint32_t> integers = {};  ///< instead of `values`: the channels are unsigned integers
 };
 
 /// PNG, 8 bit RGBA, sRGB.

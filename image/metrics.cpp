@@ -42,9 +42,9 @@ std::vector<double> gaussian_window() {
   return weights;
 }
 
-/// Which of `count` pixels is seen at `place` when they are mirrored at both ends: ..1 0 | 0 1 2 | 2 1..
-int mirrored(int place, int count) {
-  const int turn = ((place % (2 * count)) + 2 * count) % (2 * count);
+/// Which of `count` pixels is seen at `index` when they are mirrored at both ends: ..1 0 | 0 1 2 | 2 1..
+int reflected_index(int index, int count) {
+  const int turn = ((index % (2 * count)) + 2 * count) % (2 * count);
   return turn < count ? turn : 2 * count - 1 - turn;
 }
 
@@ -52,9 +52,10 @@ int mirrored(int place, int count) {
 Image<double> channel_of(std::span<const float> picture, Size size, const Rect& rect, int channel) {
   Image<double> plane({rect.width(), rect.height()});
   for (int y = rect.y0; y < rect.y1; ++y) {
-    const std::size_t row = static_cast<std::size_t>(mirrored(y, size.height)) * static_cast<std::size_t>(size.width);
+    const std::size_t row =
+        static_cast<std::size_t>(reflected_index(y, size.height)) * static_cast<std::size_t>(size.width);
     for (int x = rect.x0; x < rect.x1; ++x) {
-      const std::size_t pixel = row + static_cast<std::size_t>(mirrored(x, size.width));
+      const std::size_t pixel = row + static_cast<std::size_t>(reflected_index(x, size.width));
       const float value = picture[pixel * kChannels + static_cast<std::size_t>(channel)];
       plane.at(x - rect.x0, y - rect.y0) = static_cast<double>(value);
     }

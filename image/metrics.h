@@ -20,10 +20,10 @@ struct Difference {
   std::size_t differing = 0;  ///< pixels with any value whose bits differ by more than -0 against 0
 };
 
-/// a - b; infinite where only one of both is NaN, 0 where both are.
+/// Subtracts b from a; infinite where only one of both is NaN, 0 where both are.
 [[nodiscard]] double difference_of(double a, double b);
 
-/// The same from the differences themselves, image - reference: `channels` values per pixel, by difference_of.
+/// Summarizes differences, image - reference: `channels` values per pixel, made by difference_of.
 [[nodiscard]] Difference summarize_differences(std::span<const double> differences, std::size_t channels);
 
 /// `channels` values per pixel.
@@ -48,7 +48,7 @@ struct RelativeError {
 /// Structural similarity (Wang, Bovik, Sheikh, Simoncelli, "Image Quality Assessment: From Error Visibility to
 /// Structural Similarity", 2004): 1 for equal pictures, less the more they differ, symmetric. Gaussian window of 11 x
 /// 11 pixels, standard deviation 1.5, K1 = 0.01, K2 = 0.03; the mean over the channels and over all windows that lie
-/// whole in the picture. A picture narrower or lower than the window is mirrored at its borders instead, and every
+/// whole in the picture. A picture narrower or lower than the window is reflected at its borders instead, and every
 /// pixel is the centre of a window.
 ///
 /// Both [height][width][3] display values in [0, 1]. NaN where a value is not finite; 1 without pixels. The same bits

@@ -216,11 +216,11 @@ template <typename Pixel>
   const TileRun run = layer.layout().tiles_of(screen);
   for (std::size_t tile = run.first; tile < run.end(); ++tile) {
     if (!layer.active(tile)) continue;
-    const Rect place = layer.layout().place(tile).pixels;
-    for (int y = place.y0; y < place.y1; ++y) {
-      const auto from = layer.tile(tile).subspan(static_cast<std::size_t>(y - place.y0) * kTileSide,
-                                                 static_cast<std::size_t>(place.width()));
-      std::ranges::copy(from, image.row(y).begin() + place.x0);
+    const Rect rect = layer.layout().place(tile).pixels;
+    for (int y = rect.y0; y < rect.y1; ++y) {
+      const auto from = layer.tile(tile).subspan(static_cast<std::size_t>(y - rect.y0) * kTileSide,
+                                                 static_cast<std::size_t>(rect.width()));
+      std::ranges::copy(from, image.row(y).begin() + rect.x0);
     }
   }
   return image;

@@ -16,15 +16,15 @@ TEST(FrameLayout, TilesCoverEveryPixelOfEveryScreenOnce) {
     std::vector<Image<int>> covered;
     for (const Size& size : screens) covered.emplace_back(size, 0);
     for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
-      const TilePlace place = layout.place(tile);
-      EXPECT_FALSE(place.pixels.empty());
-      EXPECT_LE(place.pixels.width(), kTileSide);
-      EXPECT_LE(place.pixels.height(), kTileSide);
-      EXPECT_TRUE(layout.tiles_of(place.screen).contains(tile));
-      for (int y = place.pixels.y0; y < place.pixels.y1; ++y) {
-        for (int x = place.pixels.x0; x < place.pixels.x1; ++x) {
-          ++covered[place.screen].at(x, y);
-          ASSERT_EQ(layout.tile_at(place.screen, x, y), tile);
+      const TilePlace position = layout.place(tile);
+      EXPECT_FALSE(position.pixels.empty());
+      EXPECT_LE(position.pixels.width(), kTileSide);
+      EXPECT_LE(position.pixels.height(), kTileSide);
+      EXPECT_TRUE(layout.tiles_of(position.screen).contains(tile));
+      for (int y = position.pixels.y0; y < position.pixels.y1; ++y) {
+        for (int x = position.pixels.x0; x < position.pixels.x1; ++x) {
+          ++covered[position.screen].at(x, y);
+          ASSERT_EQ(layout.tile_at(position.screen, x, y), tile);
         }
       }
     }

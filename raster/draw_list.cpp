@@ -79,10 +79,10 @@ std::array<float, 16> rounded(const glm::dmat4& matrix) {
 }
 
 bool drawable(const glm::dmat4& matrix) {
-  constexpr double kMost = 1e30;  // leaves room for the product with a position
+  constexpr double kMaxElement = 1e30;  // leaves room for the product with a position
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
-      if (!(std::abs(matrix[column][row]) < kMost)) return false;
+      if (!(std::abs(matrix[column][row]) < kMaxElement)) return false;
     }
   }
   return true;

@@ -18,18 +18,19 @@ struct ChunkRun {
   std::size_t last = 0;
 };
 
-/// Where each of a mesh's vertices stands in Geometry::vertices; kNowhere if it does not yet.
-using VertexPlaces = std::vector<std::uint32_t>;
+/// The index of each of a mesh's vertices in Geometry::vertices; kNowhere if it does not yet.
+using VertexIndices = std::vector<std::uint32_t>;
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 
 /// Appends triangles [first, last): each owns the vertex of its last corner, other corners share whatever vertex has
 /// their position.
-void append_chunk(const Mesh& mesh, std::uint32_t first, std::uint32_t last, VertexPlaces& place, Geometry& geometry) {
+void append_chunk(const Mesh& mesh, std::uint32_t first, std::uint32_t last, VertexIndices& indices,
+                  Geometry& geometry) {
   Chunk chunk{first, last - first, static_cast<std::uint32_t>(geometry.triangles.size()), {}};
   const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
   chunk.box = {start, start};
   const auto add_vertex = [&](std::uint32_t vertex, std::uint32_t triangle) {
-    place[vertex] = static_cast<std::uint32_t>(geometry.vertices.size());
+    indices[vertex] = static_cast<std::uint32_t>(geometry.vertices.size());
     geometry.vertices.push_back({mesh.positions[vertex], triangle});
   };
   const auto own_corner = static_cast<std::uint32_t>(geometry.vertices.size());
@@ -40,8 +41,8 @@ void append_chunk(const Mesh& mesh, std::uint32_t first, std::uint32_t last, Ver
       const std::uint32_t vertex = mesh.triangles[t][corner];
       chunk.box.add({mesh.positions[vertex], mesh.positions[vertex]});
       if (corner == 2) continue;
-      if (place[vertex] == kNowhere) add_vertex(vertex, t);  // nobody's last corner so far
-      moved[corner] = place[vertex];
+      if (indices[vertex] == kNowhere) add_vertex(vertex, t);  // nobody's last corner so far
+      moved[corner] = indices[vertex];
     }
     geometry.triangles.push_back(moved);
   }
@@ -51,12 +52,12 @@ void append_chunk(const Mesh& mesh, std::uint32_t first, std::uint32_t last, Ver
 /// Appends the triangles of `ranges` in chunks, with borders at fixed multiples, so that instances that share a mesh
 /// share its chunks.
 ChunkRun append_mesh(const Mesh& mesh, const std::vector<SurfaceRange>& ranges, Geometry& geometry) {
-  VertexPlaces place(mesh.positions.size(), kNowhere);
+  VertexIndices indices(mesh.positions.size(), kNowhere);
   const std::size_t first_chunk = geometry.chunks.size();
   for (const SurfaceRange& range : ranges) {
     for (std::uint32_t first = range.first; first < range.last;) {
       const std::uint32_t last = std::min(range.last, (first / kChunkTriangles + 1) * kChunkTriangles);
-      append_chunk(mesh, first, last, place, geometry);
+      append_chunk(mesh, first, last, indices, geometry);
       first = last;
     }
   }
@@ -96,11 +97,11 @@ Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> obje
     for (const SurfaceRange& range : wanted[mesh]) triangles += range.count();
   }
   // Indirect draws address the index buffer with 32 bits, three indices a triangle.
-  constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() / 3;
-  if (triangles > kMostTriangles) {
+  constexpr std::uint64_t kMaxTriangles = std::numeric_limits<std::uint32_t>::max() / 3;
+  if (triangles > kMaxTriangles) {
     throw Error(
         ExitCode::Limit,
-        fmt::format("one rank's share has {} distinct triangles; OpenGL addresses {}", triangles, kMostTriangles),
+        fmt::format("one rank's share has {} distinct triangles; OpenGL addresses {}", triangles, kMaxTriangles),
         "use more ranks with --distribute sort-last");
   }
 

@@ -37,7 +37,7 @@ struct Chunk {
   Box box;
 };
 
-/// A run of chunks of one instance that belongs to the share; chunks are cut to [first, last).
+/// A run of chunks of one instance that belongs to the rank; chunks are cut to [first, last).
 struct Piece {
   std::uint32_t instance = 0;
   std::uint32_t first = 0;  ///< triangles [first, last) of the instance's mesh
@@ -47,7 +47,7 @@ struct Piece {
   Box box;
 };
 
-/// A share of a scene, ready for upload: the triangles of each mesh once, however many instances show it.
+/// One rank's part of a scene, ready for upload: the triangles of each mesh once, however many instances show it.
 struct Geometry {
   std::vector<Vertex> vertices;
   std::vector<glm::uvec3> triangles;  ///< into vertices
@@ -60,8 +60,8 @@ inline constexpr std::uint32_t kChunkTriangles = 512;
 /// Chunks of a piece: what one step of the cull loop handles.
 inline constexpr std::size_t kPieceChunks = 64;
 
-/// The share `objects` of `scene`; the ranges may come in any order, overlap and reach past the scene's triangles.
-/// Throws Error (Limit) when the share has more triangles than an indirect draw can address.
+/// The surfaces `objects` of `scene`; the ranges may come in any order, overlap and reach past the scene's triangles.
+/// Throws Error (Limit) when they have more triangles than an indirect draw can address.
 [[nodiscard]] Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> objects);
 
 }  // namespace hpr

@@ -38,13 +38,13 @@ std::map<std::uint32_t, int> surfaces_of(const Scene& scene, const Geometry& geo
 
 TEST(Geometry, HoldsExactlyTheTrianglesOfTheShareInAscendingOrder) {
   const Scene scene = test::mixed_scene();
-  const std::vector<SurfaceRange> share{{9000, 9001}, {100, 1500}, {1400, 1600},        {3100, 3300},
-                                        {6000, 8000}, {50, 50},    {12000, 4000000000U}};
-  const Geometry geometry = collect_geometry(scene, share);
+  const std::vector<SurfaceRange> ranges{{9000, 9001}, {100, 1500}, {1400, 1600},        {3100, 3300},
+                                         {6000, 8000}, {50, 50},    {12000, 4000000000U}};
+  const Geometry geometry = collect_geometry(scene, ranges);
   const auto count = surfaces_of(scene, geometry);
   for (std::uint32_t surface = 0; surface < scene.triangles; ++surface) {
     bool wanted = false;
-    for (const SurfaceRange& range : share) wanted = wanted || (surface >= range.first && surface < range.last);
+    for (const SurfaceRange& range : ranges) wanted = wanted || (surface >= range.first && surface < range.last);
     const auto found = count.find(surface);
     EXPECT_EQ(found == count.end() ? 0 : found->second, wanted ? 1 : 0) << surface;
   }

@@ -84,11 +84,11 @@ void KeyTarget::begin(Size view, const Rect& part) {
   gl.Enable(GL_SCISSOR_TEST);
   gl.Scissor(part.x0, view.height - part.y1, part.width(), part.height());
   constexpr GLuint kNoWord[4] = {0, 0, 0, 0};
-  constexpr GLfloat kFarthest = 0.0F;
+  constexpr GLfloat kFarDepth = 0.0F;
   gl.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   gl.DepthMask(GL_TRUE);
   gl.ClearBufferuiv(GL_COLOR, 0, kNoWord);
-  gl.ClearBufferfv(GL_DEPTH, 0, &kFarthest);
+  gl.ClearBufferfv(GL_DEPTH, 0, &kFarDepth);
 }
 
 void KeyTarget::read(Size view, const Rect& pixels) {

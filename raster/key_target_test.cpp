@@ -26,13 +26,13 @@ TEST(PackKeys, PutsEveryPixelWhereItBelongs) {
     TileLayer<Key> layer(FrameLayout({Size{64, 64}, Size{300, 170}}));
     pack_keys(depths, words, rect, 1, layer, 3);
     for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-      const TilePlace place = layer.layout().place(tile);
+      const TilePlace position = layer.layout().place(tile);
       bool drawn = false;
-      for (int y = place.pixels.y0; y < place.pixels.y1; ++y) {
-        for (int x = place.pixels.x0; x < place.pixels.x1; ++x) {
-          const bool inside = place.screen == 1 && x >= rect.x0 && x < rect.x1 && y >= rect.y0 && y < rect.y1;
+      for (int y = position.pixels.y0; y < position.pixels.y1; ++y) {
+        for (int x = position.pixels.x0; x < position.pixels.x1; ++x) {
+          const bool inside = position.screen == 1 && x >= rect.x0 && x < rect.x1 && y >= rect.y0 && y < rect.y1;
           const Key expected = inside ? key_at(x, y) : kNoKey;
-          ASSERT_EQ(layer.at(place.screen, x, y), expected) << x << ' ' << y;
+          ASSERT_EQ(layer.at(position.screen, x, y), expected) << x << ' ' << y;
           drawn = drawn || expected != kNoKey;
         }
       }

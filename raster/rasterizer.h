@@ -27,14 +27,14 @@ struct RasterStats {
   double pack_ms = 0.0;
 };
 
-/// Draws one rank's share of a scene into keys by OpenGL.
+/// Draws one rank's part of a scene into keys by OpenGL.
 ///
-/// The same screen gives the same keys however its area is cut into parts, however its triangles are dealt to ranks
+/// A screen gives the same keys however its area is cut into parts, however its triangles are distributed to ranks
 /// whose layers are merged by maximum, and with any number of threads.
 class Rasterizer {
  public:
   /// Uploads the triangles of `objects` once. `scene` and `context` must outlive it. Throws Error: Limit when GL has no
-  /// memory for the share, NoDevice when it reports another error. `threads`: for culling and packing; GL's own are
+  /// memory for the triangles, NoDevice when it reports another error. `threads`: for culling and packing; GL's own are
   /// set with the context.
   Rasterizer(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
              Culling culling = Culling::Chunks);

@@ -108,10 +108,10 @@ TEST_P(RasterizerTest, ThePixelsRayMeetsTheKeysTriangle) {
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
       if (image.at(x, y) == kNoKey) continue;
-      const SurfacePlace place = locate_surface(scene, key_surface(image.at(x, y)));
-      const Instance& instance = scene.instances[place.instance];
+      const SurfaceLocation location = locate_surface(scene, key_surface(image.at(x, y)));
+      const Instance& instance = scene.instances[location.instance];
       const Mesh& mesh = scene.mesh_of(instance);
-      const glm::uvec3 corners = mesh.triangles[place.triangle];
+      const glm::uvec3 corners = mesh.triangles[location.triangle];
       const glm::dvec3 a = world_position(instance, mesh.positions[corners.x]);
       const glm::dvec3 e1 = world_position(instance, mesh.positions[corners.y]) - a;
       const glm::dvec3 e2 = world_position(instance, mesh.positions[corners.z]) - a;
@@ -155,18 +155,18 @@ TEST_P(RasterizerTest, SharesMergedByMaximumHaveTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = perspective_view({257, 190});
   const Image<Key> whole = draw_all(*context_, scene, view);
-  for (const std::uint32_t shares : {2U, 3U, 7U}) {
+  for (const std::uint32_t parts : {2U, 3U, 7U}) {
     TileLayer<Key> layer(FrameLayout({view.size()}));
-    for (std::uint32_t share = 0; share < shares; ++share) {
+    for (std::uint32_t part = 0; part < parts; ++part) {
       std::vector<SurfaceRange> ranges;  // dealt like cards, 77 triangles each, in descending order
-      for (std::uint32_t first = 77 * share; first < scene.triangles; first += 77 * shares) {
+      for (std::uint32_t first = 77 * part; first < scene.triangles; first += 77 * parts) {
         ranges.push_back({first, std::min(first + 77, scene.triangles)});
       }
       std::ranges::reverse(ranges);
       Rasterizer rasterizer(*context_, scene, ranges, 1);
       rasterizer.draw(view, 0, std::array{view.block}, layer);
     }
-    EXPECT_TRUE(whole == to_image(layer, 0)) << shares << " shares";
+    EXPECT_TRUE(whole == to_image(layer, 0)) << parts << " shares";
   }
 }
 
@@ -264,8 +264,8 @@ TEST_P(RasterizerTest, TheNearerSurfaceWinsAndOfEqualOnesTheLowerId) {
   EXPECT_GT(covered(whole), 1000U);
   // The tie is decided alike when the two come from different ranks, in either order.
   TileLayer<Key> layer(FrameLayout({view.size()}));
-  for (const SurfaceRange& share : {SurfaceRange{4, 6}, SurfaceRange{2, 4}}) {
-    Rasterizer(*context_, scene, std::array{share}, 1).draw(view, 0, std::array{view.block}, layer);
+  for (const SurfaceRange& part : {SurfaceRange{4, 6}, SurfaceRange{2, 4}}) {
+    Rasterizer(*context_, scene, std::array{part}, 1).draw(view, 0, std::array{view.block}, layer);
   }
   EXPECT_TRUE(whole == to_image(layer, 0));
 }

@@ -17,7 +17,7 @@ namespace hpr {
 namespace {
 
 constexpr float kBrightest = 1e12F;  ///< radiance a user may ask for
-constexpr float kLargestHalf = 65504.0F;
+constexpr float kMaxHalf = 65504.0F;
 
 /// Three numbers with commas between; none for anything else.
 std::optional<std::array<float, 3>> three_numbers(std::string_view text) {
@@ -35,7 +35,7 @@ std::optional<std::array<float, 3>> three_numbers(std::string_view text) {
 
 float cleaned(float value) {
   if (!(value > 0.0F)) return 0.0F;
-  return std::isfinite(value) ? value : kLargestHalf;
+  return std::isfinite(value) ? value : kMaxHalf;
 }
 
 /// Where the channels R, G, B of a picture stand; grey pictures have the same one three times.

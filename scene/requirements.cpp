@@ -48,11 +48,11 @@ float least_texel(const Scene& scene, const Material& material, std::uint8_t Rgb
 }
 
 /// The least a material can reach anywhere.
-float least_roughness(const Scene& scene, const Material& material) {
+float min_roughness(const Scene& scene, const Material& material) {
   return material.roughness * least_texel(scene, material, &Rgba8::g);
 }
 
-float least_metallic(const Scene& scene, const Material& material) {
+float min_metallic(const Scene& scene, const Material& material) {
   return material.metallic * least_texel(scene, material, &Rgba8::b);
 }
 
@@ -80,11 +80,11 @@ bool is_black(const Material& material) {
 
 /// Whether some of a material is no metal, and takes in light that it may give back.
 bool takes_in(const Scene& scene, const Material& material) {
-  return !material.unlit && !is_black(material) && least_metallic(scene, material) < 1.0F;
+  return !material.unlit && !is_black(material) && min_metallic(scene, material) < 1.0F;
 }
 
 /// Whether it has a diffuse part.
-bool is_matte(const Scene& scene, const Material& material) {
+bool is_diffuse(const Scene& scene, const Material& material) {
   return takes_in(scene, material) && (material.transmission < 1.0F || material.transmission_texture.present());
 }
 
@@ -92,16 +92,16 @@ bool is_matte(const Scene& scene, const Material& material) {
 /// its index alone.
 bool reflects(const Scene& scene, const Material& material) {
   if (material.unlit) return false;
-  return material.metallic > 0.0F || (least_metallic(scene, material) < 1.0F && material.ior != 1.0F);
+  return material.metallic > 0.0F || (min_metallic(scene, material) < 1.0F && material.ior != 1.0F);
 }
 
-/// Whether it is matte, or has a specular part too rough to be followed.
+/// Whether it is diffuse, or has a specular part too rough to be followed.
 bool scatters(const Scene& scene, const Material& material) {
-  return is_matte(scene, material) || (reflects(scene, material) && material.roughness >= kMirrorRoughness);
+  return is_diffuse(scene, material) || (reflects(scene, material) && material.roughness >= kMirrorRoughness);
 }
 
 bool mirrors(const Scene& scene, const Material& material) {
-  return reflects(scene, material) && least_roughness(scene, material) < kMirrorRoughness;
+  return reflects(scene, material) && min_roughness(scene, material) < kMirrorRoughness;
 }
 
 /// An index of 0 stands for a wall that reflects all.
@@ -151,7 +151,7 @@ Requirements requirements_of(const Scene& scene) {
   const std::size_t smooth = count(mirrors);
   const std::size_t clear = count(transmits);
   const std::size_t rough = count(scatters);
-  const std::size_t matte = count(is_matte);
+  const std::size_t diffuse = count(is_diffuse);
   const std::size_t lit =
       materials.size() - count([](const Scene&, const Material& material) { return material.unlit; });
 
@@ -175,16 +175,16 @@ Requirements requirements_of(const Scene& scene) {
                      : Requirement{true, "lights reach smooth or clear materials, which bundle it into caustics"};
   for (const Material* material : materials) {
     if (!reflects(scene, *material)) continue;
-    needs.least_roughness = std::min(needs.least_roughness, least_roughness(scene, *material));
-    needs.most_roughness = std::max(needs.most_roughness, material->roughness);
+    needs.min_roughness = std::min(needs.min_roughness, min_roughness(scene, *material));
+    needs.max_roughness = std::max(needs.max_roughness, material->roughness);
   }
-  needs.even_sky = lights == 1 && shines(scene.environment) && scene.environment->is_even();
+  needs.constant_environment = lights == 1 && shines(scene.environment) && scene.environment->is_constant();
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};
   needs.ambient_occlusion =
-      matte > 0
-          ? Requirement{true, counted(matte, "material scatters ambient light", "materials scatter ambient light")}
+      diffuse > 0
+          ? Requirement{true, counted(diffuse, "material scatters ambient light", "materials scatter ambient light")}
           : Requirement{false, "no material is matte"};
   return needs;
 }

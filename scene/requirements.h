@@ -16,12 +16,12 @@ struct Requirements {
   Requirement shadow;
   Requirement reflection;
   Requirement refraction;
-  Requirement photon;             ///< caustics: light that smooth surfaces bundle
-  Requirement indirect;           ///< light that rough surfaces scatter on to others
-  Requirement ambient_occlusion;  ///< a cheap stand-in for that
-  float least_roughness = 1.0F;   ///< of any visible lit material that reflects, anywhere
-  float most_roughness = 0.0F;    ///< likewise
-  bool even_sky = false;          ///< whether all light comes from an environment of one radiance
+  Requirement photon;                 ///< caustics: light that smooth surfaces bundle
+  Requirement indirect;               ///< light that rough surfaces scatter on to others
+  Requirement ambient_occlusion;      ///< a cheap stand-in for that
+  float min_roughness = 1.0F;         ///< of any visible lit material that reflects, anywhere
+  float max_roughness = 0.0F;         ///< of the same materials
+  bool constant_environment = false;  ///< whether all light comes from an environment of one radiance
 };
 
 [[nodiscard]] Requirements requirements_of(const Scene& scene);

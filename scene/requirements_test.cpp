@@ -143,7 +143,7 @@ TEST(Requirements, WhatAMaterialIsMadeOfDecidesWhatItMirrorsAndTransmits) {
   invisible.metallic = 0.0F;
   invisible.ior = 1.0F;
   EXPECT_FALSE(requirements_of(scene_of(invisible, {Light{}})).reflection.needed) << "no boundary, no reflection";
-  EXPECT_EQ(requirements_of(scene_of(invisible, {Light{}})).least_roughness, 1.0F);
+  EXPECT_EQ(requirements_of(scene_of(invisible, {Light{}})).min_roughness, 1.0F);
   Material clear = rough(0.0F);
   clear.metallic = 0.0F;
   clear.transmission = 1.0F;
@@ -163,7 +163,7 @@ TEST(Requirements, WhatAMaterialIsMadeOfDecidesWhatItMirrorsAndTransmits) {
   grazing.base_color = black.base_color;
   EXPECT_TRUE(requirements_of(scene_of(grazing, {Light{}})).reflection.needed)
       << "black metal mirrors at grazing angles";
-  EXPECT_EQ(requirements_of(scene_of(grazing, {Light{}})).least_roughness, 0.0F);
+  EXPECT_EQ(requirements_of(scene_of(grazing, {Light{}})).min_roughness, 0.0F);
   Material wall = clear;
   wall.ior = 0.0F;
   for (const Material& opaque : {metal, black, wall}) {
@@ -205,7 +205,7 @@ TEST(Requirements, UnlitMaterialsAndDarkLightsAskForNothing) {
   EXPECT_FALSE(needs.reflection.needed);
   EXPECT_FALSE(needs.photon.needed);
   EXPECT_FALSE(needs.shadow.needed) << "nothing takes light";
-  EXPECT_EQ(needs.least_roughness, 1.0F);
+  EXPECT_EQ(needs.min_roughness, 1.0F);
   Light dark;
   dark.intensity = glm::vec3(0.0F);
   EXPECT_FALSE(requirements_of(scene_of(rough(1.0F), {dark})).shadow.needed);

@@ -13,7 +13,7 @@
 namespace hpr {
 void finish_scene(Scene& scene) {
   if (scene.materials.empty()) scene.materials.emplace_back();
-  constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() - std::uint64_t{1};
+  constexpr std::uint64_t kMaxTriangles = std::numeric_limits<std::uint32_t>::max() - std::uint64_t{1};
 
   std::vector<Bounds> boxes;
   boxes.reserve(scene.meshes.size());
@@ -25,8 +25,8 @@ void finish_scene(Scene& scene) {
     HPR_CHECK(instance.mesh < scene.meshes.size());
     instance.first_surface = static_cast<std::uint32_t>(triangles);
     triangles += scene.mesh_of(instance).triangles.size();
-    if (triangles > kMostTriangles) {
-      throw Error(ExitCode::Limit, fmt::format("the scene has more than {} triangles after instancing", kMostTriangles),
+    if (triangles > kMaxTriangles) {
+      throw Error(ExitCode::Limit, fmt::format("the scene has more than {} triangles after instancing", kMaxTriangles),
                   "surface ids have 32 bits; draw fewer instances or a coarser level of detail");
     }
     if (scene.mesh_of(instance).triangles.empty()) continue;
@@ -37,7 +37,7 @@ void finish_scene(Scene& scene) {
   scene.bounds = triangles > 0 ? bounds : Bounds{};
 }
 
-SurfacePlace locate_surface(const Scene& scene, std::uint32_t surface) {
+SurfaceLocation locate_surface(const Scene& scene, std::uint32_t surface) {
   HPR_CHECK(surface < scene.triangles);
   // The last instance that starts at or before the id; empty instances before it start there too and are skipped.
   const auto after = std::ranges::upper_bound(scene.instances, surface, {}, &Instance::first_surface);

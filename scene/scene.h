@@ -54,7 +54,7 @@ struct Material {
   TextureRef emissive_texture;            ///< sRGB
   TextureRef normal_texture;              ///< linear: a normal in the tangent frame, [0, 1] standing for [-1, 1]
   float normal_scale = 1.0F;              ///< of its x and y
-  TextureRef occlusion_texture;           ///< linear: in R, the share of ambient light that arrives
+  TextureRef occlusion_texture;           ///< linear: in R, the fraction of ambient light that arrives
   float occlusion_strength = 1.0F;        ///< 0: the texture has no effect
   float transmission = 0.0F;
   TextureRef transmission_texture;  ///< linear, in R
@@ -77,8 +77,8 @@ struct Mesh {
   std::vector<glm::vec3> normals;             ///< unit length, one per position
   std::array<std::vector<glm::vec2>, 2> uvs;  ///< per set: one per position, or none at all
   std::vector<glm::vec4> colors;              ///< linear RGBA in [0, 1], one per position, or none at all
-  /// One per position, or none at all: the way of growing u, of unit length (zero where unknown), and the sign w with
-  /// which w normal x tangent is the way of falling v.
+  /// One per position, or none at all: the direction of growing u, of unit length (zero where unknown), and the sign w
+  /// with which w normal x tangent is the direction of falling v.
   std::vector<glm::vec4> tangents;
   std::vector<glm::uvec3> triangles;  ///< may be degenerate
   std::uint32_t material = 0;         ///< index into Scene::materials, always valid
@@ -116,7 +116,7 @@ struct Light {
 };
 
 /// Light from all around, infinitely far away. The image's rows go from straight up (+y) to straight down, its columns
-/// once around: the middle one lies along -z, the columns right of it towards +x.
+/// once around: the central one lies along -z, the columns right of it towards +x.
 struct Environment {
   Image<Rgb> image;               ///< radiance, finite and not negative; one pixel: the same everywhere
   double rotation_radians = 0.0;  ///< turns it about +y, counterclockwise as seen from above
@@ -126,7 +126,7 @@ struct Environment {
   std::uint64_t not_finite = 0;
   std::size_t first_not_finite = 0;
 
-  [[nodiscard]] bool is_even() const { return image.size().area() == 1; }
+  [[nodiscard]] bool is_constant() const { return image.size().area() == 1; }
 };
 
 struct PerspectiveLens {
@@ -184,7 +184,7 @@ struct SurfaceRange {
 };
 
 /// Where a surface id lies.
-struct SurfacePlace {
+struct SurfaceLocation {
   std::uint32_t instance = 0;
   std::uint32_t triangle = 0;  ///< of the instance's mesh
 };
@@ -194,7 +194,7 @@ struct SurfacePlace {
 void finish_scene(Scene& scene);
 
 /// The instance and triangle of a surface id below scene.triangles.
-[[nodiscard]] SurfacePlace locate_surface(const Scene& scene, std::uint32_t surface);
+[[nodiscard]] SurfaceLocation locate_surface(const Scene& scene, std::uint32_t surface);
 
 /// The world position of a mesh's vertex, in double.
 [[nodiscard]] glm::dvec3 world_position(const Instance& instance, const glm::vec3& position);
@@ -206,7 +206,7 @@ void finish_scene(Scene& scene);
 /// XXH64 over everything that can change a picture; the same on every rank and machine.
 [[nodiscard]] std::uint64_t content_hash(const Scene& scene);
 
-/// A scene as bytes and back, for the way to other ranks. `from_bytes` trusts its input.
+/// A scene as bytes and back, to send to other ranks. `from_bytes` trusts its input.
 [[nodiscard]] std::vector<std::byte> to_bytes(const Scene& scene);
 [[nodiscard]] Scene scene_from_bytes(std::span<const std::byte> bytes);
 

@@ -212,8 +212,8 @@ TEST(ContentHash, ChangesWithEveryField) {
   for (const auto& [what, change] : changes) {
     Scene scene = full_scene();
     change(scene);
-    const auto [place, fresh] = seen.emplace(content_hash(scene), what);
-    EXPECT_TRUE(fresh) << what << " hashes like " << place->second;
+    const auto [entry, fresh] = seen.emplace(content_hash(scene), what);
+    EXPECT_TRUE(fresh) << what << " hashes like " << entry->second;
     EXPECT_EQ(content_hash(scene_from_bytes(to_bytes(scene))), content_hash(scene)) << what;
   }
 }

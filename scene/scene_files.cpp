@@ -14,7 +14,7 @@ void add_named(const Json& item, const std::filesystem::path& folder, std::vecto
   if (!uri.is_string() || is_data_uri(uri.string())) return;
   try {
     files.push_back(folder / jailed_path(uri.string(), ""));
-  } catch (const Error&) {  // load_scene tells
+  } catch (const Error&) {  // load_scene reports it
   }
 }
 
@@ -32,7 +32,7 @@ std::vector<std::filesystem::path> files_of_scene(const std::string& source, con
       if (!root[list].is_array()) continue;
       for (const Json& item : root[list].elements()) add_named(item, path.parent_path(), files);
     }
-  } catch (const Error&) {  // load_scene tells
+  } catch (const Error&) {  // load_scene reports it
   }
   return files;
 }

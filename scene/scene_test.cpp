@@ -106,8 +106,8 @@ TEST(LocateSurface, FindsInstanceAndTriangleAmongEmptyInstances) {
   const std::vector<std::pair<std::uint32_t, std::uint32_t>> expected{{1, 0}, {1, 1}, {1, 2}, {4, 0},
                                                                       {4, 1}, {5, 0}, {5, 1}, {5, 2}};
   for (std::uint32_t surface = 0; surface < scene.triangles; ++surface) {
-    const SurfacePlace place = locate_surface(scene, surface);
-    EXPECT_EQ(std::pair(place.instance, place.triangle), expected[surface]) << surface;
+    const SurfaceLocation location = locate_surface(scene, surface);
+    EXPECT_EQ(std::pair(location.instance, location.triangle), expected[surface]) << surface;
   }
   EXPECT_DEATH((void)locate_surface(scene, scene.triangles), "broken contract");
 }

@@ -45,13 +45,13 @@ std::vector<SurfaceRange> common_ranges(const std::vector<SurfaceRange>& a, cons
   return common;
 }
 
-std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool holed) {
+std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool alpha_tested) {
   std::vector<SurfaceRange> ranges;
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
-    const bool is_holed = scene.materials[mesh.material].alpha_mode != AlphaMode::Opaque;
+    const bool is_alpha_tested = scene.materials[mesh.material].alpha_mode != AlphaMode::Opaque;
     const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
-    if (is_holed != holed || count == 0) continue;
+    if (is_alpha_tested != alpha_tested || count == 0) continue;
     if (!ranges.empty() && ranges.back().last == instance.first_surface) {
       ranges.back().last += count;
     } else {

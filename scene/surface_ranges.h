@@ -14,8 +14,8 @@ struct InstanceRange {
   SurfaceRange range;
 };
 
-/// The same surfaces as sorted, disjoint ranges that do not touch, inside [0, end). `ranges` may come in any order,
-/// overlap and reach past `end`.
+/// Merges ranges into sorted, disjoint ones that do not touch, inside [0, end), of the same surfaces. `ranges` may come
+/// in any order, overlap and reach past `end`.
 [[nodiscard]] std::vector<SurfaceRange> merged_ranges(std::vector<SurfaceRange> ranges, std::uint32_t end);
 
 /// Merged ranges of surface ids cut at the borders of instances, in ascending order.
@@ -25,7 +25,8 @@ struct InstanceRange {
 [[nodiscard]] std::vector<SurfaceRange> common_ranges(const std::vector<SurfaceRange>& a,
                                                       const std::vector<SurfaceRange>& b);
 
-/// The surfaces whose materials cover all (or, `holed`, only part) of what is behind them, as ranges of surface ids.
-[[nodiscard]] std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool holed);
+/// The surfaces whose materials cover all (or, `alpha_tested`, only part) of what is behind them, as ranges of surface
+/// ids.
+[[nodiscard]] std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool alpha_tested);
 
 }  // namespace hpr

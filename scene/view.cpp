@@ -21,15 +21,15 @@ double near_plane(const PerspectiveLens& lens, const Bounds& bounds) {
 
 /// What (x, y) of the view looks through, on the plane its edges are on.
 glm::dvec2 looked_through(const View& view, double x, double y) {
-  const auto share = [&](const glm::dvec2& jitter) {
+  const auto fraction = [&](const glm::dvec2& jitter) {
     return glm::dvec2((view.block.x0 + x + jitter.x) / view.screen.width,
                       (view.block.y0 + y + jitter.y) / view.screen.height);
   };
-  const glm::dvec2 at = share(view.jitter);
+  const glm::dvec2 at = fraction(view.jitter);
   if (view.points) {
     if (const auto seen = view.points->seen_at(at.x, at.y)) return *seen;
-    const glm::dvec2 middle = share(glm::dvec2(0.0));
-    if (const auto seen = view.points->seen_at(middle.x, middle.y)) return *seen;
+    const glm::dvec2 center = fraction(glm::dvec2(0.0));
+    if (const auto seen = view.points->seen_at(center.x, center.y)) return *seen;
   }
   return {view.left + (view.right - view.left) * at.x, view.top - (view.top - view.bottom) * at.y};
 }
@@ -37,9 +37,9 @@ glm::dvec2 looked_through(const View& view, double x, double y) {
 }  // namespace
 
 Ray view_ray(const View& view, double x, double y) {
-  const glm::dvec2 place = looked_through(view, x, y);
-  if (view.orthographic) return {view.eye + view.axes * glm::dvec3(place, 0.0), -view.axes[2]};
-  return {view.eye, view.axes * glm::dvec3(place, -1.0)};
+  const glm::dvec2 position = looked_through(view, x, y);
+  if (view.orthographic) return {view.eye + view.axes * glm::dvec3(position, 0.0), -view.axes[2]};
+  return {view.eye, view.axes * glm::dvec3(position, -1.0)};
 }
 
 glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin) {
@@ -87,11 +87,11 @@ void tighten(View& view, const Bounds& bounds) {
   const glm::dvec3 extent = bounds.high - bounds.low;
   const double diagonal = glm::length(extent);
   if (!(diagonal > 0.0) || !std::isfinite(diagonal)) return;
-  const double middle = glm::dot(view.eye - 0.5 * (bounds.low + bounds.high), view.axes[2]);
+  const double center = glm::dot(view.eye - 0.5 * (bounds.low + bounds.high), view.axes[2]);
   const double half = 0.5 * glm::dot(extent, glm::abs(view.axes[2]));
-  const double margin = 1e-3 * diagonal + 1e-6 * std::abs(middle);  // what drawing in single precision may shift
-  const double near = std::max(view.near_distance, middle - half - margin);
-  const double far = std::min(view.far_distance, middle + half + margin);
+  const double margin = 1e-3 * diagonal + 1e-6 * std::abs(center);  // what drawing in single precision may shift
+  const double near = std::max(view.near_distance, center - half - margin);
+  const double far = std::min(view.far_distance, center + half + margin);
   if (!(near < far)) return;
   view.near_distance = near;
   view.far_distance = far;

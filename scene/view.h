@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "image/image.h"
-#include "scene/point_map.h"
+#include "scene/position_map.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -32,7 +32,7 @@ struct View {
   Size screen;  ///< pixels of the whole screen
   Rect block;   ///< the part of it this view draws; pixel (x, y) of the view is pixel (block.x0 + x, block.y0 + y)
   std::uint32_t screen_number = 0;  ///< which screen of the wall: its blocks have the same one, and so the same noise
-  /// Pixels from its centre, to the right and down, at which every pixel is looked through.
+  /// Pixels from its centre, to the right and down, at which every pixel is sampled.
   glm::dvec2 jitter{0.0};
   /// Rays go through these and no longer through the plane between the edges, which is all that rasterising knows.
   std::optional<PixelPoints> points;
@@ -46,13 +46,13 @@ struct Ray {
 };
 
 /// The ray through (x, y) of the view, in pixels from its upper left corner: pixel centres are at + 0.5. The jitter is
-/// added to the place, so asked for a centre, it is the ray of that pixel's sample. Where a screen of points has none,
-/// it is that of the place without jitter, else that of the plane.
+/// added to the position, so for a centre it is the ray of that pixel's sample. Where a screen of points has none,
+/// it is that of the position without jitter, else that of the plane.
 [[nodiscard]] Ray view_ray(const View& view, double x, double y);
 
 /// World relative to `origin` -> clip space, for a depth range of [0, 1] reversed: near is 1, infinity (or the
 /// orthographic far plane) is 0. y points up, as GL has it; pixel centres show what
-/// lies at the jittered places. Multiply with model matrices in double before rounding.
+/// lies at the jittered positions. Multiply with model matrices in double before rounding.
 [[nodiscard]] glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin);
 
 /// The depth a point at `distance` metres along the view axis has in keys.

@@ -112,9 +112,9 @@ TEST(View, AJitteredViewLooksThroughOtherPlacesOfTheSamePixels) {
     EXPECT_TRUE(ray.origin == same.origin && ray.direction == same.direction);
     for (const View& view : split_into_blocks(jittered, 128)) {
       const Ray seen = view_ray(view, 20.5, 30.5);
-      const glm::dvec3 place = project(view, seen.origin + 2.0 * seen.direction, {100, -50, 3});
-      EXPECT_NEAR(place.x, 20.5, 1e-9);
-      EXPECT_NEAR(place.y, 30.5, 1e-9);
+      const glm::dvec3 position = project(view, seen.origin + 2.0 * seen.direction, {100, -50, 3});
+      EXPECT_NEAR(position.x, 20.5, 1e-9);
+      EXPECT_NEAR(position.y, 30.5, 1e-9);
     }
   }
 }

@@ -82,7 +82,7 @@ TEST(Mpi, ExchangeMayHaveTwoSizes) {
 }
 
 TEST(Mpi, ReduceMaxLeavesTheLargestOfEachOnEveryRoot) {
-  for (const std::size_t part : {kSmallPart, MpiCommunicator::kLargestPart}) {
+  for (const std::size_t part : {kSmallPart, MpiCommunicator::kMaxPartBytes}) {
     MpiCommunicator comm(MPI_COMM_WORLD, kHangTimeout, part);
     for (int root = 0; root < comm.size(); ++root) {
       std::vector<std::uint64_t> values(1001);
@@ -201,12 +201,12 @@ TEST(Mpi, AnExchangeOfManyTakesEachMessageWithItsBodies) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{5}, kSmallPart, 3 * kSmallPart + 1}) {
     const Bytes head = test::message_of(comm.rank(), size);
     const Bytes part = test::message_of(comm.rank() + 50, size / 2);
-    const std::array<std::span<const std::byte>, 2> bodies{part, head};
+    const std::array<std::span<const std::byte>, 2> segments{part, head};
     std::vector<Outgoing> out;
     std::vector<int> from;
     for (int peer = 0; peer < comm.size(); ++peer) {
       if (peer == comm.rank()) continue;
-      out.push_back({peer, head, bodies});
+      out.push_back({peer, head, segments});
       from.push_back(peer);
     }
     std::vector<int> came;

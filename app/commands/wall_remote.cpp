@@ -53,7 +53,7 @@ class WallRemoteCommand : public Command {
     if (!wait || wait->count() <= 0) {
       throw Error(ExitCode::Usage, fmt::format("--wait: '{}' is no duration", printable(wait_)), "write e.g. 10s");
     }
-    return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*wait, kLongestWait));
+    return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*wait, kMaxWait));
   }
 
   std::string run_;

@@ -118,7 +118,7 @@ class RunningJob {
       : child_(child),
         output_(output),
         collected_(options.captured_stdout),
-        start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kLongestWait) + kStartGrace +
+        start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kMaxWait) + kStartGrace +
                      ranks * kStartOfRank),
         end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kLeastEnd, kLongestEnd)) {}
 

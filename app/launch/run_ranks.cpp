@@ -41,7 +41,7 @@ class CallLimit {
   CallLimit(std::chrono::nanoseconds limit, const char* doing)
       : thread_([this, limit, doing](const std::stop_token& stop) {
           std::unique_lock lock(mutex_);
-          if (done_.wait_for(lock, stop, std::min<std::chrono::nanoseconds>(limit, kLongestWait), [] { return false; }))
+          if (done_.wait_for(lock, stop, std::min<std::chrono::nanoseconds>(limit, kMaxWait), [] { return false; }))
             return;
           if (stop.stop_requested()) return;
           print_error({ExitCode::Hang, fmt::format("rank {} on {}: still {}", launched_rank(), host_name(), doing),

@@ -22,7 +22,7 @@ std::chrono::milliseconds time_limit(const std::string& text) {
   if (!limit || *limit <= std::chrono::nanoseconds::zero()) {
     throw Error(ExitCode::Usage, fmt::format("--pipe-timeout: '{}' is no duration", printable(text)), "write e.g. 30s");
   }
-  return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*limit, kLongestWait));
+  return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*limit, kMaxWait));
 }
 
 /// At once, also where stdout is a pipe or file: somebody waits for it.

@@ -78,10 +78,10 @@ void assign_recursively(std::vector<ScreenRect> rects, std::span<const int> weig
     return;
   }
   const std::size_t half = weights.size() / 2;
-  const double share =
+  const double fraction =
       static_cast<double>(std::accumulate(weights.begin(), weights.begin() + static_cast<std::ptrdiff_t>(half), 0)) /
       std::accumulate(weights.begin(), weights.end(), 0);
-  double wanted = share * static_cast<double>(tiles_in(rects));
+  double wanted = fraction * static_cast<double>(tiles_in(rects));
   std::vector<ScreenRect> first;
   std::vector<ScreenRect> second;
   for (const ScreenRect& rect : rects) {
@@ -153,25 +153,25 @@ int longest_axis(std::span<const Chunk> chunks) {
   return extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
 }
 
-void partition_recursively(std::span<Chunk> chunks, std::span<std::vector<SurfaceRange>> shares) {
-  if (shares.size() == 1) {
-    shares[0] = joined(chunks);
+void partition_recursively(std::span<Chunk> chunks, std::span<std::vector<SurfaceRange>> parts) {
+  if (parts.size() == 1) {
+    parts[0] = joined(chunks);
     return;
   }
   const int axis = longest_axis(chunks);
   std::ranges::sort(chunks, [axis](const Chunk& a, const Chunk& b) {
     return a.center[axis] != b.center[axis] ? a.center[axis] < b.center[axis] : a.surfaces.first < b.surfaces.first;
   });
-  const std::size_t half = shares.size() / 2;
+  const std::size_t half = parts.size() / 2;
   std::uint64_t total = 0;
   for (const Chunk& chunk : chunks) total += chunk.surfaces.count();
-  const std::uint64_t wanted = total * half / shares.size();
+  const std::uint64_t wanted = total * half / parts.size();
   std::size_t split = 0;
   for (std::uint64_t sum = 0; split < chunks.size() && sum + chunks[split].surfaces.count() / 2 < wanted; ++split) {
     sum += chunks[split].surfaces.count();
   }
-  partition_recursively(chunks.first(split), shares.first(half));
-  partition_recursively(chunks.subspan(split), shares.subspan(half));
+  partition_recursively(chunks.first(split), parts.first(half));
+  partition_recursively(chunks.subspan(split), parts.subspan(half));
 }
 
 }  // namespace
@@ -211,10 +211,10 @@ std::vector<std::vector<ScreenRect>> assign_tiles(const FrameLayout& layout, con
 
 std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts, std::uint32_t chunk) {
   HPR_CHECK(parts > 0 && chunk > 0);
-  std::vector<std::vector<SurfaceRange>> shares(static_cast<std::size_t>(parts));
+  std::vector<std::vector<SurfaceRange>> partition(static_cast<std::size_t>(parts));
   std::vector<Chunk> chunks = make_chunks(scene, chunk);
-  partition_recursively(chunks, shares);
-  return shares;
+  partition_recursively(chunks, partition);
+  return partition;
 }
 
 std::vector<std::vector<int>> make_groups(int ranks, int groups) {
@@ -243,12 +243,12 @@ std::vector<Assignment> assign(Distribution distribution, const Scene& scene, co
   const auto areas = assign_tiles(layout, weights);
 
   std::vector<Assignment> assignments(static_cast<std::size_t>(ranks));
-  std::vector<std::vector<std::vector<SurfaceRange>>> shares(static_cast<std::size_t>(ranks) + 1);  // by group size
+  std::vector<std::vector<std::vector<SurfaceRange>>> parts(static_cast<std::size_t>(ranks) + 1);  // by group size
   for (std::size_t g = 0; g < members.size(); ++g) {
-    auto& share = shares[members[g].size()];
-    if (share.empty()) share = partition_objects(scene, static_cast<int>(members[g].size()));
+    auto& objects = parts[members[g].size()];
+    if (objects.empty()) objects = partition_objects(scene, static_cast<int>(members[g].size()));
     for (std::size_t i = 0; i < members[g].size(); ++i) {
-      assignments[static_cast<std::size_t>(members[g][i])] = {members[g], share[i], areas[g]};
+      assignments[static_cast<std::size_t>(members[g][i])] = {members[g], objects[i], areas[g]};
     }
   }
   return assignments;

@@ -29,11 +29,11 @@ std::vector<int> tiles_of_areas(const FrameLayout& layout, const std::vector<std
     for (const ScreenRect& rect : area) {
       EXPECT_FALSE(rect.pixels.empty());
       for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
-        const TilePlace place = layout.place(tile);
-        if (place.screen != rect.screen) continue;
-        const Rect shared = intersection(place.pixels, rect.pixels);
+        const TilePlace position = layout.place(tile);
+        if (position.screen != rect.screen) continue;
+        const Rect shared = intersection(position.pixels, rect.pixels);
         if (shared.empty()) continue;
-        EXPECT_EQ(shared, place.pixels) << "a tile is cut";
+        EXPECT_EQ(shared, position.pixels) << "a tile is cut";
         ++owners[tile];
         ++count;
       }
@@ -106,15 +106,15 @@ Scene strewn(const std::vector<std::uint32_t>& sizes) {
   return scene;
 }
 
-void expect_partition(const std::vector<std::vector<SurfaceRange>>& shares, std::uint32_t triangles) {
+void expect_partition(const std::vector<std::vector<SurfaceRange>>& partition, std::uint32_t triangles) {
   std::vector<int> owners(triangles, 0);
-  for (const auto& share : shares) {
+  for (const auto& part : partition) {
     std::uint32_t after = 0;
-    for (const SurfaceRange& range : share) {
+    for (const SurfaceRange& range : part) {
       ASSERT_LT(range.first, range.last);
       ASSERT_LE(range.last, triangles);
       EXPECT_GE(range.first, after) << "ranges ascend";
-      EXPECT_TRUE(&range == share.data() || range.first != after) << "neighbours are merged";
+      EXPECT_TRUE(&range == part.data() || range.first != after) << "neighbours are merged";
       after = range.last;
       for (std::uint32_t surface = range.first; surface < range.last; ++surface) ++owners[surface];
     }
@@ -122,8 +122,8 @@ void expect_partition(const std::vector<std::vector<SurfaceRange>>& shares, std:
   EXPECT_EQ(std::ranges::count(owners, 1), static_cast<std::ptrdiff_t>(triangles));
 }
 
-std::uint32_t triangles_in(const std::vector<SurfaceRange>& share) {
-  return std::accumulate(share.begin(), share.end(), 0U,
+std::uint32_t triangles_in(const std::vector<SurfaceRange>& part) {
+  return std::accumulate(part.begin(), part.end(), 0U,
                          [](std::uint32_t sum, const SurfaceRange& range) { return sum + range.count(); });
 }
 
@@ -133,12 +133,12 @@ TEST(PartitionObjects, EverySurfaceLiesInExactlyOneShareAndSharesAreBalancedToAC
     const Scene scene = strewn(sizes);
     for (const std::uint32_t chunk : {1U, 7U, 512U}) {
       for (int parts = 1; parts <= 17; ++parts) {
-        const auto shares = partition_objects(scene, parts, chunk);
-        ASSERT_EQ(shares.size(), static_cast<std::size_t>(parts));
-        expect_partition(shares, scene.triangles);
+        const auto partition = partition_objects(scene, parts, chunk);
+        ASSERT_EQ(partition.size(), static_cast<std::size_t>(parts));
+        expect_partition(partition, scene.triangles);
         const double ideal = static_cast<double>(scene.triangles) / parts;
-        for (const auto& share : shares) {
-          EXPECT_NEAR(triangles_in(share), ideal, chunk + 1.0) << parts << " parts, chunks of " << chunk;
+        for (const auto& part : partition) {
+          EXPECT_NEAR(triangles_in(part), ideal, chunk + 1.0) << parts << " parts, chunks of " << chunk;
         }
       }
     }
@@ -149,9 +149,9 @@ TEST(PartitionObjects, SharesAreSpatiallyCoherent) {
   Scene scene = strewn({400});
   scene.instances[1].to_world[3] = {1000, 0, 0, 1};
   finish_scene(scene);
-  const auto shares = partition_objects(scene, 2, 16);
-  EXPECT_EQ(shares[0], (std::vector<SurfaceRange>{{0, 400}}));
-  EXPECT_EQ(shares[1], (std::vector<SurfaceRange>{{400, 800}}));
+  const auto partition = partition_objects(scene, 2, 16);
+  EXPECT_EQ(partition[0], (std::vector<SurfaceRange>{{0, 400}}));
+  EXPECT_EQ(partition[1], (std::vector<SurfaceRange>{{400, 800}}));
 }
 
 TEST(PartitionObjects, TrianglesOfOnePlaceAreStillDealtOut) {
@@ -163,7 +163,7 @@ TEST(PartitionObjects, TrianglesOfOnePlaceAreStillDealtOut) {
   scene.meshes = {mesh};
   scene.instances = {Instance{}};
   finish_scene(scene);
-  for (const auto& share : partition_objects(scene, 4, 1)) EXPECT_EQ(triangles_in(share), 25U);
+  for (const auto& part : partition_objects(scene, 4, 1)) EXPECT_EQ(triangles_in(part), 25U);
 }
 
 TEST(Groups, AreContiguousAndEvenlySized) {
@@ -202,14 +202,14 @@ TEST(Assign, EverySurfaceIsDrawnExactlyOnceForEveryTile) {
         EXPECT_EQ(std::ranges::count(mine.group, rank), 1);
         if (mine.group.front() != rank) continue;
         areas.push_back(mine.area);
-        std::vector<std::vector<SurfaceRange>> shares;
+        std::vector<std::vector<SurfaceRange>> partition;
         for (const int member : mine.group) {
           const Assignment& theirs = assignments[static_cast<std::size_t>(member)];
           EXPECT_EQ(theirs.group, mine.group);
           EXPECT_EQ(theirs.area, mine.area);
-          shares.push_back(theirs.objects);
+          partition.push_back(theirs.objects);
         }
-        expect_partition(shares, scene.triangles);
+        expect_partition(partition, scene.triangles);
       }
       EXPECT_EQ(static_cast<int>(areas.size()), distribution == Distribution::SortFirst  ? ranks
                                                 : distribution == Distribution::SortLast ? 1

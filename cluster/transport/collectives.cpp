@@ -42,8 +42,8 @@ void put(std::vector<std::byte>& bytes, const std::string& text) {
   const std::uint64_t size = text.size();
   const auto header = std::as_bytes(std::span(&size, 1));
   bytes.insert(bytes.end(), header.begin(), header.end());
-  const auto body = std::as_bytes(std::span(text));
-  bytes.insert(bytes.end(), body.begin(), body.end());
+  const auto segment = std::as_bytes(std::span(text));
+  bytes.insert(bytes.end(), segment.begin(), segment.end());
 }
 
 std::string take_text(std::span<const std::byte>& bytes) {
@@ -99,7 +99,7 @@ void broadcast(Communicator& comm, std::vector<std::byte>& bytes, int root) {
 }
 
 void barrier(Communicator& comm) {
-  // Dissemination: after round k every rank has heard of 2^k others.
+  // Dissemination: after round k every rank knows that 2^k others arrived.
   for (int step = 1; step < comm.size(); step *= 2) {
     comm.send({}, (comm.rank() + step) % comm.size());
     comm.receive(std::span<std::byte>{}, (comm.rank() - step + comm.size()) % comm.size());

@@ -13,23 +13,23 @@
 
 namespace hpr {
 
-/// One message of an exchange, with the bodies that follow it: memory that need not be copied together, and which the
-/// receiver can have put where it belongs.
+/// One message of an exchange, with the segments of payload that follow it: memory that is not copied together and that
+/// the receiver reads into wherever it belongs.
 struct Outgoing {
   int to = 0;
   std::span<const std::byte> message;
-  std::span<const std::span<const std::byte>> bodies = {};
+  std::span<const std::span<const std::byte>> segments = {};
 };
 
-/// Of the message and its bodies.
+/// The size of a message and its segments.
 [[nodiscard]] inline std::size_t bytes_of(const Outgoing& outgoing) {
   std::size_t bytes = outgoing.message.size();
-  for (const auto body : outgoing.bodies) bytes += body.size();
+  for (const auto segment : outgoing.segments) bytes += segment.size();
   return bytes;
 }
 
 /// Called with a message that has arrived; the bytes last until the call returns. They start at a multiple of 8. The
-/// call takes the message's bodies, each by one receive() from that rank, in their order.
+/// call takes the message's segments, each by one receive() from that rank, in their order.
 using Arrived = std::function<void(int from, std::span<const std::byte> message)>;
 
 /// Point-to-point messages between ranks, of any size. Messages between two ranks arrive in the order sent. No call
@@ -85,7 +85,7 @@ class Communicator {
 inline constexpr std::chrono::seconds kHangTimeout{300};
 
 /// Time limits are cut to this, ten years: a deadline further off would overflow the clock and count as passed.
-inline constexpr std::chrono::nanoseconds kLongestWait = std::chrono::hours{87600};
+inline constexpr std::chrono::nanoseconds kMaxWait = std::chrono::hours{87600};
 
 inline double Communicator::seconds() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

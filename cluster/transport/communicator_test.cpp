@@ -224,14 +224,14 @@ TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
           parts.push_back(test::message_of(comm.rank() + 7, 100));
           if (peer != comm.rank()) from.push_back(peer);
         }
-        const std::array<std::span<const std::byte>, 2> bodies{parts[0], parts[1]};
-        for (const int peer : from) out.push_back({peer, heads[static_cast<std::size_t>(peer)], bodies});
+        const std::array<std::span<const std::byte>, 2> segments{parts[0], parts[1]};
+        for (const int peer : from) out.push_back({peer, heads[static_cast<std::size_t>(peer)], segments});
         std::vector<int> came;
         comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
           came.push_back(peer);
           EXPECT_TRUE(
               std::ranges::equal(message, test::message_of(peer + round, 3 + static_cast<std::size_t>(comm.rank()))));
-          for (int body = 0; body < 2; ++body) EXPECT_EQ(comm.receive(peer), test::message_of(peer + 7, 100));
+          for (int segment = 0; segment < 2; ++segment) EXPECT_EQ(comm.receive(peer), test::message_of(peer + 7, 100));
         });
         std::ranges::sort(came);
         EXPECT_EQ(came, from);

@@ -13,7 +13,7 @@
 
 namespace hpr {
 
-/// Passes every call on: the base of communicators that change or watch one thing.
+/// Forwards every call: the base of communicators that change or observe one thing.
 class ForwardingCommunicator : public Communicator {
  public:
   explicit ForwardingCommunicator(Communicator& inner) : inner_(&inner) {}
@@ -48,7 +48,7 @@ class ForwardingCommunicator : public Communicator {
 };
 
 /// Counts what this rank sends: the cost model of a strategy, free of timing noise. A message counts as one with all
-/// its bodies; what ranks read of each other's memory does not count. A reduce_max counts as the one
+/// its segments; what ranks read of each other's memory does not count. A reduce_max counts as the one
 /// message of its values that each rank but the root gives away. What goes through a subset counts here too.
 class CountingCommunicator final : public ForwardingCommunicator {
  public:
@@ -104,7 +104,7 @@ class TracingCommunicator final : public ForwardingCommunicator {
   [[nodiscard]] std::vector<std::byte> receive(int from) override {
     trace::Span span("receive");
     std::vector<std::byte> message = inner().receive(from);
-    span.tell(kBytes, message.size());
+    span.set_detail(kBytes, message.size());
     return message;
   }
   void exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) override {
@@ -127,8 +127,8 @@ class TracingCommunicator final : public ForwardingCommunicator {
   static constexpr const char* kBytes = "bytes";
 };
 
-/// The same ranks under other numbers, such as their places in an order of visibility: what works on neighbours in
-/// number then works on neighbours in that order.
+/// Renumbers the ranks of a communicator, for example by their order of visibility: what works on neighbours in number
+/// then works on neighbours in that order.
 class RenumberedCommunicator final : public ForwardingCommunicator {
  public:
   /// ranks[n]: which rank of `inner` is rank n here, the same list on all ranks. Throws Error (Internal) when it does

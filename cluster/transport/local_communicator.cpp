@@ -52,8 +52,7 @@ struct SharedBlock {
 /// All messages on their way between the ranks of this process.
 class PostOffice {
  public:
-  explicit PostOffice(const LocalRanks& ranks)
-      : ranks_(ranks), hang_timeout_(std::min(ranks.hang_timeout, kLongestWait)) {}
+  explicit PostOffice(const LocalRanks& ranks) : ranks_(ranks), hang_timeout_(std::min(ranks.hang_timeout, kMaxWait)) {}
 
   [[nodiscard]] const LocalRanks& ranks() const { return ranks_; }
 
@@ -88,9 +87,9 @@ class PostOffice {
                   "a rank stands still; raise --hang-timeout if it only needs longer");
     }
     auto& box = boxes_[routes[chosen]];
-    std::pair<std::size_t, Message> taken{chosen, std::move(box.front())};
+    std::pair<std::size_t, Message> received{chosen, std::move(box.front())};
     box.pop_front();
-    return taken;
+    return received;
   }
 
   /// The memory that the ranks of `channel` share by their `nth` call: whoever asks first makes it.
@@ -203,7 +202,7 @@ class LocalCommunicator final : public Communicator {
     for (const Outgoing& outgoing : out) {
       disturb();
       send(outgoing.message, outgoing.to);
-      for (const auto body : outgoing.bodies) send(body, outgoing.to);
+      for (const auto segment : outgoing.segments) send(segment, outgoing.to);
     }
     std::vector<Route> routes;
     for (const int rank : from) {
@@ -249,8 +248,8 @@ class LocalCommunicator final : public Communicator {
     const int per_host = office_.ranks().ranks_per_host;
     for (const int world : worlds_) hosts.push_back(per_host > 0 ? world / per_host : 0);
     const std::size_t all = LocalPeerMemory::stride(bytes) * static_cast<std::size_t>(size_);
-    return std::make_shared<LocalPeerMemory>(office_, office_.memory(channel_, shares_++, all, size_), bytes, rank_,
-                                             std::move(hosts));
+    return std::make_shared<LocalPeerMemory>(office_, office_.memory(channel_, shared_blocks_++, all, size_), bytes,
+                                             rank_, std::move(hosts));
   }
 
  private:
@@ -280,7 +279,7 @@ class LocalCommunicator final : public Communicator {
   Channel reductions_;
   std::vector<int> worlds_;
   std::map<Channel, int> subsets_made_;
-  int shares_ = 0;
+  int shared_blocks_ = 0;
   std::mt19937_64 random_;
   int rank_;
   int size_;
@@ -288,11 +287,12 @@ class LocalCommunicator final : public Communicator {
 
 }  // namespace
 
-void run_local_ranks(int size, const std::function<void(Communicator&)>& body, std::chrono::nanoseconds hang_timeout) {
-  run_local_ranks({.size = size, .hang_timeout = hang_timeout}, body);
+void run_local_ranks(int size, const std::function<void(Communicator&)>& segment,
+                     std::chrono::nanoseconds hang_timeout) {
+  run_local_ranks({.size = size, .hang_timeout = hang_timeout}, segment);
 }
 
-void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& body) {
+void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& segment) {
   const int size = ranks.size;
   HPR_CHECK(size > 0);
   PostOffice office(ranks);
@@ -304,7 +304,7 @@ void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communica
     LocalCommunicator comm(office, {}, worlds, rank);
     const trace::InRow row({rank, 0});
     try {
-      body(comm);
+      segment(comm);
     } catch (...) {
       {
         const std::lock_guard lock(mutex);

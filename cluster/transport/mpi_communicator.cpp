@@ -186,8 +186,8 @@ MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_
 
 MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout,
                                  std::size_t part_bytes)
-    : comm_(comm), hang_timeout_(std::min(hang_timeout, kLongestWait)), part_bytes_(part_bytes) {
-  HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kLargestPart);
+    : comm_(comm), hang_timeout_(std::min(hang_timeout, kMaxWait)), part_bytes_(part_bytes) {
+  HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kMaxPartBytes);
   check_mpi(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
   check_mpi(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
   check_mpi(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
@@ -316,7 +316,7 @@ void MpiCommunicator::exchange(std::span<const Outgoing> out, std::span<const in
   std::vector<MPI_Request> sends;
   for (const Outgoing& outgoing : out) {
     start_send(outgoing.message, outgoing.to, sends);
-    for (const auto body : outgoing.bodies) start_send(body, outgoing.to, sends);
+    for (const auto segment : outgoing.segments) start_send(segment, outgoing.to, sends);
   }
   std::vector<std::unique_ptr<Incoming>> waited;
   for (const int rank : from) {

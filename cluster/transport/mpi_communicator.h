@@ -19,12 +19,12 @@ namespace hpr {
 /// Messages of any size: they travel in parts, as MPI counts are ints.
 class MpiCommunicator final : public Communicator {
  public:
-  static constexpr std::size_t kLargestPart = std::size_t{1} << 30U;
+  static constexpr std::size_t kMaxPartBytes = std::size_t{1} << 30U;
 
   /// Collective over `parent`. `part_bytes`: a message as long or longer travels in parts of this size, a multiple of 8
   /// and the same on all ranks; only tests have a reason to change it.
   explicit MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_timeout = kHangTimeout,
-                           std::size_t part_bytes = kLargestPart);
+                           std::size_t part_bytes = kMaxPartBytes);
   ~MpiCommunicator() override;
   MpiCommunicator(const MpiCommunicator&) = delete;
   MpiCommunicator& operator=(const MpiCommunicator&) = delete;

@@ -9,27 +9,27 @@
 namespace hpr {
 namespace {
 
-/// Goes through the deeds of all ranks as far as each can without what others have not given yet, again and again.
+/// Replays the events of all ranks, each as far as it can without messages that others have not sent yet, until done.
 class Replay {
  public:
-  explicit Replay(std::span<const std::vector<Deed>> deeds) : deeds_(deeds), ranks_(deeds.size()) {
-    schedule_.ranks = static_cast<int>(deeds.size());
+  explicit Replay(std::span<const std::vector<TraceEvent>> events) : events_(events), ranks_(events.size()) {
+    schedule_.ranks = static_cast<int>(events.size());
   }
 
   Schedule run() {
     for (bool moved = true; moved;) {
       moved = false;
-      for (std::size_t rank = 0; rank < deeds_.size(); ++rank) {
+      for (std::size_t rank = 0; rank < events_.size(); ++rank) {
         while (advance(rank)) moved = true;
       }
     }
-    for (std::size_t rank = 0; rank < deeds_.size(); ++rank) HPR_CHECK(ranks_[rank].next == deeds_[rank].size());
+    for (std::size_t rank = 0; rank < events_.size(); ++rank) HPR_CHECK(ranks_[rank].next == events_[rank].size());
     join_works();
     std::ranges::sort(schedule_.transfers);
-    std::ranges::sort(schedule_.gatherings);
-    auto& gatherings = schedule_.gatherings;
-    gatherings.erase(std::unique(gatherings.begin(), gatherings.end()),
-                     gatherings.end());  // every member has told of it
+    std::ranges::sort(schedule_.barriers);
+    auto& barriers = schedule_.barriers;
+    barriers.erase(std::unique(barriers.begin(), barriers.end()),
+                   barriers.end());  // every member recorded it
     return std::move(schedule_);
   }
 
@@ -37,33 +37,33 @@ class Replay {
   struct Progress {
     std::size_t next = 0;
     int round = 0;
-    bool gave = false;  ///< what the next deed gives
+    bool sent = false;  ///< the messages of the next event
   };
-  struct Parcel {
+  struct SentMessage {
     int round = 0;
     std::size_t bytes = 0;
   };
 
-  /// Does a rank's next deed; false when there is none or it waits.
+  /// Replays a rank's next event; false when there is none or it waits.
   bool advance(std::size_t rank) {
     Progress& progress = ranks_[rank];
-    if (progress.next == deeds_[rank].size()) return false;
-    const Deed& deed = deeds_[rank][progress.next];
-    if (!progress.gave) {
-      for (const auto& [ticket, bytes] : deed.given) parcels_[ticket] = {progress.round, bytes};
-      progress.gave = true;
+    if (progress.next == events_[rank].size()) return false;
+    const TraceEvent& event = events_[rank][progress.next];
+    if (!progress.sent) {
+      for (const auto& [id, bytes] : event.sent) messages_[id] = {progress.round, bytes};
+      progress.sent = true;
     }
-    if (!std::ranges::all_of(deed.taken, [&](const Ticket& ticket) { return parcels_.contains(ticket); })) return false;
+    if (!std::ranges::all_of(event.received, [&](const MessageId& id) { return messages_.contains(id); })) return false;
     int last = progress.round;
-    for (const Ticket& ticket : deed.taken) {
-      const Parcel& parcel = parcels_[ticket];
-      const int round = std::max(progress.round, parcel.round);
+    for (const MessageId& id : event.received) {
+      const SentMessage& message = messages_[id];
+      const int round = std::max(progress.round, message.round);
       last = std::max(last, round);
-      if (deed.kind == Deed::Kind::Gathering) continue;
-      schedule_.transfers.push_back({round, ticket.from, ticket.to, parcel.bytes, deed.kind == Deed::Kind::Reduction});
+      if (event.kind == TraceEvent::Kind::Barrier) continue;
+      schedule_.transfers.push_back({round, id.from, id.to, message.bytes, event.kind == TraceEvent::Kind::Reduction});
     }
-    if (deed.kind == Deed::Kind::Gathering) schedule_.gatherings.push_back({last, deed.ranks});
-    if (deed.kind == Deed::Kind::InPlaceWork) schedule_.works.push_back({last, deed.ranks, deed.bytes});
+    if (event.kind == TraceEvent::Kind::Barrier) schedule_.barriers.push_back({last, event.ranks});
+    if (event.kind == TraceEvent::Kind::InPlaceWork) schedule_.works.push_back({last, event.ranks, event.bytes});
     progress = {progress.next + 1, last + 1, false};
     schedule_.rounds = std::max(schedule_.rounds, last + 1);
     return true;
@@ -76,15 +76,15 @@ class Replay {
     for (const auto& [where, bytes] : joined) schedule_.works.push_back({where.first, where.second, bytes});
   }
 
-  std::span<const std::vector<Deed>> deeds_;
+  std::span<const std::vector<TraceEvent>> events_;
   std::vector<Progress> ranks_;
-  std::map<Ticket, Parcel> parcels_;
+  std::map<MessageId, SentMessage> messages_;
   Schedule schedule_;
 };
 
 // What is no message goes through channels of its own.
 constexpr int kReductions = -2;
-constexpr int kGatherings = -3;
+constexpr int kBarriers = -3;
 
 std::vector<int> extended(std::vector<int> channel, std::initializer_list<int> by) {
   channel.insert(channel.end(), by);
@@ -93,11 +93,11 @@ std::vector<int> extended(std::vector<int> channel, std::initializer_list<int> b
 
 }  // namespace
 
-Schedule schedule_of(std::span<const std::vector<Deed>> deeds) {
-  return Replay(deeds).run();
+Schedule schedule_of(std::span<const std::vector<TraceEvent>> events) {
+  return Replay(events).run();
 }
 
-/// Notes the meetings.
+/// Records the barriers of ranks that share memory.
 class RecordingCommunicator::Memory final : public PeerMemory {
  public:
   Memory(std::shared_ptr<PeerMemory> inner, RecordingCommunicator& comm, Channel channel)
@@ -112,13 +112,13 @@ class RecordingCommunicator::Memory final : public PeerMemory {
   void meet() override {
     // As if every rank sent each other one a message of no bytes.
     const int self = comm_.world(comm_.rank());
-    Deed deed{Deed::Kind::Gathering, {}, {}, host_, 0};
+    TraceEvent event{TraceEvent::Kind::Barrier, {}, {}, host_, 0};
     for (const int peer : host_) {
       if (peer == self) continue;
-      deed.given.push_back({comm_.next_ticket(channel_, self, peer), 0});
-      deed.taken.push_back(comm_.next_ticket(channel_, peer, self));
+      event.sent.push_back({comm_.next_id(channel_, self, peer), 0});
+      event.received.push_back(comm_.next_id(channel_, peer, self));
     }
-    comm_.log_->deeds.push_back(std::move(deed));
+    comm_.log_->events.push_back(std::move(event));
     comm_.log_->host = host_;
     inner_->meet();
   }
@@ -143,19 +143,19 @@ RecordingCommunicator::RecordingCommunicator(std::unique_ptr<Communicator> part,
       channel_(std::move(channel)),
       worlds_(std::move(worlds)) {}
 
-Ticket RecordingCommunicator::next_ticket(const Channel& channel, int from, int to) {
+MessageId RecordingCommunicator::next_id(const Channel& channel, int from, int to) {
   return {channel, from, to, log_->numbers[{channel, {from, to}}]++};
 }
 
 void RecordingCommunicator::send(std::span<const std::byte> message, int to) {
-  const Ticket ticket = next_ticket(channel_, world(rank()), world(to));
-  log_->deeds.push_back({Deed::Kind::Messages, {{ticket, message.size()}}, {}, {}, 0});
+  const MessageId id = next_id(channel_, world(rank()), world(to));
+  log_->events.push_back({TraceEvent::Kind::Messages, {{id, message.size()}}, {}, {}, 0});
   inner().send(message, to);
 }
 
 void RecordingCommunicator::note_received(int from) {
   if (log_->exchanging) return;
-  log_->deeds.push_back({Deed::Kind::Messages, {}, {next_ticket(channel_, world(from), world(rank()))}, {}, 0});
+  log_->events.push_back({TraceEvent::Kind::Messages, {}, {next_id(channel_, world(from), world(rank()))}, {}, 0});
 }
 
 void RecordingCommunicator::receive(std::span<std::byte> message, int from) {
@@ -169,12 +169,12 @@ std::vector<std::byte> RecordingCommunicator::receive(int from) {
 }
 
 void RecordingCommunicator::exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) {
-  Deed deed;
+  TraceEvent event;
   for (const Outgoing& outgoing : out) {
-    deed.given.push_back({next_ticket(channel_, world(rank()), world(outgoing.to)), bytes_of(outgoing)});
+    event.sent.push_back({next_id(channel_, world(rank()), world(outgoing.to)), bytes_of(outgoing)});
   }
-  for (const int peer : from) deed.taken.push_back(next_ticket(channel_, world(peer), world(rank())));
-  log_->deeds.push_back(std::move(deed));
+  for (const int peer : from) event.received.push_back(next_id(channel_, world(peer), world(rank())));
+  log_->events.push_back(std::move(event));
   log_->exchanging = true;
   inner().exchange(out, from, arrived);
   log_->exchanging = false;
@@ -182,15 +182,15 @@ void RecordingCommunicator::exchange(std::span<const Outgoing> out, std::span<co
 
 void RecordingCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
   const Channel channel = extended(channel_, {kReductions});
-  Deed deed{Deed::Kind::Reduction, {}, {}, {}, 0};
+  TraceEvent event{TraceEvent::Kind::Reduction, {}, {}, {}, 0};
   if (rank() == root) {
     for (int peer = 0; peer < size(); ++peer) {
-      if (peer != root) deed.taken.push_back(next_ticket(channel, world(peer), world(root)));
+      if (peer != root) event.received.push_back(next_id(channel, world(peer), world(root)));
     }
   } else {
-    deed.given.push_back({next_ticket(channel, world(rank()), world(root)), values.size_bytes()});
+    event.sent.push_back({next_id(channel, world(rank()), world(root)), values.size_bytes()});
   }
-  log_->deeds.push_back(std::move(deed));
+  log_->events.push_back(std::move(event));
   inner().reduce_max(values, root);
 }
 
@@ -205,17 +205,17 @@ std::unique_ptr<Communicator> RecordingCommunicator::subset(std::span<const int>
 }
 
 std::shared_ptr<PeerMemory> RecordingCommunicator::share(std::size_t bytes) {
-  return std::make_shared<Memory>(inner().share(bytes), *this, extended(channel_, {kGatherings, shares_++}));
+  return std::make_shared<Memory>(inner().share(bytes), *this, extended(channel_, {kBarriers, shared_blocks_++}));
 }
 
 void RecordingCommunicator::worked(std::size_t bytes) {
   inner().worked(bytes);
   if (log_->exchanging || bytes == 0) return;
-  auto& deeds = log_->deeds;
-  if (deeds.empty() || deeds.back().kind != Deed::Kind::InPlaceWork) {
-    deeds.push_back({Deed::Kind::InPlaceWork, {}, {}, log_->host, 0});
+  auto& events = log_->events;
+  if (events.empty() || events.back().kind != TraceEvent::Kind::InPlaceWork) {
+    events.push_back({TraceEvent::Kind::InPlaceWork, {}, {}, log_->host, 0});
   }
-  deeds.back().bytes += bytes;
+  events.back().bytes += bytes;
 }
 
 }  // namespace hpr

@@ -11,7 +11,7 @@
 
 namespace hpr {
 
-/// One message, with the bodies that follow it.
+/// One message, with the segments that follow it.
 struct Transfer {
   int round = 0;
   int from = 0;
@@ -22,12 +22,12 @@ struct Transfer {
   auto operator<=>(const Transfer&) const = default;  // NOLINT(modernize-use-nullptr): clang-tidy 14 sees a 0 in it
 };
 
-/// Ranks of one host that wait for each other.
-struct Gathering {
+/// A barrier between ranks of one host.
+struct Barrier {
   int round = 0;
   std::vector<int> ranks;
 
-  auto operator<=>(const Gathering&) const = default;  // NOLINT(modernize-use-nullptr): as above
+  auto operator<=>(const Barrier&) const = default;  // NOLINT(modernize-use-nullptr): as above
 };
 
 /// Pixels merged or copied without a message, by ranks that share memory; which of them did how much is chance.
@@ -41,52 +41,53 @@ struct InPlaceWork {
 
 /// Who sent what to whom, in which round. Rounds are counted from 0 and follow from what waited for what, not from the
 /// clock: a rank's calls are in rounds of their own, and a message is in the first round in which both its sender and
-/// its receiver had got to it. Everything is in order of rounds, then ranks.
+/// its receiver had reached it. Everything is in order of rounds, then ranks.
 struct Schedule {
   int ranks = 1;
   int rounds = 0;
   std::vector<Transfer> transfers;
-  std::vector<Gathering> gatherings;
+  std::vector<Barrier> barriers;
   std::vector<InPlaceWork> works;
 };
 
 /// Names a message among all of a run: number `number` of those that went from one rank to another in `channel`.
-struct Ticket {
+struct MessageId {
   std::vector<int> channel;
   int from = 0;
   int to = 0;
   int number = 0;
 
-  auto operator<=>(const Ticket&) const = default;  // NOLINT(modernize-use-nullptr): as above
+  auto operator<=>(const MessageId&) const = default;  // NOLINT(modernize-use-nullptr): as above
 };
 
-/// What one rank did in one call, as it saw it.
-struct Deed {
-  enum class Kind { Messages, Reduction, Gathering, InPlaceWork };
-  struct Given {
-    Ticket ticket;
+/// What one rank did in one call of its communicator.
+struct TraceEvent {
+  enum class Kind { Messages, Reduction, Barrier, InPlaceWork };
+  struct Sent {
+    MessageId id;
     std::size_t bytes = 0;
   };
 
   Kind kind = Kind::Messages;
-  std::vector<Given> given;   ///< without waiting
-  std::vector<Ticket> taken;  ///< waited for
-  std::vector<int> ranks;     ///< of the gathering or the work
-  std::size_t bytes = 0;      ///< of the work
+  std::vector<Sent> sent;           ///< without waiting
+  std::vector<MessageId> received;  ///< waited for
+  std::vector<int> ranks;           ///< of the barrier or the work
+  std::size_t bytes = 0;            ///< of the work
 };
 
-/// `deeds`: of each rank, in its order. What is taken must have been given.
-[[nodiscard]] Schedule schedule_of(std::span<const std::vector<Deed>> deeds);
+/// The schedule that the recorded events make. `events`: per rank, in the order of its calls. Every message received
+/// must have been sent.
+[[nodiscard]] Schedule schedule_of(std::span<const std::vector<TraceEvent>> events);
 
-/// Notes what this rank sends, takes and merges in place, and with whom it meets, in its order: the deeds of all ranks
-/// make a Schedule. It adds nothing to the messages. What goes through a subset is noted here too, by the ranks of this
-/// communicator.
+/// Records what this rank sends, receives and merges in place, and its barriers, in the order of its calls: the events
+/// of all ranks make a Schedule. It adds nothing to the messages. Calls of a subset are recorded here too, by the ranks
+/// of this communicator.
 class RecordingCommunicator final : public ForwardingCommunicator {
  public:
   explicit RecordingCommunicator(Communicator& inner);
 
-  /// What this rank has done since it was last asked. All messages given until now must be taken before ranks ask.
-  [[nodiscard]] std::vector<Deed> take_deeds() { return std::exchange(log_->deeds, {}); }
+  /// The events recorded since the last call. All messages sent until now must have been received before ranks call it.
+  [[nodiscard]] std::vector<TraceEvent> take_events() { return std::exchange(log_->events, {}); }
 
   void send(std::span<const std::byte> message, int to) override;
   void receive(std::span<std::byte> message, int from) override;
@@ -101,19 +102,19 @@ class RecordingCommunicator final : public ForwardingCommunicator {
   class Memory;
   using Channel = std::vector<int>;
 
-  /// One rank's, for a communicator and its subsets.
+  /// The record of one rank, for a communicator and its subsets.
   struct Log {
-    std::vector<Deed> deeds;
-    std::map<std::pair<Channel, std::pair<int, int>>, int> numbers;  ///< messages of a route so far
-    std::vector<int> host;                                           ///< the ranks last met
-    bool exchanging = false;                                         ///< bodies and merges belong to a message
+    std::vector<TraceEvent> events;
+    std::map<std::pair<Channel, std::pair<int, int>>, int> numbers;  ///< messages counted per route
+    std::vector<int> host;                                           ///< the ranks of the last barrier
+    bool exchanging = false;                                         ///< segments and merges belong to a message
   };
 
   RecordingCommunicator(std::unique_ptr<Communicator> part, RecordingCommunicator& whole, Channel channel,
                         std::vector<int> worlds);
 
   [[nodiscard]] int world(int rank) const { return worlds_[static_cast<std::size_t>(rank)]; }
-  [[nodiscard]] Ticket next_ticket(const Channel& channel, int from, int to);
+  [[nodiscard]] MessageId next_id(const Channel& channel, int from, int to);
   void note_received(int from);
 
   Log own_;
@@ -121,7 +122,7 @@ class RecordingCommunicator final : public ForwardingCommunicator {
   Channel channel_;  ///< empty for the whole; of a subset its members, -1 and how many of just these came before
   std::vector<int> worlds_;  ///< per rank here, its rank in the whole
   std::map<Channel, int> subsets_made_;
-  int shares_ = 0;
+  int shared_blocks_ = 0;
 };
 
 }  // namespace hpr

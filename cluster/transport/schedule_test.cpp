@@ -12,14 +12,14 @@ namespace {
 
 constexpr std::array<std::byte, 100> kBytes{};
 
-Schedule record(const LocalRanks& ranks, const std::function<void(RecordingCommunicator&)>& body) {
-  std::vector<std::vector<Deed>> deeds(static_cast<std::size_t>(ranks.size));
+Schedule record(const LocalRanks& ranks, const std::function<void(RecordingCommunicator&)>& segment) {
+  std::vector<std::vector<TraceEvent>> events(static_cast<std::size_t>(ranks.size));
   run_local_ranks(ranks, [&](Communicator& inner) {
     RecordingCommunicator comm(inner);
-    body(comm);
-    deeds[static_cast<std::size_t>(comm.rank())] = comm.take_deeds();
+    segment(comm);
+    events[static_cast<std::size_t>(comm.rank())] = comm.take_events();
   });
-  return schedule_of(deeds);
+  return schedule_of(events);
 }
 
 TEST(RecordingCommunicator, AMessageIsInTheFirstRoundBothItsRanksHaveGotTo) {
@@ -42,12 +42,13 @@ TEST(RecordingCommunicator, AnExchangeIsOneRoundAndItsBodiesBelongToTheirMessage
   const Schedule schedule = record({.size = 4, .disorder = 3}, [](Communicator& comm) {
     for (const int distance : {1, 2}) {
       const int peer = comm.rank() ^ distance;
-      const std::array<std::span<const std::byte>, 2> bodies{std::span(kBytes).first(20), std::span(kBytes).first(30)};
-      const Outgoing out{peer, std::span(kBytes).first(8), bodies};
+      const std::array<std::span<const std::byte>, 2> segments{std::span(kBytes).first(20),
+                                                               std::span(kBytes).first(30)};
+      const Outgoing out{peer, std::span(kBytes).first(8), segments};
       comm.exchange({&out, 1}, {&peer, 1}, [&](int from, std::span<const std::byte> /*message*/) {
-        std::array<std::byte, 50> body{};
-        comm.receive(std::span(body).first(20), from);
-        comm.receive(std::span(body).first(30), from);
+        std::array<std::byte, 50> segment{};
+        comm.receive(std::span(segment).first(20), from);
+        comm.receive(std::span(segment).first(30), from);
         comm.worked(50);
       });
     }
@@ -95,7 +96,7 @@ TEST(RecordingCommunicator, MeetingsAreOfAHostAndWorkBetweenThemIsAddedUp) {
   });
   EXPECT_EQ(schedule.rounds, 3);
   EXPECT_TRUE(schedule.transfers.empty());
-  EXPECT_EQ(schedule.gatherings, (std::vector<Gathering>{{0, {0, 1}}, {0, {2, 3}}, {2, {0, 1}}, {2, {2, 3}}}));
+  EXPECT_EQ(schedule.barriers, (std::vector<Barrier>{{0, {0, 1}}, {0, {2, 3}}, {2, {0, 1}}, {2, {2, 3}}}));
   EXPECT_EQ(schedule.works, (std::vector<InPlaceWork>{{1, {0, 1}, 5}, {1, {2, 3}, 12}}));
 }
 
@@ -118,12 +119,12 @@ TEST(RecordingCommunicator, TakenDeedsAreNotToldAgain) {
       }
     };
     talk();
-    EXPECT_EQ(comm.take_deeds().size(), 1U);
-    EXPECT_TRUE(comm.take_deeds().empty());
+    EXPECT_EQ(comm.take_events().size(), 1U);
+    EXPECT_TRUE(comm.take_events().empty());
     talk();
-    const auto deeds = comm.take_deeds();
-    const auto& ticket = comm.rank() == 0 ? deeds.at(0).given.at(0).ticket : deeds.at(0).taken.at(0);
-    EXPECT_EQ(ticket, (Ticket{{}, 0, 1, 1}));
+    const auto events = comm.take_events();
+    const auto& id = comm.rank() == 0 ? events.at(0).sent.at(0).id : events.at(0).received.at(0);
+    EXPECT_EQ(id, (MessageId{{}, 0, 1, 1}));
   });
 }
 

@@ -127,7 +127,7 @@ void SimulatedCommunicator::exchange(std::span<const Outgoing> out, std::span<co
     auto& message = messages.emplace_back(head.begin(), head.end());
     message.insert(message.end(), outgoing.message.begin(), outgoing.message.end());
   }
-  for (std::size_t i = 0; i < out.size(); ++i) stamped.push_back({out[i].to, messages[i], out[i].bodies});
+  for (std::size_t i = 0; i < out.size(); ++i) stamped.push_back({out[i].to, messages[i], out[i].segments});
 
   struct Waiting {
     Stamp stamp;

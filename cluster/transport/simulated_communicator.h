@@ -7,13 +7,13 @@
 
 namespace hpr {
 
-/// A cluster that is not there. Times are seconds, rates bytes per second.
+/// A modelled cluster. Times are seconds, rates bytes per second.
 struct SimulatedCluster {
   int hosts = 1;
   int ranks = 2;  ///< spread over the hosts in order, as evenly as their number allows
   int cores = 0;  ///< per host, which its ranks share; 0: one for each rank
   double latency = 2e-6;
-  double bandwidth = 12.5e9;  ///< of a rank's share of its host's link, each way
+  double bandwidth = 12.5e9;  ///< of a rank's part of its host's link, in each direction
   double overhead = 0.5e-6;   ///< of a core, per message sent or received
   double local_latency = 0.5e-6;
   double local_bandwidth = 8e9;  ///< between ranks of one host
@@ -26,13 +26,13 @@ struct SimulatedCluster {
   }
 };
 
-/// Carries messages by another communicator and reckons what they would take on a cluster: after LogGP (Alexandrov,
+/// Carries messages by another communicator and models the time they would take on a cluster: after LogGP (Alexandrov,
 /// Ionescu, Schauser and Scheiman, 1995) every message costs both ends an overhead, leaves when the sender's link is
 /// free, and is there when it has passed the latency and the receiver's link. Pixels merged or copied (worked()) take
-/// their time too. Messages of an exchange are handed out in the order they would have come, so that what is reckoned
+/// their time too. Messages of an exchange are handed out in the order they would have come, so that the modelled time
 /// depends on nothing but what was sent: the same on every run.
 ///
-/// One rank's; ranks of one host are those that share memory in the communicator underneath.
+/// Each rank has its own; ranks of one host are those that share memory in the communicator underneath.
 class SimulatedCommunicator final : public ForwardingCommunicator {
  public:
   SimulatedCommunicator(Communicator& inner, const SimulatedCluster& cluster);
@@ -57,7 +57,7 @@ class SimulatedCommunicator final : public ForwardingCommunicator {
     double out_free = 0.0;
     double in_free = 0.0;
   };
-  /// What travels before a message.
+  /// What is sent before a message.
   struct Stamp {
     double sent = 0.0;  ///< when its last byte left
     double bytes = 0.0;
@@ -77,7 +77,7 @@ class SimulatedCommunicator final : public ForwardingCommunicator {
   SimulatedCluster cluster_;
   std::vector<int> hosts_;  ///< per rank
   std::shared_ptr<Clock> clock_;
-  bool in_exchange_ = false;  ///< bodies of its messages have no stamps of their own
+  bool in_exchange_ = false;  ///< segments of its messages have no stamps of their own
 };
 
 }  // namespace hpr

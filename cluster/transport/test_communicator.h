@@ -14,7 +14,7 @@
 
 namespace hpr::test {
 
-/// `size` bytes that tell who wrote them.
+/// `size` bytes that name the rank that wrote them.
 inline std::vector<std::byte> message_of(int rank, std::size_t size) {
   std::vector<std::byte> bytes(size);
   for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + static_cast<std::size_t>(rank) * 7);
@@ -30,13 +30,13 @@ inline std::vector<std::byte> exchange_with(Communicator& comm, std::span<const 
   return in;
 }
 
-/// Runs `body` on `size` ranks and expects every one of them to throw just this.
+/// Runs `segment` on `size` ranks and expects every one of them to throw just this.
 inline void expect_error_on_all(int size, ExitCode code, const std::string& what,
-                                const std::function<void(Communicator&)>& body) {
+                                const std::function<void(Communicator&)>& segment) {
   std::atomic<int> thrown = 0;
   run_local_ranks(size, [&](Communicator& comm) {
     try {
-      body(comm);
+      segment(comm);
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), code);
       EXPECT_EQ(error.what(), what);

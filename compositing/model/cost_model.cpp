@@ -133,11 +133,11 @@ class Probe {
 
 }  // namespace
 
-Costs Costs::with_packed(double share) const {
+Costs Costs::with_packed(double fraction) const {
   Costs costs = *this;
   if (pull_byte <= 0.0) return costs;
-  costs.pull_byte += share * packing_byte;
-  costs.swap_byte += share * packing_byte * swap_byte / pull_byte;
+  costs.pull_byte += fraction * packing_byte;
+  costs.swap_byte += fraction * packing_byte * swap_byte / pull_byte;
   return costs;
 }
 
@@ -170,9 +170,9 @@ Load share_load(Communicator& comm, const TileLayer<Key>& layer, std::span<const
   } mine;
   for (const std::size_t tile : tiles) {
     if (!layer.active(tile)) continue;
-    const double share = sampled_share<Key>(layer.tile(tile));
-    const bool packs = share * kTilePixels <= kMostPackedPixels;
-    (packs ? mine.packed : mine.whole) += kTileBytes * (packs ? share + 1.0 / 64.0 : 1.0);
+    const double fraction = sampled_share<Key>(layer.tile(tile));
+    const bool packs = fraction * kTilePixels <= kMaxPackedPixels;
+    (packs ? mine.packed : mine.whole) += kTileBytes * (packs ? fraction + 1.0 / 64.0 : 1.0);
   }
   const Activity activity = share_activity(comm, layer, tiles);
   Bytes all;

@@ -17,7 +17,7 @@ namespace hpr {
 struct Costs {
   int ranks = 1;
   int hosts = 1;              ///< that share memory each
-  double message = 0.0;       ///< one small message on its way while every rank has one
+  double message = 0.0;       ///< one small message in flight while every rank has one
   double pull_byte = 0.0;     ///< a byte sent, received and merged by one rank while the others wait
   double swap_byte = 0.0;     ///< the same per byte of each rank, while all ranks send and receive at once
   double collect_byte = 0.0;  ///< a byte sent to and received by one rank, not merged
@@ -27,8 +27,8 @@ struct Costs {
   /// A byte merged in place by the ranks of a host together; none where memory is not shared.
   std::optional<double> read_byte = {};
 
-  /// The same for layers of which a part is packed.
-  [[nodiscard]] Costs with_packed(double share) const;
+  /// The costs for layers of which `fraction` of the tiles is packed.
+  [[nodiscard]] Costs with_packed(double fraction) const;
 
   /// A byte sent, received and merged by each of `receivers` ranks at once: between pull_byte and swap_byte.
   [[nodiscard]] double byte(double receivers) const;

@@ -17,8 +17,8 @@ RecordedFrame record_frame(const std::function<std::unique_ptr<Compositor>()>& m
   const std::vector<std::size_t> tiles = all_tiles(layout);
   const std::vector<int> shown_by{0};
   const auto size = static_cast<std::size_t>(ranks.size);
-  std::vector<std::vector<Deed>> composite(size);
-  std::vector<std::vector<Deed>> collect(size);
+  std::vector<std::vector<TraceEvent>> composite(size);
+  std::vector<std::vector<TraceEvent>> collect(size);
 
   run_local_ranks(ranks, [&](Communicator& inner) {
     RecordingCommunicator comm(inner);
@@ -30,11 +30,11 @@ RecordedFrame record_frame(const std::function<std::unique_ptr<Compositor>()>& m
     Assembler assembler;
     for (int frame = 0; frame < 2; ++frame) {
       draw_everywhere(layer, comm.rank());
-      (void)comm.take_deeds();
+      (void)comm.take_events();
       const Composited mine = compositor->composite(comm, layer, tiles, shown_by);
-      composite[own] = comm.take_deeds();
+      composite[own] = comm.take_events();
       if (!mine.assembled) assembler.assemble(comm, layer, mine.tiles, shown_by);
-      collect[own] = comm.take_deeds();
+      collect[own] = comm.take_events();
     }
   });
   return {tiles.size(), schedule_of(composite), schedule_of(collect)};

@@ -70,7 +70,7 @@ TEST(RecordedFrame, TheRingHandsOnToTheNextRank) {
 TEST(RecordedFrame, SharedMemoryMeetsMergesInPlaceAndMeets) {
   const RecordedFrame frame = record("shared-memory", {.size = 4});
   EXPECT_TRUE(frame.composite.transfers.empty());
-  EXPECT_EQ(frame.composite.gatherings, (std::vector<Gathering>{{0, {0, 1, 2, 3}}, {2, {0, 1, 2, 3}}}));
+  EXPECT_EQ(frame.composite.barriers, (std::vector<Barrier>{{0, {0, 1, 2, 3}}, {2, {0, 1, 2, 3}}}));
   // Three of four layers are read into the one that is shown.
   EXPECT_EQ(frame.composite.works, (std::vector<InPlaceWork>{{1, {0, 1, 2, 3}, 3 * 64 * kTileBytes}}));
   EXPECT_TRUE(frame.collect.transfers.empty());
@@ -88,7 +88,7 @@ TEST(RecordedFrame, TheSameStrategyGivesTheSameRecord) {
     const RecordedFrame one = record(compositor->name(), {.size = 6});
     const RecordedFrame other = record(compositor->name(), {.size = 6, .disorder = 7});
     EXPECT_EQ(one.composite.transfers, other.composite.transfers) << compositor->name();
-    EXPECT_EQ(one.composite.gatherings, other.composite.gatherings) << compositor->name();
+    EXPECT_EQ(one.composite.barriers, other.composite.barriers) << compositor->name();
     EXPECT_EQ(one.composite.works, other.composite.works) << compositor->name();
     EXPECT_EQ(one.collect.transfers, other.collect.transfers) << compositor->name();
     EXPECT_EQ(one.composite.rounds, other.composite.rounds) << compositor->name();

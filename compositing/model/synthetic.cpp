@@ -185,14 +185,14 @@ TileLayer<Key> synthetic_wall(SyntheticKind kind, int rank, Size screen, Size gr
   const Pattern pattern(kind, rank, {screen.width * grid.width, screen.height * grid.height}, seed);
   TileLayer<Key> layer(grid_layout(screen, grid));
   for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
-    const TilePlace place = layer.layout().place(tile);
-    const int left = static_cast<int>(place.screen) % grid.width * screen.width;
-    const int top = static_cast<int>(place.screen) / grid.width * screen.height;
+    const TilePlace position = layer.layout().place(tile);
+    const int left = static_cast<int>(position.screen) % grid.width * screen.width;
+    const int top = static_cast<int>(position.screen) / grid.width * screen.height;
     bool any = false;
-    for (int y = place.pixels.y0; y < place.pixels.y1; ++y) {
-      const auto row = layer.tile(tile).subspan(static_cast<std::size_t>(y - place.pixels.y0) * kTileSide,
-                                                static_cast<std::size_t>(place.pixels.width()));
-      any = pattern.fill_row(left + place.pixels.x0, top + y, row) || any;
+    for (int y = position.pixels.y0; y < position.pixels.y1; ++y) {
+      const auto row = layer.tile(tile).subspan(static_cast<std::size_t>(y - position.pixels.y0) * kTileSide,
+                                                static_cast<std::size_t>(position.pixels.width()));
+      any = pattern.fill_row(left + position.pixels.x0, top + y, row) || any;
     }
     if (any) layer.set_active(tile);
   }

@@ -29,8 +29,8 @@ enum class SyntheticKind {
 /// one hue per rank. Keys carry the colour: make_color_key(1 - depth, rgba).
 [[nodiscard]] TileLayer<Key> synthetic_layer(SyntheticKind kind, int rank, Size size, std::uint32_t seed);
 
-/// The same picture of `screen` times `grid` pixels, cut into grid.width x grid.height screens: row after row from the
-/// top.
+/// The picture of synthetic_layer at `screen` times `grid` pixels, cut into grid.width x grid.height screens: row after
+/// row from the top.
 [[nodiscard]] TileLayer<Key> synthetic_wall(SyntheticKind kind, int rank, Size screen, Size grid, std::uint32_t seed);
 
 /// Draws `rank` over every pixel, at one depth: a full layer that costs nothing to make.

@@ -66,14 +66,14 @@ TEST(Auto, SharedMemoryIsReckonedWithHoweverQuickItIs) {
 }
 
 TEST(Auto, TakesWhatPredictsTheLeast) {
-  std::vector<std::string> taken;
+  std::vector<std::string> chosen;
   for (const Costs& costs : machines()) {
     for (const double drawn : {0.01, 0.5, 1.0}) {
       for (const bool collects : {false, true}) {
         for (const bool in_place : {false, true}) {
           const Load load = load_of(costs.ranks, drawn);
           const std::string name = cheapest_compositor(costs, load, collects, in_place);
-          taken.push_back(name);
+          chosen.push_back(name);
           const double least = seconds(*make_compositor(name), costs, load, collects);
           for (const auto& other : all_compositors()) {
             if (other->name() == "auto" || (other->merges_in_place() && !in_place) || !other->fits(costs.ranks))
@@ -85,9 +85,9 @@ TEST(Auto, TakesWhatPredictsTheLeast) {
       }
     }
   }
-  std::ranges::sort(taken);
-  taken.erase(std::ranges::unique(taken).begin(), taken.end());
-  EXPECT_GE(taken.size(), 4U) << "no strategy is best everywhere";
+  std::ranges::sort(chosen);
+  chosen.erase(std::ranges::unique(chosen).begin(), chosen.end());
+  EXPECT_GE(chosen.size(), 4U) << "no strategy is best everywhere";
 }
 
 TEST(Auto, LooksAgainAsTheLoadChanges) {

@@ -182,18 +182,18 @@ class TileMerger<Key> {
   const Activity& activity_;
 };
 
-std::size_t place_in(std::span<const int> list, int value) {
+std::size_t position_in(std::span<const int> list, int value) {
   return static_cast<std::size_t>(std::ranges::find(list, value) - list.begin());
 }
 
 /// The places in `list` of those ranks of `order` that stand there, in that order.
-std::vector<std::size_t> places_of(std::span<const int> order, std::span<const int> list) {
-  std::vector<std::size_t> places;
+std::vector<std::size_t> positions_of(std::span<const int> order, std::span<const int> list) {
+  std::vector<std::size_t> positions;
   for (const int rank : order) {
-    const std::size_t place = place_in(list, rank);
-    if (place < list.size()) places.push_back(place);
+    const std::size_t position = position_in(list, rank);
+    if (position < list.size()) positions.push_back(position);
   }
-  return places;
+  return positions;
 }
 
 /// The messages and merges of the strategy, for any kind of pixel.
@@ -226,7 +226,7 @@ Composited SharedMemorySchedule<Pixel>::run(Communicator& comm, TileLayer<Pixel>
   if (!order.empty() && !host_->holds_runs_of(order)) {
     RenumberedCommunicator ordered(comm, order);
     std::vector<int> shown_at;
-    for (const int rank : shown_by) shown_at.push_back(static_cast<int>(place_in(order, rank)));
+    for (const int rank : shown_by) shown_at.push_back(static_cast<int>(position_in(order, rank)));
     return out_of_order_.run(ordered, layer, tiles, shown_at);
   }
   const bool in_place = layer.peers() != nullptr;
@@ -250,7 +250,7 @@ Composited SharedMemorySchedule<Pixel>::merge_on_host(Communicator& comm, TileLa
                                                       std::span<const int> shown_by) {
   std::vector<TileLayer<Pixel>> layers;
   for (const int rank : host_->ranks()) layers.push_back(shared.of_peer(rank));
-  const std::vector<std::size_t> front_to_back = places_of(order, host_->ranks());
+  const std::vector<std::size_t> front_to_back = positions_of(order, host_->ranks());
 
   host_->meet();  // all layers are drawn
   host_->start_frame();
@@ -259,7 +259,7 @@ Composited SharedMemorySchedule<Pixel>::merge_on_host(Communicator& comm, TileLa
   std::vector<std::size_t> owners;  // per position, as an index of a layer
   if (straight) {
     for (const std::size_t tile : tiles) {
-      owners.push_back(place_in(host_->ranks(), shown_by[shared.layout().place(tile).screen]));
+      owners.push_back(position_in(host_->ranks(), shown_by[shared.layout().place(tile).screen]));
     }
   } else {
     // Hosts must cut alike, so between hosts all ranks' tiles are weighed.
@@ -278,7 +278,7 @@ Composited SharedMemorySchedule<Pixel>::merge_on_host(Communicator& comm, TileLa
   host_->meet();  // all tiles are merged, and nobody reads this rank's layer any more
 
   std::vector<std::size_t> mine;
-  const std::size_t self = place_in(host_->ranks(), comm.rank());
+  const std::size_t self = position_in(host_->ranks(), comm.rank());
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (owners[i] != self) continue;
     mine.push_back(tiles[i]);
@@ -293,7 +293,7 @@ Composited SharedMemorySchedule<Pixel>::merge_between_hosts(TileLayer<Pixel>& sh
   Communicator* const column = host_->column();
   if (column == nullptr) return {};
   if (order.empty()) return between_hosts_.run(*column, shared, of_host.tiles, {});
-  const std::vector<std::size_t> hosts = places_of(order, host_->column_ranks());  // front to back
+  const std::vector<std::size_t> hosts = positions_of(order, host_->column_ranks());  // front to back
   RenumberedCommunicator ordered(*column, std::vector<int>(hosts.begin(), hosts.end()));
   return between_hosts_.run(ordered, shared, of_host.tiles, {});
 }

@@ -35,7 +35,7 @@ class WallStatus {
   template <typename States>
   void add(double ms, const FrameRecord& frame, const States& states) {
     ++done_;
-    if (!progress_.tells()) return;
+    if (!progress_.enabled()) return;
     frame_ms_.push_back(ms);
     if (!progress_.due(done_)) return;
     progress_.show(done_, describe_status(frame_ms_, frame, states()));

@@ -170,7 +170,7 @@ TEST(PixelParts, LooksGoThroughThePointsOfTheScreen) {
                  : glm::vec3(-3.0F + 0.01F * static_cast<float>(x), 0.01F * static_cast<float>(32 - y), -1.0F);
     }
   }
-  view.points = PixelPoints{std::make_shared<const PointMap>(points), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
+  view.points = PixelPoints{std::make_shared<const PositionMap>(points), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
   const Image<Rgb> image = test::light(scene, view, kDenoised).image;
   for (int y = 0; y < 64; ++y) {
     for (int x = 0; x < 64; ++x) ASSERT_EQ(image.at(x, y).g, x > 32 ? 1.0F : 0.0F) << x << ' ' << y;

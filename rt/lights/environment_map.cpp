@@ -61,12 +61,12 @@ EnvironmentMap::EnvironmentMap(const Environment& environment) : environment_(&e
   // brightness, for a constant one, 5/3. Each has its share by how little the other is good for.
   constexpr double kByBrightness = 5.0 / 3.0;
   const double by_cosine = sum > 0.0 ? std::max(0.0, squares / (sum * sum) - 1.0) : 0.0;
-  cosine_share_ = is_even() ? 1.0 : kByBrightness / (kByBrightness + by_cosine);
+  cosine_share_ = is_constant() ? 1.0 : kByBrightness / (kByBrightness + by_cosine);
 }
 
 EnvironmentMap::Seen EnvironmentMap::look(const glm::dvec3& direction) const {
   const Size size = environment_->image.size();
-  if (is_even()) return {mean_, row_sums_.back() > 0.0 ? 0.25 / kPi : 0.0};
+  if (is_constant()) return {mean_, row_sums_.back() > 0.0 ? 0.25 / kPi : 0.0};
   const double turn = 0.5 + (std::atan2(direction.x, -direction.z) + environment_->rotation_radians) / (2.0 * kPi);
   const double s = (turn - std::floor(turn)) * size.width;
   const double t = std::acos(std::clamp(direction.y, -1.0, 1.0)) / kPi * size.height;

@@ -29,7 +29,7 @@ class EnvironmentMap {
   [[nodiscard]] const glm::dvec3& mean() const { return mean_; }
 
   /// Whether radiance is the same in all directions.
-  [[nodiscard]] bool is_even() const { return environment_->is_even(); }
+  [[nodiscard]] bool is_constant() const { return environment_->is_constant(); }
 
   /// How much of a matte surface's samples are better spread by the cosine than by brightness: 1 for a constant
   /// picture, near 0 for one with a sun in it.

@@ -105,7 +105,7 @@ LightSet::Choices LightSet::make_choices(bool punctual) const {
   }
   choices.tree = LightTree(standing);
   const double around = environment_ ? kPi * mean_of(environment_->mean()) : 0.0;
-  const bool left_out = even_sky_ == EvenSky::LeftToRays && environment_ && environment_->is_even();
+  const bool left_out = even_sky_ == EvenSky::LeftToRays && environment_ && environment_->is_constant();
   if (around > 0.0 && !left_out) add_outside(environment_number(), around);
   return choices;
 }
@@ -250,7 +250,7 @@ glm::dvec3 LightSet::environment(const glm::dvec3& direction) const {
 
 std::optional<glm::dvec3> LightSet::even_environment() const {
   if (!environment_) return background_;
-  return environment_->is_even() ? std::optional(environment_->mean()) : std::nullopt;
+  return environment_->is_constant() ? std::optional(environment_->mean()) : std::nullopt;
 }
 
 double LightSet::environment_pdf_one(const glm::dvec3& place, const glm::dvec3& normal,

@@ -12,7 +12,7 @@ namespace {
 class ShadowPass final : public Pass {
  public:
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
-    if (scene.even_sky && gathers_by_rays(scene, settings)) {
+    if (scene.constant_environment && gathers_by_rays(scene, settings)) {
       return {false, "rays that gather light find an even sky, and what hides it"};
     }
     return scene.shadow;

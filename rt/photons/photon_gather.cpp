@@ -14,11 +14,11 @@ bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
 }
 
 bool follows_reflections(const Requirements& scene, double glossy_cutoff) {
-  return scene.least_roughness < std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
+  return scene.min_roughness < std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
 }
 
 bool may_take_photons(const Requirements& scene, double glossy_cutoff) {
-  return scene.ambient_occlusion.needed || scene.most_roughness >= std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
+  return scene.ambient_occlusion.needed || scene.max_roughness >= std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
 }
 
 bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {

@@ -24,7 +24,7 @@ TEST(PrimaryRaysReach, PixelsOutOfReachShowNothingOfOthers) {
   view.right = view.top = 9e18;
   // Points that are nowhere: its pixels look through the plane, and none is known to see nothing.
   const Image<glm::vec3> nowhere({1, 1}, glm::vec3(std::numeric_limits<float>::infinity()));
-  view.points = PixelPoints{.map = std::make_shared<PointMap>(nowhere), .orthographic = true};
+  view.points = PixelPoints{.map = std::make_shared<PositionMap>(nowhere), .orthographic = true};
 
   const RayScene rays(scene, RaySpace(scene.bounds), 1);
   TileLayer<Key> layer(FrameLayout({view.size()}));

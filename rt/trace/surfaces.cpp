@@ -101,7 +101,7 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
   if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangles.size()) {
     triangle.index = id - instance->first_surface;
   } else {
-    const SurfacePlace place = locate_surface(scene_, id);
+    const SurfaceLocation place = locate_surface(scene_, id);
     triangle.instance = place.instance;
     triangle.index = place.triangle;
     instance = &scene_.instances[place.instance];

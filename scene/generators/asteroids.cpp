@@ -16,7 +16,7 @@ namespace hpr {
 namespace {
 
 constexpr int kRocks = 16;
-constexpr int kLargestCount = 1'000'000;
+constexpr int kMaxCount = 1'000'000;
 
 double lattice_value(std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t seed) {
   const auto u = [](std::int64_t v) { return static_cast<std::uint32_t>(v); };
@@ -104,7 +104,7 @@ glm::dmat4 place_in_belt(int i) {
 
 void fill_asteroids(Scene& scene, const OptionReader& options) {
   const int level = options.integer("k", 3, 1, 7);
-  const int count = options.integer("count", 80, 1, kLargestCount);
+  const int count = options.integer("count", 80, 1, kMaxCount);
   const auto seed = static_cast<std::uint32_t>(options.integer("seed", 1, 0, 1'000'000'000));
   scene.background = {0.004F, 0.005F, 0.008F};
   const std::uint32_t stone = add_material(scene, plastic("rock", {0.36F, 0.31F, 0.27F}, 0.9F));
@@ -120,12 +120,12 @@ void fill_asteroids(Scene& scene, const OptionReader& options) {
   for (int i = 0; i < count; ++i) {
     const int rock = i % kRocks;
     const std::uint32_t material = i % 50 == 24 ? mirror : i % 50 == 49 ? clear : stone;
-    const auto [place, added] = meshes.try_emplace({rock, material});
+    const auto [entry, added] = meshes.try_emplace({rock, material});
     if (added) {
-      place->second = add_mesh(scene, rocks[static_cast<std::size_t>(rock)],
+      entry->second = add_mesh(scene, rocks[static_cast<std::size_t>(rock)],
                                fmt::format("{} {}", scene.materials[material].name, rock), material);
     }
-    add_instance(scene, place->second, place_in_belt(i + 1));
+    add_instance(scene, entry->second, place_in_belt(i + 1));
   }
 
   Light sun;
@@ -144,7 +144,7 @@ GeneratorOptions sized(std::uint64_t triangles) {
   int level = 3;
   std::uint64_t each = 1280;
   for (; level < 7 && triangles > 1000 * each; ++level) each *= 4;
-  const std::uint64_t count = std::clamp<std::uint64_t>((triangles + each / 2) / each, 1, kLargestCount);
+  const std::uint64_t count = std::clamp<std::uint64_t>((triangles + each / 2) / each, 1, kMaxCount);
   return {{"k", std::to_string(level)}, {"count", std::to_string(count)}};
 }
 

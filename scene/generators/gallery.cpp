@@ -133,11 +133,11 @@ void add_paintings(Scene& scene) {
   }
   for (int i = 0; i < kPaintings; ++i) {
     const bool front = i >= kPaintings / 2;
-    const int place = i % (kPaintings / 2);
-    const bool above_mirror = place >= 4 && place < 8;
-    const double x = above_mirror ? -6.0 + 4.0 * (place - 4)
-                     : place < 4  ? -20.8 + 3.6 * place
-                                  : 10.0 + 3.6 * (place - 8);
+    const int column = i % (kPaintings / 2);
+    const bool above_mirror = column >= 4 && column < 8;
+    const double x = above_mirror ? -6.0 + 4.0 * (column - 4)
+                     : column < 4 ? -20.8 + 3.6 * column
+                                  : 10.0 + 3.6 * (column - 8);
     const glm::dvec3 position(front ? -x : x, above_mirror ? 4.95 : 1.7, front ? 5.99 : -5.99);
     add_instance(scene, meshes[static_cast<std::size_t>(i % 5)], turned_about_y(position, front));
   }

@@ -35,10 +35,10 @@ GeneratorOptions parse_options(std::string_view list, std::string_view text) {
       throw Error(ExitCode::Usage, fmt::format("gen:{}: '{}' is no option", printable(text), printable(item)),
                   "write options as gen:NAME?key=value&key=value");
     }
-    const auto [place, added] = options.try_emplace(std::string(item.substr(0, equals)), item.substr(equals + 1));
+    const auto [entry, added] = options.try_emplace(std::string(item.substr(0, equals)), item.substr(equals + 1));
     if (!added) {
       throw Error(ExitCode::Usage,
-                  fmt::format("gen:{}: option '{}' is given twice", printable(text), printable(place->first)),
+                  fmt::format("gen:{}: option '{}' is given twice", printable(text), printable(entry->first)),
                   "keep one of them");
     }
   }

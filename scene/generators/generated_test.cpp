@@ -152,12 +152,12 @@ TEST(Cornell, FacesInwardsAndKeepsItsPublishedCounts) {
   EXPECT_EQ(scene.triangles, 32U);
   EXPECT_EQ(generate_scene("cornell").triangles, 38U) << "the ceiling with a hole is four quads";
   EXPECT_EQ(generate_scene("cornell?variant=glass").triangles, 28U + 20U * 1024U);
-  const glm::dvec3 middle(0.278, 0.25, 0.28);
+  const glm::dvec3 center(0.278, 0.25, 0.28);
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
     if (mesh.name.find("block") != std::string::npos) continue;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      EXPECT_GT(glm::dot(glm::dvec3(mesh.normals[i]), middle - glm::dvec3(mesh.positions[i])), 0.0) << mesh.name;
+      EXPECT_GT(glm::dot(glm::dvec3(mesh.normals[i]), center - glm::dvec3(mesh.positions[i])), 0.0) << mesh.name;
     }
   }
   // The red wall is on the left of the picture, the green one on the right.
@@ -212,18 +212,18 @@ TEST(Gallery, LiesWhollyInsideItsHall) {
 
 TEST(Gallery, HangsTwentyFourPaintingsThatDoNotOverlap) {
   const Scene scene = generate_scene("gallery?s=1&k=0");
-  std::vector<glm::dvec3> places;
+  std::vector<glm::dvec3> positions;
   for (const Instance& instance : scene.instances) {
     const Material& material = scene.materials[scene.mesh_of(instance).material];
     if (!material.base_color_texture.present() || material.name == "floor") continue;
     const glm::dvec3 here(instance.to_world[3]);
-    for (const glm::dvec3& there : places) {
+    for (const glm::dvec3& there : positions) {
       EXPECT_TRUE(here.z != there.z || std::abs(here.x - there.x) >= 1.6 || std::abs(here.y - there.y) >= 1.0);
     }
     EXPECT_TRUE(std::abs(here.x) > 8.8 || here.y > 4.3 + 0.5) << "before a mirror";
-    places.push_back(here);
+    positions.push_back(here);
   }
-  EXPECT_EQ(places.size(), 24U);
+  EXPECT_EQ(positions.size(), 24U);
 }
 
 TEST(Asteroids, HaveTheCountsOfTheirSizesAndStayInTheirBelt) {

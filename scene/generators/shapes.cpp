@@ -94,20 +94,20 @@ Faces icosahedron() {
 
 /// Four triangles for one, the new points on the sphere.
 void subdivide(Faces& faces) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> midpoints;
   std::vector<glm::dvec3>& points = faces.points;
-  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-    const auto [place, added] =
-        middles.try_emplace(std::pair(std::min(a, b), std::max(a, b)), static_cast<std::uint32_t>(points.size()));
+  const auto midpoint = [&](std::uint32_t a, std::uint32_t b) {
+    const auto [entry, added] =
+        midpoints.try_emplace(std::pair(std::min(a, b), std::max(a, b)), static_cast<std::uint32_t>(points.size()));
     if (added) points.push_back(glm::normalize(points[a] + points[b]));
-    return place->second;
+    return entry->second;
   };
   std::vector<glm::uvec3> finer;
   finer.reserve(4 * faces.triangles.size());
   for (const glm::uvec3& t : faces.triangles) {
-    const std::uint32_t ab = middle(t.x, t.y);
-    const std::uint32_t bc = middle(t.y, t.z);
-    const std::uint32_t ca = middle(t.z, t.x);
+    const std::uint32_t ab = midpoint(t.x, t.y);
+    const std::uint32_t bc = midpoint(t.y, t.z);
+    const std::uint32_t ca = midpoint(t.z, t.x);
     finer.emplace_back(t.x, ab, ca);
     finer.emplace_back(ab, t.y, bc);
     finer.emplace_back(ca, bc, t.z);
@@ -154,10 +154,10 @@ Mesh cube_sphere(int n) {
   std::vector<glm::dvec3> points;
   std::map<std::tuple<int, int, int>, std::uint32_t> known;  // by lattice point, so that faces share their edges
   const auto point = [&](const std::array<int, 3>& p) {
-    const auto [place, added] =
+    const auto [entry, added] =
         known.try_emplace(std::make_tuple(p[0], p[1], p[2]), static_cast<std::uint32_t>(points.size()));
     if (added) points.push_back(glm::normalize(glm::dvec3(p[0], p[1], p[2])));
-    return place->second;
+    return entry->second;
   };
   std::vector<glm::uvec3> triangles;
   for (std::size_t face = 0; face < 6; ++face) {

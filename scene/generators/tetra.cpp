@@ -11,7 +11,7 @@
 namespace hpr {
 namespace {
 
-constexpr int kLargestSize = 12;
+constexpr int kMaxSize = 12;
 /// Levels in one mesh; the levels above are instances of it, exact since all factors are powers of two.
 constexpr int kMeshSize = 8;
 
@@ -56,7 +56,7 @@ void add_tetrahedron(Mesh& mesh, const glm::dvec3& center, double half) {
 }
 
 void fill_tetra(Scene& scene, const OptionReader& options) {
-  const int size = options.integer("s", 6, 1, kLargestSize);
+  const int size = options.integer("s", 6, 1, kMaxSize);
   const int in_mesh = std::min(size, kMeshSize);
   scene.background = {0.078F, 0.361F, 0.753F};
   const std::uint32_t paint = add_material(scene, plastic("tetrahedron", {0.8F, 0.16F, 0.16F}, 1.0F));
@@ -77,7 +77,7 @@ void fill_tetra(Scene& scene, const OptionReader& options) {
 
 GeneratorOptions sized(std::uint64_t triangles) {
   std::vector<SceneSize> sizes;
-  for (int size = 1; size <= kLargestSize; ++size) {
+  for (int size = 1; size <= kMaxSize; ++size) {
     sizes.push_back({std::uint64_t{1} << static_cast<unsigned>(2 * size), {{"s", std::to_string(size)}}});
   }
   return nearest_size(sizes, triangles);

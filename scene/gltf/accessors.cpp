@@ -164,8 +164,8 @@ void GltfData::check_accessor(std::size_t index) const {
   if (accessor.sparse.isSparse) check_sparse(accessor, where);
   if (accessor.bufferView < 0) {
     // Zeros cost nothing in the file, so nothing but this bounds them.
-    constexpr std::size_t kMostZeros = std::size_t{1} << 26;
-    if (accessor.count > kMostZeros) {
+    constexpr std::size_t kMaxZeros = std::size_t{1} << 26;
+    if (accessor.count > kMaxZeros) {
       context_->fail(where, fmt::format("{} elements without a bufferView", accessor.count),
                      "give the accessor data of its own", ExitCode::Limit);
     }

@@ -19,7 +19,7 @@
 namespace hpr {
 
 /// A glTF model together with its bytes: accessors as plain arrays. Indices into sections were checked before
-/// (gltf_shape.h); the constructor checks every range of bytes, so that reading cannot leave a buffer.
+/// (check_shape); the constructor checks every range of bytes, so that reading cannot leave a buffer.
 class GltfData {
  public:
   /// All three must outlive this. Throws Error (BadInput) for a view or accessor that leaves what holds it.
@@ -32,7 +32,8 @@ class GltfData {
   /// The bytes of a buffer view.
   [[nodiscard]] std::span<const std::byte> view(int index) const;
 
-  /// Refuses an accessor whose type is not among `types` (TINYGLTF_TYPE_*); `where` names the place that uses it.
+  /// Refuses an accessor whose type is not among `types` (TINYGLTF_TYPE_*); `where` is the path in the document that
+  /// uses it.
   void require_type(int index, std::initializer_list<int> types, const std::string& where) const;
 
   /// All values as float: normalised integers in [0, 1] or [-1, 1], others as they are. The type must match.

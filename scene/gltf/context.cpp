@@ -18,9 +18,9 @@ void GltfContext::fail(std::string_view where, std::string_view what, std::strin
 }
 
 void GltfContext::warn(std::string_view where, std::string_view what) {
-  constexpr std::size_t kMost = 100;
+  constexpr std::size_t kMaxWarnings = 100;
   std::string message = where.empty() ? std::string(what) : fmt::format("{}: {}", where, what);
-  if (warnings_.size() >= kMost) {
+  if (warnings_.size() >= kMaxWarnings) {
     ++dropped_;
     return;
   }

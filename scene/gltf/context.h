@@ -16,7 +16,7 @@ inline constexpr std::string_view kRepairHint = "repair the file";
 inline constexpr std::string_view kDecompressHint =
     "decompress it: npx @gltf-transform/cli copy IN.glb OUT.glb, or export it without compression";
 
-/// What all steps of loading one glTF file share: its name for messages, its limits, and the warnings so far.
+/// What all steps of loading one glTF file share: its name for messages, its limits, and the warnings.
 class GltfContext {
  public:
   GltfContext(std::string_view name, const SceneLimits& limits);
@@ -33,12 +33,12 @@ class GltfContext {
 
   /// Warns of `count` values at `where` that are no finite numbers and get replaced, the first of them of that vertex.
   void warn_not_finite(std::string_view where, std::uint64_t count, std::size_t first_vertex);
-  /// All of those.
+  /// The number of all values that warn_not_finite counted.
   [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
 
   /// Counts `bytes` that are about to be allocated for `what`; throws Error (Limit) past limits().memory_bytes.
   void charge(std::uint64_t bytes, std::string_view what);
-  /// The same for memory that is given back soon.
+  /// Throws Error (Limit) as charge() does, for memory that is soon released: it is not counted.
   void check_room(std::uint64_t bytes, std::string_view what) const;
   [[nodiscard]] std::uint64_t memory_left() const { return limits_.memory_bytes - charged_; }
 

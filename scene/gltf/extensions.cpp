@@ -18,7 +18,7 @@ constexpr std::array<std::string_view, 9> kSupported{
     "KHR_materials_ior",       "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_materials_volume",    "KHR_mesh_quantization",      "KHR_texture_transform"};
 
-/// Taken, where it stands alone, as something that is drawn; check_shape tells.
+/// Drawn approximately where it stands alone; check_shape warns of it.
 constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
@@ -47,7 +47,7 @@ std::set<std::string> names_in(const GltfItem& root, const char* key) {
   return names;
 }
 
-/// Of materials: what changes their look and is neither drawn nor declared, and so not told of yet.
+/// Warns of material extensions that are neither drawn nor declared, which check_extensions has not named yet.
 void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& declared) {
   root.each("materials", Presence::Optional, [&](const GltfItem& material) {
     const auto extensions = material.object("extensions");

@@ -18,13 +18,13 @@ std::string shown(const Json& value) {
 std::optional<std::int64_t> whole_value(const Json& value) {
   if (value.is_unsigned()) {
     const auto number = value.get<std::uint64_t>();
-    if (number > GltfItem::kMostWhole) return std::nullopt;
+    if (number > GltfItem::kMaxWhole) return std::nullopt;
     return static_cast<std::int64_t>(number);
   }
   if (value.is_integer()) return value.get<std::int64_t>();
   if (!value.is_number()) return std::nullopt;
   const auto number = value.get<double>();
-  if (std::abs(number) > static_cast<double>(GltfItem::kMostWhole) || number != std::floor(number)) return std::nullopt;
+  if (std::abs(number) > static_cast<double>(GltfItem::kMaxWhole) || number != std::floor(number)) return std::nullopt;
   return static_cast<std::int64_t>(number);
 }
 

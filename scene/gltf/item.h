@@ -14,11 +14,11 @@ namespace hpr {
 enum class Presence { Optional, Required };
 
 /// One JSON object of a glTF document, with checked access to its members. Whatever has the wrong type or an index that
-/// points nowhere throws Error (BadInput) naming the place, e.g. "meshes[2].primitives[0].indices".
+/// points nowhere throws Error (BadInput) naming the path, e.g. "meshes[2].primitives[0].indices".
 class GltfItem {
  public:
-  static constexpr double kLargest = std::numeric_limits<float>::max();
-  static constexpr std::uint64_t kMostWhole = std::uint64_t{1} << 53;  ///< what JSON numbers hold exactly
+  static constexpr double kMaxNumber = std::numeric_limits<float>::max();
+  static constexpr std::uint64_t kMaxWhole = std::uint64_t{1} << 53;  ///< what JSON numbers hold exactly
 
   GltfItem(GltfContext& context, Json& root) : context_(&context), root_(&root), value_(&root) {}
 
@@ -46,7 +46,7 @@ class GltfItem {
   std::optional<bool> flag(const char* key) const;
   /// A whole number in [low, high]; 3.0 counts as 3 and is rewritten so, because stricter readers follow.
   std::optional<std::uint64_t> whole(const char* key, Presence presence = Presence::Optional, std::uint64_t low = 0,
-                                     std::uint64_t high = kMostWhole) const;
+                                     std::uint64_t high = kMaxWhole) const;
   /// An index into the top-level array `section`, or into `count` entries.
   std::optional<std::size_t> index(const char* key, const char* section, Presence presence = Presence::Optional) const;
   std::optional<std::size_t> index_below(const char* key, std::size_t count, Presence presence) const;
@@ -55,12 +55,12 @@ class GltfItem {
   /// An object whose values are all indices into `section`.
   std::size_t index_map(const char* key, const char* section, Presence presence) const;
   /// A number in [low, high].
-  std::optional<double> number(const char* key, Presence presence = Presence::Optional, double low = -kLargest,
-                               double high = kLargest) const;
+  std::optional<double> number(const char* key, Presence presence = Presence::Optional, double low = -kMaxNumber,
+                               double high = kMaxNumber) const;
   /// A number that is brought into [low, high], with a warning, when it lies outside.
   std::optional<double> clamped(const char* key, double low, double high) const;
   /// `count` numbers (any number of them when count is 0), brought into [low, high] with a warning.
-  bool numbers(const char* key, std::size_t count, double low = -kLargest, double high = kLargest) const;
+  bool numbers(const char* key, std::size_t count, double low = -kMaxNumber, double high = kMaxNumber) const;
 
   /// Entries of the top-level array `section`.
   [[nodiscard]] std::size_t section_size(const char* section) const;

@@ -112,21 +112,21 @@ class SceneBuilder {
     const std::vector<std::uint32_t>& meshes = meshes_of(from);
     if (from.skin >= 0) {
       // Skinned vertices are in the world already (glTF 2.0, section 3.7.3.3).
-      place(node, meshes, glm::dmat4(1.0), {glm::dmat4(1.0)});
+      add_instances(node, meshes, glm::dmat4(1.0), {glm::dmat4(1.0)});
     } else {
-      place(node, meshes, to_world, gpu_instances(data_, node));
+      add_instances(node, meshes, to_world, gpu_instances(data_, node));
     }
   }
 
-  void place(int node, const std::vector<std::uint32_t>& meshes, const glm::dmat4& to_world,
-             const std::vector<glm::dmat4>& copies) {
+  void add_instances(int node, const std::vector<std::uint32_t>& meshes, const glm::dmat4& to_world,
+                     const std::vector<glm::dmat4>& copies) {
     context().charge(copies.size() * meshes.size() * sizeof(Instance), "instances");
     for (const std::uint32_t mesh : meshes) {
       for (const glm::dmat4& copy : copies) {
         Instance instance{mesh, to_world * copy, 0};
         // Squares of coordinates must stay finite in single precision, and ray tracers refuse more than 1.8e19.
-        constexpr double kFarthest = 1e18;
-        if (reach(instance.to_world, largest_[mesh]) > kFarthest) {
+        constexpr double kMaxCoordinate = 1e18;
+        if (reach(instance.to_world, largest_[mesh]) > kMaxCoordinate) {
           context().warn(fmt::format("nodes[{}]", node), "reaches beyond 1e18 metres and is left out");
           continue;
         }
@@ -235,7 +235,7 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
 
   Scene scene;
   scene.name = path.stem().string();
-  GltfLook(data, buffers, images).build(scene);
+  GltfMaterials(data, buffers, images).build(scene);
   SceneBuilder(data, scene).build();
   scene.warnings = context.take_warnings();
   scene.not_finite = context.not_finite();

@@ -34,10 +34,10 @@ Material material_of(const char* text) {
   return scene.materials.at(0);
 }
 
-void expect_refused(const Json& document, const std::string& place) {
+void expect_refused(const Json& document, const std::string& where) {
   const test::Refusal found = refusal(document);
-  EXPECT_EQ(found.code, ExitCode::BadInput) << place << ": " << found.message;
-  EXPECT_NE(found.message.find(place), std::string::npos) << found.message;
+  EXPECT_EQ(found.code, ExitCode::BadInput) << where << ": " << found.message;
+  EXPECT_NE(found.message.find(where), std::string::npos) << found.message;
 }
 
 /// A triangle with normals and the attribute `name`, of four or three floats a vertex.
@@ -108,7 +108,7 @@ TEST(GltfMaterial, WrongTypesAreRefusedByName) {
       {R"({"extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 1}}}})",
        "transmissionTexture.index"},
   };
-  for (const auto& [material, place] : cases) expect_refused(dressed(Json::parse(material)).json, place);
+  for (const auto& [material, where] : cases) expect_refused(dressed(Json::parse(material)).json, where);
 }
 
 TEST(GltfMaterial, NumbersOutOfRangeAreBroughtIntoItWithAWarning) {

@@ -68,7 +68,7 @@ glm::vec3 color_of(const std::vector<double>& values, double fallback) {
 
 }  // namespace
 
-void GltfLook::build(Scene& scene) {
+void GltfMaterials::build(Scene& scene) {
   const auto& materials = data_.model().materials;
   data_.context().charge(materials.size() * sizeof(Material), "the materials");
   for (std::size_t i = 0; i < materials.size(); ++i) {
@@ -76,7 +76,7 @@ void GltfLook::build(Scene& scene) {
   }
 }
 
-Material GltfLook::material(const tinygltf::Material& from, const std::string& where, Scene& scene) {
+Material GltfMaterials::material(const tinygltf::Material& from, const std::string& where, Scene& scene) {
   const tinygltf::PbrMetallicRoughness& pbr = from.pbrMetallicRoughness;
   Material to;
   to.name = from.name;
@@ -98,14 +98,15 @@ Material GltfLook::material(const tinygltf::Material& from, const std::string& w
   return to;
 }
 
-void GltfLook::add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
+void GltfMaterials::add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
   to.normal_texture = texture_ref(from.normalTexture, where + ".normalTexture", scene);
   to.normal_scale = static_cast<float>(from.normalTexture.scale);
   to.occlusion_texture = texture_ref(from.occlusionTexture, where + ".occlusionTexture", scene);
   to.occlusion_strength = static_cast<float>(from.occlusionTexture.strength);
 }
 
-void GltfLook::add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to) {
+void GltfMaterials::add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene,
+                                   Material& to) {
   if (const auto* strength = extension(from.extensions, "KHR_materials_emissive_strength")) {
     to.emissive *= static_cast<float>(number_in(*strength, "emissiveStrength", 1.0));
   }
@@ -137,8 +138,8 @@ void GltfLook::add_extensions(const tinygltf::Material& from, const std::string&
   to.unlit = extension(from.extensions, "KHR_materials_unlit") != nullptr;
 }
 
-TextureRef GltfLook::texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
-                                 const std::string& where, Scene& scene) {
+TextureRef GltfMaterials::texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
+                                      const std::string& where, Scene& scene) {
   TextureRef ref;
   if (index < 0) return ref;
   ref.uv_set = static_cast<std::uint32_t>(uv_set);
@@ -156,7 +157,7 @@ TextureRef GltfLook::texture_ref(int index, int uv_set, const tinygltf::Extensio
   return ref.present() ? ref : TextureRef{};
 }
 
-std::int32_t GltfLook::texture(int index, const std::string& where, Scene& scene) {
+std::int32_t GltfMaterials::texture(int index, const std::string& where, Scene& scene) {
   const tinygltf::Texture& from = data_.model().textures[GltfData::to_size(index)];
   GltfContext& context = data_.context();
   if (from.source < 0) {
@@ -166,9 +167,9 @@ std::int32_t GltfLook::texture(int index, const std::string& where, Scene& scene
   SamplerKey key{from.source, Wrap::Repeat, Wrap::Repeat, false};
   if (from.sampler >= 0) {
     const tinygltf::Sampler& sampler = data_.model().samplers[GltfData::to_size(from.sampler)];
-    const std::string place = fmt::format("samplers[{}]", from.sampler);
-    key = {from.source, wrap_of(sampler.wrapS, place, context), wrap_of(sampler.wrapT, place, context),
-           is_nearest(sampler.magFilter, place, context)};
+    const std::string where_sampler = fmt::format("samplers[{}]", from.sampler);
+    key = {from.source, wrap_of(sampler.wrapS, where_sampler, context), wrap_of(sampler.wrapT, where_sampler, context),
+           is_nearest(sampler.magFilter, where_sampler, context)};
   }
   if (const auto known = textures_.find(key); known != textures_.end()) return known->second;
 
@@ -199,7 +200,7 @@ std::int32_t GltfLook::texture(int index, const std::string& where, Scene& scene
   return position;
 }
 
-std::optional<Image<Rgba8>> GltfLook::picture(int image) {
+std::optional<Image<Rgba8>> GltfMaterials::picture(int image) {
   GltfContext& context = data_.context();
   const Json& entry = images_[GltfData::to_size(image)];
   const std::string where = fmt::format("images[{}]", image);

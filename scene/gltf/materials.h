@@ -15,10 +15,10 @@ namespace hpr {
 
 /// Turns a document's materials into ours and decodes the pictures they refer to, each once. A picture that is missing
 /// or broken is left out with a warning; one past the limits is an error.
-class GltfLook {
+class GltfMaterials {
  public:
   /// `images` is the document's section of that name (or null): tinygltf never sees pictures.
-  GltfLook(const GltfData& data, const GltfBuffers& buffers, const Json& images)
+  GltfMaterials(const GltfData& data, const GltfBuffers& buffers, const Json& images)
       : data_(data), buffers_(buffers), images_(images) {}
 
   /// Fills scene.materials, one per material of the document, and scene.textures.

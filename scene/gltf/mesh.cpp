@@ -80,9 +80,9 @@ class PrimitiveBuilder {
 
   /// Triangles name their vertices in 32 bits.
   void check_vertex_count(std::size_t vertices) const {
-    constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
-    if (vertices <= kMost) return;
-    data_.context().fail(where_, fmt::format("needs {} vertices; a mesh may have {}", vertices, kMost),
+    constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint32_t>::max();
+    if (vertices <= kMaxVertices) return;
+    data_.context().fail(where_, fmt::format("needs {} vertices; a mesh may have {}", vertices, kMaxVertices),
                          "divide the mesh", ExitCode::Limit);
   }
 
@@ -118,12 +118,12 @@ class PrimitiveBuilder {
   void tame_uvs(Mesh& mesh) const {
     for (const auto& [name, set] : {std::pair{"TEXCOORD_0", 0U}, std::pair{"TEXCOORD_1", 1U}}) {
       // Samplers turn coordinates into integers; 1e6 repeats of a texture are already below what a float resolves.
-      constexpr float kFarthest = 1e6F;
+      constexpr float kMaxTexcoord = 1e6F;
       bool odd = false;
       for (glm::vec2& uv : mesh.uvs[set]) {
         for (int axis = 0; axis < 2; ++axis) {
-          if (std::abs(uv[axis]) <= kFarthest) continue;
-          uv[axis] = std::isfinite(uv[axis]) ? std::copysign(kFarthest, uv[axis]) : 0.0F;
+          if (std::abs(uv[axis]) <= kMaxTexcoord) continue;
+          uv[axis] = std::isfinite(uv[axis]) ? std::copysign(kMaxTexcoord, uv[axis]) : 0.0F;
           odd = true;
         }
       }

@@ -13,10 +13,10 @@ using test::refusal;
 using test::triangle;
 
 /// Expects exit code 3 and that the message names the place.
-void expect_refused(const Json& document, const std::string& place) {
+void expect_refused(const Json& document, const std::string& where) {
   const test::Refusal found = refusal(document);
-  EXPECT_EQ(found.code, ExitCode::BadInput) << place << ": " << found.message;
-  EXPECT_NE(found.message.find(place), std::string::npos) << found.message;
+  EXPECT_EQ(found.code, ExitCode::BadInput) << where << ": " << found.message;
+  EXPECT_NE(found.message.find(where), std::string::npos) << found.message;
 }
 
 TEST(GltfRefusal, TheDocumentsTheseTestsBreakAreSound) {

@@ -19,7 +19,7 @@ constexpr auto kRequired = Presence::Required;
 constexpr auto kOptional = Presence::Optional;
 /// Radiance, intensity and the like are held to what sums and squares of single precision can carry.
 constexpr double kBrightest = 1e12;
-constexpr double kLargestRadius = 1e12;  // of a light, metres
+constexpr double kMaxRadius = 1e12;  // of a light, metres
 
 void check_asset(const GltfItem& root) {
   const auto asset = root.object("asset", kRequired);
@@ -76,16 +76,16 @@ void check_accessors(const GltfItem& root) {
     accessor.numbers("max", 0, -std::numeric_limits<double>::max(), std::numeric_limits<double>::max());
     if (const auto sparse = accessor.object("sparse")) {
       // The model holds these as int.
-      constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
-      const auto count = sparse->whole("count", kRequired, 0, kMost);
+      constexpr std::uint64_t kMaxCount = std::numeric_limits<std::int32_t>::max();
+      const auto count = sparse->whole("count", kRequired, 0, kMaxCount);
       if (*count == 0) sparse->warn("count", "is 0");
       const auto indices = sparse->object("indices", kRequired);
       indices->index("bufferView", "bufferViews", kRequired);
-      indices->whole("byteOffset", kOptional, 0, kMost);
+      indices->whole("byteOffset", kOptional, 0, kMaxCount);
       check_component_type(*indices, "componentType");
       const auto values = sparse->object("values", kRequired);
       values->index("bufferView", "bufferViews", kRequired);
-      values->whole("byteOffset", kOptional, 0, kMost);
+      values->whole("byteOffset", kOptional, 0, kMaxCount);
     }
   });
 }
@@ -232,10 +232,10 @@ void check_material_extensions(const GltfItem& extensions) {
     if (const auto ior = refraction->number("ior"); ior && *ior != 0.0) refraction->clamped("ior", 1.0, 1000.0);
   }
   if (const auto volume = extensions.object("KHR_materials_volume")) {
-    volume->clamped("thicknessFactor", 0.0, GltfItem::kLargest);
+    volume->clamped("thicknessFactor", 0.0, GltfItem::kMaxNumber);
     check_texture_info(*volume, "thicknessTexture");
     // The extension wants more than 0; what lets light less far is black to every picture.
-    volume->clamped("attenuationDistance", 1e-12, GltfItem::kLargest);
+    volume->clamped("attenuationDistance", 1e-12, GltfItem::kMaxNumber);
     volume->numbers("attenuationColor", 3, 0.0, 1.0);
   }
   (void)extensions.object("KHR_materials_unlit");
@@ -273,7 +273,7 @@ void check_materials(const GltfItem& root) {
       occlusion->clamped("strength", 0.0, 1.0);
     }
     material.numbers("emissiveFactor", 3, 0.0, 1.0);
-    material.clamped("alphaCutoff", 0.0, GltfItem::kLargest);
+    material.clamped("alphaCutoff", 0.0, GltfItem::kMaxNumber);
     material.flag("doubleSided");
     const auto mode = material.text("alphaMode");
     if (mode && *mode != "OPAQUE" && *mode != "MASK" && *mode != "BLEND") {
@@ -285,15 +285,15 @@ void check_materials(const GltfItem& root) {
 }
 
 void check_perspective(const GltfItem& lens) {
-  constexpr double kSmallest = std::numeric_limits<float>::min();
+  constexpr double kMinNumber = std::numeric_limits<float>::min();
   // At half a turn the picture plane is infinitely wide; 3.141 is 179.97 degrees.
-  const double fov = *lens.number("yfov", kRequired, kSmallest, 3.141);
+  const double fov = *lens.number("yfov", kRequired, kMinNumber, 3.141);
   if (fov < 1e-3) lens.warn("yfov", fmt::format("{} radians are less than a telescope sees", fov));
-  const double near_distance = *lens.number("znear", kRequired, kSmallest);
+  const double near_distance = *lens.number("znear", kRequired, kMinNumber);
   if (near_distance < 1e-6) lens.warn("znear", fmt::format("{} metres leave depths little precision", near_distance));
-  const auto far_distance = lens.number("zfar", kOptional, kSmallest);
+  const auto far_distance = lens.number("zfar", kOptional, kMinNumber);
   if (far_distance && *far_distance <= near_distance) lens.fail("zfar", "must be larger than znear");
-  lens.number("aspectRatio", kOptional, kSmallest);
+  lens.number("aspectRatio", kOptional, kMinNumber);
 }
 
 void check_orthographic(const GltfItem& lens) {
@@ -351,7 +351,7 @@ void check_lights(const GltfItem& root) {
       light.warn("range", fmt::format("is {}; taken as unbounded", *range));
       light.value().erase("range");
     }
-    check_extent(light, "radius", kLargestRadius);
+    check_extent(light, "radius", kMaxRadius);
     check_extent(light, "angularRadius", std::numbers::pi / 2);
     const auto spot = light.object("spot", *type == "spot" ? kRequired : kOptional);
     if (!spot) return;

@@ -167,9 +167,9 @@ std::vector<std::byte> data_uri_bytes(std::string_view uri, const std::string& w
 }
 
 std::string jailed_path(std::string_view uri, const std::string& what) {
-  constexpr std::size_t kMostBytes = 1024;
+  constexpr std::size_t kMaxUriBytes = 1024;
   if (uri.empty()) refuse(what, uri, "is empty");
-  if (uri.size() > kMostBytes) refuse(what, uri, "is longer than 1024 bytes");
+  if (uri.size() > kMaxUriBytes) refuse(what, uri, "is longer than 1024 bytes");
   const auto decoded = percent_decoded(uri);
   if (!decoded) refuse(what, uri, "has a broken % escape");
   const std::string& path = *decoded;

@@ -32,7 +32,7 @@ constexpr std::string_view kFaint = "#c8c8c8";
 struct Column {
   std::string_view phase;  ///< above the first column of compositing, and of collecting
   std::vector<Transfer> transfers;
-  std::vector<Gathering> gatherings;
+  std::vector<Barrier> barriers;
   std::vector<InPlaceWork> works;
 };
 
@@ -41,7 +41,7 @@ std::vector<Column> columns_of(const Schedule& schedule, std::string_view phase)
   if (!columns.empty()) columns.front().phase = phase;
   const auto at = [&](int round) -> Column& { return columns[static_cast<std::size_t>(round)]; };
   for (const Transfer& transfer : schedule.transfers) at(transfer.round).transfers.push_back(transfer);
-  for (const Gathering& gathering : schedule.gatherings) at(gathering.round).gatherings.push_back(gathering);
+  for (const Barrier& barrier : schedule.barriers) at(barrier.round).barriers.push_back(barrier);
   for (const InPlaceWork& work : schedule.works) at(work.round).works.push_back(work);
   return columns;
 }
@@ -76,7 +76,7 @@ std::vector<std::string> captions(const Column& column) {
   std::size_t merged = 0;
   for (const InPlaceWork& work : column.works) merged += work.bytes / kTileBytes;
   if (merged > 0) lines.push_back(fmt::format("{} tiles read", merged));
-  if (!column.gatherings.empty()) lines.emplace_back("meet");
+  if (!column.barriers.empty()) lines.emplace_back("meet");
   return lines;
 }
 
@@ -157,7 +157,7 @@ class Sheet {
     }
     const double middle = left + width / 2;
     drawing_->text({middle, 34}, fmt::format("{}", index + 1), Anchor::Middle, 11);
-    for (const Gathering& gathering : column.gatherings) draw_gathering(gathering, middle);
+    for (const Barrier& barrier : column.barriers) draw_barrier(barrier, middle);
     for (const InPlaceWork& work : column.works) draw_work(work, middle);
     // The wide ones first, so that none hides.
     std::vector<Transfer> transfers = column.transfers;
@@ -178,11 +178,11 @@ class Sheet {
     return {kTiles, 0.8 + 3.0 * std::sqrt(static_cast<double>(transfer.bytes) / layer_bytes_)};
   }
 
-  void draw_gathering(const Gathering& gathering, double x) {
-    const double top = y_of(gathering.ranks.front());
-    const double bottom = y_of(gathering.ranks.back());
+  void draw_barrier(const Barrier& barrier, double x) {
+    const double top = y_of(barrier.ranks.front());
+    const double bottom = y_of(barrier.ranks.back());
     drawing_->line({x, top - 6}, {x, bottom + 6}, {kHostEdge, 3.0});
-    for (const int rank : gathering.ranks) drawing_->circle({x, y_of(rank)}, 4.5, kHost, {kHostEdge, 1.5});
+    for (const int rank : barrier.ranks) drawing_->circle({x, y_of(rank)}, 4.5, kHost, {kHostEdge, 1.5});
   }
 
   void draw_work(const InPlaceWork& work, double x) {

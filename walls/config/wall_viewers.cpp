@@ -29,7 +29,7 @@ void read_path(TableReader& reader, std::string_view key, const std::filesystem:
 
 void read_udp(TableReader& reader, WallTracker& tracker, Findings& findings) {
   constexpr int kLargestPort = 65535;
-  constexpr int kLongestWait = 3'600'000;
+  constexpr int kMaxWait = 3'600'000;
   tracker.kind = WallTracker::Kind::Udp;
   tracker.address = reader.text("address").value_or(tracker.address);
   reader.require("port", "5005");
@@ -37,7 +37,7 @@ void read_udp(TableReader& reader, WallTracker& tracker, Findings& findings) {
   const TomlValue* const table = reader.table("lost");
   if (table == nullptr) return;
   TableReader lost(*table, "lost", findings);
-  tracker.lost_after_ms = lost.integer("after_ms", 1, kLongestWait).value_or(tracker.lost_after_ms);
+  tracker.lost_after_ms = lost.integer("after_ms", 1, kMaxWait).value_or(tracker.lost_after_ms);
   tracker.lost_then = static_cast<WallTracker::Lost>(lost.choice("then", {"freeze", "rest"}).value_or(0));
   lost.finish();
 }

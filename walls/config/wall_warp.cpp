@@ -60,7 +60,7 @@ class WarpReader {
     std::string extension = std::filesystem::path(file).extension().string();
     std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
     if (extension == ".pfm") {
-      screen.warp.points = std::make_shared<const PointMap>(parse_position_map(bytes_, file));
+      screen.warp.points = std::make_shared<const PositionMap>(parse_position_map(bytes_, file));
       compare_shape("mesh", screen.warp.points->size(), screen);
     } else if (extension == ".csv") {
       screen.warp.grid = std::make_shared<const WarpMesh>(parse_warp_csv(text, file));

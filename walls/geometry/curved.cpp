@@ -74,7 +74,7 @@ View flat_view(const View& view, Size pixels) {
   HPR_CHECK(view.points && pixels.area() > 0);
   const PixelPoints& points = *view.points;
   Seen seen;
-  for (const PointMap::Block& block : points.map->blocks()) {
+  for (const PositionMap::Block& block : points.map->blocks()) {
     if (add_box(points, block.box, seen)) continue;
     points.map->visit(block, [&](const glm::dvec3& point) {
       if (const auto place = points.seen(point)) seen.add(*place);

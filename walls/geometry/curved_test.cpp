@@ -26,7 +26,7 @@ WallScreen arc_screen(const Arc& arc, Size pixels, Size texels) {
   screen.lower_right = arc.at(1.0, 1.0);
   screen.upper_left = arc.at(0.0, 0.0);
   screen.warp.mesh.path = "arc.pfm";
-  screen.warp.points = std::make_shared<const PointMap>(arc.points(texels));
+  screen.warp.points = std::make_shared<const PositionMap>(arc.points(texels));
   return screen;
 }
 
@@ -196,7 +196,7 @@ TEST(CurvedScreens, PointsOnTheScreensOwnPlaneChangeNothing) {
                         (screen.lower_left - screen.upper_left) * ((y + 0.5) / 48);
     }
   }
-  screen.warp.points = std::make_shared<const PointMap>(points);
+  screen.warp.points = std::make_shared<const PositionMap>(points);
   const std::vector<View> views = wall_views(wall, at(kEye), {});
   CurvedScreens curved(views, false);
   EXPECT_EQ(curved.sizes().front(), (Size{64, 48}));
@@ -216,7 +216,7 @@ TEST(CurvedScreens, WhatHasNoPointIsDarkHoweverItIsDrawn) {
   Image<glm::vec3> points = Arc{}.points({32, 24});
   for (int y = 0; y < 24; ++y) points.at(31, y) = glm::vec3(std::numeric_limits<float>::quiet_NaN());
   Wall wall = arc_wall({Arc{}}, {32, 24}, {32, 24}, kEye);
-  wall.screens.front().warp.points = std::make_shared<const PointMap>(points);
+  wall.screens.front().warp.points = std::make_shared<const PositionMap>(points);
   const std::vector<View> views = wall_views(wall, at(kEye), {});
   for (const bool by_rays : {false, true}) {
     CurvedScreens curved(views, by_rays);

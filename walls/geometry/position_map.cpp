@@ -85,7 +85,7 @@ float float_at(const char* bytes, bool swapped) {
 
 }  // namespace
 
-PointMap parse_position_map(std::span<const std::byte> bytes, const std::string& name) {
+PositionMap parse_position_map(std::span<const std::byte> bytes, const std::string& name) {
   constexpr float kFarthest = 1e6F;
   Header header({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const Layout layout = read_layout(header, name);
@@ -111,7 +111,7 @@ PointMap parse_position_map(std::span<const std::byte> bytes, const std::string&
     }
   }
   if (!any) fail(name, "no texel is a point: all are NaN or infinite");
-  return PointMap(std::move(points));
+  return PositionMap(std::move(points));
 }
 
 }  // namespace hpr

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "scene/point_map.h"
+#include "scene/position_map.h"
 
 namespace hpr {
 
@@ -12,6 +12,6 @@ namespace hpr {
 /// order, then rows from the bottom up): per texel a point in metres, wall space; NaN or infinite where no light falls.
 /// Throws Error (BadInput) with `name`: no such file, a length that does not fit, no point at all, points beyond a
 /// thousand kilometres.
-[[nodiscard]] PointMap parse_position_map(std::span<const std::byte> bytes, const std::string& name);
+[[nodiscard]] PositionMap parse_position_map(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace hpr

@@ -6,7 +6,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
-#include "scene/point_map.h"
+#include "scene/position_map.h"
 
 namespace hpr {
 
@@ -28,7 +28,7 @@ struct ScreenWarp {
   WarpFile blend;
   WarpFile black;
   /// What they hold; null where there is no such file. `points` and `grid` both are of `mesh`: one of them at most.
-  std::shared_ptr<const PointMap> points = {};  ///< wall space
+  std::shared_ptr<const PositionMap> points = {};  ///< wall space
   std::shared_ptr<const WarpMesh> grid = {};
   std::shared_ptr<const Image<Rgb>> light = {};  ///< of `blend`: factors in linear light, in [0, 1]
   std::shared_ptr<const Image<Rgb>> floor = {};  ///< of `black`: linear light in [0, 1] that is shown at least

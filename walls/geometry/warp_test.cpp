@@ -310,7 +310,7 @@ TEST(ScanOut, WhereNoLightFallsNothingIsSentWhateverTheFloor) {
   Image<glm::vec3> points = test::Arc{}.points({4, 2});
   for (int y = 0; y < 2; ++y) points.at(2, y) = points.at(3, y) = glm::vec3(std::numeric_limits<float>::infinity());
   Wall map = load_wall("1x1@4x2");
-  map.screens.front().warp.points = std::make_shared<const PointMap>(points);
+  map.screens.front().warp.points = std::make_shared<const PositionMap>(points);
   for (Wall* const wall : {&mesh, &map}) {
     WallScreen& screen = wall->screens.front();
     screen.color.black = glm::dvec3(0.2);

@@ -1,4 +1,4 @@
-#include "scene/point_map.h"
+#include "scene/position_map.h"
 
 #include <algorithm>
 #include <array>
@@ -17,24 +17,24 @@ constexpr int kBlockSide = 16;
 /// The tangent of 85 degrees.
 constexpr double kSteepest = 11.430052302761343;
 
-/// A place between two neighbours: `part` of the way from the first to the second.
+/// A position between two neighbours: `part` of the distance from the first to the second.
 struct Between {
   int first = 0;
   double part = 0.0;
 };
 
-Between between(double place, int count) {
+Between between(double position, int count) {
   // A pixel's centre must not need a neighbour because of rounding.
   constexpr double kSame = 1e-6;
   if (count == 1) return {};
-  double cell = place * count - 0.5;
+  double cell = position * count - 0.5;
   if (std::abs(cell - std::round(cell)) < kSame) cell = std::round(cell);
   const int first = static_cast<int>(std::clamp(std::floor(cell), 0.0, static_cast<double>(count - 2)));
   return {first, cell - first};
 }
 
-/// The middles of cells first to end of `count`, and the edges of the screen beside them.
-std::vector<double> places(int first, int end, int count) {
+/// The centers of cells first to end of `count`, and the edges of the screen beside them.
+std::vector<double> positions(int first, int end, int count) {
   std::vector<double> all;
   if (first == 0) all.push_back(0.0);
   for (int i = first; i < end; ++i) all.push_back((i + 0.5) / count);
@@ -48,7 +48,7 @@ bool is_finite(const glm::vec3& point) {
   return std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z);
 }
 
-PointMap::PointMap(Image<glm::vec3> points) : points_(std::move(points)) {
+PositionMap::PositionMap(Image<glm::vec3> points) : points_(std::move(points)) {
   HPR_CHECK(points_.size().area() > 0);
   for (int y = 0; y < points_.height(); y += kBlockSide) {
     for (int x = 0; x < points_.width(); x += kBlockSide) {
@@ -63,16 +63,16 @@ PointMap::PointMap(Image<glm::vec3> points) : points_(std::move(points)) {
   }
 }
 
-void PointMap::visit(const Block& block, const std::function<void(const glm::dvec3& point)>& visitor) const {
-  const std::vector<double> across = places(block.cells.x0, block.cells.x1, points_.width());
-  for (const double t : places(block.cells.y0, block.cells.y1, points_.height())) {
+void PositionMap::visit(const Block& block, const std::function<void(const glm::dvec3& point)>& visitor) const {
+  const std::vector<double> across = positions(block.cells.x0, block.cells.x1, points_.width());
+  for (const double t : positions(block.cells.y0, block.cells.y1, points_.height())) {
     for (const double s : across) {
       if (const auto point = at(s, t)) visitor(*point);
     }
   }
 }
 
-std::optional<glm::dvec3> PointMap::at(double s, double t) const {
+std::optional<glm::dvec3> PositionMap::at(double s, double t) const {
   const Between x = between(s, points_.width());
   const Between y = between(t, points_.height());
   const std::array<double, 2> columns{1.0 - x.part, x.part};

@@ -1,4 +1,4 @@
-#include "scene/point_map.h"
+#include "scene/position_map.h"
 
 #include <gtest/gtest.h>
 
@@ -37,9 +37,9 @@ View window_view() {
   return view;
 }
 
-TEST(PointMap, IsStraightBetweenItsPointsAndBeyondThem) {
+TEST(PositionMap, IsStraightBetweenItsPointsAndBeyondThem) {
   for (const Size size : {Size{1, 1}, Size{2, 2}, Size{7, 5}, Size{64, 32}}) {
-    const PointMap map(plane(size));
+    const PositionMap map(plane(size));
     for (const double s : {-0.01, 0.0, 0.1, 0.5, 0.77, 1.0, 1.01}) {
       for (const double t : {0.0, 0.3, 1.0}) {
         const auto point = map.at(s, t);
@@ -54,11 +54,11 @@ TEST(PointMap, IsStraightBetweenItsPointsAndBeyondThem) {
   }
 }
 
-TEST(PointMap, APointThatIsMissingDarkensWhatNeedsItOnly) {
+TEST(PositionMap, APointThatIsMissingDarkensWhatNeedsItOnly) {
   Image<glm::vec3> points = plane({9, 7});
   points.at(4, 3) = {0.0F, kNone, 0.0F};
   points.at(0, 0) = {std::numeric_limits<float>::infinity(), 0.0F, 0.0F};
-  const PointMap map(points);
+  const PositionMap map(points);
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 9; ++x) {
       const bool missing = (x == 4 && y == 3) || (x == 0 && y == 0);
@@ -70,15 +70,15 @@ TEST(PointMap, APointThatIsMissingDarkensWhatNeedsItOnly) {
   EXPECT_TRUE(map.at(4.6 / 9, 2.5 / 7));
 }
 
-TEST(PointMap, BlocksHoldAllThereIsAndNothingElse) {
+TEST(PositionMap, BlocksHoldAllThereIsAndNothingElse) {
   Image<glm::vec3> points = plane({40, 17});
   for (int y = 0; y < 17; ++y) {
     for (int x = 16; x < 32; ++x) points.at(x, y).x = kNone;
   }
-  const PointMap map(points);
+  const PositionMap map(points);
   EXPECT_EQ(map.blocks().size(), 4U);  // the middle two of six are empty
   Bounds all = map.blocks().front().box;
-  for (const PointMap::Block& block : map.blocks()) {
+  for (const PositionMap::Block& block : map.blocks()) {
     all.low = glm::min(all.low, block.box.low);
     all.high = glm::max(all.high, block.box.high);
   }
@@ -87,7 +87,8 @@ TEST(PointMap, BlocksHoldAllThereIsAndNothingElse) {
 }
 
 TEST(PixelPoints, AreSeenBeforeTheEyeOnly) {
-  const PixelPoints points{std::make_shared<const PointMap>(plane({4, 4})), {0.0, 0.0, 1.0}, glm::dmat3(1.0), false, 1};
+  const PixelPoints points{
+      std::make_shared<const PositionMap>(plane({4, 4})), {0.0, 0.0, 1.0}, glm::dmat3(1.0), false, 1};
   EXPECT_EQ(points.seen({3.0, -1.5, -2.0}), glm::dvec2(1.0, -0.5));
   EXPECT_FALSE(points.seen({0.0, 0.0, 1.5}));
   EXPECT_FALSE(points.seen({0.0, 0.0, 1.0}));
@@ -104,7 +105,7 @@ TEST(PixelPoints, OnAScreensOwnPlaneGiveItsOwnRays) {
   for (const Size size : {Size{64, 32}, Size{4, 3}}) {
     View view = flat;
     view.points =
-        PixelPoints{std::make_shared<const PointMap>(plane(size)), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
+        PixelPoints{std::make_shared<const PositionMap>(plane(size)), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
     for (int y = 0; y < view.size().height; y += 3) {
       for (int x = 0; x < view.size().width; x += 3) {
         const Ray expected = view_ray(flat, x + 0.5, y + 0.5);
@@ -121,7 +122,7 @@ TEST(PixelPoints, ARayWithoutAPointIsThatOfItsPixelsCentreThenOfThePlane) {
   for (glm::vec3& point : points.pixels()) point.x += 1.0F;
   points.at(21, 12) = glm::vec3(kNone);
   View view = window_view();
-  view.points = PixelPoints{std::make_shared<const PointMap>(points), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
+  view.points = PixelPoints{std::make_shared<const PositionMap>(points), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
   View still = view;
   still.jitter = glm::dvec2(0.0);
   // (20, 12) of the screen, whose jittered place needs its right neighbour.
