@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
-#include "scene/scene_files.h"
+#include "scene/load_scene.h"
 
 namespace hpr {
 

@@ -7,7 +7,7 @@
 #include "engine/frame.h"
 #include "engine/open_sky.h"
 #include "engine/primary_choice.h"
-#include "scene/surface_ranges.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

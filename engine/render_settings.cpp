@@ -13,7 +13,7 @@
 #include "core/text.h"
 #include "engine/settings_table.h"
 #include "image/filter.h"
-#include "scene/environment.h"
+#include "scene/load_scene.h"
 #include "scene/view.h"
 
 namespace hpr {

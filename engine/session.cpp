@@ -13,7 +13,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/timing.h"
-#include "scene/surface_ranges.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/error.h"
-#include "scene/surface_ranges.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

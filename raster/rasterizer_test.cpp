@@ -9,9 +9,9 @@
 #include "core/error.h"
 #include "raster/gl.h"
 #include "raster/raster_test_scenes.h"
-#include "scene/generators/generated.h"
+#include "scene/generators/generators.h"
+#include "scene/gltf/gltf.h"
 #include "scene/gltf/test_tools.h"
-#include "scene/gltf/writer.h"
 
 namespace hpr {
 namespace {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "image/image_io.h"
@@ -16,8 +18,41 @@ struct SceneLimits {
   ImageLimits image;
 };
 
-/// Loads what the command line calls SCENE: a .gltf or .glb file, or `gen:NAME?key=value&key=value`. The result is
-/// finished (finish_scene) and may be drawn as it is. Throws Error (Io, BadInput, Limit, Usage).
+/// A format of scene files.
+struct SceneImporter {
+  std::vector<std::string_view> extensions;  ///< in small letters, with their dots
+  /// Loads a file into a finished scene. Throws Error (Io, BadInput, Limit).
+  Scene (*load)(const std::filesystem::path& path, const SceneLimits& limits);
+  /// The files that `load` reads beside the scene's own; none of one it would refuse.
+  std::vector<std::filesystem::path> (*files_beside)(const std::filesystem::path& path, const SceneLimits& limits);
+};
+
+/// Every importer: X(gltf) stands for a file that defines gltf_importer(). The first one reads files whose extension
+/// none of them has.
+#define HPR_SCENE_IMPORTERS(X) X(gltf)
+
+#define HPR_DECLARE_IMPORTER(name) [[nodiscard]] SceneImporter name##_importer();
+HPR_SCENE_IMPORTERS(HPR_DECLARE_IMPORTER)
+#undef HPR_DECLARE_IMPORTER
+
+/// Loads what the command line calls SCENE: a file that an importer reads (.gltf, .glb), or
+/// `gen:NAME?key=value&key=value`. The result is finished (finish_scene) and may be drawn as it is. Throws Error (Io,
+/// BadInput, Limit, Usage).
 [[nodiscard]] Scene load_scene(const std::string& source, const SceneLimits& limits = {});
+
+/// The files load_scene(source, limits) may read: the scene's own, and the buffers and pictures that a glTF names. None
+/// of a generated scene; of a file that load_scene would refuse just that file.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_scene(const std::string& source,
+                                                                const SceneLimits& limits = {});
+
+/// What the command line calls an environment: `R,G,B`, the same radiance from everywhere, or a latitude-longitude
+/// picture (.hdr, .exr, .png, .jpg; see Environment for its orientation). PNG and JPEG are read as sRGB, white as
+/// radiance 1. Infinite values of a picture become the largest half float, 65504; NaN and negative ones become 0; those
+/// that were not finite are counted.
+/// Throws Error: Usage for a text that is neither; Io, BadInput or Limit for a picture that can't be read.
+[[nodiscard]] Environment load_environment(const std::string& text, const ImageLimits& limits = {});
+/// Makes an environment of a latitude-longitude picture that was read; replaces values as load_environment does. Errors
+/// name it `name`. Throws Error (BadInput).
+[[nodiscard]] Environment environment_of(const FloatImage& picture, const std::string& name);
 
 }  // namespace hpr

@@ -8,7 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "core/error.h"
-#include "scene/boxes.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 
 #include "core/error.h"
-#include "scene/boxes.h"
 
 namespace hpr {
 void finish_scene(Scene& scene) {
@@ -63,6 +63,96 @@ std::vector<glm::vec3> smooth_normals(const std::vector<glm::vec3>& positions,
     return length > 0.0 && std::isfinite(length) ? glm::vec3(sum / length) : glm::vec3(0.0F, 0.0F, 1.0F);
   });
   return normals;
+}
+
+Bounds empty_bounds() {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return {glm::dvec3(kInfinity), glm::dvec3(-kInfinity)};
+}
+
+Bounds united(const Bounds& a, const Bounds& b) {
+  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
+}
+
+Bounds mesh_bounds(const Mesh& mesh) {
+  return bounds_of(mesh, mesh.triangles);
+}
+
+Bounds bounds_of(const Mesh& mesh, std::span<const glm::uvec3> triangles) {
+  Bounds bounds = empty_bounds();
+  for (const glm::uvec3& triangle : triangles) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const glm::dvec3 p(mesh.positions[triangle[corner]]);
+      bounds.low = glm::min(bounds.low, p);
+      bounds.high = glm::max(bounds.high, p);
+    }
+  }
+  return bounds;
+}
+
+Bounds transformed(const glm::dmat4& matrix, const Bounds& box) {
+  const glm::dvec3 half = 0.5 * (box.high - box.low);
+  const glm::dvec3 center = glm::dvec3(matrix * glm::dvec4(0.5 * (box.low + box.high), 1.0));
+  glm::dvec3 reach(0.0);
+  for (int axis = 0; axis < 3; ++axis) reach += glm::abs(glm::dvec3(matrix[axis])) * half[axis];
+  return {center - reach, center + reach};
+}
+
+std::vector<SurfaceRange> merged_ranges(std::vector<SurfaceRange> ranges, std::uint32_t end) {
+  for (SurfaceRange& range : ranges) range.last = std::min(range.last, end);
+  std::erase_if(ranges, [](const SurfaceRange& range) { return range.first >= range.last; });
+  std::ranges::sort(ranges, {}, &SurfaceRange::first);
+  std::vector<SurfaceRange> result;
+  for (const SurfaceRange& range : ranges) {
+    if (!result.empty() && range.first <= result.back().last) {
+      result.back().last = std::max(result.back().last, range.last);
+    } else {
+      result.push_back(range);
+    }
+  }
+  return result;
+}
+
+std::vector<InstanceRange> split_by_instance(const Scene& scene, const std::vector<SurfaceRange>& ranges) {
+  std::vector<InstanceRange> parts;
+  for (const SurfaceRange& range : ranges) {
+    for (std::uint32_t instance = locate_surface(scene, range.first).instance; instance < scene.instances.size();
+         ++instance) {
+      const std::uint32_t base = scene.instances[instance].first_surface;
+      if (base >= range.last) break;
+      const auto count = static_cast<std::uint32_t>(scene.mesh_of(scene.instances[instance]).triangles.size());
+      const std::uint32_t first = std::max(range.first, base) - base;
+      const std::uint32_t last = std::min(range.last - base, count);
+      if (first < last) parts.push_back({instance, {first, last}});
+    }
+  }
+  return parts;
+}
+
+std::vector<SurfaceRange> common_ranges(const std::vector<SurfaceRange>& a, const std::vector<SurfaceRange>& b) {
+  std::vector<SurfaceRange> common;
+  for (std::size_t i = 0, k = 0; i < a.size() && k < b.size();) {
+    const SurfaceRange both{std::max(a[i].first, b[k].first), std::min(a[i].last, b[k].last)};
+    if (both.first < both.last) common.push_back(both);
+    a[i].last < b[k].last ? ++i : ++k;
+  }
+  return common;
+}
+
+std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool alpha_tested) {
+  std::vector<SurfaceRange> ranges;
+  for (const Instance& instance : scene.instances) {
+    const Mesh& mesh = scene.mesh_of(instance);
+    const bool is_alpha_tested = scene.materials[mesh.material].alpha_mode != AlphaMode::Opaque;
+    const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+    if (is_alpha_tested != alpha_tested || count == 0) continue;
+    if (!ranges.empty() && ranges.back().last == instance.first_surface) {
+      ranges.back().last += count;
+    } else {
+      ranges.push_back({instance.first_surface, instance.first_surface + count});
+    }
+  }
+  return ranges;
 }
 
 }  // namespace hpr

@@ -183,6 +183,12 @@ struct SurfaceRange {
   bool operator==(const SurfaceRange&) const = default;
 };
 
+/// Part of an instance: triangles [range.first, range.last) of its mesh.
+struct InstanceRange {
+  std::uint32_t instance = 0;
+  SurfaceRange range;
+};
+
 /// Where a surface id lies.
 struct SurfaceLocation {
   std::uint32_t instance = 0;
@@ -202,6 +208,33 @@ void finish_scene(Scene& scene);
 /// Area-weighted vertex normals (for meshes without), unit length; {0, 0, 1} where no triangle has an area.
 [[nodiscard]] std::vector<glm::vec3> smooth_normals(const std::vector<glm::vec3>& positions,
                                                     const std::vector<glm::uvec3>& triangles);
+
+/// What holds nothing: low > high.
+[[nodiscard]] Bounds empty_bounds();
+/// The box about both.
+[[nodiscard]] Bounds united(const Bounds& a, const Bounds& b);
+
+/// The box of the positions a mesh uses, or some triangles of it, in its own coordinates; empty when there are none.
+[[nodiscard]] Bounds mesh_bounds(const Mesh& mesh);
+[[nodiscard]] Bounds bounds_of(const Mesh& mesh, std::span<const glm::uvec3> triangles);
+
+/// The world box of a box: the image of its centre, give or take |M| times its half extent.
+[[nodiscard]] Bounds transformed(const glm::dmat4& matrix, const Bounds& box);
+
+/// Merges ranges into sorted, disjoint ones that do not touch, inside [0, end), of the same surfaces. `ranges` may come
+/// in any order, overlap and reach past `end`.
+[[nodiscard]] std::vector<SurfaceRange> merged_ranges(std::vector<SurfaceRange> ranges, std::uint32_t end);
+
+/// Merged ranges of surface ids cut at the borders of instances, in ascending order.
+[[nodiscard]] std::vector<InstanceRange> split_by_instance(const Scene& scene, const std::vector<SurfaceRange>& ranges);
+
+/// What two lists of merged ranges have in common, merged too.
+[[nodiscard]] std::vector<SurfaceRange> common_ranges(const std::vector<SurfaceRange>& a,
+                                                      const std::vector<SurfaceRange>& b);
+
+/// The surfaces whose materials cover all (or, `alpha_tested`, only part) of what is behind them, as ranges of surface
+/// ids.
+[[nodiscard]] std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool alpha_tested);
 
 /// XXH64 over everything that can change a picture; the same on every rank and machine.
 [[nodiscard]] std::uint64_t content_hash(const Scene& scene);

@@ -8,8 +8,8 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "rt/passes/pass_list.h"
-#include "scene/generators/generated.h"
-#include "scene/gltf/writer.h"
+#include "scene/generators/generators.h"
+#include "scene/gltf/gltf.h"
 #include "scene/load_scene.h"
 #include "scene/requirements.h"
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <span>
 
-#include "scene/boxes.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

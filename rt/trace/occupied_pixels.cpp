@@ -13,7 +13,7 @@
 #include <limits>
 #include <optional>
 
-#include "scene/boxes.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "scene/surface_ranges.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

@@ -17,7 +17,7 @@
 #include "core/parallel.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/travelling_rays.h"
-#include "scene/surface_ranges.h"
+#include "scene/scene.h"
 
 namespace hpr {
 namespace {

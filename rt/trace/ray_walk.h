@@ -10,7 +10,6 @@
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
-#include "scene/surface_ranges.h"
 
 namespace hpr {
 

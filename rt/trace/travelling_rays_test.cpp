@@ -16,7 +16,7 @@
 #include "core/error.h"
 #include "rt/lighter.h"
 #include "rt/test_scene.h"
-#include "scene/surface_ranges.h"
+#include "scene/scene.h"
 
 // A scene in parts gives the bits of a whole one.
 namespace hpr {

@@ -3,10 +3,8 @@
 #include <array>
 
 #include "scene/generators/generators.h"
-#include "scene/generators/patterns.h"
 #include "scene/generators/portable_math.h"
 #include "scene/generators/shapes.h"
-#include "scene/generators/sphereflake.h"
 
 // A museum hall of 48 x 6 x 12 m. It is closed: every surface of the room faces inwards.
 namespace hpr {

@@ -1,20 +1,60 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
 #include <initializer_list>
+#include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "scene/generators/generated.h"
+#include "scene/scene.h"
 
-/// One factory per generator, listed by all_generators(), and what they share.
 namespace hpr {
 
-[[nodiscard]] Generator gallery_generator();
-[[nodiscard]] Generator sphereflake_generator();
-[[nodiscard]] Generator tetra_generator();
-[[nodiscard]] Generator cornell_generator();
-[[nodiscard]] Generator asteroids_generator();
+/// The options of `gen:NAME?key=value&...`; every generator refuses keys it does not know (ExitCode::Usage, nearest
+/// name).
+using GeneratorOptions = std::map<std::string, std::string>;
+
+/// A scene HPR makes itself: deterministic on every rank, compiler and machine.
+struct Generator {
+  std::string name;
+  std::string summary;                         ///< one line for `hpr scene list`
+  std::map<std::string, std::string> options;  ///< key -> what it does, with its default
+  /// The finished scene. Throws Error (Usage) for an option it does not know or a value out of range.
+  std::function<Scene(const GeneratorOptions&)> make;
+  /// The size options whose triangle count is nearest to the given one; empty where the scene has only one size.
+  std::function<GeneratorOptions(std::uint64_t)> sized;
+};
+
+/// Every generator this build knows, in the order lists show them.
+[[nodiscard]] const std::vector<Generator>& all_generators();
+
+/// Throws Error (Usage) for an unknown name, with the nearest one.
+[[nodiscard]] const Generator& find_generator(std::string_view name);
+
+/// `text` is what follows "gen:", e.g. "gallery?s=2&k=4". The scene is finished. Throws Error (Usage) for an unknown
+/// name or option, or a value out of range.
+[[nodiscard]] Scene generate_scene(std::string_view text);
+
+/// Options that make the generator's scene about `triangles` triangles large, instances counted: the nearest size it
+/// has.
+[[nodiscard]] GeneratorOptions options_for_triangles(const Generator& generator, std::uint64_t triangles);
+
+/// Every generator, in the order in which lists show them: X(tetra) stands for tetra.cpp, which defines
+/// tetra_generator().
+#define HPR_GENERATORS(X) \
+  X(gallery)              \
+  X(sphereflake)          \
+  X(tetra)                \
+  X(cornell)              \
+  X(asteroids)
+
+#define HPR_DECLARE_GENERATOR(name) [[nodiscard]] Generator name##_generator();
+HPR_GENERATORS(HPR_DECLARE_GENERATOR)
+#undef HPR_DECLARE_GENERATOR
 
 /// The values of a generator's options, checked.
 class OptionReader {
@@ -43,10 +83,10 @@ struct SceneSize {
 /// The options of the size whose count differs least from `triangles`; the smaller one of two equally near.
 [[nodiscard]] GeneratorOptions nearest_size(const std::vector<SceneSize>& sizes, std::uint64_t triangles);
 
-/// Adds to `scene` and returns the index.
+/// Adds a material or a mesh to `scene` and returns its index.
 [[nodiscard]] std::uint32_t add_material(Scene& scene, Material material);
 [[nodiscard]] std::uint32_t add_mesh(Scene& scene, Mesh mesh, std::string name, std::uint32_t material);
-/// A mesh with one instance, where it is.
+/// Adds a mesh with one instance, whose matrix is the identity.
 void add_single(Scene& scene, Mesh mesh, std::string name, std::uint32_t material);
 void add_instance(Scene& scene, std::uint32_t mesh, const glm::dmat4& to_world = glm::dmat4(1.0));
 void add_point_light(Scene& scene, std::string name, const glm::dvec3& position, const glm::vec3& intensity);
@@ -61,5 +101,23 @@ void add_camera(Scene& scene, std::string name, const glm::dvec3& eye, const glm
 [[nodiscard]] Material metal(std::string name, const glm::vec3& color, float roughness);
 /// Smooth and clear, of index of refraction `ior`; solid, so its surfaces are to be closed.
 [[nodiscard]] Material glass(std::string name, float ior);
+
+/// A sphere of the flake and the axis it grew along (unit length).
+struct FlakeSphere {
+  glm::dvec3 center{0.0};
+  double radius = 0.0;
+  glm::dvec3 axis{0.0, 0.0, 1.0};
+};
+
+/// Haines' sphereflake ("A Proposal for Standard Graphics Environments", IEEE CG&A 7(11), 1987) in the coordinates of
+/// the Standard Procedural Databases: left-handed, z up, a root of radius 1/2 at the origin. `size` generations after
+/// the root: (9^(size + 1) - 1) / 8 spheres, every sphere before its children.
+[[nodiscard]] std::vector<FlakeSphere> sphereflake(int size);
+
+/// From the databases' left-handed, z-up coordinates to ours, right-handed and y up: y and z change places, which is
+/// the negation of one axis that handedness needs and a quarter turn in one. Pictures stay the same.
+[[nodiscard]] inline glm::dvec3 from_spd(const glm::dvec3& p) {
+  return {p.x, p.z, p.y};
+}
 
 }  // namespace hpr

@@ -9,7 +9,6 @@
 #include <map>
 #include <numbers>
 
-#include "scene/generators/patterns.h"
 #include "scene/generators/portable_math.h"
 #include "scene/scene_test_tools.h"
 

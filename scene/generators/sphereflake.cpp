@@ -1,5 +1,3 @@
-#include "scene/generators/sphereflake.h"
-
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>

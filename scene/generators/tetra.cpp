@@ -6,7 +6,6 @@
 
 #include "scene/generators/generators.h"
 #include "scene/generators/shapes.h"
-#include "scene/generators/sphereflake.h"
 
 namespace hpr {
 namespace {

@@ -1,11 +1,10 @@
-#include "scene/gltf/loader.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "scene/gltf/gltf.h"
 #include "scene/gltf/test_tools.h"
 
 namespace hpr {

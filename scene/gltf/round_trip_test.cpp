@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 
-#include "scene/generators/generated.h"
+#include "scene/generators/generators.h"
+#include "scene/gltf/gltf.h"
 #include "scene/gltf/test_tools.h"
-#include "scene/gltf/writer.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "scene/gltf/context.h"
+#include "scene/gltf/document.h"
 
 namespace hpr {
 

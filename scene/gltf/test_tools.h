@@ -15,7 +15,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/json.h"
-#include "scene/gltf/loader.h"
+#include "scene/gltf/gltf.h"
 
 namespace hpr::test {
 

@@ -1,5 +1,3 @@
-#include "scene/gltf/writer.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,6 +14,7 @@
 #include "core/error.h"
 #include "core/json.h"
 #include "image/image_io.h"
+#include "scene/gltf/gltf.h"
 
 // Numbers are written so that they read back to the same bits: the JSON library prints the shortest decimal that does,
 // and colours that glTF splits into a factor and a strength are split by a power of two.

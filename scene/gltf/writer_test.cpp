@@ -1,5 +1,3 @@
-#include "scene/gltf/writer.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +8,8 @@
 #include "core/error.h"
 #include "core/json.h"
 #include "image/image_io.h"
-#include "scene/generators/generated.h"
+#include "scene/generators/generators.h"
+#include "scene/gltf/gltf.h"
 
 namespace hpr {
 namespace {

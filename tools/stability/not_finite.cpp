@@ -14,7 +14,6 @@
 #include "core/json.h"
 #include "image/image_codec.h"
 #include "image/image_io.h"
-#include "scene/environment.h"
 #include "scene/load_scene.h"
 #include "tools/stability/cases.h"
 #include "tools/stability/light_tools.h"

@@ -16,7 +16,7 @@
 #include "rt/photons/photon_tracer.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
-#include "scene/generators/generated.h"
+#include "scene/generators/generators.h"
 #include "tools/stability/cases.h"
 #include "tools/stability/light_tools.h"
 #include "tools/stability/tools.h"

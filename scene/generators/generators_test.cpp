@@ -1,4 +1,4 @@
-#include "scene/generators/generated.h"
+#include "scene/generators/generators.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,6 @@
 #include <set>
 
 #include "core/error.h"
-#include "scene/generators/sphereflake.h"
 #include "scene/requirements.h"
 #include "scene/scene_test_tools.h"
 

@@ -1,4 +1,4 @@
-#include "scene/generators/generated.h"
+#include "scene/generators/generators.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,6 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "scene/generators/generators.h"
-#include "scene/generators/sphereflake.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -48,8 +46,9 @@ GeneratorOptions parse_options(std::string_view list, std::string_view text) {
 }  // namespace
 
 const std::vector<Generator>& all_generators() {
-  static const std::vector<Generator> generators{gallery_generator(), sphereflake_generator(), tetra_generator(),
-                                                 cornell_generator(), asteroids_generator()};
+#define HPR_GENERATOR(name) name##_generator(),
+  static const std::vector<Generator> generators{HPR_GENERATORS(HPR_GENERATOR)};
+#undef HPR_GENERATOR
   return generators;
 }
 

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <vector>
 
 #include "scene/load_scene.h"
+#include "scene/scene.h"
 
 namespace hpr {
 
@@ -10,5 +13,9 @@ namespace hpr {
 /// count is checked in 64 bits, URIs may only name files below the file's own folder, JSON deeper than 64 levels is
 /// refused. What is wrong but harmless becomes a warning in Scene::warnings. Throws Error (Io, BadInput, Limit).
 [[nodiscard]] Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits);
+
+/// The scene as a binary glTF 2.0 file: meshes, materials, textures (PNG), instances, punctual lights, cameras. Loading
+/// it again gives the same triangles, bit by bit. The background and headlights have no place in glTF and are left out.
+[[nodiscard]] std::vector<std::byte> encode_glb(const Scene& scene);
 
 }  // namespace hpr
