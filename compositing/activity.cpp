@@ -7,7 +7,7 @@ namespace hpr {
 namespace {
 
 // What a tile costs a strategy, about: being looked at; being announced and set up, if anything was drawn; its pixels.
-constexpr std::uint64_t kLookCost = 1;
+constexpr std::uint64_t kReadCost = 1;
 constexpr std::uint64_t kActiveCost = 4;
 constexpr std::uint64_t kFillCost = 4;
 
@@ -18,7 +18,7 @@ Activity::Activity(int ranks, std::size_t tiles, std::vector<std::uint64_t> fill
       words_((tiles + kTilesAWord - 1) / kTilesAWord),
       fills_(std::move(fills)),
       weights_(tiles),
-      costs_(tiles, kLookCost) {
+      costs_(tiles, kReadCost) {
   HPR_CHECK(fills_.size() == words_ * static_cast<std::size_t>(ranks));
   for (int rank = 0; rank < ranks; ++rank) {
     for (std::size_t position = 0; position < tiles; ++position) {

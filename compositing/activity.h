@@ -56,7 +56,7 @@ template <typename Pixel>
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (!layer.active(tiles[i])) continue;
     // A thin shape may be missed, which costs balance and nothing else.
-    const double fraction = counts ? sampled_share<Pixel>(layer.tile(tiles[i])) : 1.0;
+    const double fraction = counts ? sampled_fraction<Pixel>(layer.tile(tiles[i])) : 1.0;
     const auto fill = 1 + static_cast<std::uint64_t>(fraction * static_cast<double>(kFullTile - 1));
     fills[i / kTiles] |= fill << (4 * (i % kTiles));
   }

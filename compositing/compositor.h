@@ -113,11 +113,11 @@ class Blender {
  public:
   virtual ~Blender() = default;
 
-  /// As of the compositor that sends the same messages.
+  /// The name, equal to that of the compositor that sends the same messages.
   [[nodiscard]] virtual std::string_view name() const = 0;
   /// Whether it can run on so many ranks.
   [[nodiscard]] virtual bool fits(int ranks) const = 0;
-  /// As Compositor::merges_in_place.
+  /// Whether it merges where layers lie: see Compositor::merges_in_place.
   [[nodiscard]] virtual bool merges_in_place() const = 0;
 
   /// Collective, with layers, `tiles` and `shown_by` as for Compositor::composite. `order`: the ranks from the
@@ -134,7 +134,8 @@ class Blender {
 template <typename Pixel>
 [[nodiscard]] std::vector<std::unique_ptr<Blender<Pixel>>> all_blenders();
 
-/// As make_compositor; a strategy that does not keep the order of layers is refused by name.
+/// Makes the blender of a strategy, by a name as make_compositor takes it. Throws Error (Usage) for a strategy that
+/// does not keep the order of layers.
 template <typename Pixel>
 [[nodiscard]] std::unique_ptr<Blender<Pixel>> make_blender(std::string_view name);
 

@@ -25,7 +25,7 @@ TEST(DepthFormat, RoundsMonotonouslyAndNeverPastTheNearPlane) {
   for (const DepthFormat format : kFormats) {
     constexpr std::uint32_t kOne = 0x3F800000;
     std::uint32_t before = 0;
-    const auto look = [&](std::uint32_t bits) {
+    const auto check = [&](std::uint32_t bits) {
       const float depth = std::bit_cast<float>(bits);
       const float rounded = quantized_depth(depth, format);
       const auto after = std::bit_cast<std::uint32_t>(rounded);
@@ -35,9 +35,9 @@ TEST(DepthFormat, RoundsMonotonouslyAndNeverPastTheNearPlane) {
       ASSERT_LE(bits > after ? bits - after : after - bits, (1U << lost_bits(format)) / 2) << bits;
       before = after;
     };
-    for (std::uint32_t bits = 0; bits <= kOne; bits += 251) look(bits);
+    for (std::uint32_t bits = 0; bits <= kOne; bits += 251) check(bits);
     before = 0;
-    for (std::uint32_t bits = kOne - 100'000; bits <= kOne; ++bits) look(bits);
+    for (std::uint32_t bits = kOne - 100'000; bits <= kOne; ++bits) check(bits);
     EXPECT_EQ(quantized_depth(0.0F, format), 0.0F);
     EXPECT_EQ(quantized_depth(1.0F, format), 1.0F);
   }

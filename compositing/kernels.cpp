@@ -38,7 +38,7 @@ template <typename Lane>
 using LanesOf = hn::CappedTag<Lane, 8>;
 using Lanes = LanesOf<Key>;
 
-/// Of 64 pixels of one lane each.
+/// One bit for each of 64 pixels of one lane: is it drawn?
 template <typename Lane>
 std::uint64_t drawn_bits(const Lane* pixels) {
   const LanesOf<Lane> lanes;
@@ -52,7 +52,7 @@ std::uint64_t drawn_bits(const Lane* pixels) {
   return bits;
 }
 
-/// Of 64 pixels of two lanes each.
+/// One bit for each of 64 pixels of two lanes: is it drawn?
 std::uint64_t drawn_bits_of_pairs(const std::uint64_t* pixels) {
   const Lanes lanes;
   const auto zero = hn::Zero(lanes);

@@ -84,7 +84,7 @@ void unpack_drawn(std::span<const RgbaPremultiplied> packed, const TileMask& mas
 
 /// About the fraction of a tile that is drawn, from every eighth run of 64 pixels: enough to share work by.
 template <typename Pixel>
-[[nodiscard]] double sampled_share(std::span<const Pixel> tile) {
+[[nodiscard]] double sampled_fraction(std::span<const Pixel> tile) {
   std::size_t drawn = 0;
   for (std::size_t first = 0; first < kTilePixels; first += 512) {
     for (const Pixel& pixel : tile.subspan(first, 64)) drawn += pixel != Pixel{} ? 1U : 0U;

@@ -18,7 +18,7 @@ constexpr std::size_t words_for(std::size_t tiles) {
   return (tiles + kWordBits - 1) / kWordBits;
 }
 
-/// Of the counts of so many active tiles, in whole words.
+/// The bytes of the counts of so many active tiles, in whole words.
 constexpr std::size_t count_bytes(std::size_t active) {
   return (active * sizeof(std::uint16_t) + sizeof(Word) - 1) / sizeof(Word) * sizeof(Word);
 }
@@ -31,7 +31,7 @@ constexpr std::size_t count_bytes(std::size_t active) {
 /// Whether a tile is surely full enough to travel whole: most are, or hold little.
 template <typename Pixel>
 bool looks_full(std::span<const Pixel, kTilePixels> tile) {
-  return sampled_share<Pixel>(tile) * kTilePixels > static_cast<double>(kMaxPackedPixels) * 9.0 / 8.0;
+  return sampled_fraction<Pixel>(tile) * kTilePixels > static_cast<double>(kMaxPackedPixels) * 9.0 / 8.0;
 }
 
 /// Masks and pixels of packed tiles, one after the other, merged where they lie.

@@ -33,9 +33,9 @@ namespace hpr {
 
 inline constexpr std::uint64_t kTileFormat = 4;
 inline constexpr std::uint16_t kWholeTile = 0xFFFF;
-/// Of 4096 pixels. At 3/4 the packed tile takes 77 % of the whole one's bytes.
+/// The most pixels of a tile's 4096 that are packed. At 3/4 the packed tile takes 77 % of the whole one's bytes.
 inline constexpr std::size_t kMaxPackedPixels = kTilePixels * 3 / 4;
-/// So many tiles of keys, half a megabyte, stay in a core's cache between arriving and being merged.
+/// The most tiles of one segment: half a megabyte of keys stays in a core's cache between arriving and being merged.
 inline constexpr std::size_t kMaxSegmentTiles = 16;
 
 /// What follows the head of a message for one tile of which so many pixels are packed; nothing for the others.

@@ -140,7 +140,7 @@ TEST(TileCodec, ScatteredPixelsCostABitOfTheirTileAndEightBytesEach) {
   }
 }
 
-TEST(TileCodec, WholeNeighboursShareABodyUpToItsSize) {
+TEST(TileCodec, WholeNeighboursShareASegmentUpToItsSize) {
   std::vector<std::size_t> tiles(40);
   std::iota(tiles.begin(), tiles.end(), std::size_t{3});
   tiles[30] = 200;  // no neighbour of 32

@@ -80,7 +80,7 @@ class ContentHash {
 /// RFC 4648, section 4, with padding.
 [[nodiscard]] std::string base64(std::span<const std::byte> bytes);
 
-/// From the system's source of random numbers. Throws Error (Io).
+/// Fills `bytes` from the system's source of random numbers. Throws Error (Io).
 void fill_random(std::span<std::byte> bytes);
 
 /// 32 hexadecimal digits. Throws Error (Io).

@@ -94,12 +94,12 @@ int with_temporary_name(const std::filesystem::path& folder, std::string& name, 
   return result;
 }
 
-/// By which an open file without a name is given one.
+/// The path from which an open file without a name can be linked.
 std::string link_of(int file) {
   return fmt::format("/proc/self/fd/{}", file);
 }
 
-/// Without a name, so that nothing of it is left whatever ends the process; -1 where that cannot be had.
+/// Creates a file without a name, which vanishes with the process; -1 where the file system has none.
 int create_unnamed(const std::filesystem::path& folder) {
   const int file = ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
   if (file < 0 || ::access(link_of(file).c_str(), F_OK) == 0) return file;

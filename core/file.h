@@ -31,7 +31,7 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&&) = delete;
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
-  /// Without commit() nothing of it is left.
+  /// Removes the file unless commit() was called.
   ~AtomicFile();
 
   /// What is to be written to.
@@ -100,7 +100,7 @@ class TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
   TemporaryFile& operator=(TemporaryFile&&) = delete;
 
-  /// By which processes of this host open it while this lives.
+  /// The path by which processes of this host open the file while this object lives.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:

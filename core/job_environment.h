@@ -29,7 +29,7 @@ inline constexpr const char* kReportStartVariable = "OMPI_HPR_SAY_START";
 /// Whether stderr of this process, or of the launcher of its job, is a terminal: a progress bar may redraw itself.
 [[nodiscard]] bool stderr_is_terminal();
 
-/// As this machine calls itself.
+/// The name of this machine.
 [[nodiscard]] std::string host_name();
 
 /// What stands before the words of a rank: "rank 3 on wall02: ", nothing for rank 0.

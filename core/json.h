@@ -22,8 +22,7 @@ class JsonError : public std::runtime_error {
   explicit JsonError(const std::string& what, std::optional<std::size_t> offset = std::nullopt)
       : std::runtime_error(what), offset_(offset) {}
 
-  /// Of a syntax error: how many bytes of the text come before it, all of them where the text ends too early. None for
-  /// every other error.
+  /// The number of bytes before a syntax error, the whole text where it ends too early. None for every other error.
   [[nodiscard]] std::optional<std::size_t> offset() const { return offset_; }
 
  private:
@@ -56,7 +55,7 @@ class Json {
 
   struct Member;
 
-  /// Of arrays and objects in a parsed text; copying, writing and destroying a value recurse this deep.
+  /// How deep arrays and objects may nest in a parsed text; copying, writing and destroying a value recurse this deep.
   static constexpr int kMaxDepth = 256;
 
   Json() = default;

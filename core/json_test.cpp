@@ -143,7 +143,7 @@ TEST(Json, SyntaxErrorsSayWhereTheyAre) {
   for (const auto& [text, offset] : cases) EXPECT_EQ(error_offset(text), offset) << text;
 }
 
-TEST(Json, NumbersBeyondDoubleAreAnErrorWithoutAPlace) {
+TEST(Json, NumbersBeyondDoubleAreAnErrorWithoutAPosition) {
   EXPECT_EQ(error_offset("[1e999]"), std::nullopt);
   EXPECT_EQ(Json::parse("18446744073709551616").get<double>(), 0x1p64) << "integers beyond 64 bits are reals";
 }
@@ -159,7 +159,7 @@ TEST(Json, NestingIsLimited) {
   EXPECT_TRUE(Json::try_parse(R"([[], [], {"a": []}, {"b": {}}])", 3)) << "neighbours do not add up";
 }
 
-TEST(Json, OfEqualKeysTheLastCountsAtTheFirstsPlace) {
+TEST(Json, OfEqualKeysTheLastCountsAtTheFirstsPosition) {
   EXPECT_EQ(Json::parse(R"({"a": 1, "b": 2, "a": {"c": 3, "c": 4}, "b": 5})").dump(), R"({"a":{"c":4},"b":5})");
 }
 

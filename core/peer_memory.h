@@ -12,9 +12,9 @@ class PeerMemory {
  public:
   virtual ~PeerMemory() = default;
 
-  /// This rank's own.
+  /// The memory of this rank.
   [[nodiscard]] virtual std::span<std::byte> mine() = 0;
-  /// That of a rank; empty when it runs on another host.
+  /// The memory of `rank`; empty when that runs on another host.
   [[nodiscard]] virtual std::span<std::byte> of(int rank) = 0;
   /// Collective over the ranks of this host: returns when all of them have called it. Waits asleep, so that ranks that
   /// still have work find a free core. Throws Error (Hang) past the communicator's time limit.

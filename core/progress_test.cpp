@@ -20,7 +20,7 @@ void three_steps(Progress& progress) {
   for (const char* const detail : {"a", "bb", "c"}) progress.step(detail);
 }
 
-TEST(Progress, ALogIsToldInLinesAndOnlySoOften) {
+TEST(Progress, ALogIsWrittenInLinesAndOnlySoOften) {
   EXPECT_EQ(said([] {
               Progress progress("auto", "frame", 9, Progress::Pace{0s, 0s});
               three_steps(progress);
@@ -33,7 +33,7 @@ TEST(Progress, ALogIsToldInLinesAndOnlySoOften) {
             "");
 }
 
-TEST(Progress, WithoutAPaceALogIsToldNothing) {
+TEST(Progress, WithoutAPaceALogGetsNothing) {
   EXPECT_EQ(said([] {
               Progress progress("auto", "frame", 9);
               three_steps(progress);
@@ -61,7 +61,7 @@ TEST(Progress, AShorterLineWipesOutALongerOne) {
   EXPECT_EQ(bar, "\rframe 1 a long line\rframe 2 short      \n");
 }
 
-TEST(Progress, IsDueWhereAStepWouldBeToldOf) {
+TEST(Progress, IsDueWhereAStepWouldBeReported) {
   Progress silent("none", "frame", 2);
   EXPECT_FALSE(silent.due(1));
   Progress lines("line", "frame", 2);

@@ -51,7 +51,8 @@ struct Rgba8 {
 /// The bits of an IEEE 754 binary16: 11 bits of precision from 6e-5 to 65504, and steps of 6e-8 below.
 using HalfBits = std::uint16_t;
 
-/// To nearest, ties to even. What lies past 65504 becomes that, with its sign: light stays finite. NaN becomes 0.
+/// Rounds to the nearest half float, ties to even. What lies past 65504 becomes 65504, with its sign: light stays
+/// finite. NaN becomes 0.
 [[nodiscard]] constexpr HalfBits to_half(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   const std::uint32_t sign = bits >> 16U & 0x8000U;

@@ -17,7 +17,7 @@ double linear_of(double level) {
   return level <= 0.04045 ? level / 12.92 : std::pow((level + 0.055) / 1.055, 2.4);
 }
 
-TEST(Color, EveryLevelSurvivesTheWayToLinearAndBack) {
+TEST(Color, EveryLevelSurvivesTheConversionToLinearAndBack) {
   for (int level = 0; level < 256; ++level) {
     EXPECT_EQ(level_of(srgb_to_linear(static_cast<std::uint8_t>(level))), level);
   }
@@ -102,7 +102,7 @@ TEST(Half, EveryFiniteOneIsWhatTheStandardSaysAndComesBack) {
   }
 }
 
-TEST(Half, BetweenEachTwoTheNearerIsTakenAndTheEvenOneInTheMiddle) {
+TEST(Half, BetweenEachTwoTheNearerIsChosenAndTheEvenOneAtTheMidpoint) {
   for (std::uint32_t bits = 0; bits < 0x7BFF; ++bits) {
     const auto low = static_cast<HalfBits>(bits);
     const auto high = static_cast<HalfBits>(bits + 1);
@@ -116,7 +116,7 @@ TEST(Half, BetweenEachTwoTheNearerIsTakenAndTheEvenOneInTheMiddle) {
   }
 }
 
-TEST(Half, LightPastTheLargestStaysFinite) {
+TEST(Half, LightPastTheMaximumStaysFinite) {
   const float infinity = std::numeric_limits<float>::infinity();
   for (const float large : {65504.0F, 65519.0F, 65520.0F, 1e9F, infinity}) {
     EXPECT_EQ(from_half(to_half(large)), 65504.0F);

@@ -35,7 +35,7 @@ TEST(Convolve, RowsAndColumnsAreSumsInTheOrderOfTheWeights) {
   EXPECT_EQ(along_y.at(0, 1), 432.0);
 }
 
-TEST(Convolve, EveryPlaceIsFilteredAlikeWhateverTheWidth) {
+TEST(Convolve, EveryPositionIsFilteredAlikeWhateverTheWidth) {
   const std::vector<double> weights{0.5, -2.0, 0.25, 3.0};
   for (const int width : {4, 18, 19, 20, 35, 37}) {  // sums are taken 16 at a time, the rest one by one
     const Image<double> in = numbered({width, 6});

@@ -82,15 +82,16 @@ float color_error(const glm::vec3& rgb_a, const glm::vec3& rgb_b) {
 struct Filters {
   int radius = 0;
   Weights luminance, red_green, yellow_blue_narrow, yellow_blue_wide;
-  Weights yellow_blue_narrow_share, yellow_blue_wide_share;
+  Weights yellow_blue_narrow_fraction, yellow_blue_wide_fraction;
   Weights smooth, edge, point;  ///< for features: a Gaussian and its first and second derivative
 };
 
-/// value(x) for x in pixels from the centre, 0 beyond `reach`.
+/// value(x) for x in pixels from the centre, 0 beyond `support`.
 template <typename Function>
-Weights sampled(int radius, int reach, Function value) {
+Weights sampled(int radius, int support, Function value) {
   Weights weights;
-  for (int x = -radius; x <= radius; ++x) weights.push_back(std::abs(x) <= reach ? static_cast<float>(value(x)) : 0.0F);
+  for (int x = -radius; x <= radius; ++x)
+    weights.push_back(std::abs(x) <= support ? static_cast<float>(value(x)) : 0.0F);
   return weights;
 }
 
@@ -126,9 +127,9 @@ Filters make_filters(double pixels_per_degree) {
   constexpr double kFeatureDegrees = 0.082;  // the width of the features the eye finds best
   const double widest = std::sqrt(kYellowBlueNarrow.b / (2.0 * kPi * kPi));
   const double sigma = 0.5 * kFeatureDegrees * pixels_per_degree;
-  const int reach = static_cast<int>(std::ceil(3.0 * sigma));
+  const int support = static_cast<int>(std::ceil(3.0 * sigma));
   Filters filters;
-  filters.radius = std::max(reach, static_cast<int>(std::ceil(3.0 * widest * pixels_per_degree)));
+  filters.radius = std::max(support, static_cast<int>(std::ceil(3.0 * widest * pixels_per_degree)));
 
   const auto term = [&](const Sensitivity& s) {
     return sampled(filters.radius, filters.radius, [&](int x) {
@@ -147,14 +148,14 @@ Filters make_filters(double pixels_per_degree) {
   };
   const double narrow = volume(kYellowBlueNarrow);
   const double wide = volume(kYellowBlueWide);
-  filters.yellow_blue_narrow_share = scaled(filters.yellow_blue_narrow, narrow / (narrow + wide));
-  filters.yellow_blue_wide_share = scaled(filters.yellow_blue_wide, wide / (narrow + wide));
+  filters.yellow_blue_narrow_fraction = scaled(filters.yellow_blue_narrow, narrow / (narrow + wide));
+  filters.yellow_blue_wide_fraction = scaled(filters.yellow_blue_wide, wide / (narrow + wide));
 
   const auto bell = [&](int x) { return std::exp(-0.5 * x * x / (sigma * sigma)); };
-  filters.smooth = balanced(sampled(filters.radius, reach, bell));
-  filters.edge = balanced(sampled(filters.radius, reach, [&](int x) { return x * bell(x); }));
+  filters.smooth = balanced(sampled(filters.radius, support, bell));
+  filters.edge = balanced(sampled(filters.radius, support, [&](int x) { return x * bell(x); }));
   filters.point =
-      balanced(sampled(filters.radius, reach, [&](int x) { return (x * x / (sigma * sigma) - 1.0) * bell(x); }));
+      balanced(sampled(filters.radius, support, [&](int x) { return (x * x / (sigma * sigma) - 1.0) * bell(x); }));
   return filters;
 }
 
@@ -212,8 +213,8 @@ FilteredRows filter_picture(std::span<const float> picture, Size size, int top, 
   FilteredRows filtered_rows;
   filtered_rows.opponent[0] = filtered(planes[0], f.luminance, f.luminance);
   filtered_rows.opponent[1] = filtered(planes[1], f.red_green, f.red_green);
-  filtered_rows.opponent[2] = filtered(planes[2], f.yellow_blue_narrow, f.yellow_blue_narrow_share);
-  const Image<float> wide = filtered(planes[2], f.yellow_blue_wide, f.yellow_blue_wide_share);
+  filtered_rows.opponent[2] = filtered(planes[2], f.yellow_blue_narrow, f.yellow_blue_narrow_fraction);
+  const Image<float> wide = filtered(planes[2], f.yellow_blue_wide, f.yellow_blue_wide_fraction);
   for (std::size_t i = 0; i < wide.pixels().size(); ++i) filtered_rows.opponent[2].pixels()[i] += wide.pixels()[i];
   const Image<float> smooth_rows = filter_rows<float>(planes[0], f.smooth);
   filtered_rows.edges = feature(planes[0], smooth_rows, f.edge, f.smooth);

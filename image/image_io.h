@@ -19,7 +19,7 @@ struct ImageLimits {
   std::uint64_t pixels = std::uint64_t{1} << 27;  ///< 128 Mi
 };
 
-/// For pictures that HPR itself draws or reads back, unless the user says otherwise.
+/// The default limits of pictures that HPR itself draws or reads back.
 inline constexpr ImageLimits kPictureLimits{.side = 1 << 20, .pixels = std::uint64_t{1} << 31};
 
 /// Throws Error (Limit) for a picture or screen beyond `limits`.

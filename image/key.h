@@ -43,12 +43,12 @@ inline constexpr Key kNoKey = 0;
 enum class DepthFormat : std::uint8_t { Float32, Bits24, Bits16 };
 inline constexpr std::array<std::string_view, 3> kDepthFormatNames{"32f", "24", "16"};
 
-/// How many of the 32 bits of a depth are given up.
+/// How many of the 32 bits of a depth are dropped.
 [[nodiscard]] constexpr unsigned lost_bits(DepthFormat format) {
   constexpr std::array<unsigned, 3> kLost{0, 6, 14};
   return kLost.at(static_cast<std::size_t>(format));
 }
-/// Of a key in a message.
+/// The bytes of a key in a message.
 [[nodiscard]] constexpr std::size_t sent_bytes(DepthFormat format) {
   constexpr std::array<std::size_t, 3> kBytes{8, 7, 6};
   return kBytes.at(static_cast<std::size_t>(format));

@@ -46,7 +46,7 @@ class FrameLayout {
 
   [[nodiscard]] std::size_t screens() const { return sizes_.size(); }
   [[nodiscard]] Size size(std::size_t screen) const { return sizes_.at(screen); }
-  /// Of all screens.
+  /// The pixels of all screens.
   [[nodiscard]] std::size_t pixels() const;
   /// Columns and rows of tiles.
   [[nodiscard]] Size tile_grid(std::size_t screen) const;
@@ -76,13 +76,14 @@ class TileLayer {
 
  public:
   TileLayer() = default;
-  /// In memory of its own.
+  /// Makes an empty layer in memory of its own.
   explicit TileLayer(FrameLayout layout)
       : layout_(std::move(layout)), memory_(allocate(bytes_for(layout_) + kCacheLine)) {
     const auto past = reinterpret_cast<std::uintptr_t>(memory_.get()) % kCacheLine;
     place(memory_.get() + (kCacheLine - past) % kCacheLine);
   }
-  /// In this rank's part of `peers`, which is zero or holds a layer of this layout: bytes_for(layout) bytes or more.
+  /// Makes a layer in this rank's part of `peers`, which is zero or holds a layer of this layout: bytes_for(layout)
+  /// bytes or more.
   TileLayer(FrameLayout layout, std::shared_ptr<PeerMemory> peers)
       : layout_(std::move(layout)), peers_(std::move(peers)) {
     HPR_CHECK(peers_->mine().size() >= bytes_for(layout_));
@@ -133,8 +134,8 @@ class TileLayer {
   [[nodiscard]] Pixel& at(std::size_t screen, int x, int y) { return pixels_[index(screen, x, y)]; }
   [[nodiscard]] const Pixel& at(std::size_t screen, int x, int y) const { return pixels_[index(screen, x, y)]; }
 
-  /// For whoever is going to add to a tile that may never have been written to: reading would map the system's page of
-  /// zeros first, and each page's first write after that stops all cores to take it back.
+  /// Zeroes an inactive tile before something is added to it: a read would map the system's page of zeros first,
+  /// and the first write after that stops all cores to unmap it.
   void touch(std::size_t tile) {
     if (!active(tile)) std::ranges::fill(this->tile(tile), Pixel{});
   }

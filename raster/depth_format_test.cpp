@@ -46,7 +46,7 @@ TEST_P(DepthFormatTest, DepthsAreThoseOfTheFloatsRounded) {
   EXPECT_TRUE(drawn(rasterizer, view, DepthFormat::Float32) == exact);  // and back again
 }
 
-TEST_P(DepthFormatTest, SharesMergedByMaximumHaveTheKeysOfTheWhole) {
+TEST_P(DepthFormatTest, PartsMergedByMaximumHaveTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = perspective_view({240, 160});
   Rasterizer whole(*context_, scene, std::array{SurfaceRange{0, scene.triangles}}, 1);

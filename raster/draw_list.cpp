@@ -155,8 +155,8 @@ bool Culler::outside(const Box& box) const {
 bool Culler::inside(const Box& box) const {
   const CenterHalf b = center_half(box);
   for (std::size_t i = 0; i < kPlanes; ++i) {
-    const double least = glm::dot(planes_[i], b.center) - glm::dot(glm::abs(planes_[i]), b.half);
-    if (!(least > glm::dot(error_[i], b.largest))) return false;
+    const double min_distance = glm::dot(planes_[i], b.center) - glm::dot(glm::abs(planes_[i]), b.half);
+    if (!(min_distance > glm::dot(error_[i], b.largest))) return false;
   }
   return true;
 }
@@ -164,34 +164,34 @@ bool Culler::inside(const Box& box) const {
 bool Culler::near_breaks_down(const Box& box) const {
   if (near_ == 0.0) return false;
   const CenterHalf b = center_half(box);
-  const double least = glm::dot(planes_[kNear], b.center) - glm::dot(glm::abs(planes_[kNear]), b.half);
+  const double min_distance = glm::dot(planes_[kNear], b.center) - glm::dot(glm::abs(planes_[kNear]), b.half);
   const double error = glm::dot(row_error_[3], b.largest);
-  return least <= error && error >= 0.25 * near_;
+  return min_distance <= error && error >= 0.25 * near_;
 }
 
 Rect Culler::pixels(const Box& box) const {
   const CenterHalf b = center_half(box);
-  const double near_least = glm::dot(planes_[kNear], b.center) - glm::dot(glm::abs(planes_[kNear]), b.half);
-  if (near_ != 0.0 && !(near_least > glm::dot(error_[kNear], b.largest))) return part_;
+  const double near_min = glm::dot(planes_[kNear], b.center) - glm::dot(glm::abs(planes_[kNear]), b.half);
+  if (near_ != 0.0 && !(near_min > glm::dot(error_[kNear], b.largest))) return part_;
 
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  double w_least = kInfinity;
+  double w_min = kInfinity;
   glm::dvec2 low(kInfinity);
   glm::dvec2 high(-kInfinity);
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec4 sign((corner & 1) != 0 ? 1.0 : -1.0, (corner & 2) != 0 ? 1.0 : -1.0,
                           (corner & 4) != 0 ? 1.0 : -1.0, 0.0);
     const glm::dvec4 clip = matrix_ * (b.center + sign * b.half);
-    w_least = std::min(w_least, clip.w);
+    w_min = std::min(w_min, clip.w);
     const glm::dvec2 ndc(clip.x / clip.w, clip.y / clip.w);
     low = glm::min(low, ndc);
     high = glm::max(high, ndc);
   }
-  const glm::dvec2 reach = glm::max(glm::abs(low), glm::abs(high));
+  const glm::dvec2 max_abs = glm::max(glm::abs(low), glm::abs(high));
   const glm::dvec2 rounding(glm::dot(row_error_[0], b.largest), glm::dot(row_error_[1], b.largest));
   const double w_error = glm::dot(row_error_[3], b.largest);
-  if (!(w_error < 0.5 * w_least)) return part_;
-  const glm::dvec2 slack = 2.0 * (rounding + reach * w_error) / w_least;
+  if (!(w_error < 0.5 * w_min)) return part_;
+  const glm::dvec2 slack = 2.0 * (rounding + max_abs * w_error) / w_min;
   low -= slack;
   high += slack;
 

@@ -36,7 +36,7 @@ std::map<std::uint32_t, int> surfaces_of(const Scene& scene, const Geometry& geo
   return count;
 }
 
-TEST(Geometry, HoldsExactlyTheTrianglesOfTheShareInAscendingOrder) {
+TEST(Geometry, HoldsExactlyTheTrianglesOfTheRangesInAscendingOrder) {
   const Scene scene = test::mixed_scene();
   const std::vector<SurfaceRange> ranges{{9000, 9001}, {100, 1500}, {1400, 1600},        {3100, 3300},
                                          {6000, 8000}, {50, 50},    {12000, 4000000000U}};

@@ -37,7 +37,7 @@ struct GlOptions {
   int threads = 0;               ///< of a software renderer, before the process's first context; 0: it decides
 };
 
-/// In the order "auto" tries them.
+/// The names of all backends, in the order in which "auto" tries them.
 [[nodiscard]] std::vector<std::string> all_gl_backends();
 
 /// Throws Error (Usage), with the choices, unless `backend` is "auto" or one of all_gl_backends().

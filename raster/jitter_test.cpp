@@ -71,7 +71,7 @@ std::size_t differing_pixels(const Image<Key>& keys, const std::vector<Corners>&
   return differing;
 }
 
-TEST_P(JitterTest, TheKeysOfAJitteredViewAreThoseOfRaysThroughTheJitteredPlaces) {
+TEST_P(JitterTest, TheKeysOfAJitteredViewAreThoseOfRaysThroughTheJitteredPositions) {
   const auto context = make_gl_context({.backend = GetParam()});
   Scene scene;
   scene.meshes = {soup(400, 7), waves(12)};

@@ -18,7 +18,7 @@ struct Rows {
   const std::uint32_t* words;
   Rect pixels;
 
-  /// Of pixel (x, y) of the screen.
+  /// The index of pixel (x, y) of the screen.
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(pixels.y1 - 1 - y) * static_cast<std::size_t>(pixels.width()) +
            static_cast<std::size_t>(x - pixels.x0);

@@ -64,7 +64,8 @@ void upload(const GlFunctions& gl, const GlObject& buffer, const std::vector<T>&
   gl.NamedBufferData(buffer.name(), static_cast<GLsizeiptr>(data.size() * sizeof(T)), data.data(), usage);
 }
 
-/// In [-1, 1), the same on every machine: a 32-bit linear congruential generator (Numerical Recipes) and exact steps.
+/// A random number in [-1, 1), equal on every machine: a 32-bit linear congruential generator (Numerical Recipes) and
+/// exact steps.
 float next(std::uint32_t& state) {
   state = state * 1664525U + 1013904223U;
   return static_cast<float>(state >> 8U) / 8388608.0F - 1.0F;

@@ -14,7 +14,7 @@
 
 namespace hpr {
 
-/// Of the last draw().
+/// Counts and times of the last draw().
 struct RasterStats {
   std::uint64_t triangles_drawn = 0;  ///< sent to GL, summed over the parts
   std::uint64_t triangles_culled = 0;

@@ -151,7 +151,7 @@ TEST_P(RasterizerTest, PartsOfTheScreenHaveTheKeysOfTheWhole) {
   }
 }
 
-TEST_P(RasterizerTest, SharesMergedByMaximumHaveTheKeysOfTheWhole) {
+TEST_P(RasterizerTest, PartsMergedByMaximumHaveTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = perspective_view({257, 190});
   const Image<Key> whole = draw_all(*context_, scene, view);

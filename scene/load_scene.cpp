@@ -55,7 +55,7 @@ SceneImporter importer_for(const std::string& source) {
   return found == importers.end() ? importers.front() : *found;
 }
 
-constexpr float kBrightest = 1e12F;  ///< radiance a user may ask for
+constexpr float kMaxRadiance = 1e12F;  ///< radiance a user may ask for
 constexpr float kMaxHalf = 65504.0F;
 
 /// Three numbers with commas between; none for anything else.
@@ -115,7 +115,7 @@ std::vector<std::filesystem::path> files_of_scene(const std::string& source, con
 Environment load_environment(const std::string& text, const ImageLimits& limits) {
   if (const auto numbers = three_numbers(text)) {
     for (const float radiance : *numbers) {
-      if (radiance >= 0.0F && radiance <= kBrightest) continue;
+      if (radiance >= 0.0F && radiance <= kMaxRadiance) continue;
       throw Error(ExitCode::Usage, fmt::format("an environment of radiance {}", printable(text)),
                   "give three numbers from 0 to 1e12");
     }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kBlockSide = 16;
 /// The tangent of 85 degrees.
-constexpr double kSteepest = 11.430052302761343;
+constexpr double kMaxTangent = 11.430052302761343;
 
 /// A position between two neighbours: `part` of the distance from the first to the second.
 struct Between {
@@ -95,7 +95,7 @@ std::optional<glm::dvec2> PixelPoints::seen(const glm::dvec3& point) const {
   const glm::dvec2 aside(inside);
   if (orthographic) return aside * scale;
   const double ahead = -inside.z;
-  if (!(ahead > 0.0) || !(glm::dot(aside, aside) <= kSteepest * kSteepest * ahead * ahead)) return std::nullopt;
+  if (!(ahead > 0.0) || !(glm::dot(aside, aside) <= kMaxTangent * kMaxTangent * ahead * ahead)) return std::nullopt;
   return aside / ahead;
 }
 

@@ -26,9 +26,9 @@ class PositionMap {
   [[nodiscard]] Size size() const { return points_.size(); }
   [[nodiscard]] const Image<glm::vec3>& points() const { return points_; }
 
-  /// At (s, t) of the screen, from its upper left corner (0, 0) to its lower right one (1, 1): bilinear between the
-  /// points, which lie at the centers of equal cells, and straight on beyond the outermost. None where a point it needs
-  /// is not finite.
+  /// The point at (s, t) of the screen, from its upper left corner (0, 0) to its lower right one (1, 1): bilinear
+  /// between the points, which lie at the centers of equal cells, and straight on beyond the outermost. None where a
+  /// point it needs is not finite.
   [[nodiscard]] std::optional<glm::dvec3> at(double s, double t) const;
 
   /// A part of the map, with what its points fill.

@@ -184,7 +184,7 @@ TEST(Requirements, RoughPlasticScattersWhateverItsColour) {
   EXPECT_TRUE(requirements_of(scene_of(black, {Light{}})).indirect.needed) << "metals reflect at grazing angles";
 }
 
-TEST(Requirements, ATexelWithoutMetalIsMatte) {
+TEST(Requirements, ATexelWithoutMetalIsDiffuse) {
   Material metal = rough(0.1F);
   metal.metallic = 1.0F;
   Scene scene = scene_of(metal, {Light{}});

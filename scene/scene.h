@@ -111,7 +111,7 @@ struct Light {
   /// Metres. Point and spot lights with a radius are spheres of uniform radiance, intensity / (pi radius^2); extras
   /// `radius`.
   double radius = 0.0;
-  /// Of the disc in the sky a directional light comes from, up to pi/2; extras `angularRadius`.
+  /// The angular radius of the disc in the sky that a directional light comes from, up to pi/2; extras `angularRadius`.
   float angular_radius_radians = 0.0F;
 };
 

@@ -20,7 +20,7 @@ double near_plane(const PerspectiveLens& lens, const Bounds& bounds) {
 }
 
 /// What (x, y) of the view looks through, on the plane its edges are on.
-glm::dvec2 looked_through(const View& view, double x, double y) {
+glm::dvec2 screen_position(const View& view, double x, double y) {
   const auto fraction = [&](const glm::dvec2& jitter) {
     return glm::dvec2((view.block.x0 + x + jitter.x) / view.screen.width,
                       (view.block.y0 + y + jitter.y) / view.screen.height);
@@ -37,7 +37,7 @@ glm::dvec2 looked_through(const View& view, double x, double y) {
 }  // namespace
 
 Ray view_ray(const View& view, double x, double y) {
-  const glm::dvec2 position = looked_through(view, x, y);
+  const glm::dvec2 position = screen_position(view, x, y);
   if (view.orthographic) return {view.eye + view.axes * glm::dvec3(position, 0.0), -view.axes[2]};
   return {view.eye, view.axes * glm::dvec3(position, -1.0)};
 }
@@ -67,9 +67,9 @@ glm::dmat4 clip_from_world(const View& view, const glm::dvec3& origin) {
     clip_from_eye[2][3] = -1.0;
   }
   const glm::dmat3 eye_from_world = glm::transpose(view.axes);
-  glm::dmat4 look(eye_from_world);
-  look[3] = glm::dvec4(eye_from_world * (origin - view.eye), 1.0);
-  return clip_from_eye * look;
+  glm::dmat4 eye_from_origin(eye_from_world);
+  eye_from_origin[3] = glm::dvec4(eye_from_world * (origin - view.eye), 1.0);
+  return clip_from_eye * eye_from_origin;
 }
 
 double reversed_depth(const View& view, double distance) {

@@ -102,7 +102,7 @@ TEST(View, BlocksAreThePixelsOfTheWholeAndTheirRaysAreTheSameBits) {
   }
 }
 
-TEST(View, AJitteredViewLooksThroughOtherPlacesOfTheSamePixels) {
+TEST(View, AJitteredViewSamplesOtherPositionsOfTheSamePixels) {
   for (const bool orthographic : {false, true}) {
     const View plain = turned_view(orthographic);
     View jittered = plain;

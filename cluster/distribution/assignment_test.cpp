@@ -127,7 +127,7 @@ std::uint32_t triangles_in(const std::vector<SurfaceRange>& part) {
                          [](std::uint32_t sum, const SurfaceRange& range) { return sum + range.count(); });
 }
 
-TEST(PartitionObjects, EverySurfaceLiesInExactlyOneShareAndSharesAreBalancedToAChunk) {
+TEST(PartitionObjects, EverySurfaceLiesInExactlyOnePartAndPartsAreBalancedToAChunk) {
   for (const auto& sizes :
        std::vector<std::vector<std::uint32_t>>{{}, {0}, {1}, {3, 0, 1}, {1000, 1, 40}, {5, 5, 700, 3000}}) {
     const Scene scene = strewn(sizes);
@@ -145,7 +145,7 @@ TEST(PartitionObjects, EverySurfaceLiesInExactlyOneShareAndSharesAreBalancedToAC
   }
 }
 
-TEST(PartitionObjects, SharesAreSpatiallyCoherent) {
+TEST(PartitionObjects, PartsAreSpatiallyCoherent) {
   Scene scene = strewn({400});
   scene.instances[1].to_world[3] = {1000, 0, 0, 1};
   finish_scene(scene);
@@ -154,7 +154,7 @@ TEST(PartitionObjects, SharesAreSpatiallyCoherent) {
   EXPECT_EQ(partition[1], (std::vector<SurfaceRange>{{400, 800}}));
 }
 
-TEST(PartitionObjects, TrianglesOfOnePlaceAreStillDealtOut) {
+TEST(PartitionObjects, TrianglesOfOnePositionAreStillDistributed) {
   Scene scene;
   Mesh mesh;
   mesh.positions = {{0, 0, 0}};

@@ -30,7 +30,7 @@ void barrier(Communicator& comm);
 /// 1997; each part brings its size along.
 [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes);
 
-/// Per rank the first rank of the host it shares `memory` with.
+/// For each rank, the first rank of the host with which it shares `memory`.
 [[nodiscard]] std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory);
 
 /// Each rank's value, in order of rank, on every rank.

@@ -211,7 +211,7 @@ TEST(LocalRanksDeathTest, APeerThatDoesNotExistBreaksTheContract) {
   EXPECT_DEATH(run_local_ranks(1, [](Communicator& comm) { (void)comm.receive(-1); }), "broken contract");
 }
 
-TEST(LocalRanks, AnExchangeOfManyTakesEachMessageWithItsBodies) {
+TEST(LocalRanks, AnExchangeOfManyReceivesEachMessageWithItsSegments) {
   for (const std::uint64_t disorder : {0U, 1U, 2U}) {
     run_local_ranks({.size = 5, .disorder = disorder}, [](Communicator& comm) {
       for (int round = 0; round < 20; ++round) {

@@ -37,7 +37,7 @@ class ForwardingCommunicator : public Communicator {
   void worked(std::size_t bytes) override { inner_->worked(bytes); }
 
  protected:
-  /// Of a communicator it owns.
+  /// Forwards to a communicator that this object owns.
   explicit ForwardingCommunicator(std::unique_ptr<Communicator> inner)
       : owned_(std::move(inner)), inner_(owned_.get()) {}
   [[nodiscard]] Communicator& inner() { return *inner_; }

@@ -103,7 +103,7 @@ class WindowMemory final : public PeerMemory {
   }
 
  private:
-  /// At the start of each part; that of the host's first rank is used.
+  /// A barrier's counters, at the start of each part; those of the host's first rank are used.
   struct alignas(64) Meeting {
     std::uint32_t here;
     std::uint32_t round;

@@ -38,7 +38,7 @@ TEST(RecordingCommunicator, AMessageIsInTheFirstRoundBothItsRanksHaveGotTo) {
   EXPECT_EQ(schedule.transfers, (std::vector<Transfer>{{0, 1, 0, 3, false}, {1, 2, 0, 2, false}}));
 }
 
-TEST(RecordingCommunicator, AnExchangeIsOneRoundAndItsBodiesBelongToTheirMessage) {
+TEST(RecordingCommunicator, AnExchangeIsOneRoundAndItsSegmentsBelongToTheirMessage) {
   const Schedule schedule = record({.size = 4, .disorder = 3}, [](Communicator& comm) {
     for (const int distance : {1, 2}) {
       const int peer = comm.rank() ^ distance;
@@ -108,7 +108,7 @@ TEST(RecordingCommunicator, AReductionIsWhatEveryOtherRankGivesAway) {
   EXPECT_EQ(schedule.transfers, (std::vector<Transfer>{{0, 0, 1, 32, true}, {0, 2, 1, 32, true}}));
 }
 
-TEST(RecordingCommunicator, TakenDeedsAreNotToldAgain) {
+TEST(RecordingCommunicator, TakenEventsAreNotReturnedAgain) {
   run_local_ranks(2, [](Communicator& inner) {
     RecordingCommunicator comm(inner);
     const auto talk = [&] {

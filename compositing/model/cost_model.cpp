@@ -51,7 +51,7 @@ class Probe {
     const double scattered = scatter();
     const double packed = seconds([&] { move(is_last, 0, is_first, last, true); }) / scattered;
     costs.packing_byte = std::max(0.0, packed - costs.pull_byte);
-    look_at_hosts(costs, bytes);
+    measure_hosts(costs, bytes);
     return costs;
   }
 
@@ -95,7 +95,7 @@ class Probe {
     return static_cast<double>(tiles_.size()) * (kTileBytes / 2.0 + sizeof(TileMask));
   }
 
-  void look_at_hosts(Costs& costs, double bytes) {
+  void measure_hosts(Costs& costs, double bytes) {
     try {
       const auto meeting = comm_.share(1);
       std::vector<int> hosts = hosts_of(comm_, *meeting);
@@ -170,7 +170,7 @@ Load share_load(Communicator& comm, const TileLayer<Key>& layer, std::span<const
   } mine;
   for (const std::size_t tile : tiles) {
     if (!layer.active(tile)) continue;
-    const double fraction = sampled_share<Key>(layer.tile(tile));
+    const double fraction = sampled_fraction<Key>(layer.tile(tile));
     const bool packs = fraction * kTilePixels <= kMaxPackedPixels;
     (packs ? mine.packed : mine.whole) += kTileBytes * (packs ? fraction + 1.0 / 64.0 : 1.0);
   }
@@ -185,7 +185,7 @@ Load share_load(Communicator& comm, const TileLayer<Key>& layer, std::span<const
   load.ranks = comm.size();
   load.frame = kTileBytes * static_cast<double>(tiles.size());
   load.mean_layer = (all.whole + all.packed) / comm.size();
-  load.packed_share = load.mean_layer > 0.0 ? all.packed / (all.whole + all.packed) : 0.0;
+  load.packed_fraction = load.mean_layer > 0.0 ? all.packed / (all.whole + all.packed) : 0.0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     load.drawn_tiles += kTileBytes * activity.weight(i);
     if (activity.weight(i) > 0) load.area += kTileBytes;

@@ -41,11 +41,11 @@ struct Costs {
 /// What a frame's layers hold, in bytes as they travel. The same on every rank.
 struct Load {
   int ranks = 1;
-  double frame = 0.0;         ///< all tiles of the list, whole
-  double mean_layer = 0.0;    ///< of a rank's layer, as it travels
-  double packed_share = 0.0;  ///< of those bytes
-  double drawn_tiles = 0.0;   ///< of all ranks' active tiles, whole
-  double area = 0.0;          ///< tiles any rank has drawn into, whole
+  double frame = 0.0;            ///< all tiles of the list, whole
+  double mean_layer = 0.0;       ///< of a rank's layer, as it travels
+  double packed_fraction = 0.0;  ///< of those bytes
+  double drawn_tiles = 0.0;      ///< of all ranks' active tiles, whole
+  double area = 0.0;             ///< tiles any rank has drawn into, whole
 
   /// What is drawn after so many layers were merged, if they cover the area independently of each other.
   [[nodiscard]] double merged(double layers) const;
@@ -59,7 +59,7 @@ struct Prediction {
   double composite = 0.0;
   bool spread = true;  ///< pieces end up on all ranks, else the frame on one
 
-  /// To have the whole frame on one rank.
+  /// The time until the whole frame is on one rank.
   [[nodiscard]] double collected(const Costs& costs, const Load& load) const;
 };
 

@@ -6,7 +6,7 @@
 namespace hpr {
 namespace {
 
-constexpr int kFramesBetweenLooks = 16;
+constexpr int kFramesBetweenChoices = 16;
 
 /// The strategy that predicts the least time for these ranks and this load. On one host that is shared-memory, which
 /// reads every pixel once and sends none. Between hosts, and where a host has too little shared memory, the machine is
@@ -44,7 +44,7 @@ class Auto final : public Compositor {
       all_in_place_ = in_place && shared_by_all(*layer.peers(), comm.size());
       if (!all_in_place_) costs_ = measure_costs(comm);
     }
-    if (!is_new && (all_in_place_ || ++frames_ < kFramesBetweenLooks)) return;
+    if (!is_new && (all_in_place_ || ++frames_ < kFramesBetweenChoices)) return;
     frames_ = 0;
     const std::string name = all_in_place_ ? "shared-memory" : cheapest_for(comm, layer, tiles, collects);
     auto same = std::ranges::find(used_, name, [](const auto& compositor) { return compositor->name(); });
@@ -55,7 +55,7 @@ class Auto final : public Compositor {
   [[nodiscard]] std::string cheapest_for(Communicator& comm, const TileLayer<Key>& layer,
                                          std::span<const std::size_t> tiles, bool collects) const {
     const Load load = share_load(comm, layer, tiles);
-    return cheapest_compositor(costs_.with_packed(load.packed_share), load, collects, in_place_);
+    return cheapest_compositor(costs_.with_packed(load.packed_fraction), load, collects, in_place_);
   }
 
   Communicator* comm_ = nullptr;  ///< that the costs are of

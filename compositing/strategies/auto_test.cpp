@@ -40,7 +40,7 @@ Load load_of(int ranks, double drawn) {
   return {.ranks = ranks,
           .frame = kFrame,
           .mean_layer = drawn * kFrame,
-          .packed_share = 0.0,
+          .packed_fraction = 0.0,
           .drawn_tiles = drawn * kFrame * ranks,
           .area = kFrame * std::min(1.0, drawn * ranks)};
 }
@@ -65,7 +65,7 @@ TEST(Auto, SharedMemoryIsReckonedWithHoweverQuickItIs) {
   EXPECT_FALSE(make_compositor("shared-memory")->predict(costs, load));
 }
 
-TEST(Auto, TakesWhatPredictsTheLeast) {
+TEST(Auto, ChoosesWhatPredictsTheLeast) {
   std::vector<std::string> chosen;
   for (const Costs& costs : machines()) {
     for (const double drawn : {0.01, 0.5, 1.0}) {
@@ -90,7 +90,7 @@ TEST(Auto, TakesWhatPredictsTheLeast) {
   EXPECT_GE(chosen.size(), 4U) << "no strategy is best everywhere";
 }
 
-TEST(Auto, LooksAgainAsTheLoadChanges) {
+TEST(Auto, ChoosesAgainAsTheLoadChanges) {
   const SimulatedCluster cluster{.hosts = 4, .ranks = 4, .latency = 200e-6, .bandwidth = 1e9};
   const Size frame{1024, 512};
   std::vector<std::string> chosen;

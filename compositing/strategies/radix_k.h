@@ -44,7 +44,7 @@ class SwapRounds {
 template <typename Pixel>
 class RadixK {
  public:
-  /// With the factors chosen for the number of ranks.
+  /// Chooses the factors for the number of ranks.
   RadixK() = default;
   /// "radix-k", or "radix-k:4,2", which fits 8 ranks only. Throws Error (Usage) when what follows the colon is not a
   /// list of factors of 2 or more.

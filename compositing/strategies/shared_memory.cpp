@@ -67,7 +67,7 @@ class HostRanks {
 
   /// Starts a frame, after a barrier all ranks of the host came through.
   void start_frame() {
-    took_share_ = false;
+    took_part_ = false;
     turn_ = (turn_ + 1) % control_of_host_->next.size();
     // The counter of the coming frame: nobody uses it before the next barrier, nor after the last one.
     counter((turn_ + 1) % control_of_host_->next.size()).store(0, std::memory_order_relaxed);
@@ -77,7 +77,7 @@ class HostRanks {
     const std::size_t tiles = activity.tiles();
     if (comm_.models_time()) {
       const auto number = static_cast<std::size_t>(std::ranges::find(ranks_, comm_.rank()) - ranks_.begin());
-      if (std::exchange(took_share_, true)) return {tiles, 0};
+      if (std::exchange(took_part_, true)) return {tiles, 0};
       return activity.cut({0, tiles}, static_cast<int>(ranks_.size()))[number];
     }
     const std::size_t first = counter(turn_).fetch_add(kTilesATurn, std::memory_order_relaxed);
@@ -107,12 +107,12 @@ class HostRanks {
   std::vector<int> column_ranks_;
   std::unique_ptr<Communicator> column_;
   std::size_t turn_ = 0;
-  bool took_share_ = false;
+  bool took_part_ = false;
 };
 
 /// Which tiles the ranks of this host have drawn into.
 template <typename Pixel>
-Activity look_at(std::span<const TileLayer<Pixel>> layers, std::span<const std::size_t> tiles) {
+Activity activity_of(std::span<const TileLayer<Pixel>> layers, std::span<const std::size_t> tiles) {
   std::vector<std::uint64_t> fills;
   for (const TileLayer<Pixel>& layer : layers) {
     // Work on a host goes to who is free: counting pixels would buy nothing.
@@ -254,7 +254,7 @@ Composited SharedMemorySchedule<Pixel>::merge_on_host(Communicator& comm, TileLa
 
   host_->meet();  // all layers are drawn
   host_->start_frame();
-  const Activity here = look_at<Pixel>(layers, tiles);
+  const Activity here = activity_of<Pixel>(layers, tiles);
   const bool straight = host_->alone() && !shown_by.empty();
   std::vector<std::size_t> owners;  // per position, as an index of a layer
   if (straight) {
@@ -303,8 +303,8 @@ Composited SharedMemorySchedule<Pixel>::merge_between_hosts(TileLayer<Pixel>& sh
 /// where they are shown when that rank is on this host. Between hosts, the ranks of like number on each host then
 /// composite what they own by radix-k: two levels, each as fast as its medium.
 ///
-/// In place when the layers of all ranks live in the memory of `comm`'s share(); else, also on all ranks, through a
-/// copy that does.
+/// Composites in place when the layers of all ranks live in the memory of `comm`'s share(); else, also on all ranks,
+/// through a copy that does.
 ///
 /// Cost on one host: two barriers; every drawn tile is read once and every tile of the result written once, shared
 /// among the ranks as they find time, so that ranks that wait for a core hold nobody up.

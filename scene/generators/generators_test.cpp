@@ -102,7 +102,7 @@ TEST(Generated, SizesComeNearTheTrianglesAskedFor) {
   EXPECT_TRUE(options_for_triangles(find_generator("cornell"), 70'000).empty());
 }
 
-TEST(Sphereflake, HasTheSpheresAndFirstPlacesOfItsDescription) {
+TEST(Sphereflake, HasTheSpheresAndFirstPositionsOfItsDescription) {
   std::size_t count = 1;
   for (int size = 0; size <= 4; ++size, count = 9 * count + 1) EXPECT_EQ(sphereflake(size).size(), count);
 

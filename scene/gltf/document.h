@@ -15,7 +15,7 @@
 namespace hpr {
 
 inline constexpr std::string_view kRepairHint = "repair the file";
-/// For files whose meshes are compressed (Draco, meshopt): what writes the same scene uncompressed.
+/// The hint for files whose meshes are compressed (Draco, meshopt): a program that writes the scene uncompressed.
 inline constexpr std::string_view kDecompressHint =
     "decompress it: npx @gltf-transform/cli copy IN.glb OUT.glb, or export it without compression";
 

@@ -256,20 +256,20 @@ tinygltf::Model parse_model(Json root, const GltfContext& context) {
 }
 
 /// The largest coordinate a mesh reaches in the world, or infinity.
-double reach(const glm::dmat4& to_world, const glm::dvec3& largest) {
+double max_coordinate(const glm::dmat4& to_world, const glm::dvec3& max_abs) {
   double most = 0.0;
   for (int row = 0; row < 3; ++row) {
-    const double sum = std::abs(to_world[0][row]) * largest.x + std::abs(to_world[1][row]) * largest.y +
-                       std::abs(to_world[2][row]) * largest.z + std::abs(to_world[3][row]);
+    const double sum = std::abs(to_world[0][row]) * max_abs.x + std::abs(to_world[1][row]) * max_abs.y +
+                       std::abs(to_world[2][row]) * max_abs.z + std::abs(to_world[3][row]);
     most = std::max(most, std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity());
   }
   return most;
 }
 
-glm::dvec3 largest_coordinates(const Mesh& mesh) {
-  glm::dvec3 largest(0.0);
-  for (const glm::vec3& p : mesh.positions) largest = glm::max(largest, glm::abs(glm::dvec3(p)));
-  return largest;
+glm::dvec3 max_abs_coordinates(const Mesh& mesh) {
+  glm::dvec3 max_abs(0.0);
+  for (const glm::vec3& p : mesh.positions) max_abs = glm::max(max_abs, glm::abs(glm::dvec3(p)));
+  return max_abs;
 }
 
 /// Fills a scene from a checked document.
@@ -322,7 +322,7 @@ class SceneBuilder {
         Instance instance{mesh, to_world * copy, 0};
         // Squares of coordinates must stay finite in single precision, and ray tracers refuse more than 1.8e19.
         constexpr double kMaxCoordinate = 1e18;
-        if (reach(instance.to_world, largest_[mesh]) > kMaxCoordinate) {
+        if (max_coordinate(instance.to_world, max_abs_[mesh]) > kMaxCoordinate) {
           context().warn(fmt::format("nodes[{}]", node), "reaches beyond 1e18 metres and is left out");
           continue;
         }
@@ -354,7 +354,7 @@ class SceneBuilder {
       check_texture_coordinates(*mesh, where);
       mesh->name = from.primitives.size() > 1 ? fmt::format("{}.{}", from.name, p) : from.name;
       made.push_back(static_cast<std::uint32_t>(scene_.meshes.size()));
-      largest_.push_back(largest_coordinates(*mesh));
+      max_abs_.push_back(max_abs_coordinates(*mesh));
       scene_.meshes.push_back(*std::move(mesh));
     }
     return meshes_.emplace(std::move(key), std::move(made)).first->second;
@@ -389,7 +389,7 @@ class SceneBuilder {
   Scene& scene_;
   GltfNodes nodes_;
   std::map<PoseKey, std::vector<std::uint32_t>> meshes_;
-  std::vector<glm::dvec3> largest_;  ///< per mesh of the scene
+  std::vector<glm::dvec3> max_abs_;  ///< per mesh of the scene
   std::uint32_t default_material_ = 0;
   std::size_t singular_ = 0;
 };

@@ -48,7 +48,7 @@ test::Document with_floats(const char* name, const char* type, const std::vector
   return document;
 }
 
-TEST(GltfMaterial, MapsOfDetailKeepTheirStrengthAndPlace) {
+TEST(GltfMaterial, MapsOfDetailKeepTheirStrengthAndPosition) {
   const Material material = material_of(R"({
     "normalTexture": {"index": 0, "texCoord": 1, "scale": -0.5,
                       "extensions": {"KHR_texture_transform": {"scale": [2, 3], "texCoord": 0}}},

@@ -422,7 +422,7 @@ class PrimitiveBuilder {
     check_positions(mesh.positions);
   }
 
-  /// Of a triangle without area: any.
+  /// The unit normal of a triangle; any direction where it has no area.
   [[nodiscard]] static glm::vec3 flat_normal(const Mesh& mesh, const glm::uvec3& triangle) {
     const glm::dvec3 v0(mesh.positions[triangle.x]);
     const glm::dvec3 cross =

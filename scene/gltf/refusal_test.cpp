@@ -111,7 +111,7 @@ TEST(GltfRefusal, UnknownRequiredExtensionsAreNamed) {
   expect_refused(document.json, "XYZ_unheard_of");
 }
 
-TEST(GltfRefusal, MaterialsTellOfExtensionsThatAreNotDrawnDeclaredOrNot) {
+TEST(GltfRefusal, MaterialsWarnOfExtensionsThatAreNotDrawnDeclaredOrNot) {
   auto document = triangle();
   document.json["materials"].push_back({{"extensions", {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}}}}});
   document.json["materials"].push_back(document.json["materials"][0]);

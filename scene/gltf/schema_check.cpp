@@ -18,7 +18,7 @@ namespace {
 constexpr auto kRequired = Presence::Required;
 constexpr auto kOptional = Presence::Optional;
 /// Radiance, intensity and the like are held to what sums and squares of single precision can carry.
-constexpr double kBrightest = 1e12;
+constexpr double kMaxIntensity = 1e12;
 constexpr double kMaxRadius = 1e12;  // of a light, metres
 
 void check_asset(const GltfItem& root) {
@@ -221,7 +221,7 @@ void check_textures(const GltfItem& root) {
 
 void check_material_extensions(const GltfItem& extensions) {
   if (const auto emissive = extensions.object("KHR_materials_emissive_strength")) {
-    emissive->clamped("emissiveStrength", 0.0, kBrightest);
+    emissive->clamped("emissiveStrength", 0.0, kMaxIntensity);
   }
   if (const auto transmission = extensions.object("KHR_materials_transmission")) {
     transmission->clamped("transmissionFactor", 0.0, 1.0);
@@ -344,8 +344,8 @@ void check_lights(const GltfItem& root) {
     if (*type != "point" && *type != "directional" && *type != "spot") {
       light.fail("type", fmt::format("is \"{}\"; point, directional and spot are known", printable(*type)));
     }
-    light.numbers("color", 3, 0.0, kBrightest);
-    light.clamped("intensity", 0.0, kBrightest);
+    light.numbers("color", 3, 0.0, kMaxIntensity);
+    light.clamped("intensity", 0.0, kMaxIntensity);
     const auto range = light.number("range");
     if (range && *range <= 0.0) {
       light.warn("range", fmt::format("is {}; taken as unbounded", *range));
@@ -392,7 +392,7 @@ constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
-constexpr std::array<std::string_view, 10> kLooks{
+constexpr std::array<std::string_view, 10> kAppearanceOnly{
     "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion", "KHR_materials_iridescence", kStandsIn,
     "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_variants",
@@ -441,7 +441,7 @@ void check_extensions(Json& document, GltfContext& context) {
       root.warn("extensionsRequired", fmt::format("{} is not among extensionsUsed", printable(name)));
     }
     if (contains(kSupported, name)) continue;
-    if (contains(kLooks, name)) {
+    if (contains(kAppearanceOnly, name)) {
       root.warn("extensionsRequired", fmt::format("{} is not supported; surfaces may look different", name));
       continue;
     }

@@ -142,7 +142,7 @@ CompareResult compare_strategies(Communicator& comm, const CompareInput& input, 
   Assembler assembler;
   const Load load = share_load(comm, pristine, tiles);
   const Costs costs =
-      measure_costs(comm, std::clamp<std::size_t>(tiles.size(), 1, kMostProbeTiles)).with_packed(load.packed_share);
+      measure_costs(comm, std::clamp<std::size_t>(tiles.size(), 1, kMostProbeTiles)).with_packed(load.packed_fraction);
 
   for (int frame = -settings.warmup; frame < settings.frames; ++frame) {
     for (Contestant& contestant : contestants) {
