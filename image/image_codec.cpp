@@ -14,23 +14,6 @@
 namespace hpr {
 namespace {
 
-std::vector<std::byte> encode(const char* format, const OIIO::ImageSpec& spec, const void* pixels) {
-  std::vector<unsigned char> file;
-  OIIO::Filesystem::IOVecOutput memory(file);
-  const auto output = OIIO::ImageOutput::create(format, &memory);
-  if (!output)
-    throw Error(ExitCode::Internal, fmt::format("OpenImageIO cannot write {}", format), "reinstall libopenimageio2.4");
-  // On some formats only has_error() knows that a write failed although every call returned true.
-  const OIIO::TypeDesc type = spec.channelformats.empty() ? spec.format : OIIO::TypeDesc(OIIO::TypeDesc::UNKNOWN);
-  const bool done = output->open(std::string("memory.") + format, spec) && output->write_image(type, pixels) &&
-                    output->close() && !output->has_error();
-  if (!done)
-    throw Error(ExitCode::Io, fmt::format("cannot encode {}: {}", format, output->geterror()),
-                "check the picture's size");
-  const auto bytes = std::as_bytes(std::span(file));
-  return {bytes.begin(), bytes.end()};
-}
-
 /// The format the first bytes tell; file names and MIME types may lie.
 const char* sniff(std::span<const std::byte> bytes) {
   constexpr std::array<unsigned char, 8> kPng{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
@@ -121,51 +104,6 @@ class Input {
 class OiioCodec final : public ImageCodec {
  public:
   OiioCodec() { OIIO::attribute("threads", 1); }
-
-  [[nodiscard]] std::vector<std::byte> encode_png(const Image<Rgba8>& image) const override {
-    OIIO::ImageSpec spec(image.width(), image.height(), 4, OIIO::TypeDesc::UINT8);
-    spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("oiio:UnassociatedAlpha", 1);
-    spec.attribute("png:compressionLevel", 3);  // half the time of 6 for 5 % more bytes
-    return encode("png", spec, image.pixels().data());
-  }
-
-  [[nodiscard]] std::vector<std::byte> encode_exr(const Image<Rgb>& image,
-                                                  const std::map<std::string, std::string>& attributes,
-                                                  std::span<const ExrLayer> layers) const override {
-    OIIO::ImageSpec spec(image.width(), image.height(), 3, OIIO::TypeDesc::FLOAT);
-    spec.channelnames = {"R", "G", "B"};
-    for (const ExrLayer& layer : layers) {
-      spec.channelnames.insert(spec.channelnames.end(), layer.channels.begin(), layer.channels.end());
-    }
-    spec.nchannels = static_cast<int>(spec.channelnames.size());
-    spec.attribute("compression", "zip");
-    spec.attribute("DateTime", "1970:01:01 00:00:00");  // the same picture is the same file, whenever it is written
-    for (const auto& [key, value] : attributes) spec.attribute(key, value);
-
-    // Every channel has four bytes: they are laid side by side as words, whatever they mean.
-    const auto channels = static_cast<std::size_t>(spec.nchannels);
-    std::vector<std::uint32_t> words(image.pixels().size() * channels);
-    const auto lay = [&](std::size_t first, std::size_t count, const auto* values) {
-      for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-        std::memcpy(&words[i * channels + first], values + i * count, count * sizeof(std::uint32_t));
-      }
-    };
-    lay(0, 3, reinterpret_cast<const float*>(image.pixels().data()));
-    std::size_t first = 3;
-    for (const ExrLayer& layer : layers) {
-      const std::size_t count = layer.channels.size();
-      if (layer.integers.empty()) {
-        lay(first, count, layer.values.data());
-      } else {
-        lay(first, count, layer.integers.data());
-        spec.channelformats.resize(channels, OIIO::TypeDesc::FLOAT);
-        std::fill_n(spec.channelformats.begin() + static_cast<std::ptrdiff_t>(first), count, OIIO::TypeDesc::UINT);
-      }
-      first += count;
-    }
-    return encode("exr", spec, words.data());
-  }
 
   [[nodiscard]] Image<Rgba8> decode(std::span<const std::byte> bytes, const std::string& name,
                                     const ImageLimits& limits) const override {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 
 #include "image/image_io.h"
@@ -13,10 +12,6 @@ class ImageCodec {
  public:
   virtual ~ImageCodec() = default;
 
-  [[nodiscard]] virtual std::vector<std::byte> encode_png(const Image<Rgba8>& image) const = 0;
-  [[nodiscard]] virtual std::vector<std::byte> encode_exr(const Image<Rgb>& image,
-                                                          const std::map<std::string, std::string>& attributes,
-                                                          std::span<const ExrLayer> layers) const = 0;
   [[nodiscard]] virtual Image<Rgba8> decode(std::span<const std::byte> bytes, const std::string& name,
                                             const ImageLimits& limits) const = 0;
   [[nodiscard]] virtual FloatImage decode_float(std::span<const std::byte> bytes, const std::string& name,

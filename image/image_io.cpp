@@ -54,19 +54,6 @@ void check_size(Size size, const ImageLimits& limits) {
               "draw a smaller one, or raise --limit-image");
 }
 
-std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
-  return codec().encode_png(image);
-}
-
-std::vector<std::byte> encode_exr(const Image<Rgb>& image, const std::map<std::string, std::string>& attributes,
-                                  std::span<const ExrLayer> layers) {
-  for (const ExrLayer& layer : layers) {
-    HPR_CHECK(layer.values.empty() || layer.integers.empty());
-    HPR_CHECK(layer.values.size() + layer.integers.size() == image.pixels().size() * layer.channels.size());
-  }
-  return codec().encode_exr(image, attributes, layers);
-}
-
 Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
   return codec().decode(bytes, name, limits);
 }

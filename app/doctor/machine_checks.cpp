@@ -148,7 +148,7 @@ Finding check_image_module() {
   if (decode_image(encode_png(image), "a test picture", {}) != image) {
     return {{},
             FindingStatus::Fail,
-            "OpenImageIO does not return the pixels it wrote",
+            "OpenImageIO does not return the pixels of a PNG picture",
             "apt-get install --reinstall libopenimageio2.4"};
   }
   return ok(fmt::format("OpenImageIO opens in {:.0f} ms", watch.ms()));
