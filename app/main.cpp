@@ -15,8 +15,7 @@
 #include <thread>
 
 #include "app/command.h"
-#include "app/report_error.h"
-#include "app/trace_file.h"
+#include "app/results.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -90,7 +89,7 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   // So does a file that may not grow further.
   std::signal(SIGXFSZ, SIG_IGN);
-  // What a checkpoint is asked for by is nothing to commands that write none (engine/signals.h).
+  // What a checkpoint is asked for by is nothing to commands that write none (core/signals.h).
   for (const int request : {SIGUSR1, SIGUSR2}) std::signal(request, SIG_IGN);
   // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {

@@ -40,4 +40,10 @@ namespace hpr {
 /// "1920x1080": two positive integers.
 [[nodiscard]] std::optional<std::pair<int, int>> parse_extent(std::string_view text);
 
+/// One word of a POSIX shell that stands for `text`, in single quotes.
+[[nodiscard]] std::string shell_quote(std::string_view text);
+
+/// A command line of these words; quoted are those that a shell would not take as they are.
+[[nodiscard]] std::string shell_line(std::span<const std::string> words);
+
 }  // namespace hpr

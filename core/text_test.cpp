@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <vector>
 
 namespace hpr {
@@ -130,6 +131,12 @@ TEST(Units, ExtentsAreTwoPositiveIntegers) {
                            "99999999999x1", "1x99999999999"}) {
     EXPECT_EQ(parse_extent(text), std::nullopt) << text;
   }
+}
+
+TEST(ShellLine, QuotesWhatAShellWouldTakeApart) {
+  const std::array<std::string, 6> words{"hpr", "render", "my scene.glb", "--environment=1,1,1", "gen:rods?n=3", ""};
+  EXPECT_EQ(shell_line(words), "hpr render 'my scene.glb' --environment=1,1,1 'gen:rods?n=3' ''");
+  EXPECT_EQ(shell_quote("it's"), R"('it'\''s')");
 }
 
 }  // namespace

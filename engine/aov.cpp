@@ -8,6 +8,9 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "image/image_io.h"
+#include "rt/lighter.h"
+#include "rt/passes/pass_list.h"
 
 namespace hpr {
 namespace {

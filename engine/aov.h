@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -7,13 +8,17 @@
 #include <string_view>
 #include <vector>
 
-#include "image/image_io.h"
+#include "image/color.h"
+#include "image/image.h"
+#include "image/key.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
-#include "rt/passes/pass_list.h"
-#include "scene/view.h"
+#include "rt/passes/pass_id.h"
 
 namespace hpr {
+
+struct ExrLayer;
+struct LightOutput;
+struct View;
 
 /// What a pixel can tell beside its colour (arbitrary output variables). The parts of the light and the cost are means
 /// over the samples; the others are those of the first sample, as their mean would be neither surface's.

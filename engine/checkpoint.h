@@ -8,10 +8,16 @@
 #include <utility>
 #include <vector>
 
-#include "engine/film.h"
-#include "engine/samples.h"
+#include "engine/frame_settings.h"
 
 namespace hpr {
+
+class Film;
+class Session;
+struct FramePlan;
+struct RenderSettings;
+struct SampleProgress;
+struct View;
 
 /// Names and values of everything that decides the bits of a picture, but for the number of samples. How the work is
 /// spread over ranks and threads is not among them.
@@ -40,5 +46,13 @@ struct CheckpointSettings {
 /// differs. Nothing of damaged bytes but the header is looked at.
 [[nodiscard]] SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name,
                                                const RunIdentity& identity, Film& film);
+
+/// What decides the bits of a frame: this program, the scene, the views, how they are sampled and lit (every setting
+/// that says so in the table); and what is kept of it beside the picture. `settings` are resolved.
+[[nodiscard]] RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span<const View> views,
+                                      const RenderSettings& settings, bool keeps_keys);
+
+/// What made the keys of such a run; Auto where it does not say.
+[[nodiscard]] Primary primary_of(const RunIdentity& identity);
 
 }  // namespace hpr

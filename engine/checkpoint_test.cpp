@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/error.h"
+#include "engine/film.h"
+#include "engine/samples.h"
 
 namespace hpr {
 namespace {

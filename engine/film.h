@@ -8,12 +8,12 @@
 #include <span>
 #include <vector>
 
-#include "cluster/transport/communicator.h"
 #include "engine/aov.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
 
 namespace hpr {
+
+class Communicator;
 
 /// A sum of colours. Of floats of like size it is exact up to 2^29 of them; a million in any order lose less than a
 /// float's rounding.

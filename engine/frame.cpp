@@ -2,7 +2,13 @@
 
 #include <algorithm>
 
+#include "compositing/compositor.h"
 #include "core/timing.h"
+#include "engine/session.h"
+#include "engine/tile_homes.h"
+#include "raster/rasterizer.h"
+#include "rt/lighter.h"
+#include "rt/trace/primary_rays.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
 //

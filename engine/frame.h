@@ -1,73 +1,22 @@
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <span>
-#include <string>
-#include <string_view>
 #include <vector>
 
-#include "cluster/distribution/assignment.h"
 #include "engine/aov.h"
-#include "engine/session.h"
-#include "engine/tile_homes.h"
+#include "engine/plan.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
+#include "rt/ray_counts.h"
+#include "rt/sampling/sampler.h"
 #include "scene/view.h"
 
 namespace hpr {
 
-enum class Shading {
-  Deferred,  ///< keys are composited, then whoever owns a pixel lights it: no ray is spent on what is hidden
-  Local,     ///< each rank lights what it drew, and colours are composited: the classic order
-};
-inline constexpr std::array<std::string_view, 2> kShadingNames{"deferred", "local"};
-
-/// What makes the keys.
-enum class Primary {
-  Raster,  ///< OpenGL
-  Rays,    ///< Embree, one ray through each pixel's centre; other surfaces are seen at some edges
-  Auto,    ///< whichever a measurement finds quicker
-};
-inline constexpr std::array<std::string_view, 3> kPrimaryNames{"raster", "rays", "auto"};
-
-/// How a frame is made; every choice gives the same picture, but for local shading: it has 8 bits a channel, and
-/// coplanar surfaces of different ranks show the brighter colour.
-struct FrameSettings {
-  std::optional<Distribution> distribution;  ///< none: chosen by plan_frame
-  int groups = 0;                            ///< of Hybrid; 0: default_groups
-  std::string strategy;                      ///< empty: chosen by plan_frame
-  Primary primary = Primary::Raster;
-  DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Primary::Raster only
-  Shading shading = Shading::Deferred;
-  RaySettings rays;
-  bool partitioned = false;         ///< each rank's ray scene holds its share of the objects only, and rays travel
-  bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
-  bool photons_fit_frame = false;   ///< no more photons a sample than the frame has pixels
-  double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged
-  std::vector<Aov> aovs;            ///< with deferred shading only
-};
-
-/// Who does what in a frame; computed alike on every rank.
-struct FramePlan {
-  Distribution distribution = Distribution::SortFirst;
-  int groups = 1;
-  std::string strategy;
-  Primary primary = Primary::Raster;  ///< never Auto
-  DepthFormat depth_format = DepthFormat::Float32;
-  Shading shading = Shading::Deferred;
-  RaySettings rays;
-  std::vector<Aov> aovs;
-  bool lit = true;  ///< false: only the keys are wanted, no light is spent on them
-  FrameLayout layout;
-  Assignment mine;                     ///< this rank's part
-  std::vector<std::size_t> tiles;      ///< of this rank's group, ascending
-  std::vector<std::string> explained;  ///< one line per decision, with its reason
-};
-
-/// Collective, as it may measure (`Primary::Auto`).
-[[nodiscard]] FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views);
+class Session;
+class TileHomes;
 
 /// A finished frame, in the memory of the ranks that own its tiles.
 struct Frame {

@@ -7,9 +7,14 @@
 #include <utility>
 
 #include "cluster/transport/collectives.h"
-#include "engine/economies.h"
-#include "engine/resolution.h"
+#include "core/progress.h"
+#include "engine/budget.h"
+#include "engine/checkpoint.h"
+#include "engine/frame_sampler.h"
+#include "engine/output.h"
+#include "engine/session.h"
 #include "image/filter.h"
+#include "rt/passes/pass_list.h"
 
 namespace hpr {
 namespace {
@@ -51,6 +56,12 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
                                   fmt::join(all_to_give_up(), ", ")));
   plan_for(budget_->effort(), screens);
   plan_.explained = std::move(explained);
+}
+
+FrameMaker::~FrameMaker() = default;
+
+Frame& FrameMaker::frame() {
+  return sampler_->frame();
 }
 
 std::vector<std::string> FrameMaker::all_to_give_up() const {
@@ -110,7 +121,8 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
     const auto least = static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
     if (samples < least) sampling.filter.reset();
   }
-  sampler_.emplace(session_, plan_, sampling, number, keeps_keys_);
+  sampler_.reset();  // frees its memory before the next one takes some
+  sampler_ = std::make_unique<FrameSampler>(session_, plan_, sampling, number, keeps_keys_);
   (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
   times_ = sampler_->times();
   relmse_ = sampler_->reached_so_far().relmse;
@@ -121,7 +133,7 @@ void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Pro
   if (!refining_) {
     sampler_.reset();
     plan_for({}, screens);
-    sampler_.emplace(session_, plan_, resting_, number, false);
+    sampler_ = std::make_unique<FrameSampler>(session_, plan_, resting_, number, false);
     // A single look with nothing given up: there is nothing to add to it.
     if (!resting_.sums()) (void)sampler_->draw(blocks_.views, {}, progress);
   }

@@ -1,16 +1,22 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "engine/frame_budget.h"
-#include "engine/frame_sampler.h"
+#include "engine/budget.h"
+#include "engine/frame.h"
 #include "engine/output.h"
+#include "engine/samples.h"
 
 namespace hpr {
+
+class FrameSampler;
+class Progress;
+class Session;
 
 /// Makes one frame after the other of the same screens, each seen from anywhere. With a target time it decides what
 /// each is made with; while the eye rests it refines one picture instead, sample by sample, with nothing given up.
@@ -21,11 +27,14 @@ class FrameMaker {
   /// frames have the keys of their first sample.
   FrameMaker(Session& session, FrameSettings settings, const Sampling& sampling, std::span<const View> screens,
              std::optional<double> target_ms, const std::optional<SampleGoal>& resting = {}, bool keeps_keys = false);
+  ~FrameMaker();
+  FrameMaker(const FrameMaker&) = delete;
+  FrameMaker& operator=(const FrameMaker&) = delete;
 
   /// Collective. Valid until the next one; made in blocks(). `progress` is told of samples.
   [[nodiscard]] Frame& make(std::span<const View> screens, std::uint64_t number, Progress& progress);
   /// The last one.
-  [[nodiscard]] Frame& frame() { return sampler_->frame(); }
+  [[nodiscard]] Frame& frame();
   /// Collective. What the slowest rank took for the last frame, the same on all ranks.
   void took(double slowest_ms);
 
@@ -63,7 +72,7 @@ class FrameMaker {
   Blocks blocks_;
   FramePlan plan_;
   std::vector<View> last_screens_;
-  std::optional<FrameSampler> sampler_;  ///< of the frame at hand, or the picture that is refined
+  std::unique_ptr<FrameSampler> sampler_;  ///< of the frame at hand, or the picture that is refined
   bool refining_ = false;
   FrameTimes times_;
   FrameTimes times_before_;

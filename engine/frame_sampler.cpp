@@ -9,11 +9,15 @@
 #include <vector>
 
 #include "cluster/transport/collectives.h"
+#include "compositing/assembly.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/progress.h"
+#include "core/signals.h"
 #include "core/timing.h"
-#include "engine/signals.h"
+#include "engine/checkpoint.h"
+#include "engine/session.h"
 
 namespace hpr {
 namespace {

@@ -1,16 +1,21 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
-#include "core/progress.h"
-#include "engine/adaptive.h"
-#include "engine/checkpoint.h"
 #include "engine/film.h"
 #include "engine/frame.h"
 #include "engine/samples.h"
+#include "engine/tile_homes.h"
 
 namespace hpr {
+
+class Progress;
+class Session;
+struct CheckpointSettings;
 
 /// Makes a frame: draws samples, each a frame seen through its own place of the pixels, until the goal is reached, and
 /// takes their mean. A single look through the pixels' centres is that frame itself, and nothing is summed.

@@ -1,12 +1,27 @@
+#include "engine/plan.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <vector>
 
 #include "cluster/transport/collectives.h"
+#include "compositing/compositor.h"
+#include "core/log.h"
+#include "core/timing.h"
 #include "engine/frame.h"
-#include "engine/open_sky.h"
-#include "engine/primary_choice.h"
+#include "engine/session.h"
+#include "rt/passes/pass_list.h"
+#include "rt/sampling/sampler.h"
+#include "rt/sampling/warp.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -123,6 +138,129 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
   if (plan.rays.denoise) {
     lines.push_back(fmt::format("denoiser: in the first {} samples (as asked)", kDenoisedSamples));
   }
+}
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Rays through a grid of places of every view.
+std::vector<Ray> looks_of(std::span<const View> views) {
+  constexpr double kLooks = 1024.0;
+  const int side = std::max(4, static_cast<int>(std::sqrt(kLooks / static_cast<double>(views.size()))));
+  std::vector<Ray> looks;
+  for (const View& view : views) {
+    for (int i = 0; i < side * side; ++i) {
+      const int column = i % side;
+      const int row = i / side;
+      const double x = (column + 0.5) * view.size().width / side;
+      const double y = (row + 0.5) * view.size().height / side;
+      Ray ray = view_ray(view, x, y);
+      ray.origin += ray.direction * view.near_distance;
+      ray.direction = glm::normalize(ray.direction);
+      looks.push_back(ray);
+    }
+  }
+  return looks;
+}
+
+/// Collective. How much of the sky's light reaches the surfaces that some views see, as about a thousand rays find out:
+/// of what would without anything in its way. None where the views see no surface. The same on all ranks, however the
+/// scene is shared out.
+std::optional<double> open_sky(Session& session, const RaySettings& settings, std::span<const View> views) {
+  session.share_rays(settings);
+  const RayScene& scene = session.ray_scene(settings.build);
+  const RaySpace& space = scene.space();
+  const Surfaces surfaces(session.scene(), space);
+  const std::vector<Ray> looks = looks_of(views);
+  RayBatch rays;
+  for (const Ray& look : looks) rays.push(space.from_world(look.origin), look.direction, kInfinity);
+  std::vector<std::uint32_t> seen(looks.size());
+  std::vector<std::uint8_t> blocked;
+  scene.for_each(1, 1, [&](std::size_t) {
+    (void)scene.closest(rays, seen);
+    rays.clear();
+    WorldTriangle triangle;
+    for (std::size_t i = 0; i < looks.size(); ++i) {
+      if (seen[i] == kNoSurface) continue;
+      surfaces.load(seen[i], triangle);
+      const SurfacePoint point = surfaces.meet(triangle, looks[i].origin, looks[i].direction);
+      Sampler sampler(photon_stream({settings.seed, 0}), static_cast<std::uint32_t>(i));
+      const glm::dvec3 up = warp::cosine_lobe(point.geometric_normal, sampler.two());
+      rays.push(space.from_world(ray_origin(point, up)), up, kInfinity);
+    }
+    blocked.resize(rays.size());
+    (void)scene.occluded(rays, blocked);
+  });
+  if (blocked.empty()) return std::nullopt;
+  return static_cast<double>(std::ranges::count(blocked, 0)) / static_cast<double>(blocked.size());
+}
+
+/// A prime, so that the tiles looked at do not stand in columns.
+constexpr std::size_t kEachTile = 7;
+
+double quickest_ms(TileLayer<Key>& keys, const std::function<void()>& draw) {
+  double best = 0.0;
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    keys.clear();
+    const Stopwatch watch;
+    draw();
+    best = attempt == 0 ? watch.ms() : std::min(best, watch.ms());
+  }
+  return best;
+}
+
+/// The plan with every seventh tile of its area; `share` is set to how much of the area that is.
+FramePlan sampled(const FramePlan& plan, double& share) {
+  FramePlan some = plan;
+  some.mine.area.clear();
+  std::size_t all_pixels = 0;
+  std::size_t some_pixels = 0;
+  std::size_t seen = 0;
+  for (const ScreenRect& rect : plan.mine.area) {
+    all_pixels += rect.pixels.area();
+    for (int y = rect.pixels.y0; y < rect.pixels.y1; y += kTileSide) {
+      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide) {
+        if (seen++ % kEachTile != 0) continue;
+        const Rect tile = intersection(rect.pixels, {x, y, x + kTileSide, y + kTileSide});
+        some.mine.area.push_back({rect.screen, tile});
+        some_pixels += tile.area();
+      }
+    }
+  }
+  share = some_pixels > 0 ? static_cast<double>(some_pixels) / static_cast<double>(all_pixels) : 1.0;
+  return some;
+}
+
+struct KeyTimes {
+  double raster_ms = 0.0;
+  double rays_ms = 0.0;
+};
+
+/// Collective. Sets `plan.primary` to what makes the keys sooner, on the slowest rank: each draws its share both ways,
+/// all of it by OpenGL (whose work with vertices does not shrink with the area) and every seventh tile by rays, twice,
+/// and the quicker try counts. What both need but once (uploads, Embree's scene, shaders) is left out, as it would be
+/// in a run of frames. Returns why, with both times.
+std::string choose_primary(Session& session, FramePlan& plan, std::span<const View> views) {
+  KeyTimes mine;
+  if (!plan.mine.area.empty()) {
+    double share = 1.0;
+    const FramePlan some = sampled(plan, share);
+    TileLayer<Key> keys(plan.layout);
+    mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
+    (void)session.primary_rays(plan.mine.objects, plan.rays);
+    const FrameLook look{{views.begin(), views.end()}, {}};
+    TileLayer<Key>* const layer = &keys;
+    const auto trace = [&] { (void)trace_primary(session, some, std::span(&look, 1), std::span(&layer, 1)); };
+    mine.rays_ms = quickest_ms(keys, trace) / share;
+  }
+  KeyTimes worst;
+  for (const KeyTimes& times : all_gather_value(session.comm(), mine)) {
+    worst.raster_ms = std::max(worst.raster_ms, times.raster_ms);
+    worst.rays_ms = std::max(worst.rays_ms, times.rays_ms);
+  }
+  plan.primary = worst.rays_ms < worst.raster_ms ? Primary::Rays : Primary::Raster;
+  std::string why = fmt::format("measured: {:.1f} ms by rays, {:.1f} ms by OpenGL", worst.rays_ms, worst.raster_ms);
+  if (session.comm().rank() == 0) log::info("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", why);
+  return why;
 }
 
 /// Whether rays or photons are to bring indirect light, where the scene leaves the choice.

@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "engine/settings_table.h"
 #include "image/filter.h"
+#include "rt/passes/pass_list.h"
 #include "scene/load_scene.h"
 #include "scene/view.h"
 

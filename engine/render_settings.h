@@ -9,14 +9,16 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/frame.h"
+#include "engine/frame_settings.h"
 #include "engine/samples.h"
 #include "image/color.h"
-#include "image/image_io.h"
-#include "scene/load_scene.h"
-#include "scene/scene.h"
 
 namespace hpr {
+
+struct Camera;
+struct ImageLimits;
+struct Scene;
+struct SceneLimits;
 
 /// Which camera sees the scene. By default the scene's first, else one that frames the scene.
 struct CameraChoice {

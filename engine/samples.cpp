@@ -3,13 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
 #include <limits>
 
+#include "cluster/transport/collectives.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/text.h"
+#include "engine/film.h"
+#include "rt/sampling/sampler.h"
 
 namespace hpr {
 namespace {
@@ -96,6 +101,220 @@ std::optional<double> seconds_left(const SampleGoal& goal, const SampleProgress&
   if (goal.seconds) consider(*goal.seconds - progress.seconds);
   if (goal.relmse && progress.relmse) consider(progress.seconds * (*progress.relmse / *goal.relmse - 1.0));
   return left;
+}
+
+namespace {
+
+/// Fewer samples say too little of their variance.
+constexpr std::uint32_t kFewest = 8;
+constexpr std::uint32_t kMostSamples = std::uint32_t{1} << 30U;
+constexpr std::size_t kLevels = 32;  ///< of powers of two
+
+/// Samples in proportion to this power of the variance.
+constexpr double kExponent = 0.4;
+/// What a pixel's own samples say counts as much as what those of the 3 x 3 about it do.
+constexpr double kOwnShare = 0.5;
+
+/// Pixels are sorted by the samples they want: so many bins for a factor of 2.
+constexpr int kBinsPerLevel = 16;
+constexpr int kBins = 1024;
+constexpr int kCalm = -1;  ///< the bin of pixels whose samples are all the same
+using Histogram = std::array<std::uint64_t, kBins>;
+using TileBins = std::array<std::int16_t, kTilePixels>;
+
+template <typename Counts>
+Counts sum_over_ranks(Communicator& comm, const Counts& mine) {
+  Counts sum{};
+  for (const Counts& each : all_gather_value(comm, mine)) {
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += each[i];
+  }
+  return sum;
+}
+
+std::size_t index_of(int column, int row) {
+  return static_cast<std::size_t>(row) * kTileSide + static_cast<std::size_t>(column);
+}
+
+/// Calls `body` with the index, column and row of each pixel of a tile that is in the picture.
+template <typename Body>
+void each_pixel(const Rect& place, const Body& body) {
+  for (int y = 0; y < place.height(); ++y) {
+    for (int x = 0; x < place.width(); ++x) body(index_of(x, y), x, y);
+  }
+}
+
+double mean_about(std::span<const double> values, const Rect& place, int column, int row) {
+  double sum = 0.0;
+  int count = 0;
+  for (int y = std::max(row - 1, 0); y < std::min(row + 2, place.height()); ++y) {
+    for (int x = std::max(column - 1, 0); x < std::min(column + 2, place.width()); ++x) {
+      sum += values[index_of(x, y)];
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+/// Per pixel its bin.
+TileBins bins_of(const Film& film, std::size_t tile) {
+  const Rect place = film.layout().place(tile).pixels;
+  const std::vector<double> variances = film.variances(tile);
+  TileBins bins;
+  bins.fill(kCalm);
+  each_pixel(place, [&](std::size_t i, int x, int y) {
+    const double variance = kOwnShare * variances[i] + (1.0 - kOwnShare) * mean_about(variances, place, x, y);
+    if (!(variance > 0.0)) return;
+    const double bin = kBins / 2.0 + std::round(kBinsPerLevel * kExponent * std::log2(variance));
+    bins[i] = static_cast<std::int16_t>(std::clamp(bin, 0.0, kBins - 1.0));
+  });
+  return bins;
+}
+
+/// The power of two not above so many.
+int level_of(std::uint32_t samples) {
+  return static_cast<int>(std::bit_width(samples)) - 1;
+}
+
+/// Powers of two of samples that a stage may give.
+struct Levels {
+  int lowest = 0;
+  int highest = 0;
+
+  Levels(std::uint32_t budget, std::uint32_t pilot)
+      : lowest(level_of(std::max(budget / 4, pilot))),
+        highest(level_of(std::bit_ceil(2 * std::min(budget, kMostSamples / 2)))) {}
+
+  [[nodiscard]] int of(int bin, int shift) const {
+    if (bin == kCalm) return lowest;
+    const double level = std::floor(static_cast<double>(bin + shift) / kBinsPerLevel + 0.5);
+    return static_cast<int>(std::clamp<double>(level, lowest, highest));
+  }
+};
+
+/// The largest shift of bins with which the pixels in them get no more than the budget on average.
+int shift_within(const Histogram& pixels, const Levels& levels, std::uint32_t budget) {
+  double most = 0.0;
+  for (const std::uint64_t count : pixels) most += static_cast<double>(budget) * static_cast<double>(count);
+  const auto fits = [&](int shift) {
+    double sum = 0.0;
+    for (int bin = 0; bin < kBins; ++bin) {
+      sum += std::ldexp(static_cast<double>(pixels[static_cast<std::size_t>(bin)]), levels.of(bin, shift));
+    }
+    return sum <= most;
+  };
+  int low = -kBins;  // all bins at the lowest level
+  int high = kBins + kBinsPerLevel * static_cast<int>(kLevels);
+  while (high - low > 1) {
+    const int middle = low + (high - low) / 2;
+    (fits(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+}  // namespace
+
+std::uint32_t AdaptiveSampling::pilot_of(const Sampling& sampling) {
+  const std::uint32_t fewest = std::max(kFewest, least_samples(sampling));
+  if (!sampling.goal.samples) return fewest;
+  std::uint32_t pilot = *sampling.goal.samples;
+  while (std::bit_floor(pilot / 4) >= fewest) pilot = std::bit_floor(pilot / 4);
+  if (pilot == *sampling.goal.samples && pilot >= kLeast) pilot = fewest;
+  return pilot;
+}
+
+AdaptiveSampling::AdaptiveSampling(const Sampling& sampling) : sampling_(sampling), budget_(pilot_of(sampling)) {
+  steps_.push_back({0, budget_, 0, 1});
+  total_ = budget_;
+}
+
+std::uint32_t AdaptiveSampling::budget_after(std::uint32_t budget) const {
+  if (!sampling_.goal.samples) return std::min(4 * budget, kMostSamples / 2);
+  std::uint32_t next = *sampling_.goal.samples;
+  while (std::bit_floor(next / 4) > budget) next = std::bit_floor(next / 4);
+  return next;
+}
+
+void AdaptiveSampling::find_steps(Communicator& comm, const Film& film, std::span<const std::size_t> tiles,
+                                  std::uint32_t from) {
+  std::array<std::uint64_t, kLevels> mine{};
+  for (const std::size_t tile : tiles) {
+    const std::span<const PixelSamples> pixels = film.pixel_samples().tile(tile);
+    each_pixel(film.layout().place(tile).pixels, [&](std::size_t i, int, int) {
+      for (std::uint32_t next = std::max(pixels[i].taken, 1U); next < pixels[i].wanted;
+           next = std::bit_ceil(next + 1)) {
+        ++mine[static_cast<std::size_t>(level_of(next))];
+      }
+    });
+  }
+  const auto pixels = sum_over_ranks(comm, mine);
+  steps_.clear();
+  total_ = done_ = 0;
+  for (std::size_t level = 0; level < kLevels; ++level) {
+    if (pixels[level] == 0) continue;
+    const std::uint32_t begin = std::uint32_t{1} << level;
+    // A step that was broken off goes on.
+    const std::uint32_t number = steps_.empty() && from > begin ? std::min(from, 2 * begin - 1) : begin;
+    steps_.push_back({begin, 2 * begin, number, pixels[level]});
+    total_ += pixels[level] * (steps_.back().end - steps_.back().number);
+  }
+}
+
+void AdaptiveSampling::resume(Communicator& comm, const SampleProgress& reached, const Film& film,
+                              std::span<const std::size_t> tiles) {
+  budget_ = reached.budget;
+  before_ = reached.samples;
+  if (film.samples() < film.pilot()) {
+    steps_.front().number = film.samples();
+    done_ = film.samples();
+    before_ = 0;
+    return;
+  }
+  find_steps(comm, film, tiles, film.samples());
+}
+
+void AdaptiveSampling::deal(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) {
+  do {
+    before_ = budget_;
+    budget_ = budget_after(budget_);
+    choose(comm, film, tiles, threads);
+    find_steps(comm, film, tiles, 0);
+  } while (steps_.empty() && budget_after(budget_) > budget_);
+  if (!steps_.empty()) film.go_on_with(steps_.front().number);
+}
+
+void AdaptiveSampling::choose(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) const {
+  std::vector<TileBins> bins(tiles.size());
+  parallel_for(threads, tiles.size(), [&](std::size_t i) { bins[i] = bins_of(film, tiles[i]); });
+  Histogram mine{};
+  for (const TileBins& tile : bins) {
+    for (const std::int16_t bin : tile) {
+      if (bin != kCalm) ++mine[static_cast<std::size_t>(bin)];
+    }
+  }
+  const Levels levels(budget_, film.pilot());
+  const int shift = shift_within(sum_over_ranks(comm, mine), levels, budget_);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const std::span<PixelSamples> pixels = film.pixel_samples().tile(tiles[i]);
+    each_pixel(film.layout().place(tiles[i]).pixels, [&](std::size_t pixel, int, int) {
+      pixels[pixel].wanted = std::uint32_t{1} << static_cast<unsigned int>(levels.of(bins[i][pixel], shift));
+    });
+  }
+}
+
+void AdaptiveSampling::added(std::uint32_t count, Film& film) {
+  Step& step = steps_.front();
+  step.number += count;
+  done_ += count * step.pixels;
+  if (step.number < step.end) return;
+  steps_.erase(steps_.begin());
+  if (!steps_.empty()) film.go_on_with(steps_.front().number);
+}
+
+std::uint32_t AdaptiveSampling::samples() const {
+  if (steps_.empty() || budget_ <= before_) return budget_;
+  const double share = static_cast<double>(done_) / static_cast<double>(total_);
+  const auto more = static_cast<std::uint32_t>(share * static_cast<double>(budget_ - before_));
+  return before_ + std::min(more, budget_ - before_ - 1);
 }
 
 }  // namespace hpr

@@ -1,14 +1,19 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "image/filter.h"
-#include "rt/lighter.h"
-#include "rt/sampling/sampler.h"
 
 namespace hpr {
+
+class Communicator;
+class Film;
+struct RandomKey;
 
 /// When a frame has enough samples: whichever is set, the first to be reached counts.
 struct SampleGoal {
@@ -61,5 +66,68 @@ struct SampleProgress {
 
 /// The rest of the time, guessed: noise falls as one over the samples. None when there is nothing to guess from.
 [[nodiscard]] std::optional<double> seconds_left(const SampleGoal& goal, const SampleProgress& progress);
+
+/// Which pixels of an adaptive film get which samples: in stages, each of about four times as many samples as the one
+/// before. The first gives every pixel the same, a later one gives each between a quarter and twice as many as a pixel
+/// gets on average (the powers of two about that, where it is none), more where its samples and its neighbours' differ
+/// more; always a power of two, so that what a pixel has is a whole net of its sequence. Samples of a pixel whose
+/// variance is v have an error of about v n^-1.5 in outlines and v / n elsewhere; with n in proportion to v^0.4 the
+/// next sample is worth the same everywhere (Neyman's allocation, for an exponent between the two).
+///
+/// All pixels of the frame share the samples, and neighbours are those of the same tile: ranks, threads and ways of
+/// compositing change nothing. The mean of pixels that chance made look calm is a little off: samples decide how many
+/// more there are. The quarter that every pixel gets bounds that.
+class AdaptiveSampling {
+ public:
+  /// How many samples every pixel has before their variance is believed; all of them where fewer than kLeast are asked
+  /// for.
+  [[nodiscard]] static std::uint32_t pilot_of(const Sampling& sampling);
+  static constexpr std::uint32_t kLeast = 16;
+
+  explicit AdaptiveSampling(const Sampling& sampling);
+
+  /// Collective. Goes on where the checkpoint ended that `film` and `reached` were read from. `tiles`: this rank's.
+  void resume(Communicator& comm, const SampleProgress& reached, const Film& film, std::span<const std::size_t> tiles);
+
+  /// Whether deal() has to come before the next sample.
+  [[nodiscard]] bool is_stage_done() const { return steps_.empty(); }
+  /// Collective. Begins the next stage in which any pixel wants more: decides what each pixel of `tiles` wants, this
+  /// rank's. Where there is none before the goal, all samples that are asked for are there.
+  void deal(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads);
+
+  /// How many samples from the film's next one on go to the same pixels.
+  [[nodiscard]] std::uint32_t most_together() const { return steps_.front().end - steps_.front().number; }
+  /// After so many were added: chooses the film's next one.
+  void added(std::uint32_t count, Film& film);
+
+  /// Samples of a pixel, on average, at the end of the stage at hand.
+  [[nodiscard]] std::uint32_t budget() const { return budget_; }
+  /// Those there are: those of all stages done and of the one at hand the share that is.
+  [[nodiscard]] std::uint32_t samples() const;
+  /// Whether every pixel has a power of two of them.
+  [[nodiscard]] bool at_milestone() const { return steps_.empty() || steps_.front().number == steps_.front().begin; }
+
+ private:
+  /// Samples [begin, end) of the pixels that have those before and want these.
+  struct Step {
+    std::uint32_t begin = 0;
+    std::uint32_t end = 0;
+    std::uint32_t number = 0;  ///< of the next one
+    std::uint64_t pixels = 0;  ///< of all ranks
+  };
+
+  [[nodiscard]] std::uint32_t budget_after(std::uint32_t budget) const;
+  /// Finds the steps of a stage that are left from a sample on.
+  void find_steps(Communicator& comm, const Film& film, std::span<const std::size_t> tiles, std::uint32_t from);
+  /// Decides what pixels want in the stage at hand.
+  void choose(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) const;
+
+  Sampling sampling_;
+  std::uint32_t budget_ = 0;  ///< of the stage at hand
+  std::uint32_t before_ = 0;  ///< samples of a pixel, on average, when its steps were found
+  std::vector<Step> steps_;   ///< that are left
+  std::uint64_t total_ = 0;   ///< of the stage's steps: samples times pixels
+  std::uint64_t done_ = 0;
+};
 
 }  // namespace hpr

@@ -7,12 +7,20 @@
 
 #include "cluster/distribution/scene_distribution.h"
 #include "cluster/transport/collectives.h"
+#include "compositing/assembly.h"
+#include "compositing/compositor.h"
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/timing.h"
+#include "raster/gl_context.h"
+#include "raster/rasterizer.h"
+#include "rt/lighter.h"
+#include "rt/trace/primary_rays.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/travelling_rays.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -29,7 +37,8 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
     : comm_(comm),
       share_(share_host(comm, settings.threads)),
       scene_(load_scene_of_all(comm_, load)),
-      requirements_(requirements_of(scene_)) {
+      requirements_(requirements_of(scene_)),
+      assembler_(std::make_unique<Assembler>()) {
   warn_of_scene();
   agree_on_failure(comm_, [&] {
     const trace::Span span("start OpenGL");
@@ -41,6 +50,8 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
   log::debug("OpenGL: {}", gl_->description());
   compare_rasterizers();
 }
+
+Session::~Session() = default;
 
 Session::HostShare Session::share_host(Communicator& comm, int threads) {
   HostShare share;

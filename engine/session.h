@@ -7,21 +7,29 @@
 #include <string>
 #include <vector>
 
-#include "cluster/distribution/assignment.h"
 #include "cluster/transport/communicator_wrappers.h"
-#include "compositing/assembly.h"
-#include "compositing/compositor.h"
-#include "engine/session_settings.h"
-#include "raster/gl_context.h"
-#include "raster/rasterizer.h"
-#include "rt/lighter.h"
-#include "rt/trace/primary_rays.h"
-#include "rt/trace/ray_scene.h"
-#include "rt/trace/travelling_rays.h"
+#include "image/tiles.h"
+#include "rt/ray_settings.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 
 namespace hpr {
+
+class Assembler;
+class Compositor;
+class GlContext;
+class Lighter;
+class PrimaryRays;
+class Rasterizer;
+class RayScene;
+class TravellingRays;
+
+/// What a session uses of the machine that each of its ranks runs on.
+struct SessionSettings {
+  std::string backend = "auto";  ///< OpenGL by it, see GlContextSettings
+  int device = -1;               ///< EGL device; -1: by local rank
+  int threads = 0;               ///< of one rank; 0: the machine's cores divided among the ranks of a host
+};
 
 /// What stays resident while frames follow one another: the scene, the GL context, geometry on the GPU, the ray scene,
 /// the frame's memory. One per rank; construction is collective.
@@ -29,6 +37,9 @@ class Session {
  public:
   /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
   Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
 
   /// Collective. Another scene in this one's place; when it cannot be loaded, this one stays.
   void load(const std::function<Scene()>& load);
@@ -42,7 +53,7 @@ class Session {
   [[nodiscard]] int threads() const { return share_.threads; }
   [[nodiscard]] const std::string& host() const { return share_.host; }
   [[nodiscard]] const GlContext& gl() const { return *gl_; }
-  [[nodiscard]] Assembler& assembler() { return assembler_; }
+  [[nodiscard]] Assembler& assembler() { return *assembler_; }
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for.
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
@@ -114,7 +125,7 @@ class Session {
   Group group_;
   std::string strategy_;
   std::unique_ptr<Compositor> compositor_;
-  Assembler assembler_;
+  std::unique_ptr<Assembler> assembler_;
   TileLayer<Key> keys_;
   std::vector<TileLayer<Key>> round_keys_;
   bool keys_shared_ = false;       ///< whether they were meant to be

@@ -20,6 +20,7 @@
 #include "rt/reference/path_tracer.h"
 #include "rt/tile_output.h"
 #include "rt/trace/denormals.h"
+#include "rt/trace/travelling_rays.h"
 
 namespace hpr {
 namespace {

@@ -5,87 +5,25 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "cluster/transport/communicator.h"
 #include "image/color.h"
-#include "image/filter.h"
 #include "image/key.h"
 #include "image/tiles.h"
-#include "rt/passes/pass_list.h"
+#include "rt/passes/pass_id.h"
+#include "rt/ray_counts.h"
+#include "rt/ray_settings.h"
 #include "rt/sampling/sampler.h"
-#include "rt/screen_pixel.h"
-#include "rt/trace/ray_build.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
 namespace hpr {
 
+class Communicator;
 class RayScene;
 class TravellingRays;
-
-/// What decides how light is worked out. The same settings give the same picture on any number of ranks and threads.
-struct RaySettings {
-  std::vector<PassId> passes = {};  ///< those that are named; empty: as `auto_passes` says
-  bool auto_passes = true;          ///< where none is named: what the scene requires; false: none
-  bool all_passes = false;          ///< all that run by default, also where the scene does not require them
-  int max_depth = 8;                ///< reflections and refractions in a row
-  int light_samples = 1;            ///< rays per point and sample towards emitting surfaces and the environment
-  double glossy_cutoff = 0.3;       ///< specular lobes of at least this roughness are not followed by rays
-  std::uint32_t photons = 0;        ///< sent per sample; 0: kPhotons, and only where the pass is named
-  bool global_photons = false;      ///< also those that were scattered by rough surfaces only: all indirect light
-  bool gather = false;              ///< under an even sky rays bring all indirect light, in place of photons
-  double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density
-  int occlusion_rays = 4;           ///< of the ambient-occlusion pass, per point and sample
-  double ambient = 0.2;             ///< radiance that pass lets in where nothing is near
-  bool terminator_fix = true;       ///< lifts the origins of shadow rays onto the smooth surface normals pretend
-  RayBuild build = {};              ///< of Embree's scenes
-  /// Passes whose light of the first surface is worked out for one pixel in four and spread to its neighbours where
-  /// they see the like; PassId::Shadow stands for the light of lights.
-  std::vector<PassId> half_resolution = {};
-  /// Surfaces that this rank's rays meet at home, as those of the others travel to it; none: all of them.
-  std::optional<std::vector<SurfaceRange>> part = {};
-  bool denoise = false;                   ///< see Denoiser
-  PixelFilter filter = PixelFilter::Box;  ///< of which denoising looks at more places; none of its weights < 0
-  bool reference = false;                 ///< path tracing in place of all passes, paths of max_depth segments
-  std::uint64_t seed = 1;                 ///< of all randomness
-  int threads = 1;
-  int host_ranks = 1;  ///< ranks of this host: they share its memory
-
-  bool operator==(const RaySettings&) const = default;
-};
-
-/// So many first samples of a frame are denoised: with more of them, further plain ones are the better use of time.
-inline constexpr std::uint32_t kDenoisedSamples = 16;
-
-/// Photons sent per sample where the pass is named and nothing says how many.
-inline constexpr std::uint32_t kPhotons = 200'000;
-
-/// Rays traced, by kind, and what had to be left out.
-struct RayCounts {
-  std::uint64_t primary = 0;                    ///< from the eye: no pass counts them
-  std::array<std::uint64_t, kPasses> passes{};  ///< by PassId
-  std::uint64_t invalid = 0;                    ///< of those above, rays Embree could not bear: they missed
-  std::uint64_t cut = 0;                        ///< rays that ended among surfaces of partial coverage, see kMostPassed
-  std::uint64_t not_finite = 0;                 ///< pixels whose radiance was no finite number: they are black
-  ScreenPixel first_not_finite;                 ///< of those, in order of screen and row, whoever met it; else kNoPixel
-
-  [[nodiscard]] std::uint64_t& operator[](PassId pass) { return passes.at(static_cast<std::size_t>(pass)); }
-  [[nodiscard]] std::uint64_t operator[](PassId pass) const { return passes.at(static_cast<std::size_t>(pass)); }
-
-  RayCounts& operator+=(const RayCounts& other);
-  bool operator==(const RayCounts&) const = default;
-};
-
-struct PassTime {
-  std::string name;                 ///< a pass, or another step: "surface" and "direct" always run
-  double ms = 0.0;                  ///< summed over threads
-  std::optional<PassId> pass = {};  ///< none: another step
-};
 
 /// Layers a frame is lit into, all of one layout; null where not wanted.
 struct LightOutput {

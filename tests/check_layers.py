@@ -46,7 +46,7 @@ FORBIDDEN = {"engine": ["core/json.h"], "engine/wall": ["core/json.h"]}
 ONLY_IN = {"CLI/": "app/options/option_set.cpp", "nlohmann/": "core/json.cpp"}
 
 # Breaches that are known and on their way out: how many lines of each file. Nothing may be added here.
-KNOWN = {"engine/": 1}
+KNOWN = {}
 
 TOP_FOLDERS = sorted({room.split("/")[0] for room in ALLOWED})
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')

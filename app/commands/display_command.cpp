@@ -5,13 +5,13 @@
 #include <filesystem>
 
 #include "app/command.h"
-#include "app/commands/wall_options.h"
-#include "app/options/display_flags.h"
+#include "app/commands/wall_run.h"
+#include "app/options/display_options.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/signals.h"
 #include "core/text.h"
 #include "engine/output.h"
-#include "engine/signals.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
 #include "walls/link/display_process.h"

@@ -1,6 +1,5 @@
 
 #include "app/command.h"
-#include "app/commands/wall_options.h"
 #include "app/commands/wall_run.h"
 #include "core/job_environment.h"
 #include "walls/displays/window_display.h"

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "app/command.h"
-#include "app/commands/wall_options.h"
-#include "app/report_error.h"
+#include "app/commands/wall_run.h"
+#include "app/results.h"
 #include "core/bytes.h"
 #include "core/json.h"
 #include "core/log.h"

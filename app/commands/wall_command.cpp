@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "app/command.h"
-#include "app/commands/wall_options.h"
+#include "app/commands/wall_run.h"
 #include "core/file.h"
 #include "core/text.h"
 #include "image/image_io.h"

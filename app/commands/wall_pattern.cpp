@@ -5,14 +5,13 @@
 #include <thread>
 
 #include "app/command.h"
-#include "app/commands/wall_options.h"
-#include "app/options/display_flags.h"
-#include "app/options/link_options.h"
+#include "app/commands/wall_run.h"
+#include "app/options/display_options.h"
 #include "cluster/transport/local_communicator.h"
 #include "core/progress.h"
+#include "core/signals.h"
 #include "engine/output.h"
-#include "engine/signals.h"
-#include "engine/wall/remote_displays.h"
+#include "engine/wall/wall_displays.h"
 #include "walls/config/wall_file.h"
 #include "walls/drawing/frame_counter.h"
 #include "walls/drawing/pattern.h"

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "app/command.h"
+#include "cluster/transport/communicator.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"

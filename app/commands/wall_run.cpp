@@ -12,25 +12,23 @@
 #include <thread>
 
 #include "app/command.h"
-#include "app/commands/wall_options.h"
 #include "app/launch/launcher.h"
-#include "app/launch/supervisor.h"
-#include "app/output_files.h"
-#include "app/stats_file.h"
+#include "app/launch/run_ranks.h"
+#include "app/results.h"
 #include "cluster/transport/collectives.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/signals.h"
 #include "core/text.h"
 #include "core/timing.h"
-#include "engine/camera_path.h"
 #include "engine/output.h"
-#include "engine/signals.h"
+#include "engine/wall/viewpoint.h"
 #include "engine/wall/wall_driver.h"
-#include "engine/wall/wall_layers.h"
 #include "engine/wall/wall_status.h"
 #include "image/image_io.h"
+#include "rt/passes/pass_list.h"
 #include "walls/config/wall_file.h"
 #include "walls/displays/file_display.h"
 #include "walls/drawing/assemble.h"
@@ -402,6 +400,23 @@ class WallRunCommand final : public Command {
 /// `hpr wall run WALL SCENE`.
 std::unique_ptr<Command> make_wall_run_command() {
   return std::make_unique<WallRunCommand>();
+}
+
+void declare_wall(const OptionSet& options, std::string& wall) {
+  options.option("wall", wall, "a wall file, or CxR, or CxR@WxH").required().type("WALL");
+}
+
+void declare_overrides(const OptionSet& options, std::vector<std::string>& overrides) {
+  options.option("--set", overrides, "put a value over one of the wall file's, e.g. stereo.mode=anaglyph")
+      .type("PATH=VALUE")
+      .repeats();
+}
+
+void declare_target_ms(const OptionSet& options, std::optional<double>& target_ms, const std::string& text) {
+  options.option("--target-ms", target_ms, text)
+      .range(1e-3, 1e9)
+      .units({{"us", 1e-3}, {"ms", 1.0}, {"s", 1e3}, {"min", 6e4}})
+      .type("MS");
 }
 
 }  // namespace hpr

@@ -4,12 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "app/options/display_flags.h"
+#include "app/options/display_options.h"
 #include "app/options/globals.h"
-#include "app/options/link_options.h"
+#include "app/options/option_set.h"
 #include "app/options/render_options.h"
 #include "engine/wall/wall_job.h"
 
+/// Options that several commands of walls have.
 namespace hpr {
 
 /// A run of a wall as the command line has it: what `wall run`, `view` and `demo` share.
@@ -39,5 +40,14 @@ struct WallRun {
 
 /// Draws a job on all ranks. Throws Error, before any rank draws, where its results cannot be written.
 [[nodiscard]] ExitCode run_wall(WallJob job, Globals globals);
+
+/// The wall itself, a required positional.
+void declare_wall(const OptionSet& options, std::string& wall);
+
+/// `--set PATH=VALUE`, as often as wanted.
+void declare_overrides(const OptionSet& options, std::vector<std::string>& overrides);
+
+/// `--target-ms`: milliseconds, or another unit that is named.
+void declare_target_ms(const OptionSet& options, std::optional<double>& target_ms, const std::string& text);
 
 }  // namespace hpr

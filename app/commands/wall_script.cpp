@@ -4,8 +4,7 @@
 #include <algorithm>
 
 #include "app/command.h"
-#include "app/launch/shell_line.h"
-#include "app/output_files.h"
+#include "app/results.h"
 #include "core/text.h"
 #include "engine/output.h"
 #include "walls/config/host_list.h"

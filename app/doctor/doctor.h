@@ -37,4 +37,19 @@ struct Check {
 [[nodiscard]] std::string findings_text(std::span<const Finding> findings, bool colors);
 [[nodiscard]] std::string findings_json(std::span<const Finding> findings);
 
+/// One check per GL backend of this build: does a context come up, and on what? Red only when none does.
+[[nodiscard]] std::vector<Check> graphics_checks();
+
+/// The machine a figure was measured on, as reports name it.
+struct Machine {
+  std::string cpu;  ///< model name; "unknown" where the system does not say
+  int cores = 1;    ///< job_cores()
+  std::string mpi;  ///< library and version
+};
+[[nodiscard]] Machine this_machine();
+
+/// The cores of this machine that this process may use or, in an MPI job, its ranks together: a launcher may bind each
+/// to cores of its own.
+[[nodiscard]] int job_cores();
+
 }  // namespace hpr

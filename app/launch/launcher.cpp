@@ -4,27 +4,207 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/types.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
-#include "app/launch/passed_signals.h"
-#include "app/launch/process_tree.h"
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 
 namespace hpr {
+
+/// While it lives, SIGUSR1 and SIGUSR2 go on to mpiexec, which sends them to all ranks, unless this process ignores
+/// them, and so does what interrupts a job in a process group of its own: this process leaves when its ranks have. A
+/// second interrupt is not waited for. One at a time: signal handlers reach nothing but globals.
+class PassedSignals {
+ public:
+  explicit PassedSignals(const JobOptions& options);
+  /// Where a job was interrupted, and that was to end it, so is this process, as if the signal had not been caught.
+  ~PassedSignals();
+  PassedSignals(const PassedSignals&) = delete;
+  PassedSignals& operator=(const PassedSignals&) = delete;
+
+  static void to(pid_t child);
+  /// The child was waited for: its number may soon be another process's.
+  static void to_nobody();
+  /// The ranks have started: requests that waited for that go out.
+  static void note_start();
+
+  /// Whether mpiexec was told to end, or will be as soon as there is one: nothing more is to be said.
+  [[nodiscard]] static bool ends();
+  /// The last signal that interrupted the job; 0: none did.
+  [[nodiscard]] static int interrupted_by();
+
+ private:
+  static constexpr std::array kSignals{SIGALRM, SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
+  std::size_t count_;  ///< of them, from the front
+  std::array<struct sigaction, kSignals.size()> before_{};
+};
+
+namespace {
+
+/// Seconds after which signals are passed on though no start was heard of.
+constexpr unsigned kLongestStart = 30;
+
+std::atomic<pid_t> launched = 0;
+std::atomic<bool> stops = false;  ///< Interrupts::Stop
+std::atomic<int> interrupt = 0;
+std::atomic<bool> ending = false;   ///< PassedSignals::ends
+std::atomic<int> early = 0;         ///< a signal that came before there was anybody to pass it to
+std::atomic<bool> started = false;  ///< the ranks; before, mpiexec loses requests, or ranks die of them
+
+bool is_request(int signal) {
+  return signal == SIGUSR1 || signal == SIGUSR2;
+}
+
+/// Of two signals that wait, the one that asks for more stays.
+int weight_of(int signal) {
+  return signal == 0 ? 0 : signal == SIGUSR2 ? 1 : signal == SIGUSR1 ? 2 : 3;
+}
+
+void pass_on_early() {
+  const int signal = early.exchange(0);
+  const pid_t to = launched.load();
+  if (signal == 0) return;
+  if (to > 0 && (started.load() || !is_request(signal))) {
+    ::kill(to, signal);
+  } else {
+    int waiting = 0;  // another may have come meanwhile
+    while (weight_of(waiting) < weight_of(signal) && !early.compare_exchange_weak(waiting, signal)) {
+    }
+  }
+}
+
+extern "C" void pass_on(int signal) {
+  const int error = errno;
+  if (signal == SIGALRM) started.store(true);
+  if (signal == SIGINT || signal == SIGTERM || signal == SIGHUP) {
+    const bool again = interrupt.exchange(signal) != 0;
+    ending.store(again || !stops.load());
+    if (stops.load()) {
+      signal = again ? SIGTERM : SIGUSR1;
+    } else {
+      signal = again ? SIGKILL : SIGTERM;
+    }
+  }
+  if (signal != SIGALRM && weight_of(signal) >= weight_of(early.load())) {
+    if (early.exchange(signal) == 0 && is_request(signal) && !started.load()) ::alarm(kLongestStart);
+  }
+  pass_on_early();
+  errno = error;
+}
+
+}  // namespace
+
+PassedSignals::PassedSignals(const JobOptions& options)
+    : count_(options.input == StandardInput::None ? kSignals.size() : 3) {
+  launched.store(0);
+  early.store(0);
+  started.store(false);
+  interrupt.store(0);
+  ending.store(false);
+  stops.store(options.interrupts == Interrupts::Stop);
+  struct sigaction action {};
+  action.sa_handler = pass_on;
+  // One at a time: two that meet in the handler would lose one of them.
+  for (const int signal : kSignals) ::sigaddset(&action.sa_mask, signal);
+  for (std::size_t i = 0; i < count_; ++i) {
+    ::sigaction(kSignals.at(i), nullptr, &before_.at(i));
+    // What nohup, or a shell for its background, has us ignore stays ignored, and so do requests nobody here takes.
+    if (before_.at(i).sa_handler != SIG_IGN) ::sigaction(kSignals.at(i), &action, nullptr);
+  }
+}
+
+PassedSignals::~PassedSignals() {
+  for (std::size_t i = count_; i-- > 1;) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
+  ::alarm(0);  // no handler sets it any more
+  ::sigaction(kSignals.front(), &before_.front(), nullptr);
+  if (const int signal = interrupt.load(); signal != 0 && !stops.load()) ::raise(signal);
+}
+
+void PassedSignals::to(pid_t child) {
+  launched.store(child);
+  pass_on_early();
+}
+
+void PassedSignals::to_nobody() {
+  launched.store(0);
+}
+
+void PassedSignals::note_start() {
+  started.store(true);
+  pass_on_early();
+}
+
+bool PassedSignals::ends() {
+  return ending.load();
+}
+
+int PassedSignals::interrupted_by() {
+  return interrupt.load();
+}
+
+namespace {
+
+/// 0: it has gone.
+pid_t parent_of(const std::filesystem::path& process) {
+  std::ifstream file(process / "stat");
+  std::string stat;
+  std::getline(file, stat, '\0');  // a name may hold anything but that
+  const std::size_t name_end = stat.rfind(')');
+  if (name_end == std::string::npos || name_end + 4 > stat.size()) return 0;
+  pid_t parent = 0;
+  std::from_chars(stat.data() + name_end + 4, stat.data() + stat.size(), parent);  // after ") S "
+  return parent;
+}
+
+/// A process before those it started.
+std::vector<pid_t> with_descendants(pid_t process) {
+  std::vector<std::pair<pid_t, pid_t>> parents;  ///< a process and its parent
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry("/proc", error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    pid_t number = 0;
+    const auto [stop, wrong] = std::from_chars(name.data(), name.data() + name.size(), number);
+    if (wrong == std::errc() && stop == name.data() + name.size())
+      parents.emplace_back(number, parent_of(entry->path()));
+  }
+  std::vector<pid_t> found{process};
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    for (const auto& [number, parent] : parents) {
+      if (parent == found[i]) found.push_back(number);
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+void kill_with_descendants(pid_t process) {
+  ::kill(process, SIGSTOP);  // starts nobody more while they are listed
+  const std::vector<pid_t> all = with_descendants(process);
+  if (::getpgid(process) == process) ::kill(-process, SIGKILL);
+  for (const pid_t one : all) ::kill(one, SIGKILL);
+}
+
 namespace {
 
 /// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.

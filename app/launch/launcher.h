@@ -41,7 +41,7 @@ void tell_launcher();
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
 /// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
 /// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks, once these have started,
-/// if this process watches for them (engine/signals.h).
+/// if this process watches for them (core/signals.h).
 /// A job that takes longer to start than `options.hang_limit`, 10 s and half a second a rank is ended; one that does
 /// not end when it is told to, in as long as that limit but at least 2 and at most 10 s, is killed. Throws Error: Io
 /// when mpiexec or MPI cannot be started, Lost when a rank or mpiexec itself was killed.

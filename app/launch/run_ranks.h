@@ -15,4 +15,10 @@ namespace hpr {
 [[nodiscard]] ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communicator&)>& body,
                                  const JobOptions& options = {});
 
+/// As run_ranks; where that starts a job of several ranks, one that loses a rank or stands still is started again, up
+/// to `restarts` times, with the journal of what was done. It is not where the frame after which it ended is the one an
+/// earlier job ended at: that frame would end the next one too. Throws Error (Lost) then.
+[[nodiscard]] ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interrupts,
+                                      const std::function<ExitCode(Communicator&)>& body);
+
 }  // namespace hpr

@@ -8,6 +8,7 @@
 #include "cluster/transport/communicator.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "engine/session.h"
 
 namespace hpr {
 namespace {
@@ -81,6 +82,10 @@ std::chrono::nanoseconds Globals::hang_limit() const {
     throw Error(ExitCode::Usage, fmt::format("--hang-timeout: '{}' is no duration", hang_timeout), "write e.g. 30s");
   }
   return *limit;
+}
+
+SessionSettings Globals::session() const {
+  return {backend, device, threads};
 }
 
 }  // namespace hpr

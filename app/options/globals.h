@@ -6,11 +6,12 @@
 #include <vector>
 
 #include "app/options/option_set.h"
-#include "engine/session_settings.h"
 #include "image/image_io.h"
 #include "scene/load_scene.h"
 
 namespace hpr {
+
+struct SessionSettings;
 
 /// The options every command has.
 struct Globals {
@@ -35,7 +36,7 @@ struct Globals {
   /// How large a picture may be that HPR itself draws or reads back: --limit-image, or kPictureLimits.
   [[nodiscard]] ImageLimits picture_limits() const;
   [[nodiscard]] std::chrono::nanoseconds hang_limit() const;
-  [[nodiscard]] SessionSettings session() const { return {backend, device, threads}; }
+  [[nodiscard]] SessionSettings session() const;
 };
 
 }  // namespace hpr

@@ -40,4 +40,8 @@ void ReportOptions::declare(const OptionSet& options) {
   options.option("--stats", stats, "write what the frame took as JSON").type("FILE.json");
 }
 
+Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals) {
+  return load_scene(source, settings, globals.scene_limits(), globals.picture_limits());
+}
+
 }  // namespace hpr

@@ -26,9 +26,6 @@ struct ReportOptions {
 };
 
 /// Loads a scene lit as the settings say, within the limits of the program's options. Throws Error as load_scene does.
-[[nodiscard]] inline Scene load_scene(const std::string& source, const RenderSettings& settings,
-                                      const Globals& globals) {
-  return load_scene(source, settings, globals.scene_limits(), globals.picture_limits());
-}
+[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals);
 
 }  // namespace hpr

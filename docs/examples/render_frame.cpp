@@ -3,8 +3,12 @@
 // usage: render_frame SCENE FILE.exr
 
 #include "cluster/transport/local_communicator.h"
+#include "engine/frame.h"
 #include "engine/render_settings.h"
+#include "engine/session.h"
 #include "image/image_io.h"
+#include "scene/load_scene.h"
+#include "scene/view.h"
 
 int main(int argc, char** argv) {
   using namespace hpr;

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/error.h"
+
 namespace hpr {
 
 using Words = std::span<const std::string>;
@@ -49,5 +51,11 @@ class CommandTable {
 
 /// Of length 1, however long it was. Throws Error (Usage) for 0,0,0.
 [[nodiscard]] glm::dvec3 direction_of(const glm::dvec3& point);
+
+/// What goes wrong with one command of a session, and leaves the session as it was.
+[[nodiscard]] inline bool is_recoverable(const Error& error) {
+  return error.code() == ExitCode::Usage || error.code() == ExitCode::BadInput || error.code() == ExitCode::Io ||
+         error.code() == ExitCode::Limit;
+}
 
 }  // namespace hpr

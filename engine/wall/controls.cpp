@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "engine/session.h"
 #include "engine/settings_table.h"
 
 namespace hpr {

@@ -1,15 +1,18 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <string>
 
-#include "engine/render_settings.h"
-#include "engine/session.h"
 #include "engine/wall/command_table.h"
 #include "engine/wall/scene_edits.h"
 
 namespace hpr {
+
+class Session;
+struct RenderSettings;
+struct Scene;
 
 /// Loads a scene and lights it as the settings say.
 using SceneLoader = std::function<Scene(const std::string& source, const RenderSettings& settings)>;

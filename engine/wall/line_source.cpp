@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <vector>
 
+#include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/log.h"
 #include "walls/link/token.h"
@@ -140,6 +141,30 @@ void LineSource::answer(const InputLine& line, const std::string& text) {
       return;
     }
   }
+}
+
+namespace {
+
+constexpr char kLine = '+';
+constexpr char kNothing = '-';
+constexpr char kEnd = '.';
+
+}  // namespace
+
+Heard hear_line(Communicator& comm, LineSource* source, std::chrono::milliseconds longest,
+                std::optional<InputLine>& from) {
+  std::string said(1, kNothing);
+  if (source != nullptr) {
+    from = source->next(longest);
+    if (from) {
+      said = kLine + from->text;
+    } else if (source->ended()) {
+      said = kEnd;
+    }
+  }
+  said = broadcast_text(comm, said);
+  if (said.front() == kLine) return {said.substr(1), false};
+  return {std::nullopt, said.front() == kEnd};
 }
 
 }  // namespace hpr

@@ -10,6 +10,8 @@
 
 namespace hpr {
 
+class Communicator;
+
 /// A line somebody typed or sent, and where the answer goes.
 struct InputLine {
   int from = 0;
@@ -64,5 +66,16 @@ class LineSource {
   std::string token_;
   std::map<int, Client> clients_;  ///< by descriptor; standard input is one
 };
+
+/// What every rank heard.
+struct Heard {
+  std::optional<std::string> line;
+  bool ended = false;  ///< no line can come any more
+};
+
+/// Collective. The next line of rank 0's source, which waits at most `longest` for one; null: nothing is said.
+/// `from`: on rank 0, where the line came from.
+[[nodiscard]] Heard hear_line(Communicator& comm, LineSource* source, std::chrono::milliseconds longest,
+                              std::optional<InputLine>& from);
 
 }  // namespace hpr

@@ -3,19 +3,17 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/progress.h"
-#include "engine/camera_path.h"
 #include "engine/frame_maker.h"
 #include "engine/output.h"
-#include "engine/screens.h"
 #include "engine/session.h"
-#include "engine/wall/orbit.h"
 #include "engine/wall/run_control.h"
-#include "engine/wall/wall_heads.h"
+#include "engine/wall/viewpoint.h"
+#include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_job.h"
-#include "engine/wall/wall_monitors.h"
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
 #include "walls/geometry/curved.h"
@@ -110,5 +108,8 @@ class WallDriver {
   std::uint64_t first_frame_ = 0;
   bool interrupted_ = false;
 };
+
+/// Collective, after the last frame. Rank 0 writes the files; all ranks throw Error (Io) where it cannot.
+void write_layers(const WallLayerFiles& files, std::span<const Aov> aovs, WallDriver& driver, Session& session);
 
 }  // namespace hpr

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/camera_path.h"
 #include "engine/render_settings.h"
+#include "engine/wall/viewpoint.h"
 #include "image/image_io.h"
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "cluster/transport/collectives.h"
+#include "engine/session.h"
 
 namespace hpr {
 namespace {

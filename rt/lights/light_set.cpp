@@ -50,8 +50,8 @@ LitSphere sphere_about(const Bounds& bounds) {
 
 }  // namespace
 
-LightSet::LightSet(const Scene& scene, EvenSky even_sky)
-    : even_sky_(even_sky),
+LightSet::LightSet(const Scene& scene, EvenSky constant_environment)
+    : even_sky_(constant_environment),
       lit_(sphere_about(scene.bounds)),
       background_(scene.background.r, scene.background.g, scene.background.b),
       triangles_(scene) {

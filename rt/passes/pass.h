@@ -13,6 +13,7 @@
 #include "rt/lights/light_set.h"
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
+#include "rt/passes/pass_list.h"
 #include "rt/photons/photon_search.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_walk.h"

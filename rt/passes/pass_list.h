@@ -10,31 +10,17 @@
 #include <string_view>
 #include <vector>
 
+#include "rt/passes/pass_id.h"
 #include "scene/requirements.h"
 
-/// Which ray passes there are. To add one: its file beside this one, its PassId here (a Component too, where its light
-/// has a layer of its own), its row in pass_list.cpp and its line in rt/CMakeLists.txt.
+/// Which ray passes there are. To add one: its file beside this one, its PassId in pass_id.h (a Component too,
+/// where its light has a layer of its own), its row in pass_list.cpp and its line in rt/CMakeLists.txt.
 namespace hpr {
 
 class Pass;
 enum class Lobe : std::uint8_t;
 struct PathPoint;
 struct RaySettings;
-
-/// The ray passes, in the order in which they run and in which reports list them.
-enum class PassId : std::uint8_t { Shadow, Reflection, Refraction, AmbientOcclusion, Photon, Gather };
-inline constexpr std::size_t kPasses = static_cast<std::size_t>(PassId::Gather) + 1;
-
-/// Parts of a pixel's color; they sum to it. Apart from Direct each one belongs to a pass.
-enum class Component : std::uint8_t {
-  Direct,            ///< emission, and light as if nothing stood in its way
-  Shadow,            ///< what of that is blocked: never above 0
-  Reflection,        ///< all that arrives by the first surface's specular reflection
-  Refraction,        ///< all that arrives through the first surface
-  AmbientOcclusion,  ///< of the first surface
-  Photon,            ///< of the first surface: indirect light, by photons or by rays that gather it
-};
-inline constexpr std::size_t kComponents = static_cast<std::size_t>(Component::Photon) + 1;
 
 /// A set of components: bit i stands for component i.
 using ComponentSet = std::uint8_t;
@@ -100,13 +86,6 @@ struct PassInfo {
 [[nodiscard]] std::vector<PassId> half_resolution_passes();
 /// The components that passes of RaySettings::half_resolution share.
 [[nodiscard]] ComponentSet shared_components(const RaySettings& settings);
-
-/// Whether a pass runs for a scene, for --explain and --stats.
-struct PassPlan {
-  PassId pass = PassId::Shadow;
-  bool runs = false;
-  std::string why;
-};
 
 /// Every pass, in the order they run, for a scene that requires so much. Throws Error (Usage) where passes that
 /// `settings` name do not go together.

@@ -1,3 +1,5 @@
+#include "rt/passes/pass_list.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -12,6 +12,7 @@
 
 #include "rt/materials/bsdf_test_tools.h"
 #include "rt/photons/photon_map.h"
+#include "rt/ray_settings.h"
 
 namespace hpr {
 namespace {

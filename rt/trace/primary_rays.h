@@ -7,28 +7,13 @@
 
 #include "image/key.h"
 #include "image/tiles.h"
+#include "rt/ray_counts.h"
 #include "rt/trace/occupied_pixels.h"
 #include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
 namespace hpr {
-
-/// Of the last draw().
-struct PrimaryRayStats {
-  std::uint64_t rays = 0;      ///< none go through pixels where no box about triangles is seen
-  std::uint64_t invalid = 0;   ///< of those, rays Embree could not bear: they missed
-  std::uint64_t weighed = 0;   ///< depths reckoned in double because two candidates, or the near plane, were close
-  std::uint64_t retraced = 0;  ///< rays traced again through everything, as their first candidate was no hit
-
-  PrimaryRayStats& operator+=(const PrimaryRayStats& other) {
-    rays += other.rays;
-    invalid += other.invalid;
-    weighed += other.weighed;
-    retraced += other.retraced;
-    return *this;
-  }
-};
 
 /// Makes keys by one ray through each pixel's centre: what Rasterizer makes, from Embree.
 ///
@@ -55,6 +40,7 @@ class PrimaryRays {
             std::span<TileLayer<Key>* const> layers, const PixelMask* wanted = nullptr);
   static constexpr std::size_t kMostLooks = 16;
 
+  /// Of the last draw().
   [[nodiscard]] const PrimaryRayStats& stats() const { return stats_; }
 
  private:

@@ -5,8 +5,10 @@
 
 #include "app/options/render_options.h"
 #include "cluster/transport/local_communicator.h"
+#include "core/progress.h"
 #include "engine/frame_maker.h"
-#include "engine/screens.h"
+#include "engine/output.h"
+#include "engine/session.h"
 
 namespace hpr {
 namespace {

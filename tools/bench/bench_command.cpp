@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "app/command.h"
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "app/launch/run_ranks.h"
 #include "app/options/render_options.h"
 #include "core/job_environment.h"

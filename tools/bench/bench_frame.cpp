@@ -5,19 +5,23 @@
 #include <map>
 
 #include "app/command.h"
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "app/options/render_options.h"
-#include "app/options/words.h"
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
+#include "core/progress.h"
+#include "engine/checkpoint.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
-#include "engine/resolution.h"
-#include "engine/screens.h"
+#include "engine/session.h"
+#include "rt/lighter.h"
+#include "rt/passes/pass_list.h"
+#include "scene/view.h"
 #include "tools/bench/bench_bare_gl.h"
 #include "tools/bench/bench_rays.h"
 #include "tools/bench/bench_rows.h"
 #include "tools/bench/bench_times.h"
+#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {

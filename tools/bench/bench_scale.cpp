@@ -6,17 +6,19 @@
 #include <cstring>
 #include <set>
 
-#include "app/options/words.h"
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "core/progress.h"
+#include "engine/checkpoint.h"
 #include "engine/frame_sampler.h"
-#include "engine/resolution.h"
-#include "engine/screens.h"
+#include "engine/output.h"
 #include "engine/session.h"
-#include "engine/wall/screen_owners.h"
+#include "engine/wall/wall_displays.h"
+#include "rt/lighter.h"
 #include "tools/bench/bench_times.h"
+#include "tools/report/lists.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/geometry.h"
 

@@ -10,13 +10,11 @@
 #include <random>
 
 #include "app/command.h"
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "app/launch/launcher.h"
 #include "app/launch/run_ranks.h"
-#include "app/launch/shell_line.h"
 #include "app/options/render_options.h"
-#include "app/options/words.h"
-#include "app/output_files.h"
+#include "app/results.h"
 #include "cluster/transport/collectives.h"
 #include "core/file.h"
 #include "core/job_environment.h"
@@ -26,9 +24,11 @@
 #include "core/text.h"
 #include "engine/output.h"
 #include "scene/view.h"
+#include "scene/view.h"
 #include "tools/bench/bench_scale.h"
 #include "tools/bench/bench_scale_html.h"
 #include "tools/bench/bench_scale_report.h"
+#include "tools/report/lists.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

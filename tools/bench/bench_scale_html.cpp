@@ -7,8 +7,8 @@
 #include <iterator>
 #include <set>
 
-#include "app/options/words.h"
 #include "tools/report/html_page.h"
+#include "tools/report/lists.h"
 #include "tools/report/markup.h"
 #include "tools/report/plot_axes.h"
 

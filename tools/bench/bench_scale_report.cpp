@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "app/options/words.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "tools/compare/compare_measure.h"
+#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "tools/bench/bench_scale.h"
 
 namespace hpr {

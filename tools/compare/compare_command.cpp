@@ -10,9 +10,7 @@
 #include "app/command.h"
 #include "app/launch/launcher.h"
 #include "app/launch/run_ranks.h"
-#include "app/launch/shell_line.h"
-#include "app/options/words.h"
-#include "app/trace_file.h"
+#include "app/results.h"
 #include "cluster/transport/collectives.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/plugin.h"
@@ -22,12 +20,14 @@
 #include "engine/output.h"
 #include "image/image_io.h"
 #include "scene/view.h"
+#include "scene/view.h"
 #include "tools/compare/compare.h"
 #include "tools/compare/compare_html.h"
 #include "tools/compare/compare_options.h"
 #include "tools/compare/compare_report.h"
 #include "tools/compare/compare_scene.h"
 #include "tools/compare/compare_threads.h"
+#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {

@@ -5,15 +5,16 @@
 #include <algorithm>
 #include <charconv>
 
-#include "app/options/words.h"
-#include "app/output_files.h"
+#include "app/results.h"
 #include "compositing/compositor.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/text.h"
 #include "engine/output.h"
+#include "rt/passes/pass_list.h"
 #include "tools/compare/simulate_option.h"
+#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "app/options/words.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {

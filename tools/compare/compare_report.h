@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "tools/compare/compare.h"
 
 namespace hpr {

@@ -1,8 +1,9 @@
 #include "tools/compare/compare_scene.h"
 
-#include "app/options/words.h"
 #include "engine/frame.h"
 #include "engine/render_settings.h"
+#include "engine/session.h"
+#include "tools/report/lists.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/geometry.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "tools/report/html_page.h"
 #include "tools/report/markup.h"
 #include "tools/report/plot_axes.h"

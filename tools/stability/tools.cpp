@@ -7,6 +7,7 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "engine/frame.h"
+#include "engine/session.h"
 #include "raster/rasterizer.h"
 
 namespace hpr::stability {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/doctor/machine.h"
+#include "app/doctor/doctor.h"
 #include "engine/render_settings.h"
 #include "image/image.h"
 #include "rt/lighter.h"

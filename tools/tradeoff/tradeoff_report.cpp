@@ -8,10 +8,11 @@
 #include <cmath>
 #include <iterator>
 
-#include "app/launch/shell_line.h"
-#include "app/options/words.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "core/text.h"
+#include "rt/passes/pass_list.h"
+#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {

@@ -1,0 +1,252 @@
+#include <fmt/format.h>
+#include <netdb.h>
+#include <sched.h>
+#include <sys/resource.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
+
+#include "app/doctor/doctor.h"
+#include "app/launch/launcher.h"
+#include "cluster/transport/mpi_communicator.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/job_environment.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "core/timing.h"
+#include "image/image_io.h"
+#include "raster/gl_context.h"
+#include "rt/trace/embree_compat.h"
+
+namespace hpr {
+namespace {
+
+constexpr double kMiB = 1024.0 * 1024.0;
+constexpr double kGiB = 1024.0 * kMiB;
+
+Finding ok(std::string detail) {
+  return {{}, FindingStatus::Ok, std::move(detail), {}};
+}
+Finding warn(std::string detail, std::string remedy) {
+  return {{}, FindingStatus::Warn, std::move(detail), std::move(remedy)};
+}
+
+/// The value behind "key:" in a file of /proc, without leading blanks.
+std::string proc_value(const char* path, std::string_view key) {
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    if (!line.starts_with(key)) continue;
+    const std::size_t value = line.find_first_not_of(" \t:", key.size());
+    return value == std::string::npos ? std::string() : line.substr(value);
+  }
+  return {};
+}
+
+Finding check_cpu() {
+  const std::string model = proc_value("/proc/cpuinfo", "model name");
+  const int cores = job_cores();
+  const bool avx2 = __builtin_cpu_supports("avx2") != 0;
+  const char* const isa = __builtin_cpu_supports("avx512f") != 0 ? "AVX-512" : avx2 ? "AVX2" : "SSE";
+  std::string detail =
+      fmt::format("{} usable cores, {}, {}", cores, isa, model.empty() ? "unknown model" : printable(model));
+  if (avx2) return ok(std::move(detail));
+  return warn(std::move(detail), "without AVX2 rays are slow, and pictures differ from those of machines that have it");
+}
+
+/// Bytes this process may use: what the machine has free, or less when a container says so.
+Finding check_memory() {
+  const std::string text = proc_value("/proc/meminfo", "MemAvailable");
+  double bytes = std::strtod(text.c_str(), nullptr) * 1024.0;
+  std::string where = "available";
+  std::ifstream group("/sys/fs/cgroup/memory.max");
+  double limit = 0.0;
+  if (group >> limit && limit > 0.0 && limit < bytes) {
+    bytes = limit;
+    where = "allowed to this container";
+  }
+  std::string detail = fmt::format("{:.1f} GiB {}", bytes / kGiB, where);
+  if (bytes >= 2.0 * kGiB) return ok(std::move(detail));
+  return warn(std::move(detail), "run fewer ranks, or smaller scenes and frames");
+}
+
+Finding check_embree() {
+  auto* const device = rtcNewDevice(nullptr);
+  if (device == nullptr) {
+    return {{}, FindingStatus::Fail, "Embree opens no device", "apt-get install --reinstall libembree3-3"};
+  }
+  const auto version = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION);
+  const bool wide = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
+  const bool half = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
+  rtcReleaseDevice(device);
+  return ok(fmt::format("{}.{}.{}, native packets of {}", version / 10000, version / 100 % 100, version % 100,
+                        wide   ? 16
+                        : half ? 8
+                               : 4));
+}
+
+/// The first line `command` prints, without what follows a line break; empty when it fails.
+std::string first_line_of(const std::string& command) {
+  const auto close = [](FILE* pipe) { ::pclose(pipe); };
+  const std::unique_ptr<FILE, decltype(close)> pipe(::popen(command.c_str(), "r"), close);
+  std::array<char, 256> line{};
+  if (pipe == nullptr || std::fgets(line.data(), static_cast<int>(line.size()), pipe.get()) == nullptr) return {};
+  std::string text(line.data());
+  text.erase(text.find_last_not_of("\r\n ") + 1);
+  return printable(text);
+}
+
+Finding check_mpi() {
+  constexpr const char* kInstall = "apt-get install openmpi-bin";
+  const auto launcher = find_on_path("mpiexec");
+  if (!launcher) return warn("mpiexec is not on PATH: only one rank can run", kInstall);
+  // The launcher is named without its folder, so that nothing in a path can be taken for shell syntax.
+  const std::string version = first_line_of("mpiexec --version 2>/dev/null");
+  if (version.empty()) {
+    return warn(fmt::format("{} does not say its version: only one rank can run", launcher->string()), kInstall);
+  }
+  return ok(fmt::format("{} ({})", version, launcher->string()));
+}
+
+/// Open MPI keeps the messages of ranks on one host in `folder`.
+Finding check_space(const std::string& folder, double needed_bytes, const char* remedy) {
+  struct statvfs space {};
+  if (::statvfs(folder.c_str(), &space) != 0)
+    return warn(fmt::format("{}: {}", printable(folder), std::generic_category().message(errno)), remedy);
+  const double free_bytes = static_cast<double>(space.f_bavail) * static_cast<double>(space.f_frsize);
+  std::string detail = fmt::format("{}: {:.0f} MiB free", printable(folder), free_bytes / kMiB);
+  if (::access(folder.c_str(), W_OK) != 0) return warn(detail + ", but not writable", remedy);
+  return free_bytes >= needed_bytes ? ok(std::move(detail)) : warn(std::move(detail), remedy);
+}
+
+Finding check_host_name() {
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0) return warn("this host has no name", "set one by hostname(1)");
+  const std::string shown = printable(name.data());
+  const Stopwatch watch;
+  addrinfo* found = nullptr;
+  const int failure = ::getaddrinfo(name.data(), nullptr, nullptr, &found);
+  if (found != nullptr) ::freeaddrinfo(found);
+  if (failure == 0) return ok(fmt::format("{} resolves in {:.1f} ms", shown, watch.ms()));
+  return warn(
+      fmt::format("{} does not resolve ({}): every MPI job waits seconds at its start", shown, ::gai_strerror(failure)),
+      fmt::format("echo '127.0.1.1 {}' >> /etc/hosts", shown));
+}
+
+Finding check_image_module() {
+  const Stopwatch watch;
+  const Image<Rgba8> image({2, 2}, {1, 2, 3, 4});
+  if (decode_image(encode_png(image), "a test picture", {}) != image) {
+    return {{},
+            FindingStatus::Fail,
+            "OpenImageIO does not return the pixels of a PNG picture",
+            "apt-get install --reinstall libopenimageio2.4"};
+  }
+  return ok(fmt::format("OpenImageIO opens in {:.0f} ms", watch.ms()));
+}
+
+Finding check_stack() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0) return warn("the limit cannot be read", "ulimit -s 8192");
+  if (limit.rlim_cur == RLIM_INFINITY) return ok("unlimited");
+  std::string detail = fmt::format("{:.1f} MiB", static_cast<double>(limit.rlim_cur) / kMiB);
+  return static_cast<double>(limit.rlim_cur) >= 4.0 * kMiB ? ok(std::move(detail))
+                                                           : warn(std::move(detail), "ulimit -s 8192");
+}
+
+}  // namespace
+
+std::vector<Check> machine_checks() {
+  return {
+      {"CPU", check_cpu},
+      {"memory", check_memory},
+      {"Embree", check_embree},
+      {"MPI", check_mpi},
+      {"shared memory",
+       [] { return check_space("/dev/shm", 256.0 * kMiB, "in a container: docker run --shm-size=1g ..."); }},
+      {"temporary files",
+       [] {
+         return check_space(temporary_folder().string(), 64.0 * kMiB,
+                            "free some space, or set TMPDIR to a folder that can be written");
+       }},
+      {"host name", check_host_name},
+      {"pictures", check_image_module},
+      {"stack", check_stack},
+  };
+}
+
+namespace {
+
+Finding try_backend(const std::string& backend) {
+  try {
+    const auto context = make_gl_context({.backend = backend, .device = -1, .local_rank = 0, .threads = 1});
+    if (context->software()) {
+      return {backend, FindingStatus::Ok, context->description() + " (software: pictures are right, frames are slow)",
+              ""};
+    }
+    return {backend, FindingStatus::Ok, context->description(), ""};
+  } catch (const Error& error) {
+    return {backend, FindingStatus::Warn, error.what(), error.hint()};
+  }
+}
+
+/// One backend is enough; without any nothing can be drawn.
+Finding any_backend() {
+  const auto context = make_gl_context({.backend = "auto", .device = -1, .local_rank = 0, .threads = 1});
+  return {"OpenGL", FindingStatus::Ok, fmt::format("--backend auto takes {}", context->name()), ""};
+}
+
+}  // namespace
+
+std::vector<Check> graphics_checks() {
+  std::vector<Check> checks;
+  for (const std::string& backend : all_gl_backends()) {
+    checks.push_back({fmt::format("OpenGL by {}", backend), [backend] { return try_backend(backend); }});
+  }
+  checks.push_back({"OpenGL", any_backend});
+  return checks;
+}
+
+namespace {
+
+std::string cpu_model() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (!line.starts_with("model name")) continue;
+    const auto colon = line.find(": ");
+    if (colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+int job_cores() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  if (::sched_getaffinity(0, sizeof(cores), &cores) != 0) return usable_cores();
+  if (inside_mpi_job()) {
+    // Whoever started this rank is mostly free to use what the whole job may; a script between may not be.
+    cpu_set_t launcher;
+    CPU_ZERO(&launcher);
+    if (::sched_getaffinity(::getppid(), sizeof(launcher), &launcher) == 0) CPU_OR(&cores, &cores, &launcher);
+  }
+  return CPU_COUNT(&cores);
+}
+
+Machine this_machine() {
+  return {cpu_model(), job_cores(), mpi_version()};
+}
+
+}  // namespace hpr

@@ -1,0 +1,46 @@
+#include "engine/output.h"
+
+#include <gtest/gtest.h>
+
+#include "scene/view.h"
+#include "scene/scene.h"
+
+namespace hpr {
+namespace {
+
+View screen(Size size) {
+  Camera camera;
+  camera.lens = PerspectiveLens{.vertical_fov_radians = 1.0, .near_distance = 0.1};
+  return make_view(camera, size, {});
+}
+
+TEST(AtResolution, KeepsTheFrustumAndRoundsThePixels) {
+  const std::vector<View> screens{screen({1280, 720}), screen({171, 105}), screen({1, 3})};
+  const std::vector<View> made = at_resolution(screens, 0.5);
+  EXPECT_EQ(made[0].screen, (Size{640, 360}));
+  EXPECT_EQ(made[1].screen, (Size{86, 53}));  // 85.5 and 52.5 are rounded up
+  EXPECT_EQ(made[2].screen, (Size{1, 2}));
+  for (std::size_t i = 0; i < made.size(); ++i) {
+    EXPECT_EQ(made[i].size(), made[i].screen);
+    EXPECT_EQ(made[i].left, screens[i].left);
+    EXPECT_EQ(made[i].top, screens[i].top);
+    const Ray corner = view_ray(screens[i], screens[i].screen.width, screens[i].screen.height);
+    const Ray same = view_ray(made[i], made[i].screen.width, made[i].screen.height);
+    EXPECT_EQ(corner.direction, same.direction);
+  }
+}
+
+TEST(AtResolution, LeavesAPixelAtLeast) {
+  EXPECT_EQ(at_resolution(std::vector{screen({4, 1})}, 0.1).front().screen, (Size{1, 1}));
+}
+
+TEST(AtResolution, MakesAScreenOfSeveralBlocksOfFewer) {
+  const std::vector<View> wide{screen({40000, 10})};
+  EXPECT_EQ(split_into_blocks(wide.front(), kRasterLimit).size(), 3U);
+  const std::vector<View> blocks = split_into_blocks(at_resolution(wide, 0.5).front(), kRasterLimit);
+  ASSERT_EQ(blocks.size(), 2U);
+  EXPECT_EQ(blocks[1].block, (Rect{kRasterLimit, 0, 20000, 5}));
+}
+
+}  // namespace
+}  // namespace hpr

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "image/filter.h"
+#include "rt/passes/pass_id.h"
+#include "rt/trace/ray_build.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// What decides how light is worked out. The same settings give the same picture on any number of ranks and threads.
+struct RaySettings {
+  std::vector<PassId> passes = {};  ///< those that are named; empty: as `auto_passes` says
+  bool auto_passes = true;          ///< where none is named: what the scene requires; false: none
+  bool all_passes = false;          ///< all that run by default, also where the scene does not require them
+  int max_depth = 8;                ///< reflections and refractions in a row
+  int light_samples = 1;            ///< rays per point and sample towards emitting surfaces and the environment
+  double glossy_cutoff = 0.3;       ///< specular lobes of at least this roughness are not followed by rays
+  std::uint32_t photons = 0;        ///< sent per sample; 0: kPhotons, and only where the pass is named
+  bool global_photons = false;      ///< also those that were scattered by rough surfaces only: all indirect light
+  bool gather = false;              ///< under an even sky rays bring all indirect light, in place of photons
+  double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density
+  int occlusion_rays = 4;           ///< of the ambient-occlusion pass, per point and sample
+  double ambient = 0.2;             ///< radiance that pass lets in where nothing is near
+  bool terminator_fix = true;       ///< lifts the origins of shadow rays onto the smooth surface normals pretend
+  RayBuild build = {};              ///< of Embree's scenes
+  /// Passes whose light of the first surface is worked out for one pixel in four and spread to its neighbours where
+  /// they see the like; PassId::Shadow stands for the light of lights.
+  std::vector<PassId> half_resolution = {};
+  /// Surfaces that this rank's rays meet at home, as those of the others travel to it; none: all of them.
+  std::optional<std::vector<SurfaceRange>> part = {};
+  bool denoise = false;                   ///< see Denoiser
+  PixelFilter filter = PixelFilter::Box;  ///< of which denoising looks at more places; none of its weights < 0
+  bool reference = false;                 ///< path tracing in place of all passes, paths of max_depth segments
+  std::uint64_t seed = 1;                 ///< of all randomness
+  int threads = 1;
+  int host_ranks = 1;  ///< ranks of this host: they share its memory
+
+  bool operator==(const RaySettings&) const = default;
+};
+
+/// So many first samples of a frame are denoised: with more of them, further plain ones are the better use of time.
+inline constexpr std::uint32_t kDenoisedSamples = 16;
+
+/// Photons sent per sample where the pass is named and nothing says how many.
+inline constexpr std::uint32_t kPhotons = 200'000;
+
+}  // namespace hpr
