@@ -10,7 +10,7 @@
 
 namespace hpr {
 
-/// One word after `hpr`, or after the word of a command that has subcommands.
+/// A command of the program, the first argument of `hpr`, or a subcommand, the argument after its parent's name.
 class Command {
  public:
   virtual ~Command() = default;

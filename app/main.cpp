@@ -25,13 +25,13 @@
 namespace hpr {
 namespace {
 
-/// What needs no command; none: the words name one.
+/// Answers command lines that need no command (help); none: the arguments name a command.
 std::optional<ExitCode> answer_alone(const CommandLine& line, const std::vector<std::string>& words) {
   using Words = std::vector<std::string>;
   std::string answer;
   if (words.empty()) answer = line.help();
-  if (words == Words{"help", "knobs"}) answer = knobs_text();
-  if (words == Words{"help", "knobs", "--markdown"}) answer = knobs_markdown();
+  if (words == Words{"help", "knobs"}) answer = tradeoff_settings_text();
+  if (words == Words{"help", "knobs", "--markdown"}) answer = tradeoff_settings_markdown();
   if (words == Words{"help", "quality", "--markdown"}) answer = qualities_markdown();
   if (words == Words{"help", "--markdown"}) {
     answer = line.markdown() +
@@ -54,7 +54,7 @@ void configure_log(Globals& globals) {
                  "");
 }
 
-/// Also where nothing will be drawn by it. Windows are GLFW's, whatever draws what they show.
+/// Checks --backend, also for commands that draw nothing. Windows are GLFW's, whatever draws their pictures.
 void settle_backend(Globals& globals, const Command& command) {
   if (globals.backend == "glfw" && command.opens_windows()) globals.backend = "auto";
   check_gl_backend(globals.backend);
@@ -87,13 +87,13 @@ ExitCode run(const std::vector<std::string>& words) {
 int main(int argc, char** argv) {
   // A reader that goes away (hpr ... | head) shows as a failed write, not as a killed rank.
   std::signal(SIGPIPE, SIG_IGN);
-  // So does a file that may not grow further.
+  // A file that may not grow further shows as a failed write as well.
   std::signal(SIGXFSZ, SIG_IGN);
-  // What a checkpoint is asked for by is nothing to commands that write none (core/signals.h).
+  // Commands that write no checkpoints ignore the signals that request one (core/signals.h).
   for (const int request : {SIGUSR1, SIGUSR2}) std::signal(request, SIG_IGN);
   // A file opened while 0, 1 or 2 is closed would take its number, and what is meant for stdout or stderr.
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    // What is said on a closed stdout is lost, and that is an error where there is something to say.
+    // Output on a closed stdout is lost: an error where there is output.
     if (::fcntl(standard, F_GETFD) < 0) (void)::open(standard == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR);
   }
   try {
@@ -104,7 +104,8 @@ int main(int argc, char** argv) {
     }
     return static_cast<int>(code);
   } catch (const hpr::Error& error) {
-    // What every rank of a job finds before MPI starts is said once: rank 0's exit ends the others while they wait.
+    // An error that every rank of a job finds before MPI starts is printed once: rank 0's exit ends the others while
+    // they wait.
     if (hpr::launched_rank() != 0) std::this_thread::sleep_for(std::chrono::seconds(2));
     hpr::print_error(error, hpr::said_by(hpr::launched_rank()));
     return static_cast<int>(error.code());

@@ -16,7 +16,7 @@
 namespace hpr {
 
 /// `text` to the file `path`, or to standard output where that is empty. Throws Error where the file is there and
-/// `overwrite` is not said, or cannot be written.
+/// `overwrite` is false, or cannot be written.
 void write_or_print(std::string_view text, const std::string& path, bool overwrite);
 
 /// Throws Error (Usage) when two of these paths of results, or one and `trace`, are one file. Empty ones are none.
@@ -39,7 +39,7 @@ void check_trace(const Globals& globals);
 /// Throws Error (Io), (Usage) where `body` wrote that file, and what `body` does; then nothing is written.
 ExitCode traced(Communicator& comm, const Globals& globals, const std::function<ExitCode(Communicator&)>& body);
 
-/// The same of a command that has no job of ranks.
+/// Runs the body of a command that has no job of ranks, and writes the trace of this process alone.
 ExitCode traced_alone(const Globals& globals, const std::function<ExitCode()>& body);
 
 /// Prints an error on stderr in at most three lines: what and where, the offending line where there is one, a hint.

@@ -20,7 +20,7 @@ struct ExrLayer;
 struct LightOutput;
 struct View;
 
-/// What a pixel can tell beside its colour (arbitrary output variables). The parts of the light and the cost are means
+/// Values of a pixel beside its color (arbitrary output variables). The parts of the light and the cost are means
 /// over the samples; the others are those of the first sample, as their mean would be neither surface's.
 enum class Aov : std::uint8_t {
   Depth,   ///< depth.Z: metres along the view axis; infinite where nothing is seen

@@ -11,49 +11,51 @@
 namespace hpr {
 namespace {
 
-constexpr double kLeastScale = 0.1;
+constexpr double kMinScale = 0.1;
 /// A run starts small: a first frame that is too quick costs less than one that takes seconds.
 constexpr double kFirstScale = 0.3;
 
 // Shares of the target. 95 % of the frames are to take no more than kTail of it.
 constexpr double kTail = 1.1;
 constexpr double kTailDeviations = 1.65;
-constexpr double kHighestAim = 0.92;
-constexpr double kLowestAim = 0.75;
+constexpr double kMaxAim = 0.92;
+constexpr double kMinAim = 0.75;
 // The dead band, in shares of the aim.
 constexpr double kTooSlow = 1.08;
 constexpr double kRoomToRise = 0.93;
 constexpr std::size_t kRungsUpAtOnce = 3;
 /// Where even the least effort misses the target, what takes at most so much longer than that is kept.
 constexpr double kNotWorthSaving = 1.1;
-/// There more is tried now and then: at one and the same effort nobody can tell what is fixed.
+/// Where the target is out of reach a higher effort is tried every so many frames: times at one effort cannot separate
+/// fixed cost from cost per pixel.
 constexpr int kFramesToProbe = 12;
 
 // Standard deviations a frame adds to what is known: in shares of a frame's time, and of a pixel's.
 constexpr double kFixedDrift = 0.01;
 constexpr double kEachDrift = 0.05;
 constexpr double kSurprising = 3.0;
-constexpr double kLeastScatter = 0.02;
+constexpr double kMinScatter = 0.02;
 constexpr double kScatterMemory = 0.9;
 
-/// What an economy is believed to leave of the time before it was tried.
+/// What a degradation is believed to leave of the time before it was tried.
 constexpr double kGuessedRatio = 0.75;
 constexpr int kFramesToTrust = 4;
 
 }  // namespace
 
 double scale_of_step(int step) {
-  return std::pow(kLeastScale, static_cast<double>(step) / (kScaleSteps - 1));
+  return std::pow(kMinScale, static_cast<double>(step) / (kScaleSteps - 1));
 }
 
 FrameBudget::FrameBudget(const BudgetSettings& settings)
-    : settings_(settings), ratios_(static_cast<std::size_t>(settings.economies), kGuessedRatio) {
-  HPR_CHECK(settings.target_ms > 0.0 && settings.economies >= 0 && settings.most_samples > 0);
-  for (std::uint32_t samples = settings.most_samples; samples > 1; samples = (samples + 1) / 2) {
+    : settings_(settings), ratios_(static_cast<std::size_t>(settings.degradations), kGuessedRatio) {
+  HPR_CHECK(settings.target_ms > 0.0 && settings.degradations >= 0 && settings.max_samples > 0);
+  for (std::uint32_t samples = settings.max_samples; samples > 1; samples = (samples + 1) / 2) {
     ladder_.push_back({samples, 0, 0});
   }
-  for (int economies = 0; economies <= settings.economies; ++economies) ladder_.push_back({1, economies, 0});
-  for (int step = 1; step < kScaleSteps; ++step) ladder_.push_back({1, settings.economies, step});
+  for (int degradations = 0; degradations <= settings.degradations; ++degradations)
+    ladder_.push_back({1, degradations, 0});
+  for (int step = 1; step < kScaleSteps; ++step) ladder_.push_back({1, settings.degradations, step});
   const auto first = std::ranges::find_if(
       ladder_, [](const Effort& effort) { return scale_of_step(effort.scale_step) <= kFirstScale; });
   rung_ = static_cast<std::size_t>(first - ladder_.begin());
@@ -64,7 +66,7 @@ double FrameBudget::work(std::size_t rung) const {
   return ladder_[rung].samples * scale * scale;
 }
 
-double FrameBudget::economy_ratio(int from, int to) const {
+double FrameBudget::degradation_ratio(int from, int to) const {
   double ratio = 1.0;
   for (int i = from; i < to; ++i) ratio *= ratios_[static_cast<std::size_t>(i)];
   for (int i = to; i < from; ++i) ratio /= ratios_[static_cast<std::size_t>(i)];
@@ -72,7 +74,7 @@ double FrameBudget::economy_ratio(int from, int to) const {
 }
 
 double FrameBudget::predict(std::size_t rung) const {
-  return fixed_ms_ + work(rung) * each_ms_ * economy_ratio(ladder_[rung_].economies, ladder_[rung].economies);
+  return fixed_ms_ + work(rung) * each_ms_ * degradation_ratio(ladder_[rung_].degradations, ladder_[rung].degradations);
 }
 
 bool FrameBudget::learn(double ms) {
@@ -102,7 +104,7 @@ bool FrameBudget::learn(double ms) {
     surprises_ = 0;
     // The mean of |off| of a normal distribution is 0.8 standard deviations.
     scatter_ = kScatterMemory * scatter_ + (1.0 - kScatterMemory) * 1.25 * std::abs(off) / expected;
-    scatter_ = std::max(scatter_, kLeastScatter);
+    scatter_ = std::max(scatter_, kMinScatter);
   }
   const double total = variance();
   const double fixed_gain = (fixed_variance_ + x * covariance_) / total;
@@ -118,12 +120,12 @@ bool FrameBudget::learn(double ms) {
   return true;
 }
 
-void FrameBudget::learn_economy() {
-  const int now = ladder_[rung_].economies;
-  if (now == economies_before_ || each_before_ <= 0.0 || ++frames_since_ != kFramesToTrust) return;
-  const int low = std::min(now, economies_before_);
-  const int high = std::max(now, economies_before_);
-  const double all = now > economies_before_ ? each_ms_ / each_before_ : each_before_ / std::max(each_ms_, 1e-9);
+void FrameBudget::learn_degradation() {
+  const int now = ladder_[rung_].degradations;
+  if (now == degradations_before_ || each_before_ <= 0.0 || ++frames_since_ != kFramesToTrust) return;
+  const int low = std::min(now, degradations_before_);
+  const int high = std::max(now, degradations_before_);
+  const double all = now > degradations_before_ ? each_ms_ / each_before_ : each_before_ / std::max(each_ms_, 1e-9);
   // Of several at once nobody knows which saved how much.
   const double one = std::clamp(std::pow(all, 1.0 / (high - low)), 0.1, 1.0);
   std::fill(ratios_.begin() + low, ratios_.begin() + high, one);
@@ -138,13 +140,13 @@ std::size_t FrameBudget::best_within(double ms) const {
 }
 
 void FrameBudget::move_to(std::size_t rung) {
-  const int before = ladder_[rung_].economies;
-  const int after = ladder_[rung].economies;
+  const int before = ladder_[rung_].degradations;
+  const int after = ladder_[rung].degradations;
   if (after != before) {
-    economies_before_ = before;
+    degradations_before_ = before;
     each_before_ = each_ms_;
     frames_since_ = 0;
-    each_ms_ *= economy_ratio(before, after);
+    each_ms_ *= degradation_ratio(before, after);
     each_variance_ += 0.25 * each_ms_ * each_ms_;
     covariance_ = 0.0;
   }
@@ -153,8 +155,7 @@ void FrameBudget::move_to(std::size_t rung) {
 }
 
 void FrameBudget::choose() {
-  const double aim =
-      settings_.target_ms * std::clamp(kTail * std::exp(-kTailDeviations * scatter_), kLowestAim, kHighestAim);
+  const double aim = settings_.target_ms * std::clamp(kTail * std::exp(-kTailDeviations * scatter_), kMinAim, kMaxAim);
   const std::size_t lower = best_within(aim);
   if (lower > rung_ && predict(rung_) > kTooSlow * aim) {
     move_to(lower);
@@ -169,10 +170,10 @@ void FrameBudget::choose() {
   }
 }
 
-void FrameBudget::took(double ms) {
+void FrameBudget::record_frame_time(double ms) {
   if (!(ms > 0.0) || !std::isfinite(ms)) return;
   if (!learn(ms)) return;
-  learn_economy();
+  learn_degradation();
   choose();
 }
 
@@ -192,7 +193,7 @@ bool is_indirect(const PassInfo& pass) {
 
 }  // namespace
 
-std::vector<std::string> economies_of(const FrameSettings& settings, std::span<const PassPlan> passes) {
+std::vector<std::string> degradations_for(const FrameSettings& settings, std::span<const PassPlan> passes) {
   std::vector<std::string> names;
   if (settings.rays.reference) return names;
   const bool shares_otherwise = settings.rays.denoise || runs_pass(passes, [](const PassInfo& pass) {
@@ -207,9 +208,9 @@ std::vector<std::string> economies_of(const FrameSettings& settings, std::span<c
   return names;
 }
 
-FrameSettings economize(FrameSettings settings, std::span<const std::string> economies) {
+FrameSettings apply_degradations(FrameSettings settings, std::span<const std::string> degradations) {
   RaySettings& rays = settings.rays;
-  for (const std::string& name : economies) {
+  for (const std::string& name : degradations) {
     if (name == kHalfResolution) {
       rays.half_resolution = half_resolution_passes();
     } else if (name == kNoPhotons) {

@@ -21,8 +21,8 @@ inline constexpr int kScaleSteps = 40;
 /// What a frame is made with.
 struct Effort {
   std::uint32_t samples = 1;
-  int economies = 0;   ///< how many of the list are made, from its front
-  int scale_step = 0;  ///< see scale_of_step
+  int degradations = 0;  ///< how many of the list are made, from its front
+  int scale_step = 0;    ///< see scale_of_step
 
   bool operator==(const Effort&) const = default;
 };
@@ -38,20 +38,20 @@ struct BudgetReport {
 
 struct BudgetSettings {
   double target_ms = 33.0;
-  std::uint32_t most_samples = 1;
-  int economies = 0;  ///< how many there are
+  std::uint32_t max_samples = 1;
+  int degradations = 0;  ///< how many there are
 };
 
 /// Steers the effort from frame to frame so that frames take a target time.
 ///
-/// Efforts form a ladder: samples are given up first, by halves, then one economy after the other, then pixels. The
+/// Efforts form a ladder: samples are given up first, by halves, then one degradation after the other, then pixels. The
 /// time of a frame is taken to be fixed + work * each, work being samples times the share of pixels; both are tracked
 /// by a Kalman filter whose `each` drifts faster than its `fixed`. A single surprising time is ignored, two in a row
 /// are believed at once. The aim lies below the target by as much as times scatter, so that 95 % of the frames keep it.
 /// The effort stays inside a dead band about the aim, falls as far as it must and rises by a few rungs at a time. Where
 /// fewer pixels save next to nothing they are not given up: a scene may have a cost that does not scale.
 ///
-/// A function of the times it is told and nothing else: ranks that are told the same ones decide alike.
+/// A function of the recorded times alone: ranks that record the same times decide alike.
 class FrameBudget {
  public:
   explicit FrameBudget(const BudgetSettings& settings);
@@ -59,18 +59,18 @@ class FrameBudget {
   /// For the next frame.
   [[nodiscard]] const Effort& effort() const { return ladder_[rung_]; }
   /// What the frame made with effort() took, in ms; chooses the next one's. Times that are not above 0 are ignored.
-  void took(double ms);
+  void record_frame_time(double ms);
   /// What a frame of effort() should take.
   [[nodiscard]] double predicted_ms() const { return predict(rung_); }
 
  private:
   [[nodiscard]] double work(std::size_t rung) const;
   [[nodiscard]] double predict(std::size_t rung) const;
-  [[nodiscard]] double economy_ratio(int from, int to) const;
+  [[nodiscard]] double degradation_ratio(int from, int to) const;
   [[nodiscard]] std::size_t best_within(double ms) const;
   /// Whether the time was believed.
   bool learn(double ms);
-  void learn_economy();
+  void learn_degradation();
   void choose();
   void move_to(std::size_t rung);
 
@@ -80,7 +80,7 @@ class FrameBudget {
 
   bool started_ = false;
   double fixed_ms_ = 0.0;
-  double each_ms_ = 0.0;  ///< of a whole sample, with the economies of the present rung
+  double each_ms_ = 0.0;  ///< of a whole sample, with the degradations of the present rung
   double fixed_variance_ = 0.0;
   double each_variance_ = 0.0;
   double covariance_ = 0.0;
@@ -89,18 +89,19 @@ class FrameBudget {
   bool moved_ = false;     ///< since the last time that was believed
   int frames_out_of_reach_ = 0;
 
-  std::vector<double> ratios_;  ///< per economy: what `each` becomes by it
-  int economies_before_ = 0;    ///< before the last change of them
-  double each_before_ = 0.0;    ///< likewise
-  int frames_since_ = 0;        ///< believed ones since then
+  std::vector<double> ratios_;   ///< per degradation: what `each` becomes by it
+  int degradations_before_ = 0;  ///< before the last change of them
+  double each_before_ = 0.0;     ///< each_ms_ at that change
+  int frames_since_ = 0;         ///< believed ones since then
 };
 
 /// What a frame of these settings may do without, in the order in which it is given up: "half-resolution" of all passes
 /// that have one, "photons", "glossy-cutoff" (and chains of reflections past the second). `passes`: those of the
 /// frame's plan; what would save nothing is left out.
-[[nodiscard]] std::vector<std::string> economies_of(const FrameSettings& settings, std::span<const PassPlan> passes);
+[[nodiscard]] std::vector<std::string> degradations_for(const FrameSettings& settings,
+                                                        std::span<const PassPlan> passes);
 
-/// The settings with these economies made.
-[[nodiscard]] FrameSettings economize(FrameSettings settings, std::span<const std::string> economies);
+/// The settings with these degradations made.
+[[nodiscard]] FrameSettings apply_degradations(FrameSettings settings, std::span<const std::string> degradations);
 
 }  // namespace hpr

@@ -44,7 +44,7 @@ Trace simulate(const BudgetSettings& settings, int frames, double noise,
   for (int frame = 0; frame < frames; ++frame) {
     run.efforts.push_back(budget.effort());
     run.ms.push_back(cost(frame, budget.effort()) * std::exp(noise * normal(random)));
-    budget.took(run.ms.back());
+    budget.record_frame_time(run.ms.back());
   }
   return run;
 }
@@ -76,15 +76,15 @@ TEST(FrameBudget, HoldsTheTargetWhateverAPixelCosts) {
 }
 
 TEST(FrameBudget, WithoutNoiseItComesToRest) {
-  const Trace run = simulate({.target_ms = 100.0, .economies = 3}, 200, 0.0,
+  const Trace run = simulate({.target_ms = 100.0, .degradations = 3}, 200, 0.0,
                              [](int, const Effort& effort) { return 5.0 + 700.0 * pixels(effort); });
   EXPECT_EQ(run.changes(40), 0);
 }
 
 TEST(FrameBudget, FollowsAPathOnWhichPixelsCostMoreAndLess) {
-  const Trace run = simulate({.target_ms = 100.0, .economies = 3}, 300, 0.04, [](int frame, const Effort& effort) {
+  const Trace run = simulate({.target_ms = 100.0, .degradations = 3}, 300, 0.04, [](int frame, const Effort& effort) {
     const double each = 1500.0 * (1.0 + 0.6 * std::sin(2.0 * std::numbers::pi * frame / 100.0));
-    return 6.0 + each * std::pow(0.8, effort.economies) * pixels(effort);
+    return 6.0 + each * std::pow(0.8, effort.degradations) * pixels(effort);
   });
   EXPECT_LE(run.percentile(0.95), 115.0);
   EXPECT_GE(run.percentile(0.5), 70.0);
@@ -124,9 +124,10 @@ TEST(FrameBudget, GoesAsFarAsItCanWhereTheTargetIsOutOfReach) {
 
 TEST(FrameBudget, GivesUpSamplesThenEconomiesThenPixels) {
   const auto settled = [](double each) {
-    return simulate(
-               {.target_ms = 100.0, .most_samples = 16, .economies = 2}, 200, 0.0,
-               [&](int, const Effort& effort) { return 2.0 + each * std::pow(0.6, effort.economies) * pixels(effort); })
+    return simulate({.target_ms = 100.0, .max_samples = 16, .degradations = 2}, 200, 0.0,
+                    [&](int, const Effort& effort) {
+                      return 2.0 + each * std::pow(0.6, effort.degradations) * pixels(effort);
+                    })
         .efforts.back();
   };
   EXPECT_EQ(settled(4.0), (Effort{16, 0, 0}));
@@ -135,12 +136,12 @@ TEST(FrameBudget, GivesUpSamplesThenEconomiesThenPixels) {
   EXPECT_EQ(settled(120.0), (Effort{1, 1, 0}));
   EXPECT_EQ(settled(200.0), (Effort{1, 2, 0}));
   const Effort least = settled(1000.0);
-  EXPECT_EQ(least.economies, 2);
+  EXPECT_EQ(least.degradations, 2);
   EXPECT_GT(least.scale_step, 0);
 }
 
 TEST(FrameBudget, AnEconomyThatSavesNothingIsNoReasonToSwing) {
-  const Trace run = simulate({.target_ms = 100.0, .economies = 2}, 300, 0.02,
+  const Trace run = simulate({.target_ms = 100.0, .degradations = 2}, 300, 0.02,
                              [](int, const Effort& effort) { return 2.0 + 110.0 * pixels(effort); });
   EXPECT_LE(run.changes(100), 4);
   EXPECT_LE(run.percentile(0.95, 50), 115.0);
@@ -149,7 +150,8 @@ TEST(FrameBudget, AnEconomyThatSavesNothingIsNoReasonToSwing) {
 TEST(FrameBudget, IgnoresTimesThatAreNone) {
   FrameBudget budget({.target_ms = 33.0});
   const Effort first = budget.effort();
-  for (const double ms : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) budget.took(ms);
+  for (const double ms : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+    budget.record_frame_time(ms);
   EXPECT_EQ(budget.effort(), first);
 }
 
@@ -159,18 +161,18 @@ const std::vector<PassPlan> kAllRun{
     {PassId::Shadow, true, ""}, {PassId::Reflection, true, ""}, {PassId::Photon, true, ""}};
 
 TEST(Economies, AreThoseThatSaveSomething) {
-  EXPECT_EQ(economies_of({}, kAllRun), (Names{"half-resolution", "photons", "glossy-cutoff"}));
-  EXPECT_EQ(economies_of({}, {}), (Names{"half-resolution"}));
+  EXPECT_EQ(degradations_for({}, kAllRun), (Names{"half-resolution", "photons", "glossy-cutoff"}));
+  EXPECT_EQ(degradations_for({}, {}), (Names{"half-resolution"}));
   FrameSettings local;
   local.shading = Shading::Local;
-  EXPECT_EQ(economies_of(local, {}), Names{});
+  EXPECT_EQ(degradations_for(local, {}), Names{});
   FrameSettings reference;
   reference.rays.reference = true;
-  EXPECT_EQ(economies_of(reference, kAllRun), Names{});
+  EXPECT_EQ(degradations_for(reference, kAllRun), Names{});
   FrameSettings draft;
   draft.rays.glossy_cutoff = 0.1;
   draft.rays.max_depth = 2;
-  EXPECT_EQ(economies_of(draft, kAllRun), (Names{"half-resolution", "photons"}));
+  EXPECT_EQ(degradations_for(draft, kAllRun), (Names{"half-resolution", "photons"}));
 }
 
 TEST(Economies, WithoutPhotonsNoOtherPassStarts) {
@@ -178,22 +180,22 @@ TEST(Economies, WithoutPhotonsNoOtherPassStarts) {
   settings.rays.passes = {PassId::Photon};
   settings.rays.photons = 5;
   settings.rays.global_photons = true;
-  const FrameSettings less = economize(settings, Names{"photons"});
+  const FrameSettings less = apply_degradations(settings, Names{"photons"});
   EXPECT_TRUE(less.rays.passes.empty());
   EXPECT_FALSE(less.rays.auto_passes);
   EXPECT_FALSE(less.rays.global_photons);
-  EXPECT_TRUE(economize({}, Names{"photons"}).rays.auto_passes);
+  EXPECT_TRUE(apply_degradations({}, Names{"photons"}).rays.auto_passes);
 }
 
 TEST(Economies, NeverMakeAFrameDearer) {
   FrameSettings settings;
   settings.rays.glossy_cutoff = 0.05;
   settings.rays.max_depth = 1;
-  const FrameSettings less = economize(settings, Names{"half-resolution", "glossy-cutoff"});
+  const FrameSettings less = apply_degradations(settings, Names{"half-resolution", "glossy-cutoff"});
   EXPECT_EQ(less.rays.glossy_cutoff, 0.05);
   EXPECT_EQ(less.rays.max_depth, 1);
   EXPECT_EQ(less.rays.half_resolution.size(), 5U);
-  EXPECT_EQ(economize(settings, {}).rays, settings.rays);
+  EXPECT_EQ(apply_degradations(settings, {}).rays, settings.rays);
 }
 
 }  // namespace

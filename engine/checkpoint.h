@@ -27,9 +27,9 @@ using RunIdentity = std::vector<std::pair<std::string, std::string>>;
 struct CheckpointSettings {
   std::filesystem::path path;             ///< empty: none is written
   bool resume = false;                    ///< begin with what stands there
-  std::function<RunIdentity()> identity;  ///< asked when it is wanted: it takes a look at the whole scene
+  std::function<RunIdentity()> identity;  ///< called when it is needed: it hashes the whole scene
   bool at_end = false;                    ///< also when the goal is reached, for a later run that wants more
-  bool takes_more = false;                ///< one that holds more samples than are asked for will do
+  bool takes_more = false;                ///< a checkpoint with more samples than the goal is accepted
 };
 
 /// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the
@@ -37,8 +37,8 @@ struct CheckpointSettings {
 [[nodiscard]] std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film,
                                                        const SampleProgress& progress);
 
-/// Of which run a checkpoint is. Throws Error (BadInput) when `bytes` are no checkpoint, damaged, or of another
-/// version.
+/// The identity of the run that wrote a checkpoint. Throws Error (BadInput) when `bytes` are no checkpoint, damaged, or
+/// of another version.
 [[nodiscard]] RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name);
 
 /// Fills `film`, a new one of the same layout and content. `name` stands in errors. Throws Error (BadInput) when
@@ -52,7 +52,7 @@ struct CheckpointSettings {
 [[nodiscard]] RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span<const View> views,
                                       const RenderSettings& settings, bool keeps_keys);
 
-/// What made the keys of such a run; Auto where it does not say.
+/// What made the keys of the run with this identity; Auto where the identity does not name it.
 [[nodiscard]] Primary primary_of(const RunIdentity& identity);
 
 }  // namespace hpr

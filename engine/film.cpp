@@ -28,8 +28,8 @@ void add_to(ColorSum& sum, const Rgb& color, double weight) {
 
 /// Negative weights can lift a mean past what a float holds.
 float to_float(double value) {
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  return static_cast<float>(std::clamp(value, -kLargest, kLargest));
+  constexpr double kMax = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(value, -kMax, kMax));
 }
 
 double length2(const Rgb& color) {

@@ -23,14 +23,14 @@ struct ColorSum {
   double b = 0.0;
 };
 
-/// What a film learns of one sample.
+/// One rendered sample that is added to a film.
 struct SampleLight {
   const TileLayer<Rgb>& radiance;
   const AovLayers& aovs;
   const TileLayer<Key>& keys;
 };
 
-/// What a film knows of a pixel that may have another number of samples than its neighbours.
+/// State of a pixel that may have another number of samples than its neighbours.
 struct PixelSamples {
   std::array<double, 2> weights{};  ///< of the halves
   double squares = 0.0;             ///< sum of the colours' squared lengths
@@ -46,7 +46,7 @@ struct FilmContent {
 };
 
 /// The samples of a frame, summed per pixel for the tiles of one rank, always in the order of their numbers: that, and
-/// not who sums, decides the bits. Even and odd samples have sums of their own, whose difference tells the noise. A
+/// not who sums, decides the bits. Even and odd samples have sums of their own, whose difference estimates the noise. A
 /// pixel's samples are the first so many of all numbers, in an adaptive film more for some pixels than for others.
 class Film {
  public:
@@ -78,7 +78,7 @@ class Film {
   [[nodiscard]] const TileLayer<PixelSamples>& pixel_samples() const { return pixel_samples_; }
 
   /// Per tile of `tiles` the sum over its pixels and channels of the squared relative error of the mean, as the halves
-  /// tell it: (half their difference)^2 / (mean^2 + 0.01). A guess: of rare bright samples it sees only those met so
+  /// estimate it: (half their difference)^2 / (mean^2 + 0.01). Of rare bright samples it sees only those met so
   /// far, and their brightness excuses them. 0 before each half has a sum of weights above 0.
   [[nodiscard]] std::vector<double> squared_errors(std::span<const std::size_t> tiles, int threads) const;
 
@@ -113,7 +113,7 @@ class Film {
   }
   /// Adaptive: the pixels of a tile that are due for sample number samples().
   [[nodiscard]] std::vector<std::uint16_t> due_pixels(std::size_t tile) const;
-  /// Of the halves.
+  /// Sums of weights of both halves at a pixel.
   [[nodiscard]] const std::array<double, 2>& weights_at(std::size_t tile, std::size_t pixel) const {
     return is_adaptive() ? pixel_samples_.tile(tile)[pixel].weights : weights_;
   }

@@ -112,7 +112,7 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
   }
 }
 
-/// What the last call of light() took.
+/// Adds times and ray counts of the last call of light().
 void add_light(const Lighter& lighter, FrameTimes& taken) {
   FrameTimes light;
   light.passes = lighter.times();
@@ -203,7 +203,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   return frame;
 }
 
-std::size_t most_in_round(Session& session, const FramePlan& plan) {
+std::size_t max_round_size(Session& session, const FramePlan& plan) {
   if (session.comm().size() > 1 && plan.distribution != Distribution::SortFirst) return 1;
   if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
   if (session.lighter(plan.rays).lights_one_by_one()) return 1;

@@ -26,7 +26,7 @@ struct Frame {
   AovLayers aovs;                  ///< of owned tiles
 };
 
-/// What a frame took on this rank; of several samples, added up.
+/// Times and ray counts of a frame on this rank; summed over its samples.
 struct FrameTimes {
   double primary_ms = 0.0;  ///< the keys, drawn or traced
   PrimaryRayStats primary;
@@ -39,7 +39,7 @@ struct FrameTimes {
 };
 
 /// Makes what a frame needs and successive frames share: geometry on the GPU, the ray scene, the group's communicator.
-/// Collective. Left out, the first frame does it and takes the longer for it.
+/// Collective. Without this call the first frame does it and takes longer.
 void prepare(Session& session, const FramePlan& plan);
 
 /// Which frame of several that are one picture's samples.
@@ -58,20 +58,22 @@ struct FrameLook {
 
 /// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
-/// The same by rays, for several looks together, a layer each; all want the same pixels. Returns what it took.
+/// Makes the keys of several samples by primary rays, one layer each, in place of rasterize(); all samples want the
+/// same pixels. Returns the ray counts.
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                               std::span<TileLayer<Key>* const> keys);
 
 /// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
-/// lit if shading is local. Returns what that took.
+/// lit if shading is local. Returns times and counts.
 FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                       const FrameSample& sample = {});
 
-/// How many samples of a plan may be drawn together: 1 where they are composited, or each asks for light of its own.
-[[nodiscard]] std::size_t most_in_round(Session& session, const FramePlan& plan);
+/// How many samples of a plan may be drawn together: 1 where they are composited, or each needs photons or shared light
+/// of its own.
+[[nodiscard]] std::size_t max_round_size(Session& session, const FramePlan& plan);
 
 /// Collective: several samples step by step together, to the bit what make_frame gives one by one. What rays and lights
-/// look up for one sample is at hand for the next. At least one and at most most_in_round(); all want the same pixels.
+/// look up for one sample is at hand for the next. At least one and at most max_round_size(); all want the same pixels.
 [[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                                             FrameTimes& times);
 

@@ -20,7 +20,7 @@ namespace hpr {
 namespace {
 
 /// Of a frame that has a goal other than a number of samples.
-constexpr std::uint32_t kMostSamples = 64;
+constexpr std::uint32_t kMaxSamples = 64;
 
 /// From the same place in the same direction.
 bool same_look(const View& a, const View& b) {
@@ -48,12 +48,12 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   settings_.primary = plan_.primary;
   settings_.rays.gather = plan_.rays.gather;
   settings_.indirect_is_chosen = true;
-  economies_ = economies_of(settings_, plan_passes(session.requirements(), plan_.rays));
+  degradations_ = degradations_for(settings_, plan_passes(session.requirements(), plan_.rays));
   budget_.emplace(BudgetSettings{
-      .target_ms = *target_ms_, .most_samples = most_samples(), .economies = static_cast<int>(economies_.size())});
+      .target_ms = *target_ms_, .max_samples = max_samples(), .degradations = static_cast<int>(degradations_.size())});
   std::vector<std::string> explained = plan_.explained;
   explained.push_back(fmt::format("budget: {} ms a frame (as asked); given up, first to last: {}", *target_ms_,
-                                  fmt::join(all_to_give_up(), ", ")));
+                                  fmt::join(all_degradations(), ", ")));
   plan_for(budget_->effort(), screens);
   plan_.explained = std::move(explained);
 }
@@ -64,43 +64,43 @@ Frame& FrameMaker::frame() {
   return sampler_->frame();
 }
 
-std::vector<std::string> FrameMaker::all_to_give_up() const {
+std::vector<std::string> FrameMaker::all_degradations() const {
   std::vector<std::string> names;
-  if (most_samples() > 1) names.emplace_back("samples");
-  for (const std::string& economy : economies_) names.push_back(economy);
+  if (max_samples() > 1) names.emplace_back("samples");
+  for (const std::string& degradation : degradations_) names.push_back(degradation);
   names.emplace_back("resolution");
   return names;
 }
 
-std::uint32_t FrameMaker::most_samples() const {
-  return std::min(sampling_.goal.samples.value_or(kMostSamples), kMostSamples);
+std::uint32_t FrameMaker::max_samples() const {
+  return std::min(sampling_.goal.samples.value_or(kMaxSamples), kMaxSamples);
 }
 
 void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
-  const bool same_plan =
-      plan_.layout.tiles() > 0 && effort.economies == effort_.economies && effort.scale_step == effort_.scale_step;
+  const bool same_plan = plan_.layout.tiles() > 0 && effort.degradations == effort_.degradations &&
+                         effort.scale_step == effort_.scale_step;
   effort_ = effort;
   const double scale = settings_.resolution_scale * scale_of_step(effort.scale_step);
   blocks_ = cut_blocks(at_resolution(screens, scale));
   if (same_plan) return;
   sampler_.reset();  // it holds on to the plan
-  const auto count = static_cast<std::size_t>(effort.economies);
-  plan_ = plan_frame(session_, economize(settings_, std::span(economies_).first(count)), blocks_.views);
+  const auto count = static_cast<std::size_t>(effort.degradations);
+  plan_ = plan_frame(session_, apply_degradations(settings_, std::span(degradations_).first(count)), blocks_.views);
 }
 
-bool FrameMaker::rests(std::span<const View> screens) const {
+bool FrameMaker::is_resting(std::span<const View> screens) const {
   return std::ranges::equal(screens, last_screens_, same_look);
 }
 
 bool FrameMaker::refined(std::span<const View> screens) const {
-  return refining_ && rests(screens) && reached(resting_, sampler_->reached_so_far());
+  return refining_ && is_resting(screens) && reached(resting_, sampler_->sample_progress());
 }
 
 Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress) {
   if (!budget_) {
     plan_for({}, screens);
     make_anew(number, sampling_.goal.samples.value_or(0), progress);
-  } else if (rests(screens)) {
+  } else if (is_resting(screens)) {
     refine(screens, number, progress);
   } else {
     refining_ = false;
@@ -118,14 +118,14 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
   Sampling sampling = sampling_;
   if (budget_) {
     sampling.goal = {.samples = samples, .seconds = {}, .relmse = {}};
-    const auto least = static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
+    const auto least = static_cast<std::uint32_t>(min_samples(sampling.filter.value_or(PixelFilter::Box)));
     if (samples < least) sampling.filter.reset();
   }
   sampler_.reset();  // frees its memory before the next one takes some
   sampler_ = std::make_unique<FrameSampler>(session_, plan_, sampling, number, keeps_keys_);
   (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
   times_ = sampler_->times();
-  relmse_ = sampler_->reached_so_far().relmse;
+  relmse_ = sampler_->sample_progress().relmse;
 }
 
 void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Progress& progress) {
@@ -140,19 +140,19 @@ void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Pro
   refining_ = true;
   if (resting_.sums()) sampler_->refine(blocks_.views);
   times_ = sampler_->times();
-  relmse_ = sampler_->reached_so_far().relmse;
-  write_report({most_samples(), 0, 0}, sampler_->reached_so_far().samples);
+  relmse_ = sampler_->sample_progress().relmse;
+  write_report({max_samples(), 0, 0}, sampler_->sample_progress().samples);
   report_->resting = true;
 }
 
-void FrameMaker::took(double slowest_ms) {
-  if (budget_ && !refining_) budget_->took(slowest_ms);
+void FrameMaker::record_frame_time(double slowest_ms) {
+  if (budget_ && !refining_) budget_->record_frame_time(slowest_ms);
 }
 
 void FrameMaker::write_report(const Effort& effort, std::uint32_t samples) {
   BudgetReport report{*target_ms_, settings_.resolution_scale * scale_of_step(effort.scale_step), samples, {}};
-  if (samples < most_samples() && !refining_) report.given_up.emplace_back("samples");
-  for (int i = 0; i < effort.economies; ++i) report.given_up.push_back(economies_[static_cast<std::size_t>(i)]);
+  if (samples < max_samples() && !refining_) report.given_up.emplace_back("samples");
+  for (int i = 0; i < effort.degradations; ++i) report.given_up.push_back(degradations_[static_cast<std::size_t>(i)]);
   if (effort.scale_step > 0) report.given_up.emplace_back("resolution");
   report_ = std::move(report);
 }

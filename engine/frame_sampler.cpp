@@ -22,7 +22,7 @@
 namespace hpr {
 namespace {
 
-/// What ranks tell each other between samples.
+/// What ranks exchange between samples.
 struct Word {
   Request request = Request::None;
   double seconds = 0.0;  ///< rank 0's clock is everybody's
@@ -38,7 +38,7 @@ Word agree(Communicator& comm, const Word& mine) {
 std::string describe(const SampleGoal& goal, const SampleProgress& so_far) {
   std::string text = fmt::format("{:.1f} s", so_far.seconds);
   if (so_far.relmse) text += fmt::format(", relMSE about {:.2g}", *so_far.relmse);
-  if (const auto left = seconds_left(goal, so_far)) text += fmt::format(", {:.0f} s left", *left);
+  if (const auto left = remaining_seconds(goal, so_far)) text += fmt::format(", {:.0f} s left", *left);
   return text;
 }
 
@@ -79,12 +79,12 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
   });
   start = all_gather_value(session_.comm(), start).front();
   film_.set_counters(start.counters);
-  so_far_ = {start.samples, start.seconds, {}, start.budget};
-  if (start.relmse >= 0.0) so_far_.relmse = start.relmse;
-  if (adaptive_) adaptive_->resume(session_.comm(), so_far_, film_, tiles());
-  resumed_ = so_far_.samples;
+  progress_ = {start.samples, start.seconds, {}, start.budget};
+  if (start.relmse >= 0.0) progress_.relmse = start.relmse;
+  if (adaptive_) adaptive_->resume(session_.comm(), progress_, film_, tiles());
+  resumed_ = progress_.samples;
   scattered_ = false;
-  if (session_.rank() == 0) log::info("going on after {} samples", so_far_.samples);
+  if (session_.rank() == 0) log::info("going on after {} samples", progress_.samples);
 }
 
 void FrameSampler::write(const CheckpointSettings& checkpoint) {
@@ -94,11 +94,11 @@ void FrameSampler::write(const CheckpointSettings& checkpoint) {
   });
   agree_on_failure(session_.comm(), [&] {
     if (session_.rank() != 0) return;
-    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity(), film_, so_far_));
+    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity(), film_, progress_));
   });
 }
 
-bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
+bool FrameSampler::try_to_write(const CheckpointSettings& checkpoint) {
   try {
     write(checkpoint);
   } catch (const Error& error) {
@@ -106,12 +106,12 @@ bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
     if (session_.rank() == 0) log::error("{}: going on without a checkpoint; {}", error.what(), error.hint());
     return false;
   }
-  if (session_.rank() == 0) log::info("{} samples are in '{}'", so_far_.samples, checkpoint.path.string());
+  if (session_.rank() == 0) log::info("{} samples are in '{}'", progress_.samples, checkpoint.path.string());
   return true;
 }
 
 FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
-  const FilterSample through = look_through(sampling_, {plan_.rays.seed, number_}, number);
+  const FilterSample through = subpixel_sample(sampling_, {plan_.rays.seed, number_}, number);
   FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
   for (View& view : look.views) view.jitter = through.offset;
   weight = through.weight;
@@ -132,9 +132,9 @@ std::vector<std::size_t> FrameSampler::tiles() const {
   return session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
 }
 
-/// Those of the first sample after a checkpoint was read are not known before its tiles are at home.
+/// The pixels of the first sample after a checkpoint was read are not known before its tiles are at home.
 void FrameSampler::choose_pixels() {
-  if (adaptive_->is_stage_done()) adaptive_->deal(session_.comm(), film_, tiles(), session_.threads());
+  if (adaptive_->is_stage_done()) adaptive_->start_stage(session_.comm(), film_, tiles(), session_.threads());
   if (homes_ && scattered_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
 }
 
@@ -142,7 +142,7 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   if (adaptive_) {
     choose_pixels();
     if (adaptive_->is_stage_done()) return;  // no pixel wants more
-    count = std::min(count, scattered_ ? adaptive_->most_together() : 1);
+    count = std::min(count, scattered_ ? adaptive_->max_batch() : 1);
   }
   const std::function<void()> at_home = [this] { scatter(); };
   std::vector<FrameLook> looks;
@@ -167,16 +167,16 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   frame_.keys = frames.back().keys;
 }
 
-void FrameSampler::tell_progress(double seconds) {
-  so_far_.samples = adaptive_ ? adaptive_->samples() : film_.samples();
+void FrameSampler::report_progress(double seconds) {
+  progress_.samples = adaptive_ ? adaptive_->samples() : film_.samples();
   if (adaptive_) {
-    so_far_.budget = adaptive_->budget();
-    times_.samples = static_cast<int>(so_far_.samples - resumed_);
+    progress_.budget = adaptive_->budget();
+    times_.samples = static_cast<int>(progress_.samples - resumed_);
   }
-  so_far_.seconds = seconds;
+  progress_.seconds = seconds;
   const bool milestone = adaptive_ ? adaptive_->at_milestone() : is_milestone(film_.samples());
-  if (!milestone || so_far_.samples < 2) return;
-  so_far_.relmse = estimated_relmse(session_.comm(), film_, tiles(), session_.threads());
+  if (!milestone || progress_.samples < 2) return;
+  progress_.relmse = estimated_relmse(session_.comm(), film_, tiles(), session_.threads());
 }
 
 /// Up to the next sample after which the error is estimated, if that is a goal, else to the last one that can be
@@ -184,12 +184,12 @@ void FrameSampler::tell_progress(double seconds) {
 std::uint32_t FrameSampler::size_of_round() {
   constexpr double kSeconds = 2.0;
   constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
-  const std::uint32_t done = so_far_.samples;
-  auto most = static_cast<double>(most_in_round(session_, plan_));
+  const std::uint32_t done = progress_.samples;
+  auto most = static_cast<double>(max_round_size(session_, plan_));
   if (sampling_.goal.samples && !adaptive_) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
   if (done > 0) {
-    const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;
-    most = std::min(most, std::min(left, kSeconds) * done / std::max(so_far_.seconds, 1e-9));
+    const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - progress_.seconds : kSeconds;
+    most = std::min(most, std::min(left, kSeconds) * done / std::max(progress_.seconds, 1e-9));
   } else if (sampling_.goal.seconds ||
              plan_.layout.pixels() * static_cast<std::size_t>(plan_.rays.light_samples) > kQuickPixels) {
     most = 1.0;
@@ -208,25 +208,25 @@ std::uint32_t FrameSampler::size_of_round() {
 bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
   if (!sampling_.sums()) {
     frame_ = make_frame(session_, plan_, views, &times_, {{number_, 0}, nullptr});
-    so_far_.samples = 1;
+    progress_.samples = 1;
     return true;
   }
   if (checkpoint.resume) load(checkpoint);
-  const double before = so_far_.seconds;
+  const double before = progress_.seconds;
   const Stopwatch watch;
   std::optional<Stopwatch> written;
-  while (!reached(sampling_, so_far_)) {
+  while (!reached(sampling_, progress_)) {
     add_samples(views, size_of_round());
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.
     if (request == Request::Write && written && written->ms() < 1000.0) request = Request::None;
-    const Word word = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
-    tell_progress(word.seconds);
-    progress.show(so_far_.samples, describe(sampling_.goal, so_far_));
-    if (word.request == Request::None || reached(sampling_, so_far_)) continue;
+    const Word agreed = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
+    report_progress(agreed.seconds);
+    progress.show(progress_.samples, describe(sampling_.goal, progress_));
+    if (agreed.request == Request::None || reached(sampling_, progress_)) continue;
     progress.end();
-    if (tries_to_write(checkpoint) && word.request == Request::Stop) return false;
+    if (try_to_write(checkpoint) && agreed.request == Request::Stop) return false;
     written.emplace();
   }
   if (checkpoint.at_end && homes_) write(checkpoint);
@@ -235,11 +235,11 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
 }
 
 void FrameSampler::refine(std::span<const View> views) {
-  if (!reached(sampling_, so_far_)) {
+  if (!reached(sampling_, progress_)) {
     const Stopwatch watch;
     add_samples(views, 1);
-    const double seconds = so_far_.seconds + 1e-3 * watch.ms();
-    tell_progress(agree(session_.comm(), {Request::None, seconds}).seconds);
+    const double seconds = progress_.seconds + 1e-3 * watch.ms();
+    report_progress(agree(session_.comm(), {Request::None, seconds}).seconds);
   }
   finish();
 }

@@ -25,7 +25,7 @@ class FrameSampler {
   /// frame().keys are those of the first sample; else they are the last one's, and none where no sample was drawn.
   FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame, bool keeps_keys);
 
-  /// Collective. views[i] is screen i of the plan's layout. Between samples all ranks ask each other for signals (see
+  /// Collective. views[i] is screen i of the plan's layout. Between samples all ranks exchange received signals (see
   /// Request). False when it stopped before its goal: then a checkpoint was written. Throws Error as decode_checkpoint
   /// does, and Io.
   [[nodiscard]] bool draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress);
@@ -33,18 +33,18 @@ class FrameSampler {
   /// Collective. Draws one more sample unless the goal is reached; frame() is the means of those so far. Signals wait.
   void refine(std::span<const View> views);
 
-  /// After draw() returned true: the means. Valid as long as this.
+  /// The means, after draw() returned true. Valid as long as this object.
   [[nodiscard]] Frame& frame() { return frame_; }
   /// Summed over the samples this run drew.
   [[nodiscard]] const FrameTimes& times() const { return times_; }
-  [[nodiscard]] const SampleProgress& reached_so_far() const { return so_far_; }
+  [[nodiscard]] const SampleProgress& sample_progress() const { return progress_; }
 
  private:
   void load(const CheckpointSettings& checkpoint);
   void write(const CheckpointSettings& checkpoint);
-  /// Tells whether it could.
-  bool tries_to_write(const CheckpointSettings& checkpoint);
-  /// Together, where there are several: size_of_round() at most.
+  /// Writes a checkpoint; false, with a warning, where it cannot.
+  bool try_to_write(const CheckpointSettings& checkpoint);
+  /// Draws `count` samples together, at most size_of_round().
   void add_samples(std::span<const View> views, std::uint32_t count);
   /// How many samples to draw together.
   [[nodiscard]] std::uint32_t size_of_round();
@@ -55,8 +55,8 @@ class FrameSampler {
   [[nodiscard]] std::vector<std::size_t> tiles() const;
   /// Before samples are drawn: which pixels they are for, in due_.
   void choose_pixels();
-  /// How far it has come, after samples were added.
-  void tell_progress(double seconds);
+  /// Updates progress_ after samples were added; `seconds` in all.
+  void report_progress(double seconds);
   void finish();
 
   Session& session_;
@@ -70,7 +70,7 @@ class FrameSampler {
   std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
   bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint
   std::optional<TileHomes> homes_;
-  SampleProgress so_far_;
+  SampleProgress progress_;
   Frame frame_;
   FrameTimes times_;
 };

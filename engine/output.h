@@ -51,45 +51,45 @@ template <typename Pixel>
   return image;
 }
 
-/// A frame's tiles as display colours,
-/// `exposure_stops` brighter.
+/// Converts a frame's tiles to display colors, `exposure_stops` brighter.
 [[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops);
-/// The same of a picture.
+/// Converts a picture to display colors, `exposure_stops` brighter.
 [[nodiscard]] Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops);
 
-/// What a run of frames took, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
+/// Times and counts of a run of frames, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {
   double ms = 0.0;                     ///< one frame, all its samples, slowest rank
   int samples = 1;                     ///< drawn by this run
   int samples_in_all = 1;              ///< of the picture: with those of a checkpoint
-  std::optional<double> relmse;        ///< of a frame of several samples, as their halves tell it
+  std::optional<double> relmse;        ///< of a frame of several samples, estimated from their halves
   std::optional<BudgetReport> budget;  ///< of a frame with a target time
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
   RayCounts rays;                                ///< summed over ranks
-  std::size_t bytes_sent = 0;                    ///< by the frame, on its way to the screens too; summed over ranks
+  std::size_t bytes_sent = 0;                    ///< by the frame, to the screens included; summed over ranks
   std::vector<std::uint64_t> memory_peak_bytes;  ///< per rank
   int ranks = 1;
 };
 
-/// One frame on this rank, from its first triangle to its last tile on a screen.
+/// Time and traffic of one frame on this rank, from its first triangle to its last tile on a screen.
 struct FrameCost {
   double ms = 0.0;
   std::size_t bytes_sent = 0;
 };
 
-/// Collective. What the session's last frame took, on every rank. Warns, on rank 0, of pixels without finite radiance.
+/// Collective. Gathers the statistics of the session's last frame on every rank. Warns, on rank 0, of pixels without
+/// finite radiance.
 [[nodiscard]] RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times,
                                     const FrameCost& cost);
 
-/// What a run that is done leaves with: `strict` makes pixels without finite radiance a failed check.
+/// The exit code of a finished run: `strict` makes pixels without finite radiance a failed check.
 [[nodiscard]] inline ExitCode verdict(const RunStats& stats, bool strict) {
   return strict && stats.rays.not_finite > 0 ? ExitCode::CheckFailed : ExitCode::Done;
 }
 
-/// The same screens, seen the same way, on round(`scale` times) their pixels, at least one a side: what a frame is made
-/// at that is shown larger.
+/// The views of `screens` with round(`scale` times) their pixels, at least one a side: for frames that are made smaller
+/// than they are shown.
 [[nodiscard]] std::vector<View> at_resolution(std::span<const View> screens, double scale);
 
 /// Where a frame is shown.
@@ -110,7 +110,7 @@ struct PictureFiles {
   std::string raw;        ///< keys
   double exposure = 0.0;  ///< stops, of a .png
   std::vector<Aov> aovs;
-  ColorFormat colors = ColorFormat::Float32;  ///< on their way to an .exr
+  ColorFormat colors = ColorFormat::Float32;  ///< as sent to the rank that writes an .exr
 
   [[nodiscard]] bool is_png() const { return picture.ends_with(".png"); }
   /// Where AOVs go: into the .exr, or FILE.aov.exr beside a .png. Empty when there are none.

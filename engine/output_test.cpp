@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "scene/view.h"
 #include "scene/scene.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {

@@ -83,10 +83,10 @@ std::string explain(const RayBuild& build) {
 
 /// A map finer than the pixels that look at it is wasted work: progressive samples add up to the same.
 std::uint32_t photons_for(std::uint32_t most, std::span<const View> views) {
-  constexpr std::size_t kFewest = 1000;
+  constexpr std::size_t kMinPhotons = 1000;
   std::size_t pixels = 0;
   for (const View& view : views) pixels += view.size().area();
-  return static_cast<std::uint32_t>(std::min<std::size_t>(most, std::max(pixels, kFewest)));
+  return static_cast<std::uint32_t>(std::min<std::size_t>(most, std::max(pixels, kMinPhotons)));
 }
 
 /// One rank composites nothing.
@@ -143,10 +143,10 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Rays through a grid of places of every view.
-std::vector<Ray> looks_of(std::span<const View> views) {
+std::vector<Ray> camera_rays(std::span<const View> views) {
   constexpr double kLooks = 1024.0;
   const int side = std::max(4, static_cast<int>(std::sqrt(kLooks / static_cast<double>(views.size()))));
-  std::vector<Ray> looks;
+  std::vector<Ray> rays_from_eye;
   for (const View& view : views) {
     for (int i = 0; i < side * side; ++i) {
       const int column = i % side;
@@ -156,10 +156,10 @@ std::vector<Ray> looks_of(std::span<const View> views) {
       Ray ray = view_ray(view, x, y);
       ray.origin += ray.direction * view.near_distance;
       ray.direction = glm::normalize(ray.direction);
-      looks.push_back(ray);
+      rays_from_eye.push_back(ray);
     }
   }
-  return looks;
+  return rays_from_eye;
 }
 
 /// Collective. How much of the sky's light reaches the surfaces that some views see, as about a thousand rays find out:
@@ -170,19 +170,19 @@ std::optional<double> open_sky(Session& session, const RaySettings& settings, st
   const RayScene& scene = session.ray_scene(settings.build);
   const RaySpace& space = scene.space();
   const Surfaces surfaces(session.scene(), space);
-  const std::vector<Ray> looks = looks_of(views);
+  const std::vector<Ray> rays_from_eye = camera_rays(views);
   RayBatch rays;
-  for (const Ray& look : looks) rays.push(space.from_world(look.origin), look.direction, kInfinity);
-  std::vector<std::uint32_t> seen(looks.size());
+  for (const Ray& look : rays_from_eye) rays.push(space.from_world(look.origin), look.direction, kInfinity);
+  std::vector<std::uint32_t> seen(rays_from_eye.size());
   std::vector<std::uint8_t> blocked;
   scene.for_each(1, 1, [&](std::size_t) {
     (void)scene.closest(rays, seen);
     rays.clear();
     WorldTriangle triangle;
-    for (std::size_t i = 0; i < looks.size(); ++i) {
+    for (std::size_t i = 0; i < rays_from_eye.size(); ++i) {
       if (seen[i] == kNoSurface) continue;
       surfaces.load(seen[i], triangle);
-      const SurfacePoint point = surfaces.meet(triangle, looks[i].origin, looks[i].direction);
+      const SurfacePoint point = surfaces.meet(triangle, rays_from_eye[i].origin, rays_from_eye[i].direction);
       Sampler sampler(photon_stream({settings.seed, 0}), static_cast<std::uint32_t>(i));
       const glm::dvec3 up = warp::cosine_lobe(point.geometric_normal, sampler.two());
       rays.push(space.from_world(ray_origin(point, up)), up, kInfinity);
@@ -209,7 +209,7 @@ double quickest_ms(TileLayer<Key>& keys, const std::function<void()>& draw) {
 }
 
 /// The plan with every seventh tile of its area; `share` is set to how much of the area that is.
-FramePlan sampled(const FramePlan& plan, double& share) {
+FramePlan sampled(const FramePlan& plan, double& fraction) {
   FramePlan some = plan;
   some.mine.area.clear();
   std::size_t all_pixels = 0;
@@ -226,7 +226,7 @@ FramePlan sampled(const FramePlan& plan, double& share) {
       }
     }
   }
-  share = some_pixels > 0 ? static_cast<double>(some_pixels) / static_cast<double>(all_pixels) : 1.0;
+  fraction = some_pixels > 0 ? static_cast<double>(some_pixels) / static_cast<double>(all_pixels) : 1.0;
   return some;
 }
 
@@ -242,15 +242,15 @@ struct KeyTimes {
 std::string choose_primary(Session& session, FramePlan& plan, std::span<const View> views) {
   KeyTimes mine;
   if (!plan.mine.area.empty()) {
-    double share = 1.0;
-    const FramePlan some = sampled(plan, share);
+    double fraction = 1.0;
+    const FramePlan some = sampled(plan, fraction);
     TileLayer<Key> keys(plan.layout);
     mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
     (void)session.primary_rays(plan.mine.objects, plan.rays);
     const FrameLook look{{views.begin(), views.end()}, {}};
     TileLayer<Key>* const layer = &keys;
     const auto trace = [&] { (void)trace_primary(session, some, std::span(&look, 1), std::span(&layer, 1)); };
-    mine.rays_ms = quickest_ms(keys, trace) / share;
+    mine.rays_ms = quickest_ms(keys, trace) / fraction;
   }
   KeyTimes worst;
   for (const KeyTimes& times : all_gather_value(session.comm(), mine)) {

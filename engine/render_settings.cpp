@@ -126,7 +126,7 @@ void check_combination(const RenderSettings& settings) {
     refuse("--denoise is about the light of passes at all that is seen in the end",
            "use it without --reference and --half-resolution, and with --shading deferred");
   }
-  if (settings.sampling.filter && least_samples(*settings.sampling.filter) > 1) {
+  if (settings.sampling.filter && min_samples(*settings.sampling.filter) > 1) {
     refuse(fmt::format("--denoise looks at more places, whose weights --filter {} makes negative",
                        name_of(*settings.sampling.filter)),
            "use another filter, e.g. b-spline");

@@ -32,11 +32,11 @@ struct CameraChoice {
 };
 inline constexpr double kDefaultFovDegrees = 45.0;
 
-/// What the settings that are not given stand for.
+/// Which defaults the settings without a given value take.
 enum class Quality : std::uint8_t { Draft, Good, Best };
 inline constexpr std::array<std::string_view, 3> kQualityNames{"draft", "good", "best"};
 
-/// How pictures are encoded on their way to displays outside the job.
+/// How pictures are encoded for displays outside the job.
 struct LinkCodec {
   std::string name = "auto";
   int quality = 90;  ///< of lossy codecs, 1 to 100
@@ -52,7 +52,7 @@ struct RenderSettings {
   FrameSettings frame;
   std::string environment;                          ///< see load_environment; empty: the scene's own
   double exposure_stops = 0.0;                      ///< of display colors
-  ColorFormat color_format = ColorFormat::Float32;  ///< of radiance on its way to the rank that writes it
+  ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;
   bool strict = false;  ///< values that are not finite are errors, not replaced
 

@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint32_t kNoScreen = 0xFFFFFFFFU;
 
 /// An estimate from fewer samples may be small by chance.
-constexpr std::uint32_t kLeastForError = 16;
+constexpr std::uint32_t kMinForError = 16;
 
 [[noreturn]] void refuse(const std::string& text) {
   throw Error(ExitCode::Usage, fmt::format("--spp: '{}' is no number of samples", printable(text)),
@@ -60,19 +60,19 @@ SampleGoal parse_sample_goal(const std::string& text) {
   return {{}, std::chrono::duration<double>(*duration).count(), {}};
 }
 
-std::uint32_t least_samples(const Sampling& sampling) {
-  return static_cast<std::uint32_t>(least_samples(sampling.filter.value_or(PixelFilter::Box)));
+std::uint32_t min_samples(const Sampling& sampling) {
+  return static_cast<std::uint32_t>(min_samples(sampling.filter.value_or(PixelFilter::Box)));
 }
 
 void check_sampling(const Sampling& sampling) {
-  if (!sampling.goal.samples || *sampling.goal.samples >= least_samples(sampling)) return;
+  if (!sampling.goal.samples || *sampling.goal.samples >= min_samples(sampling)) return;
   throw Error(ExitCode::Usage,
               fmt::format("--filter {} needs {} samples, as some of its weights are negative",
-                          name_of(*sampling.filter), least_samples(sampling)),
-              fmt::format("use --spp {} or more, or another filter", least_samples(sampling)));
+                          name_of(*sampling.filter), min_samples(sampling)),
+              fmt::format("use --spp {} or more, or another filter", min_samples(sampling)));
 }
 
-FilterSample look_through(const Sampling& sampling, const RandomKey& random, std::uint32_t number) {
+FilterSample subpixel_sample(const Sampling& sampling, const RandomKey& random, std::uint32_t number) {
   if (!sampling.sums()) return {};
   Sampler sampler(pixel_stream(random, kNoScreen, 0, 0), number);
   return sample_filter(sampling.filter.value_or(PixelFilter::Box), sampler.two_of_pixel());
@@ -85,14 +85,14 @@ bool is_milestone(std::uint32_t samples) {
 
 bool reached(const Sampling& sampling, const SampleProgress& progress) {
   const SampleGoal& goal = sampling.goal;
-  if (progress.samples < least_samples(sampling)) return false;
+  if (progress.samples < min_samples(sampling)) return false;
   if (progress.samples == std::numeric_limits<std::uint32_t>::max()) return true;
   if (goal.samples && progress.samples >= *goal.samples) return true;
   if (goal.seconds && progress.seconds >= *goal.seconds) return true;
-  return goal.relmse && progress.relmse && progress.samples >= kLeastForError && *progress.relmse <= *goal.relmse;
+  return goal.relmse && progress.relmse && progress.samples >= kMinForError && *progress.relmse <= *goal.relmse;
 }
 
-std::optional<double> seconds_left(const SampleGoal& goal, const SampleProgress& progress) {
+std::optional<double> remaining_seconds(const SampleGoal& goal, const SampleProgress& progress) {
   if (progress.samples == 0) return std::nullopt;
   const double each = progress.seconds / progress.samples;
   std::optional<double> left;
@@ -105,14 +105,14 @@ std::optional<double> seconds_left(const SampleGoal& goal, const SampleProgress&
 
 namespace {
 
-/// Fewer samples say too little of their variance.
-constexpr std::uint32_t kFewest = 8;
-constexpr std::uint32_t kMostSamples = std::uint32_t{1} << 30U;
+/// Fewer samples are too few to estimate a variance.
+constexpr std::uint32_t kMinFirstStage = 8;
+constexpr std::uint32_t kMaxSamples = std::uint32_t{1} << 30U;
 constexpr std::size_t kLevels = 32;  ///< of powers of two
 
 /// Samples in proportion to this power of the variance.
 constexpr double kExponent = 0.4;
-/// What a pixel's own samples say counts as much as what those of the 3 x 3 about it do.
+/// Weight of a pixel's own variance against the mean variance of the 3 x 3 pixels around it.
 constexpr double kOwnShare = 0.5;
 
 /// Pixels are sorted by the samples they want: so many bins for a factor of 2.
@@ -182,7 +182,7 @@ struct Levels {
 
   Levels(std::uint32_t budget, std::uint32_t pilot)
       : lowest(level_of(std::max(budget / 4, pilot))),
-        highest(level_of(std::bit_ceil(2 * std::min(budget, kMostSamples / 2)))) {}
+        highest(level_of(std::bit_ceil(2 * std::min(budget, kMaxSamples / 2)))) {}
 
   [[nodiscard]] int of(int bin, int shift) const {
     if (bin == kCalm) return lowest;
@@ -205,8 +205,8 @@ int shift_within(const Histogram& pixels, const Levels& levels, std::uint32_t bu
   int low = -kBins;  // all bins at the lowest level
   int high = kBins + kBinsPerLevel * static_cast<int>(kLevels);
   while (high - low > 1) {
-    const int middle = low + (high - low) / 2;
-    (fits(middle) ? low : high) = middle;
+    const int mid = low + (high - low) / 2;
+    (fits(mid) ? low : high) = mid;
   }
   return low;
 }
@@ -214,11 +214,11 @@ int shift_within(const Histogram& pixels, const Levels& levels, std::uint32_t bu
 }  // namespace
 
 std::uint32_t AdaptiveSampling::pilot_of(const Sampling& sampling) {
-  const std::uint32_t fewest = std::max(kFewest, least_samples(sampling));
-  if (!sampling.goal.samples) return fewest;
+  const std::uint32_t min_pilot = std::max(kMinFirstStage, min_samples(sampling));
+  if (!sampling.goal.samples) return min_pilot;
   std::uint32_t pilot = *sampling.goal.samples;
-  while (std::bit_floor(pilot / 4) >= fewest) pilot = std::bit_floor(pilot / 4);
-  if (pilot == *sampling.goal.samples && pilot >= kLeast) pilot = fewest;
+  while (std::bit_floor(pilot / 4) >= min_pilot) pilot = std::bit_floor(pilot / 4);
+  if (pilot == *sampling.goal.samples && pilot >= kMinPilot) pilot = min_pilot;
   return pilot;
 }
 
@@ -228,7 +228,7 @@ AdaptiveSampling::AdaptiveSampling(const Sampling& sampling) : sampling_(samplin
 }
 
 std::uint32_t AdaptiveSampling::budget_after(std::uint32_t budget) const {
-  if (!sampling_.goal.samples) return std::min(4 * budget, kMostSamples / 2);
+  if (!sampling_.goal.samples) return std::min(4 * budget, kMaxSamples / 2);
   std::uint32_t next = *sampling_.goal.samples;
   while (std::bit_floor(next / 4) > budget) next = std::bit_floor(next / 4);
   return next;
@@ -272,7 +272,7 @@ void AdaptiveSampling::resume(Communicator& comm, const SampleProgress& reached,
   find_steps(comm, film, tiles, film.samples());
 }
 
-void AdaptiveSampling::deal(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) {
+void AdaptiveSampling::start_stage(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) {
   do {
     before_ = budget_;
     budget_ = budget_after(budget_);
@@ -312,8 +312,8 @@ void AdaptiveSampling::added(std::uint32_t count, Film& film) {
 
 std::uint32_t AdaptiveSampling::samples() const {
   if (steps_.empty() || budget_ <= before_) return budget_;
-  const double share = static_cast<double>(done_) / static_cast<double>(total_);
-  const auto more = static_cast<std::uint32_t>(share * static_cast<double>(budget_ - before_));
+  const double fraction = static_cast<double>(done_) / static_cast<double>(total_);
+  const auto more = static_cast<std::uint32_t>(fraction * static_cast<double>(budget_ - before_));
   return before_ + std::min(more, budget_ - before_ - 1);
 }
 

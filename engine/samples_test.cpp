@@ -41,10 +41,10 @@ TEST(SampleGoal, IsANumberATimeOrAnError) {
 TEST(Samples, OneSampleWithoutAFilterLooksThroughTheCentre) {
   const Sampling plain{parse_sample_goal("1"), {}};
   EXPECT_FALSE(plain.sums());
-  EXPECT_EQ(look_through(plain, {}, 0).offset, glm::dvec2(0.0));
+  EXPECT_EQ(subpixel_sample(plain, {}, 0).offset, glm::dvec2(0.0));
   const Sampling filtered{parse_sample_goal("1"), PixelFilter::Gaussian};
   EXPECT_TRUE(filtered.sums());
-  EXPECT_NE(look_through(filtered, {}, 0).offset, glm::dvec2(0.0));
+  EXPECT_NE(subpixel_sample(filtered, {}, 0).offset, glm::dvec2(0.0));
 }
 
 TEST(Samples, EverySixteenSamplesFallIntoEverySixteenthOfThePixel) {
@@ -54,7 +54,7 @@ TEST(Samples, EverySixteenSamplesFallIntoEverySixteenthOfThePixel) {
       for (int columns = 1; columns <= 16; columns *= 2) {
         std::vector<int> hits(16, 0);
         for (std::uint32_t i = first; i < first + 16; ++i) {
-          const glm::dvec2 u = look_through(box, {.seed = seed, .frame = 0}, i).offset + 0.5;
+          const glm::dvec2 u = subpixel_sample(box, {.seed = seed, .frame = 0}, i).offset + 0.5;
           const int rows = 16 / columns;
           ++hits.at(static_cast<std::size_t>(std::floor(u.x * columns) * rows + std::floor(u.y * rows)));
         }
@@ -66,10 +66,10 @@ TEST(Samples, EverySixteenSamplesFallIntoEverySixteenthOfThePixel) {
 
 TEST(Samples, SeedsAndFramesLookElsewhere) {
   const Sampling box{parse_sample_goal("4"), {}};
-  const glm::dvec2 one = look_through(box, {.seed = 1, .frame = 0}, 0).offset;
-  EXPECT_NE(look_through(box, {.seed = 2, .frame = 0}, 0).offset, one);
-  EXPECT_NE(look_through(box, {.seed = 1, .frame = 1}, 0).offset, one);
-  EXPECT_EQ(look_through(box, {.seed = 1, .frame = 0}, 0).offset, one);
+  const glm::dvec2 one = subpixel_sample(box, {.seed = 1, .frame = 0}, 0).offset;
+  EXPECT_NE(subpixel_sample(box, {.seed = 2, .frame = 0}, 0).offset, one);
+  EXPECT_NE(subpixel_sample(box, {.seed = 1, .frame = 1}, 0).offset, one);
+  EXPECT_EQ(subpixel_sample(box, {.seed = 1, .frame = 0}, 0).offset, one);
 }
 
 TEST(Samples, MitchellsWeightsSumToMoreThanZeroFromSixteenOn) {
@@ -78,7 +78,7 @@ TEST(Samples, MitchellsWeightsSumToMoreThanZeroFromSixteenOn) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     double sum = 0.0;
     for (std::uint32_t i = 0; i < 80; ++i) {
-      const double weight = look_through(mitchell, {.seed = seed, .frame = 0}, i).weight;
+      const double weight = subpixel_sample(mitchell, {.seed = seed, .frame = 0}, i).weight;
       negative += weight < 0.0;
       sum += weight;
       if (i < 15) continue;
@@ -104,18 +104,18 @@ TEST(Samples, GoalsAreReachedAndTheRestIsGuessed) {
   const Sampling count{parse_sample_goal("8"), {}};
   EXPECT_FALSE(reached(count, {7, 100.0, 0.0}));
   EXPECT_TRUE(reached(count, {8, 0.0, {}}));
-  EXPECT_DOUBLE_EQ(seconds_left(count.goal, {2, 3.0, {}}).value(), 9.0);
+  EXPECT_DOUBLE_EQ(remaining_seconds(count.goal, {2, 3.0, {}}).value(), 9.0);
   const Sampling time{parse_sample_goal("until:2s"), {}};
   EXPECT_FALSE(reached(time, {1, 1.9, {}}));
   EXPECT_TRUE(reached(time, {1, 2.0, {}}));
-  EXPECT_DOUBLE_EQ(seconds_left(time.goal, {1, 0.5, {}}).value(), 1.5);
+  EXPECT_DOUBLE_EQ(remaining_seconds(time.goal, {1, 0.5, {}}).value(), 1.5);
   const Sampling error{parse_sample_goal("until:relmse=0.01"), {}};
   EXPECT_FALSE(reached(error, {32, 0.0, {}}));
   EXPECT_FALSE(reached(error, {32, 0.0, 0.02}));
   EXPECT_FALSE(reached(error, {8, 0.0, 0.001})) << "so few samples are not believed";
   EXPECT_TRUE(reached(error, {32, 0.0, 0.01}));
-  EXPECT_DOUBLE_EQ(seconds_left(error.goal, {32, 5.0, 0.04}).value(), 15.0);
-  EXPECT_FALSE(seconds_left(error.goal, {32, 5.0, {}}));
+  EXPECT_DOUBLE_EQ(remaining_seconds(error.goal, {32, 5.0, 0.04}).value(), 15.0);
+  EXPECT_FALSE(remaining_seconds(error.goal, {32, 5.0, {}}));
 }
 
 const FrameLayout kLayout({{150, 70}, {20, 5}});
@@ -161,9 +161,9 @@ void add_some(Film& film, std::span<const std::size_t> tiles, std::uint32_t coun
 void draw(Communicator& comm, AdaptiveSampling& adaptive, Film& film, std::span<const std::size_t> tiles,
           std::uint32_t samples, std::uint32_t together) {
   while (adaptive.samples() < samples) {
-    if (adaptive.is_stage_done()) adaptive.deal(comm, film, tiles, 2);
+    if (adaptive.is_stage_done()) adaptive.start_stage(comm, film, tiles, 2);
     if (adaptive.is_stage_done()) continue;
-    const std::uint32_t count = std::min(adaptive.most_together(), together);
+    const std::uint32_t count = std::min(adaptive.max_batch(), together);
     add_some(film, tiles, count);
     adaptive.added(count, film);
   }
@@ -276,8 +276,8 @@ TEST(AdaptiveSampling, RanksRoundsAndBreaksChangeNothing) {
       AdaptiveSampling adaptive(sampling);
       std::uint32_t last = 0;
       while (adaptive.samples() < 64) {
-        if (adaptive.is_stage_done()) adaptive.deal(comm, film, mine, 1);
-        const std::uint32_t count = std::min(adaptive.most_together(), 3U);
+        if (adaptive.is_stage_done()) adaptive.start_stage(comm, film, mine, 1);
+        const std::uint32_t count = std::min(adaptive.max_batch(), 3U);
         add_some(film, mine, count);
         adaptive.added(count, film);
         EXPECT_GE(adaptive.samples(), last);
@@ -291,7 +291,7 @@ TEST(AdaptiveSampling, RanksRoundsAndBreaksChangeNothing) {
         EXPECT_EQ(other.samples(), adaptive.samples());
         EXPECT_EQ(other.is_stage_done(), adaptive.is_stage_done());
         if (!adaptive.is_stage_done()) {
-          EXPECT_EQ(other.most_together(), adaptive.most_together());
+          EXPECT_EQ(other.max_batch(), adaptive.max_batch());
         }
         adaptive = other;
       }

@@ -35,7 +35,7 @@ Scene load_scene_of_all(Communicator& comm, const std::function<Scene()>& load) 
 
 Session::Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load)
     : comm_(comm),
-      share_(share_host(comm, settings.threads)),
+      host_(find_host_resources(comm, settings.threads)),
       scene_(load_scene_of_all(comm_, load)),
       requirements_(requirements_of(scene_)),
       assembler_(std::make_unique<Assembler>()) {
@@ -44,8 +44,8 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
     const trace::Span span("start OpenGL");
     gl_ = make_gl_context({.backend = settings.backend,
                            .device = settings.device,
-                           .local_rank = share_.local_rank,
-                           .threads = share_.threads});
+                           .local_rank = host_.local_rank,
+                           .threads = host_.threads});
   });
   log::debug("OpenGL: {}", gl_->description());
   compare_rasterizers();
@@ -53,20 +53,20 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
 
 Session::~Session() = default;
 
-Session::HostShare Session::share_host(Communicator& comm, int threads) {
-  HostShare share;
-  share.host = host_name();
-  share.ranks = 0;
-  const std::vector<std::string> hosts = all_gather_texts(comm, share.host);
+Session::HostResources Session::find_host_resources(Communicator& comm, int threads) {
+  HostResources host;
+  host.host = host_name();
+  host.ranks = 0;
+  const std::vector<std::string> hosts = all_gather_texts(comm, host.host);
   for (int rank = 0; rank < comm.size(); ++rank) {
-    if (hosts[static_cast<std::size_t>(rank)] != share.host) continue;
-    if (rank < comm.rank()) ++share.local_rank;
-    ++share.ranks;
+    if (hosts[static_cast<std::size_t>(rank)] != host.host) continue;
+    if (rank < comm.rank()) ++host.local_rank;
+    ++host.ranks;
   }
   // A launcher may already have given this rank cores of its own; else the ranks of a host share all of them.
   const int online = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  share.threads = threads > 0 ? threads : std::clamp(online / share.ranks, 1, usable_cores());
-  return share;
+  host.threads = threads > 0 ? threads : std::clamp(online / host.ranks, 1, usable_cores());
+  return host;
 }
 
 void Session::load(const std::function<Scene()>& load) {
@@ -116,7 +116,7 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
     const trace::Span span("upload geometry");
     rasterizer_.reset();  // frees its GPU memory before the next one takes some
     objects_.assign(objects.begin(), objects.end());
-    rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, objects_, share_.threads);
+    rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, objects_, host_.threads);
   }
   return *rasterizer_;
 }
@@ -146,7 +146,7 @@ void Session::share_rays(const RaySettings& settings) {
 
 std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange> objects) const {
   const trace::Span span("build ray scene");
-  return std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), share_.threads, objects, ray_build_);
+  return std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), host_.threads, objects, ray_build_);
 }
 
 PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings) {
@@ -158,7 +158,7 @@ PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const 
     const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_part();
     if (!everything) traced_share_ = build_ray_scene(traced_objects_);
     primary_rays_ =
-        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_share_, share_.threads);
+        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_share_, host_.threads);
   }
   return *primary_rays_;
 }
@@ -184,8 +184,8 @@ Lighter& Session::lighter(const RaySettings& settings) {
     const trace::Span span("prepare light");
     lighter_.reset();  // its parts of the scene leave before others come
     RaySettings own = settings;
-    own.threads = share_.threads;
-    own.host_ranks = share_.ranks;
+    own.threads = host_.threads;
+    own.host_ranks = host_.ranks;
     lighter_ = std::make_unique<Lighter>(
         scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, travelling_.get());
     ray_settings_ = settings;

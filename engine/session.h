@@ -43,15 +43,15 @@ class Session {
 
   /// Collective. Another scene in this one's place; when it cannot be loaded, this one stays.
   void load(const std::function<Scene()>& load);
-  /// Changes the scene; called alike on every rank. What was made of the old one is made anew when asked for.
+  /// Changes the scene; called alike on every rank. What was made of the old scene is made again when it is needed.
   void change_scene(const std::function<void(Scene&)>& change);
 
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
   [[nodiscard]] int rank() const { return comm_.rank(); }
   [[nodiscard]] const Scene& scene() const { return scene_; }
   [[nodiscard]] const Requirements& requirements() const { return requirements_; }
-  [[nodiscard]] int threads() const { return share_.threads; }
-  [[nodiscard]] const std::string& host() const { return share_.host; }
+  [[nodiscard]] int threads() const { return host_.threads; }
+  [[nodiscard]] const std::string& host() const { return host_.host; }
   [[nodiscard]] const GlContext& gl() const { return *gl_; }
   [[nodiscard]] Assembler& assembler() { return *assembler_; }
 
@@ -76,7 +76,7 @@ class Session {
   /// ranks of one host see the layers of their group's members; collective over the group.
   [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout, const std::string& strategy,
                                      std::span<const int> members);
-  /// As many cleared layers that are not composited, reused likewise.
+  /// `count` cleared layers of keys that are not composited, reused from frame to frame.
   [[nodiscard]] std::span<TileLayer<Key>> round_keys(const FrameLayout& layout, std::size_t count);
 
  private:
@@ -92,14 +92,14 @@ class Session {
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
                                             std::span<const int> members);
 
-  /// What this rank may use of the machine it runs on.
-  struct HostShare {
+  /// The part of its host that this rank may use.
+  struct HostResources {
     std::string host;
     int local_rank = 0;  ///< among the ranks of this host
     int ranks = 1;       ///< of this host
     int threads = 1;
   };
-  [[nodiscard]] static HostShare share_host(Communicator& comm, int threads);
+  [[nodiscard]] static HostResources find_host_resources(Communicator& comm, int threads);
 
   struct Group {
     std::vector<int> members;
@@ -107,15 +107,15 @@ class Session {
   };
 
   CountingCommunicator comm_;
-  HostShare share_;
+  HostResources host_;
   Scene scene_;
   Requirements requirements_;
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
-  RayBuild ray_build_;                             ///< of all that follows
-  std::optional<std::vector<SurfaceRange>> part_;  ///< of the scene, likewise; see RaySettings
-  std::unique_ptr<TravellingRays> travelling_;     ///< where there is one
+  RayBuild ray_build_;                             ///< of the ray scenes and primary rays below
+  std::optional<std::vector<SurfaceRange>> part_;  ///< the part of the scene they hold; see RaySettings::part
+  std::unique_ptr<TravellingRays> travelling_;     ///< where there is a part
   std::unique_ptr<RayScene> ray_scene_;
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_share_;  ///< of primary_rays_; none where ray_scene_ is

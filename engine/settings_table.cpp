@@ -564,38 +564,38 @@ void reset_setting(RenderSettings& settings, std::string_view name) {
   settings.given.erase(setting->name);
 }
 
-const Setting& find_knob(const std::string& name) {
+const Setting& find_tradeoff_setting(const std::string& name) {
   const Setting* const setting = find_setting(name);
-  const bool is_knob = setting != nullptr && setting->is_knob();
-  if (is_knob && setting->scope != SettingScope::Wall) return *setting;
-  if (is_knob) {
+  const bool is_tradeoff = setting != nullptr && setting->is_tradeoff();
+  if (is_tradeoff && setting->scope != SettingScope::Wall) return *setting;
+  if (is_tradeoff) {
     throw Error(ExitCode::Usage, fmt::format("'{}' changes no picture before it is sent", name),
                 "hpr bench codec SCENE measures what it costs and loses");
   }
   std::vector<std::string> choices;
   for (const Setting& knob : all_settings()) {
-    if (knob.is_knob() && knob.scope != SettingScope::Wall) choices.emplace_back(knob.name);
+    if (knob.is_tradeoff() && knob.scope != SettingScope::Wall) choices.emplace_back(knob.name);
   }
   throw Error(ExitCode::Usage, fmt::format("there is no knob '{}'", printable(name)), unknown_name_hint(name, choices));
 }
 
-std::string knobs_text() {
+std::string tradeoff_settings_text() {
   std::string text =
       "Settings that trade speed for accuracy, options of `hpr render` and `hpr wall run` alike.\n"
       "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene;\n"
       "for those of pictures on their way to displays (`hpr wall run`) `hpr bench codec SCENE` does.\n";
   for (const Setting& knob : all_settings()) {
-    if (!knob.is_knob()) continue;
+    if (!knob.is_tradeoff()) continue;
     text += fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", knob.name, knob.value.takes, knob.costs,
                         knob.loses);
   }
   return text;
 }
 
-std::string knobs_markdown() {
+std::string tradeoff_settings_markdown() {
   std::string text = "| Option | takes | costs | loses |\n|---|---|---|---|\n";
   for (const Setting& knob : all_settings()) {
-    if (!knob.is_knob()) continue;
+    if (!knob.is_tradeoff()) continue;
     text += fmt::format("| `--{}` | {} | {} | {} |\n", knob.name, knob.value.takes, knob.costs, knob.loses);
   }
   return text;

@@ -32,7 +32,7 @@ struct Dependency {
 enum class SettingScope {
   Pictures,  ///< every command that draws a scene
   Single,    ///< those that draw one picture or run, not the measuring ones that draw many
-  Wall,      ///< walls alone: it is about what finished pictures go through on their way to displays
+  Wall,      ///< walls alone: it is about finished pictures that are sent to displays
 };
 
 /// One setting: a row of the table that the command line, the console, `--vary`, checkpoints and docs come from.
@@ -42,7 +42,7 @@ struct Setting {
   SettingValue value;
   std::string_view initial = {};                    ///< as help shows it; empty: nothing is shown
   std::array<std::string_view, 3> by_quality = {};  ///< its value under draft, good and best; empty: always the same
-  std::string_view costs = {};                      ///< what a better value takes; empty: no knob
+  std::string_view costs = {};                      ///< what a better value takes; empty: it trades nothing
   std::string_view loses = {};                      ///< what a worse value gives away
   bool decides_bits = true;                         ///< of a picture's radiance, keys or layers
   bool limits_reference = false;                    ///< a rendered reference of a sweep is made without it
@@ -51,7 +51,7 @@ struct Setting {
   std::string_view negated = {};  ///< the flag that is its opposite, without dashes
   std::vector<Dependency> used_with = {};
 
-  [[nodiscard]] bool is_knob() const { return !costs.empty(); }
+  [[nodiscard]] bool is_tradeoff() const { return !costs.empty(); }
 };
 
 /// Every setting, in the order of help.
@@ -60,19 +60,19 @@ struct Setting {
 /// Null where there is none of this name.
 [[nodiscard]] const Setting* find_setting(std::string_view name);
 
-/// Sets one setting from text. Throws Error (Usage) that names the option, and the choices and the nearest one for an
-/// unknown name.
+/// Sets one setting from text. Throws Error (Usage) that names the option; for an unknown name with the choices and the
+/// nearest one.
 void set_setting(RenderSettings& settings, std::string_view name, const std::string& value);
-/// Takes a setting back to what it is when it is not given.
+/// Resets a setting to its value when it is not given.
 void reset_setting(RenderSettings& settings, std::string_view name);
 
-/// The knob of this name, a setting that trades speed for accuracy and that a sweep can vary. Throws Error (Usage) with
+/// The setting of this name, one that trades speed for accuracy and that a sweep can vary. Throws Error (Usage) with
 /// the choices and the nearest one.
-[[nodiscard]] const Setting& find_knob(const std::string& name);
+[[nodiscard]] const Setting& find_tradeoff_setting(const std::string& name);
 
 /// What `hpr help knobs` prints; with --markdown the table of docs/knobs.md.
-[[nodiscard]] std::string knobs_text();
-[[nodiscard]] std::string knobs_markdown();
+[[nodiscard]] std::string tradeoff_settings_text();
+[[nodiscard]] std::string tradeoff_settings_markdown();
 /// The table of docs/cli.md: every setting, and its values under each quality where those differ.
 [[nodiscard]] std::string settings_markdown();
 /// The table of docs/quality.md: what each quality stands for.

@@ -15,7 +15,7 @@ TEST(SettingsTable, EachSettingTakesTheFirstValueThatItNames) {
   for (const Setting& setting : all_settings()) {
     EXPECT_TRUE(names.insert(setting.name).second) << setting.name << " stands there twice";
     EXPECT_FALSE(setting.help.empty()) << setting.name;
-    if (!setting.is_knob()) continue;
+    if (!setting.is_tradeoff()) continue;
     RenderSettings settings;
     const std::string first = setting.value.takes.substr(0, setting.value.takes.find_first_of(",: "));
     EXPECT_NO_THROW(set_setting(settings, setting.name, first)) << setting.name;
@@ -93,15 +93,15 @@ TEST(SettingsTable, UnknownNamesAndBadValuesAreRefusedWithChoices) {
 }
 
 TEST(Knobs, ThoseOfPicturesOnTheirWayToDisplaysAreNotVaried) {
-  EXPECT_TRUE(find_setting("codec")->is_knob());
+  EXPECT_TRUE(find_setting("codec")->is_tradeoff());
   try {
-    (void)find_knob("codec");
+    (void)find_tradeoff_setting("codec");
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(error.hint().find("bench codec"), std::string::npos);
   }
-  EXPECT_THROW((void)find_knob("camera"), Error);
-  EXPECT_NO_THROW((void)find_knob("spp"));
+  EXPECT_THROW((void)find_tradeoff_setting("camera"), Error);
+  EXPECT_NO_THROW((void)find_tradeoff_setting("spp"));
 }
 
 TEST(RenderSettings, WhatIsNotGivenComesFromTheQuality) {

@@ -230,7 +230,7 @@ FilterSample sample_filter(PixelFilter filter, const glm::dvec2& u) {
   return {offset, negative ? -1.0 : 1.0};
 }
 
-int least_samples(PixelFilter filter) {
+int min_samples(PixelFilter filter) {
   return filter == PixelFilter::Mitchell ? 16 : 1;
 }
 

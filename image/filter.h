@@ -64,6 +64,6 @@ struct FilterSample {
 /// How many samples of a (0, 2)-sequence a filter needs for the sum of weights to be positive, and to stay so. 1 where
 /// no weight is negative. Mitchell's negative lobes hold 1.64 % of |f| on each side, which is less than a sixteenth:
 /// of 16 such samples at most one per side and axis, 4 in all, count -1.
-[[nodiscard]] int least_samples(PixelFilter filter);
+[[nodiscard]] int min_samples(PixelFilter filter);
 
 }  // namespace hpr

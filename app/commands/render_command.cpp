@@ -145,8 +145,8 @@ class RenderCommand final : public Command {
     const CollectedPicture picture(session, sampler.frame(), blocks, size, files_);
     const FrameCost cost{watch.ms(), session.comm().bytes_sent() - sent_before};
     RunStats stats = gather_stats(session, plan, sampler.times(), cost);
-    stats.relmse = sampler.reached_so_far().relmse;
-    stats.samples_in_all = static_cast<int>(sampler.reached_so_far().samples);
+    stats.relmse = sampler.sample_progress().relmse;
+    stats.samples_in_all = static_cast<int>(sampler.sample_progress().samples);
     agree_on_failure(session.comm(), [&] {
       if (!speaks) return;
       picture.write(session.scene().name);
@@ -155,7 +155,7 @@ class RenderCommand final : public Command {
     if (speaks) {
       log::info("{} triangles, {}x{} pixels, {} rank{}: {:.1f} ms{}", session.scene().triangles, size.width,
                 size.height, stats.ranks, stats.ranks == 1 ? "" : "s", stats.ms,
-                sampling.sums() ? fmt::format(", {} samples", sampler.reached_so_far().samples) : "");
+                sampling.sums() ? fmt::format(", {} samples", sampler.sample_progress().samples) : "");
     }
     return verdict(stats, settings.strict);
   }

@@ -36,7 +36,7 @@ struct Figures {
   bool flat = true;
   double width_px = 0.0;  ///< of a flat wall, gaps included, at its finest pixels
   double height_px = 0.0;
-  double gap_percent = 0.0;  ///< of that, behind gaps
+  double gap_percent = 0.0;  ///< percent of the picture behind gaps
   WallSeams seams;
 };
 

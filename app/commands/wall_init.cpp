@@ -99,7 +99,7 @@ std::unique_ptr<Command> make_wall_init_command() {
 
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 20U;
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{4} << 20U;
 
 std::string kinds() {
   std::string text;
@@ -131,7 +131,7 @@ class WallImportCommand final : public Command {
                   "write e.g. 1920x1080");
     }
     const ImportSettings settings{{extent->first, extent->second}, 1e-3 * pitch_mm_};
-    const std::vector<std::byte> bytes = read_file(file_, kLargestFile);
+    const std::vector<std::byte> bytes = read_file(file_, kMaxFileBytes);
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     fmt::print("{}", import_wall(text, file_, kind_, settings));
     return ExitCode::Done;

@@ -27,7 +27,7 @@ class WallRemoteCommand : public Command {
   }
 
  protected:
-  [[nodiscard]] std::string say(const std::string& line) const { return ask(chosen(), line, longest()); }
+  [[nodiscard]] std::string send_line(const std::string& line) const { return send_command(chosen(), line, timeout()); }
   [[nodiscard]] RunningWall chosen() const {
     const std::vector<RunningWall> walls = running_walls();
     if (walls.empty()) {
@@ -49,7 +49,7 @@ class WallRemoteCommand : public Command {
   }
 
  private:
-  [[nodiscard]] std::chrono::milliseconds longest() const {
+  [[nodiscard]] std::chrono::milliseconds timeout() const {
     const auto wait = parse_duration(wait_);
     if (!wait || wait->count() <= 0) {
       throw Error(ExitCode::Usage, fmt::format("--wait: '{}' is no duration", printable(wait_)), "write e.g. 10s");
@@ -70,12 +70,12 @@ class WallStatusCommand final : public WallRemoteCommand {
     options.flag("--json", json_, "print one JSON document (hpr.wall-status/1)");
   }
   [[nodiscard]] ExitCode run(const Globals&) override {
-    const std::string told = say("status");
+    const std::string reply = send_line("status");
     if (json_) {
-      fmt::print("{}", told);
+      fmt::print("{}", reply);
       return ExitCode::Done;
     }
-    const auto status = Json::parse(told);
+    const auto status = Json::parse(reply);
     fmt::print("run {}: {} on {}, frame {}, {:.1f} ms a frame, {} rank{}, {} restart{}\n", status["run"].get<int>(),
                printable(status["scene"].get<std::string>()), printable(status["wall"].get<std::string>()),
                status["frame"].get<std::uint64_t>(), status["ms"].get<double>(), status["ranks"].get<int>(),
@@ -98,7 +98,7 @@ class WallCtlCommand final : public WallRemoteCommand {
   }
   void declare(const OptionSet& options) override {
     WallRemoteCommand::declare(options);
-    options.keep_remaining();  // a command's words may look like an option: -1,0,0
+    options.keep_remaining();  // a command's arguments may look like an option: -1,0,0
     options_.emplace(options);
   }
   [[nodiscard]] ExitCode run(const Globals&) override {
@@ -115,7 +115,7 @@ class WallCtlCommand final : public WallRemoteCommand {
       line << (line.tellp() > 0 ? " " : "");
       plain ? line << word : line << std::quoted(word);
     }
-    fmt::print("{}", say(line.str()));
+    fmt::print("{}", send_line(line.str()));
     return ExitCode::Done;
   }
 
@@ -128,7 +128,7 @@ class WallStopCommand final : public WallRemoteCommand {
   [[nodiscard]] std::string_view name() const override { return "stop"; }
   [[nodiscard]] std::string_view summary() const override { return "end a running wall after its frame"; }
   [[nodiscard]] ExitCode run(const Globals&) override {
-    (void)say("stop");
+    (void)send_line("stop");
     return ExitCode::Done;
   }
 };

@@ -32,14 +32,15 @@
 
 namespace hpr {
 
-/// A resident session: a scene, how it is drawn, and the last picture of it. Every rank has one and is told the same
+/// A resident session: a scene, how it is drawn, and the last picture of it. Every rank has one and runs the same
 /// lines.
 class Console {
  public:
   /// All outlive this.
   Console(Session& session, const Globals& globals, RenderSettings settings, Size size);
 
-  /// Collective. What the line has to tell. Throws Error where nothing was done: the session stays as it was.
+  /// Collective. Runs one line and returns its output. Throws Error where nothing was done: the session stays as it
+  /// was.
   [[nodiscard]] std::string run(const std::string& line) { return table_.run(line); }
   [[nodiscard]] bool quits() const { return quits_; }
   /// After an error: it came in the middle of a picture, perhaps on one rank alone.
@@ -58,10 +59,10 @@ class Console {
     std::string scene_name;
   };
 
-  std::string set_size(Words words);
+  std::string set_size(Arguments arguments);
   std::string render();
-  std::string save(Words words);
-  [[nodiscard]] std::string write_stats_of(Words words) const;
+  std::string save(Arguments arguments);
+  [[nodiscard]] std::string write_stats_of(Arguments arguments) const;
   std::string explain();
   [[nodiscard]] const Picture& picture() const;
   [[nodiscard]] View view() const;
@@ -86,13 +87,14 @@ Console::Console(Session& session, const Globals& globals, RenderSettings settin
           session, settings_, globals.seed,
           [this](const std::string& source, const RenderSettings& its) { return load_scene(source, its, globals_); },
           table_) {
-  table_.add({"size", "WxH", "pixels of the picture", [this](Words words) { return set_size(words); }});
-  table_.add({"render", "", "draw the picture", [this](Words) { return render(); }});
-  table_.add({"save", "FILE.(png|exr)", "write the last picture", [this](Words words) { return save(words); }});
+  table_.add({"size", "WxH", "pixels of the picture", [this](Arguments arguments) { return set_size(arguments); }});
+  table_.add({"render", "", "draw the picture", [this](Arguments) { return render(); }});
+  table_.add(
+      {"save", "FILE.(png|exr)", "write the last picture", [this](Arguments arguments) { return save(arguments); }});
   table_.add({"stats", "FILE.json", "write what the last picture took",
-              [this](Words words) { return write_stats_of(words); }});
-  table_.add({"explain", "", "the plan of the next picture, and why", [this](Words) { return explain(); }});
-  table_.add({"quit", "", "end the session", [this](Words) {
+              [this](Arguments arguments) { return write_stats_of(arguments); }});
+  table_.add({"explain", "", "the plan of the next picture, and why", [this](Arguments) { return explain(); }});
+  table_.add({"quit", "", "end the session", [this](Arguments) {
                 quits_ = true;
                 return std::string();
               }});
@@ -102,8 +104,8 @@ View Console::view() const {
   return make_view(choose_camera(settings_.camera, session_.scene()), size_, session_.scene().bounds);
 }
 
-std::string Console::set_size(Words words) {
-  const auto extent = words.size() == 1 ? parse_extent(words[0]) : std::nullopt;
+std::string Console::set_size(Arguments arguments) {
+  const auto extent = arguments.size() == 1 ? parse_extent(arguments[0]) : std::nullopt;
   if (!extent) refuse("a size is two numbers", "size 1920x1080");
   check_size({extent->first, extent->second}, globals_.picture_limits());
   size_ = {extent->first, extent->second};
@@ -132,7 +134,7 @@ std::string Console::render() {
   drawing_ = false;
   picture->stats = gather_stats(session_, picture->plan, picture->sampler->times(),
                                 {watch.ms(), session_.comm().bytes_sent() - sent_before});
-  picture->stats.relmse = picture->sampler->reached_so_far().relmse;
+  picture->stats.relmse = picture->sampler->sample_progress().relmse;
   picture_ = std::move(picture);
   const RunStats& stats = picture_->stats;
   return fmt::format("{}x{} pixels, {} sample{}: {:.1f} ms", size_.width, size_.height, stats.samples,
@@ -144,14 +146,14 @@ const Console::Picture& Console::picture() const {
   return *picture_;
 }
 
-std::string Console::save(Words words) {
-  if (words.size() != 1 || !(words[0].ends_with(".png") || words[0].ends_with(".exr"))) {
+std::string Console::save(Arguments arguments) {
+  if (arguments.size() != 1 || !(arguments[0].ends_with(".png") || arguments[0].ends_with(".exr"))) {
     refuse("a picture is a .png or an .exr", "save picture.png");
   }
   const Picture& last = picture();
-  check_on_root(session_.comm(), [&] { check_writable(words[0], globals_.force); });
+  check_on_root(session_.comm(), [&] { check_writable(arguments[0], globals_.force); });
   PictureFiles files;
-  files.picture = words[0];
+  files.picture = arguments[0];
   files.exposure = last.exposure;
   files.aovs = last.plan.aovs;
   files.colors = last.colors;
@@ -159,18 +161,18 @@ std::string Console::save(Words words) {
   agree_on_failure(session_.comm(), [&] {
     if (session_.comm().rank() == 0) collected.write(last.scene_name);
   });
-  return words[0];
+  return arguments[0];
 }
 
-std::string Console::write_stats_of(Words words) const {
-  if (words.size() != 1) refuse("where to?", "stats picture.json");
+std::string Console::write_stats_of(Arguments arguments) const {
+  if (arguments.size() != 1) refuse("where to?", "stats picture.json");
   const Picture& last = picture();
   agree_on_failure(session_.comm(), [&] {
     if (session_.comm().rank() != 0) return;
-    check_writable(words[0], globals_.force);
-    write_stats(words[0], last.stats);
+    check_writable(arguments[0], globals_.force);
+    write_stats(arguments[0], last.stats);
   });
-  return words[0];
+  return arguments[0];
 }
 
 std::string Console::explain() {
@@ -182,7 +184,7 @@ std::string Console::explain() {
 
 namespace {
 
-/// The other ranks hear from rank 0 at least so often: to them silence is a hang.
+/// Rank 0 sends the other ranks a message at least this often: they take a longer pause for a hang.
 constexpr std::chrono::milliseconds kHeartbeat{250};
 
 class ConsoleCommand final : public Command {
@@ -228,18 +230,18 @@ class ConsoleCommand final : public Command {
     agree_on_failure(comm, [&] {
       if (speaks) source.emplace(LineSource::Options{true, listen_});
     });
-    if (speaks) tell_where(*source);
+    if (speaks) report_address(*source);
     ExitCode worst = ExitCode::Done;
     while (!console.quits()) {
       const std::optional<Line> line = next_line(comm, source ? &*source : nullptr);
       if (!line) break;
-      const ExitCode code = obey(comm, console, *line);
+      const ExitCode code = run_line(comm, console, *line);
       if (line->scripted) worst = std::max(worst, code);
     }
     return worst;
   }
 
-  /// A line as all ranks heard it.
+  /// A line of input, the same on all ranks.
   struct Line {
     std::string text;
     bool scripted = false;         ///< by a file or a pipe
@@ -253,19 +255,19 @@ class ConsoleCommand final : public Command {
     if (typed) fmt::print("> ");
     if (source != nullptr) std::fflush(stdout);
     std::optional<InputLine> from;
-    Heard heard;
-    while (!heard.line && !heard.ended) heard = hear_line(comm, source, kHeartbeat, from);
-    if (heard.ended) return std::nullopt;
+    PolledInput input;
+    while (!input.line && !input.ended) input = poll_input(comm, source, kHeartbeat, from);
+    if (input.ended) return std::nullopt;
     const bool scripted = source != nullptr && !typed && from->from == STDIN_FILENO;
-    return Line{std::move(*heard.line), all_gather_value(comm, scripted ? 1 : 0)[0] == 1, source,
+    return Line{std::move(*input.line), all_gather_value(comm, scripted ? 1 : 0)[0] == 1, source,
                 std::move(from).value_or(InputLine{})};
   }
 
   /// Collective. Runs a line and answers it; what it failed with, where the session goes on all the same.
-  ExitCode obey(Communicator& comm, Console& console, const Line& line) const {
+  ExitCode run_line(Communicator& comm, Console& console, const Line& line) const {
     try {
-      const std::string told = console.run(line.text);
-      if (line.source != nullptr) line.source->answer(line.from, answer_of(told, line.from));
+      const std::string reply = console.run(line.text);
+      if (line.source != nullptr) line.source->answer(line.from, reply_to(reply, line.from));
       return ExitCode::Done;
     } catch (const Error& error) {
       if (!is_recoverable(error) || (console.drawing() && comm.size() > 1)) throw;
@@ -277,10 +279,11 @@ class ConsoleCommand final : public Command {
     }
   }
 
-  static void tell_where(const LineSource& source) {
+  static void report_address(const LineSource& source) {
     if (source.address().empty()) return;
     log::info("listening on {}", source.address());
-    // Not the token of the environment: who set it knows it, and logs are read by others. One made up is told always.
+    // Not the token of the environment: who set it knows it, and logs are read by others. A generated token is always
+    // printed.
     if (!source.token().empty() && source.token() != link_token()) {
       fmt::print(stderr, "hpr: the first line of a client is: token {}\n", source.token());
     }
@@ -292,8 +295,8 @@ class ConsoleCommand final : public Command {
   }
 
   /// Clients of a socket see by a last line that an answer is whole.
-  [[nodiscard]] static std::string answer_of(const std::string& told, const InputLine& line) {
-    std::string answer = told.empty() ? "" : told + "\n";
+  [[nodiscard]] static std::string reply_to(const std::string& reply, const InputLine& line) {
+    std::string answer = reply.empty() ? "" : reply + "\n";
     if (line.from != STDIN_FILENO) answer += "ok\n";
     return answer;
   }

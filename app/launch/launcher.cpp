@@ -48,21 +48,21 @@ class PassedSignals {
   /// The ranks have started: requests that waited for that go out.
   static void note_start();
 
-  /// Whether mpiexec was told to end, or will be as soon as there is one: nothing more is to be said.
+  /// Whether mpiexec was sent a signal that ends it, or will be as soon as it runs: no further message is printed.
   [[nodiscard]] static bool ends();
   /// The last signal that interrupted the job; 0: none did.
   [[nodiscard]] static int interrupted_by();
 
  private:
   static constexpr std::array kSignals{SIGALRM, SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
-  std::size_t count_;  ///< of them, from the front
+  std::size_t count_;  ///< how many of kSignals are handled, from the front
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
 namespace {
 
-/// Seconds after which signals are passed on though no start was heard of.
-constexpr unsigned kLongestStart = 30;
+/// Seconds after which signals are passed on although no start was reported.
+constexpr unsigned kMaxStartSeconds = 30;
 
 std::atomic<pid_t> launched = 0;
 std::atomic<bool> stops = false;  ///< Interrupts::Stop
@@ -75,7 +75,7 @@ bool is_request(int signal) {
   return signal == SIGUSR1 || signal == SIGUSR2;
 }
 
-/// Of two signals that wait, the one that asks for more stays.
+/// The strength of a request: of two pending signals the stronger one is kept.
 int weight_of(int signal) {
   return signal == 0 ? 0 : signal == SIGUSR2 ? 1 : signal == SIGUSR1 ? 2 : 3;
 }
@@ -106,7 +106,7 @@ extern "C" void pass_on(int signal) {
     }
   }
   if (signal != SIGALRM && weight_of(signal) >= weight_of(early.load())) {
-    if (early.exchange(signal) == 0 && is_request(signal) && !started.load()) ::alarm(kLongestStart);
+    if (early.exchange(signal) == 0 && is_request(signal) && !started.load()) ::alarm(kMaxStartSeconds);
   }
   pass_on_early();
   errno = error;
@@ -226,10 +226,10 @@ constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
 /// What starting processes may take beside what its ranks may take to start MPI, which they time themselves.
 constexpr std::chrono::seconds kStartGrace{10};
 constexpr std::chrono::milliseconds kStartOfRank{500};
-/// Between these a job may take as long as its ranks wait for each other to end once it was told to. Open MPI gives
+/// Between these a job may take as long as its ranks wait for each other to end after SIGTERM. Open MPI gives
 /// ranks a second.
-constexpr std::chrono::seconds kLeastEnd{2};
-constexpr std::chrono::seconds kLongestEnd{10};
+constexpr std::chrono::seconds kMinEnd{2};
+constexpr std::chrono::seconds kMaxEnd{10};
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
@@ -267,7 +267,7 @@ bool write_all(int file, std::string_view text) {
   return true;
 }
 
-/// Takes the mark of the start from the front of what a job says.
+/// Removes the mark of the start from the front of a job's output.
 class StartMark {
  public:
   /// What of `text`, the next piece of that, is not the mark. Meaningful until the next call.
@@ -282,16 +282,16 @@ class StartMark {
     return std::string_view(front_).substr(like ? length : 0);
   }
 
-  /// Whether the job has said anything. Where ranks run elsewhere that may be all there is to go by.
-  [[nodiscard]] bool heard() const { return looked_; }
+  /// Whether the job has written any output. For ranks on other hosts that may be the only sign of a start.
+  [[nodiscard]] bool has_output() const { return looked_; }
 
  private:
   std::string front_;
   bool looked_ = false;
 };
 
-/// A job from its start to its end. What it says on its standard output is collected, or said here as it comes: mpiexec
-/// does not tell when nobody can take it. No wait for mpiexec is without a limit.
+/// A job from its start to its end. Its standard output is collected, or copied to ours as it arrives: mpiexec
+/// does not report a reader that went away. No wait for mpiexec is without a limit.
 class RunningJob {
  public:
   RunningJob(pid_t child, int ranks, int output, const JobOptions& options)
@@ -300,31 +300,31 @@ class RunningJob {
         collected_(options.captured_stdout),
         start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kMaxWait) + kStartGrace +
                      ranks * kStartOfRank),
-        end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kLeastEnd, kLongestEnd)) {}
+        end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kMinEnd, kMaxEnd)) {}
 
-  /// Waits for its end; its status as waitpid tells it.
+  /// Waits for its end; returns its status as waitpid has it.
   int follow() {
     while (true) {
-      const bool heard = hear(output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms);
-      keep_limits();
-      if (heard && !killed_) continue;
+      const bool has_output = poll_output(output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms);
+      enforce_limits();
+      if (has_output && !killed_) continue;
       int status = 0;
       const pid_t ended = ::waitpid(child_, &status, WNOHANG);
       if (ended < 0 && errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
       if (ended != child_) continue;
-      while (hear(0)) {  // what it said last
+      while (poll_output(0)) {  // its last output
       }
       if (output_ >= 0) ::close(output_);  // somebody it left behind holds the other end
       return status;
     }
   }
 
-  [[nodiscard]] bool heard() const { return mark_.heard(); }
-  /// The errno that kept what it said from being said, and ended it; 0: all was said.
-  [[nodiscard]] int unsaid() const { return unsaid_; }
+  [[nodiscard]] bool has_output() const { return mark_.has_output(); }
+  /// The errno of the write that failed and ended the job; 0: all output was written.
+  [[nodiscard]] int output_error() const { return output_error_; }
   /// Its ranks had not started in time, and it was ended.
   [[nodiscard]] bool late() const { return late_; }
-  /// It did not end in time when it was told to.
+  /// Whether the job was killed, because it did not end in time after SIGTERM.
   [[nodiscard]] bool killed() const { return killed_; }
   [[nodiscard]] std::chrono::duration<double> start_limit() const { return start_limit_; }
 
@@ -333,8 +333,8 @@ class RunningJob {
   static constexpr int kBetweenLooks_ms = 200;
   static constexpr int kToTheEnd_ms = 5;
 
-  /// False when it says nothing just now, or nothing more.
-  bool hear(int wait_ms) {
+  /// Copies output that has arrived; waits at most `wait_ms`. False when there is none now, or none will come.
+  bool poll_output(int wait_ms) {
     pollfd waiting{.fd = output_, .events = POLLIN, .revents = 0};  // one below 0 is passed over
     if (::poll(&waiting, 1, wait_ms) <= 0) return false;
     std::array<char, 65536> buffer{};
@@ -347,24 +347,24 @@ class RunningJob {
     const std::string_view text = mark_.take({buffer.data(), static_cast<std::size_t>(got)});
     if (collected_ != nullptr) {
       collected_->append(text);
-    } else if (unsaid_ == 0 && !write_all(STDOUT_FILENO, text)) {
+    } else if (output_error_ == 0 && !write_all(STDOUT_FILENO, text)) {
       const int reason = errno;
-      if (PassedSignals::ends()) return true;  // it was told already, and twice is without mercy
-      unsaid_ = reason;
+      if (PassedSignals::ends()) return true;  // a second signal would kill it
+      output_error_ = reason;
       ::kill(child_, SIGTERM);
     }
     return true;
   }
 
-  void keep_limits() {
+  void enforce_limits() {
     const Clock::time_point now = Clock::now();
-    if (!told_ && (PassedSignals::ends() || unsaid_ != 0)) told_ = now;
-    if (!told_ && !mark_.heard() && now - begin_ > start_limit_) {
+    if (!notified_ && (PassedSignals::ends() || output_error_ != 0)) notified_ = now;
+    if (!notified_ && !mark_.has_output() && now - begin_ > start_limit_) {
       late_ = true;
-      told_ = now;
+      notified_ = now;
       ::kill(child_, SIGTERM);
     }
-    if (!told_ || killed_ || now - *told_ <= end_limit_) return;
+    if (!notified_ || killed_ || now - *notified_ <= end_limit_) return;
     log::warning("mpiexec has not ended {:g} s after it was told to, and is killed",
                  std::chrono::duration<double>(end_limit_).count());
     kill_with_descendants(child_);
@@ -378,8 +378,8 @@ class RunningJob {
   std::chrono::nanoseconds end_limit_;
   StartMark mark_;
   Clock::time_point begin_ = Clock::now();
-  std::optional<Clock::time_point> told_;  ///< to end
-  int unsaid_ = 0;
+  std::optional<Clock::time_point> notified_;  ///< to end
+  int output_error_ = 0;
   bool late_ = false;
   bool killed_ = false;
 };
@@ -399,7 +399,7 @@ std::optional<std::filesystem::path> find_on_path(std::string_view program) {
   return std::nullopt;
 }
 
-void tell_launcher() {
+void notify_launcher() {
   if (!launched_by_hpr()) return;
   std::fwrite(kStartMark.data(), 1, kStartMark.size(), stdout);
   std::fflush(stdout);
@@ -437,9 +437,9 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   RunningJob job(child, ranks, pipe[0], options);
   const int status = job.follow();
   PassedSignals::to_nobody();
-  if (job.unsaid() != 0) {
+  if (job.output_error() != 0) {
     throw Error(ExitCode::Io,
-                fmt::format("cannot write to standard output: {}", std::generic_category().message(job.unsaid())),
+                fmt::format("cannot write to standard output: {}", std::generic_category().message(job.output_error())),
                 "free some space, or see who closed the pipe");
   }
   if (job.late()) {
@@ -461,7 +461,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
   // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
-  if (code == static_cast<int>(ExitCode::CheckFailed) && !job.heard() && PassedSignals::interrupted_by() == 0) {
+  if (code == static_cast<int>(ExitCode::CheckFailed) && !job.has_output() && PassedSignals::interrupted_by() == 0) {
     throw Error(
         ExitCode::Io, fmt::format("MPI could not start {} ranks", ranks),
         "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "

@@ -34,16 +34,16 @@ struct JobOptions {
   std::chrono::nanoseconds hang_limit = kHangTimeout;  ///< how long its ranks wait for each other
 };
 
-/// Of rank 0, when all ranks of its job have started: tells a launcher of this program that they take SIGUSR1 and
-/// SIGUSR2 now, if they ever do.
-void tell_launcher();
+/// Called by rank 0 when all ranks of its job have started: notifies a launcher of this program that they take SIGUSR1
+/// and SIGUSR2 now, if they ever do.
+void notify_launcher();
 
 /// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
 /// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
 /// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks, once these have started,
 /// if this process watches for them (core/signals.h).
 /// A job that takes longer to start than `options.hang_limit`, 10 s and half a second a rank is ended; one that does
-/// not end when it is told to, in as long as that limit but at least 2 and at most 10 s, is killed. Throws Error: Io
+/// not end after SIGTERM, in as long as that limit but at least 2 and at most 10 s, is killed. Throws Error: Io
 /// when mpiexec or MPI cannot be started, Lost when a rank or mpiexec itself was killed.
 int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 

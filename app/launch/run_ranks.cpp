@@ -35,8 +35,8 @@ namespace {
   std::abort();  // MPI_Abort does not return
 }
 
-/// A time limit for the calls of MPI that cannot be polled: starting and ending. When it passes, this rank says so and
-/// ends, and the launcher ends the others.
+/// A time limit for the calls of MPI that cannot be polled: starting and ending. When it passes, this rank prints an
+/// error and ends, and the launcher ends the others.
 class CallLimit {
  public:
   CallLimit(std::chrono::nanoseconds limit, const char* doing)
@@ -69,7 +69,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
   try {
     MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
     limit.reset();
-    if (rank == 0) tell_launcher();
+    if (rank == 0) notify_launcher();
     if (globals.ranks > 0 && globals.ranks != comm.size()) {
       throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
                   "leave --ranks out under mpirun or srun: the launcher sets the number");
@@ -112,7 +112,7 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
   if (inside_mpi_job() || globals.ranks <= 1 || restarts <= 0)
     return run_ranks(globals, body, {.interrupts = interrupts});
   RunJournal journal;
-  // The launcher's own words, which name the rank and its host, are wanted here.
+  // The launcher's own messages, which name the rank and its host, are wanted here.
   const JobOptions options{
       .environment = {{RunJournal::kVariable, journal.path().string()}, {"OMPI_MCA_orte_execute_quiet", "0"}},
       .interrupts = interrupts,

@@ -24,7 +24,7 @@ struct Globals {
   std::string limit_image;
   std::string hang_timeout;
   bool force = false;             ///< overwrite files
-  std::string trace;              ///< the file that shall tell where the time went; empty: none
+  std::string trace;              ///< file for the timeline of ranks and threads; empty: none
   int ranks = 0;                  ///< 0: as many as the launcher started, else 1
   int threads = 0;                ///< of one rank; 0: the machine's cores divided among the ranks of a host
   std::vector<std::string> args;  ///< this process's command line after the program's name

@@ -38,7 +38,7 @@ Option Option::required() const {
 
 namespace {
 
-/// CLI11's own words for a range go without: help says it in ours.
+/// CLI11's own text for a range is left out: help has ours.
 template <typename Number>
 void set_range(CLI::Option& option, Number low, Number high) {
   CLI::Range range(low, high);
@@ -220,7 +220,7 @@ std::vector<std::string> names_of(const std::vector<const CLI::App*>& subcommand
   return names;
 }
 
-/// The subcommand chain the words name: `app`, or `wall`, or `wall run`, as far as it goes.
+/// The chain of subcommands that the arguments name: `app`, or `wall`, or `wall run`, as far as it goes.
 const CLI::App* innermost(const CLI::App* app, const std::vector<std::string>& words) {
   for (const std::string& word : words) {
     if (word.starts_with('-')) break;

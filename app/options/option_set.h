@@ -103,7 +103,7 @@ class OptionSet {
 
   /// An option that was declared before, by its name with dashes.
   [[nodiscard]] Option declared(const std::string& name) const;
-  /// All words from the first that is no option on are kept as they are, also those that look like options; see
+  /// All arguments from the first that is no option on are kept as they are, also those that look like options; see
   /// remaining().
   void keep_remaining() const;
   [[nodiscard]] std::vector<std::string> remaining() const;
@@ -130,7 +130,7 @@ class CommandLine {
   /// Declares a command and those below it.
   void add(std::unique_ptr<Command> command);
 
-  /// Parses the words after the program's name. Returns the command they name; null where they ask for help or the
+  /// Parses the arguments after the program's name. Returns the command they name; null where they request help or the
   /// version, which is printed where `prints`. Throws Error (Usage).
   [[nodiscard]] Command* parse(const std::vector<std::string>& words, bool prints);
   /// The help of the program.

@@ -17,7 +17,7 @@ namespace {
 
 std::vector<std::string> words_of(const std::string& line) {
   std::istringstream stream(line);
-  std::vector<std::string> words;
+  std::vector<std::string> arguments;
   std::string word;
   while (stream >> std::ws && stream.peek() != '#' && !stream.eof()) {
     const bool quoted = stream.peek() == '"';
@@ -25,41 +25,41 @@ std::vector<std::string> words_of(const std::string& line) {
       if (quoted) refuse("a quote is not closed", "hide \"big chair\"");
       break;
     }
-    words.push_back(word);
+    arguments.push_back(word);
   }
-  return words;
+  return arguments;
 }
 
 }  // namespace
 
 CommandTable::CommandTable() {
-  add({"help", "[COMMAND]", "what can be said here", [this](Words words) { return help(words); }});
+  add({"help", "[COMMAND]", "what can be said here", [this](Arguments arguments) { return help(arguments); }});
 }
 
 std::string CommandTable::run(const std::string& line) const {
-  const std::vector<std::string> words = words_of(line);
-  if (words.empty()) return "";
-  const auto found = std::ranges::find(commands_, words.front(), &SessionCommand::name);
+  const std::vector<std::string> arguments = words_of(line);
+  if (arguments.empty()) return "";
+  const auto found = std::ranges::find(commands_, arguments.front(), &SessionCommand::name);
   if (found != commands_.end()) {
-    if (found->usage.empty() && words.size() > 1) {
-      refuse(fmt::format("'{}' takes nothing", words.front()), words.front());
+    if (found->usage.empty() && arguments.size() > 1) {
+      refuse(fmt::format("'{}' takes nothing", arguments.front()), arguments.front());
     }
-    return found->run(Words(words).subspan(1));
+    return found->run(Arguments(arguments).subspan(1));
   }
   std::vector<std::string> names;
   for (const SessionCommand& command : commands_) names.push_back(command.name);
-  throw Error(ExitCode::Usage, fmt::format("there is no command '{}'", printable(words.front())),
-              unknown_name_hint(words.front(), names));
+  throw Error(ExitCode::Usage, fmt::format("there is no command '{}'", printable(arguments.front())),
+              unknown_name_hint(arguments.front(), names));
 }
 
-std::string CommandTable::help(Words words) const {
+std::string CommandTable::help(Arguments arguments) const {
   std::string text;
   for (const SessionCommand& command : commands_) {
-    if (!words.empty() && command.name != words.front()) continue;
+    if (!arguments.empty() && command.name != arguments.front()) continue;
     const std::string written = fmt::format("{} {}", command.name, command.usage);
     text += fmt::format("{}{:<44} {}", text.empty() ? "" : "\n", written, command.summary);
   }
-  if (text.empty()) refuse(fmt::format("there is no command '{}'", printable(words.front())), "help");
+  if (text.empty()) refuse(fmt::format("there is no command '{}'", printable(arguments.front())), "help");
   return text;
 }
 

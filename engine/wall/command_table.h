@@ -11,15 +11,15 @@
 
 namespace hpr {
 
-using Words = std::span<const std::string>;
+using Arguments = std::span<const std::string>;
 
 /// One command of a session.
 struct SessionCommand {
   std::string name;
   std::string usage;  ///< what follows the name
   std::string summary;
-  /// Collective; `words` without the name. What it has to tell, lines without a final newline. Throws Error.
-  std::function<std::string(Words words)> run;
+  /// Collective; `arguments` without the name. Returns the output, lines without a final newline. Throws Error.
+  std::function<std::string(Arguments arguments)> run;
 };
 
 /// The commands a session knows, `help` among them.
@@ -32,12 +32,12 @@ class CommandTable {
 
   void add(SessionCommand command) { commands_.push_back(std::move(command)); }
   [[nodiscard]] const std::vector<SessionCommand>& commands() const { return commands_; }
-  /// Runs one line: words apart by blanks, "quoted" where they hold some; what follows # is a remark. Throws Error
-  /// (Usage) for unknown commands, and what the command throws.
+  /// Runs one line: arguments separated by blanks, "quoted" where they hold some; what follows # is a comment. Throws
+  /// Error (Usage) for unknown commands, and what the command throws.
   [[nodiscard]] std::string run(const std::string& line) const;
 
  private:
-  [[nodiscard]] std::string help(Words words) const;
+  [[nodiscard]] std::string help(Arguments arguments) const;
 
   std::vector<SessionCommand> commands_;
 };
@@ -52,7 +52,7 @@ class CommandTable {
 /// Of length 1, however long it was. Throws Error (Usage) for 0,0,0.
 [[nodiscard]] glm::dvec3 direction_of(const glm::dvec3& point);
 
-/// What goes wrong with one command of a session, and leaves the session as it was.
+/// Whether an error concerns one command of a session only and leaves the session as it was.
 [[nodiscard]] inline bool is_recoverable(const Error& error) {
   return error.code() == ExitCode::Usage || error.code() == ExitCode::BadInput || error.code() == ExitCode::Io ||
          error.code() == ExitCode::Limit;

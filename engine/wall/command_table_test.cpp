@@ -10,8 +10,8 @@ namespace {
 TEST(CommandTable, SplitsWordsAndKeepsQuotedOnesWhole) {
   CommandTable table;
   std::vector<std::string> heard;
-  table.add({"say", "WORDS", "", [&](Words words) {
-               heard.assign(words.begin(), words.end());
+  table.add({"say", "WORDS", "", [&](Arguments arguments) {
+               heard.assign(arguments.begin(), arguments.end());
                return std::string("said");
              }});
   EXPECT_EQ(table.run("  say one \"two three\" # four"), "said");
@@ -22,7 +22,7 @@ TEST(CommandTable, SplitsWordsAndKeepsQuotedOnesWhole) {
 
 TEST(CommandTable, UnknownCommandsNameTheNearest) {
   CommandTable table;
-  table.add({"render", "", "", [](Words) { return std::string(); }});
+  table.add({"render", "", "", [](Arguments) { return std::string(); }});
   try {
     (void)table.run("rendr");
     FAIL();
@@ -34,7 +34,7 @@ TEST(CommandTable, UnknownCommandsNameTheNearest) {
 
 TEST(CommandTable, HelpListsEveryCommandOrOne) {
   CommandTable table;
-  table.add({"render", "", "draw", [](Words) { return std::string(); }});
+  table.add({"render", "", "draw", [](Arguments) { return std::string(); }});
   EXPECT_NE(table.run("help").find("help [COMMAND]"), std::string::npos);
   EXPECT_NE(table.run("help").find("render"), std::string::npos);
   EXPECT_EQ(table.run("help render").find("help"), std::string::npos);

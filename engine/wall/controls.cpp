@@ -17,9 +17,9 @@ std::string written(const glm::dvec3& point) {
   return fmt::format("{:g},{:g},{:g}", point.x, point.y, point.z);
 }
 
-void expect(Words words, std::size_t least, std::size_t most, const std::string& example) {
-  if (words.size() < least || words.size() > most) {
-    refuse(words.size() < least ? "something is missing" : "that is too much", example);
+void expect(Arguments arguments, std::size_t least, std::size_t most, const std::string& example) {
+  if (arguments.size() < least || arguments.size() > most) {
+    refuse(arguments.size() < least ? "something is missing" : "that is too much", example);
   }
 }
 
@@ -53,41 +53,43 @@ Controls::Controls(Session& session, RenderSettings& settings, std::uint64_t see
 }
 
 void Controls::add_scene_commands(CommandTable& table) {
-  table.add({"load", "SCENE", "another scene in this one's place", [this](Words words) { return load(words); }});
-  table.add({"nodes", "", "the scene's nodes and where they are", [this](Words) { return list_nodes(); }});
-  table.add({"move", "NODE by|to X,Y,Z", "metres, world space", [this](Words words) { return move(words); }});
-  table.add({"turn", "NODE X,Y,Z DEGREES", "about that axis through its position", [this](Words words) {
-               expect(words, 3, 3, "turn NODE 0,1,0 90");
-               edits_.turn(words[0], direction_of(point_of(words[1])), number_of(words[2]));
+  table.add(
+      {"load", "SCENE", "another scene in this one's place", [this](Arguments arguments) { return load(arguments); }});
+  table.add({"nodes", "", "the scene's nodes and where they are", [this](Arguments) { return list_nodes(); }});
+  table.add(
+      {"move", "NODE by|to X,Y,Z", "metres, world space", [this](Arguments arguments) { return move(arguments); }});
+  table.add({"turn", "NODE X,Y,Z DEGREES", "about that axis through its position", [this](Arguments arguments) {
+               expect(arguments, 3, 3, "turn NODE 0,1,0 90");
+               edits_.turn(arguments[0], direction_of(point_of(arguments[1])), number_of(arguments[2]));
                return scene_changed();
              }});
   for (const bool hidden : {true, false}) {
     const std::string name = hidden ? "hide" : "show";
-    table.add({name, "NODE", hidden ? "draw without it" : "draw it again", [this, hidden, name](Words words) {
-                 expect(words, 1, 1, name + " NODE");
-                 edits_.hide(words[0], hidden);
+    table.add({name, "NODE", hidden ? "draw without it" : "draw it again", [this, hidden, name](Arguments arguments) {
+                 expect(arguments, 1, 1, name + " NODE");
+                 edits_.hide(arguments[0], hidden);
                  return scene_changed();
                }});
   }
 }
 
 void Controls::add_light_commands(CommandTable& table) {
-  table.add({"lights", "", "the scene's lights", [this](Words) { return list_lights(); }});
+  table.add({"lights", "", "the scene's lights", [this](Arguments) { return list_lights(); }});
   table.add({"light", "NAME on|off | intensity R,G,B | position X,Y,Z | direction X,Y,Z", "change a light",
-             [this](Words words) { return change_light(words); }});
+             [this](Arguments arguments) { return change_light(arguments); }});
 }
 
 void Controls::add_drawing_commands(CommandTable& table) {
-  table.add({"cameras", "", "the scene's cameras", [this](Words) { return list_cameras(); }});
+  table.add({"cameras", "", "the scene's cameras", [this](Arguments) { return list_cameras(); }});
   table.add({"camera", "NAME|INDEX | X,Y,Z at X,Y,Z [up X,Y,Z] [fov DEGREES]", "where the picture is seen from",
-             [this](Words words) { return set_camera(words); }});
+             [this](Arguments arguments) { return set_camera(arguments); }});
   for (const char* option : {"passes", "quality", "strategy", "spp"}) {
     table.add({option, "VALUE", fmt::format("as the option --{}", option),
-               [this, option](Words words) { return set(option, words); }});
+               [this, option](Arguments arguments) { return set(option, arguments); }});
   }
-  table.add({"set", "OPTION VALUE", "any other option of render, without its dashes", [this](Words words) {
-               expect(words, 2, 2, "set photons 200000");
-               return set(words[0], words.subspan(1));
+  table.add({"set", "OPTION VALUE", "any other option of render, without its dashes", [this](Arguments arguments) {
+               expect(arguments, 2, 2, "set photons 200000");
+               return set(arguments[0], arguments.subspan(1));
              }});
 }
 
@@ -97,9 +99,9 @@ std::string Controls::scene_changed() {
   return "";
 }
 
-std::string Controls::load(Words words) {
-  expect(words, 1, 1, "load FILE.glb");
-  session_.load([&] { return load_(words[0], settings_); });
+std::string Controls::load(Arguments arguments) {
+  expect(arguments, 1, 1, "load FILE.glb");
+  session_.load([&] { return load_(arguments[0], settings_); });
   edits_ = SceneEdits(session_.scene());
   // What names a camera of the old scene names none of this one.
   reset_setting(settings_, "camera");
@@ -109,30 +111,30 @@ std::string Controls::load(Words words) {
                      edits_.nodes().size(), scene.lights.size());
 }
 
-std::string Controls::move(Words words) {
-  expect(words, 3, 3, "move NODE by 0,1,0");
-  const glm::dvec3 place = point_of(words[2]);
-  if (words[1] == "by") {
-    edits_.move_by(words[0], place);
-  } else if (words[1] == "to") {
-    edits_.move_to(words[0], place);
+std::string Controls::move(Arguments arguments) {
+  expect(arguments, 3, 3, "move NODE by 0,1,0");
+  const glm::dvec3 target = point_of(arguments[2]);
+  if (arguments[1] == "by") {
+    edits_.move_by(arguments[0], target);
+  } else if (arguments[1] == "to") {
+    edits_.move_to(arguments[0], target);
   } else {
     refuse("a node moves by metres or to a place", "move NODE by 0,1,0");
   }
   return scene_changed();
 }
 
-std::string Controls::change_light(Words words) {
-  expect(words, 2, 3, "light NAME intensity 10,10,10");
-  SceneEdits::EditedLight& edited = edits_.light(words[0]);
-  const std::string& what = words[1];
+std::string Controls::change_light(Arguments arguments) {
+  expect(arguments, 2, 3, "light NAME intensity 10,10,10");
+  SceneEdits::EditedLight& edited = edits_.light(arguments[0]);
+  const std::string& what = arguments[1];
   if (what == "on" || what == "off") {
-    expect(words, 2, 2, "light NAME off");
+    expect(arguments, 2, 2, "light NAME off");
     edited.on = what == "on";
     return scene_changed();
   }
-  expect(words, 3, 3, "light NAME position 0,2,0");
-  const glm::dvec3 value = point_of(words[2]);
+  expect(arguments, 3, 3, "light NAME position 0,2,0");
+  const glm::dvec3 value = point_of(arguments[2]);
   if (what == "intensity") {
     if (glm::any(glm::lessThan(value, glm::dvec3(0.0))) || glm::any(glm::greaterThan(value, glm::dvec3(1e30)))) {
       refuse("intensities are from 0 to 1e30", "light NAME intensity 10,10,10");
@@ -149,25 +151,25 @@ std::string Controls::change_light(Words words) {
   return scene_changed();
 }
 
-std::string Controls::set_camera(Words words) {
-  expect(words, 1, 7, "camera 0,1,5 at 0,1,0");
-  refuse_kept("camera");
+std::string Controls::set_camera(Arguments arguments) {
+  expect(arguments, 1, 7, "camera 0,1,5 at 0,1,0");
+  check_allowed("camera");
   CameraChoice choice{.fov_degrees = initial_fov_degrees_};
-  if (words.size() == 1) {
-    choice.name = words[0];
+  if (arguments.size() == 1) {
+    choice.name = arguments[0];
   } else {
-    choice.eye = point_of(words[0]);
-    for (std::size_t i = 1; i < words.size(); i += 2) {
-      if (i + 1 == words.size()) refuse(fmt::format("nothing follows '{}'", printable(words[i])), "at 0,1,0");
-      if (words[i] == "at") {
-        choice.at = point_of(words[i + 1]);
-      } else if (words[i] == "up") {
-        choice.up = point_of(words[i + 1]);
-      } else if (words[i] == "fov") {
-        choice.fov_degrees = number_of(words[i + 1]);
+    choice.eye = point_of(arguments[0]);
+    for (std::size_t i = 1; i < arguments.size(); i += 2) {
+      if (i + 1 == arguments.size()) refuse(fmt::format("nothing follows '{}'", printable(arguments[i])), "at 0,1,0");
+      if (arguments[i] == "at") {
+        choice.at = point_of(arguments[i + 1]);
+      } else if (arguments[i] == "up") {
+        choice.up = point_of(arguments[i + 1]);
+      } else if (arguments[i] == "fov") {
+        choice.fov_degrees = number_of(arguments[i + 1]);
         if (!(choice.fov_degrees > 0.0 && choice.fov_degrees < 179.0)) refuse("fov is from 0 to 179 degrees", "fov 45");
       } else {
-        refuse(fmt::format("'{}' is none of at, up and fov", printable(words[i])), "camera 0,1,5 at 0,1,0 fov 40");
+        refuse(fmt::format("'{}' is none of at, up and fov", printable(arguments[i])), "camera 0,1,5 at 0,1,0 fov 40");
       }
     }
     if (!choice.at) refuse("what does the eye look at?", "camera 0,1,5 at 0,1,0");
@@ -178,20 +180,20 @@ std::string Controls::set_camera(Words words) {
   return "";
 }
 
-void Controls::refuse_kept(const std::string& name) const {
-  const auto found = kept_.find(name);
-  if (found != kept_.end()) refuse(fmt::format("'{}' stays as it is: {}", name, found->second), "quality draft");
+void Controls::check_allowed(const std::string& name) const {
+  const auto found = rejected_.find(name);
+  if (found != rejected_.end()) refuse(fmt::format("'{}' stays as it is: {}", name, found->second), "quality draft");
 }
 
-std::string Controls::set(const std::string& name, Words words) {
-  expect(words, 1, 1, name + " VALUE");
+std::string Controls::set(const std::string& name, Arguments arguments) {
+  expect(arguments, 1, 1, name + " VALUE");
   const Setting* const setting = find_setting(name);
   if (setting != nullptr && (setting->fixed_in_session || setting->scope == SettingScope::Wall)) {
     refuse(fmt::format("--{} is not set from here", name), "set photons 200000");
   }
-  refuse_kept(name);
+  check_allowed(name);
   RenderSettings tried = settings_;
-  set_setting(tried, name, words[0]);
+  set_setting(tried, name, arguments[0]);
   (void)resolve(tried, seed_);
   settings_ = tried;
   ++changes_;

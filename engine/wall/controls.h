@@ -18,38 +18,38 @@ struct Scene;
 using SceneLoader = std::function<Scene(const std::string& source, const RenderSettings& settings)>;
 
 /// What can be changed about a resident scene and how it is drawn, by the same commands wherever they come from. Every
-/// rank has one and is told the same lines: a change travels as its command, not as the scene.
+/// rank has one and runs the same lines: a change travels as its command, not as the scene.
 class Controls {
  public:
   /// All outlive this. Adds its commands to `table`.
   Controls(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load, CommandTable& table);
 
-  /// Raised by every change: whoever keeps a plan or a picture sees by it that it is of an earlier state.
+  /// Counts the changes: a plan or a picture made at another count is of an earlier state.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
   /// From now on the command or option `name` is refused; `why` is what its user reads.
-  void keep(const std::string& name, const std::string& why) { kept_[name] = why; }
+  void reject_change(const std::string& name, const std::string& why) { rejected_[name] = why; }
 
  private:
   void add_scene_commands(CommandTable& table);
   void add_light_commands(CommandTable& table);
   void add_drawing_commands(CommandTable& table);
-  std::string load(Words words);
-  std::string move(Words words);
-  std::string change_light(Words words);
-  std::string set_camera(Words words);
-  std::string set(const std::string& option, Words words);
+  std::string load(Arguments arguments);
+  std::string move(Arguments arguments);
+  std::string change_light(Arguments arguments);
+  std::string set_camera(Arguments arguments);
+  std::string set(const std::string& option, Arguments arguments);
   [[nodiscard]] std::string list_nodes() const;
   [[nodiscard]] std::string list_lights() const;
   [[nodiscard]] std::string list_cameras() const;
   std::string scene_changed();
-  void refuse_kept(const std::string& name) const;
+  void check_allowed(const std::string& name) const;
 
   Session& session_;
   RenderSettings& settings_;
   std::uint64_t seed_;
   SceneLoader load_;
   double initial_fov_degrees_;
-  std::map<std::string, std::string> kept_;
+  std::map<std::string, std::string> rejected_;
   SceneEdits edits_;
   std::uint64_t changes_ = 0;
 };

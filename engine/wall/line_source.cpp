@@ -18,10 +18,10 @@
 namespace hpr {
 namespace {
 
-constexpr std::size_t kLongestLine = 4096;
-constexpr std::size_t kMostClients = 8;
+constexpr std::size_t kMaxLineBytes = 4096;
+constexpr std::size_t kMaxClients = 8;
 constexpr int kAnswerMs = 1000;
-constexpr int kMostTurns = 64;
+constexpr int kMaxTurns = 64;
 constexpr double kTokenMs = 2000.0;
 
 }  // namespace
@@ -38,7 +38,7 @@ LineSource::LineSource(const Options& options) : standard_input_(options.standar
 void LineSource::accept_client() {
   auto socket = listener_->accept();
   if (!socket) return;
-  if (clients_.size() >= kMostClients) {
+  if (clients_.size() >= kMaxClients) {
     log::warning("a client of the console was turned away: there are too many");
     return;
   }
@@ -53,7 +53,7 @@ void LineSource::drop(int client) {
 }
 
 bool LineSource::read_from(int client) {
-  std::array<char, kLongestLine> buffer{};
+  std::array<char, kMaxLineBytes> buffer{};
   const ssize_t count = ::read(client, buffer.data(), buffer.size());
   if (count < 0) return errno == EAGAIN || errno == EINTR;
   Client& state = clients_[client];
@@ -64,7 +64,7 @@ bool LineSource::read_from(int client) {
   }
   state.received.append(buffer.data(), static_cast<std::size_t>(count));
   return client == STDIN_FILENO || state.received.find('\n') != std::string::npos ||
-         state.received.size() <= kLongestLine;
+         state.received.size() <= kMaxLineBytes;
 }
 
 std::optional<InputLine> LineSource::take_line() {
@@ -92,10 +92,10 @@ void LineSource::drop_silent_strangers() {
                 [](const auto& client) { return !client.second.trusted && client.second.since.ms() > kTokenMs; });
 }
 
-std::optional<InputLine> LineSource::next(std::chrono::milliseconds longest) {
-  // Whoever connects has often said something already: until there is nothing new.
-  int wait = static_cast<int>(longest.count());
-  for (int turn = 0; turn < kMostTurns; ++turn) {
+std::optional<InputLine> LineSource::next(std::chrono::milliseconds timeout) {
+  // A new client has often sent a line already: until nothing new arrives.
+  int wait = static_cast<int>(timeout.count());
+  for (int turn = 0; turn < kMaxTurns; ++turn) {
     if (auto line = take_line()) return line;
     if (!watch(wait)) return std::nullopt;
     wait = 0;
@@ -103,12 +103,12 @@ std::optional<InputLine> LineSource::next(std::chrono::milliseconds longest) {
   return std::nullopt;
 }
 
-bool LineSource::watch(int longest_ms) {
+bool LineSource::watch(int timeout_ms) {
   drop_silent_strangers();
   std::vector<pollfd> watched;
   for (const auto& [client, state] : clients_) watched.push_back({client, POLLIN, 0});
   if (listener_) watched.push_back({listener_->descriptor(), POLLIN, 0});
-  if (::poll(watched.data(), watched.size(), longest_ms) <= 0) return false;
+  if (::poll(watched.data(), watched.size(), timeout_ms) <= 0) return false;
   for (const pollfd& each : watched) {
     if (each.revents == 0) continue;
     if (listener_ && each.fd == listener_->descriptor()) {
@@ -151,20 +151,20 @@ constexpr char kEnd = '.';
 
 }  // namespace
 
-Heard hear_line(Communicator& comm, LineSource* source, std::chrono::milliseconds longest,
-                std::optional<InputLine>& from) {
-  std::string said(1, kNothing);
+PolledInput poll_input(Communicator& comm, LineSource* source, std::chrono::milliseconds timeout,
+                       std::optional<InputLine>& from) {
+  std::string received_line(1, kNothing);
   if (source != nullptr) {
-    from = source->next(longest);
+    from = source->next(timeout);
     if (from) {
-      said = kLine + from->text;
+      received_line = kLine + from->text;
     } else if (source->ended()) {
-      said = kEnd;
+      received_line = kEnd;
     }
   }
-  said = broadcast_text(comm, said);
-  if (said.front() == kLine) return {said.substr(1), false};
-  return {std::nullopt, said.front() == kEnd};
+  received_line = broadcast_text(comm, received_line);
+  if (received_line.front() == kLine) return {received_line.substr(1), false};
+  return {std::nullopt, received_line.front() == kEnd};
 }
 
 }  // namespace hpr

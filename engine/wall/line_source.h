@@ -31,8 +31,8 @@ class LineSource {
   /// Throws Error: Usage for a malformed address or one in use, Io when nothing can listen there.
   explicit LineSource(const Options& options);
 
-  /// The next line, waiting at most so long for one.
-  [[nodiscard]] std::optional<InputLine> next(std::chrono::milliseconds longest);
+  /// The next line; waits at most `timeout` for it.
+  [[nodiscard]] std::optional<InputLine> next(std::chrono::milliseconds timeout);
   /// True once no line can come any more: standard input ended and nobody listens.
   [[nodiscard]] bool ended() const { return !standard_input_ && !listener_ && clients_.empty(); }
   /// Sends `text`, whole lines, where the line came from. A client that does not take it within a second is dropped.
@@ -53,11 +53,11 @@ class LineSource {
   };
 
   void accept_client();
-  /// What arrived is kept; false when the client left or sends what is no line.
+  /// Appends what arrived to the client's buffer; false when the client left or sends what is no line.
   [[nodiscard]] bool read_from(int client);
   [[nodiscard]] std::optional<InputLine> take_line();
-  /// Takes in what comes within that time; false: nothing did.
-  bool watch(int longest_ms);
+  /// Reads what arrives within that time; false: nothing did.
+  bool watch(int timeout_ms);
   void drop(int client);
   void drop_silent_strangers();
 
@@ -67,15 +67,15 @@ class LineSource {
   std::map<int, Client> clients_;  ///< by descriptor; standard input is one
 };
 
-/// What every rank heard.
-struct Heard {
+/// A line of input as every rank has it.
+struct PolledInput {
   std::optional<std::string> line;
   bool ended = false;  ///< no line can come any more
 };
 
-/// Collective. The next line of rank 0's source, which waits at most `longest` for one; null: nothing is said.
+/// Collective. The next line of rank 0's source, which waits at most `timeout` for one; no line where none came.
 /// `from`: on rank 0, where the line came from.
-[[nodiscard]] Heard hear_line(Communicator& comm, LineSource* source, std::chrono::milliseconds longest,
-                              std::optional<InputLine>& from);
+[[nodiscard]] PolledInput poll_input(Communicator& comm, LineSource* source, std::chrono::milliseconds timeout,
+                                     std::optional<InputLine>& from);
 
 }  // namespace hpr

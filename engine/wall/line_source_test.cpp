@@ -39,11 +39,11 @@ class Client {
   Client& operator=(const Client&) = delete;
 
   [[nodiscard]] bool connected() const { return connected_; }
-  void say(std::string_view text) const {
+  void send(std::string_view text) const {
     ASSERT_EQ(::send(socket_, text.data(), text.size(), MSG_NOSIGNAL), text.size());
   }
   /// Empty once the other end closed.
-  [[nodiscard]] std::string hear() const {
+  [[nodiscard]] std::string received() const {
     std::array<char, 256> buffer{};
     const ssize_t count = ::recv(socket_, buffer.data(), buffer.size(), 0);
     return {buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(count, 0))};
@@ -75,13 +75,13 @@ TEST_F(LineSourceTest, LinesOfAUnixSocketAreAnsweredWhereTheyCameFrom) {
   EXPECT_EQ(std::filesystem::status(path()).permissions(), std::filesystem::perms(0600));
   const Client first(path());
   const Client second(path());
-  second.say("two\r\nthr");
+  second.send("two\r\nthr");
   auto line = next_line(source);
   ASSERT_TRUE(line);
   EXPECT_EQ(line->text, "two");
   source.answer(*line, "ok\n");
-  EXPECT_EQ(second.hear(), "ok\n");
-  second.say("ee\n");
+  EXPECT_EQ(second.received(), "ok\n");
+  second.send("ee\n");
   line = next_line(source);
   ASSERT_TRUE(line);
   EXPECT_EQ(line->text, "three");
@@ -94,11 +94,11 @@ TEST_F(LineSourceTest, AClientOfTcpSaysTheTokenFirst) {
   const auto port = static_cast<std::uint16_t>(std::stoi(source.address().substr(source.address().rfind(':') + 1)));
   EXPECT_GE(source.token().size(), 32U);
   const Client stranger(port);
-  stranger.say("quit\n");
+  stranger.send("quit\n");
   EXPECT_FALSE(next_line(source));
-  EXPECT_EQ(stranger.hear(), "");
+  EXPECT_EQ(stranger.received(), "");
   const Client guest(port);
-  guest.say("token " + source.token() + "\nhelp\n");
+  guest.send("token " + source.token() + "\nhelp\n");
   const auto line = next_line(source);
   ASSERT_TRUE(line);
   EXPECT_EQ(line->text, "help");
@@ -107,11 +107,11 @@ TEST_F(LineSourceTest, AClientOfTcpSaysTheTokenFirst) {
 TEST_F(LineSourceTest, AnEndlessLineEndsTheClientAlone) {
   LineSource source({.listen = path()});
   const Client client(path());
-  client.say(std::string(10'000, 'x'));
+  client.send(std::string(10'000, 'x'));
   EXPECT_FALSE(next_line(source));
-  EXPECT_EQ(client.hear(), "");
+  EXPECT_EQ(client.received(), "");
   const Client other(path());
-  other.say("help\n");
+  other.send("help\n");
   EXPECT_TRUE(next_line(source));
 }
 

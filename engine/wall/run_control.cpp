@@ -99,10 +99,11 @@ RunControl::RunControl(Session& session, RenderSettings& settings, std::uint64_t
       settings_(settings),
       apply_(std::move(apply)),
       remember_(std::move(remember)) {
-  table_.add(
-      {"status", "", "what the wall shows and how long it takes, as JSON",
-       [this, status = std::move(status)](Words) { return session_.comm().rank() == 0 ? status() : std::string(); }});
-  table_.add({"stop", "", "end the run after this frame", [this](Words) {
+  table_.add({"status", "", "what the wall shows and how long it takes, as JSON",
+              [this, status = std::move(status)](Arguments) {
+                return session_.comm().rank() == 0 ? status() : std::string();
+              }});
+  table_.add({"stop", "", "end the run after this frame", [this](Arguments) {
                 stops_ = true;
                 return std::string();
               }});
@@ -145,7 +146,7 @@ void RunControl::replay(std::span<const std::string> lines) {
 
 void RunControl::poll() {
   std::optional<InputLine> from;
-  while (const auto line = hear_line(session_.comm(), source_ ? &*source_ : nullptr, {}, from).line) {
+  while (const auto line = poll_input(session_.comm(), source_ ? &*source_ : nullptr, {}, from).line) {
     std::string answer;
     try {
       const std::string result = apply_command(*line);
@@ -174,7 +175,7 @@ std::vector<RunningWall> running_walls() {
   return walls;
 }
 
-std::string ask(const RunningWall& wall, const std::string& line, std::chrono::milliseconds longest) {
+std::string send_command(const RunningWall& wall, const std::string& line, std::chrono::milliseconds timeout) {
   const Socket socket = call(wall, line + "\n");
   const Stopwatch watch;
   std::string answer;
@@ -183,14 +184,14 @@ std::string ask(const RunningWall& wall, const std::string& line, std::chrono::m
     if (last == "ok\n") return answer.substr(0, answer.size() - last.size());
     if (last.starts_with(kRefused)) throw_refusal(last.substr(kRefused.size(), last.size() - kRefused.size() - 1));
     pollfd ready{socket.descriptor(), POLLIN, 0};
-    const int left = static_cast<int>(std::min(static_cast<double>(longest.count()) - watch.ms(), 60'000.0));
+    const int left = static_cast<int>(std::min(static_cast<double>(timeout.count()) - watch.ms(), 60'000.0));
     std::array<char, 4096> buffer{};
     if (left <= 0 || ::poll(&ready, 1, left) <= 0) break;
     const ssize_t count = ::recv(socket.descriptor(), buffer.data(), buffer.size(), 0);
     if (count <= 0) break;
     answer.append(buffer.data(), static_cast<std::size_t>(count));
   }
-  throw Error(ExitCode::Io, fmt::format("run {} gave no answer within {} s", wall.run, longest.count() / 1000),
+  throw Error(ExitCode::Io, fmt::format("run {} gave no answer within {} s", wall.run, timeout.count() / 1000),
               "it answers between frames: wait longer with --wait");
 }
 

@@ -16,8 +16,8 @@ namespace hpr {
 /// Error (Io) when it cannot be made, or is another's.
 [[nodiscard]] std::filesystem::path control_folder();
 
-/// Lets others tell a running wall what to do, between frames: every command of a console but those about pictures,
-/// and `status` and `stop`.
+/// Runs the commands that other processes send to a running wall, between frames: every command of a console but those
+/// about pictures, and `status` and `stop`.
 class RunControl {
  public:
   /// Collective. Session and settings outlive this. `settings`: what the commands change. `status`: one JSON document;
@@ -28,8 +28,8 @@ class RunControl {
              std::function<std::string()> status, std::function<void()> apply,
              std::function<void(const std::string& line)> remember);
 
-  /// See Controls::keep().
-  void keep(const std::string& name, const std::string& why) { controls_.keep(name, why); }
+  /// See Controls::reject_change().
+  void reject_change(const std::string& name, const std::string& why) { controls_.reject_change(name, why); }
   /// Collective. Carries out the commands that an earlier job of this run carried out, and answers nobody.
   void replay(std::span<const std::string> lines);
 
@@ -56,11 +56,12 @@ struct RunningWall {
   std::filesystem::path socket;
 };
 
-/// Those that answer; sockets that killed runs left are removed.
+/// The running walls of this user on this host; sockets that killed runs left are removed.
 [[nodiscard]] std::vector<RunningWall> running_walls();
 
-/// Sends one line to a running wall and waits for its answer, at most `longest`. Throws Error: Io when nobody is there
+/// Sends one line to a running wall and waits for its answer, at most `timeout`. Throws Error: Io when nobody is there
 /// or the answer does not come; what the wall's own error is (Usage, BadInput, Io, Limit) when it refuses.
-[[nodiscard]] std::string ask(const RunningWall& wall, const std::string& line, std::chrono::milliseconds longest);
+[[nodiscard]] std::string send_command(const RunningWall& wall, const std::string& line,
+                                       std::chrono::milliseconds timeout);
 
 }  // namespace hpr

@@ -16,18 +16,18 @@ namespace hpr {
 namespace {
 
 /// As far as a file may place a node.
-constexpr double kFarthest = 1e18;
+constexpr double kMaxCoordinate = 1e18;
 
 [[noreturn]] void throw_unknown(std::string_view what, const std::string& name, const std::vector<std::string>& names) {
-  constexpr std::size_t kMostListed = 40;
+  constexpr std::size_t kMaxListed = 40;
   if (names.empty()) {
     throw Error(ExitCode::Usage, fmt::format("the scene has no {} '{}'", what, printable(name)), "it has none at all");
   }
   const auto nearest = nearest_name(name, names);
   throw Error(ExitCode::Usage, fmt::format("the scene has no {} '{}'", what, printable(name)),
-              names.size() <= kMostListed ? unknown_name_hint(name, names)
-              : nearest                   ? fmt::format("did you mean '{}'?", *nearest)
-                                          : fmt::format("it has {} others: {}s lists them", names.size(), what));
+              names.size() <= kMaxListed ? unknown_name_hint(name, names)
+              : nearest                  ? fmt::format("did you mean '{}'?", *nearest)
+                                         : fmt::format("it has {} others: {}s lists them", names.size(), what));
 }
 
 }  // namespace
@@ -67,12 +67,12 @@ glm::dvec3 SceneEdits::position(const Node& node) const {
   return instances_[node.instances.front()].to_world[3];
 }
 
-void SceneEdits::place(const Node& node, const glm::dmat4& change) {
+void SceneEdits::transform(const Node& node, const glm::dmat4& change) {
   for (const std::size_t i : node.instances) {
     const glm::dmat4 moved = change * instances_[i].to_world;
     for (int column = 0; column < 4; ++column) {
       for (int row = 0; row < 3; ++row) {
-        if (!(std::abs(moved[column][row]) <= kFarthest)) {
+        if (!(std::abs(moved[column][row]) <= kMaxCoordinate)) {
           throw Error(ExitCode::Usage, fmt::format("node '{}' would lie beyond 1e18 metres", printable(node.name)),
                       "keep it nearer");
         }
@@ -83,13 +83,13 @@ void SceneEdits::place(const Node& node, const glm::dmat4& change) {
 }
 
 void SceneEdits::move_by(const std::string& node, const glm::dvec3& offset) {
-  place(find(node), glm::translate(glm::dmat4(1.0), offset));
+  transform(find(node), glm::translate(glm::dmat4(1.0), offset));
 }
 
 void SceneEdits::move_to(const std::string& node, const glm::dvec3& position) {
   Node& found = find(node);
   const glm::dvec3 from = this->position(found);
-  place(found, glm::translate(glm::dmat4(1.0), position - from));
+  transform(found, glm::translate(glm::dmat4(1.0), position - from));
   // Exactly there, whatever the difference was rounded to.
   for (int i = 0; i < 3; ++i) instances_[found.instances.front()].to_world[3][i] = position[i];
 }
@@ -103,7 +103,7 @@ void SceneEdits::turn(const std::string& node, const glm::dvec3& axis, double de
   const glm::dvec3 about = position(found);
   glm::dmat4 change = glm::translate(glm::dmat4(1.0), about);
   change = glm::rotate(change, glm::radians(degrees), glm::normalize(axis));
-  place(found, glm::translate(change, -about));
+  transform(found, glm::translate(change, -about));
 }
 
 void SceneEdits::hide(const std::string& node, bool hidden) {

@@ -44,7 +44,7 @@ class SceneEdits {
 
  private:
   [[nodiscard]] Node& find(const std::string& name);
-  void place(const Node& node, const glm::dmat4& change);
+  void transform(const Node& node, const glm::dmat4& change);
 
   std::vector<Node> nodes_;
   std::vector<Instance> instances_;  ///< all, where they are now

@@ -28,7 +28,7 @@
 namespace hpr {
 namespace {
 
-constexpr std::uint64_t kLargestFile = 16U << 20U;
+constexpr std::uint64_t kMaxFileBytes = 16U << 20U;
 
 std::optional<double> number(std::string_view word) {
   double value = 0.0;
@@ -51,24 +51,24 @@ std::optional<glm::dvec3> point(std::string_view word) {
   return value;
 }
 
-/// None where a word or value is not understood, or eye or target is missing.
+/// None where a name or value is not understood, or eye or target is missing.
 std::optional<CameraKey> parse_key(const std::string& line) {
   CameraKey key;
   bool eye = false;
   bool at = false;
-  std::istringstream words(line);
-  for (std::string name, value; words >> name;) {
-    if (!(words >> value)) return std::nullopt;
-    const auto place = point(value);
+  std::istringstream arguments(line);
+  for (std::string name, value; arguments >> name;) {
+    if (!(arguments >> value)) return std::nullopt;
+    const auto position = point(value);
     const auto angle = number(value);
-    if (name == "eye" && place) {
-      key.eye = *place;
+    if (name == "eye" && position) {
+      key.eye = *position;
       eye = true;
-    } else if (name == "at" && place) {
-      key.at = *place;
+    } else if (name == "at" && position) {
+      key.at = *position;
       at = true;
-    } else if (name == "up" && place) {
-      key.up = *place;
+    } else if (name == "up" && position) {
+      key.up = *position;
     } else if (name == "fov" && angle && *angle > 0.0 && *angle < 180.0) {
       key.fov_degrees = *angle;
     } else {
@@ -79,11 +79,11 @@ std::optional<CameraKey> parse_key(const std::string& line) {
 }
 
 template <typename Value>
-Value spline(const Value& before, const Value& from, const Value& to, const Value& after, double way) {
+Value spline(const Value& before, const Value& from, const Value& to, const Value& after, double t) {
   const Value slope = to - before;
   const Value bend = 2.0 * before - 5.0 * from + 4.0 * to - after;
   const Value twist = 3.0 * (from - to) + after - before;
-  return from + 0.5 * way * (slope + way * (bend + way * twist));
+  return from + 0.5 * t * (slope + t * (bend + t * twist));
 }
 
 bool same(const CameraKey& a, const CameraKey& b) {
@@ -99,19 +99,19 @@ CameraPath::CameraPath(std::vector<CameraKey> keys) : keys_(std::move(keys)) {
 CameraKey CameraPath::at_frame(std::size_t index, std::size_t frames) const {
   const std::size_t last = keys_.size() - 1;
   if (frames < 2 || last == 0) return keys_.front();
-  const double place = static_cast<double>(index) * static_cast<double>(last) / static_cast<double>(frames - 1);
-  const std::size_t first = std::min(static_cast<std::size_t>(place), last);
-  const double way = place - static_cast<double>(first);
+  const double position = static_cast<double>(index) * static_cast<double>(last) / static_cast<double>(frames - 1);
+  const std::size_t first = std::min(static_cast<std::size_t>(position), last);
+  const double t = position - static_cast<double>(first);
   const CameraKey& from = keys_[first];
   const CameraKey& to = keys_[std::min(first + 1, last)];
-  if (way == 0.0 || same(from, to)) return from;
+  if (t == 0.0 || same(from, to)) return from;
   const CameraKey& before = keys_[first > 0 ? first - 1 : 0];
   const CameraKey& after = keys_[std::min(first + 2, last)];
   CameraKey key;
-  key.eye = spline(before.eye, from.eye, to.eye, after.eye, way);
-  key.at = spline(before.at, from.at, to.at, after.at, way);
-  key.up = spline(before.up, from.up, to.up, after.up, way);
-  const double fov = spline(before.fov_degrees, from.fov_degrees, to.fov_degrees, after.fov_degrees, way);
+  key.eye = spline(before.eye, from.eye, to.eye, after.eye, t);
+  key.at = spline(before.at, from.at, to.at, after.at, t);
+  key.up = spline(before.up, from.up, to.up, after.up, t);
+  const double fov = spline(before.fov_degrees, from.fov_degrees, to.fov_degrees, after.fov_degrees, t);
   key.fov_degrees = std::clamp(fov, 0.001, 179.0);  // a spline may swing beyond its keys
   return key;
 }
@@ -146,7 +146,7 @@ CameraPath parse_camera_path(std::string_view text, const std::string& name) {
 }
 
 CameraPath load_camera_path(const std::filesystem::path& file) {
-  const auto bytes = read_file(file, kLargestFile);
+  const auto bytes = read_file(file, kMaxFileBytes);
   return parse_camera_path({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, printable(file.string()));
 }
 
@@ -180,8 +180,8 @@ double height_of(const Camera& camera, double distance) {
 }  // namespace
 
 OrbitCamera::OrbitCamera(const Camera& start, const Bounds& bounds) : camera_(start), vertical_(0.0, 1.0, 0.0) {
-  constexpr double kLeastUpright = 0.3;
-  if (start.axes[1].y < kLeastUpright) vertical_ = start.axes[1];
+  constexpr double kMinUpright = 0.3;
+  if (start.axes[1].y < kMinUpright) vertical_ = start.axes[1];
   const double extent = std::max(glm::length(bounds.high - bounds.low), 1e-6);
   const double ahead = glm::dot(start.axes[2], start.eye - 0.5 * (bounds.low + bounds.high));
   distance_ = std::max(ahead, 0.1 * extent);

@@ -28,7 +28,7 @@ struct CameraKey {
   double fov_degrees = 45.0;
 };
 
-/// A recorded way of a camera, docs/commands.md has its format. Passes through its keys on a Catmull-Rom spline
+/// A recorded path of a camera, docs/commands.md has its format. Passes through its keys on a Catmull-Rom spline
 /// (Catmull, Rom, "A Class of Local Interpolating Splines", 1974), and rests between two equal keys that follow each
 /// other.
 class CameraPath {
@@ -61,7 +61,7 @@ void check_directions(const CameraPath& path, std::size_t frames, const std::str
 /// where it lies on its side, and stop short of looking straight up or down.
 class OrbitCamera {
  public:
-  /// It looks at the middle of `bounds`, or at what lies as far away straight ahead.
+  /// Turns about the center of `bounds`, or about the point straight ahead at its distance.
   OrbitCamera(const Camera& start, const Bounds& bounds);
 
   /// Stays at distances, and an orthographic camera at picture sizes, from which there is a way back.
@@ -77,7 +77,7 @@ class OrbitCamera {
   double farthest_;
 };
 
-/// Where the viewers' heads are from frame to frame: rank 0 asks their trackers and tells the others.
+/// Where the viewers' heads are from frame to frame: rank 0 reads the trackers and broadcasts the poses.
 class WallHeads {
  public:
   /// Collective. Both outlive this.
@@ -86,14 +86,14 @@ class WallHeads {
   WallHeads(const WallHeads&) = delete;
   WallHeads& operator=(const WallHeads&) = delete;
 
-  /// Collective. One pose per viewer, for frame `number`: recordings are asked for frame after frame at their own rate,
-  /// so that a run is the same however long its frames take; what is live is asked for now.
+  /// Collective. One pose per viewer, for frame `number`: recordings are read frame after frame at their own rate,
+  /// so that a run is the same however long its frames take; live trackers give the current pose.
   [[nodiscard]] std::vector<HeadPose> at(std::uint64_t number);
 
   /// Whether later frames have other poses because recordings go on after frame `number`.
   [[nodiscard]] bool plays_on(std::uint64_t number) const;
 
-  /// Of at()'s last answer, those who are tracked.
+  /// The poses of tracked viewers at the last call of at().
   [[nodiscard]] std::vector<HeadRecord> report() const;
 
  private:

@@ -166,12 +166,12 @@ TEST(OrbitCamera, AfterAThousandNotchesEitherWayThereIsAWayBack) {
   };
   for (OrbitCamera orbit : {from_the_front(), OrbitCamera(flat, kBounds)}) {
     const double start = seen(orbit);
-    for (const double way : {-kNotch, kNotch}) {
-      for (int i = 0; i < 1000; ++i) orbit.move({.dolly = way});
+    for (const double direction : {-kNotch, kNotch}) {
+      for (int i = 0; i < 1000; ++i) orbit.move({.dolly = direction});
       const double there = seen(orbit);
-      EXPECT_TRUE(way < 0.0 ? there > 1e3 * start : there < 1e-3 * start) << there;
+      EXPECT_TRUE(direction < 0.0 ? there > 1e3 * start : there < 1e-3 * start) << there;
       int notches = 0;
-      for (; (way < 0.0) == (seen(orbit) > start) && notches < 100; ++notches) orbit.move({.dolly = -way});
+      for (; (direction < 0.0) == (seen(orbit) > start) && notches < 100; ++notches) orbit.move({.dolly = -direction});
       EXPECT_LT(notches, 100);
     }
   }

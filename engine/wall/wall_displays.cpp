@@ -50,7 +50,7 @@ std::optional<std::size_t> window_mate(const Wall& wall, std::size_t screen) {
   return std::nullopt;
 }
 
-/// Screens that are not shown where the wall says.
+/// Screens that are shown by another rank than the wall file names.
 struct Misplaced {
   std::vector<std::string> hosts;  ///< without a rank, each once
   std::size_t homeless = 0;        ///< screens of those hosts
@@ -68,8 +68,8 @@ struct Misplaced {
                    beyond.size() == 1 ? "it" : "them");
     }
     if (hosts.empty()) return;
-    constexpr std::size_t kMostNames = 4;
-    const std::size_t named = std::min(hosts.size(), kMostNames);
+    constexpr std::size_t kMaxNames = 4;
+    const std::size_t named = std::min(hosts.size(), kMaxNames);
     log::warning("no rank runs on {}{}: others show {} screen{}",
                  fmt::join(hosts.begin(), hosts.begin() + static_cast<std::ptrdiff_t>(named), ", "),
                  hosts.size() > named ? fmt::format(" and {} more hosts", hosts.size() - named) : "", homeless,
@@ -147,7 +147,7 @@ std::unique_ptr<WallSender> connect_displays(Communicator& comm, const Wall& wal
 }
 
 bool end_displays(Communicator& comm, WallSender& sender, RunManifest& manifest) {
-  // Rank 0 says that the run is over once the other ranks' pictures are on their way.
+  // Rank 0 ends the run's links after the other ranks have sent their pictures.
   if (comm.rank() != 0) sender.finish();
   barrier(comm);
   if (comm.rank() != 0) return true;

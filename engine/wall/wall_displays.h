@@ -40,8 +40,8 @@ class WallMonitors {
 
   [[nodiscard]] bool any() const { return !layouts_.empty(); }
 
-  /// Collective. One picture per monitor, on rank 0; empty elsewhere. `pictures`: per screen, on the rank `shown_by`
-  /// says.
+  /// Collective. One picture per monitor, on rank 0; empty elsewhere. `pictures`: per screen, on the rank that
+  /// `shown_by` has for it.
   [[nodiscard]] std::vector<Image<Rgba8>> draw(Communicator& comm, std::span<const Image<Rgba8>> pictures,
                                                std::span<const int> shown_by) const;
 

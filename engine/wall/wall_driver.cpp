@@ -49,7 +49,7 @@ FrameSettings settings_for(const Wall& wall, FrameSettings settings) {
   return settings;
 }
 
-/// A viewer who moves the camera waits no longer for a frame, unless told otherwise.
+/// The default target time of a frame while a viewer moves the camera.
 std::optional<double> target_of(const WallJob& job) {
   constexpr double kResponsive_ms = 50.0;
   if (job.target_ms || !job.open_ended()) return job.target_ms;
@@ -82,8 +82,8 @@ WallDriver::WallDriver(const WallJob& job, Session& session)
           }),
       hosts_(all_gather_texts(session.comm(), session.host())),
       owners_(owners_of(wall_, hosts_, job.link.has_value())) {
-  control_.keep("aov", "its files are named before a wall starts");
-  if (job_.path) control_.keep("camera", "it follows --path");
+  control_.reject_change("aov", "its files are named before a wall starts");
+  if (job_.path) control_.reject_change("camera", "it follows --path");
   if (job_.display->whole_wall) std::ranges::fill(owners_, 0);
   start_frames();
   if (job_.link) remote_ = connect_displays(session_.comm(), wall_, owners_, *job_.link);
@@ -313,26 +313,26 @@ void WallDriver::show(std::uint64_t number) {
   display_->show({number, mine, monitors});
 }
 
-/// Every rank tells of what it showed: the screens' records, on rank 0.
+/// Collects the records of the screens of all ranks on rank 0.
 std::vector<ScreenRecord> WallDriver::record_screens() {
   // Per screen its hash, its bytes, and the microseconds it took and one; 0: not known.
   const std::size_t count = owners_.size();
-  std::vector<std::uint64_t> told(3 * count, 0);
+  std::vector<std::uint64_t> reported(3 * count, 0);
   for (std::size_t screen = 0; screen < count; ++screen) {
     if (owners_[screen] != session_.comm().rank()) continue;
-    told[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
+    reported[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
   }
   for (const ScreenCost& cost : remote_ ? remote_->costs() : display_ ? display_->costs() : std::vector<ScreenCost>()) {
-    told[count + cost.screen] = cost.bytes;
-    told[2 * count + cost.screen] = static_cast<std::uint64_t>(1000.0 * cost.ms) + 1;
+    reported[count + cost.screen] = cost.bytes;
+    reported[2 * count + cost.screen] = static_cast<std::uint64_t>(1000.0 * cost.ms) + 1;
   }
-  session_.comm().reduce_max(told, 0);  // all but the owner's are 0
+  session_.comm().reduce_max(reported, 0);  // all but the owner's are 0
   std::vector<ScreenRecord> screens;
   for (std::size_t i = 0; i < count; ++i) {
-    ScreenRecord screen{wall_.screens[i].id, wall_.screens[i].pixels, told[i], ScreenState::Fresh, owners_[i]};
-    if (const std::uint64_t microseconds = told[2 * count + i]; microseconds > 0) {
+    ScreenRecord screen{wall_.screens[i].id, wall_.screens[i].pixels, reported[i], ScreenState::Fresh, owners_[i]};
+    if (const std::uint64_t microseconds = reported[2 * count + i]; microseconds > 0) {
       screen.ms = static_cast<double>(microseconds - 1) / 1000.0;
-      screen.bytes = told[count + i];
+      screen.bytes = reported[count + i];
     }
     screens.push_back(std::move(screen));
   }
@@ -341,7 +341,7 @@ std::vector<ScreenRecord> WallDriver::record_screens() {
 
 void WallDriver::record(std::uint64_t number) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
-  frames_->took(slowest);
+  frames_->record_frame_time(slowest);
   FrameRecord frame{number, slowest, strategy(), record_screens()};
   if (frames_->report()) frame.budget = to_record(*frames_->report());
   frame.slowest = slowest_of(session_, *frames_, hosts_);
@@ -353,9 +353,9 @@ void WallDriver::record(std::uint64_t number) {
   constexpr std::uint64_t kSignOfLife = 1000;
   if (journal_ && (job_.frames || number % kSignOfLife == 0)) journal_->add_frame(to_json(frame));
   // An open-ended run keeps its last frames only.
-  constexpr std::size_t kMostRecords = 10'000;
-  if (!job_.frames && manifest_.frames.size() == kMostRecords) {
-    manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMostRecords / 2);
+  constexpr std::size_t kMaxRecords = 10'000;
+  if (!job_.frames && manifest_.frames.size() == kMaxRecords) {
+    manifest_.frames.erase(manifest_.frames.begin(), manifest_.frames.begin() + kMaxRecords / 2);
     if (remote_ && session_.comm().rank() == 0) remote_->forget_before(manifest_.frames.front().frame);
   }
   manifest_.frames.push_back(std::move(frame));
@@ -363,7 +363,7 @@ void WallDriver::record(std::uint64_t number) {
 
 std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
-  // Of the latest frames displays have not said anything yet.
+  // Displays have not reported the latest frames yet.
   const std::uint64_t awaited = job_.link ? static_cast<std::uint64_t>(job_.link->in_flight) + 1 : 0;
   const std::vector<ScreenState> unheard(owners_.size(), ScreenState::Fresh);
   if (!remote_ || last < first_frame_ + awaited) return unheard;

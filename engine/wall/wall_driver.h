@@ -42,23 +42,23 @@ class WallDriver {
   [[nodiscard]] const FrameTimes& times() const { return frames_->times(); }
   [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
   [[nodiscard]] std::optional<double> relmse() const { return frames_->relmse(); }
-  /// On rank 0: what the screens show, as far as displays outside the job have told by now.
+  /// On rank 0: what the screens show, as far as displays outside the job have reported it.
   [[nodiscard]] std::vector<ScreenState> states() const;
 
   /// The frame to begin with: past 0 where an earlier job of this run was lost or stopped.
   [[nodiscard]] std::uint64_t first_frame() const { return first_frame_; }
-  /// Collective. Does what others told the run since the last frame; false when they ended it.
+  /// Collective. Runs the commands that arrived since the last frame; false when one of them ended the run.
   [[nodiscard]] bool apply_commands();
 
-  /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` is told of samples.
+  /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` shows its samples.
   void draw(std::uint64_t number, Progress& progress);
 
-  /// Collective. Moves the camera as viewers on all ranks asked since the last call; a camera on a path stays on it.
-  /// False once one of them, or a signal, asked to end the run.
+  /// Collective. Moves the camera by the input of viewers on all ranks since the last call; a camera on a path stays on
+  /// it. False once one of them, or a signal, ended the run.
   [[nodiscard]] bool follow_viewers();
-  /// Whether it was a signal.
+  /// Whether a signal ended the run.
   [[nodiscard]] bool interrupted() const { return interrupted_; }
-  /// On rank 0: the run ends before its last frame, and its manifest says so.
+  /// On rank 0: the run ends before its last frame, and its manifest records it.
   void note_stop(int frames) { manifest_.stopped_of = frames; }
   /// Collective. Whether the next frame would be the last one again.
   [[nodiscard]] bool settled();

@@ -33,7 +33,7 @@ struct WallOutputs {
   WallLayerFiles layers = {};
 };
 
-/// A run of a wall: what the command line said, resolved and checked before any rank starts to draw.
+/// A run of a wall: the command line, resolved and checked before any rank starts to draw.
 struct WallJob {
   Wall wall;
   std::string wall_file = {};    ///< as the user named it, for errors

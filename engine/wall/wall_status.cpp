@@ -32,16 +32,16 @@ Work work_of(const FrameTimes& times, const FrameTimes& before, int threads) {
 
 /// "; stale: a, b" for the screens in that state; a few of them by name.
 std::string screens_in(ScreenState state, const FrameRecord& frame, std::span<const ScreenState> states) {
-  constexpr std::size_t kMostNames = 4;
+  constexpr std::size_t kMaxNames = 4;
   std::string text;
   std::size_t count = 0;
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (states[i] != state) continue;
-    if (count < kMostNames) text += fmt::format("{}{}", count == 0 ? "" : ", ", frame.screens.at(i).id);
+    if (count < kMaxNames) text += fmt::format("{}{}", count == 0 ? "" : ", ", frame.screens.at(i).id);
     ++count;
   }
   if (count == 0) return "";
-  if (count > kMostNames) text += fmt::format(" and {} more", count - kMostNames);
+  if (count > kMaxNames) text += fmt::format(" and {} more", count - kMaxNames);
   return fmt::format("; {}: {}", to_string(state), text);
 }
 

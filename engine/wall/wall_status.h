@@ -11,7 +11,7 @@
 
 namespace hpr {
 
-/// Collective. The rank that did most for a frame: of what `frames` tells of its times, what is its own doing. `hosts`:
+/// Collective. The rank that did most for a frame: the times of `frames` that are its own work count. `hosts`:
 /// per rank.
 [[nodiscard]] SlowestRecord slowest_of(Session& session, const FrameMaker& frames, std::span<const std::string> hosts);
 
@@ -23,15 +23,15 @@ namespace hpr {
 [[nodiscard]] std::string describe_status(std::span<const double> frame_ms, const FrameRecord& last,
                                           std::span<const ScreenState> states);
 
-/// Tells on stderr how a wall's run fares: a line that redraws itself once a second on a terminal, a line every ten
-/// seconds in a log.
+/// Reports on stderr how a wall's run proceeds: a line that redraws itself once a second on a terminal, a line every
+/// ten seconds in a log.
 class WallStatus {
  public:
   /// `mode`: as Progress has it. `done` of `frames` are done already; 0: nobody knows how many there will be.
   WallStatus(const std::string& mode, std::size_t done, std::size_t frames)
       : progress_(mode, "frame", frames, Progress::Pace{}), done_(done) {}
 
-  /// After every frame; `states()` is asked where there is something to tell.
+  /// After every frame; `states()` is called where a line is due.
   template <typename States>
   void add(double ms, const FrameRecord& frame, const States& states) {
     ++done_;
@@ -45,7 +45,7 @@ class WallStatus {
  private:
   Progress progress_;
   std::size_t done_;
-  std::vector<double> frame_ms_;  ///< since something was told
+  std::vector<double> frame_ms_;  ///< since the last line
 };
 
 }  // namespace hpr

@@ -24,7 +24,6 @@
 #include "core/text.h"
 #include "engine/output.h"
 #include "scene/view.h"
-#include "scene/view.h"
 #include "tools/bench/bench_scale.h"
 #include "tools/bench/bench_scale_html.h"
 #include "tools/bench/bench_scale_report.h"
@@ -166,7 +165,7 @@ ScaleInput BenchScaleCommand::make_input(const Globals& globals) const {
   ScaleInput input{scene_, resolve(settings_, globals.seed), parse_size(size_, "--size", kRasterLimit), {}, warmup_};
   check_size(input.size, globals.picture_limits());
   for (const std::string& tiles : split_commas(tiles_)) {
-    const Size grid = parse_size(tiles, "--tiles", kMostScreensASide);
+    const Size grid = parse_size(tiles, "--tiles", kMaxScreensASide);
     (void)wall_from_shorthand(wall_of(grid, input.size));  // refuses too many screens
     check_size({grid.width * input.size.width, grid.height * input.size.height}, globals.picture_limits());
     if (std::ranges::find(input.grids, grid) == input.grids.end()) input.grids.push_back(grid);

@@ -20,7 +20,6 @@
 #include "engine/output.h"
 #include "image/image_io.h"
 #include "scene/view.h"
-#include "scene/view.h"
 #include "tools/compare/compare.h"
 #include "tools/compare/compare_html.h"
 #include "tools/compare/compare_options.h"
@@ -62,7 +61,7 @@ class CompareCommand final : public Command {
  private:
   [[nodiscard]] CompareInput make_input(const Globals& globals) const {
     const Size screen = parse_size(options_.size, "--size", kRasterLimit);
-    const Size grid = parse_size(options_.tiles, "--tiles", kMostScreensASide);
+    const Size grid = parse_size(options_.tiles, "--tiles", kMaxScreensASide);
     check_size(screen, globals.picture_limits());
     check_size({screen.width * grid.width, screen.height * grid.height}, globals.picture_limits());
     if (options_.scene.empty() == options_.synthetic.empty()) {

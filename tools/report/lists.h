@@ -9,7 +9,7 @@
 /// How lists and sizes are written on the command line and in reports.
 namespace hpr {
 
-inline constexpr int kMostScreensASide = 256;
+inline constexpr int kMaxScreensASide = 256;
 
 /// "3x2"; throws Error: Usage for what is no size, Limit past `most` a side.
 [[nodiscard]] Size parse_size(const std::string& text, const std::string& option, int most);

@@ -53,7 +53,7 @@ KnobSweep parse_knob_sweep(const std::string& text) {
   if (equals == std::string::npos) {
     throw Error(ExitCode::Usage, fmt::format("--vary {}: no values", printable(text)), "write e.g. --vary spp=1,4,16");
   }
-  KnobSweep sweep{std::string(find_knob(text.substr(0, equals)).name), {}};
+  KnobSweep sweep{std::string(find_tradeoff_setting(text.substr(0, equals)).name), {}};
   for (std::size_t start = equals + 1; start <= text.size();) {
     const std::size_t end = std::min(text.find(',', start), text.size());
     std::string value = text.substr(start, end - start);
@@ -96,7 +96,7 @@ RenderSettings with_knobs(const RenderSettings& base, const KnobValues& values) 
   for (const auto& [knob, value] : values) {
     std::string written = value;
     std::ranges::replace(written, '+', ',');
-    const Setting& setting = find_knob(knob);
+    const Setting& setting = find_tradeoff_setting(knob);
     try {
       set_setting(settings, knob, written);
     } catch (const Error& error) {

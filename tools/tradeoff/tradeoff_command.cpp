@@ -23,7 +23,6 @@
 #include "core/timing.h"
 #include "engine/output.h"
 #include "scene/view.h"
-#include "scene/view.h"
 #include "tools/report/lists.h"
 #include "tools/tradeoff/tradeoff_html.h"
 #include "tools/tradeoff/tradeoff_measure.h"

@@ -210,7 +210,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderSet
     sampler.emplace(session, setup.plan, setup.settings.sampling, 0, false);
     if (!draw(kept, *sampler)) return std::nullopt;
   }
-  const SampleProgress reached = sampler->reached_so_far();
+  const SampleProgress reached = sampler->sample_progress();
   if (speaks) tell_of_more(reached.samples, how.reference_spp);
   reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size, ColorFormat::Float32);
   reference.about = {.how = passes ? "passes at best" : "path tracing",
