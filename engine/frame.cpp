@@ -77,7 +77,7 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
 
 namespace {
 
-/// The keys of each look, before any rank meets another.
+/// raster: the keys of each sample, before any rank exchanges them.
 FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                      std::span<TileLayer<Key>* const> keys) {
   FrameTimes taken;
@@ -91,7 +91,7 @@ FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const Fr
   return taken;
 }
 
-/// Merges the group's layers; returns the tiles this rank ends up owning.
+/// compositing: merges the group's layers; returns the tiles that this rank owns after it.
 std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {
   if (plan.mine.group.size() == 1) return plan.tiles;
   const trace::Span span("composite");
@@ -134,6 +134,25 @@ void mark_rank(const Session& session, Frame& frame) {
   for (const std::size_t tile : frame.owned) {
     std::ranges::fill(layer->second.tile(tile), static_cast<float>(session.rank()));
     layer->second.set_active(tile);
+  }
+}
+
+/// rt: gives the owned tiles of `frame` their radiance, from keys or from colors that keys carry.
+void shade(Session& session, const FramePlan& plan, std::span<const View> views, const FrameSample& sample,
+           Frame& frame, FrameTimes& taken) {
+  if (plan.shading == Shading::Local) {
+    const trace::Span light("light");
+    Lighter& lighter = session.lighter(plan.rays);
+    unpack_colors(*frame.keys, frame.owned, frame.radiance);
+    light_empty(lighter, views, *frame.keys, frame.owned, frame.radiance, sample.number);
+    add_light(lighter, taken);
+  } else if (plan.lit) {
+    const trace::Span light("light");
+    Lighter& lighter = session.lighter(plan.rays);
+    const LitSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
+    lighter.light(std::span(&lit, 1), frame.owned);
+    mark_rank(session, frame);
+    add_light(lighter, taken);
   }
 }
 
@@ -184,20 +203,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   if (sample.at_home != nullptr) (*sample.at_home)();
   taken.composite_ms = watch.ms();
 
-  if (plan.shading == Shading::Local) {
-    const trace::Span light("light");
-    Lighter& lighter = session.lighter(plan.rays);
-    unpack_colors(keys, frame.owned, frame.radiance);
-    light_empty(lighter, views, keys, frame.owned, frame.radiance, sample.number);
-    add_light(lighter, taken);
-  } else if (plan.lit) {
-    const trace::Span light("light");
-    Lighter& lighter = session.lighter(plan.rays);
-    const LitSample lit{views, &keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
-    lighter.light(std::span(&lit, 1), frame.owned);
-    mark_rank(session, frame);
-    add_light(lighter, taken);
-  }
+  shade(session, plan, views, sample, frame, taken);
   taken.samples = 1;
   if (times != nullptr) *times = taken;
   return frame;
