@@ -26,14 +26,14 @@ namespace hpr {
 namespace {
 
 /// Answers command lines that need no command (help); none: the arguments name a command.
-std::optional<ExitCode> answer_alone(const CommandLine& line, const std::vector<std::string>& words) {
-  using Words = std::vector<std::string>;
+std::optional<ExitCode> answer_alone(const CommandLine& line, const std::vector<std::string>& arguments) {
+  using Arguments = std::vector<std::string>;
   std::string answer;
-  if (words.empty()) answer = line.help();
-  if (words == Words{"help", "knobs"}) answer = tradeoff_settings_text();
-  if (words == Words{"help", "knobs", "--markdown"}) answer = tradeoff_settings_markdown();
-  if (words == Words{"help", "quality", "--markdown"}) answer = qualities_markdown();
-  if (words == Words{"help", "--markdown"}) {
+  if (arguments.empty()) answer = line.help();
+  if (arguments == Arguments{"help", "knobs"}) answer = tradeoff_settings_text();
+  if (arguments == Arguments{"help", "knobs", "--markdown"}) answer = tradeoff_settings_markdown();
+  if (arguments == Arguments{"help", "quality", "--markdown"}) answer = qualities_markdown();
+  if (arguments == Arguments{"help", "--markdown"}) {
     answer = line.markdown() +
              "\n## Settings\n\nOf every command that draws a scene. A default of three values is that of the qualities "
              "draft, "
@@ -42,7 +42,7 @@ std::optional<ExitCode> answer_alone(const CommandLine& line, const std::vector<
   }
   if (answer.empty()) return std::nullopt;
   fmt::print("{}", answer);
-  return words.empty() ? ExitCode::Usage : ExitCode::Done;
+  return arguments.empty() ? ExitCode::Usage : ExitCode::Done;
 }
 
 void configure_log(Globals& globals) {
@@ -60,16 +60,16 @@ void settle_backend(Globals& globals, const Command& command) {
   check_gl_backend(globals.backend);
 }
 
-ExitCode run(const std::vector<std::string>& words) {
+ExitCode run(const std::vector<std::string>& arguments) {
   Globals globals;
-  globals.args = words;
+  globals.args = arguments;
   CommandLine line("hpr", "Hybrid sort-first/sort-last rasteriser plus ray tracer for tiled displays",
                    fmt::format("hpr {} ({})", kVersion, kCommit));
   globals.declare(line.everywhere());
   for (auto& command : all_commands()) line.add(std::move(command));
 
-  if (const auto answered = answer_alone(line, words)) return *answered;
-  Command* const command = line.parse(words, launched_rank() == 0);
+  if (const auto answered = answer_alone(line, arguments)) return *answered;
+  Command* const command = line.parse(arguments, launched_rank() == 0);
   if (command == nullptr) return ExitCode::Done;
   configure_log(globals);
   (void)globals.scene_limits();  // malformed sizes and durations are found before any work

@@ -53,8 +53,8 @@ void check_distinct(std::span<const std::string> paths, const std::string& trace
   for (const std::string& path : all) {
     std::error_code error;
     const std::filesystem::path plain = std::filesystem::absolute(path, error);
-    const std::filesystem::path place = std::filesystem::weakly_canonical(plain, error);
-    if (path.empty() || named.insert(error ? plain : place).second) continue;
+    const std::filesystem::path canonical = std::filesystem::weakly_canonical(plain, error);
+    if (path.empty() || named.insert(error ? plain : canonical).second) continue;
     throw Error(ExitCode::Usage, fmt::format("'{}' is named for two results", printable(path)),
                 "give each its own name");
   }

@@ -47,13 +47,13 @@ std::vector<Aov> parse_aovs(const std::string& list) {
   std::vector<Aov> aovs;
   for (std::size_t start = 0; start <= list.size();) {
     const std::size_t end = std::min(list.find(',', start), list.size());
-    const std::string word = list.substr(start, end - start);
+    const std::string name = list.substr(start, end - start);
     start = end + 1;
-    if (word.empty()) continue;
-    const auto found = std::ranges::find(names, word);
+    if (name.empty()) continue;
+    const auto found = std::ranges::find(names, name);
     if (found == names.end()) {
       const std::vector<std::string> choices(names.begin(), names.end());
-      throw Error(ExitCode::Usage, fmt::format("unknown AOV '{}'", printable(word)), unknown_name_hint(word, choices));
+      throw Error(ExitCode::Usage, fmt::format("unknown AOV '{}'", printable(name)), unknown_name_hint(name, choices));
     }
     aovs.push_back(static_cast<Aov>(found - names.begin()));
   }

@@ -77,7 +77,7 @@ double FrameBudget::predict(std::size_t rung) const {
   return fixed_ms_ + work(rung) * each_ms_ * degradation_ratio(ladder_[rung_].degradations, ladder_[rung].degradations);
 }
 
-bool FrameBudget::learn(double ms) {
+bool FrameBudget::update_model(double ms) {
   const double x = work(rung_);
   if (!started_) {
     started_ = true;
@@ -120,7 +120,7 @@ bool FrameBudget::learn(double ms) {
   return true;
 }
 
-void FrameBudget::learn_degradation() {
+void FrameBudget::update_degradation() {
   const int now = ladder_[rung_].degradations;
   if (now == degradations_before_ || each_before_ <= 0.0 || ++frames_since_ != kFramesToTrust) return;
   const int low = std::min(now, degradations_before_);
@@ -172,8 +172,8 @@ void FrameBudget::choose() {
 
 void FrameBudget::record_frame_time(double ms) {
   if (!(ms > 0.0) || !std::isfinite(ms)) return;
-  if (!learn(ms)) return;
-  learn_degradation();
+  if (!update_model(ms)) return;
+  update_degradation();
   choose();
 }
 

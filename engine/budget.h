@@ -69,8 +69,8 @@ class FrameBudget {
   [[nodiscard]] double degradation_ratio(int from, int to) const;
   [[nodiscard]] std::size_t best_within(double ms) const;
   /// Whether the time was believed.
-  bool learn(double ms);
-  void learn_degradation();
+  bool update_model(double ms);
+  void update_degradation();
   void choose();
   void move_to(std::size_t rung);
 

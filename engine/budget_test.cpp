@@ -122,7 +122,7 @@ TEST(FrameBudget, GoesAsFarAsItCanWhereTheTargetIsOutOfReach) {
   EXPECT_GE(run.efforts.back().scale_step, kScaleSteps - 4);
 }
 
-TEST(FrameBudget, GivesUpSamplesThenEconomiesThenPixels) {
+TEST(FrameBudget, GivesUpSamplesThenDegradationsThenPixels) {
   const auto settled = [](double each) {
     return simulate({.target_ms = 100.0, .max_samples = 16, .degradations = 2}, 200, 0.0,
                     [&](int, const Effort& effort) {
@@ -160,7 +160,7 @@ using Names = std::vector<std::string>;
 const std::vector<PassPlan> kAllRun{
     {PassId::Shadow, true, ""}, {PassId::Reflection, true, ""}, {PassId::Photon, true, ""}};
 
-TEST(Economies, AreThoseThatSaveSomething) {
+TEST(Degradations, AreThoseThatSaveSomething) {
   EXPECT_EQ(degradations_for({}, kAllRun), (Names{"half-resolution", "photons", "glossy-cutoff"}));
   EXPECT_EQ(degradations_for({}, {}), (Names{"half-resolution"}));
   FrameSettings local;
@@ -175,7 +175,7 @@ TEST(Economies, AreThoseThatSaveSomething) {
   EXPECT_EQ(degradations_for(draft, kAllRun), (Names{"half-resolution", "photons"}));
 }
 
-TEST(Economies, WithoutPhotonsNoOtherPassStarts) {
+TEST(Degradations, WithoutPhotonsNoOtherPassStarts) {
   FrameSettings settings;
   settings.rays.passes = {PassId::Photon};
   settings.rays.photons = 5;
@@ -187,7 +187,7 @@ TEST(Economies, WithoutPhotonsNoOtherPassStarts) {
   EXPECT_TRUE(apply_degradations({}, Names{"photons"}).rays.auto_passes);
 }
 
-TEST(Economies, NeverMakeAFrameDearer) {
+TEST(Degradations, NeverMakeAFrameDearer) {
   FrameSettings settings;
   settings.rays.glossy_cutoff = 0.05;
   settings.rays.max_depth = 1;

@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint32_t kMaxSamples = 64;
 
 /// From the same place in the same direction.
-bool same_look(const View& a, const View& b) {
+bool same_projection(const View& a, const View& b) {
   return a.eye == b.eye && a.axes == b.axes && a.left == b.left && a.right == b.right && a.top == b.top &&
          a.bottom == b.bottom;
 }
@@ -89,7 +89,7 @@ void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
 }
 
 bool FrameMaker::is_resting(std::span<const View> screens) const {
-  return std::ranges::equal(screens, last_screens_, same_look);
+  return std::ranges::equal(screens, last_screens_, same_projection);
 }
 
 bool FrameMaker::refined(std::span<const View> screens) const {

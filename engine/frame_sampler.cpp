@@ -23,15 +23,15 @@ namespace hpr {
 namespace {
 
 /// What ranks exchange between samples.
-struct Word {
+struct RankState {
   Request request = Request::None;
   double seconds = 0.0;  ///< rank 0's clock is everybody's
 };
 
-Word agree(Communicator& comm, const Word& mine) {
-  const std::vector<Word> all = all_gather_value(comm, mine);
-  Word agreed = all.front();
-  for (const Word& each : all) agreed.request = std::max(agreed.request, each.request);
+RankState agree(Communicator& comm, const RankState& mine) {
+  const std::vector<RankState> all = all_gather_value(comm, mine);
+  RankState agreed = all.front();
+  for (const RankState& each : all) agreed.request = std::max(agreed.request, each.request);
   return agreed;
 }
 
@@ -221,7 +221,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.
     if (request == Request::Write && written && written->ms() < 1000.0) request = Request::None;
-    const Word agreed = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
+    const RankState agreed = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
     report_progress(agreed.seconds);
     progress.show(progress_.samples, describe(sampling_.goal, progress_));
     if (agreed.request == Request::None || reached(sampling_, progress_)) continue;

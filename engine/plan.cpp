@@ -144,8 +144,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Rays through a grid of places of every view.
 std::vector<Ray> camera_rays(std::span<const View> views) {
-  constexpr double kLooks = 1024.0;
-  const int side = std::max(4, static_cast<int>(std::sqrt(kLooks / static_cast<double>(views.size()))));
+  constexpr double kRays = 1024.0;
+  const int side = std::max(4, static_cast<int>(std::sqrt(kRays / static_cast<double>(views.size()))));
   std::vector<Ray> rays_from_eye;
   for (const View& view : views) {
     for (int i = 0; i < side * side; ++i) {
@@ -166,7 +166,7 @@ std::vector<Ray> camera_rays(std::span<const View> views) {
 /// of what would without anything in its way. None where the views see no surface. The same on all ranks, however the
 /// scene is shared out.
 std::optional<double> open_sky(Session& session, const RaySettings& settings, std::span<const View> views) {
-  session.share_rays(settings);
+  session.partition_rays(settings);
   const RayScene& scene = session.ray_scene(settings.build);
   const RaySpace& space = scene.space();
   const Surfaces surfaces(session.scene(), space);

@@ -49,13 +49,13 @@ SampleGoal parse_sample_goal(const std::string& text) {
     if (!samples || *samples == 0 || *samples == std::numeric_limits<std::uint32_t>::max()) refuse(text);
     return {samples, {}, {}};
   }
-  const std::string_view rest = std::string_view(text).substr(kUntil.size());
-  if (rest.starts_with(kError)) {
-    const auto relmse = parse_whole<double>(rest.substr(kError.size()));
+  const std::string_view condition = std::string_view(text).substr(kUntil.size());
+  if (condition.starts_with(kError)) {
+    const auto relmse = parse_whole<double>(condition.substr(kError.size()));
     if (!relmse || !(*relmse > 0.0) || !std::isfinite(*relmse)) refuse(text);
     return {{}, {}, relmse};
   }
-  const auto duration = parse_duration(rest);
+  const auto duration = parse_duration(condition);
   if (!duration || duration->count() <= 0) refuse(text);
   return {{}, std::chrono::duration<double>(*duration).count(), {}};
 }
@@ -113,7 +113,7 @@ constexpr std::size_t kLevels = 32;  ///< of powers of two
 /// Samples in proportion to this power of the variance.
 constexpr double kExponent = 0.4;
 /// Weight of a pixel's own variance against the mean variance of the 3 x 3 pixels around it.
-constexpr double kOwnShare = 0.5;
+constexpr double kOwnWeight = 0.5;
 
 /// Pixels are sorted by the samples they want: so many bins for a factor of 2.
 constexpr int kBinsPerLevel = 16;
@@ -162,7 +162,7 @@ TileBins bins_of(const Film& film, std::size_t tile) {
   TileBins bins;
   bins.fill(kCalm);
   each_pixel(place, [&](std::size_t i, int x, int y) {
-    const double variance = kOwnShare * variances[i] + (1.0 - kOwnShare) * mean_about(variances, place, x, y);
+    const double variance = kOwnWeight * variances[i] + (1.0 - kOwnWeight) * mean_about(variances, place, x, y);
     if (!(variance > 0.0)) return;
     const double bin = kBins / 2.0 + std::round(kBinsPerLevel * kExponent * std::log2(variance));
     bins[i] = static_cast<std::int16_t>(std::clamp(bin, 0.0, kBins - 1.0));

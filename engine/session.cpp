@@ -125,7 +125,7 @@ void Session::forget_rays() {
   lighter_.reset();
   ray_settings_.reset();
   primary_rays_.reset();
-  traced_share_.reset();
+  traced_part_.reset();
   ray_scene_.reset();
 }
 
@@ -135,7 +135,7 @@ void Session::build_rays_by(const RayBuild& build) {
   ray_build_ = build;
 }
 
-void Session::share_rays(const RaySettings& settings) {
+void Session::partition_rays(const RaySettings& settings) {
   build_rays_by(settings.build);
   if (settings.part == part_) return;
   forget_rays();
@@ -150,15 +150,15 @@ std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange>
 }
 
 PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings) {
-  share_rays(settings);
+  partition_rays(settings);
   if (!primary_rays_ || !std::ranges::equal(objects, traced_objects_)) {
     primary_rays_.reset();
-    traced_share_.reset();  // frees its memory before the next one takes some
+    traced_part_.reset();  // frees its memory before the next one takes some
     traced_objects_.assign(objects.begin(), objects.end());
     const bool everything = merged_ranges(traced_objects_, scene_.triangles) == covering_part();
-    if (!everything) traced_share_ = build_ray_scene(traced_objects_);
+    if (!everything) traced_part_ = build_ray_scene(traced_objects_);
     primary_rays_ =
-        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_share_, host_.threads);
+        std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_part_, host_.threads);
   }
   return *primary_rays_;
 }
@@ -179,7 +179,7 @@ const RayScene& Session::ray_scene(const RayBuild& build) {
 }
 
 Lighter& Session::lighter(const RaySettings& settings) {
-  share_rays(settings);
+  partition_rays(settings);
   if (!lighter_ || ray_settings_ != settings) {
     const trace::Span span("prepare light");
     lighter_.reset();  // its parts of the scene leave before others come

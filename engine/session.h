@@ -64,7 +64,7 @@ class Session {
   /// asked for. Asking for one built in another way ends it, and the lighter and primary rays that use it.
   [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
   /// Collective. Makes what travelling rays need, where `settings` have a part.
-  void share_rays(const RaySettings& settings);
+  void partition_rays(const RaySettings& settings);
   /// The lighter of these settings; kept until others are asked for.
   [[nodiscard]] Lighter& lighter(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
@@ -118,7 +118,7 @@ class Session {
   std::unique_ptr<TravellingRays> travelling_;     ///< where there is a part
   std::unique_ptr<RayScene> ray_scene_;
   std::vector<SurfaceRange> traced_objects_;
-  std::unique_ptr<RayScene> traced_share_;  ///< of primary_rays_; none where ray_scene_ is
+  std::unique_ptr<RayScene> traced_part_;  ///< of primary_rays_; none where ray_scene_ is
   std::unique_ptr<PrimaryRays> primary_rays_;
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<Lighter> lighter_;

@@ -59,16 +59,16 @@ SettingValue plain_text(std::string type, std::string takes, At at) {
 template <typename Number, typename At>
 SettingValue number(Number low, Number high, At at, std::string takes = {}) {
   constexpr bool kReal = std::is_floating_point_v<Number>;
-  const std::string words = kReal ? fmt::format("{:g} to {:g}", static_cast<double>(low), static_cast<double>(high))
+  const std::string range = kReal ? fmt::format("{:g} to {:g}", static_cast<double>(low), static_cast<double>(high))
                                   : fmt::format("{} to {}", low, high);
   const auto parse = [=](const std::string& written) {
     const auto parsed = parse_number<Number>(written);
     // Written so that a NaN is refused.
     if (parsed && *parsed >= low && *parsed <= high) return *parsed;
-    throw Error(ExitCode::Usage, fmt::format("'{}' is no number from {}", printable(written), words),
-                fmt::format("write one from {}", words));
+    throw Error(ExitCode::Usage, fmt::format("'{}' is no number from {}", printable(written), range),
+                fmt::format("write one from {}", range));
   };
-  return text(fmt::format("{} {}", kReal ? "FLOAT" : "INT", words), takes.empty() ? words : std::move(takes), at, parse,
+  return text(fmt::format("{} {}", kReal ? "FLOAT" : "INT", range), takes.empty() ? range : std::move(takes), at, parse,
               [=](Number value) { return value >= low && value <= high ? fmt::format("{}", value) : std::string(); });
 }
 
@@ -150,17 +150,17 @@ void parse_passes(Settings& settings, const std::string& list) {
   if (named.empty()) {
     throw Error(ExitCode::Usage, "names no pass", "write auto, all, none, or a list such as shadow,reflection");
   }
-  const std::vector<std::string> words{"auto", "all", "none"};
-  const bool one_word = named.size() == 1 && std::ranges::find(words, named.front()) != words.end();
+  const std::vector<std::string> keywords{"auto", "all", "none"};
+  const bool is_keyword = named.size() == 1 && std::ranges::find(keywords, named.front()) != keywords.end();
   std::vector<PassId> passes;
   for (const std::string& name : named) {
-    if (!one_word && std::ranges::find(words, name) != words.end()) {
+    if (!is_keyword && std::ranges::find(keywords, name) != keywords.end()) {
       throw Error(ExitCode::Usage, fmt::format("'{}' goes with no other word", name), "leave it or the others out");
     }
-    if (!one_word) passes.push_back(parse_pass(name, words));
+    if (!is_keyword) passes.push_back(parse_pass(name, keywords));
   }
-  rays.auto_passes = one_word && named.front() == "auto";
-  rays.all_passes = one_word && named.front() == "all";
+  rays.auto_passes = is_keyword && named.front() == "auto";
+  rays.all_passes = is_keyword && named.front() == "all";
   rays.passes = std::move(passes);
 }
 
@@ -573,8 +573,8 @@ const Setting& find_tradeoff_setting(const std::string& name) {
                 "hpr bench codec SCENE measures what it costs and loses");
   }
   std::vector<std::string> choices;
-  for (const Setting& knob : all_settings()) {
-    if (knob.is_tradeoff() && knob.scope != SettingScope::Wall) choices.emplace_back(knob.name);
+  for (const Setting& other : all_settings()) {
+    if (other.is_tradeoff() && other.scope != SettingScope::Wall) choices.emplace_back(other.name);
   }
   throw Error(ExitCode::Usage, fmt::format("there is no knob '{}'", printable(name)), unknown_name_hint(name, choices));
 }
@@ -584,19 +584,19 @@ std::string tradeoff_settings_text() {
       "Settings that trade speed for accuracy, options of `hpr render` and `hpr wall run` alike.\n"
       "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene;\n"
       "for those of pictures on their way to displays (`hpr wall run`) `hpr bench codec SCENE` does.\n";
-  for (const Setting& knob : all_settings()) {
-    if (!knob.is_tradeoff()) continue;
-    text += fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", knob.name, knob.value.takes, knob.costs,
-                        knob.loses);
+  for (const Setting& setting : all_settings()) {
+    if (!setting.is_tradeoff()) continue;
+    text += fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", setting.name, setting.value.takes,
+                        setting.costs, setting.loses);
   }
   return text;
 }
 
 std::string tradeoff_settings_markdown() {
   std::string text = "| Option | takes | costs | loses |\n|---|---|---|---|\n";
-  for (const Setting& knob : all_settings()) {
-    if (!knob.is_tradeoff()) continue;
-    text += fmt::format("| `--{}` | {} | {} | {} |\n", knob.name, knob.value.takes, knob.costs, knob.loses);
+  for (const Setting& setting : all_settings()) {
+    if (!setting.is_tradeoff()) continue;
+    text += fmt::format("| `--{}` | {} | {} | {} |\n", setting.name, setting.value.takes, setting.costs, setting.loses);
   }
   return text;
 }

@@ -103,17 +103,17 @@ class WallCtlCommand final : public WallRemoteCommand {
   }
   [[nodiscard]] ExitCode run(const Globals&) override {
     std::ostringstream line;
-    const std::vector<std::string> words = options_->remaining();
-    if (words.empty())
+    const std::vector<std::string> arguments = options_->remaining();
+    if (arguments.empty())
       throw Error(ExitCode::Usage, "there is nothing to tell", "write e.g. hpr wall ctl quality draft");
-    for (const std::string& word : words) {
-      if (std::ranges::any_of(word, [](unsigned char c) { return std::iscntrl(c) != 0; })) {
-        throw Error(ExitCode::Usage, fmt::format("'{}' holds what no line may", printable(word)),
+    for (const std::string& argument : arguments) {
+      if (std::ranges::any_of(argument, [](unsigned char c) { return std::iscntrl(c) != 0; })) {
+        throw Error(ExitCode::Usage, fmt::format("'{}' holds what no line may", printable(argument)),
                     "tell one thing a time");
       }
-      const bool plain = !word.empty() && word.find_first_of(" \"\\#") == std::string::npos;
+      const bool plain = !argument.empty() && argument.find_first_of(" \"\\#") == std::string::npos;
       line << (line.tellp() > 0 ? " " : "");
-      plain ? line << word : line << std::quoted(word);
+      plain ? line << argument : line << std::quoted(argument);
     }
     fmt::print("{}", send_line(line.str()));
     return ExitCode::Done;

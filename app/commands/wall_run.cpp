@@ -52,12 +52,12 @@ void report_budget(const RunManifest& manifest) {
   if (ms.empty()) return;
   std::ranges::sort(ms);
   const auto within = [&](std::size_t percent) { return ms[(percent * ms.size() + 99) / 100 - 1]; };  // nearest rank
-  std::vector<std::string> words;
-  words.reserve(given_up.size());
-  for (const auto& [what, frames] : given_up) words.push_back(fmt::format("{} in {}", what, frames));
+  std::vector<std::string> parts;
+  parts.reserve(given_up.size());
+  for (const auto& [what, frames] : given_up) parts.push_back(fmt::format("{} in {}", what, frames));
   log::info("{} frames: half took up to {:.1f} ms, 95 % up to {:.1f} ms, target {:.1f} ms; given up: {}", ms.size(),
             within(50), within(95), manifest.frames.back().budget->target_ms,
-            words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, ", ")));
+            parts.empty() ? "nothing" : fmt::format("{}", fmt::join(parts, ", ")));
 }
 
 void print_summary(const RunStats& stats, const Wall& wall, const Scene& scene) {

@@ -18,12 +18,12 @@
 namespace hpr {
 namespace {
 
-struct Look {
-  std::string_view word;
+struct StatusStyle {
+  std::string_view text;
   std::string_view color;
 };
 
-Look look_of(FindingStatus status) {
+StatusStyle style_of(FindingStatus status) {
   switch (status) {
     case FindingStatus::Warn:
       return {"warn", "\x1b[33m"};
@@ -65,8 +65,8 @@ std::string findings_text(std::span<const Finding> findings, bool colors) {
   for (const Finding& finding : findings) width = std::max(width, finding.name.size());
   std::string text;
   for (const Finding& finding : findings) {
-    const Look look = look_of(finding.status);
-    text += fmt::format("{}{:<4}{}  {:<{}}  {}\n", colors ? look.color : "", look.word, colors ? "\x1b[0m" : "",
+    const StatusStyle style = style_of(finding.status);
+    text += fmt::format("{}{:<4}{}  {:<{}}  {}\n", colors ? style.color : "", style.text, colors ? "\x1b[0m" : "",
                         finding.name, width, finding.detail);
     if (!finding.remedy.empty()) text += fmt::format("{:{}}-> {}\n", "", width + 8, finding.remedy);
   }
@@ -77,7 +77,7 @@ std::string findings_json(std::span<const Finding> findings) {
   Json json{{"schema", "hpr.doctor/1"}, {"healthy", healthy(findings)}, {"findings", Json::array()}};
   for (const Finding& finding : findings) {
     json["findings"].push_back({{"name", finding.name},
-                                {"status", look_of(finding.status).word},
+                                {"status", style_of(finding.status).text},
                                 {"detail", finding.detail},
                                 {"remedy", finding.remedy}});
   }

@@ -232,8 +232,7 @@ constexpr std::chrono::seconds kMinEnd{2};
 constexpr std::chrono::seconds kMaxEnd{10};
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
-[[noreturn]] void become(const std::vector<char*>& arguments, const JobOptions& options, int stdout_pipe,
-                         pid_t parent) {
+[[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, int stdout_pipe, pid_t parent) {
   // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
   if (options.input == StandardInput::None) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -251,7 +250,7 @@ constexpr std::chrono::seconds kMaxEnd{10};
   ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
-  ::execvp(arguments.front(), arguments.data());
+  ::execvp(pointers.front(), pointers.data());
   ::_exit(127);
 }
 
@@ -305,7 +304,7 @@ class RunningJob {
   /// Waits for its end; returns its status as waitpid has it.
   int follow() {
     while (true) {
-      const bool has_output = poll_output(output_ < 0 ? kToTheEnd_ms : kBetweenLooks_ms);
+      const bool has_output = poll_output(output_ < 0 ? kToTheEnd_ms : kPollInterval_ms);
       enforce_limits();
       if (has_output && !killed_) continue;
       int status = 0;
@@ -330,7 +329,7 @@ class RunningJob {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr int kBetweenLooks_ms = 200;
+  static constexpr int kPollInterval_ms = 200;
   static constexpr int kToTheEnd_ms = 5;
 
   /// Copies output that has arrived; waits at most `wait_ms`. False when there is none now, or none will come.
@@ -414,12 +413,12 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
     throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
                 "install openmpi-bin, or run with --ranks 1");
   }
-  std::vector<std::string> words{"mpiexec", "-n", std::to_string(ranks), program_path()};
-  words.insert(words.end(), args.begin(), args.end());
-  std::vector<char*> arguments;
-  arguments.reserve(words.size() + 1);
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
+  std::vector<std::string> arguments{"mpiexec", "-n", std::to_string(ranks), program_path()};
+  arguments.insert(arguments.end(), args.begin(), args.end());
+  std::vector<char*> pointers;
+  pointers.reserve(arguments.size() + 1);
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
 
   std::array<int, 2> pipe{-1, -1};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) {
@@ -430,7 +429,7 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
-  if (child == 0) become(arguments, options, pipe[1], parent);
+  if (child == 0) become(pointers, options, pipe[1], parent);
   PassedSignals::to(child);
 
   ::close(pipe[1]);

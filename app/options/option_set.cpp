@@ -221,10 +221,10 @@ std::vector<std::string> names_of(const std::vector<const CLI::App*>& subcommand
 }
 
 /// The chain of subcommands that the arguments name: `app`, or `wall`, or `wall run`, as far as it goes.
-const CLI::App* innermost(const CLI::App* app, const std::vector<std::string>& words) {
-  for (const std::string& word : words) {
-    if (word.starts_with('-')) break;
-    const auto children = app->get_subcommands([&](const CLI::App* child) { return child->get_name() == word; });
+const CLI::App* innermost(const CLI::App* app, const std::vector<std::string>& arguments) {
+  for (const std::string& argument : arguments) {
+    if (argument.starts_with('-')) break;
+    const auto children = app->get_subcommands([&](const CLI::App* child) { return child->get_name() == argument; });
     if (children.empty()) break;
     app = children.front();
   }
@@ -251,14 +251,14 @@ std::vector<std::string> long_options(const CLI::App* app) {
 }
 
 /// CLI11's complaint in our form: what, and the nearest name.
-Error usage_error(const CLI::App& app, const std::vector<std::string>& words, const CLI::ParseError& error) {
-  const CLI::App* const context = innermost(&app, words);
+Error usage_error(const CLI::App& app, const std::vector<std::string>& arguments, const CLI::ParseError& error) {
+  const CLI::App* const context = innermost(&app, arguments);
   const std::string command = full_name(context);
   const std::string help = fmt::format("see '{} --help'", command);
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     const auto known = long_options(context);
-    for (const std::string& word : words) {
-      const std::string option = word.substr(0, word.find('='));
+    for (const std::string& argument : arguments) {
+      const std::string option = argument.substr(0, argument.find('='));
       if (!option.starts_with("--") || std::ranges::find(known, option) != known.end()) continue;
       const auto nearest = nearest_name(option, known);
       return {ExitCode::Usage, fmt::format("unknown option '{}'", printable(option)),
@@ -268,13 +268,13 @@ Error usage_error(const CLI::App& app, const std::vector<std::string>& words, co
   const auto subcommands = context->get_subcommands([](const CLI::App*) { return true; });
   if (context != &app && !subcommands.empty()) {
     const std::vector<std::string> choices = names_of(subcommands);
-    const auto word =
-        std::ranges::find_if(words.begin() + 1, words.end(), [](const std::string& w) { return !w.starts_with('-'); });
-    if (word == words.end())
+    const auto argument = std::ranges::find_if(arguments.begin() + 1, arguments.end(),
+                                               [](const std::string& w) { return !w.starts_with('-'); });
+    if (argument == arguments.end())
       return {ExitCode::Usage, fmt::format("{} needs a subcommand", command),
               fmt::format("choices: {}", fmt::join(choices, ", "))};
-    return {ExitCode::Usage, fmt::format("unknown subcommand '{} {}'", command, printable(*word)),
-            unknown_name_hint(*word, choices)};
+    return {ExitCode::Usage, fmt::format("unknown subcommand '{} {}'", command, printable(*argument)),
+            unknown_name_hint(*argument, choices)};
   }
   if (app.get_subcommands().empty() && dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     return {ExitCode::Usage, fmt::format("{} needs a command", command),
@@ -381,12 +381,12 @@ void CommandLine::declare(Declared& parent, std::unique_ptr<Command> command) {
   parent.children.push_back(std::move(declared));
 }
 
-Command* CommandLine::parse(const std::vector<std::string>& words, bool prints) {
+Command* CommandLine::parse(const std::vector<std::string>& arguments, bool prints) {
   CLI::App& app = *root_->app;
   // `hpr help` and `hpr help COMMAND` are other ways to write --help.
-  const auto first = std::ranges::find_if(words, [](const std::string& word) { return word != "help"; });
-  std::vector<std::string> parsed(first, words.end());
-  if (first != words.begin()) parsed.emplace_back("--help");
+  const auto first = std::ranges::find_if(arguments, [](const std::string& argument) { return argument != "help"; });
+  std::vector<std::string> parsed(first, arguments.end());
+  if (first != arguments.begin()) parsed.emplace_back("--help");
   if (!parsed.front().starts_with('-')) {
     const auto names = names_of(std::as_const(app).get_subcommands([](const CLI::App*) { return true; }));
     if (std::ranges::find(names, parsed.front()) == names.end()) {

@@ -132,7 +132,7 @@ class CommandLine {
 
   /// Parses the arguments after the program's name. Returns the command they name; null where they request help or the
   /// version, which is printed where `prints`. Throws Error (Usage).
-  [[nodiscard]] Command* parse(const std::vector<std::string>& words, bool prints);
+  [[nodiscard]] Command* parse(const std::vector<std::string>& arguments, bool prints);
   /// The help of the program.
   [[nodiscard]] std::string help() const;
   /// Every command and option as docs/cli.md lists them.

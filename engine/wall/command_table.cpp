@@ -15,17 +15,17 @@
 namespace hpr {
 namespace {
 
-std::vector<std::string> words_of(const std::string& line) {
+std::vector<std::string> split_arguments(const std::string& line) {
   std::istringstream stream(line);
   std::vector<std::string> arguments;
-  std::string word;
+  std::string text;
   while (stream >> std::ws && stream.peek() != '#' && !stream.eof()) {
     const bool quoted = stream.peek() == '"';
-    if (!(stream >> std::quoted(word))) {
+    if (!(stream >> std::quoted(text))) {
       if (quoted) refuse("a quote is not closed", "hide \"big chair\"");
       break;
     }
-    arguments.push_back(word);
+    arguments.push_back(text);
   }
   return arguments;
 }
@@ -37,7 +37,7 @@ CommandTable::CommandTable() {
 }
 
 std::string CommandTable::run(const std::string& line) const {
-  const std::vector<std::string> arguments = words_of(line);
+  const std::vector<std::string> arguments = split_arguments(line);
   if (arguments.empty()) return "";
   const auto found = std::ranges::find(commands_, arguments.front(), &SessionCommand::name);
   if (found != commands_.end()) {
@@ -67,26 +67,26 @@ void refuse(const std::string& problem, const std::string& example) {
   throw Error(ExitCode::Usage, problem, "write e.g. " + example);
 }
 
-double number_of(const std::string& word) {
+double number_of(const std::string& text) {
   double number = 0.0;
-  const char* const last = word.data() + word.size();
-  const auto result = std::from_chars(word.data(), last, number);
+  const char* const last = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), last, number);
   if (result.ec != std::errc() || result.ptr != last || !std::isfinite(number)) {
-    refuse(fmt::format("'{}' is no finite number", printable(word)), "1.5");
+    refuse(fmt::format("'{}' is no finite number", printable(text)), "1.5");
   }
   return number;
 }
 
-glm::dvec3 point_of(const std::string& word) {
+glm::dvec3 point_of(const std::string& text) {
   glm::dvec3 point{0.0};
-  std::istringstream stream(word);
+  std::istringstream stream(text);
   std::string part;
   int count = 0;
   for (; std::getline(stream, part, ','); ++count) {
     if (count < 3) point[count] = number_of(part);
   }
-  if (count != 3 || word.ends_with(',')) {
-    refuse(fmt::format("'{}' is not X,Y,Z", printable(word)), "0,1.5,-2");
+  if (count != 3 || text.ends_with(',')) {
+    refuse(fmt::format("'{}' is not X,Y,Z", printable(text)), "0,1.5,-2");
   }
   return point;
 }

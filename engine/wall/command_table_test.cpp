@@ -9,13 +9,13 @@ namespace {
 
 TEST(CommandTable, SplitsWordsAndKeepsQuotedOnesWhole) {
   CommandTable table;
-  std::vector<std::string> heard;
+  std::vector<std::string> received;
   table.add({"say", "WORDS", "", [&](Arguments arguments) {
-               heard.assign(arguments.begin(), arguments.end());
+               received.assign(arguments.begin(), arguments.end());
                return std::string("said");
              }});
   EXPECT_EQ(table.run("  say one \"two three\" # four"), "said");
-  EXPECT_EQ(heard, (std::vector<std::string>{"one", "two three"}));
+  EXPECT_EQ(received, (std::vector<std::string>{"one", "two three"}));
   EXPECT_EQ(table.run(""), "");
   EXPECT_EQ(table.run("# a remark"), "");
 }

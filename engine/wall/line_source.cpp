@@ -87,7 +87,7 @@ std::optional<InputLine> LineSource::take_line() {
   return std::nullopt;
 }
 
-void LineSource::drop_silent_strangers() {
+void LineSource::drop_unauthenticated() {
   std::erase_if(clients_,
                 [](const auto& client) { return !client.second.trusted && client.second.since.ms() > kTokenMs; });
 }
@@ -104,7 +104,7 @@ std::optional<InputLine> LineSource::next(std::chrono::milliseconds timeout) {
 }
 
 bool LineSource::watch(int timeout_ms) {
-  drop_silent_strangers();
+  drop_unauthenticated();
   std::vector<pollfd> watched;
   for (const auto& [client, state] : clients_) watched.push_back({client, POLLIN, 0});
   if (listener_) watched.push_back({listener_->descriptor(), POLLIN, 0});

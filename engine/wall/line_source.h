@@ -59,7 +59,7 @@ class LineSource {
   /// Reads what arrives within that time; false: nothing did.
   bool watch(int timeout_ms);
   void drop(int client);
-  void drop_silent_strangers();
+  void drop_unauthenticated();
 
   bool standard_input_;
   std::optional<Listener> listener_;

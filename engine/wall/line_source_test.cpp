@@ -93,10 +93,10 @@ TEST_F(LineSourceTest, AClientOfTcpSaysTheTokenFirst) {
   LineSource source({.listen = "127.0.0.1:0"});
   const auto port = static_cast<std::uint16_t>(std::stoi(source.address().substr(source.address().rfind(':') + 1)));
   EXPECT_GE(source.token().size(), 32U);
-  const Client stranger(port);
-  stranger.send("quit\n");
+  const Client unauthenticated(port);
+  unauthenticated.send("quit\n");
   EXPECT_FALSE(next_line(source));
-  EXPECT_EQ(stranger.received(), "");
+  EXPECT_EQ(unauthenticated.received(), "");
   const Client guest(port);
   guest.send("token " + source.token() + "\nhelp\n");
   const auto line = next_line(source);

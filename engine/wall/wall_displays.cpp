@@ -61,7 +61,7 @@ struct Misplaced {
     if (std::ranges::find(hosts, host) == hosts.end()) hosts.push_back(host);
   }
 
-  void tell(int ranks) const {
+  void warn(int ranks) const {
     if (!beyond.empty()) {
       log::warning("{} screen{} of ranks {} to {}, but there are only {}: others show {}", beyond.size(),
                    beyond.size() == 1 ? " is" : "s are", std::ranges::min(beyond), std::ranges::max(beyond), ranks,
@@ -107,7 +107,7 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
     const bool any_host = node == wall.nodes.end() || node->host == "localhost" || node->host == "*";
     if (screen.rank < 0 && near.empty() && !any_host && !remote) misplaced.add_homeless(node->host);
   }
-  misplaced.tell(ranks);
+  misplaced.warn(ranks);
   return owners;
 }
 

@@ -58,9 +58,9 @@ std::optional<double> target_of(const WallJob& job) {
 
 /// While nobody moves the camera, the picture of an open-ended run gets better.
 std::optional<SampleGoal> resting_of(const WallJob& job, const RenderSettings& settings) {
-  constexpr std::uint32_t kSamplesAtRest = 64;
+  constexpr std::uint32_t kSamplesWhileResting = 64;
   if (!job.open_ended() || !sampling_of(job, settings).goal.one() || settings.is_given("spp")) return std::nullopt;
-  return SampleGoal{.samples = kSamplesAtRest, .seconds = {}, .relmse = {}};
+  return SampleGoal{.samples = kSamplesWhileResting, .seconds = {}, .relmse = {}};
 }
 
 }  // namespace
@@ -171,20 +171,20 @@ void WallDriver::resume(std::vector<std::string>& frames) {
   std::error_code error;
   if (!std::filesystem::exists(job_.outputs.manifest, error)) return;
   ManifestFile before = load_manifest(job_.outputs.manifest.string());
-  const int asked = job_.frame_count();
+  const int frame_count = job_.frame_count();
   std::string other;
   if (before.wall_hash != manifest_.wall_hash) other = "another wall";
   if (before.scene_hash != manifest_.scene_hash) other = "another scene";
   if (before.seed != manifest_.seed) other = fmt::format("seed {}", before.seed);
   const int of = before.stopped_of.value_or(static_cast<int>(before.frames.size()));
-  if (of != asked) other = fmt::format("{} frames", of);
+  if (of != frame_count) other = fmt::format("{} frames", of);
   if (!other.empty()) {
     throw Error(ExitCode::BadInput,
                 fmt::format("'{}' is of a run with {}", printable(job_.outputs.manifest.string(), 200), other),
                 "go on with the same command line, or begin anew with --force in place of --resume");
   }
   check_records(before, wall_.screens, job_.outputs.manifest.string());
-  log::info("going on after {} of {} frames", before.frames.size(), asked);
+  log::info("going on after {} of {} frames", before.frames.size(), frame_count);
   frames = std::move(before.frames);
   manifest_.restarts = std::move(before.restarts);
   // A job that is lost from here on starts again from all that was done.
@@ -242,17 +242,17 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
 }
 
 bool WallDriver::follow_viewers() {
-  struct Asked {
+  struct ViewerInput {
     DisplayInput input;
     bool interrupt = false;
   };
-  const Asked mine{display_ ? display_->take_input() : DisplayInput{}, take_request() == Request::Stop};
+  const ViewerInput mine{display_ ? display_->take_input() : DisplayInput{}, take_request() == Request::Stop};
   OrbitInput motion;
   bool stop = false;
-  for (const Asked& asked : all_gather_value(session_.comm(), mine)) {
-    motion += asked.input.orbit;
-    stop = stop || asked.input.stop;
-    interrupted_ = interrupted_ || asked.interrupt;
+  for (const ViewerInput& viewer : all_gather_value(session_.comm(), mine)) {
+    motion += viewer.input.orbit;
+    stop = stop || viewer.input.stop;
+    interrupted_ = interrupted_ || viewer.interrupt;
   }
   orbit_.move(motion);
   return !stop && !interrupted_;
