@@ -11,6 +11,7 @@
 
 #include "rt/denoise/denoiser.h"
 #include "rt/denoise/pixel_parts.h"
+#include "rt/lighter.h"
 #include "rt/passes/half_resolution.h"
 #include "rt/passes/pass.h"
 

@@ -9,12 +9,13 @@
 #include <span>
 #include <vector>
 
-#include "rt/lighter.h"
 #include "rt/lights/light_set.h"
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/passes/pass_list.h"
 #include "rt/photons/photon_search.h"
+#include "rt/ray_counts.h"
+#include "rt/ray_settings.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_walk.h"
 #include "rt/trace/surfaces.h"

@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "cluster/transport/communicator.h"
-#include "rt/lighter.h"
 #include "rt/lights/light_set.h"
 #include "rt/photons/photon_map.h"
 #include "rt/photons/photon_tracer.h"
+#include "rt/ray_settings.h"
 
 namespace hpr {
 

@@ -1,6 +1,6 @@
-#include <algorithm>
+#include "rt/ray_counts.h"
 
-#include "rt/lighter.h"
+#include <algorithm>
 
 namespace hpr {
 
