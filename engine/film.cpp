@@ -102,7 +102,7 @@ void Film::add_tile(const SampleLight& light, double weight, std::uint32_t numbe
     each_due([&](std::size_t i) {
       pixels[i].weights[number % 2] += weight;
       pixels[i].squares += length2(from[i]);
-      ++pixels[i].taken;
+      ++pixels[i].sample_count;
     });
     pixel_samples_.set_active(tile);
   }
@@ -154,7 +154,7 @@ void Film::resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rg
     }
     if (cost_.tiles() > 0) {
       each(aovs.single.at(Aov::Cost), [&](std::size_t pixel) {
-        const std::uint32_t samples = is_adaptive() ? pixel_samples_.tile(tile)[pixel].taken : samples_;
+        const std::uint32_t samples = is_adaptive() ? pixel_samples_.tile(tile)[pixel].sample_count : samples_;
         return to_float(cost_.tile(tile)[pixel] / static_cast<double>(samples));
       });
     }
@@ -210,7 +210,7 @@ std::vector<double> Film::variances(std::size_t tile) const {
                         (even[i].b + odd[i].b) / weights};
     const double squared = mean.r * mean.r + mean.g * mean.g + mean.b * mean.b;
     // Where a filter with negative weights overshoots, the mean of squares may be the smaller one.
-    const double variance = std::abs(pixel.squares / pixel.taken - squared);
+    const double variance = std::abs(pixel.squares / pixel.sample_count - squared);
     if (variance > kRounding * squared) variances[i] = variance / (squared / 3.0 + kRelativeFloor);
   }
   return variances;

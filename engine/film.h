@@ -34,7 +34,7 @@ struct SampleLight {
 struct PixelSamples {
   std::array<double, 2> weights{};  ///< of the halves
   double squares = 0.0;             ///< sum of the colours' squared lengths
-  std::uint32_t taken = 0;
+  std::uint32_t sample_count = 0;
   std::uint32_t wanted = 0;
 };
 
@@ -109,7 +109,7 @@ class Film {
   void add_tile(const SampleLight& light, double weight, std::uint32_t number, std::size_t tile,
                 std::span<const std::uint16_t> due);
   [[nodiscard]] bool is_due(const PixelSamples& pixel) const {
-    return pixel.taken == samples_ && samples_ < std::max(pixel.wanted, pilot_);
+    return pixel.sample_count == samples_ && samples_ < std::max(pixel.wanted, pilot_);
   }
   /// Adaptive: the pixels of a tile that are due for sample number samples().
   [[nodiscard]] std::vector<std::uint16_t> due_pixels(std::size_t tile) const;

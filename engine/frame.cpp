@@ -80,15 +80,15 @@ namespace {
 /// raster: the keys of each sample, before any rank exchanges them.
 FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
                      std::span<TileLayer<Key>* const> keys) {
-  FrameTimes taken;
+  FrameTimes spent;
   const Stopwatch watch;
   if (plan.primary == Primary::Rays) {
-    taken.primary = trace_primary(session, plan, looks, keys);
+    spent.primary = trace_primary(session, plan, looks, keys);
   } else {
     for (std::size_t i = 0; i < looks.size(); ++i) rasterize(session, plan, looks[i].views, *keys[i]);
   }
-  taken.primary_ms = watch.ms();
-  return taken;
+  spent.primary_ms = watch.ms();
+  return spent;
 }
 
 /// compositing: merges the group's layers; returns the tiles that this rank owns after it.
@@ -113,11 +113,11 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
 }
 
 /// Adds times and ray counts of the last call of light().
-void add_light(const Lighter& lighter, FrameTimes& taken) {
+void add_light(const Lighter& lighter, FrameTimes& spent) {
   FrameTimes light;
   light.passes = lighter.times();
   light.rays = lighter.counts();
-  taken += light;
+  spent += light;
 }
 
 /// Moves keys to where their tiles' sums are.
@@ -139,20 +139,20 @@ void mark_rank(const Session& session, Frame& frame) {
 
 /// rt: gives the owned tiles of `frame` their radiance, from keys or from colors that keys carry.
 void shade(Session& session, const FramePlan& plan, std::span<const View> views, const FrameSample& sample,
-           Frame& frame, FrameTimes& taken) {
+           Frame& frame, FrameTimes& spent) {
   if (plan.shading == Shading::Local) {
     const trace::Span light("light");
     Lighter& lighter = session.lighter(plan.rays);
     unpack_colors(*frame.keys, frame.owned, frame.radiance);
     light_empty(lighter, views, *frame.keys, frame.owned, frame.radiance, sample.number);
-    add_light(lighter, taken);
+    add_light(lighter, spent);
   } else if (plan.lit) {
     const trace::Span light("light");
     Lighter& lighter = session.lighter(plan.rays);
     const LitSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
     lighter.light(std::span(&lit, 1), frame.owned);
     mark_rank(session, frame);
-    add_light(lighter, taken);
+    add_light(lighter, spent);
   }
 }
 
@@ -176,7 +176,7 @@ FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const V
                       const FrameSample& sample) {
   const FrameLook look{{views.begin(), views.end()}, sample};
   TileLayer<Key>* const layer = &keys;
-  FrameTimes taken = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
+  FrameTimes spent = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
 
   if (spends_light(plan)) {
     const trace::Span photons("photons");
@@ -185,9 +185,9 @@ FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const V
   if (plan.shading == Shading::Local) {
     const trace::Span shading("light");
     shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
-    add_light(session.lighter(plan.rays), taken);
+    add_light(session.lighter(plan.rays), spent);
   }
-  return taken;
+  return spent;
 }
 
 Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
@@ -195,17 +195,17 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   const trace::Span span("sample", "number", sample.number.sample);
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
   keys.set_depth_format(plan.depth_format);
-  FrameTimes taken = draw_layer(session, plan, views, keys, sample);
+  FrameTimes spent = draw_layer(session, plan, views, keys, sample);
 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
   if (sample.homes != nullptr) bring_home(session, plan, *sample.homes, frame);
   if (sample.at_home != nullptr) (*sample.at_home)();
-  taken.composite_ms = watch.ms();
+  spent.composite_ms = watch.ms();
 
-  shade(session, plan, views, sample, frame, taken);
-  taken.samples = 1;
-  if (times != nullptr) *times = taken;
+  shade(session, plan, views, sample, frame, spent);
+  spent.samples = 1;
+  if (times != nullptr) *times = spent;
   return frame;
 }
 

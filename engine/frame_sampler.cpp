@@ -35,10 +35,10 @@ RankState agree(Communicator& comm, const RankState& mine) {
   return agreed;
 }
 
-std::string describe(const SampleGoal& goal, const SampleProgress& so_far) {
-  std::string text = fmt::format("{:.1f} s", so_far.seconds);
-  if (so_far.relmse) text += fmt::format(", relMSE about {:.2g}", *so_far.relmse);
-  if (const auto left = remaining_seconds(goal, so_far)) text += fmt::format(", {:.0f} s left", *left);
+std::string describe(const SampleGoal& goal, const SampleProgress& progress) {
+  std::string text = fmt::format("{:.1f} s", progress.seconds);
+  if (progress.relmse) text += fmt::format(", relMSE about {:.2g}", *progress.relmse);
+  if (const auto left = remaining_seconds(goal, progress)) text += fmt::format(", {:.0f} s left", *left);
   return text;
 }
 
@@ -151,19 +151,19 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
     looks.push_back(look(views, film_.samples() + i, weights[i]));
     looks.back().sample.at_home = &at_home;
   }
-  FrameTimes taken;
+  FrameTimes round_times;
   std::vector<Frame> frames;
   if (count > 1) {
-    frames = make_round(session_, plan_, looks, taken);
+    frames = make_round(session_, plan_, looks, round_times);
   } else {
-    frames.push_back(make_frame(session_, plan_, looks.front().views, &taken, looks.front().sample));
+    frames.push_back(make_frame(session_, plan_, looks.front().views, &round_times, looks.front().sample));
   }
   std::vector<SampleLight> lights;
   lights.reserve(count);
   for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
   film_.add(lights, weights, homes_->mine(), session_.threads());
   if (adaptive_) adaptive_->added(count, film_);
-  times_ += taken;
+  times_ += round_times;
   frame_.keys = frames.back().keys;
 }
 

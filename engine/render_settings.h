@@ -56,9 +56,9 @@ struct RenderSettings {
   LinkCodec codec;
   bool strict = false;  ///< values that are not finite are errors, not replaced
 
-  std::set<std::string_view> given = {};  ///< names of the settings that have a value of their own
+  std::set<std::string_view> specified = {};  ///< names of the settings that have a value of their own
 
-  [[nodiscard]] bool is_given(std::string_view name) const { return given.contains(name); }
+  [[nodiscard]] bool is_given(std::string_view name) const { return specified.contains(name); }
 };
 
 /// Fills in what was not given, by the quality and by what goes together, and checks the whole. `seed`: of everything

@@ -137,17 +137,17 @@ std::size_t index_of(int column, int row) {
 
 /// Calls `body` with the index, column and row of each pixel of a tile that is in the picture.
 template <typename Body>
-void each_pixel(const Rect& place, const Body& body) {
-  for (int y = 0; y < place.height(); ++y) {
-    for (int x = 0; x < place.width(); ++x) body(index_of(x, y), x, y);
+void each_pixel(const Rect& rect, const Body& body) {
+  for (int y = 0; y < rect.height(); ++y) {
+    for (int x = 0; x < rect.width(); ++x) body(index_of(x, y), x, y);
   }
 }
 
-double mean_about(std::span<const double> values, const Rect& place, int column, int row) {
+double mean_about(std::span<const double> values, const Rect& rect, int column, int row) {
   double sum = 0.0;
   int count = 0;
-  for (int y = std::max(row - 1, 0); y < std::min(row + 2, place.height()); ++y) {
-    for (int x = std::max(column - 1, 0); x < std::min(column + 2, place.width()); ++x) {
+  for (int y = std::max(row - 1, 0); y < std::min(row + 2, rect.height()); ++y) {
+    for (int x = std::max(column - 1, 0); x < std::min(column + 2, rect.width()); ++x) {
       sum += values[index_of(x, y)];
       ++count;
     }
@@ -157,12 +157,12 @@ double mean_about(std::span<const double> values, const Rect& place, int column,
 
 /// Per pixel its bin.
 TileBins bins_of(const Film& film, std::size_t tile) {
-  const Rect place = film.layout().place(tile).pixels;
+  const Rect rect = film.layout().place(tile).pixels;
   const std::vector<double> variances = film.variances(tile);
   TileBins bins;
   bins.fill(kCalm);
-  each_pixel(place, [&](std::size_t i, int x, int y) {
-    const double variance = kOwnWeight * variances[i] + (1.0 - kOwnWeight) * mean_about(variances, place, x, y);
+  each_pixel(rect, [&](std::size_t i, int x, int y) {
+    const double variance = kOwnWeight * variances[i] + (1.0 - kOwnWeight) * mean_about(variances, rect, x, y);
     if (!(variance > 0.0)) return;
     const double bin = kBins / 2.0 + std::round(kBinsPerLevel * kExponent * std::log2(variance));
     bins[i] = static_cast<std::int16_t>(std::clamp(bin, 0.0, kBins - 1.0));
@@ -240,7 +240,7 @@ void AdaptiveSampling::find_steps(Communicator& comm, const Film& film, std::spa
   for (const std::size_t tile : tiles) {
     const std::span<const PixelSamples> pixels = film.pixel_samples().tile(tile);
     each_pixel(film.layout().place(tile).pixels, [&](std::size_t i, int, int) {
-      for (std::uint32_t next = std::max(pixels[i].taken, 1U); next < pixels[i].wanted;
+      for (std::uint32_t next = std::max(pixels[i].sample_count, 1U); next < pixels[i].wanted;
            next = std::bit_ceil(next + 1)) {
         ++mine[static_cast<std::size_t>(level_of(next))];
       }

@@ -195,16 +195,16 @@ Dealt dealt_in(const Film& film, std::uint32_t fewest, std::uint32_t most) {
   Dealt dealt;
   std::array<double, 3> count{};
   for (const std::size_t tile : all_tiles(kLayout)) {
-    const Rect place = kLayout.place(tile).pixels;
-    for (int i = 0; i < place.width() * place.height(); ++i) {
-      const auto at = static_cast<std::size_t>(i / place.width() * kTileSide + i % place.width());
+    const Rect rect = kLayout.place(tile).pixels;
+    for (int i = 0; i < rect.width() * rect.height(); ++i) {
+      const auto at = static_cast<std::size_t>(i / rect.width() * kTileSide + i % rect.width());
       const PixelSamples& pixel = film.pixel_samples().tile(tile)[at];
-      EXPECT_TRUE(std::has_single_bit(pixel.taken)) << pixel.taken;
-      EXPECT_GE(pixel.taken, fewest);
-      EXPECT_LE(pixel.taken, most);
-      EXPECT_EQ(pixel.weights[0], pixel.taken / 2.0);
-      EXPECT_EQ(pixel.weights[1], pixel.taken / 2.0);
-      dealt.mean[tile % 3] += pixel.taken;
+      EXPECT_TRUE(std::has_single_bit(pixel.sample_count)) << pixel.sample_count;
+      EXPECT_GE(pixel.sample_count, fewest);
+      EXPECT_LE(pixel.sample_count, most);
+      EXPECT_EQ(pixel.weights[0], pixel.sample_count / 2.0);
+      EXPECT_EQ(pixel.weights[1], pixel.sample_count / 2.0);
+      dealt.mean[tile % 3] += pixel.sample_count;
       count[tile % 3] += 1.0;
     }
   }
@@ -245,10 +245,10 @@ TEST(AdaptiveSampling, MeansAreOfTheSamplesAPixelHas) {
   film.resolve(tiles, 2, radiance, none);
   for (const std::size_t tile : tiles) {
     for (std::size_t pixel = 0; pixel < kTilePixels; pixel += 37) {
-      const std::uint32_t taken = film.pixel_samples().tile(tile)[pixel].taken;
+      const std::uint32_t sample_count = film.pixel_samples().tile(tile)[pixel].sample_count;
       double sum = 0.0;
-      for (std::uint32_t i = 0; i < taken; ++i) sum += static_cast<double>(sample_of(tile, pixel, i).g);
-      EXPECT_NEAR(radiance.tile(tile)[pixel].g, sum / taken, 1e-6);
+      for (std::uint32_t i = 0; i < sample_count; ++i) sum += static_cast<double>(sample_of(tile, pixel, i).g);
+      EXPECT_NEAR(radiance.tile(tile)[pixel].g, sum / sample_count, 1e-6);
     }
   }
 }
@@ -257,9 +257,9 @@ TEST(AdaptiveSampling, MeansAreOfTheSamplesAPixelHas) {
 TEST(AdaptiveSampling, RanksRoundsAndBreaksChangeNothing) {
   const Sampling sampling = sampling_of(64);
   const auto taken_of = [](const Film& film, std::size_t tile) {
-    std::vector<std::uint32_t> taken;
-    for (const PixelSamples& pixel : film.pixel_samples().tile(tile)) taken.push_back(pixel.taken);
-    return taken;
+    std::vector<std::uint32_t> sample_count;
+    for (const PixelSamples& pixel : film.pixel_samples().tile(tile)) sample_count.push_back(pixel.sample_count);
+    return sample_count;
   };
   Film expected = film_for(sampling);
   run_local_ranks(1, [&](Communicator& comm) {
@@ -311,9 +311,9 @@ TEST(AdaptiveSampling, PicturesWithoutNoiseComeToAnEnd) {
       AdaptiveSampling adaptive(sampling);
       run_local_ranks(1, [&](Communicator& comm) { draw(comm, adaptive, film, calm, samples, 16); });
       EXPECT_EQ(adaptive.samples(), samples);
-      const std::uint32_t taken = film.pixel_samples().at(0, 0, 0).taken;
-      EXPECT_LE(taken, std::max(samples / 4, AdaptiveSampling::pilot_of(sampling)));
-      EXPECT_GE(taken, std::max(samples / 8, 8U));
+      const std::uint32_t sample_count = film.pixel_samples().at(0, 0, 0).sample_count;
+      EXPECT_LE(sample_count, std::max(samples / 4, AdaptiveSampling::pilot_of(sampling)));
+      EXPECT_GE(sample_count, std::max(samples / 8, 8U));
       EXPECT_GE(film.samples(), film.pilot()) << "a checkpoint of it would be taken for one of the pilot";
     }
   }

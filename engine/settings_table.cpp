@@ -554,14 +554,14 @@ void set_setting(RenderSettings& settings, std::string_view name, const std::str
     const std::string what = error.what();
     throw Error(error.code(), what.starts_with("--") ? what : fmt::format("--{}: {}", name, what), error.hint());
   }
-  settings.given.insert(setting->name);
+  settings.specified.insert(setting->name);
 }
 
 void reset_setting(RenderSettings& settings, std::string_view name) {
   const Setting* const setting = find_setting(name);
   HPR_CHECK(setting != nullptr);
   setting->value.copy(RenderSettings(), settings);
-  settings.given.erase(setting->name);
+  settings.specified.erase(setting->name);
 }
 
 const Setting& find_tradeoff_setting(const std::string& name) {

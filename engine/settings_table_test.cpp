@@ -56,7 +56,7 @@ TEST(SettingsTable, EachSettingTouchesItsOwnValueAlone) {
       if (&other == &setting) continue;
       EXPECT_EQ(other.value.write(settings), other.value.write(untouched)) << setting.name << " changed " << other.name;
     }
-    settings.given.insert(setting.name);
+    settings.specified.insert(setting.name);
     reset_setting(settings, setting.name);
     EXPECT_EQ(setting.value.write(settings), setting.value.write(untouched)) << setting.name;
     EXPECT_FALSE(settings.is_given(setting.name));
@@ -89,10 +89,10 @@ TEST(SettingsTable, UnknownNamesAndBadValuesAreRefusedWithChoices) {
       EXPECT_EQ(std::string(error.what()).rfind(std::string("--") + name, 0), 0U) << error.what();
     }
   }
-  EXPECT_TRUE(settings.given.empty());
+  EXPECT_TRUE(settings.specified.empty());
 }
 
-TEST(Knobs, ThoseOfPicturesOnTheirWayToDisplaysAreNotVaried) {
+TEST(TradeoffSettings, ThoseOfPicturesOnTheirWayToDisplaysAreNotVaried) {
   EXPECT_TRUE(find_setting("codec")->is_tradeoff());
   try {
     (void)find_tradeoff_setting("codec");

@@ -138,7 +138,7 @@ void LinkOptions::declare(const OptionSet& options, RenderSettings& settings) {
 
 void LinkOptions::refuse() const {
   for (const Option& option : declared_) {
-    if (!option.given()) continue;
+    if (!option.specified()) continue;
     throw Error(ExitCode::Usage, fmt::format("{} is for displays outside the job", option.name()),
                 "add --display remote");
   }

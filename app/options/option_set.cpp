@@ -119,7 +119,7 @@ Option Option::group(const std::string& heading) const {
   return *this;
 }
 
-bool Option::given() const {
+bool Option::specified() const {
   return option_->count() > 0;
 }
 
@@ -199,7 +199,7 @@ std::vector<std::string> OptionSet::remaining() const {
   return app_->remaining();
 }
 
-std::vector<GivenOption> OptionSet::given() const {
+std::vector<GivenOption> OptionSet::specified() const {
   std::vector<GivenOption> all;
   for (const CLI::App* level = app_; level != nullptr; level = level->get_parent()) {
     for (const CLI::Option* option : level->get_options()) {

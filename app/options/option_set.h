@@ -58,7 +58,7 @@ class Option {
   Option hidden() const { return group(""); }
 
   /// Whether the command line has it. Known once the command line was parsed.
-  [[nodiscard]] bool given() const;
+  [[nodiscard]] bool specified() const;
   /// "--size".
   [[nodiscard]] std::string name() const;
 
@@ -108,7 +108,7 @@ class OptionSet {
   void keep_remaining() const;
   [[nodiscard]] std::vector<std::string> remaining() const;
   /// The options that were given to this command and to those above it.
-  [[nodiscard]] std::vector<GivenOption> given() const;
+  [[nodiscard]] std::vector<GivenOption> specified() const;
 
  private:
   CLI::App* app_;

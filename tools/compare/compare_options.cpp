@@ -77,7 +77,7 @@ void CompareOptions::declare(const OptionSet& options) {
 }
 
 void CompareOptions::settle() {
-  if (!simulate.empty() && !frames_option_->given()) frames = warmup = 1;  // simulated frames are all alike
+  if (!simulate.empty() && !frames_option_->specified()) frames = warmup = 1;  // simulated frames are all alike
   check_transport();
   check_operator();
   check_shading();

@@ -43,7 +43,7 @@ std::vector<std::string> base_words(const OptionSet& options, std::span<const st
                                               "progress", "hang-timeout", "limit-mem", "limit-image",   "trace",
                                               "resume",   "force",        "strict",    "quiet",         "verbose"};
   std::vector<std::string> words;
-  for (const GivenOption& option : options.given()) {
+  for (const GivenOption& option : options.specified()) {
     if (left_out.contains(option.name) || std::ranges::find(varied, option.name) != varied.end()) continue;
     const bool is_set_flag = option.is_flag && option.value == "true";
     words.push_back(is_set_flag ? "--" + option.name : fmt::format("--{}={}", option.name, option.value));
