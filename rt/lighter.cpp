@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -11,14 +12,15 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/timing.h"
+#include "rt/denoise/denoiser.h"
+#include "rt/denoise/pixel_parts.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/first_points.h"
 #include "rt/passes/half_resolution.h"
-#include "rt/passes/light_scratch.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/pixel_sums.h"
 #include "rt/photons/photon_maps.h"
 #include "rt/reference/path_tracer.h"
-#include "rt/tile_output.h"
 #include "rt/trace/denormals.h"
 
 namespace hpr {
@@ -44,6 +46,31 @@ struct RunningPass {
 
 bool gathers_all_lobes(std::span<const PassPlan> plan) {
   return runs_pass(plan, [](const PassInfo& pass) { return pass.gathers_all_lobes; });
+}
+
+/// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
+struct Scratch {
+  explicit Scratch(std::size_t times) : ms(times, 0.0) {}
+
+  PixelSums sums;
+  RayBuffers buffers;
+  SharedLight shared;
+  Denoiser denoiser;
+  PartFinder finder;
+  std::vector<std::vector<PathPoint>> waiting;  ///< by depth
+  Wave wave;
+  std::vector<double> ms;  ///< spent on each step
+};
+
+/// What all steps took so far.
+double spent_ms(const Scratch& scratch) {
+  return std::accumulate(scratch.ms.begin(), scratch.ms.end(), 0.0);
+}
+
+/// While rays travel, more threads wait for theirs than there are: of the time that was spent, each step has its share.
+void share_out(double spent, std::vector<double>& ms) {
+  const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
+  for (double& step : ms) step *= sum > 0.0 ? spent / sum : 0.0;
 }
 
 }  // namespace
@@ -90,12 +117,12 @@ struct Lighter::State {
   const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
   void tell_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
-  void light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+  void light_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                   std::span<const LitSample> samples);
-  void denoise(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
+  void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
   void tell(double spent_ms);
-  void light_waiting(Scratch& scratch) const;
-  void light_wave(Scratch& scratch) const;
+  void light_waiting(const LightContext& context, Scratch& scratch) const;
+  void light_wave(const LightContext& context, Scratch& scratch) const;
 };
 
 Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
@@ -210,18 +237,12 @@ std::unique_ptr<Scratch> Lighter::State::take_scratch() {
       return scratch;
     }
   }
-  return std::make_unique<Scratch>(TileWork{.scene = scene,
-                                            .surfaces = surfaces,
-                                            .rays = rays ? &*rays : nullptr,
-                                            .lights = lights,
-                                            .settings = settings,
-                                            .followed_lobes = followed_lobes,
-                                            .gathers = gathers},
-                                   kFirstPassStep + passes.size() + 1);
+  return std::make_unique<Scratch>(kFirstPassStep + passes.size() + 1);
 }
 
-void Lighter::State::light_wave(Scratch& scratch) const {
-  TileWork& tile = scratch.work;
+void Lighter::State::light_wave(const LightContext& context, Scratch& scratch) const {
+  PixelSums& sums = scratch.sums;
+  RayBuffers& buffers = scratch.buffers;
   Wave& wave = scratch.wave;
   Stopwatch watch;
   const auto charge = [&](std::size_t step) {
@@ -234,21 +255,21 @@ void Lighter::State::light_wave(Scratch& scratch) const {
       charge(kFirstPassStep + i);
     }
   };
-  add_emission(tile, wave);
+  add_emission(context, wave, sums);
   charge(kDirectStep);
   const std::size_t depth = wave.points.front().depth + 1U;
   if (scratch.waiting.size() <= depth) scratch.waiting.resize(depth + 1);
-  for_each_pass([&](const Pass& pass) { pass.spread(tile, wave, scratch.waiting[depth]); });
-  for (DirectLight light(tile, wave); light.sample_next();) {
+  for_each_pass([&](const Pass& pass) { pass.spread(context, wave, buffers, sums, scratch.waiting[depth]); });
+  for (DirectLight light(context, wave); light.sample_next();) {
     charge(kDirectStep);
-    for_each_pass([&](const Pass& pass) { pass.hide(tile, wave); });
-    add_samples(tile, wave);
+    for_each_pass([&](const Pass& pass) { pass.hide(context, buffers, sums, wave); });
+    add_samples(wave, sums);
     charge(kDirectStep);
   }
 }
 
 /// Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
-void Lighter::State::light_waiting(Scratch& scratch) const {
+void Lighter::State::light_waiting(const LightContext& context, Scratch& scratch) const {
   while (true) {
     const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
                                               [](const auto& points) { return !points.empty(); });
@@ -261,51 +282,54 @@ void Lighter::State::light_waiting(Scratch& scratch) const {
       scratch.wave.points.assign(first, deepest->end());
       deepest->erase(first, deepest->end());
     }
-    light_wave(scratch);
+    light_wave(context, scratch);
   }
 }
 
 /// Light of neighbours in place of a sample's own, once that is known.
-void Lighter::State::denoise(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index) {
+void Lighter::State::denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                             std::size_t index) {
   const Stopwatch watch;
   const double before = spent_ms(scratch);
-  const TileParts& again = parts.of_tile(scratch.work, jobs.front(), index, scratch.finder);
+  const TileParts& again = parts.of_tile(context, scratch.buffers, jobs.front(), index, scratch.finder);
   for (const TileJob& job : jobs) {
     if (job.number.sample >= kDenoisedSamples) break;
-    scratch.denoiser.look_again(scratch.work, job, again, scratch.waiting[0]);
-    light_waiting(scratch);
-    scratch.denoiser.resolve(scratch.work, job, again);
+    scratch.denoiser.look_again(context, job, again, scratch.buffers, scratch.sums, scratch.waiting[0]);
+    light_waiting(context, scratch);
+    scratch.denoiser.resolve(context, job, again, scratch.sums);
   }
   scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
 }
 
 /// Some rows of one sample after those of another: what one sample has looked up the next one finds at hand.
-void Lighter::State::light_tile(Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
-                                std::span<const LitSample> samples) {
+void Lighter::State::light_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                std::size_t index, std::span<const LitSample> samples) {
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
-  TileWork& tile = scratch.work;
+  PixelSums& sums = scratch.sums;
   const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
-  clear(tile, index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises);
-  if (denoises) scratch.denoiser.start(jobs.size());
+  sums.clear(index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises);
+  if (denoises) scratch.denoiser.start(jobs.size(), sums.wants_components);
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
-  if (shared != 0) scratch.shared.start(shared, tile, jobs.front());
+  if (shared != 0) scratch.shared.start(shared, context, jobs.front());
   const int height = jobs.front().place.height();
   for (RowRange rows; rows.first < height; rows.first = rows.end) {
     rows.end = end_of_wave(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       const Stopwatch watch;
-      find_first_points(tile, jobs[i], rows, scratch.waiting[0]);
+      find_first_points(context, jobs[i], rows, scratch.buffers, sums, scratch.waiting[0]);
       add_first_surfaces(scratch.waiting[0], index, samples[i].output);
       if (shared != 0) scratch.shared.choose(scratch.waiting[0], rows.first);
-      if (denoises) scratch.denoiser.note(tile, scratch.waiting[0]);
+      if (denoises) scratch.denoiser.note(context, scratch.waiting[0]);
       scratch.ms[kSurfaceStep] += watch.ms();
-      light_waiting(scratch);
+      light_waiting(context, scratch);
     }
   }
-  if (shared != 0) scratch.shared.spread(tile);
-  if (denoises) denoise(scratch, jobs, index);
-  for (std::size_t i = 0; i < jobs.size(); ++i) store(tile, jobs[i], index, samples[i].output);
+  if (shared != 0) scratch.shared.spread(sums);
+  if (denoises) denoise(context, scratch, jobs, index);
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);
+  }
 }
 
 /// Counts and times of what was lit, gathered from the threads' memory.
@@ -313,8 +337,8 @@ void Lighter::State::tell(double spent_ms) {
   counts = {};
   std::vector<double> ms(kFirstPassStep + passes.size() + 1, 0.0);
   for (const auto& scratch : idle) {
-    counts += std::exchange(scratch->work.counts, {});
-    counts.cut += std::exchange(scratch->work.scratch.cut, 0);
+    counts += std::exchange(scratch->buffers.counts, {});
+    counts.cut += std::exchange(scratch->buffers.scratch.cut, 0);
     for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
   }
   if (travelling != nullptr) share_out(spent_ms, ms);
@@ -390,10 +414,17 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
                       static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
     }
     std::unique_ptr<Scratch> scratch = state.take_scratch();
-    scratch->work.view = &first.views[place.screen];
-    scratch->work.eye_media = eyes[place.screen];
-    scratch->work.photons = photons;
-    state.light_tile(*scratch, jobs, tile, samples);
+    const LightContext context{.scene = state.scene,
+                               .surfaces = state.surfaces,
+                               .rays = state.rays ? &*state.rays : nullptr,
+                               .lights = state.lights,
+                               .settings = state.settings,
+                               .followed_lobes = state.followed_lobes,
+                               .gathers = state.gathers,
+                               .photons = photons,
+                               .view = &first.views[place.screen],
+                               .eye_media = eyes[place.screen]};
+    state.light_tile(context, *scratch, jobs, tile, samples);
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "rt/tile_output.h"
+#include "rt/passes/pixel_sums.h"
 
 namespace hpr {
 namespace {
@@ -50,9 +50,21 @@ std::size_t plane_index(std::uint32_t pixel) {
   return LenderPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
 }
 
+/// Sum i, see Denoiser::each_sum.
+std::vector<glm::dvec3>& sum_of(PixelSums& sums, std::size_t i) {
+  return i == 0 ? sums.radiance : sums.components.at(i - 1);
+}
+const std::vector<glm::dvec3>& sum_of(const PixelSums& sums, std::size_t i) {
+  return i == 0 ? sums.radiance : sums.components.at(i - 1);
+}
+const std::vector<glm::dvec3>& diffuse_of(const PixelSums& sums, std::size_t i) {
+  return i == 0 ? sums.diffuse : sums.diffuse_components.at(i - 1);
+}
+
 }  // namespace
 
-void Denoiser::start(std::size_t samples) {
+void Denoiser::start(std::size_t samples, bool with_components) {
+  sums_ = with_components ? 1 + kComponents : 1;
   states_.assign(samples * kTilePixels, State::Unlit);
   seen_.resize(states_.size());
   some_split_ = false;
@@ -61,27 +73,27 @@ void Denoiser::start(std::size_t samples) {
 }
 
 /// Light that is sampled comes by all lobes together: where it does not stay with its pixel, matte light is not known.
-bool Denoiser::tells_matte(const TileWork& tile) {
-  return keeps_direct(tile.scene) || (tile.lights.listed() == 0 && !tile.lights.has_sampled());
+bool Denoiser::tells_matte(const LightContext& context) {
+  return keeps_direct(context.scene) || (context.lights.listed() == 0 && !context.lights.has_sampled());
 }
 
-void Denoiser::note(const TileWork& tile, std::span<const PathPoint> points) {
+void Denoiser::note(const LightContext& context, std::span<const PathPoint> points) {
   for (const PathPoint& point : points) {
     State& state = states_[point.pixel];
     const bool lends = state == State::Unlit && point.throughput == glm::dvec3(1.0) && point.share == 1.0 &&
                        point.material.emission == glm::dvec3(0.0);
     Seen& seen = seen_[point.pixel];
-    if (state == State::Unlit) seen.sight = sight_of(point.surface, tile.view->eye);
+    if (state == State::Unlit) seen.sight = sight_of(point.surface, context.view->eye);
     state = lends ? State::Lends : State::KeepsToItself;
     if (!lends) continue;
     seen.mapped = point.material.normal;
     seen.width = std::clamp(static_cast<float>(point.material.roughness) / kSmooth, kLeastWidth, 1.0F);
     seen.matte = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
     seen.mirrored = glm::vec3(0.0F);
-    seen.is_split = seen.width < 1.0F && seen.matte != glm::vec3(0.0F) && tells_matte(tile);
+    seen.is_split = seen.width < 1.0F && seen.matte != glm::vec3(0.0F) && tells_matte(context);
     for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
       seen.mirrored += glm::vec3(point.bsdf.weight(lobe));
-      if (point.bsdf.present(lobe) && !tile.follows_for_itself(point.bsdf, lobe)) seen.is_split = false;
+      if (point.bsdf.present(lobe) && !context.follows_for_itself(point.bsdf, lobe)) seen.is_split = false;
     }
     some_split_ |= seen.is_split;
   }
@@ -98,17 +110,14 @@ Borrower Denoiser::borrower_of(const View& view, const Sight& sight, std::uint32
   return borrower;
 }
 
-/// Calls `body` with the index of each sum that is wanted, its pixels, and what of them is matte.
 template <typename Body>
-void Denoiser::each_sum(TileWork& tile, const Body& body) {
-  body(std::size_t{0}, tile.radiance, tile.matte);
-  if (!tile.wants_components) return;
-  for (std::size_t i = 0; i < kComponents; ++i) body(1 + i, tile.components[i], tile.matte_components[i]);
+void Denoiser::each_sum(const Body& body) const {
+  for (std::size_t i = 0; i < sums_; ++i) body(i);
 }
 
 /// Light of small lights has no noise that sharing would take, and shadows with edges.
-bool Denoiser::keeps(const TileWork& tile, std::size_t sum) {
-  return keeps_direct(tile.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
+bool Denoiser::keeps(const LightContext& context, std::size_t sum) {
+  return keeps_direct(context.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
 }
 
 void Denoiser::set_sights(const TileJob& job) {
@@ -128,7 +137,7 @@ void Denoiser::set_sights(const TileJob& job) {
   }
 }
 
-void Denoiser::set_lent(TileWork& tile, const TileJob& job) {
+void Denoiser::set_lent(const LightContext& context, const TileJob& job, const PixelSums& sums) {
   const auto set = [&](LenderVectors<double>& lent, const auto& light_of) {
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const std::uint32_t own = job.first_pixel + pixel;
@@ -136,29 +145,28 @@ void Denoiser::set_lent(TileWork& tile, const TileJob& job) {
     }
   };
   const auto kept = [&](std::size_t part, std::uint32_t pixel) {
-    return tile.components.at(part)[pixel] - tile.matte_components.at(part)[pixel];
+    return sums.components.at(part)[pixel] - sums.diffuse_components.at(part)[pixel];
   };
-  const std::size_t sums = tile.wants_components ? 1 + kComponents : 1;
-  lent_.resize(sums);
-  if (some_split_) matte_.resize(sums);
-  if (keeps_direct(tile.scene)) kept_.resize(sums);
-  each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const std::vector<glm::dvec3>& matte) {
-    set(lent_[i], [&](std::uint32_t pixel) { return from[pixel]; });
-    if (some_split_) set(matte_[i], [&](std::uint32_t pixel) { return matte[pixel]; });
-    if (!keeps(tile, i)) return;
+  lent_.resize(sums_);
+  if (some_split_) matte_.resize(sums_);
+  if (keeps_direct(context.scene)) kept_.resize(sums_);
+  each_sum([&](std::size_t i) {
+    set(lent_[i], [&](std::uint32_t pixel) { return sum_of(sums, i)[pixel]; });
+    if (some_split_) set(matte_[i], [&](std::uint32_t pixel) { return diffuse_of(sums, i)[pixel]; });
+    if (!keeps(context, i)) return;
     set(kept_[i],
         [&](std::uint32_t pixel) { return i == 0 ? kept(kDirect, pixel) + kept(kShadow, pixel) : kept(i - 1, pixel); });
   });
 }
 
-void Denoiser::add_background(TileWork& tile, const Look& look, const glm::dvec3& direction) {
-  const glm::dvec3 light = look.share * tile.lights.environment(direction);
-  sums_[0][look.pixel] += light;
-  if (tile.wants_components) sums_[1 + static_cast<std::size_t>(Component::Direct)][look.pixel] += light;
+void Denoiser::add_background(const LightContext& context, const Look& look, const glm::dvec3& direction) {
+  const glm::dvec3 light = look.share * context.lights.environment(direction);
+  filtered_[0][look.pixel] += light;
+  if (sums_ > 1) filtered_[1 + static_cast<std::size_t>(Component::Direct)][look.pixel] += light;
 }
 
-bool Denoiser::add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen) {
-  const Material& material = tile.scene.materials[seen.material];
+bool Denoiser::add_lent(const LightContext& context, const TileJob& job, const Look& look, const Sight& seen) {
+  const Material& material = context.scene.materials[seen.material];
   if (material.unlit || material.emissive != glm::vec3(0.0F)) return false;  // what emits lends nothing
   Borrower borrower = borrower_of(*job.view, seen, look.pixel);
   borrower.normal = seen.normal;
@@ -168,30 +176,28 @@ bool Denoiser::add_lent(TileWork& tile, const TileJob& job, const Look& look, co
   borrower.is_pixel = false;
   weigh_lenders(*sights_, borrower, weights_);
   if (weights_.sum == 0.0F) return false;
-  each_sum(tile, [&](std::size_t i, const auto& /*from*/, const auto& /*matte*/) {
-    sums_.at(i)[look.pixel] += look.share * mean_of(weights_, lent_[i]);
-  });
+  each_sum([&](std::size_t i) { filtered_.at(i)[look.pixel] += look.share * mean_of(weights_, lent_[i]); });
   return true;
 }
 
 /// What one of the rays traced sees, which is one of the looks at a pixel.
-void Denoiser::add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray,
-                        std::vector<PathPoint>& alone) {
-  const RayRequest& request = tile.requests[ray];
-  if (tile.hits[ray] == kNoSurface) return add_background(tile, look, request.direction);
-  const WorldTriangle& triangle = tile.triangles.load(tile.surfaces, tile.hits[ray]);
-  const SurfacePoint surface = tile.surfaces.meet(triangle, request.origin, request.direction);
-  if (add_lent(tile, job, look, sight_of(surface, job.view->eye))) return;
+void Denoiser::add_look(const LightContext& context, const TileJob& job, RayBuffers& buffers, const Look& look,
+                        std::size_t ray, std::vector<PathPoint>& alone) {
+  const RayRequest& request = buffers.requests[ray];
+  if (buffers.hits[ray] == kNoSurface) return add_background(context, look, request.direction);
+  const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.hits[ray]);
+  const SurfacePoint surface = context.surfaces.meet(triangle, request.origin, request.direction);
+  if (add_lent(context, job, look, sight_of(surface, job.view->eye))) return;
   PathPoint& point = alone.emplace_back();
   point.surface = surface;
-  start_point(tile, job, static_cast<int>(look.pixel) % kTileSide, static_cast<int>(look.pixel) / kTileSide, look.share,
-              point);
+  start_point(context, job, static_cast<int>(look.pixel) % kTileSide, static_cast<int>(look.pixel) / kTileSide,
+              look.share, point);
   point.sampler = point.sampler.branch(kLookBranch + look.number);
   point.pixel = spare_ + look.pixel;
 }
 
 /// The brightest of the pixels about one that are lit.
-double Denoiser::brightest_about(const TileWork& tile, const TileJob& job, int column, int row) {
+double Denoiser::brightest_about(const PixelSums& sums, const TileJob& job, int column, int row) {
   const Rect about{column - 1, row - 1, column + 2, row + 2};
   const Rect pixels = intersection(about, {0, 0, job.place.width(), job.place.height()});
   double found = 0.0;
@@ -199,21 +205,21 @@ double Denoiser::brightest_about(const TileWork& tile, const TileJob& job, int c
     for (int x = pixels.x0; x < pixels.x1; ++x) {
       const std::size_t pixel = index_of(x, y);
       if ((x == column && y == row) || !job.wants(pixel)) continue;
-      found = std::max(found, brightness(tile.radiance[job.first_pixel + pixel]));
+      found = std::max(found, brightness(sums.radiance[job.first_pixel + pixel]));
     }
   }
   return found;
 }
 
-void Denoiser::set_apart(const TileWork& tile, const TileJob& job) {
+void Denoiser::set_apart(const PixelSums& sums, const TileJob& job) {
   std::vector<std::size_t> apart;
   for (int y = 0; y < job.place.height(); ++y) {
     for (int x = 0; x < job.place.width(); ++x) {
       const std::size_t own = job.first_pixel + index_of(x, y);
       if (states_[own] == State::Unlit) continue;
-      const glm::dvec3& light = tile.radiance[own];
+      const glm::dvec3& light = sums.radiance[own];
       const bool is_far_brighter =
-          states_[own] == State::Lends && brightness(light) > kFarBrighter * brightest_about(tile, job, x, y);
+          states_[own] == State::Lends && brightness(light) > kFarBrighter * brightest_about(sums, job, x, y);
       if (!fits_floats(light) || is_far_brighter) apart.push_back(own);
     }
   }
@@ -234,34 +240,35 @@ void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const PixelPar
   }
 }
 
-void Denoiser::look_again(TileWork& tile, const TileJob& job, const TileParts& again, std::vector<PathPoint>& alone) {
-  set_apart(tile, job);
-  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& from, const auto& /*matte*/) {
-    sums_.at(i).assign(kTilePixels, glm::dvec3(0.0));
-    std::fill_n(from.begin() + spare_, kTilePixels, glm::dvec3(0.0));
+void Denoiser::look_again(const LightContext& context, const TileJob& job, const TileParts& again, RayBuffers& buffers,
+                          PixelSums& sums, std::vector<PathPoint>& alone) {
+  set_apart(sums, job);
+  each_sum([&](std::size_t i) {
+    filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
+    std::fill_n(sum_of(sums, i).begin() + spare_, kTilePixels, glm::dvec3(0.0));
   });
   narrowed_ = 1.0F / std::sqrt(std::sqrt(1.0F + static_cast<float>(job.number.sample)));
   set_unexpected_apart(job, again.parts);
   set_sights(job);
-  set_lent(tile, job);
+  set_lent(context, job, sums);
   View view = unjittered(job);
-  tile.requests.clear();
+  buffers.requests.clear();
   looks_.clear();
   for (const PixelPart& part : again.parts) {
     if (!job.wants(part.pixel) || states_[job.first_pixel + part.pixel] == State::Apart) continue;
-    look_at_part(tile, job, view, part, *again.places);
+    look_at_part(context, job, buffers, sums, view, part, *again.places);
   }
-  trace_from_eye(tile);
-  for (std::size_t i = 0; i < looks_.size(); ++i) add_look(tile, job, looks_[i], i, alone);
-  for (PathPoint& point : alone) finish_point(tile, point);
+  trace_from_eye(context, buffers);
+  for (std::size_t i = 0; i < looks_.size(); ++i) add_look(context, job, buffers, looks_[i], i, alone);
+  for (PathPoint& point : alone) finish_point(context, point);
 }
 
 /// Asks for a ray where nobody lends.
-void Denoiser::look_at_part(TileWork& tile, const TileJob& job, View& view, const PixelPart& part,
-                            const Looks& places) {
+void Denoiser::look_at_part(const LightContext& context, const TileJob& job, RayBuffers& buffers, PixelSums& sums,
+                            View& view, const PixelPart& part, const Looks& places) {
   if (part.shows == PixelPart::Shows::Background) {
     const Look look{part.pixel, 0, part.place(places, job.number.sample), part.share};
-    return add_background(tile, look, ray_through(view, job, look.pixel, look.place).direction);
+    return add_background(context, look, ray_through(view, job, look.pixel, look.place).direction);
   }
   const bool is_surface = part.shows == PixelPart::Shows::Surface;
   const std::uint32_t count = is_surface ? std::clamp(part.count(), 1U, kLooksAgain) : kLooksAtMany;
@@ -269,10 +276,10 @@ void Denoiser::look_at_part(TileWork& tile, const TileJob& job, View& view, cons
     const std::uint32_t number = looks_.empty() || looks_.back().pixel != part.pixel ? 0 : looks_.back().number + 1;
     const glm::vec2 place = part.place(places, job.number.sample * count + i);
     const Look look{part.pixel, number, place, part.share / static_cast<float>(count)};
-    if (is_surface && add_lent(tile, job, look, part.patch.at(place))) continue;
+    if (is_surface && add_lent(context, job, look, part.patch.at(place))) continue;
     looks_.push_back(look);
-    tile.requests.push_back(ray_through(view, job, look.pixel, place));
-    tile.charge_ray(job.first_pixel + look.pixel);
+    buffers.requests.push_back(ray_through(view, job, look.pixel, place));
+    sums.charge_ray(job.first_pixel + look.pixel);
   }
 }
 
@@ -290,43 +297,37 @@ Borrower Denoiser::borrower_at(const TileJob& job, std::uint32_t pixel, Lent len
   return borrower;
 }
 
-void Denoiser::share(TileWork& tile, const TileJob& job, std::uint32_t pixel) {
+void Denoiser::share(const LightContext& context, const TileJob& job, std::uint32_t pixel) {
   const bool is_split = seen_[job.first_pixel + pixel].is_split;
   const std::size_t own = plane_index(pixel);
   weigh_lenders(*sights_, borrower_at(job, pixel, is_split ? Lent::Mirrored : Lent::All), weights_);
   if (is_split) weigh_lenders(*sights_, borrower_at(job, pixel, Lent::Matte), matte_weights_);
-  each_sum(tile, [&](std::size_t i, const auto& /*from*/, const auto& /*matte*/) {
-    glm::dvec3& sum = sums_.at(i)[pixel];
+  each_sum([&](std::size_t i) {
+    glm::dvec3& sum = filtered_.at(i)[pixel];
     sum = mean_of(weights_, lent_[i]);
     if (is_split) sum += mean_of(matte_weights_, matte_[i]) - mean_of(weights_, matte_[i]);
-    if (keeps(tile, i)) sum += kept_[i].at(own) - mean_of(weights_, kept_[i]);
+    if (keeps(context, i)) sum += kept_[i].at(own) - mean_of(weights_, kept_[i]);
   });
 }
 
-void Denoiser::resolve(TileWork& tile, const TileJob& job, const TileParts& again) {
+void Denoiser::resolve(const LightContext& context, const TileJob& job, const TileParts& again, PixelSums& sums) {
   for (int y = 0; y < job.place.height(); ++y) {
     for (int x = 0; x < job.place.width(); ++x) {
       const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
       if (!job.wants(pixel)) continue;
       const std::uint32_t own = job.first_pixel + pixel;
-      if (tile.wants_cost) tile.cost[own] += std::exchange(tile.cost[spare_ + pixel], 0.0F);
+      if (sums.wants_cost) sums.cost[own] += std::exchange(sums.cost[spare_ + pixel], 0.0F);
       const bool is_crossed = again.crossed[pixel] != 0 && states_[own] != State::Apart;
       if (is_crossed) {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const auto& /*matte*/) {
-          sums_.at(i)[pixel] += from[spare_ + pixel];
-        });
+        each_sum([&](std::size_t i) { filtered_.at(i)[pixel] += sum_of(sums, i)[spare_ + pixel]; });
       } else if (states_[own] == State::Lends) {
-        share(tile, job, pixel);
+        share(context, job, pixel);
       } else {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const auto& /*matte*/) {
-          sums_.at(i)[pixel] = from[own];
-        });
+        each_sum([&](std::size_t i) { filtered_.at(i)[pixel] = sum_of(sums, i)[own]; });
       }
     }
   }
-  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& to, const auto& /*matte*/) {
-    std::ranges::copy(sums_.at(i), to.begin() + job.first_pixel);
-  });
+  each_sum([&](std::size_t i) { std::ranges::copy(filtered_.at(i), sum_of(sums, i).begin() + job.first_pixel); });
 }
 
 }  // namespace hpr

@@ -30,17 +30,18 @@ class Denoiser {
   /// Whether direct light stays with its pixel, which components of the light are needed for.
   [[nodiscard]] static bool keeps_direct(const Scene& scene) { return !scene.lights.empty(); }
 
-  /// Starts a tile of so many samples.
-  void start(std::size_t samples);
+  /// Starts a tile of so many samples, whose components are filtered too where they are summed.
+  void start(std::size_t samples, bool with_components);
 
   /// Takes note of points the eye sees, which are finished but not lit.
-  void note(const TileWork& tile, std::span<const PathPoint> points);
+  void note(const LightContext& context, std::span<const PathPoint> points);
 
   /// Once all is lit: looks again at pixels that outlines cross. Puts what is to be lit in addition into `alone`.
-  void look_again(TileWork& tile, const TileJob& job, const TileParts& again, std::vector<PathPoint>& alone);
+  void look_again(const LightContext& context, const TileJob& job, const TileParts& again, RayBuffers& buffers,
+                  PixelSums& sums, std::vector<PathPoint>& alone);
 
   /// Once that is lit too: replaces the sample's sums.
-  void resolve(TileWork& tile, const TileJob& job, const TileParts& again);
+  void resolve(const LightContext& context, const TileJob& job, const TileParts& again, PixelSums& sums);
 
  private:
   enum class State : std::uint8_t {
@@ -68,28 +69,31 @@ class Denoiser {
     double share = 0.0;        ///< of the pixel
   };
 
-  [[nodiscard]] static bool tells_matte(const TileWork& tile);
-  [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
+  [[nodiscard]] static bool tells_matte(const LightContext& context);
+  [[nodiscard]] static double brightest_about(const PixelSums& sums, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
-  void set_apart(const TileWork& tile, const TileJob& job);
+  void set_apart(const PixelSums& sums, const TileJob& job);
   /// Whether there is light in a sum that stays with its pixel.
-  [[nodiscard]] static bool keeps(const TileWork& tile, std::size_t sum);
+  [[nodiscard]] static bool keeps(const LightContext& context, std::size_t sum);
   /// Sets what the pixels that lend see and lend.
   void set_sights(const TileJob& job);
-  void set_lent(TileWork& tile, const TileJob& job);
+  void set_lent(const LightContext& context, const TileJob& job, const PixelSums& sums);
   /// Without what pixels and looks have of their own.
   [[nodiscard]] static Borrower borrower_of(const View& view, const Sight& sight, std::uint32_t pixel);
   [[nodiscard]] Borrower borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const;
-  void add_background(TileWork& tile, const Look& look, const glm::dvec3& direction);
+  void add_background(const LightContext& context, const Look& look, const glm::dvec3& direction);
   /// False where nobody lends.
-  [[nodiscard]] bool add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen);
+  [[nodiscard]] bool add_lent(const LightContext& context, const TileJob& job, const Look& look, const Sight& seen);
   /// Pixels whose sample sees what none of their parts is stay apart: so what was missed keeps its light.
   void set_unexpected_apart(const TileJob& job, std::span<const PixelPart> parts);
-  void look_at_part(TileWork& tile, const TileJob& job, View& view, const PixelPart& part, const Looks& places);
-  void add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray, std::vector<PathPoint>& alone);
-  void share(TileWork& tile, const TileJob& job, std::uint32_t pixel);
+  void look_at_part(const LightContext& context, const TileJob& job, RayBuffers& buffers, PixelSums& sums, View& view,
+                    const PixelPart& part, const Looks& places);
+  void add_look(const LightContext& context, const TileJob& job, RayBuffers& buffers, const Look& look, std::size_t ray,
+                std::vector<PathPoint>& alone);
+  void share(const LightContext& context, const TileJob& job, std::uint32_t pixel);
+  /// Calls `body` with the number of each sum that is wanted: 0 for the radiance, 1 + i for component i.
   template <typename Body>
-  static void each_sum(TileWork& tile, const Body& body);
+  void each_sum(const Body& body) const;
 
   std::vector<State> states_;             ///< per pixel, sample after sample
   std::vector<Seen> seen_;                ///< likewise, of those that lend
@@ -105,7 +109,8 @@ class Denoiser {
   std::vector<Look> looks_;  ///< that rays were sent for
   std::uint32_t spare_ = 0;  ///< where the tile's sums have room for what is lit in addition
   /// Of the sample at hand, per pixel: radiance, then the components that are wanted.
-  std::array<std::vector<glm::dvec3>, 1 + kComponents> sums_;
+  std::array<std::vector<glm::dvec3>, 1 + kComponents> filtered_;
+  std::size_t sums_ = 1;  ///< how many of those are wanted
 };
 
 }  // namespace hpr

@@ -114,31 +114,33 @@ RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, cons
   return ray;
 }
 
-void trace_from_eye(TileWork& work, Coherence coherence) {
-  work.hits.resize(work.requests.size());
-  if (work.requests.empty()) return;
-  work.counts.primary += work.requests.size();
-  work.counts.invalid += work.rays->closest(work.requests, work.hits, work.scratch, coherence);
+void trace_from_eye(const LightContext& context, RayBuffers& buffers, Coherence coherence) {
+  buffers.hits.resize(buffers.requests.size());
+  if (buffers.requests.empty()) return;
+  buffers.counts.primary += buffers.requests.size();
+  buffers.counts.invalid += context.rays->closest(buffers.requests, buffers.hits, buffers.scratch, coherence);
 }
 
-void look_from_eye(TileWork& work, const glm::dvec3& eye, std::vector<Sight>& seen, Coherence coherence) {
-  trace_from_eye(work, coherence);
+void look_from_eye(const LightContext& context, RayBuffers& buffers, const glm::dvec3& eye, std::vector<Sight>& seen,
+                   Coherence coherence) {
+  trace_from_eye(context, buffers, coherence);
   seen.clear();
-  for (std::size_t i = 0; i < work.hits.size(); ++i) {
+  for (std::size_t i = 0; i < buffers.hits.size(); ++i) {
     Sight& sight = seen.emplace_back();
-    if (work.hits[i] == kNoSurface) continue;
-    const WorldTriangle& triangle = work.triangles.load(work.surfaces, work.hits[i]);
-    const SurfacePoint point = work.surfaces.meet(triangle, work.requests[i].origin, work.requests[i].direction);
+    if (buffers.hits[i] == kNoSurface) continue;
+    const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.hits[i]);
+    const SurfacePoint point =
+        context.surfaces.meet(triangle, buffers.requests[i].origin, buffers.requests[i].direction);
     sight = sight_of(point, eye);
   }
 }
 
-void TileOutlines::look_at_corners(TileWork& work, const TileJob& job) {
-  work.requests.clear();
+void TileOutlines::look_at_corners(const LightContext& context, RayBuffers& buffers, const TileJob& job) {
+  buffers.requests.clear();
   for (int y = -1; y <= height_ + 1; ++y) {
-    for (int x = -1; x <= width_ + 1; ++x) work.requests.push_back(eye_ray(view_, job, x, y));
+    for (int x = -1; x <= width_ + 1; ++x) buffers.requests.push_back(eye_ray(view_, job, x, y));
   }
-  look_from_eye(work, view_.eye, sights_, Coherence::High);
+  look_from_eye(context, buffers, view_.eye, sights_, Coherence::High);
 }
 
 void TileOutlines::find_edge(int x, int y, int axis) {
@@ -160,13 +162,13 @@ void TileOutlines::find_edges() {
   });
 }
 
-void TileOutlines::bisect_edges(TileWork& work, const TileJob& job) {
+void TileOutlines::bisect_edges(const LightContext& context, RayBuffers& buffers, const TileJob& job) {
   for (int halving = 0; halving < kHalvings; ++halving) {
-    work.requests.clear();
+    buffers.requests.clear();
     for (const Edge& edge : edges_) {
-      if (edge.is_clear) work.requests.push_back(eye_ray(view_, job, edge.middle().x, edge.middle().y));
+      if (edge.is_clear) buffers.requests.push_back(eye_ray(view_, job, edge.middle().x, edge.middle().y));
     }
-    look_from_eye(work, view_.eye, seen_);
+    look_from_eye(context, buffers, view_.eye, seen_);
     auto seen = seen_.begin();
     for (Edge& edge : edges_) {
       if (!edge.is_clear) continue;
@@ -322,7 +324,7 @@ void TileOutlines::halve_bend(std::size_t i) {
   pixel.bend = 0.5F * (between_[i][0] + between_[i][1]);
 }
 
-void TileOutlines::bisect_bends(TileWork& work, const TileJob& job) {
+void TileOutlines::bisect_bends(const LightContext& context, RayBuffers& buffers, const TileJob& job) {
   bent_.clear();
   between_.clear();
   for (Pixel& pixel : crossed_) {
@@ -336,11 +338,11 @@ void TileOutlines::bisect_bends(TileWork& work, const TileJob& job) {
     between_.push_back({-most_bend(pixel), most_bend(pixel)});
   }
   for (int halving = 0; halving < kBendHalvings; ++halving) {
-    work.requests.clear();
+    buffers.requests.clear();
     for (const Pixel* pixel : bent_) {
-      work.requests.push_back(ray_through(view_, job, pixel->pixel, pixel->middle_of_outline()));
+      buffers.requests.push_back(ray_through(view_, job, pixel->pixel, pixel->middle_of_outline()));
     }
-    look_from_eye(work, view_.eye, seen_);
+    look_from_eye(context, buffers, view_.eye, seen_);
     for (std::size_t i = 0; i < bent_.size(); ++i) halve_bend(i);
   }
   for (std::size_t i = 0; i < bent_.size(); ++i) {
@@ -351,15 +353,15 @@ void TileOutlines::bisect_bends(TileWork& work, const TileJob& job) {
   }
 }
 
-void TileOutlines::find(TileWork& work, const TileJob& job) {
+void TileOutlines::find(const LightContext& context, RayBuffers& buffers, const TileJob& job) {
   view_ = unjittered(job);
   width_ = job.place.width();
   height_ = job.place.height();
-  look_at_corners(work, job);
+  look_at_corners(context, buffers, job);
   find_edges();
-  bisect_edges(work, job);
+  bisect_edges(context, buffers, job);
   find_pixels();
-  bisect_bends(work, job);
+  bisect_bends(context, buffers, job);
 }
 
 }  // namespace hpr

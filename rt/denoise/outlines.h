@@ -46,11 +46,11 @@ inline constexpr float kMostBent = 0.5F;
 /// The ray from the eye through a place of a pixel of the tile, from its centre. `view`: not jittered.
 [[nodiscard]] RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, const glm::vec2& place);
 
-/// Traces work.requests, which start at the eye: sets work.hits.
-void trace_from_eye(TileWork& work, Coherence coherence = Coherence::Low);
+/// Traces buffers.requests, which start at the eye: sets buffers.hits.
+void trace_from_eye(const LightContext& context, RayBuffers& buffers, Coherence coherence = Coherence::Low);
 
 /// Traces them and tells what they see.
-void look_from_eye(TileWork& work, const glm::dvec3& eye, std::vector<Sight>& seen,
+void look_from_eye(const LightContext& context, RayBuffers& buffers, const glm::dvec3& eye, std::vector<Sight>& seen,
                    Coherence coherence = Coherence::Low);
 
 /// Where in a pixel something is known to be seen.
@@ -87,7 +87,7 @@ class TileOutlines {
   };
 
   /// `job`: any sample of the tile.
-  void find(TileWork& work, const TileJob& job);
+  void find(const LightContext& context, RayBuffers& buffers, const TileJob& job);
 
   [[nodiscard]] const std::vector<Pixel>& crossed() const { return crossed_; }
   [[nodiscard]] std::span<const Sight> sights() const { return sights_; }
@@ -113,10 +113,10 @@ class TileOutlines {
   [[nodiscard]] std::uint32_t corner(int x, int y) const {
     return static_cast<std::uint32_t>((y + 1) * (width_ + 3) + x + 1);
   }
-  void look_at_corners(TileWork& work, const TileJob& job);
+  void look_at_corners(const LightContext& context, RayBuffers& buffers, const TileJob& job);
   void find_edges();
   void find_edge(int x, int y, int axis);
-  void bisect_edges(TileWork& work, const TileJob& job);
+  void bisect_edges(const LightContext& context, RayBuffers& buffers, const TileJob& job);
   void find_pixels();
   [[nodiscard]] bool differ(int x, int y, const glm::ivec2& way) const;
   [[nodiscard]] bool is_thin(int x, int y) const;
@@ -124,7 +124,7 @@ class TileOutlines {
   void find_sides(Pixel& pixel, int x, int y, const std::array<std::int32_t, 4>& around) const;
   [[nodiscard]] std::optional<glm::vec2> end_of_next(const Pixel& pixel, std::size_t end) const;
   [[nodiscard]] std::optional<float> even_bend(const Pixel& pixel) const;
-  void bisect_bends(TileWork& work, const TileJob& job);
+  void bisect_bends(const LightContext& context, RayBuffers& buffers, const TileJob& job);
   void halve_bend(std::size_t i);
   [[nodiscard]] bool is_on_side(const Pixel& pixel, std::size_t side, const Sight& sight) const;
 

@@ -65,13 +65,13 @@ void PartFinder::add_sides(const TileJob& job, const TileOutlines::Pixel& pixel,
   }
 }
 
-void PartFinder::ask(TileWork& work, const TileJob& job, TileParts& found) {
+void PartFinder::ask(const LightContext& context, RayBuffers& buffers, const TileJob& job, TileParts& found) {
   const Looks& places = *found.places;
-  work.requests.clear();
+  buffers.requests.clear();
   for (const std::uint32_t pixel : asked_) {
-    for (const glm::vec2& place : places) work.requests.push_back(ray_through(view_, job, pixel, place));
+    for (const glm::vec2& place : places) buffers.requests.push_back(ray_through(view_, job, pixel, place));
   }
-  look_from_eye(work, view_.eye, seen_, Coherence::High);
+  look_from_eye(context, buffers, view_.eye, seen_, Coherence::High);
   for (std::size_t i = 0; i < asked_.size(); ++i) {
     group(job, asked_[i], std::span(seen_).subspan(i * places.size(), places.size()), found);
   }
@@ -105,24 +105,25 @@ void PartFinder::group(const TileJob& job, std::uint32_t pixel, std::span<const 
   }
 }
 
-std::vector<std::uint8_t> PartFinder::find(TileWork& work, const TileJob& job, TileParts& found) {
+std::vector<std::uint8_t> PartFinder::find(const LightContext& context, RayBuffers& buffers, const TileJob& job,
+                                           TileParts& found) {
   std::vector<std::uint8_t> crossed(kTilePixels, 0);
-  if (work.rays->has_holes()) return crossed;
+  if (context.rays->has_holes()) return crossed;
   view_ = unjittered(job);
   asked_.clear();
   found.parts.clear();
-  outlines_.find(work, job);
+  outlines_.find(context, buffers, job);
   found.parts.reserve(2 * outlines_.crossed().size());
   for (const TileOutlines::Pixel& pixel : outlines_.crossed()) {
     crossed[pixel.pixel] = 1;
-    if (pixel.has_sides && work.settings.filter == PixelFilter::Box) {  // others reach beyond the pixel
+    if (pixel.has_sides && context.settings.filter == PixelFilter::Box) {  // others reach beyond the pixel
       add_sides(job, pixel, found);
       continue;
     }
     asked_.push_back(pixel.pixel);
-    if (asked_.size() == kPixelsTogether) ask(work, job, found);
+    if (asked_.size() == kPixelsTogether) ask(context, buffers, job, found);
   }
-  ask(work, job, found);
+  ask(context, buffers, job, found);
   return crossed;
 }
 
@@ -202,10 +203,11 @@ void PixelParts::prepare(const FrameLayout& layout, std::span<const View> views,
   }
 }
 
-const TileParts& PixelParts::of_tile(TileWork& work, const TileJob& job, std::size_t tile, PartFinder& finder) {
+const TileParts& PixelParts::of_tile(const LightContext& context, RayBuffers& buffers, const TileJob& job,
+                                     std::size_t tile, PartFinder& finder) {
   TileParts& found = tiles_[tile];
   found.places = &places_;
-  if (found.crossed.empty()) found.crossed = finder.find(work, job, found);
+  if (found.crossed.empty()) found.crossed = finder.find(context, buffers, job, found);
   return found;
 }
 

@@ -69,7 +69,8 @@ struct TileParts {
 class PartFinder {
  public:
   /// Sets the parts and returns which pixels outlines cross. `job`: any sample of the tile.
-  [[nodiscard]] std::vector<std::uint8_t> find(TileWork& work, const TileJob& job, TileParts& found);
+  [[nodiscard]] std::vector<std::uint8_t> find(const LightContext& context, RayBuffers& buffers, const TileJob& job,
+                                               TileParts& found);
 
  private:
   /// Looks that see the like.
@@ -82,7 +83,7 @@ class PartFinder {
                                std::span<const Sight> sights);
   void add_sides(const TileJob& job, const TileOutlines::Pixel& pixel, TileParts& found);
   /// Asks rays for all looks at the pixels that are left over.
-  void ask(TileWork& work, const TileJob& job, TileParts& found);
+  void ask(const LightContext& context, RayBuffers& buffers, const TileJob& job, TileParts& found);
   void group(const TileJob& job, std::uint32_t pixel, std::span<const Sight> seen, TileParts& found);
 
   View view_;
@@ -101,7 +102,8 @@ class PixelParts {
   void prepare(const FrameLayout& layout, std::span<const View> views, const RaySettings& settings);
 
   /// `job`: any sample of the frame. One thread at a time asks for a tile.
-  [[nodiscard]] const TileParts& of_tile(TileWork& work, const TileJob& job, std::size_t tile, PartFinder& finder);
+  [[nodiscard]] const TileParts& of_tile(const LightContext& context, RayBuffers& buffers, const TileJob& job,
+                                         std::size_t tile, PartFinder& finder);
 
  private:
   FrameLayout layout_;

@@ -6,32 +6,32 @@
 
 namespace hpr {
 
-double share_of_ray(const TileWork& tile, double pdf, double light_pdf) {
+double share_of_ray(const LightContext& context, double pdf, double light_pdf) {
   if (!(pdf > 0.0)) return 1.0;
-  const double lights = light_pdf * tile.settings.light_samples;
+  const double lights = light_pdf * context.settings.light_samples;
   return pdf / (pdf + lights);
 }
 
-void add_emission(TileWork& tile, const Wave& wave) {
+void add_emission(const LightContext& context, const Wave& wave, PixelSums& sums) {
   for (const PathPoint& point : wave.points) {
     if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered)) continue;
     double share = 1.0;
     if (point.seen_pdf > 0.0) {
       share = share_of_ray(
-          tile, point.seen_pdf,
-          tile.lights.surface_pdf_one(point.seen_from, point.seen_normal, point.surface.surface, point.surface));
+          context, point.seen_pdf,
+          context.lights.surface_pdf_one(point.seen_from, point.seen_normal, point.surface.surface, point.surface));
     }
-    tile.add(point.pixel, point.component, share * point.throughput * point.material.emission);
+    sums.add(point.pixel, point.component, share * point.throughput * point.material.emission);
   }
 }
 
 bool DirectLight::sample_next() {
   wave_.samples.clear();
-  if (light_ < tile_.lights.listed()) {
+  if (light_ < context_.lights.listed()) {
     sample_listed();
     return true;
   }
-  if (tile_.lights.has_sampled() && round_ < tile_.settings.light_samples) {
+  if (context_.lights.has_sampled() && round_ < context_.settings.light_samples) {
     sample_others();
     return true;
   }
@@ -39,14 +39,14 @@ bool DirectLight::sample_next() {
 }
 
 void DirectLight::sample_listed() {
-  const std::size_t end = std::min(light_ + kLightsAtOnce, tile_.lights.listed());
+  const std::size_t end = std::min(light_ + kLightsAtOnce, context_.lights.listed());
   for (; light_ < end; ++light_) {
-    const bool fixed = tile_.lights.listed_is_fixed(light_);
+    const bool fixed = context_.lights.listed_is_fixed(light_);
     for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
       PathPoint& point = wave_.points[i];
       if (point.borrows_light(Component::Direct)) continue;
       const glm::dvec2 u = fixed ? glm::dvec2(0.0) : next_two(point.sampler, point.depth);
-      add(i, tile_.lights.sample_listed(light_, point.surface.position, *tile_.view, u));
+      add(i, context_.lights.sample_listed(light_, point.surface.position, *context_.view, u));
     }
   }
 }
@@ -57,9 +57,10 @@ void DirectLight::sample_others() {
     if (point.borrows_light(Component::Direct)) continue;
     const double choice = point.sampler.one();
     const glm::dvec2 u = round_ == 0 ? next_two(point.sampler, point.depth) : point.sampler.two();
-    auto light = tile_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *tile_.view, choice, u);
+    auto light =
+        context_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *context_.view, choice, u);
     if (!light) continue;
-    light->weight /= tile_.settings.light_samples;
+    light->weight /= context_.settings.light_samples;
     add(i, *light);
   }
   ++round_;
@@ -89,23 +90,23 @@ glm::dvec3 DirectLight::shared_scattering(const PathPoint& point, const LightSam
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
   for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
-    const double share = point.may_follow[lobe] ? 1.0 - share_of_ray(tile_, all.pdf[lobe], light.pdf) : 1.0;
+    const double share = point.may_follow[lobe] ? 1.0 - share_of_ray(context_, all.pdf[lobe], light.pdf) : 1.0;
     scattered += share * all.value[lobe];
   }
   return scattered;
 }
 
-void add_samples(TileWork& tile, const Wave& wave) {
+void add_samples(const Wave& wave, PixelSums& sums) {
   for (const DirectSample& sample : wave.samples) {
     const PathPoint& point = wave.points[sample.point];
     const glm::dvec3 arriving = static_cast<double>(sample.visible) * sample.radiance;
-    if (point.component != Component::Direct || !tile.wants_components) {
-      tile.add(point.pixel, point.component, arriving);
+    if (point.component != Component::Direct || !sums.wants_components) {
+      sums.add(point.pixel, point.component, arriving);
       continue;
     }
-    tile.radiance[point.pixel] += arriving;
-    tile.components[static_cast<std::size_t>(Component::Direct)][point.pixel] += sample.radiance;
-    tile.components[static_cast<std::size_t>(Component::Shadow)][point.pixel] += arriving - sample.radiance;
+    sums.radiance[point.pixel] += arriving;
+    sums.components[static_cast<std::size_t>(Component::Direct)][point.pixel] += sample.radiance;
+    sums.components[static_cast<std::size_t>(Component::Shadow)][point.pixel] += arriving - sample.radiance;
   }
 }
 

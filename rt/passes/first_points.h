@@ -17,7 +17,7 @@ struct TileJob {
   SampleNumber number;
   std::span<const Key> keys;
   const View* view = nullptr;
-  std::uint32_t first_pixel = 0;              ///< of TileWork's: those of other samples come before
+  std::uint32_t first_pixel = 0;              ///< index into PixelSums: those of other samples come before
   std::span<const std::uint8_t> wanted = {};  ///< 1 at the pixels that are lit; empty: all
 
   [[nodiscard]] bool wants(std::size_t pixel) const { return wanted.empty() || wanted[pixel] != 0; }
@@ -45,10 +45,11 @@ inline constexpr std::size_t kWavePoints = 512;
 [[nodiscard]] int end_of_wave(const TileJob& job, int first);
 
 /// Sets a point whose surface is set, seen at pixel (x, y) of the tile, of which it covers `share`.
-void start_point(const TileWork& tile, const TileJob& job, int x, int y, double share, PathPoint& point);
+void start_point(const LightContext& context, const TileJob& job, int x, int y, double share, PathPoint& point);
 
 /// The first generation of points in some rows of a tile: the surfaces its keys name, and those of partial coverage
 /// before them, each with the share of the pixel it covers. Adds the background where neither is.
-void find_first_points(TileWork& tile, const TileJob& job, const RowRange& rows, std::vector<PathPoint>& points);
+void find_first_points(const LightContext& context, const TileJob& job, const RowRange& rows, RayBuffers& buffers,
+                       PixelSums& sums, std::vector<PathPoint>& points);
 
 }  // namespace hpr

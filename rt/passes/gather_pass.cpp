@@ -17,8 +17,9 @@ class GatherPass final : public Pass {
     return gathers_by_rays(scene, settings);
   }
 
-  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
-    for (const Lobe lobe : kLobes) follow_lobe(tile, wave, info_of(PassId::Gather), lobe, next);
+  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
+              std::vector<PathPoint>& next) const override {
+    for (const Lobe lobe : kLobes) follow_lobe(context, wave, info_of(PassId::Gather), lobe, buffers, sums, next);
   }
 };
 

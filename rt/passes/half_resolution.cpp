@@ -41,13 +41,13 @@ glm::dvec3 made_up_for(const glm::vec3& borrower, const glm::vec3& lender) {
 
 }  // namespace
 
-void SharedLight::start(ComponentSet shared, const TileWork& tile, const TileJob& job) {
+void SharedLight::start(ComponentSet shared, const LightContext& context, const TileJob& job) {
   shared_ = shared;
-  glossy_cutoff_ = tile.settings.glossy_cutoff;
+  glossy_cutoff_ = context.settings.glossy_cutoff;
   const std::size_t turn = job.number.sample % kLenderX.size();
   lender_x_ = kLenderX.at(turn);
   lender_y_ = kLenderY.at(turn);
-  eye_ = tile.view->eye;
+  eye_ = context.view->eye;
   lender_of_.assign(static_cast<std::size_t>(kBlocksPerRow) * kBlocksPerRow, kNobody);
   lenders_.clear();
   borrowers_.clear();
@@ -135,16 +135,16 @@ SharedLight::Lenders SharedLight::lenders_about(const Seen& borrower) const {
   return found;
 }
 
-void SharedLight::spread(TileWork& tile) const {
+void SharedLight::spread(PixelSums& sums) const {
   for (const Seen& borrower : borrowers_) {
     const Lenders about = lenders_about(borrower);
     for (std::size_t part = 0; part < kComponents; ++part) {
       if (!contains(shared_, static_cast<Component>(part))) continue;
       glm::dvec3 sum(0.0);
       for (const Seen* const lender : std::span(about.at).first(about.count)) {
-        sum += made_up_for(borrower.weights[part], lender->weights[part]) * tile.components[part][lender->pixel];
+        sum += made_up_for(borrower.weights[part], lender->weights[part]) * sums.components[part][lender->pixel];
       }
-      tile.add(borrower.pixel, static_cast<Component>(part), sum / static_cast<double>(about.count));
+      sums.add(borrower.pixel, static_cast<Component>(part), sum / static_cast<double>(about.count));
     }
   }
 }

@@ -18,7 +18,7 @@ namespace hpr {
 class SharedLight {
  public:
   /// Starts a tile. `shared`: see shared_components.
-  void start(ComponentSet shared, const TileWork& tile, const TileJob& job);
+  void start(ComponentSet shared, const LightContext& context, const TileJob& job);
 
   /// Decides who borrows among the first generation of points of some rows, whole blocks of them: those have
   /// PathPoint::borrows set and follow no ray of a shared pass.
@@ -26,7 +26,7 @@ class SharedLight {
 
   /// When all light of the tile is worked out: adds to each borrower the mean of the lenders about it that see the
   /// like as near, each made up for how much of such light the two surfaces scatter.
-  void spread(TileWork& tile) const;
+  void spread(PixelSums& sums) const;
 
  private:
   /// What tells whether two pixels see the like.

@@ -13,6 +13,7 @@
 #include "rt/lights/light_set.h"
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
+#include "rt/passes/pixel_sums.h"
 #include "rt/photons/photon_search.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_walk.h"
@@ -35,7 +36,7 @@ struct PathPoint {
   std::array<bool, kLobes.size()> may_follow{};  ///< whether one might have
   Sampler sampler;
   double share = 1.0;                       ///< of the pixel that the first surface of the path covers
-  std::uint32_t pixel = 0;                  ///< of TileWork's
+  std::uint32_t pixel = 0;                  ///< index into PixelSums
   std::uint16_t depth = 0;                  ///< bounces from the eye
   std::uint16_t followed = 0;               ///< of those, by lobes that passes follow one by one
   Component component = Component::Direct;  ///< where its light counts
@@ -69,8 +70,8 @@ struct Following {
 
 struct PhotonMaps;
 
-/// What passes need and write while one thread lights one tile.
-struct TileWork {
+/// What passes read while one thread lights one tile: the scene, its lights and rays, the settings, and the view.
+struct LightContext {
   const Scene& scene;
   const Surfaces& surfaces;
   const RayWalk* rays;  ///< null when no pass needs rays
@@ -78,53 +79,24 @@ struct TileWork {
   const RaySettings& settings;
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
   bool gathers = false;                              ///< whether one runs that follows all the others
+  const PhotonMaps* photons = nullptr;               ///< null when none were traced
+  const View* view = nullptr;                        ///< the tile's view in any sample: the eye's position
+  Media eye_media = {};                              ///< the media that the eye of that view lies in
 
   /// Whether a lobe is followed for itself, not by whoever follows the rest.
   [[nodiscard]] bool follows_for_itself(const Bsdf& bsdf, Lobe lobe) const;
-  const PhotonMaps* photons = nullptr;  ///< null when none were sent
-  const View* view = nullptr;           ///< of the tile at hand, of whatever sample: the eye's place
-  Media eye_media = {};                 ///< what the eye of that view lies in
-  bool wants_components = false;
-  bool wants_matte = false;
-  bool wants_cost = false;
+};
 
-  /// Per pixel of the tile, sample after sample, summed in a fixed order.
-  std::vector<glm::dvec3> radiance = {};
-  std::array<std::vector<glm::dvec3>, kComponents> components = {};  ///< likewise, when wanted
-  /// Of both, what the first surface scatters by lobes that no pass follows for itself, but for what lights bring that
-  /// are sampled: likewise, when wanted.
-  std::vector<glm::dvec3> matte = {};
-  std::array<std::vector<glm::dvec3>, kComponents> matte_components = {};
-  std::vector<float> cost = {};  ///< rays per pixel, when wanted
-  RayCounts counts = {};
-  WalkScratch scratch = {};
-  std::vector<RayRequest> requests = {};
-  std::vector<Following> following = {};
-  std::vector<std::uint32_t> hits = {};
-  FoundPhotons found_photons = {};
-  RecentTriangles triangles = {};
-
-  /// Adds light that reaches a pixel.
-  void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
-    add(pixel, component, light, contains(kDiffuseComponents, component));
-  }
-  void add(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
-    radiance[pixel] += light;
-    if (is_matte && wants_matte) matte[pixel] += light;
-    if (wants_components) add_part(pixel, component, light, is_matte);
-  }
-  /// Adds matte light that something hides, to components that are wanted: as direct light and its shadow.
-  void add_hidden(std::uint32_t pixel, const glm::dvec3& light) {
-    add_part(pixel, Component::Direct, light, true);
-    add_part(pixel, Component::Shadow, -light, true);
-  }
-  void add_part(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
-    components[static_cast<std::size_t>(component)][pixel] += light;
-    if (is_matte && wants_matte) matte_components[static_cast<std::size_t>(component)][pixel] += light;
-  }
-  void charge_ray(std::uint32_t pixel) {
-    if (wants_cost) cost[pixel] += 1.0F;
-  }
+/// Rays that one thread traces together: the requests and what they hit, how many were traced, and the memory that is
+/// kept from call to call.
+struct RayBuffers {
+  std::vector<RayRequest> requests;
+  std::vector<std::uint32_t> hits;   ///< per request: a surface, or kNoSurface
+  std::vector<Following> following;  ///< per request of follow_lobe
+  RayCounts counts;
+  WalkScratch scratch;
+  FoundPhotons found_photons;
+  RecentTriangles triangles;
 };
 
 /// One kind of ray-traced light. Passes see a wave of points at a time and keep no state between calls, so a pass is
@@ -141,11 +113,13 @@ class Pass {
     return true;
   }
 
-  /// Once per wave: reads its points; may add to the tile's radiance and put the points its rays reach into `next`.
-  virtual void spread(TileWork& /*tile*/, const Wave& /*wave*/, std::vector<PathPoint>& /*next*/) const {}
+  /// Once per wave: reads its points; may add to the pixels' sums and put the points its rays reach into `next`.
+  virtual void spread(const LightContext& /*context*/, const Wave& /*wave*/, RayBuffers& /*buffers*/,
+                      PixelSums& /*sums*/, std::vector<PathPoint>& /*next*/) const {}
 
   /// Once per handful of lights: may hide direct samples of `wave`.
-  virtual void hide(TileWork& /*tile*/, Wave& /*wave*/) const {}
+  virtual void hide(const LightContext& /*context*/, RayBuffers& /*buffers*/, PixelSums& /*sums*/,
+                    Wave& /*wave*/) const {}
 };
 
 /// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
@@ -168,11 +142,12 @@ inline constexpr double kLeastThroughput = 1.0 / 65536.0;
 
 /// Completes a point whose surface, throughput, sampler, depth and media are set: reads its material, takes off what
 /// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
-void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
+void finish_point(const LightContext& context, PathPoint& point, double metres = 0.0);
 
 /// What passes that follow lobes do: a ray per point of the wave that follows `lobe`, and the points those rays reach.
 /// A pass that gathers all lobes sends rays where no other pass follows the lobe for itself: the sky that such rays
 /// find from the first surface counts as direct light, and what hides it as shadow.
-void follow_lobe(TileWork& tile, const Wave& wave, const PassInfo& pass, Lobe lobe, std::vector<PathPoint>& next);
+void follow_lobe(const LightContext& context, const Wave& wave, const PassInfo& pass, Lobe lobe, RayBuffers& buffers,
+                 PixelSums& sums, std::vector<PathPoint>& next);
 
 }  // namespace hpr

@@ -25,17 +25,18 @@ class PhotonPass final : public Pass {
     return settings.photons > 0 && !gathers_by_rays(scene, settings);
   }
 
-  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
-    if (tile.photons == nullptr) return;
+  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
+              std::vector<PathPoint>& /*next*/) const override {
+    if (context.photons == nullptr) return;
     for (const PathPoint& point : wave.points) {
       if (point.borrows_light(Component::Photon)) continue;
       glm::dvec3 light(0.0);
-      for (const PhotonMap* map : {&tile.photons->caustic, &tile.photons->global}) {
-        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff,
-                                tile.found_photons);
+      for (const PhotonMap* map : {&context.photons->caustic, &context.photons->global}) {
+        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, context.settings.glossy_cutoff,
+                                buffers.found_photons);
       }
       if (light != glm::dvec3(0.0)) {
-        tile.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
+        sums.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
       }
     }
   }

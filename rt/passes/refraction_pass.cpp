@@ -10,9 +10,10 @@ class RefractionPass final : public Pass {
     return scene.refraction;
   }
 
-  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& next) const override {
+  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
+              std::vector<PathPoint>& next) const override {
     const PassInfo& pass = info_of(PassId::Refraction);
-    follow_lobe(tile, wave, pass, *pass.lobe, next);
+    follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
   }
 };
 
