@@ -54,7 +54,7 @@ struct Scratch {
 
   PixelSums sums;
   RayBuffers buffers;
-  SharedLight shared;
+  HalfResShading shared;
   Denoiser denoiser;
   PartFinder finder;
   std::vector<std::vector<PathPoint>> waiting;  ///< by depth
@@ -84,7 +84,7 @@ struct Lighter::State {
   LightSet lights;
   MediumFinder media;
   std::vector<RunningPass> passes;
-  ComponentSet shared = 0;  ///< see SharedLight
+  ComponentSet shared = 0;  ///< see HalfResShading
   std::array<bool, kLobes.size()> followed_lobes{};
   bool gathers;
   std::optional<RayScene> own_opaque;
@@ -325,7 +325,7 @@ void Lighter::State::light_tile(const LightContext& context, Scratch& scratch, s
       light_waiting(context, scratch);
     }
   }
-  if (shared != 0) scratch.shared.spread(sums);
+  if (shared != 0) scratch.shared.upsample(sums);
   if (denoises) denoise(context, scratch, jobs, index);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);

@@ -30,6 +30,8 @@ constexpr float kNeighbourSamples = 16.0F;
 constexpr double kFarBrighter = 3.0;
 /// How many times as much light one may scatter as the other.
 constexpr float kMostBrighter = 4.0F;
+/// One for each FilterLobe.
+constexpr std::size_t kLobePlanes = 3;
 constexpr auto kDirect = static_cast<std::size_t>(Component::Direct);
 constexpr auto kShadow = static_cast<std::size_t>(Component::Shadow);
 
@@ -37,7 +39,7 @@ float square(float value) {
   return value * value;
 }
 
-/// What a borrower takes of so narrow a width, in parts of kNormalWidth.
+/// FilterCenter::sharpness for so narrow a width, in parts of kNormalWidth.
 float sharpness_of(float width) {
   return 1.0F / square(kNormalWidth * width);
 }
@@ -47,7 +49,7 @@ std::size_t index_of(int column, int row) {
 }
 
 std::size_t plane_index(std::uint32_t pixel) {
-  return LenderPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
+  return TapPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
 }
 
 /// Sum i, see Denoiser::each_sum.
@@ -68,7 +70,10 @@ void Denoiser::start(std::size_t samples, bool with_components) {
   states_.assign(samples * kTilePixels, State::Unlit);
   seen_.resize(states_.size());
   some_split_ = false;
-  if (!sights_) sights_ = std::make_unique<LenderSights>();
+  if (!taps_) {
+    taps_ = std::make_unique<NeighborFeatures<float>>();
+    taps_->scattering.resize(kLobePlanes);
+  }
   spare_ = static_cast<std::uint32_t>(states_.size());
 }
 
@@ -99,15 +104,16 @@ void Denoiser::note(const LightContext& context, std::span<const PathPoint> poin
   }
 }
 
-Borrower Denoiser::borrower_of(const View& view, const Sight& sight, std::uint32_t pixel) {
-  Borrower borrower;
-  borrower.material = sight.material;
-  borrower.place = sight.place;
-  borrower.most_apart2 = most_apart2(view, sight.place);
-  borrower.most_bent2 = square(kMostBent);
-  borrower.most_brighter = kMostBrighter;
-  borrower.pixel = {pixel % kTileSide, pixel / kTileSide};
-  return borrower;
+FilterCenter<float> Denoiser::center_of(const View& view, const Sight& sight, std::uint32_t pixel) {
+  FilterCenter<float> center;
+  center.material = sight.material;
+  center.position = sight.place;
+  center.max_distance2 = most_apart2(view, sight.place);
+  center.max_bend2 = square(kMostBent);
+  center.max_ratio = kMostBrighter;
+  center.min_ratio = 1.0F / kMostBrighter;
+  center.pixel = {pixel % kTileSide, pixel / kTileSide};
+  return center;
 }
 
 template <typename Body>
@@ -121,24 +127,26 @@ bool Denoiser::keeps(const LightContext& context, std::size_t sum) {
 }
 
 void Denoiser::set_sights(const TileJob& job) {
+  NeighborFeatures<float>& taps = *taps_;
   for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
     const std::uint32_t own = job.first_pixel + pixel;
     const std::size_t at = plane_index(pixel);
-    sights_->lends.at(at) = LenderSights::kLendsNothing;
+    taps.kinds.at(at) = NeighborFeatures<float>::kNoTap;
     if (states_[own] != State::Lends) continue;
     const Seen& seen = seen_[own];
-    sights_->lends.at(at) = kind_of_lender(seen.sight.material, seen.is_split);
-    sights_->place.set(at, seen.sight.place);
-    sights_->normal.set(at, seen.sight.normal);
-    sights_->mapped.set(at, seen.mapped);
-    sights_->mirrored.set(at, seen.mirrored);
-    sights_->matte.set(at, seen.matte);
-    sights_->sharpness.at(at) = 1.0F / square(seen.width);
+    taps.kinds.at(at) = tap_kind(seen.sight.material, seen.is_split);
+    taps.position.set(at, seen.sight.place);
+    taps.normal.set(at, seen.sight.normal);
+    taps.shading_normal.set(at, seen.mapped);
+    for (const FilterLobe lobe : {FilterLobe::All, FilterLobe::Specular, FilterLobe::Diffuse}) {
+      taps.scattering[static_cast<std::size_t>(lobe)].set(at, scattering_of(seen, lobe));
+    }
+    taps.sharpness.at(at) = 1.0F / square(seen.width);
   }
 }
 
 void Denoiser::set_lent(const LightContext& context, const TileJob& job, const PixelSums& sums) {
-  const auto set = [&](LenderVectors<double>& lent, const auto& light_of) {
+  const auto set = [&](TapVectors<double>& lent, const auto& light_of) {
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const std::uint32_t own = job.first_pixel + pixel;
       lent.set(plane_index(pixel), states_[own] == State::Lends ? light_of(own) : glm::dvec3(0.0));
@@ -168,15 +176,17 @@ void Denoiser::add_background(const LightContext& context, const Look& look, con
 bool Denoiser::add_lent(const LightContext& context, const TileJob& job, const Look& look, const Sight& seen) {
   const Material& material = context.scene.materials[seen.material];
   if (material.unlit || material.emissive != glm::vec3(0.0F)) return false;  // what emits lends nothing
-  Borrower borrower = borrower_of(*job.view, seen, look.pixel);
-  borrower.normal = seen.normal;
-  borrower.sharpness = sharpness_of(narrowed_);
-  borrower.radius = job.number.sample == 0 ? 2 : 1;
-  borrower.way = look.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
-  borrower.is_pixel = false;
-  weigh_lenders(*sights_, borrower, weights_);
+  const int radius = job.number.sample == 0 ? 2 : 1;
+  FilterCenter<float> center = center_of(*job.view, seen, look.pixel);
+  center.normal = seen.normal;
+  center.sharpness = sharpness_of(narrowed_);
+  center.offset = look.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
+  center.window = window_about(center.pixel, center.offset, radius);
+  center.reach = static_cast<float>(radius) + 1.0F;
+  center.is_pixel = false;
+  joint_bilateral_weights(*taps_, center, weights_);
   if (weights_.sum == 0.0F) return false;
-  each_sum([&](std::size_t i) { filtered_.at(i)[look.pixel] += look.share * mean_of(weights_, lent_[i]); });
+  each_sum([&](std::size_t i) { filtered_.at(i)[look.pixel] += look.share * filtered_mean(weights_, lent_[i]); });
   return true;
 }
 
@@ -283,30 +293,37 @@ void Denoiser::look_at_part(const LightContext& context, const TileJob& job, Ray
   }
 }
 
-Borrower Denoiser::borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const {
+glm::vec3 Denoiser::scattering_of(const Seen& seen, FilterLobe lobe) {
+  if (lobe == FilterLobe::All) return seen.mirrored + seen.matte;
+  return lobe == FilterLobe::Diffuse ? seen.matte : seen.mirrored;
+}
+
+FilterCenter<float> Denoiser::center_at(const TileJob& job, std::uint32_t pixel, FilterLobe lobe) const {
   const Seen& seen = seen_[job.first_pixel + pixel];
-  const float width = lent == Lent::Matte ? 1.0F : seen.width;
-  Borrower borrower = borrower_of(*job.view, seen.sight, pixel);
-  borrower.is_split = seen.is_split;
-  borrower.normal = seen.mapped;
-  borrower.sharpness = sharpness_of(narrowed_ * width);
-  borrower.others = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
-  borrower.weight = lent == Lent::All ? seen.mirrored + seen.matte : lent == Lent::Matte ? seen.matte : seen.mirrored;
-  borrower.lent = lent;
-  borrower.radius = (width < 1.0F ? 1 : 2) + (job.number.sample == 0 ? 1 : 0);
-  return borrower;
+  const float width = lobe == FilterLobe::Diffuse ? 1.0F : seen.width;
+  const int radius = (width < 1.0F ? 1 : 2) + (job.number.sample == 0 ? 1 : 0);
+  FilterCenter<float> center = center_of(*job.view, seen.sight, pixel);
+  center.separate_diffuse = seen.is_split;
+  center.normal = seen.mapped;
+  center.sharpness = sharpness_of(narrowed_ * width);
+  center.neighbor_weight = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
+  center.terms[0] = {static_cast<std::size_t>(lobe), scattering_of(seen, lobe)};
+  center.term_count = 1;
+  center.window = window_about(center.pixel, center.offset, radius);
+  center.reach = static_cast<float>(radius) + 1.0F;
+  return center;
 }
 
 void Denoiser::share(const LightContext& context, const TileJob& job, std::uint32_t pixel) {
   const bool is_split = seen_[job.first_pixel + pixel].is_split;
   const std::size_t own = plane_index(pixel);
-  weigh_lenders(*sights_, borrower_at(job, pixel, is_split ? Lent::Mirrored : Lent::All), weights_);
-  if (is_split) weigh_lenders(*sights_, borrower_at(job, pixel, Lent::Matte), matte_weights_);
+  joint_bilateral_weights(*taps_, center_at(job, pixel, is_split ? FilterLobe::Specular : FilterLobe::All), weights_);
+  if (is_split) joint_bilateral_weights(*taps_, center_at(job, pixel, FilterLobe::Diffuse), matte_weights_);
   each_sum([&](std::size_t i) {
     glm::dvec3& sum = filtered_.at(i)[pixel];
-    sum = mean_of(weights_, lent_[i]);
-    if (is_split) sum += mean_of(matte_weights_, matte_[i]) - mean_of(weights_, matte_[i]);
-    if (keeps(context, i)) sum += kept_[i].at(own) - mean_of(weights_, kept_[i]);
+    sum = filtered_mean(weights_, lent_[i]);
+    if (is_split) sum += filtered_mean(matte_weights_, matte_[i]) - filtered_mean(weights_, matte_[i]);
+    if (keeps(context, i)) sum += kept_[i].at(own) - filtered_mean(weights_, kept_[i]);
   });
 }
 

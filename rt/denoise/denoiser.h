@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "rt/denoise/lenders.h"
+#include "rt/denoise/joint_bilateral_filter.h"
 #include "rt/denoise/pixel_parts.h"
 #include "rt/passes/first_points.h"
 #include "rt/passes/pass.h"
@@ -51,6 +51,13 @@ class Denoiser {
     Apart,  ///< keeps its own light even on an outline
   };
 
+  /// The light that is filtered: planes of NeighborFeatures::scattering.
+  enum class FilterLobe : std::uint8_t {
+    All,
+    Specular,  ///< all that is not diffuse
+    Diffuse,
+  };
+
   /// What tells whether two places are alike.
   struct Seen {
     Sight sight;
@@ -78,9 +85,11 @@ class Denoiser {
   /// Sets what the pixels that lend see and lend.
   void set_sights(const TileJob& job);
   void set_lent(const LightContext& context, const TileJob& job, const PixelSums& sums);
-  /// Without what pixels and looks have of their own.
-  [[nodiscard]] static Borrower borrower_of(const View& view, const Sight& sight, std::uint32_t pixel);
-  [[nodiscard]] Borrower borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const;
+  /// What the centers of pixels and of subpixel samples have in common.
+  [[nodiscard]] static FilterCenter<float> center_of(const View& view, const Sight& sight, std::uint32_t pixel);
+  /// The fraction of light that is scattered to the eye.
+  [[nodiscard]] static glm::vec3 scattering_of(const Seen& seen, FilterLobe lobe);
+  [[nodiscard]] FilterCenter<float> center_at(const TileJob& job, std::uint32_t pixel, FilterLobe lobe) const;
   void add_background(const LightContext& context, const Look& look, const glm::dvec3& direction);
   /// False where nobody lends.
   [[nodiscard]] bool add_lent(const LightContext& context, const TileJob& job, const Look& look, const Sight& seen);
@@ -95,16 +104,16 @@ class Denoiser {
   template <typename Body>
   void each_sum(const Body& body) const;
 
-  std::vector<State> states_;             ///< per pixel, sample after sample
-  std::vector<Seen> seen_;                ///< likewise, of those that lend
-  std::unique_ptr<LenderSights> sights_;  ///< of the sample at hand
+  std::vector<State> states_;                      ///< per pixel, sample after sample
+  std::vector<Seen> seen_;                         ///< likewise, of those that lend
+  std::unique_ptr<NeighborFeatures<float>> taps_;  ///< of the sample at hand
   /// Likewise light, 0 where nothing is lent: radiance, then the components that are wanted.
-  std::vector<LenderVectors<double>> lent_;
-  std::vector<LenderVectors<double>> matte_;  ///< of that; when some pixel of the tile is_split
-  std::vector<LenderVectors<double>> kept_;   ///< of that: light of small lights, which stays with its pixel
+  std::vector<TapVectors<double>> lent_;
+  std::vector<TapVectors<double>> matte_;  ///< of that; when some pixel of the tile is_split
+  std::vector<TapVectors<double>> kept_;   ///< of that: light of small lights, which stays with its pixel
   bool some_split_ = false;
-  LenderWeights weights_;
-  LenderWeights matte_weights_;
+  TapWeights<float> weights_;
+  TapWeights<float> matte_weights_;
   float narrowed_ = 1.0F;    ///< how far normals may differ in the sample at hand, in parts of the first one's
   std::vector<Look> looks_;  ///< that rays were sent for
   std::uint32_t spare_ = 0;  ///< where the tile's sums have room for what is lit in addition

@@ -40,7 +40,7 @@ struct PathPoint {
   std::uint16_t depth = 0;                  ///< bounces from the eye
   std::uint16_t followed = 0;               ///< of those, by lobes that passes follow one by one
   Component component = Component::Direct;  ///< where its light counts
-  ComponentSet borrows = 0;                 ///< that come from neighbours, see SharedLight
+  ComponentSet borrows = 0;                 ///< that come from neighbours, see HalfResShading
   bool gathered = false;  ///< reached by rays that gather: what is to be looked at only lights nothing
 
   [[nodiscard]] bool borrows_light(Component which) const { return contains(borrows, which); }
