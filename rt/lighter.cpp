@@ -19,7 +19,7 @@
 #include "rt/passes/half_resolution.h"
 #include "rt/passes/pass.h"
 #include "rt/passes/pixel_sums.h"
-#include "rt/photons/photon_maps.h"
+#include "rt/photons/photon_tracer.h"
 #include "rt/reference/path_tracer.h"
 #include "rt/trace/denormals.h"
 

@@ -14,7 +14,7 @@
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/passes/pixel_sums.h"
-#include "rt/photons/photon_search.h"
+#include "rt/photons/photon_map.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_walk.h"
 #include "rt/trace/surfaces.h"

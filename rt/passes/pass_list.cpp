@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "rt/passes/pass.h"
-#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_query.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "rt/lights/direct_light.h"
 #include "rt/passes/pass.h"
-#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_query.h"
 #include "rt/sampling/pick.h"
 
 namespace hpr {

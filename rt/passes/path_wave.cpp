@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_query.h"
 #include "rt/trace/ray_walk.h"
 
 namespace hpr {

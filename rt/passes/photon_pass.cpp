@@ -1,6 +1,6 @@
 #include "rt/passes/pass.h"
-#include "rt/photons/photon_gather.h"
-#include "rt/photons/photon_maps.h"
+#include "rt/photons/photon_query.h"
+#include "rt/photons/photon_tracer.h"
 
 namespace hpr {
 namespace {

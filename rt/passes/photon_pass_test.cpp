@@ -7,7 +7,7 @@
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
 #include "rt/lighter.h"
-#include "rt/photons/photon_maps.h"
+#include "rt/photons/photon_tracer.h"
 #include "rt/test_scene.h"
 
 namespace hpr {

@@ -1,5 +1,5 @@
 #include "rt/passes/pass.h"
-#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_query.h"
 
 namespace hpr {
 namespace {

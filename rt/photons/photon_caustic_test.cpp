@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_query.h"
 #include "rt/photons/photon_test_tools.h"
 
 namespace hpr {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "rt/photons/photon_query.h"
 
 namespace hpr {
 namespace {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
+#include "rt/lighter.h"
 #include "rt/lights/light_set.h"
 #include "rt/materials/bsdf.h"
 #include "rt/photons/flux_scatter.h"
@@ -21,7 +22,7 @@
 namespace hpr {
 
 struct PhotonSettings {
-  double glossy_cutoff = 0.25;  ///< specular lobes smoother than it are followed from the eye (photon_gather.h)
+  double glossy_cutoff = 0.25;  ///< specular lobes smoother than it are followed from the eye (photon_query.h)
   bool caustics_only = false;   ///< photons end where they would cease to be caustic ones
   int max_bounces = 1024;       ///< roulette ends paths long before, but for scenes that absorb less than 1 %
   int threads = 1;
@@ -66,7 +67,7 @@ using PhotonSource = std::function<std::optional<PhotonStart>(double u_choice, c
 
 /// Sends photons through the scene and keeps them where the eye's paths will ask for them: at every arrival on a
 /// surface with a lobe that those do not follow, except straight from the light (Jensen, "Global Illumination using
-/// Photon Maps", 1996, with the partition of photon_gather.h). Light that passes a surface of partial coverage still
+/// Photon Maps", 1996, with the partition of photon_query.h). Light that passes a surface of partial coverage still
 /// comes straight from its light; light that glass lets through does not.
 ///
 /// A photon depends on the key and its index only; threads, ranks and ranges change no bit.
@@ -114,5 +115,40 @@ class PhotonTracer {
 
 /// Collective: every rank's photons on every rank, in order of rank. The counts stay this rank's own.
 void share_photons(Communicator& comm, TracedPhotons& photons);
+
+/// Makes the photon maps of one sample after the other: every sample sends photons of its own, and their radius shrinks
+/// from sample to sample, so that the mean of many has neither noise nor blur (Knaus and Zwicker, "Progressive Photon
+/// Mapping: A Probabilistic Approach", 2011).
+class PhotonSender {
+ public:
+  /// All that is referred to must outlive this. `rays` holds the whole scene.
+  PhotonSender(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& rays,
+               const LightSet& lights, const RaySettings& settings);
+
+  /// The maps of a sample; kept until another sample is asked for, or forget(). With a communicator, collective: its
+  /// ranks share the work, and each gets all photons.
+  const PhotonMaps& send(const SampleNumber& number, Communicator* comm);
+
+  /// The next maps are made anew, with the radii of before.
+  void forget() { sent_.reset(); }
+
+  /// Of this rank, since the last call.
+  [[nodiscard]] PhotonCounts take_counts();
+
+ private:
+  void settle(Communicator& comm);
+  [[nodiscard]] TracedPhotons trace(const SampleNumber& number, Communicator* comm);
+  void choose_radii(const TracedPhotons& first);
+
+  RaySpace space_;
+  RaySettings settings_;
+  bool settled_ = false;  ///< what depends on the other ranks
+  PhotonTracer tracer_;
+  std::optional<SampleNumber> sent_;
+  double caustic_radius_ = 0.0;  ///< metres, of a frame's first sample; 0: not chosen yet
+  double global_radius_ = 0.0;
+  PhotonMaps maps_;
+  PhotonCounts counts_;
+};
 
 }  // namespace hpr

@@ -29,7 +29,7 @@ struct PathSettings {
       64;  ///< ray segments of the longest path: 1 shows what emits, 2 adds its light on surfaces, and so on
   int roulette_from = 4;  ///< bounces every path is let make; past max_depth: no roulette
   Technique technique = Technique::Both;
-  double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_gather.h) show unlit surfaces, others do not
+  double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_query.h) show unlit surfaces, others do not
   /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift), as the passes do.
   /// It changes the integral: what is compared with others does without.
   bool terminator_fix = false;

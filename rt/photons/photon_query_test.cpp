@@ -1,4 +1,4 @@
-#include "rt/photons/photon_reflection.h"
+#include "rt/photons/photon_query.h"
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
