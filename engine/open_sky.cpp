@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "rt/sampling/sampler.h"
-#include "rt/sampling/warp.h"
+#include "rt/sampling/sampling.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 

@@ -15,13 +15,13 @@
 #include "rt/denoise/denoiser.h"
 #include "rt/denoise/pixel_parts.h"
 #include "rt/lights/direct_light.h"
-#include "rt/passes/first_points.h"
 #include "rt/passes/half_resolution.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 #include "rt/passes/pixel_sums.h"
 #include "rt/photons/photon_tracer.h"
 #include "rt/reference/path_tracer.h"
-#include "rt/trace/denormals.h"
+#include "rt/trace/ray_scene.h"
 
 namespace hpr {
 namespace {
@@ -74,6 +74,16 @@ void share_out(double spent, std::vector<double>& ms) {
 }
 
 }  // namespace
+
+RayCounts& RayCounts::operator+=(const RayCounts& other) {
+  primary += other.primary;
+  for (std::size_t i = 0; i < kPasses; ++i) passes[i] += other.passes[i];
+  invalid += other.invalid;
+  cut += other.cut;
+  not_finite += other.not_finite;
+  first_not_finite = std::min(first_not_finite, other.first_not_finite);
+  return *this;
+}
 
 struct Lighter::State {
   const Scene& scene;
@@ -437,6 +447,38 @@ void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
 
 void Lighter::forget_photons() {
   if (state_->photons) state_->photons->forget();
+}
+
+void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
+                 std::span<const std::size_t> tiles, const SampleNumber& number) {
+  TileLayer<Rgb> radiance(keys.layout());
+  lighter.light(views, keys, tiles, {.radiance = &radiance}, number);
+  for (const std::size_t tile : tiles) {
+    const std::span<const Rgb> colors = radiance.tile(tile);
+    const std::span<Key> words = keys.tile(tile);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (words[i] != kNoKey) words[i] = make_color_key(key_depth(words[i]), to_word(to_srgb(colors[i])));
+    }
+  }
+}
+
+void light_empty(Lighter& lighter, std::span<const View> views, const TileLayer<Key>& keys,
+                 std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number) {
+  std::vector<std::size_t> open;
+  std::ranges::copy_if(tiles, std::back_inserter(open),
+                       [&](std::size_t tile) { return std::ranges::count(keys.tile(tile), kNoKey) > 0; });
+  // Keys that carry colours name no surfaces: pixels that have one are lit as if they were empty, and left out.
+  const TileLayer<Key> empty(keys.layout());
+  TileLayer<Rgb> behind(keys.layout());
+  lighter.light(views, empty, open, {.radiance = &behind}, number);
+  for (const std::size_t tile : open) {
+    const std::span<const Key> words = keys.tile(tile);
+    const std::span<const Rgb> from = behind.tile(tile);
+    const std::span<Rgb> to = radiance.tile(tile);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (words[i] == kNoKey) to[i] = from[i];
+    }
+  }
 }
 
 }  // namespace hpr

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "rt/hybrid_test_tools.h"
 #include "rt/lighter.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr {

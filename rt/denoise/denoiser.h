@@ -11,8 +11,8 @@
 
 #include "rt/denoise/joint_bilateral_filter.h"
 #include "rt/denoise/pixel_parts.h"
-#include "rt/passes/first_points.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "rt/denoise/denoiser_test_tools.h"
+#include "rt/denoise/test_denoiser.h"
 
 // What the denoiser shares of smooth surfaces' light.
 namespace hpr::test {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "rt/denoise/denoiser_test_tools.h"
+#include "rt/denoise/test_denoiser.h"
 
 namespace hpr {
 namespace {

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "rt/passes/first_points.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 

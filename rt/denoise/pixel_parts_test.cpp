@@ -11,7 +11,7 @@
 #include <memory>
 #include <vector>
 
-#include "rt/hybrid_test_tools.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr {

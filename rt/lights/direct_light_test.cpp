@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "rt/passes/path_vertex.h"
 #include "rt/test_scene.h"
 
 namespace hpr {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "core/error.h"
-#include "rt/sampling/pick.h"
+#include "rt/sampling/sampling.h"
 
 namespace hpr {
 namespace {

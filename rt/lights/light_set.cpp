@@ -6,8 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "rt/sampling/pick.h"
-#include "rt/sampling/warp.h"
+#include "rt/sampling/sampling.h"
 #include "scene/requirements.h"
 
 namespace hpr {
@@ -50,8 +49,8 @@ LitSphere sphere_about(const Bounds& bounds) {
 
 }  // namespace
 
-LightSet::LightSet(const Scene& scene, EvenSky even_sky)
-    : even_sky_(even_sky),
+LightSet::LightSet(const Scene& scene, EvenSky constant_environment)
+    : even_sky_(constant_environment),
       lit_(sphere_about(scene.bounds)),
       background_(scene.background.r, scene.background.g, scene.background.b),
       triangles_(scene) {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "rt/lights/environment_map.h"
-#include "rt/lights/light_sample.h"
 #include "rt/lights/light_tree.h"
 #include "rt/lights/punctual_light.h"
 #include "rt/lights/triangle_lights.h"
@@ -30,7 +29,7 @@ class LightSet {
  public:
   /// The scene must outlive this. A scene that gives no light (gives_light) gets a headlight. Lights without any
   /// intensity are left out. O(n log n) for n lights.
-  explicit LightSet(const Scene& scene, EvenSky even_sky = EvenSky::Sampled);
+  explicit LightSet(const Scene& scene, EvenSky constant_environment = EvenSky::Sampled);
 
   /// Lights that are few enough to be asked one by one at every point, punctual and sphere lights; past
   /// `kMostListed` none is listed and all are sampled.

@@ -8,7 +8,7 @@
 #include <glm/mat3x3.hpp>
 #include <numbers>
 
-#include "rt/sampling/warp.h"
+#include "rt/sampling/sampling.h"
 
 namespace hpr {
 namespace {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
-#include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "rt/hybrid_test_tools.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 // Indirect light along rays, held to the reference as all passes are.

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "rt/denoise/joint_bilateral_filter.h"
-#include "rt/passes/first_points.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "rt/hybrid_test_tools.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr {

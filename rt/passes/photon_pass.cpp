@@ -1,4 +1,4 @@
-#include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 #include "rt/photons/photon_query.h"
 #include "rt/photons/photon_tracer.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "rt/passes/first_points.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 #include <tuple>
 
-#include "rt/materials/bsdf_test_tools.h"
-#include "rt/sampling/warp.h"
+#include "rt/materials/test_bsdf.h"
+#include "rt/sampling/sampling.h"
 #include "rt/test_scene.h"
 
 // Light that is carried from lamps against light that is looked for from the eye, where normals lean.

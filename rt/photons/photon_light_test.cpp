@@ -5,7 +5,7 @@
 #include <random>
 
 #include "rt/photons/photon_query.h"
-#include "rt/photons/photon_test_tools.h"
+#include "rt/photons/test_photons.h"
 
 // What photon maps bring to a picture, against brute force that knows nothing of photons.
 namespace hpr {

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "rt/trace/ray_space.h"
+#include "rt/trace/ray_scene.h"
 
 namespace hpr {
 

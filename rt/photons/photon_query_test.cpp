@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "rt/materials/bsdf_test_tools.h"
+#include "rt/materials/test_bsdf.h"
 #include "rt/photons/photon_map.h"
 
 namespace hpr {

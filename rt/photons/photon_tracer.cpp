@@ -16,7 +16,7 @@
 #include "core/parallel.h"
 #include "rt/lights/punctual_light.h"
 #include "rt/photons/photon_query.h"
-#include "rt/trace/denormals.h"
+#include "rt/trace/ray_scene.h"
 #include "rt/trace/ray_walk.h"
 
 namespace hpr {

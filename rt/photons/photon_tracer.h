@@ -15,7 +15,6 @@
 #include "rt/photons/photon_map.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/ray_space.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 

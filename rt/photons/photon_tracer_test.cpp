@@ -7,7 +7,7 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
-#include "rt/photons/photon_test_tools.h"
+#include "rt/photons/test_photons.h"
 
 namespace hpr {
 namespace {

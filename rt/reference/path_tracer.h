@@ -9,7 +9,6 @@
 #include "image/tiles.h"
 #include "rt/lights/light_set.h"
 #include "rt/sampling/sampler.h"
-#include "rt/screen_pixel.h"
 #include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 #include "scene/view.h"

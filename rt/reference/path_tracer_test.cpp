@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rt/reference/path_test_tools.h"
+#include "rt/reference/test_paths.h"
 
 namespace hpr {
 namespace {

@@ -11,7 +11,6 @@
 #include "core/parallel.h"
 #include "rt/trace/primary_rays.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/ray_space.h"
 #include "tools/stability/tools.h"
 
 namespace hpr::stability {

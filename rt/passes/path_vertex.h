@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -51,5 +52,33 @@ void start_point(const LightContext& context, const TileJob& job, int x, int y, 
 /// before them, each with the share of the pixel it covers. Adds the background where neither is.
 void find_first_points(const LightContext& context, const TileJob& job, const RowRange& rows, RayBuffers& buffers,
                        PixelSums& sums, std::vector<PathPoint>& points);
+
+/// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
+/// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
+inline constexpr double kLeastThroughput = 1.0 / 65536.0;
+
+[[nodiscard]] inline double brightness(const glm::dvec3& color) {
+  return std::max({color.r, color.g, color.b});
+}
+
+/// What a path whose throughput is so bright is to be multiplied by: 1, or what roulette makes of it, 0 where it ends.
+[[nodiscard]] inline double survival(double brightness, Sampler& sampler) {
+  if (!(brightness < kLeastThroughput)) return 1.0;
+  const double chance = brightness / kLeastThroughput;
+  return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
+}
+
+/// The component that light from a followed lobe of `point` counts in.
+[[nodiscard]] Component component_after(const PathPoint& point, Component first);
+
+/// Completes a point whose surface, throughput, sampler, depth and media are set: reads its material, takes off what
+/// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
+void finish_point(const LightContext& context, PathPoint& point, double metres = 0.0);
+
+/// What passes that follow lobes do: a ray per point of the wave that follows `lobe`, and the points those rays reach.
+/// A pass that gathers all lobes sends rays where no other pass follows the lobe for itself: the sky that such rays
+/// find from the first surface counts as direct light, and what hides it as shadow.
+void follow_lobe(const LightContext& context, const Wave& wave, const PassInfo& pass, Lobe lobe, RayBuffers& buffers,
+                 PixelSums& sums, std::vector<PathPoint>& next);
 
 }  // namespace hpr

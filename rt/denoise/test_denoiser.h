@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "rt/hybrid_test_tools.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr::test {
