@@ -9,7 +9,7 @@
 
 #include "image/image_io.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/passes/pass_list.h"
 #include "scene/view.h"
 
@@ -43,7 +43,7 @@ inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Cost) + 1;
 [[nodiscard]] constexpr bool is_part(Aov aov) {
   return aov >= Aov::Direct && aov < Aov::Rank;
 }
-/// Whether the lighter fills a layer of three floats for it.
+/// Whether the shader fills a layer of three floats for it.
 [[nodiscard]] constexpr bool has_rgb(Aov aov) {
   return aov >= Aov::Normal && aov < Aov::Rank;
 }
@@ -60,7 +60,7 @@ struct AovLayers {
   AovLayers() = default;
   AovLayers(const FrameLayout& layout, std::span<const Aov> wanted);
 
-  /// Where the lighter is to put them, beside `radiance`.
+  /// Where the shader is to put them, beside `radiance`.
   [[nodiscard]] LightOutput output(TileLayer<Rgb>& radiance);
 };
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/frame.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 
 namespace hpr {
 

@@ -11,7 +11,7 @@
 #include "cluster/transport/communicator.h"
 #include "engine/aov.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 
 namespace hpr {
 

@@ -11,9 +11,9 @@
 #include "cluster/distribution/assignment.h"
 #include "engine/aov.h"
 #include "engine/session.h"
-#include "engine/tile_homes.h"
+#include "engine/tile_ownership.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -96,13 +96,13 @@ void prepare(Session& session, const FramePlan& plan);
 /// Which frame of several that are one picture's samples.
 struct FrameSample {
   SampleNumber number;
-  std::optional<TileHomes>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
-  const PixelMask* wanted = nullptr;          ///< pixels that are lit; null: all. Others' radiance means nothing
+  std::optional<TileOwnership>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
+  const PixelMask* wanted = nullptr;              ///< pixels that are lit; null: all. Others' radiance means nothing
   const std::function<void()>* at_home = nullptr;  ///< called once tiles are at home, before any is lit
 };
 
 /// One of several samples that are drawn together.
-struct FrameLook {
+struct JitteredViews {
   std::vector<View> views;  ///< views[i] is screen i of the plan's layout; those of the samples differ by their jitter
   FrameSample sample;
 };
@@ -110,7 +110,7 @@ struct FrameLook {
 /// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
 /// The same by rays, for several looks together, a layer each; all want the same pixels. Returns what it took.
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
                               std::span<TileLayer<Key>* const> keys);
 
 /// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
@@ -119,12 +119,12 @@ FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const V
                       const FrameSample& sample = {});
 
 /// How many samples of a plan may be drawn together: 1 where they are composited, or each asks for light of its own.
-[[nodiscard]] std::size_t most_in_round(Session& session, const FramePlan& plan);
+[[nodiscard]] std::size_t max_in_round(Session& session, const FramePlan& plan);
 
 /// Collective: several samples step by step together, to the bit what make_frame gives one by one. What rays and lights
-/// look up for one sample is at hand for the next. At least one and at most most_in_round(); all want the same pixels.
-[[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
-                                            FrameTimes& times);
+/// look up for one sample is at hand for the next. At least one and at most max_in_round(); all want the same pixels.
+[[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan,
+                                            std::span<const JitteredViews> looks, FrameTimes& times);
 
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
 [[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,

@@ -106,9 +106,9 @@ bool FrameSampler::tries_to_write(const CheckpointSettings& checkpoint) {
   return true;
 }
 
-FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
+JitteredViews FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
   const FilterSample through = look_through(sampling_, {plan_.rays.seed, number_}, number);
-  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
+  JitteredViews look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
   for (View& view : look.views) view.jitter = through.offset;
   weight = through.weight;
   return look;
@@ -141,7 +141,7 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
     count = std::min(count, scattered_ ? adaptive_->most_together() : 1);
   }
   const std::function<void()> at_home = [this] { scatter(); };
-  std::vector<FrameLook> looks;
+  std::vector<JitteredViews> looks;
   std::vector<double> weights(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     looks.push_back(look(views, film_.samples() + i, weights[i]));
@@ -181,7 +181,7 @@ std::uint32_t FrameSampler::size_of_round() {
   constexpr double kSeconds = 2.0;
   constexpr std::size_t kQuickPixels = std::size_t{1} << 18U;  // of which a few samples take no longer
   const std::uint32_t done = so_far_.samples;
-  auto most = static_cast<double>(most_in_round(session_, plan_));
+  auto most = static_cast<double>(max_in_round(session_, plan_));
   if (sampling_.goal.samples && !adaptive_) most = std::min(most, static_cast<double>(*sampling_.goal.samples - done));
   if (done > 0) {
     const double left = sampling_.goal.seconds ? *sampling_.goal.seconds - so_far_.seconds : kSeconds;

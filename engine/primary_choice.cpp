@@ -63,7 +63,7 @@ std::string choose_primary(Session& session, FramePlan& plan, std::span<const Vi
     TileLayer<Key> keys(plan.layout);
     mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
     (void)session.primary_rays(plan.mine.objects, plan.rays);
-    const FrameLook look{{views.begin(), views.end()}, {}};
+    const JitteredViews look{{views.begin(), views.end()}, {}};
     TileLayer<Key>* const layer = &keys;
     const auto trace = [&] { (void)trace_primary(session, some, std::span(&look, 1), std::span(&layer, 1)); };
     mine.rays_ms = quickest_ms(keys, trace) / share;

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "image/filter.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/sampling/sampler.h"
 
 namespace hpr {

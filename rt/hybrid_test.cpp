@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 
 namespace hpr::test {
@@ -57,13 +57,13 @@ inline Scene corner(const Material& ball, glm::vec3 floor = glm::vec3(0.8F),
 template <typename Body>
 void for_each_shaken(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t frames,
                      const Body& body) {
-  Lighter lighter(scene, settings);
+  DeferredShader shader(scene, settings);
   for (std::uint32_t i = 0; i < frames; ++i) {
     View shaken = view;
     shaken.jitter = Sampler(7, i).two() - 0.5;
     const TileLayer<Key> keys = cast_keys(scene, std::span(&shaken, 1));
     TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&shaken, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.frame = i});
+    shader.shade(std::span(&shaken, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.frame = i});
     body(radiance);
   }
 }
@@ -72,11 +72,11 @@ void for_each_shaken(const Scene& scene, const View& view, const RaySettings& se
 inline glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySettings& settings, std::uint32_t samples,
                           const Scene* covering = nullptr) {
   const TileLayer<Key> keys = cast_keys(covering != nullptr ? *covering : scene, std::span(&view, 1));
-  Lighter lighter(scene, settings);
+  DeferredShader shader(scene, settings);
   glm::dvec3 sum(0.0);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
     for (int y = 0; y < 16; ++y) {
       for (int x = 0; x < 16; ++x) {
         const Rgb& color = radiance.at(0, x, y);

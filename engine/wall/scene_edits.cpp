@@ -19,15 +19,15 @@ namespace {
 constexpr double kFarthest = 1e18;
 
 [[noreturn]] void throw_unknown(std::string_view what, const std::string& name, const std::vector<std::string>& names) {
-  constexpr std::size_t kMostListed = 40;
+  constexpr std::size_t kMaxListed = 40;
   if (names.empty()) {
     throw Error(ExitCode::Usage, fmt::format("the scene has no {} '{}'", what, printable(name)), "it has none at all");
   }
   const auto nearest = nearest_name(name, names);
   throw Error(ExitCode::Usage, fmt::format("the scene has no {} '{}'", what, printable(name)),
-              names.size() <= kMostListed ? unknown_name_hint(name, names)
-              : nearest                   ? fmt::format("did you mean '{}'?", *nearest)
-                                          : fmt::format("it has {} others: {}s lists them", names.size(), what));
+              names.size() <= kMaxListed ? unknown_name_hint(name, names)
+              : nearest                  ? fmt::format("did you mean '{}'?", *nearest)
+                                         : fmt::format("it has {} others: {}s lists them", names.size(), what));
 }
 
 }  // namespace

@@ -23,12 +23,12 @@ inline RaySettings denoised(RaySettings settings) {
 /// The mean over its samples of a picture whose keys are found for each.
 inline Image<Rgb> mean_picture(const Scene& scene, View view, const RaySettings& settings, std::uint32_t samples) {
   Image<Rgb> sum(view.size());
-  Lighter lighter(scene, settings);
+  DeferredShader shader(scene, settings);
   for (std::uint32_t i = 0; i < samples; ++i) {
     view.jitter = Sampler(7, i).two() - 0.5;
     const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
     TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = i});
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = i});
     for (int y = 0; y < sum.height(); ++y) {
       for (int x = 0; x < sum.width(); ++x) {
         const Rgb& color = radiance.at(0, x, y);

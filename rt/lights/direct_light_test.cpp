@@ -38,11 +38,11 @@ class LitFloor {
     surfaces.load(0, triangle);
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const Ray ray = view_ray(view, pixel % kTileSide + 0.5, static_cast<int>(pixel) / kTileSide + 0.5);
-      PathPoint& point = wave.points.emplace_back();
+      PathVertex& point = wave.vertices.emplace_back();
       point.surface = surfaces.meet(triangle, ray.origin, ray.direction);
       point.pixel = pixel;
       point.sampler = Sampler(pixel, 0);
-      finish_point(*context, point);
+      finish_vertex(*context, point);
     }
   }
 
@@ -51,27 +51,28 @@ class LitFloor {
   Surfaces surfaces{scene, space};
   View view;
   RaySettings settings;
-  std::optional<LightSet> set;
+  std::optional<LightSampler> set;
   std::optional<LightContext> context;
   PixelSums sums;
-  Wave wave;
+  Wavefront wave;
 };
 
 TEST(DirectLight, ItsMemoryDoesNotGrowWithTheNumberOfLights) {
-  LitFloor floor(LightSet::kMostListed);
+  LitFloor floor(LightSampler::kMaxEnumerated);
   std::size_t samples = 0;
   for (DirectLight light(*floor.context, floor.wave); light.sample_next();) samples += floor.wave.samples.size();
-  EXPECT_EQ(samples, LightSet::kMostListed * kTilePixels) << "every light reaches every pixel, in one block or another";
+  EXPECT_EQ(samples, LightSampler::kMaxEnumerated * kTilePixels)
+      << "every light reaches every pixel, in one block or another";
   EXPECT_LE(floor.wave.samples.capacity() * sizeof(DirectSample), std::size_t{16} << 20);
 }
 
 TEST(DirectLight, FewLightsAreAddedInTheirOrderWhateverTheBlocks) {
   LitFloor floor(19);
   for (DirectLight light(*floor.context, floor.wave); light.sample_next();) add_samples(floor.wave, floor.sums);
-  for (const PathPoint& point : floor.wave.points) {
+  for (const PathVertex& point : floor.wave.vertices) {
     glm::dvec3 sum(0.0);
-    for (std::size_t i = 0; i < floor.set->listed(); ++i) {
-      const LightSample light = floor.set->sample_listed(i, point.surface.position, floor.view, {});
+    for (std::size_t i = 0; i < floor.set->enumerated(); ++i) {
+      const LightSample light = floor.set->sample_enumerated(i, point.surface.position, floor.view, {});
       glm::dvec3 scattered(0.0);
       for (const Lobe lobe : kLobes) scattered += point.bsdf.value(lobe, light.to_light);
       sum += point.throughput * scattered * light.weight * std::abs(glm::dot(point.material.normal, light.to_light));
@@ -81,20 +82,20 @@ TEST(DirectLight, FewLightsAreAddedInTheirOrderWhateverTheBlocks) {
 }
 
 TEST(DirectLight, ManyLightsAreSampledAndRightInTheMean) {
-  LitFloor few(LightSet::kMostListed);
-  LitFloor many(LightSet::kMostListed + 1);
-  ASSERT_EQ(many.set->listed(), 0U);
+  LitFloor few(LightSampler::kMaxEnumerated);
+  LitFloor many(LightSampler::kMaxEnumerated + 1);
+  ASSERT_EQ(many.set->enumerated(), 0U);
   Scene last = white_floor();
   last.lights = {many.scene.lights.back()};
-  const LightSet one(last);
+  const LightSampler one(last);
   const auto total = [](const LitFloor& floor) {
     double sum = 0.0;
     for (const glm::dvec3& light : floor.sums.radiance) sum += light.g;
     return sum;
   };
   for (DirectLight light(*few.context, few.wave); light.sample_next();) add_samples(few.wave, few.sums);
-  for (const PathPoint& point : few.wave.points) {
-    const LightSample light = one.sample_listed(0, point.surface.position, few.view, {});
+  for (const PathVertex& point : few.wave.vertices) {
+    const LightSample light = one.sample_enumerated(0, point.surface.position, few.view, {});
     for (const Lobe lobe : kLobes) {
       few.sums.radiance[point.pixel] += point.bsdf.value(lobe, light.to_light) * light.weight *
                                         std::abs(glm::dot(point.material.normal, light.to_light));

@@ -16,8 +16,8 @@
 namespace hpr {
 namespace {
 
-constexpr double kLeastSolidAngle = 1e-6;
-constexpr double kLeastSine = 1e-4;
+constexpr double kMinSolidAngle = 1e-6;
+constexpr double kMinSine = 1e-4;
 
 /// The part of `v` that is perpendicular to `axis`, at unit length.
 glm::dvec3 perpendicular(const glm::dvec3& v, const glm::dvec3& axis) {
@@ -51,7 +51,7 @@ SphericalTriangle::SphericalTriangle(const glm::dvec3& place, const glm::dvec3& 
 }
 
 bool SphericalTriangle::can_sample() const {
-  return solid_angle_ >= kLeastSolidAngle && std::sin(alpha_) > kLeastSine && below_cos_c_ < 2.0 - 1e-6;
+  return solid_angle_ >= kMinSolidAngle && std::sin(alpha_) > kMinSine && below_cos_c_ < 2.0 - 1e-6;
 }
 
 glm::dvec3 SphericalTriangle::sample(const glm::dvec2& u) const {
@@ -78,11 +78,11 @@ glm::dvec3 SphericalTriangle::sample(const glm::dvec2& u) const {
 namespace {
 
 /// A texture is looked at texel by texel where a triangle shows no more of them.
-constexpr double kMostTexels = 1024.0;
+constexpr double kMaxTexels = 1024.0;
 /// The quadrature of a triangle's mean radiance: so many parts a side.
-constexpr int kMostParts = 16;
+constexpr int kMaxParts = 16;
 /// What a triangle is chosen by is never below this share of its brightest spot, which the quadrature may miss.
-constexpr double kLeastShare = 0.01;
+constexpr double kMinShare = 0.01;
 
 double mean_of(const glm::dvec3& color) {
   return (color.r + color.g + color.b) / 3.0;
@@ -114,7 +114,7 @@ double coverage(const Scene& scene, const Material& material, const Mesh& mesh, 
 }
 
 /// No place of the triangle has more.
-double most_coverage(const Material& material, const Mesh& mesh, const glm::uvec3& corners) {
+double max_coverage(const Material& material, const Mesh& mesh, const glm::uvec3& corners) {
   auto alpha = static_cast<double>(material.base_color.a);
   if (!mesh.colors.empty()) {
     alpha *=
@@ -200,13 +200,13 @@ void TriangleLights::estimate_brightness(TriangleLight& triangle) const {
   const Material& material = scene_->materials[mesh.material];
   const glm::uvec3& corners = mesh.triangles[triangle.index];
   double peak = mean_of(glm::dvec3(material.emissive));
-  int parts = material.alpha_mode == AlphaMode::Opaque ? 1 : kMostParts;
+  int parts = material.alpha_mode == AlphaMode::Opaque ? 1 : kMaxParts;
   if (const TextureRef& reference = material.emissive_texture; reference.present()) {
     const Texture& texture = scene_->textures[static_cast<std::size_t>(reference.texture)];
     const TexelBox box = texels_of(texture, reference, mesh, corners);
     const double side = std::max(box.high.x - box.low.x, box.high.y - box.low.y);
-    parts = std::max(parts, static_cast<int>(std::clamp(side, 1.0, static_cast<double>(kMostParts))));
-    if (texture.image.size().area() > 0 && box.count() <= kMostTexels) {
+    parts = std::max(parts, static_cast<int>(std::clamp(side, 1.0, static_cast<double>(kMaxParts))));
+    if (texture.image.size().area() > 0 && box.count() <= kMaxTexels) {
       peak = 0.0;
       const glm::dvec2 size(texture.image.width(), texture.image.height());
       for (double y = box.low.y; y <= box.high.y; ++y) {
@@ -217,7 +217,7 @@ void TriangleLights::estimate_brightness(TriangleLight& triangle) const {
       }
     }
   }
-  peak *= most_coverage(material, mesh, corners);
+  peak *= max_coverage(material, mesh, corners);
   if (!(peak > 0.0)) return;
   // The middles of parts^2 equal triangles.
   glm::dvec3 sum(0.0);
@@ -229,7 +229,7 @@ void TriangleLights::estimate_brightness(TriangleLight& triangle) const {
     }
   }
   triangle.mean = sum / static_cast<double>(parts * parts);
-  triangle.brightness = std::max(mean_of(triangle.mean), kLeastShare * peak);
+  triangle.brightness = std::max(mean_of(triangle.mean), kMinShare * peak);
 }
 
 glm::dvec3 TriangleLights::radiance(const TriangleLight& triangle, const glm::dvec2& at) const {

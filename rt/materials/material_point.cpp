@@ -122,11 +122,11 @@ glm::dvec3 absorption_of(const Material& material) {
   glm::dvec3 absorption(0.0);
   if (!std::isfinite(material.attenuation_distance)) return absorption;
   // What hides all but 1e-30 of the light hides all of it; held finite, so that no distance makes it NaN.
-  constexpr double kLeastLeft = 1e-30;
-  constexpr double kMost = 1e30;
+  constexpr double kMinLeft = 1e-30;
+  constexpr double kMaxAbsorption = 1e30;
   for (int c = 0; c < 3; ++c) {
-    const double left = std::clamp(static_cast<double>(material.attenuation_color[c]), kLeastLeft, 1.0);
-    absorption[c] = std::min(-std::log(left) / static_cast<double>(material.attenuation_distance), kMost);
+    const double left = std::clamp(static_cast<double>(material.attenuation_color[c]), kMinLeft, 1.0);
+    absorption[c] = std::min(-std::log(left) / static_cast<double>(material.attenuation_distance), kMaxAbsorption);
   }
   return absorption;
 }

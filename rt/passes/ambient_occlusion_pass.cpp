@@ -20,15 +20,15 @@ class AmbientOcclusionPass final : public Pass {
     return false;
   }
 
-  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
-              std::vector<PathPoint>& /*next*/) const override {
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& /*next*/) const override {
     const int count = context.settings.occlusion_rays;
     std::vector<glm::dvec3> light;
     buffers.requests.clear();
     const double reach = kReach * glm::length(context.scene.bounds.high - context.scene.bounds.low) / 2.0;
-    for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
-      const PathPoint& point = wave.points[i];
-      if (point.borrows_light(Component::AmbientOcclusion)) continue;
+    for (std::uint32_t i = 0; i < wave.vertices.size(); ++i) {
+      const PathVertex& point = wave.vertices[i];
+      if (point.is_upsampled(Component::AmbientOcclusion)) continue;
       if (point.bsdf.weight(Lobe::Diffuse) == glm::dvec3(0.0)) continue;
       Sampler sampler = point.sampler.branch(kBranch);
       for (int ray = 0; ray < count; ++ray) {
@@ -38,14 +38,14 @@ class AmbientOcclusionPass final : public Pass {
             {ray_origin(point.surface, sample->direction) + point.surface.lift, sample->direction, reach, nullptr, i});
         light.push_back(point.throughput * sample->weight * point.material.occlusion * context.settings.ambient /
                         static_cast<double>(count));
-        sums.charge_ray(point.pixel);
+        sums.count_ray(point.pixel);
       }
     }
     std::vector<float> passed(buffers.requests.size());
     buffers.counts[PassId::AmbientOcclusion] += buffers.requests.size();
     buffers.counts.invalid += context.rays->passed(buffers.requests, passed, buffers.scratch);
     for (std::size_t i = 0; i < passed.size(); ++i) {
-      const PathPoint& point = wave.points[buffers.requests[i].owner];
+      const PathVertex& point = wave.vertices[buffers.requests[i].owner];
       sums.add(point.pixel, component_after(point, Component::AmbientOcclusion),
                static_cast<double>(passed[i]) * light[i]);
     }

@@ -50,7 +50,7 @@ void HalfResShading::start(ComponentSet shared, const LightContext& context, con
   upsampled_.clear();
 }
 
-HalfResShading::Feature HalfResShading::feature_of(const PathPoint& point) const {
+HalfResShading::Feature HalfResShading::feature_of(const PathVertex& point) const {
   Feature feature{.position = point.surface.position,
                   .normal = point.material.normal,
                   .material = point.surface.material,
@@ -88,24 +88,24 @@ FilterCenter<double> HalfResShading::center_of(const Feature& feature) const {
   return center;
 }
 
-bool HalfResShading::is_tap(const PathPoint& point) const {
+bool HalfResShading::is_tap(const PathVertex& point) const {
   return static_cast<int>(point.pixel % kTileSide) % kBlockSide == tap_x_ &&
          static_cast<int>(point.pixel / kTileSide) % kBlockSide == tap_y_;
 }
 
-void HalfResShading::choose(std::vector<PathPoint>& points, int first_row) {
+void HalfResShading::choose(std::vector<PathVertex>& points, int first_row) {
   // A pixel that shows several surfaces, each in part, keeps to itself.
   std::array<std::uint8_t, kTilePixels> surfaces{};
-  for (const PathPoint& point : points) surfaces.at(point.pixel) = surfaces.at(point.pixel) == 0 ? 1 : 2;
-  const auto shows_one = [&](const PathPoint& point) {
+  for (const PathVertex& point : points) surfaces.at(point.pixel) = surfaces.at(point.pixel) == 0 ? 1 : 2;
+  const auto shows_one = [&](const PathVertex& point) {
     return surfaces.at(point.pixel) == 1 && point.throughput == glm::dvec3(1.0);
   };
   HPR_CHECK(first_row % kBlockSide == 0);
-  for (const PathPoint& point : points) {
+  for (const PathVertex& point : points) {
     // What glows is no light that falls on it.
     if (is_tap(point) && shows_one(point) && point.material.emission == glm::dvec3(0.0)) set_tap(feature_of(point));
   }
-  for (PathPoint& point : points) {
+  for (PathVertex& point : points) {
     const glm::ivec2 block = block_of(point.pixel);
     const bool has_tap = taps_->kinds.at(TapPlanes::index(block.x, block.y)) != NeighborFeatures<double>::kNoTap;
     if (!has_tap || is_tap(point) || !shows_one(point)) continue;
@@ -115,9 +115,9 @@ void HalfResShading::choose(std::vector<PathPoint>& points, int first_row) {
     joint_bilateral_weights(*taps_, center, weights_);
     if (weights_.sum == 0.0) continue;
     upsampled_.push_back(feature);
-    point.borrows = shared_;
+    point.upsampled = shared_;
     for (const PassInfo* const pass : passes_) {
-      if (pass->lobe) point.follows.at(static_cast<std::size_t>(*pass->lobe)) = 0.0F;
+      if (pass->lobe) point.lobe_weights.at(static_cast<std::size_t>(*pass->lobe)) = 0.0F;
     }
   }
 }

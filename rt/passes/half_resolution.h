@@ -24,8 +24,8 @@ class HalfResShading {
   void start(ComponentSet shared, const LightContext& context, const TileJob& job);
 
   /// Decides which pixels are upsampled among the first generation of points of some rows, whole blocks of them: those
-  /// have PathPoint::borrows set and follow no ray of a shared pass.
-  void choose(std::vector<PathPoint>& points, int first_row);
+  /// have PathVertex::upsampled set and follow no ray of a shared pass.
+  void choose(std::vector<PathVertex>& points, int first_row);
 
   /// Once all light of the tile is computed: adds to each upsampled pixel the mean of the taps about it.
   void upsample(PixelSums& sums);
@@ -40,11 +40,11 @@ class HalfResShading {
     std::array<glm::vec3, kPasses> scattering{};  ///< of the shared passes: about the fraction that reaches the eye
   };
 
-  [[nodiscard]] Feature feature_of(const PathPoint& point) const;
+  [[nodiscard]] Feature feature_of(const PathVertex& point) const;
   void set_tap(const Feature& feature);
   /// The center of a pixel; its window is to be set.
   [[nodiscard]] FilterCenter<double> center_of(const Feature& feature) const;
-  [[nodiscard]] bool is_tap(const PathPoint& point) const;
+  [[nodiscard]] bool is_tap(const PathVertex& point) const;
   [[nodiscard]] FilterWindow taps_about(std::uint32_t pixel) const;
 
   ComponentSet shared_ = 0;

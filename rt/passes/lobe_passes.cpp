@@ -19,8 +19,8 @@ class ReflectionPass final : public Pass {
                                : "no material is smoother than the glossy cutoff"};
   }
 
-  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
-              std::vector<PathPoint>& next) const override {
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& next) const override {
     const PassInfo& pass = info_of(PassId::Reflection);
     follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
   }
@@ -33,15 +33,16 @@ class RefractionPass final : public Pass {
     return scene.refraction;
   }
 
-  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
-              std::vector<PathPoint>& next) const override {
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& next) const override {
     const PassInfo& pass = info_of(PassId::Refraction);
     follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
   }
 };
 
 /// Indirect light along rays: lobes that no other pass follows are followed too, so that paths go on until they leave
-/// the scene. What photons do where lights are small, without their blur; an even sky's own light comes the same way.
+/// the scene. What photons do where lights are small, without their blur; the light of a constant environment comes
+/// that way too.
 class GatherPass final : public Pass {
  public:
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
@@ -52,8 +53,8 @@ class GatherPass final : public Pass {
     return gathers_by_rays(scene, settings);
   }
 
-  void spread(const LightContext& context, const Wave& wave, RayBuffers& buffers, PixelSums& sums,
-              std::vector<PathPoint>& next) const override {
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& next) const override {
     for (const Lobe lobe : kLobes) follow_lobe(context, wave, info_of(PassId::Gather), lobe, buffers, sums, next);
   }
 };

@@ -54,7 +54,7 @@ void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::span<con
 
 }  // namespace
 
-void PixelSums::clear(std::size_t tile, std::span<const LitSample> samples, bool all_components, bool with_diffuse) {
+void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, bool all_components, bool with_diffuse) {
   const LightOutput& output = samples.front().output;  // all want the same
   wants_components =
       all_components || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
@@ -69,7 +69,7 @@ void PixelSums::clear(std::size_t tile, std::span<const LitSample> samples, bool
     if (wants_diffuse) clear_sums(diffuse_components.at(i), pixels, wanted);
   }
   if (wants_cost) cost.assign(pixels, 0.0F);
-  for (const LitSample& sample : samples) {
+  for (const ShadedSample& sample : samples) {
     for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
       if (layer != nullptr) std::ranges::fill(layer->tile(tile), Rgb{});
     }
@@ -107,13 +107,13 @@ void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& o
   }
 }
 
-void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t tile, const LightOutput& output) {
+void add_first_surfaces(const std::vector<PathVertex>& points, std::size_t tile, const LightOutput& output) {
   for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
     if (layer == nullptr) continue;
     const auto pixels = layer->tile(tile);
-    for (const PathPoint& point : points) {
+    for (const PathVertex& point : points) {
       const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
-      const Rgb part = to_rgb(point.share * value);
+      const Rgb part = to_rgb(point.coverage * value);
       Rgb& sum = pixels[point.pixel % kTilePixels];
       sum = {sum.r + part.r, sum.g + part.g, sum.b + part.b};
     }

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/passes/pass_list.h"
 
 namespace hpr {
@@ -20,7 +20,7 @@ class PixelSums {
   /// Sets all sums of tile `tile` to 0 where `samples` want them, and what the samples store directly (normal, albedo).
   /// `all_components`: also those that no sample wants. `with_diffuse`: also the diffuse part of each, and
   /// there is room for one more sample behind those given (a denoiser's).
-  void clear(std::size_t tile, std::span<const LitSample> samples, bool all_components, bool with_diffuse);
+  void clear(std::size_t tile, std::span<const ShadedSample> samples, bool all_components, bool with_diffuse);
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
@@ -32,12 +32,12 @@ class PixelSums {
     if (wants_components) add_to_component(pixel, component, light, is_diffuse);
   }
   /// Adds diffuse light that something hides, to components that are wanted: as direct light and its shadow.
-  void add_hidden(std::uint32_t pixel, const glm::dvec3& light) {
+  void add_shadowed(std::uint32_t pixel, const glm::dvec3& light) {
     add_to_component(pixel, Component::Direct, light, true);
     add_to_component(pixel, Component::Shadow, -light, true);
   }
   /// Counts a ray that was traced for a pixel.
-  void charge_ray(std::uint32_t pixel) {
+  void count_ray(std::uint32_t pixel) {
     if (wants_cost) cost[pixel] += 1.0F;
   }
 
@@ -52,8 +52,8 @@ class PixelSums {
   // Per pixel of the tile, sample after sample; all but the radiance only when wanted.
   std::vector<glm::dvec3> radiance;
   std::array<std::vector<glm::dvec3>, kComponents> components;
-  /// Of the radiance, what the first surface scatters by lobes that no pass follows for itself, but for what lights
-  /// bring that are sampled; and the part of each component that is so.
+  /// The diffuse part of the radiance: what the first surface scatters by lobes that no pass follows for itself,
+  /// without the light of sampled lights; then the diffuse part of each component.
   std::vector<glm::dvec3> diffuse;
   std::array<std::vector<glm::dvec3>, kComponents> diffuse_components;
   std::vector<float> cost;  ///< rays traced
@@ -69,7 +69,7 @@ class PixelSums {
 [[nodiscard]] bool fits_floats(const glm::dvec3& light);
 
 /// Adds normal and base color of what each pixel sees to tile `tile`, of several surfaces each by its share.
-void add_first_surfaces(const std::vector<PathPoint>& points, std::size_t tile, const LightOutput& output);
+void add_first_surfaces(const std::vector<PathVertex>& points, std::size_t tile, const LightOutput& output);
 
 /// Makes the tile active in all layers there are.
 void set_active(const LightOutput& output, std::size_t tile);

@@ -18,15 +18,16 @@ class ShadowPass final : public Pass {
     return scene.shadow;
   }
 
-  void hide(const LightContext& context, RayBuffers& buffers, PixelSums& sums, Wave& wave) const override {
+  void trace_shadows(const LightContext& context, RayBuffers& buffers, PixelSums& sums,
+                     Wavefront& wave) const override {
     buffers.requests.clear();
     for (std::uint32_t i = 0; i < wave.samples.size(); ++i) {
       const DirectSample& sample = wave.samples[i];
       if (!sample.light.casts_shadows) continue;
-      const PathPoint& point = wave.points[sample.point];
+      const PathVertex& point = wave.vertices[sample.point];
       buffers.requests.push_back(towards(context, point, sample.light));
       buffers.requests.back().owner = i;
-      sums.charge_ray(point.pixel);
+      sums.count_ray(point.pixel);
     }
     std::vector<float> passed(buffers.requests.size());
     buffers.counts[PassId::Shadow] += buffers.requests.size();
@@ -35,7 +36,7 @@ class ShadowPass final : public Pass {
   }
 
  private:
-  static RayRequest towards(const LightContext& context, const PathPoint& point, const LightSample& light) {
+  static RayRequest towards(const LightContext& context, const PathVertex& point, const LightSample& light) {
     RayRequest ray;
     ray.origin = ray_origin(point.surface, light.to_light);
     const bool viewers_side = glm::dot(light.to_light, point.surface.geometric_normal) > 0.0;

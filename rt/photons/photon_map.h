@@ -145,7 +145,7 @@ class PhotonMap {
 
   static constexpr double kMiddle = 1073741824.0;  // 2^30 cells each way
   static constexpr double kLast = 2.0 * kMiddle - 2.0;
-  static constexpr double kLeastCosine2 = 0.25;
+  static constexpr double kMinCosine2 = 0.25;
 
   void sort(std::span<const Photon> photons);
 

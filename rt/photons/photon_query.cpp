@@ -83,13 +83,13 @@ struct Wanted {
     radius2 = all(static_cast<float>(search.radius2));
     inverse_radius2 = all(static_cast<float>(search.inverse_radius2));
     flatness = all(static_cast<float>(search.flatness));
-    least_cosine2 = all(static_cast<float>(search.least_cosine2));
+    min_cosine2 = all(static_cast<float>(search.min_cosine2));
     layer = hn::Set(Words(), static_cast<std::int32_t>(search.layer));
   }
   glm::vec3 high;  ///< the place: as a float, and what that leaves out
   glm::vec3 low;
   glm::vec3 normal;
-  Vector radius2, inverse_radius2, flatness, least_cosine2;
+  Vector radius2, inverse_radius2, flatness, min_cosine2;
   hn::Vec<Words> layer;
 };
 
@@ -109,8 +109,8 @@ HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* places, Vector& w
   const Vector cosine = dot(facing, wanted.normal);
   const Mask near =
       hn::And(hn::Lt(distance2, wanted.radius2), hn::Le(hn::Abs(dot(way, wanted.normal)), wanted.flatness));
-  const Mask turned = hn::And(hn::Gt(cosine, hn::Zero(Floats())),
-                              hn::Ge(square(cosine), hn::Mul(wanted.least_cosine2, length2(facing))));
+  const Mask turned =
+      hn::And(hn::Gt(cosine, hn::Zero(Floats())), hn::Ge(square(cosine), hn::Mul(wanted.min_cosine2, length2(facing))));
   return hn::And(same_layer, hn::And(near, turned));
 }
 

@@ -21,13 +21,13 @@ namespace hpr {
 /// transmission always, as what lies behind a surface is seldom what lights it.
 [[nodiscard]] bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff);
 
-/// Whether the eye's paths follow reflections of anything in the scene, as far as its least roughness tells.
+/// Whether the eye's paths follow reflections of anything in the scene, judged by its least roughness.
 [[nodiscard]] bool follows_reflections(const Requirements& scene, double glossy_cutoff);
 
-/// Whether light that photons bring may show on anything in the scene, as far as its materials tell.
+/// Whether light that photons bring may show on anything in the scene, judged by its materials.
 [[nodiscard]] bool may_take_photons(const Requirements& scene, double glossy_cutoff);
 
-/// Whether some lobe is not.
+/// Whether some lobe is not followed and so takes photons.
 [[nodiscard]] bool takes_photons(const Bsdf& bsdf, double glossy_cutoff);
 
 /// Photons about a place on a surface, in ray space.
@@ -39,12 +39,12 @@ struct PhotonSearch {
   std::uint32_t layer_step = 0;
   std::uint32_t last_slot = 0;  ///< as many slots as a power of two, less one
   glm::dvec3 normal{0.0};       ///< of the surface, unit length
-  std::uint8_t layer = 0;       ///< photons count of the same,
+  std::uint8_t layer = 0;       ///< photons of this layer count,
   double radius2 = 0.0;         ///< photons count that lie nearer than its root,
   double inverse_radius2 = 0.0;
   double cells_per_unit = 0.0;
-  double flatness = 0.0;       ///< so much off the plane at the most,
-  double least_cosine2 = 0.0;  ///< and on surfaces whose normal has a cosine to this one of at least its root
+  double flatness = 0.0;     ///< so much off the plane at the most,
+  double min_cosine2 = 0.0;  ///< and on surfaces whose normal has a cosine to this one of at least its root
 };
 
 /// Finds the photons that count in the 3 x 3 rows of cells about a place, with Epanechnikov's weight 1 - d^2 / r^2: row

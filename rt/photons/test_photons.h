@@ -8,7 +8,7 @@
 #include "rt/photons/photon_tracer.h"
 #include "rt/test_scene.h"
 
-/// Rooms and photon sources for tests, without LightSet.
+/// Rooms and photon sources for tests, without LightSampler.
 namespace hpr::test {
 
 /// The cube [-1, 1]^3 from inside, as six quads in the order -x +x -y +y -z +z: wall w is surfaces 2 w and 2 w + 1.

@@ -16,8 +16,8 @@
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/photons/photon_query.h"
+#include "rt/trace/coverage_traversal.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/ray_walk.h"
 #include "rt/trace/surfaces.h"
 
 namespace hpr {
@@ -27,7 +27,7 @@ namespace {
 struct PathScene {
   const Scene& scene;
   const RayScene& rays;
-  const LightSet& lights;
+  const LightSampler& lights;
   RaySpace space;
   Surfaces surfaces;
   PathSettings settings;
@@ -42,16 +42,16 @@ struct Path {
   glm::dvec3 followed{1.0};    ///< the part of throughput that came by lobes the passes follow
   glm::dvec3 from{0.0};        ///< where it was scattered last, and the normal (light_normal) lights were chosen by
   glm::dvec3 from_normal{0.0};
-  double pdf = 0.0;        ///< of the direction it was sent in, per solid angle; 0: the only one
-  double squeeze = 1.0;    ///< the part of throughput that is radiance squeezed by refraction, not energy lost
-  double travelled = 0.0;  ///< metres before its origin: from the eye to the near plane
-  double reach = 0.0;      ///< metres
-  Media media;             ///< that the ray goes through
+  double pdf = 0.0;             ///< of the direction it was sent in, per solid angle; 0: the only one
+  double radiance_scale = 1.0;  ///< the part of throughput that is radiance squeezed by refraction, not energy lost
+  double travelled = 0.0;       ///< metres before its origin: from the eye to the near plane
+  double reach = 0.0;           ///< metres
+  Media media;                  ///< that the ray goes through
   Sampler sampler;
   std::uint32_t pixel = 0;
   int segments = 1;  ///< including the one ahead
   int passed = 0;    ///< surfaces since the last scattering, by chance
-  Passed last;       ///< of those
+  Passed last;       ///< the last of the surfaces passed
 };
 
 /// Light on its way to a path's surface, if nothing stands between.
@@ -62,14 +62,14 @@ struct ShadowRay {
   glm::dvec3 radiance{0.0};  ///< what reaches the pixel
   std::uint32_t pixel = 0;
   int passed = 0;  ///< surfaces, by their coverage
-  Passed last;     ///< of those
+  Passed last;     ///< the last of the surfaces passed
 };
 
 /// The paths of some pixels, all in step: each step traces the rays of every path sorted by the lobe that sent them,
 /// adds the light found, and leaves one ray or none for each path. So there are never more rays in flight than pixels.
-class PathWave {
+class PathWavefront {
  public:
-  explicit PathWave(const PathScene& shared) : shared_(shared) {}
+  explicit PathWavefront(const PathScene& shared) : shared_(shared) {}
 
   /// Starts with black pixels and no paths.
   void start(const View& view, std::size_t pixels);
@@ -87,16 +87,17 @@ class PathWave {
 
   void trace_paths();
   void arrive(Path& path, std::size_t kind, const Passed& met);
-  /// Of the batch's rays. Where some materials let rays pass, met_ says what each has passed, and then what it met.
+  /// Finds the hits of the batch's rays. Where some materials let rays pass, met_ says what each has passed, and then
+  /// what it met.
   void find_hits();
   void miss(const Path& path);
   void add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface, const glm::dvec3& emission);
   void scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material);
-  void ask_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
-                 const std::array<double, kLobes.size()>& chances);
-  bool survives(Path& path);
+  void sample_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
+                    const std::array<double, kLobes.size()>& chances);
+  bool survives_roulette(Path& path);
   void trace_shadows();
-  void pass_covers();
+  void trace_through_coverage();
 
   const PathScene& shared_;
   const View* view_ = nullptr;
@@ -124,21 +125,21 @@ double largest(const glm::dvec3& v) {
 }
 
 /// By how much radiance is squeezed (or, on its way out, stretched) where it is refracted.
-double squeeze_of(const MaterialPoint& material, const SurfacePoint& point) {
+double radiance_scale_of(const MaterialPoint& material, const SurfacePoint& point) {
   if (!material.solid || !(material.ior > 0.0)) return 1.0;
   const double squared = material.ior * material.ior;
   return point.inside ? squared : 1.0 / squared;
 }
 
 /// How likely each lobe is chosen: as much of the path's light as it scatters, by energy: so that clear glass changes
-/// the weight of a path by nothing but the squeeze. False when no lobe is there.
-bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double squeeze,
+/// the weight of a path by nothing but the radiance_scale. False when no lobe is there.
+bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double radiance_scale,
                     std::array<double, kLobes.size()>& chances) {
   double sum = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
     const glm::dvec3 part = throughput * bsdf.weight(kLobes[i]);
     chances[i] = part.x + part.y + part.z;
-    if (kLobes[i] == Lobe::Transmission && bsdf.is_delta(kLobes[i])) chances[i] /= squeeze;
+    if (kLobes[i] == Lobe::Transmission && bsdf.is_delta(kLobes[i])) chances[i] /= radiance_scale;
     sum += chances[i];
   }
   if (!(sum > 0.0) || !std::isfinite(sum)) return false;
@@ -174,7 +175,7 @@ glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size
   return share;
 }
 
-std::size_t pick(const std::array<double, kLobes.size()>& chances, double u) {
+std::size_t choose_lobe(const std::array<double, kLobes.size()>& chances, double u) {
   std::size_t last = 0;
   for (std::size_t i = 0; i < chances.size(); ++i) {
     if (!(chances[i] > 0.0)) continue;
@@ -185,18 +186,18 @@ std::size_t pick(const std::array<double, kLobes.size()>& chances, double u) {
   return last;
 }
 
-void PathWave::start(const View& view, std::size_t pixels) {
+void PathWavefront::start(const View& view, std::size_t pixels) {
   view_ = &view;
   radiance_.assign(pixels, glm::dvec3(0.0));
   for (auto& paths : paths_) paths.clear();
 }
 
-void PathWave::add(const Path& path) {
+void PathWavefront::add(const Path& path) {
   paths_[0].push_back(path);
   ++counts_.paths;
 }
 
-void PathWave::run() {
+void PathWavefront::run() {
   const auto some_left = [&] { return std::ranges::any_of(paths_, [](const auto& paths) { return !paths.empty(); }); };
   while (some_left()) {
     for (auto& paths : next_) paths.clear();
@@ -207,13 +208,13 @@ void PathWave::run() {
   }
 }
 
-void PathWave::find_hits() {
+void PathWavefront::find_hits() {
   hits_.resize(batch_.size());
   counts_.invalid +=
       shared_.has_coverage ? shared_.rays.closest(batch_, met_, hits_) : shared_.rays.closest(batch_, hits_);
 }
 
-void PathWave::trace_paths() {
+void PathWavefront::trace_paths() {
   batch_.clear();
   met_.clear();
   for (const auto& paths : paths_) {
@@ -242,7 +243,7 @@ void PathWave::trace_paths() {
   }
 }
 
-void PathWave::miss(const Path& path) {
+void PathWavefront::miss(const Path& path) {
   // A background is a backdrop, to be looked at as unlit surfaces are: no light.
   const glm::dvec3 light = shared_.lights.environment(path.direction);
   if (!shared_.scene.environment) {
@@ -259,7 +260,7 @@ void PathWave::miss(const Path& path) {
   radiance_[path.pixel] += path.throughput * light * weight;
 }
 
-void PathWave::arrive(Path& path, std::size_t kind, const Passed& met) {
+void PathWavefront::arrive(Path& path, std::size_t kind, const Passed& met) {
   shared_.surfaces.load(met.surface, triangle_);
   const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
   const Material& look = shared_.scene.materials[point.material];
@@ -278,8 +279,8 @@ void PathWave::arrive(Path& path, std::size_t kind, const Passed& met) {
   }
   const MaterialPoint material = evaluate_material(shared_.scene, point);
   const double metres = path.travelled + glm::distance(path.origin, point.position);
-  path.throughput *=
-      path.segments == 1 ? left_after(path.media.here, metres) : left_at(path.media, point, material, metres);
+  path.throughput *= path.segments == 1 ? transmittance(path.media.here, metres)
+                                        : transmittance_to(path.media, point, material, metres);
   if (material.unlit) {
     // A colour to be looked at, not light: seen, mirrored and seen through glass, as the passes show it.
     radiance_[path.pixel] += path.throughput * path.followed * material.emission;
@@ -293,8 +294,8 @@ void PathWave::arrive(Path& path, std::size_t kind, const Passed& met) {
   scatter(path, point, material);
 }
 
-void PathWave::add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface,
-                            const glm::dvec3& emission) {
+void PathWavefront::add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface,
+                                 const glm::dvec3& emission) {
   double weight = 1.0;
   if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
     const double by_light = shared_.lights.surface_pdf_any(path.from, path.from_normal, surface, point);
@@ -305,14 +306,14 @@ void PathWave::add_emission(const Path& path, const SurfacePoint& point, std::ui
   radiance_[path.pixel] += path.throughput * emission * weight;
 }
 
-void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material) {
+void PathWavefront::scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material) {
   const Bsdf bsdf(material, point);
   std::array<double, kLobes.size()> chances{};
-  const double squeeze = squeeze_of(material, point);
-  if (!choose_chances(bsdf, path.throughput, squeeze, chances)) return;
-  ask_light(path, point, material, bsdf, chances);
+  const double radiance_scale = radiance_scale_of(material, point);
+  if (!choose_chances(bsdf, path.throughput, radiance_scale, chances)) return;
+  sample_light(path, point, material, bsdf, chances);
 
-  const std::size_t chosen = pick(chances, path.sampler.one());
+  const std::size_t chosen = choose_lobe(chances, path.sampler.one());
   const Lobe lobe = kLobes[chosen];
   const auto sample = bsdf.sample(lobe, next_two(path.sampler, path.segments - 1));
   if (!sample) return;
@@ -327,8 +328,8 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
     path.followed *= followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
     path.pdf = scattered.pdf;
   }
-  if (lobe == Lobe::Transmission) path.squeeze *= squeeze;
-  if (!survives(path)) return;
+  if (lobe == Lobe::Transmission) path.radiance_scale *= radiance_scale;
+  if (!survives_roulette(path)) return;
   path.media = media_towards(path.media, point, material, sample->direction);
   path.origin = ray_origin(point, sample->direction);
   path.direction = sample->direction;
@@ -342,8 +343,8 @@ void PathWave::scatter(Path& path, const SurfacePoint& point, const MaterialPoin
   next_[kind_of(lobe)].push_back(path);
 }
 
-void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
-                         const std::array<double, kLobes.size()>& chances) {
+void PathWavefront::sample_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
+                                 const std::array<double, kLobes.size()>& chances) {
   const double u_choice = path.sampler.one();
   const glm::dvec2 u = next_two(path.sampler, path.segments - 1);
   const auto light = shared_.lights.sample_any(point.position, bsdf.light_normal(), *view_, u_choice, u);
@@ -360,7 +361,7 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
     radiance_[path.pixel] += path.followed * radiance;
     return;
   }
-  radiance *= left_of_light(path.media, point, material, light->to_light, light->distance);
+  radiance *= transmittance_to_light(path.media, point, material, light->to_light, light->distance);
 
   ShadowRay& ray = shadows_.emplace_back();
   ray.pixel = path.pixel;
@@ -381,17 +382,17 @@ void PathWave::ask_light(Path& path, const SurfacePoint& point, const MaterialPo
   ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
 }
 
-bool PathWave::survives(Path& path) {
+bool PathWavefront::survives_roulette(Path& path) {
   if (!(largest(path.throughput) > 0.0)) return false;
   if (path.segments < shared_.settings.roulette_from) return true;
-  const double chance = largest(path.throughput) / path.squeeze;
+  const double chance = largest(path.throughput) / path.radiance_scale;
   if (chance >= 1.0) return true;
   if (path.sampler.one() >= chance) return false;
   path.throughput /= chance;
   return true;
 }
 
-void PathWave::trace_shadows() {
+void PathWavefront::trace_shadows() {
   while (!shadows_.empty()) {
     batch_.clear();
     met_.clear();
@@ -401,7 +402,7 @@ void PathWave::trace_shadows() {
     }
     counts_.shadow += shadows_.size();
     if (shared_.has_coverage) {
-      pass_covers();
+      trace_through_coverage();
       continue;
     }
     blocked_.resize(batch_.size());
@@ -413,7 +414,7 @@ void PathWave::trace_shadows() {
   }
 }
 
-void PathWave::pass_covers() {
+void PathWavefront::trace_through_coverage() {
   find_hits();
   std::size_t left = 0;
   for (std::size_t i = 0; i < shadows_.size(); ++i) {
@@ -489,28 +490,28 @@ struct PathTracer::State {
 
   PathScene shared;
   MediumFinder media;
-  std::vector<std::unique_ptr<PathWave>> idle;  ///< kept from tile to tile: fresh pages cost time
+  std::vector<std::unique_ptr<PathWavefront>> idle;  ///< kept from tile to tile: fresh pages cost time
   std::mutex mutex;
   PathCounts counts;
 
-  std::unique_ptr<PathWave> take_wave();
-  void trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
+  std::unique_ptr<PathWavefront> take_wave();
+  void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& place,
                   const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels) const;
 };
 
-std::unique_ptr<PathWave> PathTracer::State::take_wave() {
+std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
   {
     const std::lock_guard lock(mutex);
     if (!idle.empty()) {
-      std::unique_ptr<PathWave> wave = std::move(idle.back());
+      std::unique_ptr<PathWavefront> wave = std::move(idle.back());
       idle.pop_back();
       return wave;
     }
   }
-  return std::make_unique<PathWave>(shared);
+  return std::make_unique<PathWavefront>(shared);
 }
 
-void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
+void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& place,
                                    const SampleNumber& number, std::span<const std::uint8_t> wanted,
                                    std::span<Rgb> pixels) const {
   const DenormalsAsZero mode;
@@ -540,7 +541,7 @@ void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media
   }
 }
 
-PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSet& lights, PathSettings settings)
+PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSampler& lights, PathSettings settings)
     : state_(std::make_unique<State>(PathScene{.scene = scene,
                                                .rays = rays,
                                                .lights = lights,
@@ -569,7 +570,7 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
     const trace::Span span("path trace tile", "tile", tile);
     const TilePlace place = layout.place(tile);
     radiance.set_active(tile);
-    std::unique_ptr<PathWave> wave = state.take_wave();
+    std::unique_ptr<PathWavefront> wave = state.take_wave();
     state.trace_tile(*wave, views[place.screen], eyes[place.screen], place, number, mask_of(wanted, tile),
                      radiance.tile(tile));
     const std::lock_guard lock(state.mutex);

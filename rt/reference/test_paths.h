@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/reference/path_tracer.h"
 #include "rt/test_scene.h"
 #include "rt/trace/ray_scene.h"
@@ -17,7 +17,7 @@ struct PathBench {
   explicit PathBench(const Scene& traced) : scene(traced), rays(traced, RaySpace(traced.bounds), 1), lights(traced) {}
   const Scene& scene;
   RayScene rays;
-  LightSet lights;
+  LightSampler lights;
 };
 
 /// One sample of every pixel, as it is.

@@ -12,7 +12,7 @@
 
 namespace hpr {
 
-struct Picked {
+struct DiscreteSample {
   std::size_t index = 0;
   double probability = 0.0;
   double rest = 0.0;  ///< what is left of the random number, again uniform in [0, 1)
@@ -20,7 +20,7 @@ struct Picked {
 
 /// Chooses i with a probability in proportion to sums[i] - sums[i - 1]. `sums` never falls and ends above 0; what has
 /// no share is never chosen. O(log n).
-[[nodiscard]] inline Picked pick(std::span<const double> sums, double u) {
+[[nodiscard]] inline DiscreteSample sample_discrete(std::span<const double> sums, double u) {
   constexpr double kBelowOne = 1.0 - 1.0 / 9007199254740992.0;
   const double target = std::min(u, kBelowOne) * sums.back();
   // The product may round up to the whole sum: then the last one with a share.

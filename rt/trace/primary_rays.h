@@ -14,11 +14,11 @@
 
 namespace hpr {
 
-/// Of the last draw().
+/// Counts of the last draw().
 struct PrimaryRayStats {
   std::uint64_t rays = 0;      ///< none go through pixels where no box about triangles is seen
-  std::uint64_t invalid = 0;   ///< of those, rays Embree could not bear: they missed
-  std::uint64_t weighed = 0;   ///< depths reckoned in double because two candidates, or the near plane, were close
+  std::uint64_t invalid = 0;   ///< rays that Embree cannot trace (is_traceable): they missed
+  std::uint64_t weighed = 0;   ///< depths computed in double because two candidates, or the near plane, were close
   std::uint64_t retraced = 0;  ///< rays traced again through everything, as their first candidate was no hit
 
   PrimaryRayStats& operator+=(const PrimaryRayStats& other) {
@@ -32,7 +32,7 @@ struct PrimaryRayStats {
 
 /// Makes keys by one ray through each pixel's centre: what Rasterizer makes, from Embree.
 ///
-/// A key's depth is reckoned in double from the triangle and the pixel's ray, and the largest key among the triangles
+/// A key's depth is computed in double from the triangle and the pixel's ray, and the largest key among the triangles
 /// the ray meets stays, exactly as compositing would have it. So the same screen gives the same keys however its area
 /// is cut into parts, however its triangles are dealt to ranks, and with any number of threads. Against the
 /// rasteriser's, other surfaces are seen in the pixels whose centre lies on an edge but for rounding.
@@ -48,12 +48,12 @@ class PrimaryRays {
   /// Merges (maximum) the keys of `parts` of the layer's `screen` into `layer`; tiles become active where something is
   /// seen. `view` is as large as that screen; parts are in its pixels and may reach past it.
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
-  /// The same for several views that differ by their jitter only, kMostLooks at most, together: rays through one pixel
-  /// are quicker in one another's company. Keys of looks[i] go to layers[i]; they are those each draw() would make.
-  /// Where pixels are not `wanted`, which is all of them when null, there are none.
-  void draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
+  /// Draws several views together that differ by their jitter only, at most kMaxViews: rays through one pixel are
+  /// quicker in one packet. Keys of views[i] go to layers[i]; they are those that draw() of each view would make. Where
+  /// pixels are not `wanted`, which is all of them when null, there are none.
+  void draw(std::span<const View> views, std::size_t screen, std::span<const Rect> parts,
             std::span<TileLayer<Key>* const> layers, const PixelMask* wanted = nullptr);
-  static constexpr std::size_t kMostLooks = 16;
+  static constexpr std::size_t kMaxViews = 16;
 
   [[nodiscard]] const PrimaryRayStats& stats() const { return stats_; }
 

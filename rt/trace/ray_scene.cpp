@@ -16,13 +16,13 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "rt/trace/embree_compat.h"
-#include "rt/trace/travelling_rays.h"
+#include "rt/trace/ray_forwarding.h"
 #include "scene/scene.h"
 
 namespace hpr {
 namespace {
 
-constexpr double kMostDistortion = 16.0;
+constexpr double kMaxDistortion = 16.0;
 
 template <typename Handle, void (*release)(Handle)>
 class Owned {
@@ -74,7 +74,7 @@ class Failure {
 };
 
 bool tracable(const float* p) {
-  return std::abs(p[0]) < kFarthestRay && std::abs(p[1]) < kFarthestRay && std::abs(p[2]) < kFarthestRay;
+  return std::abs(p[0]) < kMaxRayDistance && std::abs(p[1]) < kMaxRayDistance && std::abs(p[2]) < kMaxRayDistance;
 }
 
 /// Triangles [range.first, range.last) of a mesh, and the vertices they use, numbered anew unless all triangles are
@@ -254,18 +254,18 @@ RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::
 }
 
 RayScene::~RayScene() {
-  if (others_ != nullptr) others_->remove(part_);
+  if (forwarding_ != nullptr) forwarding_->remove(part_);
 }
 
-void RayScene::share(TravellingRays& others) {
-  HPR_CHECK(others_ == nullptr);
-  part_ = others.add(*this);
-  others_ = &others;
+void RayScene::share(RayForwarding& forwarding) {
+  HPR_CHECK(forwarding_ == nullptr);
+  part_ = forwarding.add(*this);
+  forwarding_ = &forwarding;
 }
 
 void RayScene::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const {
-  if (others_ != nullptr) {
-    others_->for_each(threads, count, body);
+  if (forwarding_ != nullptr) {
+    forwarding_->for_each(threads, count, body);
   } else {
     parallel_for(threads, count, body);
   }
@@ -303,7 +303,7 @@ std::vector<std::uint8_t> shared_instances(const Scene& scene) {
   std::vector<std::uint8_t> shared(scene.instances.size(), 0);
   for (std::size_t i = 0; i < shared.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    shared[i] = uses[instance.mesh] > 1 && distortion(glm::dmat3(instance.to_world)) <= kMostDistortion ? 1 : 0;
+    shared[i] = uses[instance.mesh] > 1 && distortion(glm::dmat3(instance.to_world)) <= kMaxDistortion ? 1 : 0;
   }
   return shared;
 }
@@ -379,11 +379,11 @@ bool validate(const Packet& packet, int* valid) {
     const float dx = std::abs(packet.direction[0][i]);
     const float dy = std::abs(packet.direction[1][i]);
     const float dz = std::abs(packet.direction[2][i]);
-    const int near = static_cast<int>(std::abs(packet.origin[0][i]) < kFarthestRay) &
-                     static_cast<int>(std::abs(packet.origin[1][i]) < kFarthestRay) &
-                     static_cast<int>(std::abs(packet.origin[2][i]) < kFarthestRay);
-    const int finite =
-        static_cast<int>(dx < kFarthestRay) & static_cast<int>(dy < kFarthestRay) & static_cast<int>(dz < kFarthestRay);
+    const int near = static_cast<int>(std::abs(packet.origin[0][i]) < kMaxRayDistance) &
+                     static_cast<int>(std::abs(packet.origin[1][i]) < kMaxRayDistance) &
+                     static_cast<int>(std::abs(packet.origin[2][i]) < kMaxRayDistance);
+    const int finite = static_cast<int>(dx < kMaxRayDistance) & static_cast<int>(dy < kMaxRayDistance) &
+                       static_cast<int>(dz < kMaxRayDistance);
     const int directed = static_cast<int>(dx > 0.0F) | static_cast<int>(dy > 0.0F) | static_cast<int>(dz > 0.0F);
     valid[i] = -(near & finite & directed & static_cast<int>(packet.reach[i] >= 0.0F));
     all &= valid[i];
@@ -418,21 +418,21 @@ std::uint64_t load(const Packet& packet, std::size_t count, embree::RayPacket& r
 
 }  // namespace
 
-bool is_bearable(const RayBatch::Ray& ray) {
+bool is_traceable(const RayBatch::Ray& ray) {
   bool directed = false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float part = std::abs(ray.direction[axis]);
-    if (!(std::abs(ray.origin[axis]) < kFarthestRay) || !(part < kFarthestRay)) return false;
+    if (!(std::abs(ray.origin[axis]) < kMaxRayDistance) || !(part < kMaxRayDistance)) return false;
     directed = directed || part > 0.0F;
   }
   return directed && ray.reach >= 0.0F;
 }
 
 std::uint64_t RayScene::occluded(const RayBatch& rays, std::span<std::uint8_t> blocked) const {
-  return others_ != nullptr ? others_->occluded(part_, rays, blocked) : occluded_here(rays, blocked);
+  return forwarding_ != nullptr ? forwarding_->occluded(part_, rays, blocked) : occluded_local(rays, blocked);
 }
 
-std::uint64_t RayScene::occluded_here(const RayBatch& rays, std::span<std::uint8_t> blocked) const {
+std::uint64_t RayScene::occluded_local(const RayBatch& rays, std::span<std::uint8_t> blocked) const {
   HPR_CHECK(blocked.size() == rays.size());
   embree::Context context;
   embree::start(context, embree::Rays::Incoherent);
@@ -451,17 +451,18 @@ std::uint64_t RayScene::occluded_here(const RayBatch& rays, std::span<std::uint8
 }
 
 std::uint64_t RayScene::closest(const RayBatch& rays, std::span<std::uint32_t> surfaces, Coherence coherence) const {
-  if (others_ == nullptr) return find_closest(rays, nullptr, surfaces, coherence);
-  return others_->closest(part_, rays, {}, surfaces);
+  if (forwarding_ == nullptr) return find_closest(rays, nullptr, surfaces, coherence);
+  return forwarding_->closest(part_, rays, {}, surfaces);
 }
 
 std::uint64_t RayScene::closest(const RayBatch& rays, std::span<Passed> passed,
                                 std::span<std::uint32_t> surfaces) const {
-  return others_ != nullptr ? others_->closest(part_, rays, passed, surfaces) : closest_here(rays, passed, surfaces);
+  return forwarding_ != nullptr ? forwarding_->closest(part_, rays, passed, surfaces)
+                                : closest_local(rays, passed, surfaces);
 }
 
-std::uint64_t RayScene::closest_here(const RayBatch& rays, std::span<Passed> passed,
-                                     std::span<std::uint32_t> surfaces) const {
+std::uint64_t RayScene::closest_local(const RayBatch& rays, std::span<Passed> passed,
+                                      std::span<std::uint32_t> surfaces) const {
   HPR_CHECK(passed.size() == rays.size());
   return find_closest(rays, passed.data(), surfaces, Coherence::Low);
 }

@@ -78,7 +78,7 @@ class DenormalsAsZero {
 inline constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
 
 /// Embree's own limit is the square root of the largest float; past it (or at NaN) builds with assertions abort.
-inline constexpr float kFarthestRay = 1.8e18F;
+inline constexpr float kMaxRayDistance = 1.8e18F;
 
 /// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
 class RayBatch {
@@ -141,10 +141,11 @@ class RayBatch {
   std::vector<Packet> packets_;
 };
 
-/// Whether Embree can bear it: finite, with a direction, within kFarthestRay.
-[[nodiscard]] bool is_bearable(const RayBatch::Ray& ray);
+/// Whether Embree can trace it: finite, with a direction, within kMaxRayDistance.
+[[nodiscard]] bool is_traceable(const RayBatch::Ray& ray);
 
-/// Whether rays that share a packet go the same way; Embree is quicker when told so rightly. No answer depends on it.
+/// Whether rays that share a packet go the same way; a hint that makes Embree quicker where it is right and changes no
+/// result.
 enum class Coherence { Low, High };
 
 /// What a ray has met and passed, if it is sent once more from where it began: it then meets what comes next by
@@ -164,7 +165,7 @@ struct RayGeometry {
   std::uint32_t first_surface = 0;
 };
 
-class TravellingRays;
+class RayForwarding;
 
 /// The scene as Embree holds it: meshes used once go in as world triangles, shared ones as instances of a sub-scene.
 ///
@@ -187,24 +188,26 @@ class RayScene {
   /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
   [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces,
                                       Coherence coherence = Coherence::Low) const;
-  /// The same for rays that may have passed surfaces: passed[i] says which, and is set to what ray i meets now.
+  /// Finds the first surface of rays that may have passed surfaces before: passed[i] says which, and is set to what ray
+  /// i meets now.
   [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<Passed> passed,
                                       std::span<std::uint32_t> surfaces) const;
 
-  /// This is one rank's part of a scene of which the others hold the rest: from now on answers are of all of it, and
-  /// may be asked for inside for_each() only. Ranks call it alike, scene by scene. `others` outlives this.
-  void share(TravellingRays& others);
+  /// Declares this one rank's part of a scene of which the other ranks hold the rest: from now on queries answer for
+  /// all of it, and may be called inside for_each() only. Collective: ranks call it scene by scene in one order.
+  /// `forwarding` outlives this.
+  void share(RayForwarding& forwarding);
   /// Calls body(i) for i in [0, count) by `threads` threads, as parallel_for; collective where the scene is shared.
   void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const;
-  /// Of this rank's part alone.
-  [[nodiscard]] std::uint64_t occluded_here(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
-  [[nodiscard]] std::uint64_t closest_here(const RayBatch& rays, std::span<Passed> passed,
-                                           std::span<std::uint32_t> surfaces) const;
+  /// Queries of this rank's part alone.
+  [[nodiscard]] std::uint64_t occluded_local(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+  [[nodiscard]] std::uint64_t closest_local(const RayBatch& rays, std::span<Passed> passed,
+                                            std::span<std::uint32_t> surfaces) const;
 
   /// Triangles left out because their world positions are beyond what float holds.
   [[nodiscard]] std::uint64_t skipped_triangles() const;
 
-  /// For those in rt/ who ask Embree themselves. Geometry ids of its top level index geometries(); where it holds
+  /// For code in rt/ that calls Embree itself. Geometry ids of its top level index geometries(); where it holds
   /// instances, only instance ids do.
   [[nodiscard]] RTCSceneTy* embree() const;
   [[nodiscard]] std::span<const RayGeometry> geometries() const;
@@ -215,8 +218,8 @@ class RayScene {
                              Coherence coherence) const;
 
   struct Embree;
-  TravellingRays* others_ = nullptr;  ///< null: this is the whole scene
-  std::uint32_t part_ = 0;            ///< its number there
+  RayForwarding* forwarding_ = nullptr;  ///< null: this is the whole scene
+  std::uint32_t part_ = 0;               ///< its number there
   RaySpace space_;
   std::unique_ptr<Embree> embree_;
 };

@@ -33,9 +33,9 @@ std::vector<std::uint32_t> welded(const Mesh& mesh) {
 }
 
 /// Vertices that are joined, as trees (Tarjan 1975, with halved paths).
-class Joined {
+class DisjointSets {
  public:
-  explicit Joined(std::size_t count) : above_(count) { std::iota(above_.begin(), above_.end(), 0U); }
+  explicit DisjointSets(std::size_t count) : above_(count) { std::iota(above_.begin(), above_.end(), 0U); }
 
   std::uint32_t root(std::uint32_t vertex) {
     while (above_[vertex] != vertex) vertex = above_[vertex] = above_[above_[vertex]];
@@ -51,7 +51,7 @@ class Joined {
 
 std::vector<std::uint32_t> parts_of(const Mesh& mesh) {
   const std::vector<std::uint32_t> first = welded(mesh);
-  Joined joined(first.size());
+  DisjointSets joined(first.size());
   for (const glm::uvec3& corners : mesh.triangles) {
     joined.join(first[corners.x], first[corners.y]);
     joined.join(first[corners.x], first[corners.z]);

@@ -30,7 +30,7 @@ struct WorldTriangle {
   double offset = 0.0;                  ///< metres by which ray origins must leave it
 };
 
-/// Where a ray meets a surface, and all that shading asks of the place. World coordinates, metres.
+/// Where a ray meets a surface, and all that shading needs of the place. World coordinates, metres.
 struct SurfacePoint {
   glm::dvec3 position{0.0};          ///< v0 + u e1 + v e2
   glm::dvec3 to_viewer{0.0};         ///< unit length, against the ray

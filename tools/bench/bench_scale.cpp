@@ -73,7 +73,7 @@ class WallBench {
 
   Times draw_one() {
     CountingCommunicator& comm = session_.comm();
-    session_.lighter(plan_.rays).forget_photons();  // of the same sample, in the frame before
+    session_.shader(plan_.rays).discard_photons();  // of the same sample, in the frame before
     barrier(comm);
     const std::size_t bytes_before = comm.bytes_sent();
     const double start = comm.seconds();

@@ -1,4 +1,4 @@
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -49,8 +49,8 @@ LitSphere sphere_about(const Bounds& bounds) {
 
 }  // namespace
 
-LightSet::LightSet(const Scene& scene, EvenSky constant_environment)
-    : even_sky_(constant_environment),
+LightSampler::LightSampler(const Scene& scene, ConstantEnvironment constant_environment)
+    : constant_environment_(constant_environment),
       lit_(sphere_about(scene.bounds)),
       background_(scene.background.r, scene.background.g, scene.background.b),
       triangles_(scene) {
@@ -60,15 +60,15 @@ LightSet::LightSet(const Scene& scene, EvenSky constant_environment)
     punctual_.push_back(make_headlight());
   }
   if (scene.environment && scene.environment->image.size().area() > 0) environment_.emplace(*scene.environment);
-  listed_ = punctual_.size() <= kMostListed ? punctual_.size() : 0;
+  enumerated_ = punctual_.size() <= kMaxEnumerated ? punctual_.size() : 0;
   all_ = make_choices(true);
-  if (listed_ > 0) sampled_ = make_choices(false);
+  if (enumerated_ > 0) sampled_ = make_choices(false);
   sum_powers();
   find_media(scene);
 }
 
 /// A light lies in one place; a mesh that emits, where its first triangle does.
-void LightSet::find_media(const Scene& scene) {
+void LightSampler::find_media(const Scene& scene) {
   const MediumFinder finder(scene);
   if (!finder.absorbs()) return;
   for (const Light& light : punctual_) {
@@ -81,7 +81,7 @@ void LightSet::find_media(const Scene& scene) {
   }
 }
 
-LightSet::Choices LightSet::make_choices(bool punctual) const {
+LightSampler::Choices LightSampler::make_choices(bool punctual) const {
   Choices choices;
   std::vector<LightBounds> standing;
   double sum = 0.0;
@@ -104,12 +104,13 @@ LightSet::Choices LightSet::make_choices(bool punctual) const {
   }
   choices.tree = LightTree(standing);
   const double around = environment_ ? kPi * mean_of(environment_->mean()) : 0.0;
-  const bool left_out = even_sky_ == EvenSky::LeftToRays && environment_ && environment_->is_constant();
+  const bool left_out =
+      constant_environment_ == ConstantEnvironment::LeftToRays && environment_ && environment_->is_constant();
   if (around > 0.0 && !left_out) add_outside(environment_number(), around);
   return choices;
 }
 
-void LightSet::sum_powers() {
+void LightSampler::sum_powers() {
   double sum = 0.0;
   const auto add = [&](double chosen_by, double watts) {
     power_sums_.push_back(sum += chosen_by);
@@ -128,37 +129,37 @@ void LightSet::sum_powers() {
   }
 }
 
-std::size_t LightSet::listed() const {
-  return listed_;
+std::size_t LightSampler::enumerated() const {
+  return enumerated_;
 }
 
-LightSample LightSet::sample_listed(std::size_t light, const glm::dvec3& place, const View& view,
-                                    const glm::dvec2& u) const {
+LightSample LightSampler::sample_enumerated(std::size_t light, const glm::dvec3& place, const View& view,
+                                            const glm::dvec2& u) const {
   return sample_punctual(punctual_[light], place, view, u);
 }
 
-bool LightSet::listed_is_fixed(std::size_t light) const {
+bool LightSampler::enumerated_is_fixed(std::size_t light) const {
   return is_fixed(punctual_[light]);
 }
 
-bool LightSet::has_sampled() const {
+bool LightSampler::has_tree() const {
   return !one().tree.empty() || !one().outside.empty();
 }
 
 /// How often a light outside the tree is chosen: in proportion to its irradiance and to what the tree promises, which
 /// is a rough estimate, and therefore never trusted to rule out either.
-double LightSet::outside_share(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal) const {
+double LightSampler::outside_share(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal) const {
   if (choices.outside.empty()) return 0.0;
   const double from_tree = choices.tree.empty() ? 0.0 : choices.tree.importance(place, normal);
   if (!(from_tree > 0.0)) return 1.0;
   return std::clamp(choices.outside_sums.back() / (choices.outside_sums.back() + from_tree), 0.1, 0.9);
 }
 
-std::optional<LightSet::Chosen> LightSet::choose(const Choices& choices, const glm::dvec3& place,
-                                                 const glm::dvec3& normal, double u) const {
+std::optional<LightSampler::Chosen> LightSampler::choose(const Choices& choices, const glm::dvec3& place,
+                                                         const glm::dvec3& normal, double u) const {
   const double share = outside_share(choices, place, normal);
   if (u < share) {
-    const Picked picked = pick(choices.outside_sums, u / share);
+    const DiscreteSample picked = sample_discrete(choices.outside_sums, u / share);
     return Chosen{choices.outside[picked.index], share * picked.probability, picked.rest};
   }
   if (!(share < 1.0)) return std::nullopt;
@@ -167,8 +168,9 @@ std::optional<LightSet::Chosen> LightSet::choose(const Choices& choices, const g
   return Chosen{choices.in_tree[choice->light], (1.0 - share) * choice->probability};
 }
 
-std::optional<LightSample> LightSet::sample(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
-                                            const View& view, double u_choice, const glm::dvec2& u) const {
+std::optional<LightSample> LightSampler::sample(const Choices& choices, const glm::dvec3& place,
+                                                const glm::dvec3& normal, const View& view, double u_choice,
+                                                const glm::dvec2& u) const {
   const auto chosen = choose(choices, place, normal, u_choice);
   if (!chosen) return std::nullopt;
   LightSample sample;
@@ -187,25 +189,25 @@ std::optional<LightSample> LightSet::sample(const Choices& choices, const glm::d
 }
 
 /// By brightness or by the cosine, as suits the environment; the density is that of both together.
-void LightSet::sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u,
-                                  LightSample& sample) const {
-  const bool by_cosine = normal != glm::dvec3(0.0) && rest < environment_->cosine_share();
+void LightSampler::sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u,
+                                      LightSample& sample) const {
+  const bool by_cosine = normal != glm::dvec3(0.0) && rest < environment_->cosine_fraction();
   sample.to_light = by_cosine ? warp::cosine_lobe(normal, u) : environment_->sample(u);
   sample.distance = std::numeric_limits<double>::infinity();
-  const EnvironmentMap::Seen seen = environment_->look(sample.to_light);
+  const EnvironmentMap::DirectionalRadiance seen = environment_->evaluate(sample.to_light);
   sample.pdf = environment_density(seen.pdf, normal, sample.to_light);
   if (sample.pdf > 0.0) sample.weight = seen.radiance / sample.pdf;
 }
 
-double LightSet::environment_density(double by_brightness, const glm::dvec3& normal,
-                                     const glm::dvec3& direction) const {
+double LightSampler::environment_density(double by_brightness, const glm::dvec3& normal,
+                                         const glm::dvec3& direction) const {
   if (normal == glm::dvec3(0.0)) return by_brightness;
-  const double share = environment_->cosine_share();
+  const double share = environment_->cosine_fraction();
   return (1.0 - share) * by_brightness + share * std::max(0.0, glm::dot(normal, direction)) / kPi;
 }
 
-double LightSet::surface_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
-                             std::uint32_t surface, const SurfacePoint& hit) const {
+double LightSampler::surface_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
+                                 std::uint32_t surface, const SurfacePoint& hit) const {
   const auto triangle = triangles_.find(surface);
   if (!triangle) return 0.0;
   const double in_tree = 1.0 - outside_share(choices, place, normal);
@@ -213,63 +215,63 @@ double LightSet::surface_pdf(const Choices& choices, const glm::dvec3& place, co
   return probability > 0.0 ? triangles_.pdf(*triangle, place, hit.position) * probability : 0.0;
 }
 
-double LightSet::environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
-                                 const glm::dvec3& direction) const {
+double LightSampler::environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
+                                     const glm::dvec3& direction) const {
   if (choices.outside.empty() || choices.outside.back() != environment_number()) return 0.0;
-  // As pick() has it, bit for bit.
+  // Equals sample_discrete(), bit for bit.
   const double before = choices.outside.size() > 1 ? choices.outside_sums[choices.outside.size() - 2] : 0.0;
   const double sum = choices.outside_sums.back();
   const double probability = outside_share(choices, place, normal) * ((sum - before) / sum);
-  return environment_density(environment_->look(direction).pdf, normal, direction) * probability;
+  return environment_density(environment_->evaluate(direction).pdf, normal, direction) * probability;
 }
 
-std::optional<LightSample> LightSet::sample_one(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
+std::optional<LightSample> LightSampler::sample(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
                                                 double u_choice, const glm::dvec2& u) const {
   return sample(one(), place, normal, view, u_choice, u);
 }
 
-std::optional<LightSample> LightSet::sample_any(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
-                                                double u_choice, const glm::dvec2& u) const {
+std::optional<LightSample> LightSampler::sample_any(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
+                                                    double u_choice, const glm::dvec2& u) const {
   return sample(all_, place, normal, view, u_choice, u);
 }
 
-double LightSet::surface_pdf_one(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+double LightSampler::surface_pdf(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
                                  const SurfacePoint& hit) const {
   return surface_pdf(one(), place, normal, surface, hit);
 }
 
-double LightSet::surface_pdf_any(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
-                                 const SurfacePoint& hit) const {
+double LightSampler::surface_pdf_any(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+                                     const SurfacePoint& hit) const {
   return surface_pdf(all_, place, normal, surface, hit);
 }
 
-glm::dvec3 LightSet::environment(const glm::dvec3& direction) const {
-  return environment_ ? environment_->look(direction).radiance : background_;
+glm::dvec3 LightSampler::environment(const glm::dvec3& direction) const {
+  return environment_ ? environment_->evaluate(direction).radiance : background_;
 }
 
-std::optional<glm::dvec3> LightSet::even_environment() const {
+std::optional<glm::dvec3> LightSampler::constant_environment() const {
   if (!environment_) return background_;
   return environment_->is_constant() ? std::optional(environment_->mean()) : std::nullopt;
 }
 
-double LightSet::environment_pdf_one(const glm::dvec3& place, const glm::dvec3& normal,
+double LightSampler::environment_pdf(const glm::dvec3& place, const glm::dvec3& normal,
                                      const glm::dvec3& direction) const {
   return environment_pdf(one(), place, normal, direction);
 }
 
-double LightSet::environment_pdf_any(const glm::dvec3& place, const glm::dvec3& normal,
-                                     const glm::dvec3& direction) const {
+double LightSampler::environment_pdf_any(const glm::dvec3& place, const glm::dvec3& normal,
+                                         const glm::dvec3& direction) const {
   return environment_pdf(all_, place, normal, direction);
 }
 
-double LightSet::power() const {
+double LightSampler::power() const {
   return power_;
 }
 
-std::optional<PhotonStart> LightSet::emit(double u_choice, const glm::dvec2& u_place,
-                                          const glm::dvec2& u_direction) const {
+std::optional<PhotonStart> LightSampler::emit(double u_choice, const glm::dvec2& u_place,
+                                              const glm::dvec2& u_direction) const {
   if (power_sums_.empty() || !(power_sums_.back() > 0.0)) return std::nullopt;
-  const Picked picked = pick(power_sums_, u_choice);
+  const DiscreteSample picked = sample_discrete(power_sums_, u_choice);
   PhotonStart start;
   if (picked.index < punctual_.size()) {
     start = emit_punctual(punctual_[picked.index], lit_, u_place, u_direction);
@@ -277,7 +279,7 @@ std::optional<PhotonStart> LightSet::emit(double u_choice, const glm::dvec2& u_p
     start = triangles_.emit(picked.index - punctual_.size(), picked.rest, u_place, u_direction);
   } else {
     const glm::dvec3 from = environment_->sample(u_direction);
-    const EnvironmentMap::Seen seen = environment_->look(from);
+    const EnvironmentMap::DirectionalRadiance seen = environment_->evaluate(from);
     const double disc = kPi * lit_.radius * lit_.radius;
     start =
         emit_from_outside(lit_, -from, seen.pdf > 0.0 ? seen.radiance * (disc / seen.pdf) : glm::dvec3(0.0), u_place);

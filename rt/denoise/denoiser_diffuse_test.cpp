@@ -6,9 +6,9 @@
 namespace hpr::test {
 namespace {
 
-/// Light that a lacquered surface scatters below its lacquer is shared as if it were matte, what it mirrors is not;
-/// where there are lamps, whose light is not shared, that of the sky still is.
-TEST(Denoiser, MatteLightOfSmoothSurfacesIsSharedAsWidely) {
+/// Light that a lacquered surface scatters below its lacquer is filtered as if the surface were diffuse, what it
+/// mirrors is not; where there are lamps, whose light is not shared, that of the sky still is.
+TEST(Denoiser, DiffuseLightOfSmoothSurfacesIsSharedAsWidely) {
   Scene scene = corner(matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
   for (Material& material : scene.materials) {
     material.roughness = 0.0F;
@@ -28,7 +28,7 @@ TEST(Denoiser, MatteLightOfSmoothSurfacesIsSharedAsWidely) {
   }
 }
 
-/// Where rays that gather follow mirrors too, what those show is not taken for matte light.
+/// Where rays that gather follow mirrors too, what those show is not taken for diffuse light.
 TEST(Denoiser, GatheredMirrorImagesAreNotSharedWidely) {
   Scene scene;
   Material half = mirror(0.5F);
@@ -42,8 +42,8 @@ TEST(Denoiser, GatheredMirrorImagesAreNotSharedWidely) {
   scene.environment = even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = view_from({0, 4, 6}, {0, 0, -1}, {64, 64}, scene);
-  const Image<Rgb> plain = light(scene, view, kGathered).image;
-  const Image<Rgb> smooth = light(scene, view, denoised(kGathered)).image;
+  const Image<Rgb> plain = shade(scene, view, kGathered).image;
+  const Image<Rgb> smooth = shade(scene, view, denoised(kGathered)).image;
   EXPECT_LT(squared_error(smooth, plain), 0.011);  // 0.0145 if they were
 }
 
@@ -54,8 +54,8 @@ TEST(Denoiser, TexturesOfSmoothSurfacesStayInSampledLight) {
   scene.materials[0].roughness = 0.2F;
   finish_scene(scene);
   const View view = view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
-  const Lit plain = light(scene, view, kGathered);
-  const Lit smooth = light(scene, view, denoised(kGathered));
+  const Shaded plain = shade(scene, view, kGathered);
+  const Shaded smooth = shade(scene, view, denoised(kGathered));
   EXPECT_GT(mean(plain.image), 0.05);
   expect_same_inside(smooth.image, plain.image, 1e-3F);
 }

@@ -1,4 +1,4 @@
-#include "rt/trace/ray_walk.h"
+#include "rt/trace/coverage_traversal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,22 +10,23 @@
 
 namespace hpr {
 
-void RayWalk::push(const RayRequest& ray, RayBatch& batch) const {
+void CoverageTraversal::push(const RayRequest& ray, RayBatch& batch) const {
   // Space is scaled by a power of two, so an infinite reach stays one.
   batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale);
 }
 
-double RayWalk::size_of(const glm::dvec3& place) const {
+double CoverageTraversal::size_of(const glm::dvec3& place) const {
   const glm::dvec3 seen = space_.from_world(place);
   return std::max({std::abs(seen.x), std::abs(seen.y), std::abs(seen.z), 1.0}) / space_.scale;
 }
 
-double RayWalk::coverage_of(const SurfacePoint& point) const {
+double CoverageTraversal::coverage_of(const SurfacePoint& point) const {
   return evaluate_alpha(scene_, scene_.materials[point.material], point.uv, point.color.a);
 }
 
-void RayWalk::visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch, const Visit& visit) const {
-  if (holed_ == nullptr) return;
+void CoverageTraversal::visit_alpha_tested(std::span<const RayRequest> rays, TraversalScratch& scratch,
+                                           const Visit& visit) const {
+  if (alpha_tested_ == nullptr) return;
   scratch.waiting.resize(rays.size());
   std::iota(scratch.waiting.begin(), scratch.waiting.end(), 0U);
   scratch.passed.assign(rays.size(), 0);
@@ -39,7 +40,7 @@ void RayWalk::visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch
       scratch.met.push_back(scratch.last[ray]);
     }
     scratch.surfaces.resize(scratch.waiting.size());
-    (void)holed_->closest(scratch.batch, scratch.met, scratch.surfaces);
+    (void)alpha_tested_->closest(scratch.batch, scratch.met, scratch.surfaces);
     std::size_t left = 0;
     for (std::size_t i = 0; i < scratch.waiting.size(); ++i) {
       if (scratch.surfaces[i] == kNoSurface) continue;
@@ -60,14 +61,14 @@ void RayWalk::visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch
   }
 }
 
-std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, WalkScratch& scratch,
-                               Coherence coherence) const {
+std::uint64_t CoverageTraversal::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
+                                         TraversalScratch& scratch, Coherence coherence) const {
   HPR_CHECK(hits.size() == rays.size());
   scratch.batch.clear();
   for (const RayRequest& ray : rays) push(ray, scratch.batch);
   const std::uint64_t invalid = opaque_.closest(scratch.batch, hits, coherence);
   surfaces_.prefetch(hits);
-  if (holed_ == nullptr) return invalid;
+  if (alpha_tested_ == nullptr) return invalid;
   WorldTriangle triangle;
   scratch.rest.assign(rays.begin(), rays.end());
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -77,7 +78,7 @@ std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::
     const SurfacePoint point = surfaces_.meet(triangle, ray.origin, ray.direction);
     ray.reach = std::min(ray.reach, glm::dot(point.position - ray.origin, ray.direction));
   }
-  visit_holed(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint& point, double coverage) {
+  visit_alpha_tested(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint& point, double coverage) {
     if (passes_by_chance(coverage, *rays[i].sampler)) return true;
     hits[i] = point.surface;
     return false;
@@ -85,19 +86,20 @@ std::uint64_t RayWalk::closest(std::span<const RayRequest> rays, std::span<std::
   return invalid;
 }
 
-std::uint64_t RayWalk::passed(std::span<const RayRequest> rays, std::span<float> passed, WalkScratch& scratch) const {
+std::uint64_t CoverageTraversal::passed(std::span<const RayRequest> rays, std::span<float> passed,
+                                        TraversalScratch& scratch) const {
   HPR_CHECK(passed.size() == rays.size());
   scratch.batch.clear();
   for (const RayRequest& ray : rays) push(ray, scratch.batch);
   scratch.blocked.resize(rays.size());
   const std::uint64_t invalid = opaque_.occluded(scratch.batch, scratch.blocked);
   for (std::size_t i = 0; i < rays.size(); ++i) passed[i] = scratch.blocked[i] != 0 ? 0.0F : 1.0F;
-  if (holed_ == nullptr) return invalid;
+  if (alpha_tested_ == nullptr) return invalid;
   scratch.rest.assign(rays.begin(), rays.end());
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (passed[i] == 0.0F) scratch.rest[i].reach = 0.0;
   }
-  visit_holed(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint&, double coverage) {
+  visit_alpha_tested(scratch.rest, scratch, [&](std::size_t i, const SurfacePoint&, double coverage) {
     passed[i] *= static_cast<float>(1.0 - coverage);
     return passed[i] > 0.0F;
   });

@@ -1,4 +1,4 @@
-#include "engine/tile_homes.h"
+#include "engine/tile_ownership.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ int owner_of(std::size_t tile, int sample, int ranks) {
   return static_cast<int>(random() % static_cast<std::uint32_t>(ranks));
 }
 
-TEST(TileHomes, KeysTravelToTheRankThatHadTheTileFirst) {
+TEST(TileOwnership, KeysTravelToTheRankThatHadTheTileFirst) {
   const FrameLayout layout({{700, 300}, {64, 1}});
   for (const int ranks : {1, 2, 3, 5}) {
     run_local_ranks(ranks, [&](Communicator& comm) {
@@ -31,7 +31,7 @@ TEST(TileHomes, KeysTravelToTheRankThatHadTheTileFirst) {
         }
         return owned;
       };
-      TileHomes homes(comm, layout, owned_in(0));
+      TileOwnership homes(comm, layout, owned_in(0));
       EXPECT_EQ(homes.of(comm.rank()), homes.mine());
       for (const int sample : {0, 1, 2}) {
         TileLayer<Key> layer(layout);
@@ -52,13 +52,13 @@ TEST(TileHomes, KeysTravelToTheRankThatHadTheTileFirst) {
   }
 }
 
-TEST(TileHomes, ScatteringGivesEachRankItsTiles) {
+TEST(TileOwnership, ScatteringGivesEachRankItsTiles) {
   const FrameLayout layout({{300, 200}});
   run_local_ranks(3, [&](Communicator& comm) {
     std::vector<std::size_t> owned;
     for (std::size_t tile = static_cast<std::size_t>(comm.rank()); tile < layout.tiles(); tile += 3)
       owned.push_back(tile);
-    TileHomes homes(comm, layout, owned);
+    TileOwnership homes(comm, layout, owned);
     TileLayer<double> layer(layout);
     if (comm.rank() == 0) {
       for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {

@@ -15,16 +15,16 @@ namespace hpr {
 
 /// Surfaces of partial coverage that light is followed through in a row, by the passes and by the reference. Past
 /// them the passes see what covers wholly, the reference and photons nothing.
-inline constexpr int kMostPassed = 1000;
+inline constexpr int kMaxPassed = 1000;
 
 /// Counts a surface that a ray has passed, and came `gained` metres farther by it; false when it is one too many. What
 /// covers nothing does not count, unless nothing was gained: then the ray is caught between coincident surfaces.
 [[nodiscard]] inline bool passes_on(int& passed, double coverage, double gained) {
   if (!(coverage > 0.0) && gained > 0.0) return true;
-  return ++passed <= kMostPassed;
+  return ++passed <= kMaxPassed;
 }
 
-/// A ray that is wanted, in world coordinates.
+/// A ray to trace, in world coordinates.
 struct RayRequest {
   glm::dvec3 origin{0.0};      ///< off the surface it leaves
   glm::dvec3 direction{0.0};   ///< unit length
@@ -34,7 +34,7 @@ struct RayRequest {
 };
 
 /// Memory of one thread, kept from call to call.
-struct WalkScratch {
+struct TraversalScratch {
   RayBatch batch;
   std::vector<std::uint32_t> surfaces;
   std::vector<std::uint8_t> blocked;
@@ -48,32 +48,32 @@ struct WalkScratch {
 
 /// Rays through a scene some of whose surfaces cover only part of what is behind them (alpha MASK and BLEND): such a
 /// surface is met with the probability that it covers, and shadow rays lose the share it covers.
-class RayWalk {
+class CoverageTraversal {
  public:
-  /// All must outlive this. `holed` holds the surfaces of partial coverage, null where there are none; `opaque` the
-  /// others.
-  RayWalk(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& opaque,
-          const RayScene* holed)
-      : scene_(scene), surfaces_(surfaces), space_(space), opaque_(opaque), holed_(holed) {}
+  /// All must outlive this. `alpha_tested` holds the surfaces of partial coverage, null where there are none; `opaque`
+  /// the others.
+  CoverageTraversal(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& opaque,
+                    const RayScene* alpha_tested)
+      : scene_(scene), surfaces_(surfaces), space_(space), opaque_(opaque), alpha_tested_(alpha_tested) {}
 
   /// hits[i] is the surface ray i meets first; kNoSurface where it leaves the scene. Returns how many rays were
   /// invalid.
-  std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, WalkScratch& scratch,
+  std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, TraversalScratch& scratch,
                         Coherence coherence = Coherence::Low) const;
 
   /// passed[i] is the share of light that gets through to the end of ray i: 0 behind anything opaque. Returns how many
   /// rays were invalid.
-  std::uint64_t passed(std::span<const RayRequest> rays, std::span<float> passed, WalkScratch& scratch) const;
+  std::uint64_t passed(std::span<const RayRequest> rays, std::span<float> passed, TraversalScratch& scratch) const;
 
-  /// What visit_holed calls: ray i meets a surface that covers so much; returns whether the ray goes on.
+  /// The callback of visit_alpha_tested: ray i meets a surface that covers so much; returns whether the ray goes on.
   using Visit = std::function<bool(std::size_t ray, const SurfacePoint& point, double coverage)>;
   /// Calls `visit` for every surface of partial coverage along each ray, nearest first, while it passes_on.
-  void visit_holed(std::span<const RayRequest> rays, WalkScratch& scratch, const Visit& visit) const;
+  void visit_alpha_tested(std::span<const RayRequest> rays, TraversalScratch& scratch, const Visit& visit) const;
 
   /// Metres: the largest coordinate of a place as rays see it, which says what rounding it costs.
   [[nodiscard]] double size_of(const glm::dvec3& place) const;
 
-  [[nodiscard]] bool has_holes() const { return holed_ != nullptr; }
+  [[nodiscard]] bool has_alpha_tested() const { return alpha_tested_ != nullptr; }
 
  private:
   [[nodiscard]] double coverage_of(const SurfacePoint& point) const;
@@ -83,7 +83,7 @@ class RayWalk {
   const Surfaces& surfaces_;
   const RaySpace& space_;
   const RayScene& opaque_;
-  const RayScene* holed_;
+  const RayScene* alpha_tested_;
 };
 
 }  // namespace hpr

@@ -28,12 +28,12 @@ struct RayBox {
 inline constexpr float kBoxSlack = 1e-4F;
 
 /// About all of them.
-[[nodiscard]] RayBox box_about(std::span<const RayBox> boxes);
+[[nodiscard]] RayBox enclosing_box(std::span<const RayBox> boxes);
 
 /// Boxes about the surfaces of `part`, 16 at most: few enough to be tried one by one, many enough that empty space
 /// between surfaces is left out.
-[[nodiscard]] std::vector<RayBox> boxes_about(const Scene& scene, const RaySpace& space,
-                                              std::span<const SurfaceRange> part);
+[[nodiscard]] std::vector<RayBox> enclosing_boxes(const Scene& scene, const RaySpace& space,
+                                                  std::span<const SurfaceRange> part);
 
 /// A ray as boxes are met by it.
 struct BoxedRay {
@@ -59,34 +59,34 @@ struct BoxedRay {
   }
 };
 
-/// Rays through a scene of which every rank's Embree holds a part: a ray goes to the ranks whose boxes it meets
-/// before what it meets at home, and what it meets there comes back. Two messages between any two ranks carry all rays
-/// of a round, of whatever kind and generation, and their answers: 28 bytes a ray, 40 where it may have passed
+/// Forwards rays through a scene of which every rank's Embree holds a part: a ray is sent to the remote ranks whose
+/// boxes it meets before its local hit, and its remote hits come back. Two messages between any two ranks carry all
+/// rays of a round, of whatever kind and generation, and their answers: 28 bytes a ray, 40 where it may have passed
 /// surfaces; a bit back for a shadow ray, 12 bytes for others.
 ///
 /// Answers have the bits of a scene that is whole: the nearest of all ranks' hits, the lowest id among equals.
-class TravellingRays {
+class RayForwarding {
  public:
   /// Collective. `part`: the surfaces that this rank holds, any ranges; the ranks' parts are the whole scene. `comm`
   /// outlives this and is used by the threads that call the constructor and for_each() only.
-  TravellingRays(Communicator& comm, const Scene& scene, const RaySpace& space, std::span<const SurfaceRange> part);
+  RayForwarding(Communicator& comm, const Scene& scene, const RaySpace& space, std::span<const SurfaceRange> part);
 
   /// This rank's part of something of which every rank holds one, in the same order on all. Returns its number.
   [[nodiscard]] std::uint32_t add(const RayScene& part);
   void remove(std::uint32_t part) { parts_.erase(part); }
 
   /// Collective, whatever each rank's `count`: calls body(i) for i in [0, count), by many threads, of which
-  /// `threads` at a time do not rest while their rays travel; as many trace what arrives. Returns when all ranks are
+  /// `threads` at a time do not wait for forwarded rays; as many trace the rays that arrive. Returns when all ranks are
   /// done. Rethrows the first exception a call left; the other ranks throw Error (Lost).
   void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body);
 
-  /// As RayScene's, of all ranks' parts of that number; from inside a body of for_each() only. No `passed`: nothing
-  /// was.
+  /// The queries of RayScene over all ranks' parts of that number; from inside a body of for_each() only. Empty
+  /// `passed`: the rays have passed nothing.
   std::uint64_t occluded(std::uint32_t part, const RayBatch& rays, std::span<std::uint8_t> blocked);
   std::uint64_t closest(std::uint32_t part, const RayBatch& rays, std::span<Passed> passed,
                         std::span<std::uint32_t> surfaces);
 
-  /// What rays ask for, as messages have it.
+  /// The kind of a query, as messages encode it.
   struct Kind {
     std::uint32_t part = 0;
     std::uint32_t count = 0;
@@ -97,35 +97,36 @@ class TravellingRays {
  private:
   struct Query;
   struct Run;
-  struct Parcel;
+  struct QueryBlock;
   enum class State : std::uint32_t { Working, Done, Failed };
 
-  /// Of every message, the answers too, which have their question's.
-  struct Head {
+  /// Starts every message; answers repeat that of their query.
+  struct MessageHeader {
     State state = State::Working;
     std::uint32_t round = 0;
   };
 
-  void address(Query& query) const;
-  void ask(Query& query);
+  void route(Query& query) const;
+  void wait_for_answers(Query& query);
   void work(Run& run);
-  [[nodiscard]] State travel(const Run& run);
+  [[nodiscard]] State run_rounds(const Run& run);
   [[nodiscard]] State round(State mine, int threads);
   [[nodiscard]] std::vector<std::vector<std::byte>> pack(State mine) const;
   [[nodiscard]] State state_in(std::span<const std::byte> message) const;
-  static void unpack(std::span<const std::byte> message, std::vector<std::byte>& answers, std::vector<Parcel>& parcels);
-  void answer(const Parcel& parcel) const;
-  void take_answers(std::size_t rank, std::span<const std::byte> answers) const;
+  static void unpack(std::span<const std::byte> message, std::vector<std::byte>& answers,
+                     std::vector<QueryBlock>& blocks);
+  void answer(const QueryBlock& block) const;
+  void store_answers(std::size_t rank, std::span<const std::byte> answers) const;
   void release(bool answered);
 
   Communicator& comm_;
   std::vector<std::vector<RayBox>> boxes_;  ///< [rank]
-  std::vector<RayBox> around_;              ///< all of a rank's
+  std::vector<RayBox> bounds_;              ///< all of a rank's
   std::map<std::uint32_t, const RayScene*> parts_;
   std::uint32_t next_part_ = 0;
 
   std::mutex mutex_;
-  std::condition_variable all_rest_;
+  std::condition_variable all_waiting_;
   std::condition_variable answered_;
   Run* run_ = nullptr;  ///< inside for_each()
   std::vector<Query*> waiting_;

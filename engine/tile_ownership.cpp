@@ -1,4 +1,4 @@
-#include "engine/tile_homes.h"
+#include "engine/tile_ownership.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +18,7 @@ std::vector<std::size_t> read_tiles(std::span<const std::byte> bytes) {
 
 }  // namespace
 
-TileHomes::TileHomes(Communicator& comm, const FrameLayout& layout, std::span<const std::size_t> owned)
+TileOwnership::TileOwnership(Communicator& comm, const FrameLayout& layout, std::span<const std::size_t> owned)
     : mine_(owned.begin(), owned.end()), home_(layout.tiles(), -1) {
   const auto all = all_gather(comm, std::as_bytes(owned));
   for (int rank = 0; rank < comm.size(); ++rank) {
@@ -29,7 +29,7 @@ TileHomes::TileHomes(Communicator& comm, const FrameLayout& layout, std::span<co
   }
 }
 
-std::vector<std::size_t> TileHomes::of(int rank) const {
+std::vector<std::size_t> TileOwnership::of(int rank) const {
   std::vector<std::size_t> tiles;
   for (std::size_t tile = 0; tile < home_.size(); ++tile) {
     if (home_[tile] == rank) tiles.push_back(tile);
@@ -37,7 +37,7 @@ std::vector<std::size_t> TileHomes::of(int rank) const {
   return tiles;
 }
 
-void TileHomes::bring(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> owned) {
+void TileOwnership::bring(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> owned) {
   const std::uint8_t moved = std::ranges::equal(owned, mine_) ? 0 : 1;
   if (std::ranges::none_of(all_gather_value(comm, moved), [](std::uint8_t any) { return any != 0; })) return;
   // The lists of all tell every rank who has what: messages need no list of their own.

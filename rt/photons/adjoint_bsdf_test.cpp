@@ -1,4 +1,4 @@
-#include "rt/photons/flux_scatter.h"
+#include "rt/photons/adjoint_bsdf.h"
 
 #include <gtest/gtest.h>
 
@@ -108,7 +108,7 @@ Sums by_light(const Place& place, Lobe lobe) {
     const MaterialPoint material = evaluate_material(place.scene, surface);
     const Bsdf bsdf(material, surface, Carried::Flux);
     const FluxArrival arrival{surface, material, bsdf, place.triangle};
-    const FluxScatter scatters(place.scene, *place.surfaces, arrival);
+    const AdjointBsdf scatters(place.scene, *place.surfaces, arrival);
     const auto sample = scatters.sample(lobe, sampler);
     EXPECT_TRUE(!sample || sample->weight.r == 0.0 || scatters.weight(lobe).r > 0.0);
     if (!sample) continue;
@@ -126,9 +126,9 @@ Material glass(float roughness, float thickness) {
   return material;
 }
 
-class FluxScatter : public testing::TestWithParam<Leaning> {};
+class AdjointBsdf : public testing::TestWithParam<Leaning> {};
 
-TEST_P(FluxScatter, SendsOnWhatEyesSee) {
+TEST_P(AdjointBsdf, SendsOnWhatEyesSee) {
   const std::array cases{std::tuple("matte", Lobe::Diffuse, surface_of(0.0F, 0.6F)),
                          std::tuple("rough metal", Lobe::Reflection, surface_of(1.0F, 0.5F)),
                          std::tuple("rough varnish", Lobe::Reflection, surface_of(0.0F, 0.9F)),
@@ -154,7 +154,7 @@ std::string name_of(const testing::TestParamInfo<Leaning>& info) {
   return std::to_string(std::lround(info.param.degrees)) + (info.param.mapped ? "DegreesMapped" : "DegreesSmooth");
 }
 
-INSTANTIATE_TEST_SUITE_P(Normals, FluxScatter,
+INSTANTIATE_TEST_SUITE_P(Normals, AdjointBsdf,
                          testing::Values(Leaning{0, false}, Leaning{10, false}, Leaning{40, false}, Leaning{70, false},
                                          Leaning{25, true}, Leaning{58, true}),
                          name_of);

@@ -25,9 +25,9 @@
 namespace hpr {
 
 class RayScene;
-class TravellingRays;
+class RayForwarding;
 
-/// What decides how light is worked out. The same settings give the same picture on any number of ranks and threads.
+/// How light is computed. Equal settings give equal pictures on any number of ranks and threads.
 struct RaySettings {
   std::vector<PassId> passes = {};  ///< those that are named; empty: as `auto_passes` says
   bool auto_passes = true;          ///< where none is named: what the scene requires; false: none
@@ -37,21 +37,22 @@ struct RaySettings {
   double glossy_cutoff = 0.3;       ///< specular lobes of at least this roughness are not followed by rays
   std::uint32_t photons = 0;        ///< sent per sample; 0: kPhotons, and only where the pass is named
   bool global_photons = false;      ///< also those that were scattered by rough surfaces only: all indirect light
-  bool gather = false;              ///< under an even sky rays bring all indirect light, in place of photons
+  bool gather = false;              ///< under a constant environment rays bring all indirect light, in place of photons
   double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density
   int occlusion_rays = 4;           ///< of the ambient-occlusion pass, per point and sample
   double ambient = 0.2;             ///< radiance that pass lets in where nothing is near
-  bool terminator_fix = true;       ///< lifts the origins of shadow rays onto the smooth surface normals pretend
-  RayBuild build = {};              ///< of Embree's scenes
-  /// Passes whose light of the first surface is worked out for one pixel in four and spread to its neighbours where
-  /// they see the like; PassId::Shadow stands for the light of lights.
+  bool terminator_fix = true;  ///< lifts the origins of shadow rays onto the smooth surface that the normals describe
+  RayBuild build = {};         ///< of Embree's scenes
+  /// Passes whose light of the first surface is computed for one pixel in four and upsampled to its neighbors
+  /// (HalfResShading); PassId::Shadow stands for direct light.
   std::vector<PassId> half_resolution = {};
-  /// Surfaces that this rank's rays meet at home, as those of the others travel to it; none: all of them.
+  /// Surfaces that this rank's ray scenes hold, where rays are forwarded between ranks; none: all of them.
   std::optional<std::vector<SurfaceRange>> part = {};
-  bool denoise = false;                   ///< see Denoiser
-  PixelFilter filter = PixelFilter::Box;  ///< of which denoising looks at more places; none of its weights < 0
-  bool reference = false;                 ///< path tracing in place of all passes, paths of max_depth segments
-  std::uint64_t seed = 1;                 ///< of all randomness
+  bool denoise = false;  ///< see Denoiser
+  PixelFilter filter =
+      PixelFilter::Box;    ///< of the pixels, which denoising samples at more places; none of its weights < 0
+  bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
+  std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;
   int host_ranks = 1;  ///< ranks of this host: they share its memory
 
@@ -68,10 +69,10 @@ inline constexpr std::uint32_t kPhotons = 200'000;
 struct RayCounts {
   std::uint64_t primary = 0;                    ///< from the eye: no pass counts them
   std::array<std::uint64_t, kPasses> passes{};  ///< by PassId
-  std::uint64_t invalid = 0;                    ///< of those above, rays Embree could not bear: they missed
-  std::uint64_t cut = 0;                        ///< rays that ended among surfaces of partial coverage, see kMostPassed
+  std::uint64_t invalid = 0;                    ///< rays above that Embree cannot trace (is_traceable): they missed
+  std::uint64_t cut = 0;                        ///< rays that ended among surfaces of partial coverage, see kMaxPassed
   std::uint64_t not_finite = 0;                 ///< pixels whose radiance was no finite number: they are black
-  ScreenPixel first_not_finite;                 ///< of those, in order of screen and row, whoever met it; else kNoPixel
+  ScreenPixel first_not_finite;  ///< the first such pixel by screen and row, on any thread; else kNoPixel
 
   [[nodiscard]] std::uint64_t& operator[](PassId pass) { return passes.at(static_cast<std::size_t>(pass)); }
   [[nodiscard]] std::uint64_t operator[](PassId pass) const { return passes.at(static_cast<std::size_t>(pass)); }
@@ -86,7 +87,7 @@ struct PassTime {
   std::optional<PassId> pass = {};  ///< none: another step
 };
 
-/// Layers a frame is lit into, all of one layout; null where not wanted.
+/// Layers that shading writes, all of one layout; null where not wanted.
 struct LightOutput {
   TileLayer<Rgb>* radiance = nullptr;
   std::array<TileLayer<Rgb>*, kComponents> components{};
@@ -95,59 +96,59 @@ struct LightOutput {
   TileLayer<float>* cost = nullptr;  ///< rays traced for the pixel
 };
 
-/// One of several samples of a frame that are lit together.
-struct LitSample {
+/// One of several samples of a frame that are shaded together.
+struct ShadedSample {
   std::span<const View> views;  ///< those of the samples differ by their jitter only
   const TileLayer<Key>* keys = nullptr;
   LightOutput output;
   SampleNumber number;
-  const PixelMask* wanted = nullptr;  ///< pixels that are lit; null: all. What is stored elsewhere means nothing
+  const PixelMask* wanted = nullptr;  ///< pixels that are shaded; null: all. What is stored elsewhere means nothing
 };
 
 /// Turns keys into radiance: reconstructs the surface each key names, adds emission and direct light, then what the
 /// planned passes add. A pixel's value depends on its key, its view and the scene only; threads, tile lists and ranks
 /// change no bit.
-class Lighter {
+class DeferredShader {
  public:
-  /// Where rays through the surfaces that cover all behind them come from (covering_surfaces); asked once, and only if
-  /// a planned pass needs them. They outlive the lighter.
+  /// Where rays through the surfaces that cover all behind them come from (covering_surfaces); called once, and only if
+  /// a planned pass needs them. They outlive the shader.
   using RaySource = std::function<const RayScene&()>;
 
   /// Builds a ray scene of its own if a planned pass needs one and there is no `rays`. The scene must outlive this, and
-  /// so must `travelling`, by which rays reach what is not in `settings.part`: then light() is collective, and so is
-  /// this.
-  /// Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires looks at
-  /// every texel once.
-  Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {},
-          TravellingRays* travelling = nullptr);
-  Lighter(const Scene& scene, const RaySettings& settings) : Lighter(scene, settings, requirements_of(scene)) {}
-  ~Lighter();
-  Lighter(const Lighter&) = delete;
-  Lighter& operator=(const Lighter&) = delete;
-  Lighter(Lighter&&) noexcept;
-  Lighter& operator=(Lighter&&) noexcept;
+  /// so must `forwarding`, by which rays reach what is not in `settings.part`: then shade() and this constructor are
+  /// collective. Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires
+  /// reads every texel once.
+  DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {},
+                 RayForwarding* forwarding = nullptr);
+  DeferredShader(const Scene& scene, const RaySettings& settings)
+      : DeferredShader(scene, settings, requirements_of(scene)) {}
+  ~DeferredShader();
+  DeferredShader(const DeferredShader&) = delete;
+  DeferredShader& operator=(const DeferredShader&) = delete;
+  DeferredShader(DeferredShader&&) noexcept;
+  DeferredShader& operator=(DeferredShader&&) noexcept;
 
-  /// Collective over `comm`, whose ranks light parts of one frame with the same settings: sends the photons of the
-  /// sample that is lit next, if a planned pass needs any, every rank its share. Without this call light() sends all of
-  /// them itself; pictures are the same.
-  void send_photons(Communicator& comm, const SampleNumber& number = {});
+  /// Collective over `comm`, whose ranks shade parts of one frame with equal settings: traces the photons of the sample
+  /// that is shaded next, if a planned pass needs any, every rank its share. Without this call shade() traces all of
+  /// them itself; pictures are equal.
+  void trace_photons(Communicator& comm, const SampleNumber& number = {});
 
-  /// What the last sample left behind is made anew, so that the same sample once more takes as long as the first time.
-  void forget_photons();
+  /// Discards the photon maps of the last sample, so that shading it once more takes as long as the first time.
+  void discard_photons();
 
-  /// Lights the pixels of `tiles` (indices into the layout of `keys`; screen i of it is seen by views[i], of equal
+  /// Shades the pixels of `tiles` (indices into the layout of `keys`; screen i of it is seen by views[i], of equal
   /// size) and makes them active in all layers of `output`, whose other tiles stay as they are. The background stands
   /// where a key is 0. Values are finite.
-  void light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
+  void shade(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
              const LightOutput& output, const SampleNumber& number = {});
 
-  /// The same for several samples of one frame; where what they share stays at hand, in less time than one by one. To
-  /// the bit what one by one would give. Not where lights_one_by_one().
-  void light(std::span<const LitSample> samples, std::span<const std::size_t> tiles);
-  /// Whether each sample asks for something of its own: photons, the reference, light that pixels share.
-  [[nodiscard]] bool lights_one_by_one() const;
+  /// Shades several samples of one frame together; in less time than one by one where what they share stays in the
+  /// cache, and with the same bits. Not where shades_one_by_one().
+  void shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles);
+  /// Whether samples must be shaded one by one: with photons, the reference, or half-resolution passes.
+  [[nodiscard]] bool shades_one_by_one() const;
 
-  /// Of the last light().
+  /// The rays traced by the last shade(), and the time its steps took.
   [[nodiscard]] const RayCounts& counts() const;
   [[nodiscard]] const std::vector<PassTime>& times() const;
 
@@ -156,16 +157,16 @@ class Lighter {
   std::unique_ptr<State> state_;
 };
 
-/// `--shading local`: lights `tiles` of `keys` and puts the display colour where the surface id stood, so that the
+/// `--shading local`: shades `tiles` of `keys` and puts the display colour where the surface id stood, so that the
 /// nearest key carries its pixel's colour. Pixels without a key stay so. Of equal depths on different ranks the larger
-/// colour word wins, so coplanar surfaces may look different with another number of ranks.
-void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
+/// colour word wins, so coplanar surfaces may show another color with another number of ranks.
+void shade_local(DeferredShader& shader, std::span<const View> views, TileLayer<Key>& keys,
                  std::span<const std::size_t> tiles, const SampleNumber& number = {});
 
 /// The pixels that shade_local leaves without a colour, once no rank has a key for them: of `tiles`, those of `keys`
 /// without one get the radiance that is there in `radiance` (background, environment, surfaces that cover in part); the
-/// others keep theirs. Collective where light() is.
-void light_empty(Lighter& lighter, std::span<const View> views, const TileLayer<Key>& keys,
+/// others keep theirs. Collective where shade() is.
+void shade_empty(DeferredShader& shader, std::span<const View> views, const TileLayer<Key>& keys,
                  std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number = {});
 
 }  // namespace hpr

@@ -1,4 +1,4 @@
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/timing.h"
+#include "rt/denoise/coverage_fragments.h"
 #include "rt/denoise/denoiser.h"
-#include "rt/denoise/pixel_parts.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/half_resolution.h"
 #include "rt/passes/pass.h"
@@ -26,9 +26,9 @@
 namespace hpr {
 namespace {
 
-void check_sizes(std::span<const LitSample> samples) {
+void check_sizes(std::span<const ShadedSample> samples) {
   const FrameLayout& layout = samples.front().keys->layout();
-  for (const LitSample& sample : samples) {
+  for (const ShadedSample& sample : samples) {
     HPR_CHECK(sample.keys->layout() == layout && sample.views.size() == layout.screens());
     for (std::size_t i = 0; i < sample.views.size(); ++i) HPR_CHECK(sample.views[i].size() == layout.size(i));
   }
@@ -56,9 +56,9 @@ struct Scratch {
   RayBuffers buffers;
   HalfResShading shared;
   Denoiser denoiser;
-  PartFinder finder;
-  std::vector<std::vector<PathPoint>> waiting;  ///< by depth
-  Wave wave;
+  FragmentFinder finder;
+  std::vector<std::vector<PathVertex>> waiting;  ///< by depth
+  Wavefront wave;
   std::vector<double> ms;  ///< spent on each step
 };
 
@@ -67,7 +67,8 @@ double spent_ms(const Scratch& scratch) {
   return std::accumulate(scratch.ms.begin(), scratch.ms.end(), 0.0);
 }
 
-/// While rays travel, more threads wait for theirs than there are: of the time that was spent, each step has its share.
+/// While rays are forwarded, more threads run than there are cores, and most of them wait: scales the times of the
+/// steps to the time that was spent.
 void share_out(double spent, std::vector<double>& ms) {
   const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
   for (double& step : ms) step *= sum > 0.0 ? spent / sum : 0.0;
@@ -85,13 +86,13 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
   return *this;
 }
 
-struct Lighter::State {
+struct DeferredShader::State {
   const Scene& scene;
   RaySettings settings;
   std::vector<PassPlan> plan;
   RaySpace space;
   Surfaces surfaces;
-  LightSet lights;
+  LightSampler lights;
   MediumFinder media;
   std::vector<RunningPass> passes;
   ComponentSet shared = 0;  ///< see HalfResShading
@@ -99,23 +100,23 @@ struct Lighter::State {
   bool gathers;
   std::optional<RayScene> own_opaque;
   const RayScene* opaque = nullptr;
-  std::optional<RayScene> holed;
-  std::optional<RayWalk> rays;
+  std::optional<RayScene> alpha_tested;
+  std::optional<CoverageTraversal> rays;
   std::optional<RayScene> whole;  ///< for photons; only where `opaque` is not all
-  std::optional<PhotonSender> photons;
+  std::optional<PhotonMapBuilder> photons;
   std::optional<PathTracer> reference;
-  PixelParts parts;  ///< what denoising looks at again
+  CoverageFragments fragments;  ///< of the pixels that denoising samples again
   std::vector<std::unique_ptr<Scratch>> idle;
   std::mutex mutex;
   RayCounts counts;
-  double photon_ms = 0.0;  ///< spent on sending, since light() last told
-  bool has_told = false;   ///< that rays were cut
+  double photon_ms = 0.0;   ///< spent on tracing photons, since the last gather_counts()
+  bool has_warned = false;  ///< that rays were cut
   std::vector<PassTime> times;
 
-  TravellingRays* travelling;
+  RayForwarding* forwarding;
 
   State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
-        TravellingRays* others);
+        RayForwarding* others);
   void build_rays(const RaySource& source);
   const RayScene& build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects);
   void build_photons();
@@ -123,30 +124,30 @@ struct Lighter::State {
   void for_each(std::size_t count, const std::function<void(std::size_t)>& body) const;
   /// What rays meet that decide about coverage themselves.
   const RayScene& whole_scene();
-  void trace_reference(const LitSample& sample, std::span<const std::size_t> tiles);
-  const PhotonMaps* send_photons(const SampleNumber& number, Communicator* comm);
-  void tell_of_cut_rays();
+  void trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles);
+  const PhotonMaps* trace_photons(const SampleNumber& number, Communicator* comm);
+  void warn_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
-  void light_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
-                  std::span<const LitSample> samples);
+  void shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+                  std::span<const ShadedSample> samples);
   void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
-  void tell(double spent_ms);
-  void light_waiting(const LightContext& context, Scratch& scratch) const;
-  void light_wave(const LightContext& context, Scratch& scratch) const;
+  void gather_counts(double spent_ms);
+  void shade_waiting(const LightContext& context, Scratch& scratch) const;
+  void shade_wavefront(const LightContext& context, Scratch& scratch) const;
 };
 
-Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
-                      TravellingRays* others)
+DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
+                             const RaySource& source, RayForwarding* others)
     : scene(lit),
       settings(std::move(chosen)),
       plan(plan_passes(requirements, settings)),
       space(lit.bounds),
       surfaces(lit, space, lifts_origins(plan, settings)),
-      lights(lit, gathers_all_lobes(plan) ? EvenSky::LeftToRays : EvenSky::Sampled),
+      lights(lit, gathers_all_lobes(plan) ? ConstantEnvironment::LeftToRays : ConstantEnvironment::Sampled),
       media(lit),
       shared(shared_components(settings)),
       gathers(gathers_all_lobes(plan)),
-      travelling(others) {
+      forwarding(others) {
   for (const PassPlan& planned : plan) {
     if (!planned.runs) continue;
     const PassInfo& info = info_of(planned.pass);
@@ -160,15 +161,15 @@ Lighter::State::State(const Scene& lit, RaySettings chosen, const Requirements& 
   if (settings.reference) build_reference();
 }
 
-/// Of `objects` this rank's part.
-const RayScene& Lighter::State::build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects) {
+/// Builds the ray scene of this rank's part of `objects`.
+const RayScene& DeferredShader::State::build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects) {
   if (settings.part) objects = common_ranges(merged_ranges(*settings.part, scene.triangles), objects);
   made.emplace(scene, space, settings.threads, objects, settings.build);
-  if (travelling != nullptr) made->share(*travelling);
+  if (forwarding != nullptr) made->share(*forwarding);
   return *made;
 }
 
-void Lighter::State::for_each(std::size_t count, const std::function<void(std::size_t)>& body) const {
+void DeferredShader::State::for_each(std::size_t count, const std::function<void(std::size_t)>& body) const {
   if (opaque != nullptr) {
     opaque->for_each(settings.threads, count, body);
   } else {
@@ -176,23 +177,23 @@ void Lighter::State::for_each(std::size_t count, const std::function<void(std::s
   }
 }
 
-void Lighter::State::build_rays(const RaySource& source) {
+void DeferredShader::State::build_rays(const RaySource& source) {
   opaque = source ? &source() : &build(own_opaque, covering_surfaces(scene, false));
   std::uint64_t skipped = opaque->skipped_triangles();
-  if (const auto with_holes = covering_surfaces(scene, true); !with_holes.empty()) {
-    (void)build(holed, with_holes);
-    skipped += holed->skipped_triangles();
+  if (const auto with_alpha = covering_surfaces(scene, true); !with_alpha.empty()) {
+    (void)build(alpha_tested, with_alpha);
+    skipped += alpha_tested->skipped_triangles();
   }
-  rays.emplace(scene, surfaces, space, *opaque, holed ? &*holed : nullptr);
+  rays.emplace(scene, surfaces, space, *opaque, alpha_tested ? &*alpha_tested : nullptr);
   if (skipped > 0) log::warning("{} triangles lie beyond what rays can reach; no ray meets them", skipped);
 }
 
-void Lighter::State::build_photons() {
+void DeferredShader::State::build_photons() {
   if (settings.photons == 0) settings.photons = kPhotons;
   photons.emplace(scene, surfaces, space, whole_scene(), lights, settings);
 }
 
-void Lighter::State::build_reference() {
+void DeferredShader::State::build_reference() {
   PathSettings own;
   own.seed = settings.seed;
   own.max_depth = settings.max_depth;
@@ -203,12 +204,12 @@ void Lighter::State::build_reference() {
   reference.emplace(scene, whole_scene(), lights, own);
 }
 
-const RayScene& Lighter::State::whole_scene() {
-  if (!holed) return *opaque;
+const RayScene& DeferredShader::State::whole_scene() {
+  if (!alpha_tested) return *opaque;
   return whole ? *whole : build(whole, {SurfaceRange{0, scene.triangles}});
 }
 
-void Lighter::State::trace_reference(const LitSample& sample, std::span<const std::size_t> tiles) {
+void DeferredShader::State::trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles) {
   const Stopwatch watch;
   reference->trace(sample.views, tiles, sample.number, *sample.output.radiance, sample.wanted);
   const PathCounts& traced = reference->counts();
@@ -224,21 +225,21 @@ void Lighter::State::trace_reference(const LitSample& sample, std::span<const st
   times = {{"reference", watch.ms() * settings.threads}};
 }
 
-const PhotonMaps* Lighter::State::send_photons(const SampleNumber& number, Communicator* comm) {
+const PhotonMaps* DeferredShader::State::trace_photons(const SampleNumber& number, Communicator* comm) {
   if (!photons) return nullptr;
   const Stopwatch watch;
-  const PhotonMaps& maps = photons->send(number, comm);
+  const PhotonMaps& maps = photons->build(number, comm);
   photon_ms += watch.ms();
   return &maps;
 }
 
-void Lighter::State::tell_of_cut_rays() {
-  if (counts.cut == 0 || std::exchange(has_told, true)) return;
+void DeferredShader::State::warn_of_cut_rays() {
+  if (counts.cut == 0 || std::exchange(has_warned, true)) return;
   log::warning("{} rays of a sample or a few passed {} surfaces that cover in part; what is behind is not all seen",
-               counts.cut, kMostPassed);
+               counts.cut, kMaxPassed);
 }
 
-std::unique_ptr<Scratch> Lighter::State::take_scratch() {
+std::unique_ptr<Scratch> DeferredShader::State::take_scratch() {
   {
     const std::lock_guard lock(mutex);
     if (!idle.empty()) {
@@ -250,10 +251,10 @@ std::unique_ptr<Scratch> Lighter::State::take_scratch() {
   return std::make_unique<Scratch>(kFirstPassStep + passes.size() + 1);
 }
 
-void Lighter::State::light_wave(const LightContext& context, Scratch& scratch) const {
+void DeferredShader::State::shade_wavefront(const LightContext& context, Scratch& scratch) const {
   PixelSums& sums = scratch.sums;
   RayBuffers& buffers = scratch.buffers;
-  Wave& wave = scratch.wave;
+  Wavefront& wave = scratch.wave;
   Stopwatch watch;
   const auto charge = [&](std::size_t step) {
     scratch.ms[step] += watch.ms();
@@ -267,53 +268,54 @@ void Lighter::State::light_wave(const LightContext& context, Scratch& scratch) c
   };
   add_emission(context, wave, sums);
   charge(kDirectStep);
-  const std::size_t depth = wave.points.front().depth + 1U;
+  const std::size_t depth = wave.vertices.front().depth + 1U;
   if (scratch.waiting.size() <= depth) scratch.waiting.resize(depth + 1);
-  for_each_pass([&](const Pass& pass) { pass.spread(context, wave, buffers, sums, scratch.waiting[depth]); });
+  for_each_pass([&](const Pass& pass) { pass.scatter(context, wave, buffers, sums, scratch.waiting[depth]); });
   for (DirectLight light(context, wave); light.sample_next();) {
     charge(kDirectStep);
-    for_each_pass([&](const Pass& pass) { pass.hide(context, buffers, sums, wave); });
+    for_each_pass([&](const Pass& pass) { pass.trace_shadows(context, buffers, sums, wave); });
     add_samples(wave, sums);
     charge(kDirectStep);
   }
 }
 
 /// Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
-void Lighter::State::light_waiting(const LightContext& context, Scratch& scratch) const {
+void DeferredShader::State::shade_waiting(const LightContext& context, Scratch& scratch) const {
   while (true) {
     const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
                                               [](const auto& points) { return !points.empty(); });
     if (deepest == scratch.waiting.rend()) return;
-    if (deepest->size() <= kWavePoints) {
-      scratch.wave.points.clear();
-      std::swap(scratch.wave.points, *deepest);
+    if (deepest->size() <= kWavefrontVertices) {
+      scratch.wave.vertices.clear();
+      std::swap(scratch.wave.vertices, *deepest);
     } else {
-      const auto first = deepest->end() - static_cast<std::ptrdiff_t>(kWavePoints);
-      scratch.wave.points.assign(first, deepest->end());
+      const auto first = deepest->end() - static_cast<std::ptrdiff_t>(kWavefrontVertices);
+      scratch.wave.vertices.assign(first, deepest->end());
       deepest->erase(first, deepest->end());
     }
-    light_wave(context, scratch);
+    shade_wavefront(context, scratch);
   }
 }
 
 /// Light of neighbours in place of a sample's own, once that is known.
-void Lighter::State::denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
-                             std::size_t index) {
+void DeferredShader::State::denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                    std::size_t index) {
   const Stopwatch watch;
   const double before = spent_ms(scratch);
-  const TileParts& again = parts.of_tile(context, scratch.buffers, jobs.front(), index, scratch.finder);
+  const TileFragments& tile_fragments =
+      fragments.of_tile(context, scratch.buffers, jobs.front(), index, scratch.finder);
   for (const TileJob& job : jobs) {
     if (job.number.sample >= kDenoisedSamples) break;
-    scratch.denoiser.look_again(context, job, again, scratch.buffers, scratch.sums, scratch.waiting[0]);
-    light_waiting(context, scratch);
-    scratch.denoiser.resolve(context, job, again, scratch.sums);
+    scratch.denoiser.resample_edges(context, job, tile_fragments, scratch.buffers, scratch.sums, scratch.waiting[0]);
+    shade_waiting(context, scratch);
+    scratch.denoiser.resolve(context, job, tile_fragments, scratch.sums);
   }
   scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
 }
 
-/// Some rows of one sample after those of another: what one sample has looked up the next one finds at hand.
-void Lighter::State::light_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
-                                std::size_t index, std::span<const LitSample> samples) {
+/// Shades some rows of one sample after those of another: what one sample has read the next one finds in the cache.
+void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                       std::size_t index, std::span<const ShadedSample> samples) {
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
   PixelSums& sums = scratch.sums;
@@ -324,15 +326,15 @@ void Lighter::State::light_tile(const LightContext& context, Scratch& scratch, s
   if (shared != 0) scratch.shared.start(shared, context, jobs.front());
   const int height = jobs.front().place.height();
   for (RowRange rows; rows.first < height; rows.first = rows.end) {
-    rows.end = end_of_wave(jobs.front(), rows.first);
+    rows.end = end_of_wavefront(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       const Stopwatch watch;
-      find_first_points(context, jobs[i], rows, scratch.buffers, sums, scratch.waiting[0]);
+      find_primary_vertices(context, jobs[i], rows, scratch.buffers, sums, scratch.waiting[0]);
       add_first_surfaces(scratch.waiting[0], index, samples[i].output);
       if (shared != 0) scratch.shared.choose(scratch.waiting[0], rows.first);
-      if (denoises) scratch.denoiser.note(context, scratch.waiting[0]);
+      if (denoises) scratch.denoiser.add_vertices(context, scratch.waiting[0]);
       scratch.ms[kSurfaceStep] += watch.ms();
-      light_waiting(context, scratch);
+      shade_waiting(context, scratch);
     }
   }
   if (shared != 0) scratch.shared.upsample(sums);
@@ -343,7 +345,7 @@ void Lighter::State::light_tile(const LightContext& context, Scratch& scratch, s
 }
 
 /// Counts and times of what was lit, gathered from the threads' memory.
-void Lighter::State::tell(double spent_ms) {
+void DeferredShader::State::gather_counts(double spent_ms) {
   counts = {};
   std::vector<double> ms(kFirstPassStep + passes.size() + 1, 0.0);
   for (const auto& scratch : idle) {
@@ -351,7 +353,7 @@ void Lighter::State::tell(double spent_ms) {
     counts.cut += std::exchange(scratch->buffers.scratch.cut, 0);
     for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
   }
-  if (travelling != nullptr) share_out(spent_ms, ms);
+  if (forwarding != nullptr) share_out(spent_ms, ms);
   if (photons) {
     const PhotonCounts sent = photons->take_counts();
     for (const RunningPass& running : passes) {
@@ -360,7 +362,7 @@ void Lighter::State::tell(double spent_ms) {
     counts.invalid += sent.invalid;
     counts.cut += sent.cut;
   }
-  tell_of_cut_rays();
+  warn_of_cut_rays();
   times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
   for (std::size_t i = 0; i < passes.size(); ++i) {
     double& spent = ms[kFirstPassStep + i];
@@ -372,45 +374,45 @@ void Lighter::State::tell(double spent_ms) {
   if (settings.denoise) times.push_back({"denoise", ms.back()});
 }
 
-Lighter::Lighter(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays,
-                 TravellingRays* travelling)
-    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, travelling)) {}
-Lighter::~Lighter() = default;
-Lighter::Lighter(Lighter&&) noexcept = default;
-Lighter& Lighter::operator=(Lighter&&) noexcept = default;
+DeferredShader::DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements,
+                               const RaySource& rays, RayForwarding* forwarding)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, forwarding)) {}
+DeferredShader::~DeferredShader() = default;
+DeferredShader::DeferredShader(DeferredShader&&) noexcept = default;
+DeferredShader& DeferredShader::operator=(DeferredShader&&) noexcept = default;
 
-const RayCounts& Lighter::counts() const {
+const RayCounts& DeferredShader::counts() const {
   return state_->counts;
 }
-const std::vector<PassTime>& Lighter::times() const {
+const std::vector<PassTime>& DeferredShader::times() const {
   return state_->times;
 }
 
-bool Lighter::lights_one_by_one() const {
+bool DeferredShader::shades_one_by_one() const {
   return state_->reference || state_->photons || state_->shared != 0;
 }
 
-void Lighter::light(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
-                    const LightOutput& output, const SampleNumber& number) {
-  const LitSample only{views, &keys, output, number};
-  light(std::span(&only, 1), tiles);
+void DeferredShader::shade(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
+                           const LightOutput& output, const SampleNumber& number) {
+  const ShadedSample only{views, &keys, output, number};
+  shade(std::span(&only, 1), tiles);
 }
 
-void Lighter::light(std::span<const LitSample> samples, std::span<const std::size_t> tiles) {
-  HPR_CHECK(samples.size() == 1 || (!samples.empty() && !lights_one_by_one()));
+void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles) {
+  HPR_CHECK(samples.size() == 1 || (!samples.empty() && !shades_one_by_one()));
   check_sizes(samples);
-  const LitSample& first = samples.front();
+  const ShadedSample& first = samples.front();
   const FrameLayout& layout = first.keys->layout();
   State& state = *state_;
   if (state.reference) {
     state.trace_reference(first, tiles);
-    state.tell_of_cut_rays();
+    state.warn_of_cut_rays();
     return;
   }
-  const PhotonMaps* const photons = state.send_photons(first.number, nullptr);
+  const PhotonMaps* const photons = state.trace_photons(first.number, nullptr);
   const std::vector<Media> eyes = state.media.of_eyes(first.views);
   const Stopwatch watch;
-  if (state.settings.denoise) state.parts.prepare(layout, first.views, state.settings);
+  if (state.settings.denoise) state.fragments.prepare(layout, first.views, state.settings);
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     const std::size_t tile = order[i];
@@ -418,7 +420,7 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
     if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
     std::vector<TileJob> jobs;
-    for (const LitSample& sample : samples) {
+    for (const ShadedSample& sample : samples) {
       set_active(sample.output, tile);
       jobs.push_back({place.pixels, sample.number, sample.keys->tile(tile), &sample.views[place.screen],
                       static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
@@ -434,25 +436,25 @@ void Lighter::light(std::span<const LitSample> samples, std::span<const std::siz
                                .photons = photons,
                                .view = &first.views[place.screen],
                                .eye_media = eyes[place.screen]};
-    state.light_tile(context, *scratch, jobs, tile, samples);
+    state.shade_tile(context, *scratch, jobs, tile, samples);
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });
-  state.tell(watch.ms() * state.settings.threads);
+  state.gather_counts(watch.ms() * state.settings.threads);
 }
 
-void Lighter::send_photons(Communicator& comm, const SampleNumber& number) {
-  (void)state_->send_photons(number, &comm);
+void DeferredShader::trace_photons(Communicator& comm, const SampleNumber& number) {
+  (void)state_->trace_photons(number, &comm);
 }
 
-void Lighter::forget_photons() {
-  if (state_->photons) state_->photons->forget();
+void DeferredShader::discard_photons() {
+  if (state_->photons) state_->photons->discard();
 }
 
-void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& keys,
+void shade_local(DeferredShader& shader, std::span<const View> views, TileLayer<Key>& keys,
                  std::span<const std::size_t> tiles, const SampleNumber& number) {
   TileLayer<Rgb> radiance(keys.layout());
-  lighter.light(views, keys, tiles, {.radiance = &radiance}, number);
+  shader.shade(views, keys, tiles, {.radiance = &radiance}, number);
   for (const std::size_t tile : tiles) {
     const std::span<const Rgb> colors = radiance.tile(tile);
     const std::span<Key> words = keys.tile(tile);
@@ -462,7 +464,7 @@ void shade_local(Lighter& lighter, std::span<const View> views, TileLayer<Key>& 
   }
 }
 
-void light_empty(Lighter& lighter, std::span<const View> views, const TileLayer<Key>& keys,
+void shade_empty(DeferredShader& shader, std::span<const View> views, const TileLayer<Key>& keys,
                  std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number) {
   std::vector<std::size_t> open;
   std::ranges::copy_if(tiles, std::back_inserter(open),
@@ -470,7 +472,7 @@ void light_empty(Lighter& lighter, std::span<const View> views, const TileLayer<
   // Keys that carry colours name no surfaces: pixels that have one are lit as if they were empty, and left out.
   const TileLayer<Key> empty(keys.layout());
   TileLayer<Rgb> behind(keys.layout());
-  lighter.light(views, empty, open, {.radiance = &behind}, number);
+  shader.shade(views, empty, open, {.radiance = &behind}, number);
   for (const std::size_t tile : open) {
     const std::span<const Key> words = keys.tile(tile);
     const std::span<const Rgb> from = behind.tile(tile);

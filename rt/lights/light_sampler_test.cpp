@@ -1,4 +1,4 @@
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 
 #include <gtest/gtest.h>
 
@@ -49,32 +49,32 @@ Environment sky() {
 }
 
 /// The irradiance on the floor at `place` with nothing in the way.
-glm::dvec3 estimate(const LightSet& lights, const glm::dvec3& place, std::uint32_t samples, bool any) {
+glm::dvec3 estimate(const LightSampler& lights, const glm::dvec3& place, std::uint32_t samples, bool any) {
   glm::dvec3 sum(0.0);
   for (std::uint32_t i = 0; i < samples; ++i) {
     Sampler sampler(11, i);
     const double u = sampler.one();
     const auto sample = any ? lights.sample_any(place, kUp, View{}, u, sampler.two())
-                            : lights.sample_one(place, kUp, View{}, u, sampler.two());
+                            : lights.sample(place, kUp, View{}, u, sampler.two());
     if (sample) sum += sample->weight * std::max(0.0, sample->to_light.z);
     if (any) continue;
-    for (std::size_t light = 0; light < lights.listed(); ++light) {
-      const LightSample of_light = lights.sample_listed(light, place, View{}, sampler.two());
+    for (std::size_t light = 0; light < lights.enumerated(); ++light) {
+      const LightSample of_light = lights.sample_enumerated(light, place, View{}, sampler.two());
       sum += of_light.weight * std::max(0.0, of_light.to_light.z);
     }
   }
   return sum / static_cast<double>(samples);
 }
 
-TEST(LightSet, ASceneWithoutLightGetsAHeadlightThatSendsNoPhotons) {
+TEST(LightSampler, ASceneWithoutLightGetsAHeadlightThatSendsNoPhotons) {
   Scene scene = hall(0);
-  const LightSet lights(scene);
-  ASSERT_EQ(lights.listed(), 1U);
-  EXPECT_TRUE(lights.listed_is_fixed(0));
-  EXPECT_FALSE(lights.has_sampled());
+  const LightSampler lights(scene);
+  ASSERT_EQ(lights.enumerated(), 1U);
+  EXPECT_TRUE(lights.enumerated_is_fixed(0));
+  EXPECT_FALSE(lights.has_tree());
   View view;
   view.eye = {0, 0, 9};
-  const LightSample sample = lights.sample_listed(0, glm::dvec3(0.0), view, {});
+  const LightSample sample = lights.sample_enumerated(0, glm::dvec3(0.0), view, {});
   EXPECT_FALSE(sample.casts_shadows);
   EXPECT_NEAR(sample.weight.r, kPi, 1e-6);
   EXPECT_GT(sample.to_light.z, 0.85);
@@ -83,23 +83,23 @@ TEST(LightSet, ASceneWithoutLightGetsAHeadlightThatSendsNoPhotons) {
   EXPECT_EQ(any->weight, sample.weight);
   EXPECT_FALSE(lights.emit(0.5, {0.5, 0.5}, {0.5, 0.5}).has_value());
   EXPECT_EQ(lights.power(), 0.0);
-  EXPECT_EQ(LightSet(hall(1)).listed(), 0U) << "an emitting surface takes its place";
+  EXPECT_EQ(LightSampler(hall(1)).enumerated(), 0U) << "an emitting surface takes its place";
 }
 
-TEST(LightSet, FewPunctualLightsAreListedAndManyAreSampled) {
+TEST(LightSampler, FewPunctualLightsAreListedAndManyAreSampled) {
   Scene scene = hall(1);
-  for (std::size_t i = 0; i < LightSet::kMostListed; ++i)
+  for (std::size_t i = 0; i < LightSampler::kMaxEnumerated; ++i)
     scene.lights.push_back(lamp({0.1 * static_cast<double>(i), 0, 2}, 1.0F, 0.1));
   scene.lights.push_back(lamp({0, 0, 5}, 0.0F));
-  const LightSet few(scene);
-  EXPECT_EQ(few.listed(), LightSet::kMostListed) << "the one without intensity isn't there";
-  EXPECT_FALSE(few.listed_is_fixed(0));
-  EXPECT_TRUE(few.has_sampled());
+  const LightSampler few(scene);
+  EXPECT_EQ(few.enumerated(), LightSampler::kMaxEnumerated) << "the one without intensity isn't there";
+  EXPECT_FALSE(few.enumerated_is_fixed(0));
+  EXPECT_TRUE(few.has_tree());
   scene.lights.push_back(lamp({0, 0, 3}, 1.0F));
-  EXPECT_EQ(LightSet(scene).listed(), 0U);
+  EXPECT_EQ(LightSampler(scene).enumerated(), 0U);
 }
 
-TEST(LightSet, AllWaysToAskGiveTheSameLight) {
+TEST(LightSampler, AllWaysToAskGiveTheSameLight) {
   Scene scene = hall();
   scene.environment = sky();
   scene.lights = {lamp({1, 2, 3}, 30.0F), lamp({-3, 1, 2}, 20.0F, 0.5), lamp({}, 2.0F)};
@@ -107,13 +107,13 @@ TEST(LightSet, AllWaysToAskGiveTheSameLight) {
   scene.lights[2].direction = {0, 0, -1};
   constexpr std::uint32_t kSamples = 65536;
   for (const glm::dvec3 place : {glm::dvec3(0, 0, 0.01), glm::dvec3(8, -7, 0.5)}) {
-    const LightSet lights(scene);
+    const LightSampler lights(scene);
     const glm::dvec3 one = estimate(lights, place, kSamples, false);
     const glm::dvec3 any = estimate(lights, place, kSamples, true);
     Scene many = scene;
     for (int i = 0; i < 100; ++i) many.lights.push_back(lamp({0, 0, 9}, 1e-9F));
-    const LightSet unlisted(many);
-    ASSERT_EQ(unlisted.listed(), 0U);
+    const LightSampler unlisted(many);
+    ASSERT_EQ(unlisted.enumerated(), 0U);
     const glm::dvec3 sampled = estimate(unlisted, place, kSamples, false);
     for (int c = 0; c < 3; ++c) {
       EXPECT_NEAR(any[c] / one[c], 1.0, 0.01) << c;
@@ -122,14 +122,14 @@ TEST(LightSet, AllWaysToAskGiveTheSameLight) {
   }
 }
 
-TEST(LightSet, DensitiesFoundBackwardsAreThoseOfTheSamples) {
+TEST(LightSampler, DensitiesFoundBackwardsAreThoseOfTheSamples) {
   Scene scene = hall();
   scene.environment = sky();
   scene.environment->scale = 0.02;  // so that triangles are chosen as well
   scene.lights = {lamp({1, 2, 3}, 30.0F), lamp({-3, 1, 2}, 20.0F, 0.5)};
   scene.lights.push_back(lamp({}, 0.01F));
   scene.lights.back().type = LightType::Directional;
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   const Surfaces surfaces(scene, RaySpace(scene.bounds));
   int triangles = 0;
   int outside = 0;
@@ -140,12 +140,12 @@ TEST(LightSet, DensitiesFoundBackwardsAreThoseOfTheSamples) {
     const bool any = i % 2 == 0;
     const double u = sampler.one();
     const auto sample = any ? lights.sample_any(place, normal, View{}, u, sampler.two())
-                            : lights.sample_one(place, normal, View{}, u, sampler.two());
+                            : lights.sample(place, normal, View{}, u, sampler.two());
     if (!sample || sample->pdf == 0.0) continue;
     if (std::isinf(sample->distance)) {
       ++outside;
       EXPECT_EQ(any ? lights.environment_pdf_any(place, normal, sample->to_light)
-                    : lights.environment_pdf_one(place, normal, sample->to_light),
+                    : lights.environment_pdf(place, normal, sample->to_light),
                 sample->pdf);
       continue;
     }
@@ -162,7 +162,7 @@ TEST(LightSet, DensitiesFoundBackwardsAreThoseOfTheSamples) {
       const double off = glm::distance(met.position, sample->goal);
       if (off >= nearest) continue;
       nearest = off;
-      best = any ? lights.surface_pdf_any(place, normal, id, hit) : lights.surface_pdf_one(place, normal, id, hit);
+      best = any ? lights.surface_pdf_any(place, normal, id, hit) : lights.surface_pdf(place, normal, id, hit);
     }
     if (nearest > 1e-9) continue;
     EXPECT_NEAR(best / sample->pdf, 1.0, 1e-9) << nearest;
@@ -172,10 +172,10 @@ TEST(LightSet, DensitiesFoundBackwardsAreThoseOfTheSamples) {
   EXPECT_GT(outside, 2000);
 }
 
-TEST(LightSet, TheEnvironmentsDensitiesSumToOneOverItsTexels) {
+TEST(LightSampler, TheEnvironmentsDensitiesSumToOneOverItsTexels) {
   Scene scene = hall(0);
   scene.environment = sky();
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   double sum = 0.0;
   for (int y = 0; y < 8; ++y) {
     const double middle = kPi * (y + 0.5) / 8.0;
@@ -183,7 +183,7 @@ TEST(LightSet, TheEnvironmentsDensitiesSumToOneOverItsTexels) {
     for (int x = 0; x < 16; ++x) {
       const double angle = 2.0 * kPi * ((x + 0.5) / 16.0 - 0.5);
       const glm::dvec3 w(std::sin(middle) * std::sin(angle), std::cos(middle), -std::sin(middle) * std::cos(angle));
-      sum += lights.environment_pdf_one(glm::dvec3(0.0), glm::dvec3(0.0), w) * solid_angle;
+      sum += lights.environment_pdf(glm::dvec3(0.0), glm::dvec3(0.0), w) * solid_angle;
     }
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
@@ -193,14 +193,14 @@ TEST(LightSet, TheEnvironmentsDensitiesSumToOneOverItsTexels) {
 double spread_of_sky(const Environment& environment, const glm::dvec3& normal) {
   Scene scene = hall(0);
   scene.environment = environment;
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   double sum = 0.0;
   double squares = 0.0;
   constexpr std::uint32_t kSamples = 16384;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(5, i);
     const double u = sampler.one();
-    const auto sample = lights.sample_one({0, 0, 1}, normal, View{}, u, sampler.two());
+    const auto sample = lights.sample({0, 0, 1}, normal, View{}, u, sampler.two());
     const double irradiance = sample ? sample->weight.g * std::max(0.0, glm::dot(normal, sample->to_light)) : 0.0;
     sum += irradiance;
     squares += irradiance * irradiance;
@@ -208,7 +208,7 @@ double spread_of_sky(const Environment& environment, const glm::dvec3& normal) {
   return std::sqrt(std::max(0.0, squares / kSamples / (sum * sum / kSamples / kSamples) - 1.0));
 }
 
-TEST(LightSet, MatteSurfacesUnderAnEvenSkySeeNoNoise) {
+TEST(LightSampler, MatteSurfacesUnderAnEvenSkySeeNoNoise) {
   const glm::dvec3 normal = glm::normalize(glm::dvec3(0.3, -0.2, 0.8));
   EXPECT_LT(spread_of_sky(Environment{Image<Rgb>({1, 1}, {2, 2, 2})}, normal), 1e-7);
   EXPECT_LT(spread_of_sky(Environment{Image<Rgb>({8, 4}, {2, 2, 2})}, normal), 1e-7);
@@ -221,17 +221,17 @@ TEST(LightSet, MatteSurfacesUnderAnEvenSkySeeNoNoise) {
   EXPECT_LT(spread_of_sky(sun, to_sun), 1.5) << "by the cosine alone it is above 10";
 }
 
-TEST(LightSet, TheBackgroundIsSeenButLightsNothing) {
+TEST(LightSampler, TheBackgroundIsSeenButLightsNothing) {
   Scene scene = hall(1);
   scene.background = {0.5F, 0.6F, 0.7F};
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   EXPECT_NEAR(lights.environment({0, 1, 0}).g, 0.6, 1e-7);
   EXPECT_EQ(lights.environment_pdf_any(glm::dvec3(0.0), kUp, {0, 1, 0}), 0.0);
   scene.environment = Environment{Image<Rgb>({1, 1}, {9, 9, 9})};
-  EXPECT_NEAR(LightSet(scene).environment({0, 1, 0}).g, 9.0, 1e-12);
+  EXPECT_NEAR(LightSampler(scene).environment({0, 1, 0}).g, 9.0, 1e-12);
 }
 
-TEST(LightSet, NothingIsNanWhateverTheLights) {
+TEST(LightSampler, NothingIsNanWhateverTheLights) {
   Scene scene = hall(2);
   scene.environment = Environment{Image<Rgb>({3, 2})};
   scene.lights = {lamp({0, 0, 0}, 1.0F), lamp({0, 0, 0}, 0.0F), lamp({0, 0, 0}, 1.0F, 1e-6),
@@ -241,7 +241,7 @@ TEST(LightSet, NothingIsNanWhateverTheLights) {
   test::place(scene, 1, glm::dmat4(0.0));
   scene.instances.back().to_world[3] = glm::dvec4(0, 0, 0, 1);
   finish_scene(scene);
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   EXPECT_TRUE(std::isfinite(lights.power()));
   const auto finite = [](const LightSample& sample) {
     return std::isfinite(sample.weight.r) && std::isfinite(sample.pdf) && std::isfinite(sample.to_light.x) &&
@@ -255,11 +255,11 @@ TEST(LightSet, NothingIsNanWhateverTheLights) {
     if (const auto sample = lights.sample_any(place, normal, View{}, u, sampler.two())) {
       EXPECT_TRUE(finite(*sample));
     }
-    if (const auto sample = lights.sample_one(place, normal, View{}, u, sampler.two())) {
+    if (const auto sample = lights.sample(place, normal, View{}, u, sampler.two())) {
       EXPECT_TRUE(finite(*sample));
     }
-    for (std::size_t light = 0; light < lights.listed(); ++light) {
-      EXPECT_TRUE(finite(lights.sample_listed(light, place, View{}, sampler.two())));
+    for (std::size_t light = 0; light < lights.enumerated(); ++light) {
+      EXPECT_TRUE(finite(lights.sample_enumerated(light, place, View{}, sampler.two())));
     }
     const glm::dvec2 u_place = sampler.two();
     const auto photon = lights.emit(u, u_place, sampler.two());

@@ -13,10 +13,10 @@ namespace hpr {
 /// Which rank keeps the sums of which tile. A sort-last strategy may leave a tile with another rank in every sample;
 /// its keys then travel to the rank that had it in the first one, which lights it. Sums stay where they are, and each
 /// is made by one rank in the order of the samples.
-class TileHomes {
+class TileOwnership {
  public:
   /// Collective. `owned`: this rank's tiles, ascending; the home of each from now on.
-  TileHomes(Communicator& comm, const FrameLayout& layout, std::span<const std::size_t> owned);
+  TileOwnership(Communicator& comm, const FrameLayout& layout, std::span<const std::size_t> owned);
 
   /// This rank's, ascending.
   [[nodiscard]] const std::vector<std::size_t>& mine() const { return mine_; }
@@ -24,7 +24,8 @@ class TileHomes {
   [[nodiscard]] std::vector<std::size_t> of(int rank) const;
 
   /// Collective over `comm`. The ranks own partitions of the same tiles as when this was made; after it `layer` holds
-  /// this rank's own tiles. One round of messages where any rank owns a stranger's tile, else none but for the asking.
+  /// this rank's own tiles. One round of messages where any rank owns a remote tile, else only the one that finds that
+  /// out.
   void bring(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> owned);
 
   /// Collective over `comm`. `layer` of rank 0 holds all tiles; after it every rank has its own of them.

@@ -1,4 +1,4 @@
-#include "rt/trace/travelling_rays.h"
+#include "rt/trace/ray_forwarding.h"
 
 #include <algorithm>
 #include <atomic>
@@ -57,7 +57,7 @@ RayBox box_of(const Scene& scene, const RaySpace& space, const InstanceRange& pa
 /// Halves them about the middle of the longest axis, and again, and puts boxes about what is left together.
 void merge_near(std::span<RayBox> boxes, int halvings, std::vector<RayBox>& merged) {
   if (boxes.empty()) return;
-  RayBox all = box_about(boxes);
+  RayBox all = enclosing_box(boxes);
   if (halvings == 0 || boxes.size() == 1) {
     merged.push_back(all);
     return;
@@ -74,13 +74,13 @@ void merge_near(std::span<RayBox> boxes, int halvings, std::vector<RayBox>& merg
 
 }  // namespace
 
-RayBox box_about(std::span<const RayBox> boxes) {
+RayBox enclosing_box(std::span<const RayBox> boxes) {
   RayBox all = empty_box();
   for (const RayBox& box : boxes) widen(all, box);
   return all;
 }
 
-std::vector<RayBox> boxes_about(const Scene& scene, const RaySpace& space, std::span<const SurfaceRange> part) {
+std::vector<RayBox> enclosing_boxes(const Scene& scene, const RaySpace& space, std::span<const SurfaceRange> part) {
   std::vector<RayBox> small;
   for (InstanceRange piece : split_by_instance(scene, merged_ranges({part.begin(), part.end()}, scene.triangles))) {
     const std::uint32_t last = piece.range.last;
@@ -96,7 +96,7 @@ std::vector<RayBox> boxes_about(const Scene& scene, const RaySpace& space, std::
 
 namespace {
 
-/// Rays that rest while others travel are worth a message only in numbers.
+/// Threads per core: a message pays off only for many rays, so more threads than cores collect them.
 constexpr int kThreadsEach = 4;
 
 Error lost() {
@@ -121,19 +121,19 @@ std::vector<std::vector<std::byte>> swap_messages(Communicator& comm, std::vecto
   return received;
 }
 
-std::size_t bytes_of_ray(const TravellingRays::Kind& kind) {
+std::size_t bytes_of_ray(const RayForwarding::Kind& kind) {
   return sizeof(RayBatch::Ray) + (kind.has_passed != 0 ? sizeof(Passed) : 0);
 }
 
 /// A bit for every shadow ray, what it met for every other one.
-std::size_t bytes_of_answers(const TravellingRays::Kind& kind) {
+std::size_t bytes_of_answers(const RayForwarding::Kind& kind) {
   return kind.shadows != 0 ? (kind.count + 7) / 8 : kind.count * sizeof(Passed);
 }
 
 }  // namespace
 
-/// What one thread asks: where each of its rays goes, and the answers so far.
-struct TravellingRays::Query {
+/// The query of one thread: the ranks each of its rays is sent to, and the answers so far.
+struct RayForwarding::Query {
   Kind kind;
   const RayBatch& rays;
   std::span<Passed> passed;         ///< of rays that look for the closest; none: they have passed nothing
@@ -143,7 +143,7 @@ struct TravellingRays::Query {
 };
 
 /// One call of for_each().
-struct TravellingRays::Run {
+struct RayForwarding::Run {
   int threads;
   std::size_t count;
   const std::function<void(std::size_t)>& body;
@@ -160,92 +160,92 @@ struct TravellingRays::Run {
     core_is_free.wait(lock, [this] { return cores > 0; });
     --cores;
   }
-  void leave_core() {
+  void release_core() {
     ++cores;
     core_is_free.notify_one();
   }
 };
 
 /// Rays of one query that came from one rank, as they lie in its message, and where in the answer theirs stand.
-struct TravellingRays::Parcel {
+struct RayForwarding::QueryBlock {
   Kind kind;
   const std::byte* rays = nullptr;
   std::byte* answers = nullptr;
 };
 
-TravellingRays::TravellingRays(Communicator& comm, const Scene& scene, const RaySpace& space,
-                               std::span<const SurfaceRange> part)
+RayForwarding::RayForwarding(Communicator& comm, const Scene& scene, const RaySpace& space,
+                             std::span<const SurfaceRange> part)
     : comm_(comm) {
-  const std::vector<RayBox> mine = boxes_about(scene, space, part);
+  const std::vector<RayBox> mine = enclosing_boxes(scene, space, part);
   for (const auto& bytes : all_gather(comm, std::as_bytes(std::span(mine)))) {
     boxes_.emplace_back(bytes.size() / sizeof(RayBox));
     if (!bytes.empty()) std::memcpy(boxes_.back().data(), bytes.data(), bytes.size());
-    around_.push_back(box_about(boxes_.back()));
+    bounds_.push_back(enclosing_box(boxes_.back()));
   }
 }
 
-std::uint32_t TravellingRays::add(const RayScene& part) {
+std::uint32_t RayForwarding::add(const RayScene& part) {
   parts_[next_part_] = &part;
   return next_part_++;
 }
 
-std::uint64_t TravellingRays::occluded(std::uint32_t part, const RayBatch& rays, std::span<std::uint8_t> blocked) {
+std::uint64_t RayForwarding::occluded(std::uint32_t part, const RayBatch& rays, std::span<std::uint8_t> blocked) {
   Query query{.kind = {.part = part, .shadows = 1}, .rays = rays, .passed = {}, .blocked = blocked};
-  const std::uint64_t invalid = parts_.at(part)->occluded_here(rays, blocked);
-  address(query);
-  ask(query);
+  const std::uint64_t invalid = parts_.at(part)->occluded_local(rays, blocked);
+  route(query);
+  wait_for_answers(query);
   return invalid;
 }
 
-std::uint64_t TravellingRays::closest(std::uint32_t part, const RayBatch& rays, std::span<Passed> passed,
-                                      std::span<std::uint32_t> surfaces) {
+std::uint64_t RayForwarding::closest(std::uint32_t part, const RayBatch& rays, std::span<Passed> passed,
+                                     std::span<std::uint32_t> surfaces) {
   const auto has_passed = static_cast<std::uint16_t>(passed.empty() ? 0 : 1);
   Query query{.kind = {.part = part, .has_passed = has_passed}, .rays = rays, .passed = passed, .blocked = {}};
   query.met.assign(passed.begin(), passed.end());
   query.met.resize(rays.size());
-  const std::uint64_t invalid = parts_.at(part)->closest_here(rays, query.met, surfaces);
-  address(query);
-  ask(query);
+  const std::uint64_t invalid = parts_.at(part)->closest_local(rays, query.met, surfaces);
+  route(query);
+  wait_for_answers(query);
   for (std::size_t i = 0; i < surfaces.size(); ++i) surfaces[i] = query.met[i].surface;
   if (!passed.empty()) std::ranges::copy(query.met, passed.begin());
   return invalid;
 }
 
-/// Where rays go that have met what there is at home.
-void TravellingRays::address(Query& query) const {
+/// Finds the ranks that rays are sent to once their local hits are known.
+void RayForwarding::route(Query& query) const {
   // What lies at the distance of a hit may still come before it, by its id.
   constexpr float kBeyond = 1.0F + 1e-5F;
   query.to.resize(boxes_.size());
   for (std::uint32_t i = 0; i < query.rays.size(); ++i) {
     RayBatch::Ray ray = query.rays.ray(i);
-    if (!is_bearable(ray) || (query.kind.shadows != 0 && query.blocked[i] != 0)) continue;
+    if (!is_traceable(ray) || (query.kind.shadows != 0 && query.blocked[i] != 0)) continue;
     if (query.kind.shadows == 0 && query.met[i].surface != kNoSurface) {
       ray.reach = std::min(ray.reach, query.met[i].distance * kBeyond);
     }
     const BoxedRay line(ray);
     for (std::size_t rank = 0; rank < boxes_.size(); ++rank) {
       const auto meets = [&](const RayBox& box) { return line.meets(box); };
-      if (static_cast<int>(rank) == comm_.rank() || !meets(around_[rank])) continue;
+      if (static_cast<int>(rank) == comm_.rank() || !meets(bounds_[rank])) continue;
       if (std::ranges::any_of(boxes_[rank], meets)) query.to[rank].push_back(i);
     }
   }
 }
 
-/// Rests until the other ranks have answered.
-void TravellingRays::ask(Query& query) {
+/// Waits until the other ranks have answered.
+void RayForwarding::wait_for_answers(Query& query) {
   if (std::ranges::all_of(query.to, [](const auto& rays) { return rays.empty(); })) return;
   std::unique_lock lock(mutex_);
   HPR_CHECK(run_ != nullptr);
   waiting_.push_back(&query);
   const std::uint64_t asked = round_;
-  run_->leave_core();
-  if (--running_ == 0) all_rest_.notify_one();
+  run_->release_core();
+  if (--running_ == 0) all_waiting_.notify_one();
   answered_.wait(lock, [&] { return round_ != asked || failed_; });
   if (round_ == asked) throw lost();
   run_->take_core(lock);
 }
 
-void TravellingRays::release(bool answered) {
+void RayForwarding::release(bool answered) {
   const std::lock_guard lock(mutex_);
   running_ += static_cast<int>(waiting_.size());
   waiting_.clear();
@@ -258,7 +258,7 @@ void TravellingRays::release(bool answered) {
 }
 
 /// What one of the threads does.
-void TravellingRays::work(Run& run) {
+void RayForwarding::work(Run& run) {
   std::unique_lock lock(mutex_);
   run.take_core(lock);
   lock.unlock();
@@ -272,16 +272,16 @@ void TravellingRays::work(Run& run) {
   lock.lock();
   if (failure && !run.failure) run.failure = failure;
   // Who has failed may have had a core or not. One too many does no harm: others soon end as well.
-  run.leave_core();
-  if (--running_ == 0) all_rest_.notify_one();
+  run.release_core();
+  if (--running_ == 0) all_waiting_.notify_one();
 }
 
 /// Rounds until all ranks are done, or one of them has failed.
-TravellingRays::State TravellingRays::travel(const Run& run) {
+RayForwarding::State RayForwarding::run_rounds(const Run& run) {
   State all = State::Working;
   while (all == State::Working) {
     std::unique_lock lock(mutex_);
-    all_rest_.wait(lock, [&] { return running_ == 0; });
+    all_waiting_.wait(lock, [&] { return running_ == 0; });
     const State mine = run.failure ? State::Failed : waiting_.empty() ? State::Done : State::Working;
     lock.unlock();
     all = round(mine, run.threads);
@@ -290,7 +290,7 @@ TravellingRays::State TravellingRays::travel(const Run& run) {
   return all;
 }
 
-void TravellingRays::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) {
+void RayForwarding::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) {
   HPR_CHECK(run_ == nullptr);
   Run run(std::max(threads, 1), count, body);
   run_ = &run;
@@ -307,7 +307,7 @@ void TravellingRays::for_each(int threads, std::size_t count, const std::functio
       });
     }
     try {
-      all = travel(run);
+      all = run_rounds(run);
     } catch (...) {
       run.failure = std::current_exception();
       release(false);
@@ -319,11 +319,11 @@ void TravellingRays::for_each(int threads, std::size_t count, const std::functio
 }
 
 /// For every rank: how its sender fares, and the rays that go there, query by query.
-std::vector<std::vector<std::byte>> TravellingRays::pack(State mine) const {
+std::vector<std::vector<std::byte>> RayForwarding::pack(State mine) const {
   std::vector<std::vector<std::byte>> messages(boxes_.size());
   for (std::size_t rank = 0; rank < messages.size(); ++rank) {
     std::vector<std::byte>& message = messages[rank];
-    std::size_t bytes = sizeof(Head);
+    std::size_t bytes = sizeof(MessageHeader);
     for (const Query* query : waiting_) {
       if (!query->to[rank].empty()) bytes += sizeof(Kind) + query->to[rank].size() * bytes_of_ray(query->kind);
     }
@@ -333,7 +333,7 @@ std::vector<std::vector<std::byte>> TravellingRays::pack(State mine) const {
       std::memcpy(to, &value, sizeof(value));
       to += sizeof(value);
     };
-    put(Head{mine, static_cast<std::uint32_t>(round_)});
+    put(MessageHeader{mine, static_cast<std::uint32_t>(round_)});
     for (const Query* query : waiting_) {
       if (query->to[rank].empty()) continue;
       Kind kind = query->kind;
@@ -349,37 +349,37 @@ std::vector<std::vector<std::byte>> TravellingRays::pack(State mine) const {
 }
 
 /// How the sender fares. Throws Error (Lost) when it is elsewhere: it has failed, and says so to others.
-TravellingRays::State TravellingRays::state_in(std::span<const std::byte> message) const {
-  Head head{State::Failed, 0};
-  if (message.size() >= sizeof(Head)) std::memcpy(&head, message.data(), sizeof(Head));
-  if (message.size() >= sizeof(Head) && head.round == static_cast<std::uint32_t>(round_)) return head.state;
+RayForwarding::State RayForwarding::state_in(std::span<const std::byte> message) const {
+  MessageHeader head{State::Failed, 0};
+  if (message.size() >= sizeof(MessageHeader)) std::memcpy(&head, message.data(), sizeof(MessageHeader));
+  if (message.size() >= sizeof(MessageHeader) && head.round == static_cast<std::uint32_t>(round_)) return head.state;
   throw lost();
 }
 
 /// What lies in `message`; `answers` becomes as large as the answers to it.
-void TravellingRays::unpack(std::span<const std::byte> message, std::vector<std::byte>& answers,
-                            std::vector<Parcel>& parcels) {
-  std::size_t bytes = sizeof(Head);
-  const std::size_t first = parcels.size();
-  for (std::size_t at = sizeof(Head); at < message.size();) {
-    Parcel parcel;
-    std::memcpy(&parcel.kind, message.data() + at, sizeof(Kind));
-    parcel.rays = message.data() + at + sizeof(Kind);
-    at += sizeof(Kind) + parcel.kind.count * bytes_of_ray(parcel.kind);
+void RayForwarding::unpack(std::span<const std::byte> message, std::vector<std::byte>& answers,
+                           std::vector<QueryBlock>& blocks) {
+  std::size_t bytes = sizeof(MessageHeader);
+  const std::size_t first = blocks.size();
+  for (std::size_t at = sizeof(MessageHeader); at < message.size();) {
+    QueryBlock block;
+    std::memcpy(&block.kind, message.data() + at, sizeof(Kind));
+    block.rays = message.data() + at + sizeof(Kind);
+    at += sizeof(Kind) + block.kind.count * bytes_of_ray(block.kind);
     HPR_CHECK(at <= message.size());
-    bytes += bytes_of_answers(parcel.kind);
-    parcels.push_back(parcel);
+    bytes += bytes_of_answers(block.kind);
+    blocks.push_back(block);
   }
   answers.assign(bytes, std::byte{0});
-  std::memcpy(answers.data(), message.data(), sizeof(Head));
-  std::byte* to = answers.data() + sizeof(Head);
-  for (Parcel& parcel : std::span(parcels).subspan(first)) {
-    parcel.answers = to;
-    to += bytes_of_answers(parcel.kind);
+  std::memcpy(answers.data(), message.data(), sizeof(MessageHeader));
+  std::byte* to = answers.data() + sizeof(MessageHeader);
+  for (QueryBlock& block : std::span(blocks).subspan(first)) {
+    block.answers = to;
+    to += bytes_of_answers(block.kind);
   }
 }
 
-TravellingRays::State TravellingRays::round(State mine, int threads) {
+RayForwarding::State RayForwarding::round(State mine, int threads) {
   const trace::Span span("rays travel");
   const std::vector<std::vector<std::byte>> arrived = swap_messages(comm_, pack(mine));
   State all = State::Done;
@@ -390,43 +390,43 @@ TravellingRays::State TravellingRays::round(State mine, int threads) {
   }
   if (all == State::Done) return all;
 
-  std::vector<Parcel> parcels;
+  std::vector<QueryBlock> blocks;
   std::vector<std::vector<std::byte>> answers(arrived.size());
-  for (std::size_t rank = 0; rank < arrived.size(); ++rank) unpack(arrived[rank], answers[rank], parcels);
-  parallel_for(threads, parcels.size(), [&](std::size_t i) { answer(parcels[i]); });
+  for (std::size_t rank = 0; rank < arrived.size(); ++rank) unpack(arrived[rank], answers[rank], blocks);
+  parallel_for(threads, blocks.size(), [&](std::size_t i) { answer(blocks[i]); });
   const std::vector<std::vector<std::byte>> back = swap_messages(comm_, std::move(answers));
-  for (std::size_t rank = 0; rank < back.size(); ++rank) take_answers(rank, back[rank]);
+  for (std::size_t rank = 0; rank < back.size(); ++rank) store_answers(rank, back[rank]);
   return all;
 }
 
-void TravellingRays::answer(const Parcel& parcel) const {
+void RayForwarding::answer(const QueryBlock& block) const {
   const DenormalsAsZero mode;
-  const RayScene& scene = *parts_.at(parcel.kind.part);
-  const std::size_t count = parcel.kind.count;
+  const RayScene& scene = *parts_.at(block.kind.part);
+  const std::size_t count = block.kind.count;
   RayBatch batch;
-  std::vector<Passed> met(parcel.kind.shadows != 0 ? 0 : count);
-  const std::byte* from = parcel.rays;
-  for (std::size_t i = 0; i < count; ++i, from += bytes_of_ray(parcel.kind)) {
+  std::vector<Passed> met(block.kind.shadows != 0 ? 0 : count);
+  const std::byte* from = block.rays;
+  for (std::size_t i = 0; i < count; ++i, from += bytes_of_ray(block.kind)) {
     RayBatch::Ray ray;
     std::memcpy(&ray, from, sizeof(ray));
     batch.push(ray);
-    if (parcel.kind.has_passed != 0) std::memcpy(&met[i], from + sizeof(ray), sizeof(Passed));
+    if (block.kind.has_passed != 0) std::memcpy(&met[i], from + sizeof(ray), sizeof(Passed));
   }
-  if (parcel.kind.shadows != 0) {
+  if (block.kind.shadows != 0) {
     std::vector<std::uint8_t> blocked(count);
-    (void)scene.occluded_here(batch, blocked);
-    for (std::size_t i = 0; i < count; ++i) parcel.answers[i / 8] |= std::byte{blocked[i]} << (i % 8);
+    (void)scene.occluded_local(batch, blocked);
+    for (std::size_t i = 0; i < count; ++i) block.answers[i / 8] |= std::byte{blocked[i]} << (i % 8);
     return;
   }
   std::vector<std::uint32_t> surfaces(count);
-  (void)scene.closest_here(batch, met, surfaces);
-  std::memcpy(parcel.answers, met.data(), bytes_of_answers(parcel.kind));
+  (void)scene.closest_local(batch, met, surfaces);
+  std::memcpy(block.answers, met.data(), bytes_of_answers(block.kind));
 }
 
 /// Of one rank, in the order its rays were sent.
-void TravellingRays::take_answers(std::size_t rank, std::span<const std::byte> answers) const {
+void RayForwarding::store_answers(std::size_t rank, std::span<const std::byte> answers) const {
   (void)state_in(answers);
-  const std::byte* from = answers.data() + sizeof(Head);
+  const std::byte* from = answers.data() + sizeof(MessageHeader);
   for (Query* query : waiting_) {
     const std::vector<std::uint32_t>& sent = query->to[rank];
     Kind kind = query->kind;

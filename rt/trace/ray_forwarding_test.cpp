@@ -1,4 +1,4 @@
-#include "rt/trace/travelling_rays.h"
+#include "rt/trace/ray_forwarding.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 #include "cluster/distribution/assignment.h"
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 #include "scene/scene.h"
 
@@ -72,7 +72,7 @@ RayBatch random_rays(int count, unsigned int seed) {
   return rays;
 }
 
-TEST(TravellingRays, MeetWhatTheyMeetInAWholeScene) {
+TEST(RayForwarding, MeetWhatTheyMeetInAWholeScene) {
   const Scene scene = crowd();
   const RaySpace space(scene.bounds);
   const RayScene whole(scene, space, 1);
@@ -82,7 +82,7 @@ TEST(TravellingRays, MeetWhatTheyMeetInAWholeScene) {
       std::uint32_t triangles = 0;
       for (const SurfaceRange& range : mine) triangles += range.count();
       EXPECT_LE(triangles, scene.triangles / static_cast<std::uint32_t>(ranks) + 64);
-      TravellingRays others(comm, scene, space, mine);
+      RayForwarding others(comm, scene, space, mine);
       RayScene part(scene, space, 1, mine);
       part.share(others);
       // Ranks have different numbers of jobs, and one has none.
@@ -114,7 +114,7 @@ TEST(TravellingRays, MeetWhatTheyMeetInAWholeScene) {
   }
 }
 
-TEST(TravellingRays, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
+TEST(RayForwarding, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
   const Scene scene = crowd();
   const View view = test::view_from({0, 1.2, 4}, {0, 0.5, 0}, {130, 70}, scene);
   for (const bool reference : {false, true}) {
@@ -123,25 +123,25 @@ TEST(TravellingRays, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
     const TileLayer<Key> keys = test::cast_keys(crowd(false), std::span(&view, 1));
     const FrameLayout& layout = keys.layout();
     TileLayer<Rgb> alone(layout);
-    Lighter one(scene, settings);
-    one.light(std::span(&view, 1), keys, all_tiles(layout), {.radiance = &alone});
+    DeferredShader one(scene, settings);
+    one.shade(std::span(&view, 1), keys, all_tiles(layout), {.radiance = &alone});
     for (const int ranks : {2, 5}) {
       std::atomic<std::uint64_t> shadow_rays = 0;
       run_local_ranks(ranks, [&](Communicator& comm) {
         RaySettings own = settings;
         own.part = part_of(scene, comm);
         own.threads = 2;
-        TravellingRays others(comm, scene, RaySpace(scene.bounds), *own.part);
-        Lighter lighter(scene, own, requirements_of(scene), {}, &others);
+        RayForwarding others(comm, scene, RaySpace(scene.bounds), *own.part);
+        DeferredShader shader(scene, own, requirements_of(scene), {}, &others);
         std::vector<std::size_t> tiles;
         for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
           if (static_cast<int>(tile) % ranks == comm.rank()) tiles.push_back(tile);
         }
         TileLayer<Rgb> lit(layout);
-        if (!reference) lighter.send_photons(comm);
-        lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &lit});
+        if (!reference) shader.trace_photons(comm);
+        shader.shade(std::span(&view, 1), keys, tiles, {.radiance = &lit});
         for (const std::size_t tile : tiles) EXPECT_TRUE(std::ranges::equal(lit.tile(tile), alone.tile(tile))) << tile;
-        shadow_rays += lighter.counts()[PassId::Shadow];
+        shadow_rays += shader.counts()[PassId::Shadow];
       });
       EXPECT_EQ(shadow_rays, one.counts()[PassId::Shadow]);
     }
@@ -150,7 +150,7 @@ TEST(TravellingRays, LightAPictureToTheBitAsRanksDoThatHaveAllOfTheScene) {
 
 // Every round wakes all threads that rest, for fewer cores: whoever finds none free must not miss the next one. A wait
 // that misses one in a million stands still here once in sixty times.
-TEST(TravellingRays, RestAndGoOnThousandsOfTimes) {
+TEST(RayForwarding, RestAndGoOnThousandsOfTimes) {
   constexpr std::size_t kJobs = 300;
   constexpr std::size_t kCalls = 10;
   const Scene scene = crowd();
@@ -165,7 +165,7 @@ TEST(TravellingRays, RestAndGoOnThousandsOfTimes) {
   }
   run_local_ranks(3, [&](Communicator& comm) {
     const std::vector<SurfaceRange> mine = part_of(scene, comm);
-    TravellingRays others(comm, scene, space, mine);
+    RayForwarding others(comm, scene, space, mine);
     RayScene part(scene, space, 1, mine);
     part.share(others);
     for (std::size_t call = 0; call < kCalls; ++call) {
@@ -183,14 +183,14 @@ TEST(TravellingRays, RestAndGoOnThousandsOfTimes) {
   EXPECT_EQ(done, 3 * kCalls * kJobs);
 }
 
-TEST(TravellingRays, ARankThatFailsEndsTheOthers) {
+TEST(RayForwarding, ARankThatFailsEndsTheOthers) {
   const Scene scene = crowd();
   const RaySpace space(scene.bounds);
   constexpr int kRanks = 3;
   std::array<std::atomic<int>, kRanks> code{};
   run_local_ranks(kRanks, [&](Communicator& comm) {
     const std::vector<SurfaceRange> mine = part_of(scene, comm);
-    TravellingRays others(comm, scene, space, mine);
+    RayForwarding others(comm, scene, space, mine);
     RayScene part(scene, space, 1, mine);
     part.share(others);
     try {

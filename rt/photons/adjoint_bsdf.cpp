@@ -1,4 +1,4 @@
-#include "rt/photons/flux_scatter.h"
+#include "rt/photons/adjoint_bsdf.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +38,7 @@ std::optional<glm::dvec3> sent_from(const glm::dvec3& arrived, const glm::dvec3&
 
 }  // namespace
 
-FluxScatter::FluxScatter(const Scene& scene, const Surfaces& surfaces, const FluxArrival& at)
+AdjointBsdf::AdjointBsdf(const Scene& scene, const Surfaces& surfaces, const FluxArrival& at)
     : scene_(scene),
       surfaces_(surfaces),
       at_(at),
@@ -47,30 +47,30 @@ FluxScatter::FluxScatter(const Scene& scene, const Surfaces& surfaces, const Flu
   plain_ = at.bsdf.seen_from(at.surface.to_viewer, at.surface.geometric_normal);
   for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
     if (at.bsdf.present(lobe) && at.bsdf.is_delta(lobe) && !is_plain(lobe)) {
-      ways_[lobe == Lobe::Transmission ? 1 : 0] = find_ways(lobe);
+      directions_[lobe == Lobe::Transmission ? 1 : 0] = find_directions(lobe);
     }
   }
 }
 
 /// What passes a clear sheet goes straight on, whatever its normal.
-bool FluxScatter::is_plain(Lobe lobe) const {
+bool AdjointBsdf::is_plain(Lobe lobe) const {
   const bool bends = at_.material.solid && at_.material.ior != 1.0;
   return flat_ || (lobe == Lobe::Transmission && at_.bsdf.is_delta(lobe) && !bends);
 }
 
-glm::dvec3 FluxScatter::weight(Lobe lobe) const {
+glm::dvec3 AdjointBsdf::weight(Lobe lobe) const {
   if (is_plain(lobe)) return at_.bsdf.weight(lobe);
-  if (at_.bsdf.is_delta(lobe)) return ways(lobe).sum;
+  if (at_.bsdf.is_delta(lobe)) return directions(lobe).sum;
   return 0.5 * (at_.bsdf.weight(lobe) + plain_.weight(lobe));
 }
 
-std::optional<BsdfSample> FluxScatter::sample(Lobe lobe, Sampler& sampler) const {
+std::optional<BsdfSample> AdjointBsdf::sample(Lobe lobe, Sampler& sampler) const {
   if (is_plain(lobe)) return at_.bsdf.sample(lobe, sampler.two());
-  return at_.bsdf.is_delta(lobe) ? sample_way(ways(lobe), sampler) : sample_wide(lobe, sampler);
+  return at_.bsdf.is_delta(lobe) ? sample_direction(directions(lobe), sampler) : sample_wide(lobe, sampler);
 }
 
 /// The place as an eye in `direction` meets it.
-SurfacePoint FluxScatter::seen_from(const glm::dvec3& direction) const {
+SurfacePoint AdjointBsdf::seen_from(const glm::dvec3& direction) const {
   if (glm::dot(direction, at_.surface.geometric_normal) < 0.0) {
     return surfaces_.meet(at_.triangle, at_.surface.position + direction, -direction);
   }
@@ -80,7 +80,7 @@ SurfacePoint FluxScatter::seen_from(const glm::dvec3& direction) const {
 }
 
 /// f times its cosine, as an eye in `direction` has it for light from `surface.to_viewer`, brought to flux: 1/sr.
-glm::dvec3 FluxScatter::scattered(Lobe lobe, const glm::dvec3& direction) const {
+glm::dvec3 AdjointBsdf::scattered(Lobe lobe, const glm::dvec3& direction) const {
   const glm::dvec3& light = at_.surface.to_viewer;
   const glm::dvec3& geometric = at_.surface.geometric_normal;
   const double falls = glm::dot(light, geometric);
@@ -95,7 +95,7 @@ glm::dvec3 FluxScatter::scattered(Lobe lobe, const glm::dvec3& direction) const 
   return at_.bsdf.seen_from(direction, normal).value(lobe, light) * (std::abs(glm::dot(light, normal)) * leaves);
 }
 
-std::optional<BsdfSample> FluxScatter::sample_wide(Lobe lobe, Sampler& sampler) const {
+std::optional<BsdfSample> AdjointBsdf::sample_wide(Lobe lobe, Sampler& sampler) const {
   const double plain_chance = chance_of_plain(at_.surface, at_.material.normal, lobe);
   const bool by_plain = plain_chance == 1.0 || sampler.one() < plain_chance;
   std::optional<BsdfSample> sample = (by_plain ? plain_ : at_.bsdf).sample(lobe, sampler.two());
@@ -108,7 +108,8 @@ std::optional<BsdfSample> FluxScatter::sample_wide(Lobe lobe, Sampler& sampler) 
 }
 
 /// The way by one normal, for light that arrives as it is, or as it was before an eye's ray was put back on its side.
-FluxWay FluxScatter::way_by(const glm::dvec3& arrived, const glm::dvec3& normal, std::optional<double> eta) const {
+FluxDirection AdjointBsdf::direction_by(const glm::dvec3& arrived, const glm::dvec3& normal,
+                                        std::optional<double> eta) const {
   const glm::dvec3& geometric = at_.surface.geometric_normal;
   const double falls = glm::dot(at_.surface.to_viewer, geometric);
   const std::optional<glm::dvec3> direction = sent_from(arrived, normal, eta);
@@ -124,7 +125,7 @@ FluxWay FluxScatter::way_by(const glm::dvec3& arrived, const glm::dvec3& normal,
   return {*direction, bsdf.weight(lobe) * (squeezed * std::abs(leaves) / falls)};
 }
 
-FluxScatter::Ways FluxScatter::find_ways(Lobe lobe) const {
+AdjointBsdf::Directions AdjointBsdf::find_directions(Lobe lobe) const {
   const SurfacePoint& surface = at_.surface;
   const glm::dvec3& light = surface.to_viewer;
   const glm::dvec3& geometric = surface.geometric_normal;
@@ -134,29 +135,29 @@ FluxScatter::Ways FluxScatter::find_ways(Lobe lobe) const {
   const std::array<glm::dvec3, 4> normals{at_.material.normal, normal_to_shade_with(scene_, seen_from(geometric)),
                                           surface.shading_normal, geometric};
   const std::array<glm::dvec3, 2> arrived{light, light - 2.0 * glm::dot(light, geometric) * geometric};
-  Ways ways;
+  Directions directions;
   for (auto normal = normals.begin(); normal != normals.end(); ++normal) {
     const auto same = [&](const glm::dvec3& other) { return glm::distance(other, *normal) < 4.0 * kSame; };
     if (std::any_of(normals.begin(), normal, same)) continue;
     for (const glm::dvec3& before : arrived) {
-      const FluxWay way = way_by(before, *normal, eta);
+      const FluxDirection way = direction_by(before, *normal, eta);
       if (!(sum_of(way.weight) > 0.0) || !std::isfinite(sum_of(way.weight))) continue;
-      ways.sum += way.weight;
-      ways.all.at(ways.count++) = way;
+      directions.sum += way.weight;
+      directions.all.at(directions.count++) = way;
     }
   }
-  return ways;
+  return directions;
 }
 
-std::optional<BsdfSample> FluxScatter::sample_way(const Ways& ways, Sampler& sampler) const {
-  if (ways.count == 0) return std::nullopt;
-  const double sum = sum_of(ways.sum);
-  double left = ways.count == 1 ? 0.0 : sampler.one() * sum;
+std::optional<BsdfSample> AdjointBsdf::sample_direction(const Directions& directions, Sampler& sampler) const {
+  if (directions.count == 0) return std::nullopt;
+  const double sum = sum_of(directions.sum);
+  double left = directions.count == 1 ? 0.0 : sampler.one() * sum;
   std::size_t chosen = 0;
-  while (chosen + 1 < ways.count && left >= sum_of(ways.all.at(chosen).weight)) {
-    left -= sum_of(ways.all.at(chosen++).weight);
+  while (chosen + 1 < directions.count && left >= sum_of(directions.all.at(chosen).weight)) {
+    left -= sum_of(directions.all.at(chosen++).weight);
   }
-  const FluxWay& way = ways.all.at(chosen);
+  const FluxDirection& way = directions.all.at(chosen);
   return BsdfSample{way.direction, way.weight * (sum / sum_of(way.weight)), 0.0};
 }
 

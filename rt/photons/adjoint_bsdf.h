@@ -22,7 +22,7 @@ struct FluxArrival {
 };
 
 /// An eye's ray that ends at the light, and what of the flux goes back along it.
-struct FluxWay {
+struct FluxDirection {
   glm::dvec3 direction{0.0};
   glm::dvec3 weight{0.0};
 };
@@ -36,10 +36,10 @@ struct FluxWay {
 /// chosen about both normals, and weighed by the normal that an eye there would shade with. A lobe of one direction may
 /// send light of several eyes' rays to one lamp: those that Bsdf::sample puts back on their side meet others. One is
 /// chosen.
-class FluxScatter {
+class AdjointBsdf {
  public:
   /// All must outlive this.
-  FluxScatter(const Scene& scene, const Surfaces& surfaces, const FluxArrival& at);
+  AdjointBsdf(const Scene& scene, const Surfaces& surfaces, const FluxArrival& at);
 
   /// About the share of the flux that the lobe sends on: for choosing among lobes. Zero only where it sends none.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
@@ -48,27 +48,30 @@ class FluxScatter {
 
  private:
   /// Of a lobe of one direction.
-  struct Ways {
-    std::array<FluxWay, 8> all;
+  struct Directions {
+    std::array<FluxDirection, 8> all;
     std::size_t count = 0;
     glm::dvec3 sum{0.0};
   };
 
   [[nodiscard]] bool is_plain(Lobe lobe) const;
-  [[nodiscard]] const Ways& ways(Lobe lobe) const { return ways_[lobe == Lobe::Transmission ? 1 : 0]; }
-  [[nodiscard]] Ways find_ways(Lobe lobe) const;
-  [[nodiscard]] FluxWay way_by(const glm::dvec3& arrived, const glm::dvec3& normal, std::optional<double> eta) const;
+  [[nodiscard]] const Directions& directions(Lobe lobe) const {
+    return directions_[lobe == Lobe::Transmission ? 1 : 0];
+  }
+  [[nodiscard]] Directions find_directions(Lobe lobe) const;
+  [[nodiscard]] FluxDirection direction_by(const glm::dvec3& arrived, const glm::dvec3& normal,
+                                           std::optional<double> eta) const;
   [[nodiscard]] SurfacePoint seen_from(const glm::dvec3& direction) const;
   [[nodiscard]] glm::dvec3 scattered(Lobe lobe, const glm::dvec3& direction) const;
   [[nodiscard]] std::optional<BsdfSample> sample_wide(Lobe lobe, Sampler& sampler) const;
-  [[nodiscard]] std::optional<BsdfSample> sample_way(const Ways& ways, Sampler& sampler) const;
+  [[nodiscard]] std::optional<BsdfSample> sample_direction(const Directions& directions, Sampler& sampler) const;
 
   const Scene& scene_;
   const Surfaces& surfaces_;
   const FluxArrival& at_;
   bool flat_;   ///< every eye shades by the true surface's normal
   Bsdf plain_;  ///< by that normal; only where it is not flat
-  std::array<Ways, 2> ways_;
+  std::array<Directions, 2> directions_;
 };
 
 }  // namespace hpr

@@ -4,14 +4,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
 namespace {
 
-TEST(LitSamples, TogetherAreThoseOneByOne) {
+TEST(ShadedSamples, TogetherAreThoseOneByOne) {
   Scene scene = test::room(test::mirror(0.7F), true);
   scene.materials.back().alpha_mode = AlphaMode::Blend;
   scene.materials.back().base_color.a = 0.5F;
@@ -19,40 +19,40 @@ TEST(LitSamples, TogetherAreThoseOneByOne) {
   Light& light = scene.lights.emplace_back();
   light.position = {0.3, 0.5, 0.2};
   light.intensity = glm::vec3(2.0F);
-  std::vector<std::vector<View>> looks;
+  std::vector<std::vector<View>> views;
   std::vector<TileLayer<Key>> keys;
   for (int i = 0; i < 5; ++i) {
     View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {150, 130}, scene, 1.3);
     view.jitter = {0.1 * i, -0.2 * i};
-    looks.push_back({view, view});
-    keys.push_back(test::cast_keys(scene, looks.back()));
+    views.push_back({view, view});
+    keys.push_back(test::cast_keys(scene, views.back()));
   }
   const FrameLayout& layout = keys.front().layout();
   const std::vector<std::size_t> tiles = all_tiles(layout);
-  Lighter lighter(scene, {.threads = 2});
+  DeferredShader shader(scene, {.threads = 2});
   std::vector<TileLayer<Rgb>> together;
   std::vector<TileLayer<Rgb>> normals;
   std::vector<TileLayer<float>> costs;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
     together.emplace_back(layout);
     normals.emplace_back(layout);
     costs.emplace_back(layout);
   }
-  std::vector<LitSample> samples;
-  for (std::uint32_t i = 0; i < looks.size(); ++i) {
+  std::vector<ShadedSample> samples;
+  for (std::uint32_t i = 0; i < views.size(); ++i) {
     samples.push_back(
-        {looks[i], &keys[i], {.radiance = &together[i], .normal = &normals[i], .cost = &costs[i]}, {7, i}});
+        {views[i], &keys[i], {.radiance = &together[i], .normal = &normals[i], .cost = &costs[i]}, {7, i}});
   }
-  ASSERT_FALSE(lighter.lights_one_by_one());
-  lighter.light(samples, tiles);
-  const RayCounts counts = lighter.counts();
+  ASSERT_FALSE(shader.shades_one_by_one());
+  shader.shade(samples, tiles);
+  const RayCounts counts = shader.counts();
   RayCounts summed;
-  for (std::uint32_t i = 0; i < looks.size(); ++i) {
+  for (std::uint32_t i = 0; i < views.size(); ++i) {
     TileLayer<Rgb> alone(layout);
     TileLayer<Rgb> normal(layout);
     TileLayer<float> cost(layout);
-    lighter.light(looks[i], keys[i], tiles, {.radiance = &alone, .normal = &normal, .cost = &cost}, {7, i});
-    summed += lighter.counts();
+    shader.shade(views[i], keys[i], tiles, {.radiance = &alone, .normal = &normal, .cost = &cost}, {7, i});
+    summed += shader.counts();
     for (const std::size_t tile : tiles) {
       EXPECT_TRUE(std::ranges::equal(alone.tile(tile), together[i].tile(tile))) << i << ' ' << tile;
       EXPECT_TRUE(std::ranges::equal(normal.tile(tile), normals[i].tile(tile))) << i << ' ' << tile;
@@ -63,7 +63,7 @@ TEST(LitSamples, TogetherAreThoseOneByOne) {
 }
 
 /// Other pixels' light is not worked out, and what is worked out does not change but for the order of its sums.
-TEST(LitSamples, OnlyPixelsThatAreWanted) {
+TEST(ShadedSamples, OnlyPixelsThatAreWanted) {
   const Scene scene = test::room(test::mirror(0.7F), true);
   const std::vector<View> views(1, test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {150, 130}, scene, 1.3));
   const TileLayer<Key> keys = test::cast_keys(scene, views);
@@ -76,14 +76,14 @@ TEST(LitSamples, OnlyPixelsThatAreWanted) {
     if (tile == 3) std::ranges::fill(wanted.tile(tile), std::uint8_t{0});
   }
   for (const bool reference : {false, true}) {
-    Lighter lighter(scene, {.reference = reference, .threads = 2});
+    DeferredShader shader(scene, {.reference = reference, .threads = 2});
     TileLayer<Rgb> all(layout);
-    lighter.light(views, keys, tiles, {.radiance = &all}, {7, 3});
-    const RayCounts of_all = lighter.counts();
+    shader.shade(views, keys, tiles, {.radiance = &all}, {7, 3});
+    const RayCounts of_all = shader.counts();
     TileLayer<Rgb> some(layout);
-    const LitSample sample{views, &keys, {.radiance = &some}, {7, 3}, &wanted};
-    lighter.light(std::span(&sample, 1), tiles);
-    EXPECT_LT(lighter.counts()[PassId::Shadow], of_all[PassId::Shadow] / 2);
+    const ShadedSample sample{views, &keys, {.radiance = &some}, {7, 3}, &wanted};
+    shader.shade(std::span(&sample, 1), tiles);
+    EXPECT_LT(shader.counts()[PassId::Shadow], of_all[PassId::Shadow] / 2);
     for (const std::size_t tile : tiles) {
       for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
         if (wanted.active(tile) && wanted.tile(tile)[pixel] == 0) continue;

@@ -1,4 +1,4 @@
-#include "rt/denoise/pixel_parts.h"
+#include "rt/denoise/coverage_fragments.h"
 
 #include <gtest/gtest.h>
 
@@ -41,7 +41,7 @@ struct Error {
 
 /// Of a picture of such a scene, by what `hides` says of rays through many places of each pixel.
 Error error_of(const Scene& scene, const View& view, const std::function<bool(const Ray&)>& hides) {
-  const Image<Rgb> image = test::light(scene, view, kDenoised).image;
+  const Image<Rgb> image = test::shade(scene, view, kDenoised).image;
   constexpr int kSide = 48;
   Error error;
   for (int y = 0; y < image.height(); ++y) {
@@ -69,7 +69,7 @@ View straight_on(const Scene& scene, const Size& size = {64, 64}) {
   return test::view_from({0, 0, 3}, {0, 0, 0}, size, scene);
 }
 
-TEST(PixelParts, SharesOfStraightOutlinesAreMeasured) {
+TEST(CoverageFragments, SharesOfStraightOutlinesAreMeasured) {
   for (const float angle : {0.1F, 0.5F, 0.785F, 1.2F, 2.0F, 3.0F}) {
     Scene scene = before_the_sky();
     const glm::vec3 along(std::cos(angle), std::sin(angle), 0.0F);
@@ -87,7 +87,7 @@ TEST(PixelParts, SharesOfStraightOutlinesAreMeasured) {
 }
 
 /// Radii of about 4 to 15 pixels.
-TEST(PixelParts, SharesOfRoundOutlinesAreMeasured) {
+TEST(CoverageFragments, SharesOfRoundOutlinesAreMeasured) {
   for (const double radius : {0.2, 0.4, 0.8}) {
     Scene scene = before_the_sky();
     const glm::dvec3 centre(0.013, 0.037, 0.0);  // else the same few pixels stand all about
@@ -105,7 +105,7 @@ TEST(PixelParts, SharesOfRoundOutlinesAreMeasured) {
 }
 
 /// A corner in a pixel, sharp or blunt, is no outline that bends a little, nor is one beside it.
-TEST(PixelParts, CornersAreCounted) {
+TEST(CoverageFragments, CornersAreCounted) {
   struct Wedge {
     glm::dvec3 a, b;
     double most;
@@ -129,7 +129,7 @@ TEST(PixelParts, CornersAreCounted) {
 }
 
 /// Strips thinner than a pixel before an outline, which corners between two of them know nothing of.
-TEST(PixelParts, WhatNoCornerSeesKeepsItsLight) {
+TEST(CoverageFragments, WhatNoCornerSeesKeepsItsLight) {
   Scene scene = before_the_sky();
   add_material(scene, test::matte(glm::vec3(0.0F)));
   place(scene, add_mesh(scene, quad({-4, -4, 0}, {8, 0, 0}, {0, 4.01F, 0}, 0)));
@@ -155,7 +155,7 @@ TEST(PixelParts, WhatNoCornerSeesKeepsItsLight) {
 }
 
 /// Where a screen of points has none, looks see what the pixel's centre does; the plane's corners say nothing.
-TEST(PixelParts, LooksGoThroughThePointsOfTheScreen) {
+TEST(CoverageFragments, LooksGoThroughThePointsOfTheScreen) {
   Scene scene = before_the_sky();
   place(scene, add_mesh(scene, quad({-9, -9, 0}, {9.5F, 0, 0}, {0, 18, 0}, 0)));
   finish_scene(scene);
@@ -171,14 +171,14 @@ TEST(PixelParts, LooksGoThroughThePointsOfTheScreen) {
     }
   }
   view.points = PixelPoints{std::make_shared<const PositionMap>(points), glm::dvec3(0.0), glm::dmat3(1.0), false, 1};
-  const Image<Rgb> image = test::light(scene, view, kDenoised).image;
+  const Image<Rgb> image = test::shade(scene, view, kDenoised).image;
   for (int y = 0; y < 64; ++y) {
     for (int x = 0; x < 64; ++x) ASSERT_EQ(image.at(x, y).g, x > 32 ? 1.0F : 0.0F) << x << ' ' << y;
   }
 }
 
 /// Three surfaces meet, and a gap thinner than a pixel runs from there: rays ask.
-TEST(PixelParts, SharesAreCountedWhereMoreThanOneOutlineRuns) {
+TEST(CoverageFragments, SharesAreCountedWhereMoreThanOneOutlineRuns) {
   Scene scene = before_the_sky();
   place(scene, add_mesh(scene, quad({-3.02F, -3, 0}, {3, 0, 0}, {0, 6, 0}, 0)));
   place(scene, add_mesh(scene, quad({0.02F, -3, 0}, {3, 0, 0}, {0.4F, 3.2F, 0}, 0)));
@@ -192,30 +192,30 @@ TEST(PixelParts, SharesAreCountedWhereMoreThanOneOutlineRuns) {
 }
 
 /// A wider filter reaches beyond the pixel: its half of a straight outline through the middle is one half too.
-TEST(PixelParts, WiderFiltersAreCounted) {
+TEST(CoverageFragments, WiderFiltersAreCounted) {
   Scene scene = before_the_sky();
   place(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
   finish_scene(scene);
   RaySettings settings = kDenoised;
   settings.filter = PixelFilter::Gaussian;
-  const Image<Rgb> image = test::light(scene, straight_on(scene, {65, 65}), settings).image;
+  const Image<Rgb> image = test::shade(scene, straight_on(scene, {65, 65}), settings).image;
   for (int y = 0; y < 64; ++y) EXPECT_NEAR(image.at(32, y).g, 0.5, 0.1) << y;
 }
 
-TEST(PixelParts, AreFoundOnceWhileTheViewStays) {
+TEST(CoverageFragments, AreFoundOnceWhileTheViewStays) {
   Scene scene = before_the_sky();
   place(scene, add_mesh(scene, test::sphere(0.8, 32, 0)));
   finish_scene(scene);
   View view = straight_on(scene);
-  Lighter lighter(scene, kDenoised);
+  DeferredShader shader(scene, kDenoised);
   std::vector<std::uint64_t> rays;
   std::vector<std::vector<Rgb>> pictures;
   for (const double x : {0.0, 0.0, 0.25}) {
     view.eye.x = x;
     const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
     TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {});
-    rays.push_back(lighter.counts().primary);
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {});
+    rays.push_back(shader.counts().primary);
     pictures.emplace_back(radiance.tile(0).begin(), radiance.tile(0).end());
   }
   EXPECT_GT(rays[0], 65U * 65U);
@@ -225,7 +225,7 @@ TEST(PixelParts, AreFoundOnceWhileTheViewStays) {
   EXPECT_NE(pictures[0], pictures[2]);
 }
 
-Sight on_sphere(double x, double y, double radius) {
+SurfaceFeature on_sphere(double x, double y, double radius) {
   const glm::vec3 normal(x / radius, y / radius, std::sqrt(1.0 - (x * x + y * y) / (radius * radius)));
   return {true, 3, static_cast<float>(radius) * normal - glm::vec3(0, 0, 100), normal};
 }
@@ -234,31 +234,31 @@ Sight on_sphere(double x, double y, double radius) {
 TEST(Patch, FollowsASphereUpToItsOutline) {
   constexpr double kRadius = 10.0;
   const glm::dvec2 pixel(9.3, 0.4);  // the outline runs through it, at x of 0.68 or so from its centre
-  std::vector<Known> known;
-  std::vector<Sight> sights;
+  std::vector<KnownFeature> known;
+  std::vector<SurfaceFeature> features;
   for (const glm::vec2& at : {glm::vec2(-0.5F, -0.5F), {-0.5F, 0.5F}, {0.5F, -0.5F}, {0.6F, 0.1F}}) {
-    known.push_back({at, static_cast<std::uint32_t>(sights.size())});
-    sights.push_back(on_sphere(pixel.x + at.x, pixel.y + at.y, kRadius));
+    known.push_back({at, static_cast<std::uint32_t>(features.size())});
+    features.push_back(on_sphere(pixel.x + at.x, pixel.y + at.y, kRadius));
   }
-  const Patch patch(known, sights, {0, 0, 1});
+  const Patch patch(known, features, {0, 0, 1});
   for (const glm::vec2& at : {glm::vec2(-0.4F, 0.3F), {0.0F, 0.0F}, {0.3F, -0.3F}, {0.4F, 0.2F}, {0.6F, 0.0F}}) {
-    const Sight truth = on_sphere(pixel.x + at.x, pixel.y + at.y, kRadius);
-    const Sight found = patch.at(at);
+    const SurfaceFeature truth = on_sphere(pixel.x + at.x, pixel.y + at.y, kRadius);
+    const SurfaceFeature found = patch.at(at);
     EXPECT_EQ(found.material, 3U);
     EXPECT_NEAR(glm::length(found.normal), 1.0F, 1e-5F);
     EXPECT_LT(glm::distance(found.normal, truth.normal), 0.05F) << at.x << ' ' << at.y;
-    EXPECT_LT(glm::distance(found.place, truth.place), 1.0F) << at.x << ' ' << at.y;
+    EXPECT_LT(glm::distance(found.position, truth.position), 1.0F) << at.x << ' ' << at.y;
   }
   EXPECT_NEAR(glm::length(patch.at({3.0F, 0.0F}).normal), 1.0F, 1e-5F);  // past the outline
 }
 
 TEST(Patch, OfOnePlaceIsThatEverywhere) {
-  const Sight sight = on_sphere(0.3, 0.2, 1.0);
-  const Known known{{0.25F, -0.25F}, 0};
-  const Patch patch(std::span(&known, 1), std::span(&sight, 1), {0, 0, 1});
+  const SurfaceFeature feature = on_sphere(0.3, 0.2, 1.0);
+  const KnownFeature known{{0.25F, -0.25F}, 0};
+  const Patch patch(std::span(&known, 1), std::span(&feature, 1), {0, 0, 1});
   for (const glm::vec2& at : {glm::vec2(0.0F), {0.5F, 0.5F}}) {
-    EXPECT_LT(glm::distance(patch.at(at).normal, sight.normal), 1e-5F);
-    EXPECT_LT(glm::distance(patch.at(at).place, sight.place), 1e-4F);
+    EXPECT_LT(glm::distance(patch.at(at).normal, feature.normal), 1e-5F);
+    EXPECT_LT(glm::distance(patch.at(at).position, feature.position), 1e-4F);
   }
 }
 

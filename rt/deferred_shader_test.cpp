@@ -1,4 +1,4 @@
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 
 #include <gtest/gtest.h>
 
@@ -34,12 +34,12 @@ Scene white_floor() {
   return scene;
 }
 
-TEST(Lighter, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
+TEST(DeferredShader, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
   Scene scene = white_floor();
   scene.lights = {point_light({0.1, 2.0, 0.1}, 7.0F)};
   // Narrow, and with the light near the eye's axis: there the specular layer's share is below 1e-7.
   const View view = test::view_from({0, 5, 0.1}, {0, 0, 0}, {65, 33}, scene, 0.1);
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   for (int y = 0; y < 33; ++y) {
     for (int x = 0; x < 65; ++x) {
       const Ray ray = view_ray(view, x + 0.5, y + 0.5);
@@ -54,7 +54,7 @@ TEST(Lighter, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
   EXPECT_EQ(lit.counts.not_finite, 0U);
 }
 
-TEST(Lighter, ABlockersShadowEndsWhereGeometrySays) {
+TEST(DeferredShader, ABlockersShadowEndsWhereGeometrySays) {
   Scene scene = white_floor();
   // A square of half side 0.5 at half the light's height: its shadow has half side 1.
   place(scene, add_mesh(scene, quad({-0.5, 1, 0.5}, {1, 0, 0}, {0, 0, -1}, 0)));
@@ -62,8 +62,8 @@ TEST(Lighter, ABlockersShadowEndsWhereGeometrySays) {
   scene.lights = {point_light({0, 2, 0}, 1.0F)};
   const View view = test::view_from({0.0, 0.9, 3.9}, {0, 0, 0}, {80, 60}, scene);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-  const test::Lit lit = test::light(scene, view);
-  const test::Lit unshadowed = test::light(scene, view, {.auto_passes = false});
+  const test::Shaded lit = test::shade(scene, view);
+  const test::Shaded unshadowed = test::shade(scene, view, {.auto_passes = false});
   int dark = 0;
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 80; ++x) {
@@ -82,28 +82,28 @@ TEST(Lighter, ABlockersShadowEndsWhereGeometrySays) {
   EXPECT_EQ(unshadowed.counts[PassId::Shadow], 0U);
 }
 
-TEST(Lighter, ALightThatLiesOnASurfaceIsNotHiddenByIt) {
+TEST(DeferredShader, ALightThatLiesOnASurfaceIsNotHiddenByIt) {
   Scene scene = white_floor();
   add_mesh(scene, quad({-4, 3, -4}, {8, 0, 0}, {0, 0, 8}, 0));
   place(scene, 1);
   finish_scene(scene);
   scene.lights = {point_light({0.1, 3.0, 0.2}, 1.0F)};
   const View view = test::view_from({0, 1, 0.1}, {0, 0, 0}, {32, 32}, scene);
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   for (const Rgb& pixel : lit.image.pixels()) EXPECT_GT(pixel.r, 0.0F);
 }
 
-TEST(Lighter, ALightNearerThanRoundingCastsNoImpossibleRay) {
+TEST(DeferredShader, ALightNearerThanRoundingCastsNoImpossibleRay) {
   Scene scene = white_floor();
   // Where rays of this floor start: 4 * 2^-23 of 4 + 8 metres above it.
   scene.lights = {point_light({0, 5.7e-6, 0}, 1e-10F)};
-  const test::Lit lit = test::light(scene, test::view_from({0, 3, 0}, {0, 0, 0}, {3, 3}, scene, 1e-4, {0, 0, -1}));
+  const test::Shaded lit = test::shade(scene, test::view_from({0, 3, 0}, {0, 0, 0}, {3, 3}, scene, 1e-4, {0, 0, -1}));
   EXPECT_GT(lit.counts[PassId::Shadow], 0U);
   EXPECT_EQ(lit.counts.invalid, 0U);
   EXPECT_GT(lit.image.at(1, 1).r, 0.0F);
 }
 
-TEST(Lighter, NoSphereShadowsItselfAtAnyScale) {
+TEST(DeferredShader, NoSphereShadowsItselfAtAnyScale) {
   for (const double scale : {1e-9, 1e-3, 1.0, 1e3, 1e9}) {
     for (const double offset : {0.0, 100.0}) {
       Scene scene;
@@ -117,8 +117,8 @@ TEST(Lighter, NoSphereShadowsItselfAtAnyScale) {
       sun.direction = glm::normalize(glm::vec3(-0.8F, -0.5F, -0.2F));
       scene.lights = {sun};
       const View view = test::view_from(center + glm::dvec3(0, 0, 4.0 * scale), center, {64, 64}, scene, 0.6);
-      const test::Lit lit = test::light(scene, view);
-      const test::Lit unshadowed = test::light(scene, view, {.auto_passes = false});
+      const test::Shaded lit = test::shade(scene, view);
+      const test::Shaded unshadowed = test::shade(scene, view, {.auto_passes = false});
       int differing = 0;
       int lit_pixels = 0;
       for (std::size_t i = 0; i < lit.image.pixels().size(); ++i) {
@@ -161,7 +161,7 @@ Scene busy_scene(bool flattened) {
   return scene;
 }
 
-TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
+TEST(DeferredShader, InstancedAndFlattenedScenesLookTheSame) {
   const Scene instanced = busy_scene(false);
   const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {96, 64}, instanced, 0.7);
   const TileLayer<Key> keys = test::cast_keys(instanced, std::span(&view, 1));
@@ -169,8 +169,8 @@ TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
   TileLayer<Rgb> a(keys.layout());
   TileLayer<Rgb> b(keys.layout());
   const Scene flattened = busy_scene(true);
-  Lighter(instanced, {}).light(std::span(&view, 1), keys, tiles, {.radiance = &a});
-  Lighter(flattened, {}).light(std::span(&view, 1), keys, tiles, {.radiance = &b});
+  DeferredShader(instanced, {}).shade(std::span(&view, 1), keys, tiles, {.radiance = &a});
+  DeferredShader(flattened, {}).shade(std::span(&view, 1), keys, tiles, {.radiance = &b});
   int differing = 0;
   for (const std::size_t tile : tiles) {
     for (std::size_t i = 0; i < kTilePixels; ++i) {
@@ -184,7 +184,7 @@ TEST(Lighter, InstancedAndFlattenedScenesLookTheSame) {
   EXPECT_LE(differing, 6);
 }
 
-TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
+TEST(DeferredShader, ThreadsAndTileListsChangeNoBit) {
   const Scene scene = busy_scene(false);
   const View left = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {150, 130}, scene, 0.7);
   const View right = test::view_from({3.3, 1.5, 6}, {0, -0.2, 0}, {70, 64}, scene, 0.7);
@@ -194,17 +194,17 @@ TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
   TileLayer<Rgb> whole(keys.layout());
   TileLayer<Rgb> threaded(keys.layout());
   TileLayer<Rgb> split(keys.layout());
-  Lighter one(scene, {.threads = 1});
-  one.light(views, keys, tiles, {.radiance = &whole});
+  DeferredShader one(scene, {.threads = 1});
+  one.shade(views, keys, tiles, {.radiance = &whole});
   const RayCounts counts = one.counts();
   EXPECT_GT(counts[PassId::Reflection], 100U);
   EXPECT_GT(counts[PassId::Shadow], 100U);
-  Lighter two(scene, {.threads = 2});
-  two.light(views, keys, tiles, {.radiance = &threaded});
+  DeferredShader two(scene, {.threads = 2});
+  two.shade(views, keys, tiles, {.radiance = &threaded});
   EXPECT_EQ(two.counts(), counts);
   RayCounts summed;
   for (auto tile = tiles.rbegin(); tile != tiles.rend(); ++tile) {
-    one.light(views, keys, std::span(&*tile, 1), {.radiance = &split});
+    one.shade(views, keys, std::span(&*tile, 1), {.radiance = &split});
     summed += one.counts();
   }
   EXPECT_EQ(summed, counts);
@@ -214,7 +214,7 @@ TEST(Lighter, ThreadsAndTileListsChangeNoBit) {
   }
 }
 
-TEST(Lighter, APixelDoesNotDependOnItsNeighbours) {
+TEST(DeferredShader, APixelDoesNotDependOnItsNeighbours) {
   const Scene scene = busy_scene(false);
   const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {64, 64}, scene, 0.7);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
@@ -227,9 +227,9 @@ TEST(Lighter, APixelDoesNotDependOnItsNeighbours) {
   const std::vector<std::size_t> tiles{0};
   TileLayer<Rgb> all(keys.layout());
   TileLayer<Rgb> some(keys.layout());
-  Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &all});
-  lighter.light(std::span(&view, 1), sparse, tiles, {.radiance = &some});
+  DeferredShader shader(scene, {});
+  shader.shade(std::span(&view, 1), keys, tiles, {.radiance = &all});
+  shader.shade(std::span(&view, 1), sparse, tiles, {.radiance = &some});
   for (std::size_t i = 0; i < kTilePixels; ++i) {
     if (sparse.tile(0)[i] != kNoKey) {
       ASSERT_EQ(all.tile(0)[i], some.tile(0)[i]) << i;
@@ -237,7 +237,7 @@ TEST(Lighter, APixelDoesNotDependOnItsNeighbours) {
   }
 }
 
-TEST(Lighter, ScalingTheWholeSceneByAPowerOfTwoScalesNothingButTheLight) {
+TEST(DeferredShader, ScalingTheWholeSceneByAPowerOfTwoScalesNothingButTheLight) {
   const auto picture = [](double scale) {
     Scene scene = busy_scene(false);
     for (Instance& instance : scene.instances) {
@@ -249,34 +249,34 @@ TEST(Lighter, ScalingTheWholeSceneByAPowerOfTwoScalesNothingButTheLight) {
     }
     finish_scene(scene);
     const View view = test::view_from(scale * glm::dvec3(0.3, 1.5, 6), {0, -0.2 * scale, 0}, {64, 48}, scene, 0.7);
-    return test::light(scene, view).image;
+    return test::shade(scene, view).image;
   };
   const Image<Rgb> base = picture(1.0);
   EXPECT_TRUE(base == picture(std::ldexp(1.0, 20)));
   EXPECT_TRUE(base == picture(std::ldexp(1.0, -20)));
 }
 
-TEST(Lighter, AnEmptySceneIsItsBackground) {
+TEST(DeferredShader, AnEmptySceneIsItsBackground) {
   Scene scene;
   scene.background = {1.0F, 2.0F, 3.0F};
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {10, 7}, scene);
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   for (const Rgb& pixel : lit.image.pixels()) EXPECT_EQ(pixel, (Rgb{1.0F, 2.0F, 3.0F}));
 }
 
-TEST(Lighter, InfiniteRadianceIsBlackAndCounted) {
+TEST(DeferredShader, InfiniteRadianceIsBlackAndCounted) {
   Scene scene = white_floor();
   scene.materials[0].emissive = glm::vec3(3e38F);
   scene.materials[0].base_color = glm::vec4(1.0F);
   scene.lights = {point_light({0, 1e-30, 0}, 3e38F), point_light({0, 1, 0}, 3e38F), point_light({0, 1, 0}, 3e38F)};
   const View view = test::view_from({0, 0.5, 0.1}, {0, 0, 0}, {9, 9}, scene);
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   for (const Rgb& pixel : lit.image.pixels()) EXPECT_TRUE(std::isfinite(pixel.r));
   EXPECT_GT(lit.counts.not_finite, 0U);
 }
 
-TEST(Lighter, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {
+TEST(DeferredShader, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {
   Scene scene;
   test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
   Material bright = test::glowing(glm::vec3(3e38F));
@@ -294,10 +294,10 @@ TEST(Lighter, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {
   for (const int threads : {1, 3}) {
     RaySettings settings;
     settings.threads = threads;
-    Lighter lighter(scene, settings);
+    DeferredShader shader(scene, settings);
     TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &radiance});
-    const RayCounts counts = lighter.counts();
+    shader.shade(std::span(&view, 1), keys, tiles, {.radiance = &radiance});
+    const RayCounts counts = shader.counts();
     ASSERT_GT(counts.not_finite, 1U);
     EXPECT_EQ(expected.value_or(counts), counts);
     expected = counts;
@@ -309,28 +309,28 @@ TEST(Lighter, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {
   // Two ranks with half the tiles each add up to the same.
   RayCounts sum;
   for (std::size_t part = 0; part < 2; ++part) {
-    Lighter lighter(scene, {});
+    DeferredShader shader(scene, {});
     TileLayer<Rgb> radiance(keys.layout());
     const std::size_t half = tiles.size() / 2;
     const auto mine = std::span(tiles).subspan(part * half, part == 0 ? half : tiles.size() - half);
-    lighter.light(std::span(&view, 1), keys, mine, {.radiance = &radiance});
-    sum += lighter.counts();
+    shader.shade(std::span(&view, 1), keys, mine, {.radiance = &radiance});
+    sum += shader.counts();
   }
   EXPECT_EQ(sum.first_not_finite, expected->first_not_finite);
   EXPECT_EQ(sum.not_finite, expected->not_finite);
   EXPECT_LT(sum.first_not_finite, kNoPixel);
 }
 
-TEST(Lighter, LocalShadingPutsTheDisplayColourIntoTheKeys) {
+TEST(DeferredShader, LocalShadingPutsTheDisplayColourIntoTheKeys) {
   const Scene scene = busy_scene(false);
   const View view = test::view_from({0.3, 1.5, 6}, {0, -0.2, 0}, {64, 64}, scene, 0.7);
   TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
   const std::vector<Key> before(keys.tile(0).begin(), keys.tile(0).end());
   const std::vector<std::size_t> tiles{0};
   TileLayer<Rgb> radiance(keys.layout());
-  Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &radiance});
-  shade_local(lighter, std::span(&view, 1), keys, tiles);
+  DeferredShader shader(scene, {});
+  shader.shade(std::span(&view, 1), keys, tiles, {.radiance = &radiance});
+  shade_local(shader, std::span(&view, 1), keys, tiles);
   for (std::size_t i = 0; i < kTilePixels; ++i) {
     if (before[i] == kNoKey) {
       ASSERT_EQ(keys.tile(0)[i], kNoKey);
@@ -342,7 +342,7 @@ TEST(Lighter, LocalShadingPutsTheDisplayColourIntoTheKeys) {
 }
 
 // A flat floor whose normals pretend a hill, higher than the wall that stands on it: lifted rays look over the wall.
-TEST(Lighter, TheReferenceLiftsShadowRaysAsSettingsSay) {
+TEST(DeferredShader, TheReferenceLiftsShadowRaysAsSettingsSay) {
   Scene scene;
   const std::uint32_t white = add_material(scene, test::matte());
   Mesh hill = quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, white);
@@ -357,7 +357,7 @@ TEST(Lighter, TheReferenceLiftsShadowRaysAsSettingsSay) {
   finish_scene(scene);
   const View view = test::view_from({-0.5, 4, 0}, {-0.5, 0, 0}, {32, 32}, scene, 0.3, {1.0, 0.0, 0.0});
   const auto sum = [&](bool fix) {
-    const Image<Rgb> image = test::light(scene, view, {.terminator_fix = fix, .reference = true}).image;
+    const Image<Rgb> image = test::shade(scene, view, {.terminator_fix = fix, .reference = true}).image;
     double total = 0.0;
     for (int y = 0; y < 32; ++y) {
       for (int x = 0; x < 32; ++x) total += image.at(x, y).g;

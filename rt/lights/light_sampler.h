@@ -16,56 +16,57 @@
 
 namespace hpr {
 
-/// Whether sampling lights finds an environment of one radiance, or that is left to rays of all directions.
-enum class EvenSky : std::uint8_t { Sampled, LeftToRays };
+/// Whether an environment of one radiance is sampled as a light, or left to rays of all directions.
+enum class ConstantEnvironment : std::uint8_t { Sampled, LeftToRays };
 
 /// All that gives light in a scene: punctual lights (KHR_lights_punctual), spheres (lights with a radius), triangles
 /// that emit (from both sides, as they are shown), and the environment. Knows nothing of visibility.
 ///
-/// A `normal` stands for the side a surface takes light on: lights wholly below its plane are never chosen, and an even
-/// sky is sampled by the cosine. Where light may also come through the surface, pass a zero normal. All numbers `u` lie
-/// in [0, 1).
-class LightSet {
+/// A `normal` stands for the side a surface takes light on: lights wholly below its plane are never chosen, and a
+/// constant environment is sampled by the cosine. Where light may also come through the surface, pass a zero normal.
+/// All numbers `u` lie in [0, 1).
+class LightSampler {
  public:
   /// The scene must outlive this. A scene that gives no light (gives_light) gets a headlight. Lights without any
   /// intensity are left out. O(n log n) for n lights.
-  explicit LightSet(const Scene& scene, EvenSky constant_environment = EvenSky::Sampled);
+  explicit LightSampler(const Scene& scene, ConstantEnvironment constant_environment = ConstantEnvironment::Sampled);
 
-  /// Lights that are few enough to be asked one by one at every point, punctual and sphere lights; past
-  /// `kMostListed` none is listed and all are sampled.
-  [[nodiscard]] std::size_t listed() const;
-  /// Light i of those. `u` is used by lights with an extent. weight is zero where it does not reach.
-  [[nodiscard]] LightSample sample_listed(std::size_t light, const glm::dvec3& place, const View& view,
-                                          const glm::dvec2& u) const;
-  /// Whether light i of those sends the same light every time (it has no extent): then more samples of it are of no
+  /// The number of lights that every vertex samples one by one: punctual and sphere lights, unless there are more than
+  /// kMaxEnumerated; then 0, and all are in the tree.
+  [[nodiscard]] std::size_t enumerated() const;
+  /// A sample of enumerated light i. `u` is used by lights with an extent. weight is zero where it does not reach.
+  [[nodiscard]] LightSample sample_enumerated(std::size_t light, const glm::dvec3& place, const View& view,
+                                              const glm::dvec2& u) const;
+  /// Whether every sample of enumerated light i is equal (it has no extent): then more samples of it are of no
   /// use.
-  [[nodiscard]] bool listed_is_fixed(std::size_t light) const;
+  [[nodiscard]] bool enumerated_is_fixed(std::size_t light) const;
 
-  /// Whether there are lights beside the listed ones: emitting triangles, the environment, and, when they are many,
+  /// Whether there are lights beside the enumerated ones: emitting triangles, the environment, and, when they are many,
   /// all.
-  [[nodiscard]] bool has_sampled() const;
-  /// One of those lights, chosen by what it may give to a surface at `place` with `normal` (a light tree: Conty and
-  /// Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018). None when no light reaches it.
-  [[nodiscard]] std::optional<LightSample> sample_one(const glm::dvec3& place, const glm::dvec3& normal,
-                                                      const View& view, double u_choice, const glm::dvec2& u) const;
+  [[nodiscard]] bool has_tree() const;
+  /// A sample of one of the lights that are not enumerated, chosen by what it may give to a surface at `place` with
+  /// `normal` (a light tree: Conty and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018).
+  /// None when no light reaches it.
+  [[nodiscard]] std::optional<LightSample> sample(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
+                                                  double u_choice, const glm::dvec2& u) const;
 
-  /// One of all lights, listed or not, for path tracing; the headlight is one of them.
+  /// A sample of one of all lights, enumerated or not, for path tracing; the headlight is one of them.
   [[nodiscard]] std::optional<LightSample> sample_any(const glm::dvec3& place, const glm::dvec3& normal,
                                                       const View& view, double u_choice, const glm::dvec2& u) const;
 
-  /// Per solid angle: the density with which sample_one (or sample_any) at `place` picks the direction to the point
+  /// Per solid angle: the density with which sample (or sample_any) at `place` picks the direction to the point
   /// `hit` of an emitting surface; of a sample, the very pdf it says. 0 for surfaces that do not emit.
-  [[nodiscard]] double surface_pdf_one(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
-                                       const SurfacePoint& hit) const;
+  [[nodiscard]] double surface_pdf(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+                                   const SurfacePoint& hit) const;
   [[nodiscard]] double surface_pdf_any(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
                                        const SurfacePoint& hit) const;
 
   /// Radiance from outside the scene along `direction`: the environment, or the background where there is none.
   [[nodiscard]] glm::dvec3 environment(const glm::dvec3& direction) const;
-  /// The same where it does not depend on the direction.
-  [[nodiscard]] std::optional<glm::dvec3> even_environment() const;
-  [[nodiscard]] double environment_pdf_one(const glm::dvec3& place, const glm::dvec3& normal,
-                                           const glm::dvec3& direction) const;
+  /// The radiance from outside the scene where no direction changes it.
+  [[nodiscard]] std::optional<glm::dvec3> constant_environment() const;
+  [[nodiscard]] double environment_pdf(const glm::dvec3& place, const glm::dvec3& normal,
+                                       const glm::dvec3& direction) const;
   [[nodiscard]] double environment_pdf_any(const glm::dvec3& place, const glm::dvec3& normal,
                                            const glm::dvec3& direction) const;
 
@@ -77,7 +78,7 @@ class LightSet {
   [[nodiscard]] std::optional<PhotonStart> emit(double u_choice, const glm::dvec2& u_place,
                                                 const glm::dvec2& u_direction) const;
 
-  static constexpr std::size_t kMostListed = 64;
+  static constexpr std::size_t kMaxEnumerated = 64;
 
  private:
   /// Lights that can be chosen from: those that stand somewhere in a tree, the others beside it.
@@ -96,7 +97,7 @@ class LightSet {
 
   // Lights are numbered: punctual ones, triangles, the environment.
   [[nodiscard]] std::size_t environment_number() const { return punctual_.size() + triangles_.size(); }
-  [[nodiscard]] const Choices& one() const { return listed_ > 0 ? sampled_ : all_; }
+  [[nodiscard]] const Choices& one() const { return enumerated_ > 0 ? sampled_ : all_; }
   [[nodiscard]] Choices make_choices(bool punctual) const;
   void sum_powers();
   void find_media(const Scene& scene);
@@ -114,15 +115,15 @@ class LightSet {
   [[nodiscard]] double environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
                                        const glm::dvec3& direction) const;
 
-  EvenSky even_sky_;
+  ConstantEnvironment constant_environment_;
   LitSphere lit_;
   glm::dvec3 background_{0.0};
   std::vector<Light> punctual_;
   TriangleLights triangles_;
   std::optional<EnvironmentMap> environment_;
-  std::size_t listed_ = 0;
+  std::size_t enumerated_ = 0;
   Choices all_;
-  Choices sampled_;           ///< without the listed ones; empty when none is listed
+  Choices sampled_;           ///< without the enumerated ones; empty when none is enumerated
   std::vector<Media> media_;  ///< of every light but the environment; none where no solid absorbs
   std::vector<double> power_sums_;
   double power_ = 0.0;
