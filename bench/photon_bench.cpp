@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "rt/photons/photon_gather.h"
 #include "rt/photons/photon_map.h"
+#include "rt/photons/photon_query.h"
 #include "rt/ray_settings.h"
 
 // A million photons on the walls of a room: sorting them into a map, and the light of about 50 gathered at a place. The

@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "image/image_io.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/passes/pass_list.h"
 
 namespace hpr {

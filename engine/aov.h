@@ -48,7 +48,7 @@ inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Cost) + 1;
 [[nodiscard]] constexpr bool is_part(Aov aov) {
   return aov >= Aov::Direct && aov < Aov::Rank;
 }
-/// Whether the lighter fills a layer of three floats for it.
+/// Whether the shader fills a layer of three floats for it.
 [[nodiscard]] constexpr bool has_rgb(Aov aov) {
   return aov >= Aov::Normal && aov < Aov::Rank;
 }
@@ -65,7 +65,7 @@ struct AovLayers {
   AovLayers() = default;
   AovLayers(const FrameLayout& layout, std::span<const Aov> wanted);
 
-  /// Where the lighter is to put them, beside `radiance`.
+  /// Where the shader is to put them, beside `radiance`.
   [[nodiscard]] LightOutput output(TileLayer<Rgb>& radiance);
 };
 

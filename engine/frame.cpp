@@ -5,9 +5,9 @@
 #include "compositing/compositor.h"
 #include "core/timing.h"
 #include "engine/session.h"
-#include "engine/tile_homes.h"
+#include "engine/tile_ownership.h"
 #include "raster/rasterizer.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/trace/primary_rays.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
@@ -43,7 +43,7 @@ void prepare(Session& session, const FramePlan& plan) {
       (void)session.rasterizer(plan.mine.objects);
     }
   }
-  if (spends_light(plan)) (void)session.lighter(plan.rays);
+  if (spends_light(plan)) (void)session.shader(plan.rays);
   if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
 }
 
@@ -56,7 +56,7 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
   }
 }
 
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
                               std::span<TileLayer<Key>* const> keys) {
   PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
   const trace::Span span("primary rays");
@@ -68,7 +68,7 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
     if (parts.empty()) continue;
     std::vector<View> views;
     views.reserve(looks.size());
-    for (const FrameLook& look : looks) views.push_back(look.views[screen]);
+    for (const JitteredViews& look : looks) views.push_back(look.views[screen]);
     rays.draw(views, screen, parts, keys, draws_own ? looks.front().sample.wanted : nullptr);
     stats += rays.stats();
   }
@@ -78,7 +78,7 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
 namespace {
 
 /// raster: the keys of each sample, before any rank exchanges them.
-FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
                      std::span<TileLayer<Key>* const> keys) {
   FrameTimes spent;
   const Stopwatch watch;
@@ -113,15 +113,15 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
 }
 
 /// Adds times and ray counts of the last call of light().
-void add_light(const Lighter& lighter, FrameTimes& spent) {
+void add_light(const DeferredShader& shader, FrameTimes& spent) {
   FrameTimes light;
-  light.passes = lighter.times();
-  light.rays = lighter.counts();
+  light.passes = shader.times();
+  light.rays = shader.counts();
   spent += light;
 }
 
 /// Moves keys to where their tiles' sums are.
-void bring_home(Session& session, const FramePlan& plan, std::optional<TileHomes>& homes, Frame& frame) {
+void bring_home(Session& session, const FramePlan& plan, std::optional<TileOwnership>& homes, Frame& frame) {
   if (!homes) homes.emplace(session.comm(), plan.layout, frame.owned);
   if (plan.distribution == Distribution::SortFirst) return;
   homes->bring(session.comm(), *frame.keys, frame.owned);
@@ -142,17 +142,17 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
            Frame& frame, FrameTimes& spent) {
   if (plan.shading == Shading::Local) {
     const trace::Span light("light");
-    Lighter& lighter = session.lighter(plan.rays);
+    DeferredShader& shader = session.shader(plan.rays);
     unpack_colors(*frame.keys, frame.owned, frame.radiance);
-    light_empty(lighter, views, *frame.keys, frame.owned, frame.radiance, sample.number);
-    add_light(lighter, spent);
+    shade_empty(shader, views, *frame.keys, frame.owned, frame.radiance, sample.number);
+    add_light(shader, spent);
   } else if (plan.lit) {
     const trace::Span light("light");
-    Lighter& lighter = session.lighter(plan.rays);
-    const LitSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
-    lighter.light(std::span(&lit, 1), frame.owned);
+    DeferredShader& shader = session.shader(plan.rays);
+    const ShadedSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
+    shader.shade(std::span(&lit, 1), frame.owned);
     mark_rank(session, frame);
-    add_light(lighter, spent);
+    add_light(shader, spent);
   }
 }
 
@@ -174,18 +174,18 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
 
 FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                       const FrameSample& sample) {
-  const FrameLook look{{views.begin(), views.end()}, sample};
+  const JitteredViews look{{views.begin(), views.end()}, sample};
   TileLayer<Key>* const layer = &keys;
   FrameTimes spent = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
 
   if (spends_light(plan)) {
     const trace::Span photons("photons");
-    session.lighter(plan.rays).send_photons(session.comm(), sample.number);
+    session.shader(plan.rays).trace_photons(session.comm(), sample.number);
   }
   if (plan.shading == Shading::Local) {
     const trace::Span shading("light");
-    shade_local(session.lighter(plan.rays), views, keys, plan.tiles, sample.number);
-    add_light(session.lighter(plan.rays), spent);
+    shade_local(session.shader(plan.rays), views, keys, plan.tiles, sample.number);
+    add_light(session.shader(plan.rays), spent);
   }
   return spent;
 }
@@ -212,14 +212,14 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
 std::size_t max_round_size(Session& session, const FramePlan& plan) {
   if (session.comm().size() > 1 && plan.distribution != Distribution::SortFirst) return 1;
   if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
-  if (session.lighter(plan.rays).lights_one_by_one()) return 1;
+  if (session.shader(plan.rays).shades_one_by_one()) return 1;
   // Keys and colours of a round are in memory together.
   constexpr std::size_t kPixels = std::size_t{1} << 23U;
   const std::size_t fit = kPixels / std::max<std::size_t>(plan.layout.pixels(), 1);
-  return std::clamp(fit, std::size_t{1}, PrimaryRays::kMostLooks);
+  return std::clamp(fit, std::size_t{1}, PrimaryRays::kMaxViews);
 }
 
-std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
                               FrameTimes& times) {
   const trace::Span span("round", "samples", looks.size());
   const std::span<TileLayer<Key>> keys = session.round_keys(plan.layout, looks.size());
@@ -230,7 +230,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
   }
   times = draw_keys(session, plan, looks, layers);
   std::vector<Frame> frames;
-  std::vector<LitSample> samples;
+  std::vector<ShadedSample> samples;
   for (std::size_t i = 0; i < looks.size(); ++i) {
     frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, {}});
     if (looks[i].sample.homes != nullptr) bring_home(session, plan, *looks[i].sample.homes, frames.back());
@@ -241,9 +241,9 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
     samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});
   }
   const trace::Span light("light");
-  Lighter& lighter = session.lighter(plan.rays);
-  lighter.light(samples, frames.front().owned);
-  add_light(lighter, times);
+  DeferredShader& shader = session.shader(plan.rays);
+  shader.shade(samples, frames.front().owned);
+  add_light(shader, times);
   times.samples = static_cast<int>(looks.size());
   return frames;
 }

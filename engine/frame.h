@@ -16,7 +16,7 @@
 namespace hpr {
 
 class Session;
-class TileHomes;
+class TileOwnership;
 
 /// A finished frame, in the memory of the ranks that own its tiles.
 struct Frame {
@@ -45,13 +45,13 @@ void prepare(Session& session, const FramePlan& plan);
 /// Which frame of several that are one picture's samples.
 struct FrameSample {
   SampleNumber number;
-  std::optional<TileHomes>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
-  const PixelMask* wanted = nullptr;          ///< pixels that are lit; null: all. Others' radiance means nothing
+  std::optional<TileOwnership>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
+  const PixelMask* wanted = nullptr;              ///< pixels that are lit; null: all. Others' radiance means nothing
   const std::function<void()>* at_home = nullptr;  ///< called once tiles are at home, before any is lit
 };
 
 /// One of several samples that are drawn together.
-struct FrameLook {
+struct JitteredViews {
   std::vector<View> views;  ///< views[i] is screen i of the plan's layout; those of the samples differ by their jitter
   FrameSample sample;
 };
@@ -60,7 +60,7 @@ struct FrameLook {
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
 /// Makes the keys of several samples by primary rays, one layer each, in place of rasterize(); all samples want the
 /// same pixels. Returns the ray counts.
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
                               std::span<TileLayer<Key>* const> keys);
 
 /// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
@@ -74,8 +74,8 @@ FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const V
 
 /// Collective: several samples step by step together, to the bit what make_frame gives one by one. What rays and lights
 /// look up for one sample is at hand for the next. At least one and at most max_round_size(); all want the same pixels.
-[[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const FrameLook> looks,
-                                            FrameTimes& times);
+[[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan,
+                                            std::span<const JitteredViews> looks, FrameTimes& times);
 
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
 [[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,

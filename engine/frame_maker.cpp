@@ -42,7 +42,7 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   if (resting) resting_.goal = *resting;
   plan_for({}, screens);
   if (!target_ms_) return;
-  // Whatever the size of a frame, it has as many photons and takes its keys the same way: the lighter stays.
+  // Whatever the size of a frame, it has as many photons and takes its keys the same way: the shader stays.
   settings_.photons_fit_frame = false;
   settings_.rays.photons = plan_.rays.photons;
   settings_.primary = plan_.primary;

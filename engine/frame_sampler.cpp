@@ -110,9 +110,9 @@ bool FrameSampler::try_to_write(const CheckpointSettings& checkpoint) {
   return true;
 }
 
-FrameLook FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
+JitteredViews FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
   const FilterSample through = subpixel_sample(sampling_, {plan_.rays.seed, number_}, number);
-  FrameLook look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
+  JitteredViews look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
   for (View& view : look.views) view.jitter = through.offset;
   weight = through.weight;
   return look;
@@ -145,7 +145,7 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
     count = std::min(count, scattered_ ? adaptive_->max_batch() : 1);
   }
   const std::function<void()> at_home = [this] { scatter(); };
-  std::vector<FrameLook> looks;
+  std::vector<JitteredViews> looks;
   std::vector<double> weights(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     looks.push_back(look(views, film_.samples() + i, weights[i]));

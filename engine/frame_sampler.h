@@ -9,7 +9,7 @@
 #include "engine/film.h"
 #include "engine/frame.h"
 #include "engine/samples.h"
-#include "engine/tile_homes.h"
+#include "engine/tile_ownership.h"
 
 namespace hpr {
 
@@ -50,7 +50,7 @@ class FrameSampler {
   [[nodiscard]] std::uint32_t size_of_round();
   /// When the first sample drawn since a checkpoint was read is at home: sums go to where their tiles are lit.
   void scatter();
-  [[nodiscard]] FrameLook look(std::span<const View> views, std::uint32_t number, double& weight);
+  [[nodiscard]] JitteredViews look(std::span<const View> views, std::uint32_t number, double& weight);
   /// This rank's tiles.
   [[nodiscard]] std::vector<std::size_t> tiles() const;
   /// Before samples are drawn: which pixels they are for, in due_.
@@ -69,7 +69,7 @@ class FrameSampler {
   bool keeps_keys_;
   std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
   bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint
-  std::optional<TileHomes> homes_;
+  std::optional<TileOwnership> homes_;
   SampleProgress progress_;
   Frame frame_;
   FrameTimes times_;

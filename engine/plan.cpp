@@ -19,7 +19,7 @@
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
 #include "rt/sampling/sampler.h"
-#include "rt/sampling/warp.h"
+#include "rt/sampling/sampling.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
@@ -247,7 +247,7 @@ std::string choose_primary(Session& session, FramePlan& plan, std::span<const Vi
     TileLayer<Key> keys(plan.layout);
     mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
     (void)session.primary_rays(plan.mine.objects, plan.rays);
-    const FrameLook look{{views.begin(), views.end()}, {}};
+    const JitteredViews look{{views.begin(), views.end()}, {}};
     TileLayer<Key>* const layer = &keys;
     const auto trace = [&] { (void)trace_primary(session, some, std::span(&look, 1), std::span(&layer, 1)); };
     mine.rays_ms = quickest_ms(keys, trace) / fraction;

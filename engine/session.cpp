@@ -17,10 +17,10 @@
 #include "core/timing.h"
 #include "raster/gl_context.h"
 #include "raster/rasterizer.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/trace/primary_rays.h"
+#include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/travelling_rays.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -92,7 +92,7 @@ void Session::warn_of_scene() const {
 void Session::forget_scene() {
   forget_rays();
   part_.reset();
-  travelling_.reset();
+  forwarding_.reset();
   traced_objects_.clear();
   rasterizer_.reset();
   objects_.clear();
@@ -122,7 +122,7 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
 }
 
 void Session::forget_rays() {
-  lighter_.reset();
+  shader_.reset();
   ray_settings_.reset();
   primary_rays_.reset();
   traced_part_.reset();
@@ -139,9 +139,9 @@ void Session::partition_rays(const RaySettings& settings) {
   build_rays_by(settings.build);
   if (settings.part == part_) return;
   forget_rays();
-  travelling_.reset();
+  forwarding_.reset();
   part_ = settings.part;
-  if (part_) travelling_ = std::make_unique<TravellingRays>(comm_, scene_, RaySpace(scene_.bounds), *part_);
+  if (part_) forwarding_ = std::make_unique<RayForwarding>(comm_, scene_, RaySpace(scene_.bounds), *part_);
 }
 
 std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange> objects) const {
@@ -173,24 +173,24 @@ const RayScene& Session::ray_scene(const RayBuild& build) {
   build_rays_by(build);
   if (!ray_scene_) {
     ray_scene_ = build_ray_scene(covering_part());
-    if (travelling_) ray_scene_->share(*travelling_);
+    if (forwarding_) ray_scene_->share(*forwarding_);
   }
   return *ray_scene_;
 }
 
-Lighter& Session::lighter(const RaySettings& settings) {
+DeferredShader& Session::shader(const RaySettings& settings) {
   partition_rays(settings);
-  if (!lighter_ || ray_settings_ != settings) {
+  if (!shader_ || ray_settings_ != settings) {
     const trace::Span span("prepare light");
-    lighter_.reset();  // its parts of the scene leave before others come
+    shader_.reset();  // its parts of the scene leave before others come
     RaySettings own = settings;
     own.threads = host_.threads;
     own.host_ranks = host_.ranks;
-    lighter_ = std::make_unique<Lighter>(
-        scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, travelling_.get());
+    shader_ = std::make_unique<DeferredShader>(
+        scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, forwarding_.get());
     ray_settings_ = settings;
   }
-  return *lighter_;
+  return *shader_;
 }
 
 Communicator& Session::group(std::span<const int> members) {

@@ -18,11 +18,11 @@ namespace hpr {
 class Assembler;
 class Compositor;
 class GlContext;
-class Lighter;
+class DeferredShader;
 class PrimaryRays;
 class Rasterizer;
 class RayScene;
-class TravellingRays;
+class RayForwarding;
 
 /// What a session uses of the machine that each of its ranks runs on.
 struct SessionSettings {
@@ -58,15 +58,15 @@ class Session {
   /// The rasteriser that holds `objects`; kept until other objects are asked for.
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
-  /// scene are asked for. Collective where `settings` have a part, as lighter() is.
+  /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
   /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
-  /// asked for. Asking for one built in another way ends it, and the lighter and primary rays that use it.
+  /// asked for. Asking for one built in another way ends it, and the shader and primary rays that use it.
   [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
   /// Collective. Makes what travelling rays need, where `settings` have a part.
   void partition_rays(const RaySettings& settings);
-  /// The lighter of these settings; kept until others are asked for.
-  [[nodiscard]] Lighter& lighter(const RaySettings& settings);
+  /// The shader of these settings; kept until others are asked for.
+  [[nodiscard]] DeferredShader& shader(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the
   /// group. What it sends counts in comm() too.
   [[nodiscard]] Communicator& group(std::span<const int> members);
@@ -115,13 +115,13 @@ class Session {
   std::unique_ptr<Rasterizer> rasterizer_;
   RayBuild ray_build_;                             ///< of the ray scenes and primary rays below
   std::optional<std::vector<SurfaceRange>> part_;  ///< the part of the scene they hold; see RaySettings::part
-  std::unique_ptr<TravellingRays> travelling_;     ///< where there is a part
+  std::unique_ptr<RayForwarding> forwarding_;      ///< where there is a part
   std::unique_ptr<RayScene> ray_scene_;
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_part_;  ///< of primary_rays_; none where ray_scene_ is
   std::unique_ptr<PrimaryRays> primary_rays_;
   std::optional<RaySettings> ray_settings_;
-  std::unique_ptr<Lighter> lighter_;
+  std::unique_ptr<DeferredShader> shader_;
   Group group_;
   std::string strategy_;
   std::unique_ptr<Compositor> compositor_;

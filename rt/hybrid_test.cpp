@@ -2,8 +2,8 @@
 
 #include <array>
 
-#include "rt/hybrid_test_tools.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 // All passes together, held to the reference: light is neither lost between them nor counted twice.

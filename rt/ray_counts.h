@@ -7,15 +7,15 @@
 #include <string>
 
 #include "rt/passes/pass_id.h"
-#include "rt/screen_pixel.h"
+#include "rt/sampling/sampler.h"
 
 namespace hpr {
 
-/// What PrimaryRays::draw() did.
+/// What the last PrimaryRays::draw() counted.
 struct PrimaryRayStats {
   std::uint64_t rays = 0;      ///< none go through pixels where no box about triangles is seen
-  std::uint64_t invalid = 0;   ///< of those, rays Embree could not bear: they missed
-  std::uint64_t weighed = 0;   ///< depths reckoned in double because two candidates, or the near plane, were close
+  std::uint64_t invalid = 0;   ///< rays that Embree cannot trace (is_traceable): they missed
+  std::uint64_t weighed = 0;   ///< depths computed in double because two candidates, or the near plane, were close
   std::uint64_t retraced = 0;  ///< rays traced again through everything, as their first candidate was no hit
 
   PrimaryRayStats& operator+=(const PrimaryRayStats& other) {
@@ -31,10 +31,10 @@ struct PrimaryRayStats {
 struct RayCounts {
   std::uint64_t primary = 0;                    ///< from the eye: no pass counts them
   std::array<std::uint64_t, kPasses> passes{};  ///< by PassId
-  std::uint64_t invalid = 0;                    ///< of those above, rays Embree could not bear: they missed
-  std::uint64_t cut = 0;                        ///< rays that ended among surfaces of partial coverage, see kMostPassed
+  std::uint64_t invalid = 0;                    ///< rays above that Embree cannot trace (is_traceable): they missed
+  std::uint64_t cut = 0;                        ///< rays that ended among surfaces of partial coverage, see kMaxPassed
   std::uint64_t not_finite = 0;                 ///< pixels whose radiance was no finite number: they are black
-  ScreenPixel first_not_finite;                 ///< of those, in order of screen and row, whoever met it; else kNoPixel
+  ScreenPixel first_not_finite;  ///< the first such pixel by screen and row, on any thread; else kNoPixel
 
   [[nodiscard]] std::uint64_t& operator[](PassId pass) { return passes.at(static_cast<std::size_t>(pass)); }
   [[nodiscard]] std::uint64_t operator[](PassId pass) const { return passes.at(static_cast<std::size_t>(pass)); }

@@ -6,12 +6,12 @@
 
 #include "image/filter.h"
 #include "rt/passes/pass_id.h"
-#include "rt/trace/ray_build.h"
+#include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 
 namespace hpr {
 
-/// What decides how light is worked out. The same settings give the same picture on any number of ranks and threads.
+/// How light is computed. Equal settings give equal pictures on any number of ranks and threads.
 struct RaySettings {
   std::vector<PassId> passes = {};  ///< those that are named; empty: as `auto_passes` says
   bool auto_passes = true;          ///< where none is named: what the scene requires; false: none
@@ -21,21 +21,22 @@ struct RaySettings {
   double glossy_cutoff = 0.3;       ///< specular lobes of at least this roughness are not followed by rays
   std::uint32_t photons = 0;        ///< sent per sample; 0: kPhotons, and only where the pass is named
   bool global_photons = false;      ///< also those that were scattered by rough surfaces only: all indirect light
-  bool gather = false;              ///< under an even sky rays bring all indirect light, in place of photons
+  bool gather = false;              ///< under a constant environment rays bring all indirect light, in place of photons
   double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density
   int occlusion_rays = 4;           ///< of the ambient-occlusion pass, per point and sample
   double ambient = 0.2;             ///< radiance that pass lets in where nothing is near
-  bool terminator_fix = true;       ///< lifts the origins of shadow rays onto the smooth surface normals pretend
-  RayBuild build = {};              ///< of Embree's scenes
-  /// Passes whose light of the first surface is worked out for one pixel in four and spread to its neighbours where
-  /// they see the like; PassId::Shadow stands for the light of lights.
+  bool terminator_fix = true;  ///< lifts the origins of shadow rays onto the smooth surface that the normals describe
+  RayBuild build = {};         ///< of Embree's scenes
+  /// Passes whose light of the first surface is computed for one pixel in four and upsampled to its neighbors
+  /// (HalfResShading); PassId::Shadow stands for direct light.
   std::vector<PassId> half_resolution = {};
-  /// Surfaces that this rank's rays meet at home, as those of the others travel to it; none: all of them.
+  /// Surfaces that this rank's ray scenes hold, where rays are forwarded between ranks; none: all of them.
   std::optional<std::vector<SurfaceRange>> part = {};
-  bool denoise = false;                   ///< see Denoiser
-  PixelFilter filter = PixelFilter::Box;  ///< of which denoising looks at more places; none of its weights < 0
-  bool reference = false;                 ///< path tracing in place of all passes, paths of max_depth segments
-  std::uint64_t seed = 1;                 ///< of all randomness
+  bool denoise = false;  ///< see Denoiser
+  PixelFilter filter =
+      PixelFilter::Box;    ///< of the pixels, which denoising samples at more places; none of its weights < 0
+  bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
+  std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;
   int host_ranks = 1;  ///< ranks of this host: they share its memory
 

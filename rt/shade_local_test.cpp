@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -27,13 +27,13 @@ TEST(ShadeLocal, WhatItLeavesEmptyIsLitLikeAllElse) {
   TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
   const std::vector<std::size_t> tiles{0};
   TileLayer<Rgb> expected(keys.layout());
-  Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, tiles, {.radiance = &expected});
-  shade_local(lighter, std::span(&view, 1), keys, tiles);
+  DeferredShader shader(scene, {});
+  shader.shade(std::span(&view, 1), keys, tiles, {.radiance = &expected});
+  shade_local(shader, std::span(&view, 1), keys, tiles);
   constexpr Rgb kUntouched{7.0F, 7.0F, 7.0F};
   TileLayer<Rgb> radiance(keys.layout());
   std::ranges::fill(radiance.tile(0), kUntouched);
-  light_empty(lighter, std::span(&view, 1), keys, tiles, radiance);
+  shade_empty(shader, std::span(&view, 1), keys, tiles, radiance);
   std::size_t empty = 0;
   for (std::size_t i = 0; i < kTilePixels; ++i) {
     empty += keys.tile(0)[i] == kNoKey ? 1U : 0U;

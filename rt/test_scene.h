@@ -8,7 +8,7 @@
 
 #include "image/key.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
@@ -166,28 +166,28 @@ inline TileLayer<Key> cast_keys(const Scene& scene, std::span<const View> views)
   return keys;
 }
 
-struct Lit {
+struct Shaded {
   Image<Rgb> image;
   RayCounts counts;
 };
 
-inline Lit light(const Scene& scene, const View& view, const RaySettings& settings = {}) {
+inline Shaded shade(const Scene& scene, const View& view, const RaySettings& settings = {}) {
   const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
   TileLayer<Rgb> radiance(keys.layout());
-  Lighter lighter(scene, settings);
-  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
-  return {to_image(radiance, 0), lighter.counts()};
+  DeferredShader shader(scene, settings);
+  shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
+  return {to_image(radiance, 0), shader.counts()};
 }
 
 /// The mean of a pixel over many samples.
 inline glm::dvec3 mean_pixel(const Scene& scene, const View& view, int x, int y, std::uint32_t samples,
                              const RaySettings& settings = {}) {
   const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
-  Lighter lighter(scene, settings);
+  DeferredShader shader(scene, settings);
   glm::dvec3 sum(0.0);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     TileLayer<Rgb> radiance(keys.layout());
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
     const Rgb& color = radiance.at(0, x, y);
     sum += glm::dvec3(color.r, color.g, color.b);
   }

@@ -6,30 +6,32 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "rt/tile_output.h"
+#include "rt/passes/pixel_sums.h"
 
 namespace hpr {
 namespace {
 
 /// Branches of a pixel's sampler.
-constexpr std::uint32_t kLookBranch = 0x4C4F4F4BU;
+constexpr std::uint32_t kSubpixelBranch = 0x4C4F4F4BU;
 
-/// Distance of unit normals from which on two places are not alike, in a frame's first sample.
+/// Distance of unit normals at which the weight falls to 0, in a frame's first sample.
 constexpr float kNormalWidth = 0.9F;
 /// On surfaces smoother than this roughness normals must be closer and neighbours count less, in proportion down to a
 /// tenth: what mirrors show changes quickly with their normal and with the place.
 constexpr float kSmooth = 0.5F;
-constexpr float kLeastWidth = 0.1F;
-/// At so many places of a pixel's part that shows a surface a sample looks again, and of one that shows many.
-constexpr std::uint32_t kLooksAgain = 2;
-constexpr std::uint32_t kLooksAtMany = 4;
+constexpr float kMinWidth = 0.1F;
+/// Subpixel samples of a fragment that shows one surface, and of one that shows many.
+constexpr std::uint32_t kSurfaceSamples = 2;
+constexpr std::uint32_t kMixedSamples = 4;
 /// Samples after which neighbours count less.
 constexpr float kNeighbourSamples = 16.0F;
-/// What is so many times as bright as all pixels about is rare light, whose share chance has not yet settled: blotches
-/// if it were lent.
+/// What is so many times as bright as all pixels about is rare light that few samples have found yet: filtered, it
+/// would make blotches.
 constexpr double kFarBrighter = 3.0;
-/// How many times as much light one may scatter as the other.
-constexpr float kMostBrighter = 4.0F;
+/// Bound of the ratio of scattered fractions, either way.
+constexpr float kMaxRatio = 4.0F;
+/// One for each FilterLobe.
+constexpr std::size_t kLobePlanes = 3;
 constexpr auto kDirect = static_cast<std::size_t>(Component::Direct);
 constexpr auto kShadow = static_cast<std::size_t>(Component::Shadow);
 
@@ -37,7 +39,7 @@ float square(float value) {
   return value * value;
 }
 
-/// What a borrower takes of so narrow a width, in parts of kNormalWidth.
+/// FilterCenter::sharpness for so narrow a width, relative to kNormalWidth.
 float sharpness_of(float width) {
   return 1.0F / square(kNormalWidth * width);
 }
@@ -47,151 +49,168 @@ std::size_t index_of(int column, int row) {
 }
 
 std::size_t plane_index(std::uint32_t pixel) {
-  return LenderPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
+  return TapPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
+}
+
+/// Sum i, see Denoiser::each_sum.
+std::vector<glm::dvec3>& sum_of(PixelSums& sums, std::size_t i) {
+  return i == 0 ? sums.radiance : sums.components.at(i - 1);
+}
+const std::vector<glm::dvec3>& sum_of(const PixelSums& sums, std::size_t i) {
+  return i == 0 ? sums.radiance : sums.components.at(i - 1);
+}
+const std::vector<glm::dvec3>& diffuse_of(const PixelSums& sums, std::size_t i) {
+  return i == 0 ? sums.diffuse : sums.diffuse_components.at(i - 1);
 }
 
 }  // namespace
 
-void Denoiser::start(std::size_t samples) {
+void Denoiser::start(std::size_t samples, bool with_components) {
+  sums_ = with_components ? 1 + kComponents : 1;
   states_.assign(samples * kTilePixels, State::Unlit);
-  seen_.resize(states_.size());
-  some_split_ = false;
-  if (!sights_) sights_ = std::make_unique<LenderSights>();
+  pixel_features_.resize(states_.size());
+  some_separate_ = false;
+  if (!taps_) {
+    taps_ = std::make_unique<NeighborFeatures<float>>();
+    taps_->scattering.resize(kLobePlanes);
+  }
   spare_ = static_cast<std::uint32_t>(states_.size());
 }
 
-/// Light that is sampled comes by all lobes together: where it does not stay with its pixel, matte light is not known.
-bool Denoiser::tells_matte(const TileWork& tile) {
-  return keeps_direct(tile.scene) || (tile.lights.listed() == 0 && !tile.lights.has_sampled());
+/// Sampled lights bring light by all lobes together: where it does not stay with its pixel, the diffuse part is not
+/// known.
+bool Denoiser::knows_diffuse(const LightContext& context) {
+  return keeps_direct(context.scene) || (context.lights.enumerated() == 0 && !context.lights.has_tree());
 }
 
-void Denoiser::note(const TileWork& tile, std::span<const PathPoint> points) {
-  for (const PathPoint& point : points) {
+void Denoiser::add_vertices(const LightContext& context, std::span<const PathVertex> points) {
+  for (const PathVertex& point : points) {
     State& state = states_[point.pixel];
-    const bool lends = state == State::Unlit && point.throughput == glm::dvec3(1.0) && point.share == 1.0 &&
-                       point.material.emission == glm::dvec3(0.0);
-    Seen& seen = seen_[point.pixel];
-    if (state == State::Unlit) seen.sight = sight_of(point.surface, tile.view->eye);
-    state = lends ? State::Lends : State::KeepsToItself;
-    if (!lends) continue;
-    seen.mapped = point.material.normal;
-    seen.width = std::clamp(static_cast<float>(point.material.roughness) / kSmooth, kLeastWidth, 1.0F);
-    seen.matte = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
-    seen.mirrored = glm::vec3(0.0F);
-    seen.is_split = seen.width < 1.0F && seen.matte != glm::vec3(0.0F) && tells_matte(tile);
+    const bool is_tap = state == State::Unlit && point.throughput == glm::dvec3(1.0) && point.coverage == 1.0 &&
+                        point.material.emission == glm::dvec3(0.0);
+    PixelFeature& seen = pixel_features_[point.pixel];
+    if (state == State::Unlit) seen.feature = feature_at(point.surface, context.view->eye);
+    state = is_tap ? State::Tap : State::Alone;
+    if (!is_tap) continue;
+    seen.shading_normal = point.material.normal;
+    seen.width = std::clamp(static_cast<float>(point.material.roughness) / kSmooth, kMinWidth, 1.0F);
+    seen.diffuse = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
+    seen.specular = glm::vec3(0.0F);
+    seen.separate_diffuse = seen.width < 1.0F && seen.diffuse != glm::vec3(0.0F) && knows_diffuse(context);
     for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
-      seen.mirrored += glm::vec3(point.bsdf.weight(lobe));
-      if (point.bsdf.present(lobe) && !tile.follows_for_itself(point.bsdf, lobe)) seen.is_split = false;
+      seen.specular += glm::vec3(point.bsdf.weight(lobe));
+      if (point.bsdf.present(lobe) && !context.follows_for_itself(point.bsdf, lobe)) seen.separate_diffuse = false;
     }
-    some_split_ |= seen.is_split;
+    some_separate_ |= seen.separate_diffuse;
   }
 }
 
-Borrower Denoiser::borrower_of(const View& view, const Sight& sight, std::uint32_t pixel) {
-  Borrower borrower;
-  borrower.material = sight.material;
-  borrower.place = sight.place;
-  borrower.most_apart2 = most_apart2(view, sight.place);
-  borrower.most_bent2 = square(kMostBent);
-  borrower.most_brighter = kMostBrighter;
-  borrower.pixel = {pixel % kTileSide, pixel / kTileSide};
-  return borrower;
+FilterCenter<float> Denoiser::center_of(const View& view, const SurfaceFeature& feature, std::uint32_t pixel) {
+  FilterCenter<float> center;
+  center.material = feature.material;
+  center.position = feature.position;
+  center.max_distance2 = max_distance2(view, feature.position);
+  center.max_bend2 = square(kMaxBend);
+  center.max_ratio = kMaxRatio;
+  center.min_ratio = 1.0F / kMaxRatio;
+  center.pixel = {pixel % kTileSide, pixel / kTileSide};
+  return center;
 }
 
-/// Calls `body` with the index of each sum that is wanted, its pixels, and what of them is matte.
 template <typename Body>
-void Denoiser::each_sum(TileWork& tile, const Body& body) {
-  body(std::size_t{0}, tile.radiance, tile.matte);
-  if (!tile.wants_components) return;
-  for (std::size_t i = 0; i < kComponents; ++i) body(1 + i, tile.components[i], tile.matte_components[i]);
+void Denoiser::each_sum(const Body& body) const {
+  for (std::size_t i = 0; i < sums_; ++i) body(i);
 }
 
 /// Light of small lights has no noise that sharing would take, and shadows with edges.
-bool Denoiser::keeps(const TileWork& tile, std::size_t sum) {
-  return keeps_direct(tile.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
+bool Denoiser::keeps(const LightContext& context, std::size_t sum) {
+  return keeps_direct(context.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
 }
 
-void Denoiser::set_sights(const TileJob& job) {
+void Denoiser::set_taps(const TileJob& job) {
+  NeighborFeatures<float>& taps = *taps_;
   for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
     const std::uint32_t own = job.first_pixel + pixel;
     const std::size_t at = plane_index(pixel);
-    sights_->lends.at(at) = LenderSights::kLendsNothing;
-    if (states_[own] != State::Lends) continue;
-    const Seen& seen = seen_[own];
-    sights_->lends.at(at) = kind_of_lender(seen.sight.material, seen.is_split);
-    sights_->place.set(at, seen.sight.place);
-    sights_->normal.set(at, seen.sight.normal);
-    sights_->mapped.set(at, seen.mapped);
-    sights_->mirrored.set(at, seen.mirrored);
-    sights_->matte.set(at, seen.matte);
-    sights_->sharpness.at(at) = 1.0F / square(seen.width);
+    taps.kinds.at(at) = NeighborFeatures<float>::kNoTap;
+    if (states_[own] != State::Tap) continue;
+    const PixelFeature& seen = pixel_features_[own];
+    taps.kinds.at(at) = tap_kind(seen.feature.material, seen.separate_diffuse);
+    taps.position.set(at, seen.feature.position);
+    taps.normal.set(at, seen.feature.normal);
+    taps.shading_normal.set(at, seen.shading_normal);
+    for (const FilterLobe lobe : {FilterLobe::All, FilterLobe::Specular, FilterLobe::Diffuse}) {
+      taps.scattering[static_cast<std::size_t>(lobe)].set(at, scattering_of(seen, lobe));
+    }
+    taps.sharpness.at(at) = 1.0F / square(seen.width);
   }
 }
 
-void Denoiser::set_lent(TileWork& tile, const TileJob& job) {
-  const auto set = [&](LenderVectors<double>& lent, const auto& light_of) {
+void Denoiser::set_light(const LightContext& context, const TileJob& job, const PixelSums& sums) {
+  const auto set = [&](TapVectors<double>& lent, const auto& light_of) {
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const std::uint32_t own = job.first_pixel + pixel;
-      lent.set(plane_index(pixel), states_[own] == State::Lends ? light_of(own) : glm::dvec3(0.0));
+      lent.set(plane_index(pixel), states_[own] == State::Tap ? light_of(own) : glm::dvec3(0.0));
     }
   };
-  const auto kept = [&](std::size_t part, std::uint32_t pixel) {
-    return tile.components.at(part)[pixel] - tile.matte_components.at(part)[pixel];
+  const auto kept = [&](std::size_t fragment, std::uint32_t pixel) {
+    return sums.components.at(fragment)[pixel] - sums.diffuse_components.at(fragment)[pixel];
   };
-  const std::size_t sums = tile.wants_components ? 1 + kComponents : 1;
-  lent_.resize(sums);
-  if (some_split_) matte_.resize(sums);
-  if (keeps_direct(tile.scene)) kept_.resize(sums);
-  each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const std::vector<glm::dvec3>& matte) {
-    set(lent_[i], [&](std::uint32_t pixel) { return from[pixel]; });
-    if (some_split_) set(matte_[i], [&](std::uint32_t pixel) { return matte[pixel]; });
-    if (!keeps(tile, i)) return;
-    set(kept_[i],
+  light_.resize(sums_);
+  if (some_separate_) diffuse_light_.resize(sums_);
+  if (keeps_direct(context.scene)) kept_light_.resize(sums_);
+  each_sum([&](std::size_t i) {
+    set(light_[i], [&](std::uint32_t pixel) { return sum_of(sums, i)[pixel]; });
+    if (some_separate_) set(diffuse_light_[i], [&](std::uint32_t pixel) { return diffuse_of(sums, i)[pixel]; });
+    if (!keeps(context, i)) return;
+    set(kept_light_[i],
         [&](std::uint32_t pixel) { return i == 0 ? kept(kDirect, pixel) + kept(kShadow, pixel) : kept(i - 1, pixel); });
   });
 }
 
-void Denoiser::add_background(TileWork& tile, const Look& look, const glm::dvec3& direction) {
-  const glm::dvec3 light = look.share * tile.lights.environment(direction);
-  sums_[0][look.pixel] += light;
-  if (tile.wants_components) sums_[1 + static_cast<std::size_t>(Component::Direct)][look.pixel] += light;
+void Denoiser::add_background(const LightContext& context, const SubpixelSample& sample, const glm::dvec3& direction) {
+  const glm::dvec3 light = sample.fraction * context.lights.environment(direction);
+  filtered_[0][sample.pixel] += light;
+  if (sums_ > 1) filtered_[1 + static_cast<std::size_t>(Component::Direct)][sample.pixel] += light;
 }
 
-bool Denoiser::add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen) {
-  const Material& material = tile.scene.materials[seen.material];
-  if (material.unlit || material.emissive != glm::vec3(0.0F)) return false;  // what emits lends nothing
-  Borrower borrower = borrower_of(*job.view, seen, look.pixel);
-  borrower.normal = seen.normal;
-  borrower.sharpness = sharpness_of(narrowed_);
-  borrower.radius = job.number.sample == 0 ? 2 : 1;
-  borrower.way = look.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
-  borrower.is_pixel = false;
-  weigh_lenders(*sights_, borrower, weights_);
+bool Denoiser::add_filtered(const LightContext& context, const TileJob& job, const SubpixelSample& sample,
+                            const SurfaceFeature& seen) {
+  const Material& material = context.scene.materials[seen.material];
+  if (material.unlit || material.emissive != glm::vec3(0.0F)) return false;  // surfaces that emit are no taps
+  const int radius = job.number.sample == 0 ? 2 : 1;
+  FilterCenter<float> center = center_of(*job.view, seen, sample.pixel);
+  center.normal = seen.normal;
+  center.sharpness = sharpness_of(narrowed_);
+  center.offset = sample.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
+  center.window = window_about(center.pixel, center.offset, radius);
+  center.reach = static_cast<float>(radius) + 1.0F;
+  center.is_pixel = false;
+  joint_bilateral_weights(*taps_, center, weights_);
   if (weights_.sum == 0.0F) return false;
-  each_sum(tile, [&](std::size_t i, const auto& /*from*/, const auto& /*matte*/) {
-    sums_.at(i)[look.pixel] += look.share * mean_of(weights_, lent_[i]);
-  });
+  each_sum(
+      [&](std::size_t i) { filtered_.at(i)[sample.pixel] += sample.fraction * filtered_mean(weights_, light_[i]); });
   return true;
 }
 
-/// What one of the rays traced sees, which is one of the looks at a pixel.
-void Denoiser::add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray,
-                        std::vector<PathPoint>& alone) {
-  const RayRequest& request = tile.requests[ray];
-  if (tile.hits[ray] == kNoSurface) return add_background(tile, look, request.direction);
-  const WorldTriangle& triangle = tile.triangles.load(tile.surfaces, tile.hits[ray]);
-  const SurfacePoint surface = tile.surfaces.meet(triangle, request.origin, request.direction);
-  if (add_lent(tile, job, look, sight_of(surface, job.view->eye))) return;
-  PathPoint& point = alone.emplace_back();
+/// Adds the subpixel sample that a ray was traced for.
+void Denoiser::add_sample(const LightContext& context, const TileJob& job, RayBuffers& buffers,
+                          const SubpixelSample& sample, std::size_t ray, std::vector<PathVertex>& unfiltered) {
+  const RayRequest& request = buffers.requests[ray];
+  if (buffers.hits[ray] == kNoSurface) return add_background(context, sample, request.direction);
+  const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.hits[ray]);
+  const SurfacePoint surface = context.surfaces.meet(triangle, request.origin, request.direction);
+  if (add_filtered(context, job, sample, feature_at(surface, job.view->eye))) return;
+  PathVertex& point = unfiltered.emplace_back();
   point.surface = surface;
-  start_point(tile, job, static_cast<int>(look.pixel) % kTileSide, static_cast<int>(look.pixel) / kTileSide, look.share,
-              point);
-  point.sampler = point.sampler.branch(kLookBranch + look.number);
-  point.pixel = spare_ + look.pixel;
+  start_vertex(context, job, static_cast<int>(sample.pixel) % kTileSide, static_cast<int>(sample.pixel) / kTileSide,
+               sample.fraction, point);
+  point.sampler = point.sampler.branch(kSubpixelBranch + sample.number);
+  point.pixel = spare_ + sample.pixel;
 }
 
 /// The brightest of the pixels about one that are lit.
-double Denoiser::brightest_about(const TileWork& tile, const TileJob& job, int column, int row) {
+double Denoiser::brightest_about(const PixelSums& sums, const TileJob& job, int column, int row) {
   const Rect about{column - 1, row - 1, column + 2, row + 2};
   const Rect pixels = intersection(about, {0, 0, job.place.width(), job.place.height()});
   double found = 0.0;
@@ -199,134 +218,141 @@ double Denoiser::brightest_about(const TileWork& tile, const TileJob& job, int c
     for (int x = pixels.x0; x < pixels.x1; ++x) {
       const std::size_t pixel = index_of(x, y);
       if ((x == column && y == row) || !job.wants(pixel)) continue;
-      found = std::max(found, brightness(tile.radiance[job.first_pixel + pixel]));
+      found = std::max(found, brightness(sums.radiance[job.first_pixel + pixel]));
     }
   }
   return found;
 }
 
-void Denoiser::set_apart(const TileWork& tile, const TileJob& job) {
+void Denoiser::set_apart(const PixelSums& sums, const TileJob& job) {
   std::vector<std::size_t> apart;
   for (int y = 0; y < job.place.height(); ++y) {
     for (int x = 0; x < job.place.width(); ++x) {
       const std::size_t own = job.first_pixel + index_of(x, y);
       if (states_[own] == State::Unlit) continue;
-      const glm::dvec3& light = tile.radiance[own];
+      const glm::dvec3& light = sums.radiance[own];
       const bool is_far_brighter =
-          states_[own] == State::Lends && brightness(light) > kFarBrighter * brightest_about(tile, job, x, y);
+          states_[own] == State::Tap && brightness(light) > kFarBrighter * brightest_about(sums, job, x, y);
       if (!fits_floats(light) || is_far_brighter) apart.push_back(own);
     }
   }
   for (const std::size_t pixel : apart) states_[pixel] = State::Apart;
 }
 
-void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const PixelPart> parts) {
+void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const CoverageFragment> fragments) {
   const glm::vec2 place(job.view->jitter);
-  for (auto part = parts.begin(); part != parts.end();) {
-    const std::uint32_t pixel = part->pixel;
-    const auto next = std::find_if(part, parts.end(), [&](const PixelPart& each) { return each.pixel != pixel; });
+  for (auto fragment = fragments.begin(); fragment != fragments.end();) {
+    const std::uint32_t pixel = fragment->pixel;
+    const auto next =
+        std::find_if(fragment, fragments.end(), [&](const CoverageFragment& each) { return each.pixel != pixel; });
     const std::uint32_t own = job.first_pixel + pixel;
-    const Sight seen = states_[own] == State::Unlit ? Sight{} : seen_[own].sight;
+    const SurfaceFeature seen = states_[own] == State::Unlit ? SurfaceFeature{} : pixel_features_[own].feature;
     const bool is_expected =
-        std::any_of(part, next, [&](const PixelPart& each) { return each.is_like(*job.view, seen, place); });
+        std::any_of(fragment, next, [&](const CoverageFragment& each) { return each.matches(*job.view, seen, place); });
     if (job.wants(pixel) && !is_expected) states_[own] = State::Apart;
-    part = next;
+    fragment = next;
   }
 }
 
-void Denoiser::look_again(TileWork& tile, const TileJob& job, const TileParts& again, std::vector<PathPoint>& alone) {
-  set_apart(tile, job);
-  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& from, const auto& /*matte*/) {
-    sums_.at(i).assign(kTilePixels, glm::dvec3(0.0));
-    std::fill_n(from.begin() + spare_, kTilePixels, glm::dvec3(0.0));
+void Denoiser::resample_edges(const LightContext& context, const TileJob& job, const TileFragments& fragments,
+                              RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& unfiltered) {
+  set_apart(sums, job);
+  each_sum([&](std::size_t i) {
+    filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
+    std::fill_n(sum_of(sums, i).begin() + spare_, kTilePixels, glm::dvec3(0.0));
   });
   narrowed_ = 1.0F / std::sqrt(std::sqrt(1.0F + static_cast<float>(job.number.sample)));
-  set_unexpected_apart(job, again.parts);
-  set_sights(job);
-  set_lent(tile, job);
+  set_unexpected_apart(job, fragments.fragments);
+  set_taps(job);
+  set_light(context, job, sums);
   View view = unjittered(job);
-  tile.requests.clear();
-  looks_.clear();
-  for (const PixelPart& part : again.parts) {
-    if (!job.wants(part.pixel) || states_[job.first_pixel + part.pixel] == State::Apart) continue;
-    look_at_part(tile, job, view, part, *again.places);
+  buffers.requests.clear();
+  samples_.clear();
+  for (const CoverageFragment& fragment : fragments.fragments) {
+    if (!job.wants(fragment.pixel) || states_[job.first_pixel + fragment.pixel] == State::Apart) continue;
+    sample_fragment(context, job, buffers, sums, view, fragment, *fragments.places);
   }
-  trace_from_eye(tile);
-  for (std::size_t i = 0; i < looks_.size(); ++i) add_look(tile, job, looks_[i], i, alone);
-  for (PathPoint& point : alone) finish_point(tile, point);
+  trace_primary_rays(context, buffers);
+  for (std::size_t i = 0; i < samples_.size(); ++i) add_sample(context, job, buffers, samples_[i], i, unfiltered);
+  for (PathVertex& point : unfiltered) finish_vertex(context, point);
 }
 
-/// Asks for a ray where nobody lends.
-void Denoiser::look_at_part(TileWork& tile, const TileJob& job, View& view, const PixelPart& part,
-                            const Looks& places) {
-  if (part.shows == PixelPart::Shows::Background) {
-    const Look look{part.pixel, 0, part.place(places, job.number.sample), part.share};
-    return add_background(tile, look, ray_through(view, job, look.pixel, look.place).direction);
+/// Requests a ray where no tap has a weight.
+void Denoiser::sample_fragment(const LightContext& context, const TileJob& job, RayBuffers& buffers, PixelSums& sums,
+                               View& view, const CoverageFragment& fragment, const SubpixelOffsets& places) {
+  if (fragment.shows == CoverageFragment::Shows::Background) {
+    const SubpixelSample sample{fragment.pixel, 0, fragment.place(places, job.number.sample), fragment.fraction};
+    return add_background(context, sample, ray_through(view, job, sample.pixel, sample.place).direction);
   }
-  const bool is_surface = part.shows == PixelPart::Shows::Surface;
-  const std::uint32_t count = is_surface ? std::clamp(part.count(), 1U, kLooksAgain) : kLooksAtMany;
+  const bool is_surface = fragment.shows == CoverageFragment::Shows::Surface;
+  const std::uint32_t count = is_surface ? std::clamp(fragment.count(), 1U, kSurfaceSamples) : kMixedSamples;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t number = looks_.empty() || looks_.back().pixel != part.pixel ? 0 : looks_.back().number + 1;
-    const glm::vec2 place = part.place(places, job.number.sample * count + i);
-    const Look look{part.pixel, number, place, part.share / static_cast<float>(count)};
-    if (is_surface && add_lent(tile, job, look, part.patch.at(place))) continue;
-    looks_.push_back(look);
-    tile.requests.push_back(ray_through(view, job, look.pixel, place));
-    tile.charge_ray(job.first_pixel + look.pixel);
+    const std::uint32_t number =
+        samples_.empty() || samples_.back().pixel != fragment.pixel ? 0 : samples_.back().number + 1;
+    const glm::vec2 place = fragment.place(places, job.number.sample * count + i);
+    const SubpixelSample sample{fragment.pixel, number, place, fragment.fraction / static_cast<float>(count)};
+    if (is_surface && add_filtered(context, job, sample, fragment.patch.at(place))) continue;
+    samples_.push_back(sample);
+    buffers.requests.push_back(ray_through(view, job, sample.pixel, place));
+    sums.count_ray(job.first_pixel + sample.pixel);
   }
 }
 
-Borrower Denoiser::borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const {
-  const Seen& seen = seen_[job.first_pixel + pixel];
-  const float width = lent == Lent::Matte ? 1.0F : seen.width;
-  Borrower borrower = borrower_of(*job.view, seen.sight, pixel);
-  borrower.is_split = seen.is_split;
-  borrower.normal = seen.mapped;
-  borrower.sharpness = sharpness_of(narrowed_ * width);
-  borrower.others = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
-  borrower.weight = lent == Lent::All ? seen.mirrored + seen.matte : lent == Lent::Matte ? seen.matte : seen.mirrored;
-  borrower.lent = lent;
-  borrower.radius = (width < 1.0F ? 1 : 2) + (job.number.sample == 0 ? 1 : 0);
-  return borrower;
+glm::vec3 Denoiser::scattering_of(const PixelFeature& seen, FilterLobe lobe) {
+  if (lobe == FilterLobe::All) return seen.specular + seen.diffuse;
+  return lobe == FilterLobe::Diffuse ? seen.diffuse : seen.specular;
 }
 
-void Denoiser::share(TileWork& tile, const TileJob& job, std::uint32_t pixel) {
-  const bool is_split = seen_[job.first_pixel + pixel].is_split;
+FilterCenter<float> Denoiser::center_at(const TileJob& job, std::uint32_t pixel, FilterLobe lobe) const {
+  const PixelFeature& seen = pixel_features_[job.first_pixel + pixel];
+  const float width = lobe == FilterLobe::Diffuse ? 1.0F : seen.width;
+  const int radius = (width < 1.0F ? 1 : 2) + (job.number.sample == 0 ? 1 : 0);
+  FilterCenter<float> center = center_of(*job.view, seen.feature, pixel);
+  center.separate_diffuse = seen.separate_diffuse;
+  center.normal = seen.shading_normal;
+  center.sharpness = sharpness_of(narrowed_ * width);
+  center.neighbor_weight = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
+  center.terms[0] = {static_cast<std::size_t>(lobe), scattering_of(seen, lobe)};
+  center.term_count = 1;
+  center.window = window_about(center.pixel, center.offset, radius);
+  center.reach = static_cast<float>(radius) + 1.0F;
+  return center;
+}
+
+void Denoiser::filter(const LightContext& context, const TileJob& job, std::uint32_t pixel) {
+  const bool separate_diffuse = pixel_features_[job.first_pixel + pixel].separate_diffuse;
   const std::size_t own = plane_index(pixel);
-  weigh_lenders(*sights_, borrower_at(job, pixel, is_split ? Lent::Mirrored : Lent::All), weights_);
-  if (is_split) weigh_lenders(*sights_, borrower_at(job, pixel, Lent::Matte), matte_weights_);
-  each_sum(tile, [&](std::size_t i, const auto& /*from*/, const auto& /*matte*/) {
-    glm::dvec3& sum = sums_.at(i)[pixel];
-    sum = mean_of(weights_, lent_[i]);
-    if (is_split) sum += mean_of(matte_weights_, matte_[i]) - mean_of(weights_, matte_[i]);
-    if (keeps(tile, i)) sum += kept_[i].at(own) - mean_of(weights_, kept_[i]);
+  joint_bilateral_weights(*taps_, center_at(job, pixel, separate_diffuse ? FilterLobe::Specular : FilterLobe::All),
+                          weights_);
+  if (separate_diffuse) joint_bilateral_weights(*taps_, center_at(job, pixel, FilterLobe::Diffuse), diffuse_weights_);
+  each_sum([&](std::size_t i) {
+    glm::dvec3& sum = filtered_.at(i)[pixel];
+    sum = filtered_mean(weights_, light_[i]);
+    if (separate_diffuse)
+      sum += filtered_mean(diffuse_weights_, diffuse_light_[i]) - filtered_mean(weights_, diffuse_light_[i]);
+    if (keeps(context, i)) sum += kept_light_[i].at(own) - filtered_mean(weights_, kept_light_[i]);
   });
 }
 
-void Denoiser::resolve(TileWork& tile, const TileJob& job, const TileParts& again) {
+void Denoiser::resolve(const LightContext& context, const TileJob& job, const TileFragments& fragments,
+                       PixelSums& sums) {
   for (int y = 0; y < job.place.height(); ++y) {
     for (int x = 0; x < job.place.width(); ++x) {
       const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
       if (!job.wants(pixel)) continue;
       const std::uint32_t own = job.first_pixel + pixel;
-      if (tile.wants_cost) tile.cost[own] += std::exchange(tile.cost[spare_ + pixel], 0.0F);
-      const bool is_crossed = again.crossed[pixel] != 0 && states_[own] != State::Apart;
+      if (sums.wants_cost) sums.cost[own] += std::exchange(sums.cost[spare_ + pixel], 0.0F);
+      const bool is_crossed = fragments.crossed[pixel] != 0 && states_[own] != State::Apart;
       if (is_crossed) {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const auto& /*matte*/) {
-          sums_.at(i)[pixel] += from[spare_ + pixel];
-        });
-      } else if (states_[own] == State::Lends) {
-        share(tile, job, pixel);
+        each_sum([&](std::size_t i) { filtered_.at(i)[pixel] += sum_of(sums, i)[spare_ + pixel]; });
+      } else if (states_[own] == State::Tap) {
+        filter(context, job, pixel);
       } else {
-        each_sum(tile, [&](std::size_t i, const std::vector<glm::dvec3>& from, const auto& /*matte*/) {
-          sums_.at(i)[pixel] = from[own];
-        });
+        each_sum([&](std::size_t i) { filtered_.at(i)[pixel] = sum_of(sums, i)[own]; });
       }
     }
   }
-  each_sum(tile, [&](std::size_t i, std::vector<glm::dvec3>& to, const auto& /*matte*/) {
-    std::ranges::copy(sums_.at(i), to.begin() + job.first_pixel);
-  });
+  each_sum([&](std::size_t i) { std::ranges::copy(filtered_.at(i), sum_of(sums, i).begin() + job.first_pixel); });
 }
 
 }  // namespace hpr

@@ -9,20 +9,19 @@
 #include <span>
 #include <vector>
 
-#include "rt/denoise/lenders.h"
-#include "rt/denoise/pixel_parts.h"
-#include "rt/passes/first_points.h"
+#include "rt/denoise/coverage_fragments.h"
+#include "rt/denoise/joint_bilateral_filter.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 
-/// Smooths a sample's light over the pixels about each that see the like (a cross-bilateral filter: Eisemann, Durand,
-/// "Flash Photography Enhancement via Intrinsic Relighting", 2004), and looks again where outlines are, lighting there
-/// only what no pixel about has lit (as in Chajdas, McGuire, Luebke, "Subpixel Reconstruction Antialiasing", 2011).
-/// Alike are places of one material, turned and placed alike; what one pixel lends another is made up for how much
-/// light the two scatter, so textures stay. From sample to sample fewer neighbours are alike and count less, so that
-/// the mean of many samples is nearly that without. What emits light, is seen through an absorbing medium or lies
-/// behind surfaces that cover in part keeps to itself. Only a frame's first kDenoisedSamples are.
+/// Filters a sample's light by a joint bilateral filter (joint_bilateral_filter.h), and samples pixels that silhouette
+/// edges cross at more places, shading there only what no pixel about has shaded (as in Chajdas, McGuire, Luebke,
+/// "Subpixel Reconstruction Antialiasing", 2011). From sample to sample fewer neighbors are accepted and weigh less, so
+/// that the mean of many samples is nearly the unfiltered one. Surfaces that emit, that are seen through an absorbing
+/// medium or that lie behind surfaces of partial coverage are left as they are. Only a frame's first kDenoisedSamples
+/// are filtered.
 ///
 /// Light stays in its tile, and a sample in itself: neither ranks nor threads change a bit.
 class Denoiser {
@@ -30,82 +29,100 @@ class Denoiser {
   /// Whether direct light stays with its pixel, which components of the light are needed for.
   [[nodiscard]] static bool keeps_direct(const Scene& scene) { return !scene.lights.empty(); }
 
-  /// Starts a tile of so many samples.
-  void start(std::size_t samples);
+  /// Starts a tile of so many samples, whose components are filtered too where they are summed.
+  void start(std::size_t samples, bool with_components);
 
-  /// Takes note of points the eye sees, which are finished but not lit.
-  void note(const TileWork& tile, std::span<const PathPoint> points);
+  /// Reads the features of primary vertices, which are finished but not shaded.
+  void add_vertices(const LightContext& context, std::span<const PathVertex> points);
 
-  /// Once all is lit: looks again at pixels that outlines cross. Puts what is to be lit in addition into `alone`.
-  void look_again(TileWork& tile, const TileJob& job, const TileParts& again, std::vector<PathPoint>& alone);
+  /// Once all is shaded: samples the fragments of pixels that edges cross. Appends the vertices that no tap can stand
+  /// in for to `unfiltered`: they are to be shaded.
+  void resample_edges(const LightContext& context, const TileJob& job, const TileFragments& fragments,
+                      RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& unfiltered);
 
-  /// Once that is lit too: replaces the sample's sums.
-  void resolve(TileWork& tile, const TileJob& job, const TileParts& again);
+  /// Once those are shaded too: replaces the sample's sums.
+  void resolve(const LightContext& context, const TileJob& job, const TileFragments& fragments, PixelSums& sums);
 
  private:
   enum class State : std::uint8_t {
     Unlit,
-    Lends,
-    KeepsToItself,
-    Apart,  ///< keeps its own light even on an outline
+    Tap,
+    Alone,
+    Apart,  ///< keeps its own light even where an edge crosses it
   };
 
-  /// What tells whether two places are alike.
-  struct Seen {
-    Sight sight;
-    glm::vec3 mapped{0.0F};    ///< the normal shaded with
-    glm::vec3 mirrored{0.0F};  ///< about the share of light that it mirrors and lets through to the eye
-    glm::vec3 matte{0.0F};     ///< and that it scatters otherwise
-    float width = 1.0F;        ///< how far normals may differ, in parts of what those of rough surfaces may
-    bool is_split = false;     ///< that holds for what it mirrors alone, and matte light is known
+  /// The light that is filtered: planes of NeighborFeatures::scattering.
+  enum class FilterLobe : std::uint8_t {
+    All,
+    Specular,  ///< all that is not diffuse
+    Diffuse,
+  };
+
+  /// What the filter compares.
+  struct PixelFeature {
+    SurfaceFeature feature;
+    glm::vec3 shading_normal{0.0F};  ///< the normal shaded with
+    glm::vec3 specular{0.0F};  ///< about the fraction of light reflected or transmitted by specular lobes to the eye
+    glm::vec3 diffuse{0.0F};   ///< about the fraction of light scattered by the diffuse lobe
+    float width = 1.0F;        ///< how far normals may differ, relative to those of rough surfaces
+    bool separate_diffuse = false;  ///< `width` holds for specular light only, and diffuse light is known
   };
 
   /// One more place of a pixel.
-  struct Look {
+  struct SubpixelSample {
     std::uint32_t pixel = 0;   ///< of the tile
-    std::uint32_t number = 0;  ///< of the pixel's looks
+    std::uint32_t number = 0;  ///< of the pixel's samples
     glm::vec2 place{0.0F};     ///< from the pixel's centre
-    double share = 0.0;        ///< of the pixel
+    double fraction = 0.0;     ///< of the pixel
   };
 
-  [[nodiscard]] static bool tells_matte(const TileWork& tile);
-  [[nodiscard]] static double brightest_about(const TileWork& tile, const TileJob& job, int column, int row);
+  [[nodiscard]] static bool knows_diffuse(const LightContext& context);
+  [[nodiscard]] static double brightest_about(const PixelSums& sums, const TileJob& job, int column, int row);
   /// Finds pixels that stay apart.
-  void set_apart(const TileWork& tile, const TileJob& job);
+  void set_apart(const PixelSums& sums, const TileJob& job);
   /// Whether there is light in a sum that stays with its pixel.
-  [[nodiscard]] static bool keeps(const TileWork& tile, std::size_t sum);
-  /// Sets what the pixels that lend see and lend.
-  void set_sights(const TileJob& job);
-  void set_lent(TileWork& tile, const TileJob& job);
-  /// Without what pixels and looks have of their own.
-  [[nodiscard]] static Borrower borrower_of(const View& view, const Sight& sight, std::uint32_t pixel);
-  [[nodiscard]] Borrower borrower_at(const TileJob& job, std::uint32_t pixel, Lent lent) const;
-  void add_background(TileWork& tile, const Look& look, const glm::dvec3& direction);
-  /// False where nobody lends.
-  [[nodiscard]] bool add_lent(TileWork& tile, const TileJob& job, const Look& look, const Sight& seen);
+  [[nodiscard]] static bool keeps(const LightContext& context, std::size_t sum);
+  /// Sets the features of the taps, then their light.
+  void set_taps(const TileJob& job);
+  void set_light(const LightContext& context, const TileJob& job, const PixelSums& sums);
+  /// What the centers of pixels and of subpixel samples have in common.
+  [[nodiscard]] static FilterCenter<float> center_of(const View& view, const SurfaceFeature& feature,
+                                                     std::uint32_t pixel);
+  /// The fraction of light that is scattered to the eye.
+  [[nodiscard]] static glm::vec3 scattering_of(const PixelFeature& seen, FilterLobe lobe);
+  [[nodiscard]] FilterCenter<float> center_at(const TileJob& job, std::uint32_t pixel, FilterLobe lobe) const;
+  void add_background(const LightContext& context, const SubpixelSample& sample, const glm::dvec3& direction);
+  /// False where no tap has a weight.
+  [[nodiscard]] bool add_filtered(const LightContext& context, const TileJob& job, const SubpixelSample& sample,
+                                  const SurfaceFeature& seen);
   /// Pixels whose sample sees what none of their parts is stay apart: so what was missed keeps its light.
-  void set_unexpected_apart(const TileJob& job, std::span<const PixelPart> parts);
-  void look_at_part(TileWork& tile, const TileJob& job, View& view, const PixelPart& part, const Looks& places);
-  void add_look(TileWork& tile, const TileJob& job, const Look& look, std::size_t ray, std::vector<PathPoint>& alone);
-  void share(TileWork& tile, const TileJob& job, std::uint32_t pixel);
+  void set_unexpected_apart(const TileJob& job, std::span<const CoverageFragment> fragments);
+  void sample_fragment(const LightContext& context, const TileJob& job, RayBuffers& buffers, PixelSums& sums,
+                       View& view, const CoverageFragment& fragment, const SubpixelOffsets& places);
+  void add_sample(const LightContext& context, const TileJob& job, RayBuffers& buffers, const SubpixelSample& sample,
+                  std::size_t ray, std::vector<PathVertex>& unfiltered);
+  void filter(const LightContext& context, const TileJob& job, std::uint32_t pixel);
+  /// Calls `body` with the number of each sum that is wanted: 0 for the radiance, 1 + i for component i.
   template <typename Body>
-  static void each_sum(TileWork& tile, const Body& body);
+  void each_sum(const Body& body) const;
 
-  std::vector<State> states_;             ///< per pixel, sample after sample
-  std::vector<Seen> seen_;                ///< likewise, of those that lend
-  std::unique_ptr<LenderSights> sights_;  ///< of the sample at hand
-  /// Likewise light, 0 where nothing is lent: radiance, then the components that are wanted.
-  std::vector<LenderVectors<double>> lent_;
-  std::vector<LenderVectors<double>> matte_;  ///< of that; when some pixel of the tile is_split
-  std::vector<LenderVectors<double>> kept_;   ///< of that: light of small lights, which stays with its pixel
-  bool some_split_ = false;
-  LenderWeights weights_;
-  LenderWeights matte_weights_;
-  float narrowed_ = 1.0F;    ///< how far normals may differ in the sample at hand, in parts of the first one's
-  std::vector<Look> looks_;  ///< that rays were sent for
-  std::uint32_t spare_ = 0;  ///< where the tile's sums have room for what is lit in addition
-  /// Of the sample at hand, per pixel: radiance, then the components that are wanted.
-  std::array<std::vector<glm::dvec3>, 1 + kComponents> sums_;
+  std::vector<State> states_;                      ///< per pixel, sample after sample
+  std::vector<PixelFeature> pixel_features_;       ///< per pixel, sample after sample; of taps
+  std::unique_ptr<NeighborFeatures<float>> taps_;  ///< of the current sample
+  /// Light of the taps by pixel, 0 where there is none: radiance, then the components that are wanted.
+  std::vector<TapVectors<double>> light_;
+  std::vector<TapVectors<double>>
+      diffuse_light_;  ///< the diffuse part of light_; when some pixel of the tile separates it
+  std::vector<TapVectors<double>> kept_light_;  ///< the part of light_ that stays with its pixel: direct light
+  bool some_separate_ = false;
+  TapWeights<float> weights_;
+  TapWeights<float> diffuse_weights_;
+  float narrowed_ = 1.0F;  ///< how far normals may differ in the sample at hand, relative to the first one
+  std::vector<SubpixelSample> samples_;  ///< that rays were sent for
+  std::uint32_t spare_ = 0;              ///< where the tile's sums have room for what is lit in addition
+  /// The filtered sums of the current sample, per pixel: radiance, then the components that are wanted.
+  std::array<std::vector<glm::dvec3>, 1 + kComponents> filtered_;
+  std::size_t sums_ = 1;  ///< how many of filtered_ are wanted
 };
 
 }  // namespace hpr

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "rt/denoise/denoiser_test_tools.h"
+#include "rt/denoise/test_denoiser.h"
 
 namespace hpr {
 namespace {
@@ -43,8 +43,8 @@ TEST(Denoiser, LeavesSamplesPastTheFirstAlone) {
     TileLayer<Rgb> plain(keys.layout());
     TileLayer<Rgb> smooth(keys.layout());
     for (TileLayer<Rgb>* const layer : {&plain, &smooth}) {
-      Lighter lighter(scene, layer == &plain ? kGathered : denoised(kGathered));
-      lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = layer}, {.sample = sample});
+      DeferredShader shader(scene, layer == &plain ? kGathered : denoised(kGathered));
+      shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = layer}, {.sample = sample});
     }
     EXPECT_EQ(std::ranges::equal(plain.tile(0), smooth.tile(0)), sample == kDenoisedSamples) << sample;
   }
@@ -58,8 +58,8 @@ TEST(Denoiser, LooksAgainAtOutlines) {
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {65, 65}, scene);  // the edge goes through column 32
-  const test::Lit plain = test::light(scene, view, kGathered);
-  const test::Lit smooth = test::light(scene, view, denoised(kGathered));
+  const test::Shaded plain = test::shade(scene, view, kGathered);
+  const test::Shaded smooth = test::shade(scene, view, denoised(kGathered));
   for (int y = 0; y < 64; ++y) {
     EXPECT_EQ(plain.image.at(31, y).g + 1.0F, plain.image.at(33, y).g);
     EXPECT_NEAR(smooth.image.at(32, y).g, 0.5, 0.04) << y;  // halved five times: a sixty-fourth of a pixel
@@ -92,8 +92,8 @@ TEST(Denoiser, ThinThingsKeepTheirLight) {
 TEST(Denoiser, TexturesStay) {
   const Scene scene = painted_floor();
   const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
-  const Image<Rgb> plain = test::light(scene, view, kGathered).image;
-  expect_same_inside(test::light(scene, view, denoised(kGathered)).image, plain, 1e-5F);
+  const Image<Rgb> plain = test::shade(scene, view, kGathered).image;
+  expect_same_inside(test::shade(scene, view, denoised(kGathered)).image, plain, 1e-5F);
 }
 
 /// A mirror that shows something black, and beside it in the same plane what is matte and sees the sky about that.
@@ -110,7 +110,7 @@ TEST(Denoiser, NoLightCrossesToAnotherMaterial) {
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene, 0.5);
   RaySettings settings = kGathered;
   settings.passes.push_back(PassId::Reflection);
-  const Image<Rgb> smooth = test::light(scene, view, denoised(settings)).image;
+  const Image<Rgb> smooth = test::shade(scene, view, denoised(settings)).image;
   float beside = 0.0F;
   for (int y = 0; y < 64; ++y) {
     for (int x = 33; x < 64; ++x) ASSERT_EQ(smooth.at(x, y).g, 0.0F) << x << ' ' << y;
@@ -138,9 +138,9 @@ TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
   const std::vector<std::size_t> tiles = all_tiles(layout);
   RaySettings settings = denoised(kGathered);
   settings.passes = {PassId::Gather, PassId::Shadow, PassId::Reflection};
-  Lighter one(scene, settings);
+  DeferredShader one(scene, settings);
   settings.threads = 3;
-  Lighter three(scene, settings);
+  DeferredShader three(scene, settings);
   std::vector<TileLayer<Rgb>> together;
   std::vector<TileLayer<Rgb>> parts;
   std::vector<TileLayer<float>> costs;
@@ -149,17 +149,17 @@ TEST(Denoiser, HasTheSameBitsHoweverSamplesAndTilesAreLit) {
     costs.emplace_back(layout);
     for (std::size_t part = 0; part < kComponents; ++part) parts.emplace_back(layout);
   }
-  std::vector<LitSample> samples;
+  std::vector<ShadedSample> samples;
   for (std::uint32_t i = 0; i < views.size(); ++i) {
     LightOutput output{.radiance = &together[i], .cost = &costs[i]};
     for (std::size_t part = 0; part < kComponents; ++part) output.components.at(part) = &parts[i * kComponents + part];
     samples.push_back({std::span(&views[i], 1), &keys[i], output, {7, i}});
   }
-  three.light(samples, tiles);
+  three.shade(samples, tiles);
   for (std::uint32_t i = 0; i < views.size(); ++i) {
     TileLayer<Rgb> alone(layout);
     for (const std::size_t tile : tiles) {
-      one.light(std::span(&views[i], 1), keys[i], std::span(&tile, 1), {.radiance = &alone}, {7, i});
+      one.shade(std::span(&views[i], 1), keys[i], std::span(&tile, 1), {.radiance = &alone}, {7, i});
       EXPECT_TRUE(std::ranges::equal(alone.tile(tile), together[i].tile(tile))) << i << ' ' << tile;
       for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
         float sum = 0.0F;
@@ -187,8 +187,8 @@ TEST(Denoiser, EmissionIsNotLent) {
   Scene scene = painted_floor();
   scene.materials[0].emissive = glm::vec3(100.0F);
   const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
-  const Image<Rgb> plain = test::light(scene, view, kGathered).image;
-  const Image<Rgb> smooth = test::light(scene, view, denoised(kGathered)).image;
+  const Image<Rgb> plain = test::shade(scene, view, kGathered).image;
+  const Image<Rgb> smooth = test::shade(scene, view, denoised(kGathered)).image;
   expect_same_inside(smooth, plain, 0.0F);
 }
 
@@ -204,8 +204,8 @@ TEST(Denoiser, ShadowsOfSmallLightsKeepTheirEdges) {
   finish_scene(scene);
   const View view = test::view_from({4, 1.5, 0}, {2, 0, 0}, {64, 64}, scene);
   const RaySettings settings{.passes = {PassId::Shadow}};
-  const Image<Rgb> plain = test::light(scene, view, settings).image;
-  const Image<Rgb> smooth = test::light(scene, view, denoised(settings)).image;
+  const Image<Rgb> plain = test::shade(scene, view, settings).image;
+  const Image<Rgb> smooth = test::shade(scene, view, denoised(settings)).image;
   EXPECT_GT(std::ranges::count(plain.pixels(), Rgb{}), 100);
   EXPECT_LT(std::ranges::count(plain.pixels(), Rgb{}), 2000);
   for (std::size_t i = 0; i < plain.pixels().size(); ++i) ASSERT_NEAR(plain.pixels()[i].g, smooth.pixels()[i].g, 1e-6);
@@ -222,8 +222,8 @@ TEST(Denoiser, WhatIsFarBrighterThanAllAboutStaysApart) {
   place(scene, add_mesh(scene, quad({-0.4F, 3, -0.4F}, {0.8F, 0, 0}, {0, 0, 0.8F}, 2)));
   finish_scene(scene);
   const View view = test::view_from({0, 2.5, 0.01}, {0, 0, 0}, {64, 64}, scene);
-  const Image<Rgb> plain = test::light(scene, view, kGathered).image;
-  const Image<Rgb> smooth = test::light(scene, view, denoised(kGathered)).image;
+  const Image<Rgb> plain = test::shade(scene, view, kGathered).image;
+  const Image<Rgb> smooth = test::shade(scene, view, denoised(kGathered)).image;
   const auto bright = [](const Image<Rgb>& image) {
     return std::ranges::count_if(image.pixels(), [](const Rgb& color) { return color.g > 400.0F; });
   };
@@ -275,8 +275,8 @@ TEST(Denoiser, LooksEndAtTheFarPlane) {
   TileLayer<Rgb> with(keys.layout());
   TileLayer<Rgb> without(keys.layout());
   for (const auto& [shown, layer] : {std::pair(&scene, &with), std::pair(&near, &without)}) {
-    Lighter lighter(*shown, denoised({.passes = {PassId::Shadow}}));
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = layer});
+    DeferredShader shader(*shown, denoised({.passes = {PassId::Shadow}}));
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = layer});
   }
   EXPECT_TRUE(std::ranges::equal(with.tile(0), without.tile(0)));
   EXPECT_EQ(with.at(0, 5, 24).g, 0.25F);

@@ -13,7 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace hpr {  // NOLINT(modernize-concat-nested-namespaces): HWY_NAMESPACE is a macro
-/// Vectors of three, many at a time, in single precision. Only operations that every processor rounds alike.
+/// Vectors of three, many at a time, mostly in single precision. Only operations that every processor rounds alike.
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -26,15 +26,18 @@ using Words = hn::RebindToSigned<Floats>;
 using Vector = hn::Vec<Floats>;
 using Mask = hn::Mask<Floats>;
 
-struct Vector3 {
-  Vector x, y, z;
+template <typename V>
+struct VectorOf {
+  V x, y, z;
 };
+using Vector3 = VectorOf<Vector>;
 
 HWY_INLINE Vector all(float value) {
   return hn::Set(Floats(), value);
 }
 
-HWY_INLINE Vector square(Vector a) {
+template <typename V>
+HWY_INLINE V square(V a) {
   return hn::Mul(a, a);
 }
 
@@ -42,11 +45,13 @@ HWY_INLINE Vector dot(const Vector3& a, const glm::vec3& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, all(b.x)), hn::Mul(a.y, all(b.y))), hn::Mul(a.z, all(b.z)));
 }
 
-HWY_INLINE Vector dot(const Vector3& a, const Vector3& b) {
+template <typename V>
+HWY_INLINE V dot(const VectorOf<V>& a, const VectorOf<V>& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
 
-HWY_INLINE Vector length2(const Vector3& a) {
+template <typename V>
+HWY_INLINE V length2(const VectorOf<V>& a) {
   return hn::Add(hn::Add(square(a.x), square(a.y)), square(a.z));
 }
 

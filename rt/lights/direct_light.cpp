@@ -6,60 +6,60 @@
 
 namespace hpr {
 
-double share_of_ray(const TileWork& tile, double pdf, double light_pdf) {
+double balance_heuristic(const LightContext& context, double pdf, double light_pdf) {
   if (!(pdf > 0.0)) return 1.0;
-  const double lights = light_pdf * tile.settings.light_samples;
+  const double lights = light_pdf * context.settings.light_samples;
   return pdf / (pdf + lights);
 }
 
-void add_emission(TileWork& tile, const Wave& wave) {
-  for (const PathPoint& point : wave.points) {
+void add_emission(const LightContext& context, const Wavefront& wave, PixelSums& sums) {
+  for (const PathVertex& point : wave.vertices) {
     if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered)) continue;
     double share = 1.0;
-    if (point.seen_pdf > 0.0) {
-      share = share_of_ray(
-          tile, point.seen_pdf,
-          tile.lights.surface_pdf_one(point.seen_from, point.seen_normal, point.surface.surface, point.surface));
+    if (point.previous_pdf > 0.0) {
+      share = balance_heuristic(context, point.previous_pdf,
+                                context.lights.surface_pdf(point.previous_position, point.previous_normal,
+                                                           point.surface.surface, point.surface));
     }
-    tile.add(point.pixel, point.component, share * point.throughput * point.material.emission);
+    sums.add(point.pixel, point.component, share * point.throughput * point.material.emission);
   }
 }
 
 bool DirectLight::sample_next() {
   wave_.samples.clear();
-  if (light_ < tile_.lights.listed()) {
-    sample_listed();
+  if (light_ < context_.lights.enumerated()) {
+    sample_enumerated();
     return true;
   }
-  if (tile_.lights.has_sampled() && round_ < tile_.settings.light_samples) {
+  if (context_.lights.has_tree() && round_ < context_.settings.light_samples) {
     sample_others();
     return true;
   }
   return false;
 }
 
-void DirectLight::sample_listed() {
-  const std::size_t end = std::min(light_ + kLightsAtOnce, tile_.lights.listed());
+void DirectLight::sample_enumerated() {
+  const std::size_t end = std::min(light_ + kLightsAtOnce, context_.lights.enumerated());
   for (; light_ < end; ++light_) {
-    const bool fixed = tile_.lights.listed_is_fixed(light_);
-    for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
-      PathPoint& point = wave_.points[i];
-      if (point.borrows_light(Component::Direct)) continue;
+    const bool fixed = context_.lights.enumerated_is_fixed(light_);
+    for (std::uint32_t i = 0; i < wave_.vertices.size(); ++i) {
+      PathVertex& point = wave_.vertices[i];
+      if (point.is_upsampled(Component::Direct)) continue;
       const glm::dvec2 u = fixed ? glm::dvec2(0.0) : next_two(point.sampler, point.depth);
-      add(i, tile_.lights.sample_listed(light_, point.surface.position, *tile_.view, u));
+      add(i, context_.lights.sample_enumerated(light_, point.surface.position, *context_.view, u));
     }
   }
 }
 
 void DirectLight::sample_others() {
-  for (std::uint32_t i = 0; i < wave_.points.size(); ++i) {
-    PathPoint& point = wave_.points[i];
-    if (point.borrows_light(Component::Direct)) continue;
+  for (std::uint32_t i = 0; i < wave_.vertices.size(); ++i) {
+    PathVertex& point = wave_.vertices[i];
+    if (point.is_upsampled(Component::Direct)) continue;
     const double choice = point.sampler.one();
     const glm::dvec2 u = round_ == 0 ? next_two(point.sampler, point.depth) : point.sampler.two();
-    auto light = tile_.lights.sample_one(point.surface.position, point.bsdf.light_normal(), *tile_.view, choice, u);
+    auto light = context_.lights.sample(point.surface.position, point.bsdf.light_normal(), *context_.view, choice, u);
     if (!light) continue;
-    light->weight /= tile_.settings.light_samples;
+    light->weight /= context_.settings.light_samples;
     add(i, *light);
   }
   ++round_;
@@ -67,7 +67,7 @@ void DirectLight::sample_others() {
 
 void DirectLight::add(std::uint32_t index, const LightSample& light) {
   if (light.weight == glm::dvec3(0.0)) return;
-  const PathPoint& point = wave_.points[index];
+  const PathVertex& point = wave_.vertices[index];
   glm::dvec3 scattered(0.0);
   if (!(light.pdf > 0.0)) {
     scattered = point.bsdf.reflected(light.to_light) + point.bsdf.value(Lobe::Transmission, light.to_light);
@@ -76,36 +76,36 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
   }
   const double cosine = std::abs(glm::dot(point.material.normal, light.to_light));
   glm::dvec3 radiance = point.throughput * scattered * light.weight * cosine;
-  // The headlight is wherever it is asked for, and shows what is looked at.
+  // The headlight stands at the eye and lights what the eye sees only.
   if (!light.casts_shadows && point.gathered) return;
   if (light.casts_shadows) {
-    radiance *= left_of_light(point.media, point.surface, point.material, light.to_light, light.distance);
+    radiance *= transmittance_to_light(point.media, point.surface, point.material, light.to_light, light.distance);
   }
   if (radiance == glm::dvec3(0.0)) return;
   wave_.samples.push_back({index, 1.0F, light, radiance});
 }
 
-glm::dvec3 DirectLight::shared_scattering(const PathPoint& point, const LightSample& light) const {
+glm::dvec3 DirectLight::shared_scattering(const PathVertex& point, const LightSample& light) const {
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
   for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
-    const double share = point.may_follow[lobe] ? 1.0 - share_of_ray(tile_, all.pdf[lobe], light.pdf) : 1.0;
+    const double share = point.may_follow[lobe] ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
     scattered += share * all.value[lobe];
   }
   return scattered;
 }
 
-void add_samples(TileWork& tile, const Wave& wave) {
+void add_samples(const Wavefront& wave, PixelSums& sums) {
   for (const DirectSample& sample : wave.samples) {
-    const PathPoint& point = wave.points[sample.point];
+    const PathVertex& point = wave.vertices[sample.point];
     const glm::dvec3 arriving = static_cast<double>(sample.visible) * sample.radiance;
-    if (point.component != Component::Direct || !tile.wants_components) {
-      tile.add(point.pixel, point.component, arriving);
+    if (point.component != Component::Direct || !sums.wants_components) {
+      sums.add(point.pixel, point.component, arriving);
       continue;
     }
-    tile.radiance[point.pixel] += arriving;
-    tile.components[static_cast<std::size_t>(Component::Direct)][point.pixel] += sample.radiance;
-    tile.components[static_cast<std::size_t>(Component::Shadow)][point.pixel] += arriving - sample.radiance;
+    sums.radiance[point.pixel] += arriving;
+    sums.components[static_cast<std::size_t>(Component::Direct)][point.pixel] += sample.radiance;
+    sums.components[static_cast<std::size_t>(Component::Shadow)][point.pixel] += arriving - sample.radiance;
   }
 }
 

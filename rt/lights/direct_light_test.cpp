@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "rt/passes/path_vertex.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -30,18 +31,18 @@ class LitFloor {
     }
     set.emplace(scene);
     view = test::view_from({0, 3, 0.1}, {0, 0, 0}, {kTileSide, kTileSide}, scene, 0.5);
-    tile.emplace(TileWork{.scene = scene, .surfaces = surfaces, .rays = nullptr, .lights = *set, .settings = settings});
-    tile->radiance.assign(kTilePixels, glm::dvec3(0.0));
-    tile->view = &view;
+    context.emplace(LightContext{
+        .scene = scene, .surfaces = surfaces, .rays = nullptr, .lights = *set, .settings = settings, .view = &view});
+    sums.radiance.assign(kTilePixels, glm::dvec3(0.0));
     WorldTriangle triangle;
     surfaces.load(0, triangle);
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const Ray ray = view_ray(view, pixel % kTileSide + 0.5, static_cast<int>(pixel) / kTileSide + 0.5);
-      PathPoint& point = wave.points.emplace_back();
+      PathVertex& point = wave.vertices.emplace_back();
       point.surface = surfaces.meet(triangle, ray.origin, ray.direction);
       point.pixel = pixel;
       point.sampler = Sampler(pixel, 0);
-      finish_point(*tile, point);
+      finish_vertex(*context, point);
     }
   }
 
@@ -50,66 +51,68 @@ class LitFloor {
   Surfaces surfaces{scene, space};
   View view;
   RaySettings settings;
-  std::optional<LightSet> set;
-  std::optional<TileWork> tile;
-  Wave wave;
+  std::optional<LightSampler> set;
+  std::optional<LightContext> context;
+  PixelSums sums;
+  Wavefront wave;
 };
 
 TEST(DirectLight, ItsMemoryDoesNotGrowWithTheNumberOfLights) {
-  LitFloor floor(LightSet::kMostListed);
+  LitFloor floor(LightSampler::kMaxEnumerated);
   std::size_t samples = 0;
-  for (DirectLight light(*floor.tile, floor.wave); light.sample_next();) samples += floor.wave.samples.size();
-  EXPECT_EQ(samples, LightSet::kMostListed * kTilePixels) << "every light reaches every pixel, in one block or another";
+  for (DirectLight light(*floor.context, floor.wave); light.sample_next();) samples += floor.wave.samples.size();
+  EXPECT_EQ(samples, LightSampler::kMaxEnumerated * kTilePixels)
+      << "every light reaches every pixel, in one block or another";
   EXPECT_LE(floor.wave.samples.capacity() * sizeof(DirectSample), std::size_t{16} << 20);
 }
 
 TEST(DirectLight, FewLightsAreAddedInTheirOrderWhateverTheBlocks) {
   LitFloor floor(19);
-  for (DirectLight light(*floor.tile, floor.wave); light.sample_next();) add_samples(*floor.tile, floor.wave);
-  for (const PathPoint& point : floor.wave.points) {
+  for (DirectLight light(*floor.context, floor.wave); light.sample_next();) add_samples(floor.wave, floor.sums);
+  for (const PathVertex& point : floor.wave.vertices) {
     glm::dvec3 sum(0.0);
-    for (std::size_t i = 0; i < floor.set->listed(); ++i) {
-      const LightSample light = floor.set->sample_listed(i, point.surface.position, floor.view, {});
+    for (std::size_t i = 0; i < floor.set->enumerated(); ++i) {
+      const LightSample light = floor.set->sample_enumerated(i, point.surface.position, floor.view, {});
       glm::dvec3 scattered(0.0);
       for (const Lobe lobe : kLobes) scattered += point.bsdf.value(lobe, light.to_light);
       sum += point.throughput * scattered * light.weight * std::abs(glm::dot(point.material.normal, light.to_light));
     }
-    ASSERT_EQ(floor.tile->radiance[point.pixel], sum) << point.pixel;
+    ASSERT_EQ(floor.sums.radiance[point.pixel], sum) << point.pixel;
   }
 }
 
 TEST(DirectLight, ManyLightsAreSampledAndRightInTheMean) {
-  LitFloor few(LightSet::kMostListed);
-  LitFloor many(LightSet::kMostListed + 1);
-  ASSERT_EQ(many.set->listed(), 0U);
+  LitFloor few(LightSampler::kMaxEnumerated);
+  LitFloor many(LightSampler::kMaxEnumerated + 1);
+  ASSERT_EQ(many.set->enumerated(), 0U);
   Scene last = white_floor();
   last.lights = {many.scene.lights.back()};
-  const LightSet one(last);
+  const LightSampler one(last);
   const auto total = [](const LitFloor& floor) {
     double sum = 0.0;
-    for (const glm::dvec3& light : floor.tile->radiance) sum += light.g;
+    for (const glm::dvec3& light : floor.sums.radiance) sum += light.g;
     return sum;
   };
-  for (DirectLight light(*few.tile, few.wave); light.sample_next();) add_samples(*few.tile, few.wave);
-  for (const PathPoint& point : few.wave.points) {
-    const LightSample light = one.sample_listed(0, point.surface.position, few.view, {});
+  for (DirectLight light(*few.context, few.wave); light.sample_next();) add_samples(few.wave, few.sums);
+  for (const PathVertex& point : few.wave.vertices) {
+    const LightSample light = one.sample_enumerated(0, point.surface.position, few.view, {});
     for (const Lobe lobe : kLobes) {
-      few.tile->radiance[point.pixel] += point.bsdf.value(lobe, light.to_light) * light.weight *
-                                         std::abs(glm::dot(point.material.normal, light.to_light));
+      few.sums.radiance[point.pixel] += point.bsdf.value(lobe, light.to_light) * light.weight *
+                                        std::abs(glm::dot(point.material.normal, light.to_light));
     }
   }
   many.settings.light_samples = 16;
-  for (DirectLight light(*many.tile, many.wave); light.sample_next();) add_samples(*many.tile, many.wave);
+  for (DirectLight light(*many.context, many.wave); light.sample_next();) add_samples(many.wave, many.sums);
   EXPECT_NEAR(total(many) / total(few), 1.0, 5e-3);
 }
 
 TEST(DirectLight, HiddenSamplesAddNothing) {
   LitFloor floor(2);
-  DirectLight light(*floor.tile, floor.wave);
+  DirectLight light(*floor.context, floor.wave);
   ASSERT_TRUE(light.sample_next());
   for (DirectSample& sample : floor.wave.samples) sample.visible = sample.point % 3 != 0 ? 1.0F : 0.0F;
-  add_samples(*floor.tile, floor.wave);
-  for (std::uint32_t i = 0; i < kTilePixels; ++i) EXPECT_EQ(floor.tile->radiance[i].g > 0.0, i % 3 != 0) << i;
+  add_samples(floor.wave, floor.sums);
+  for (std::uint32_t i = 0; i < kTilePixels; ++i) EXPECT_EQ(floor.sums.radiance[i].g > 0.0, i % 3 != 0) << i;
   EXPECT_FALSE(light.sample_next());
 }
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "core/error.h"
-#include "rt/sampling/pick.h"
+#include "rt/sampling/sampling.h"
 
 namespace hpr {
 namespace {
@@ -61,10 +61,10 @@ EnvironmentMap::EnvironmentMap(const Environment& environment) : environment_(&e
   // brightness, for a constant one, 5/3. Each has its share by how little the other is good for.
   constexpr double kByBrightness = 5.0 / 3.0;
   const double by_cosine = sum > 0.0 ? std::max(0.0, squares / (sum * sum) - 1.0) : 0.0;
-  cosine_share_ = is_constant() ? 1.0 : kByBrightness / (kByBrightness + by_cosine);
+  cosine_fraction_ = is_constant() ? 1.0 : kByBrightness / (kByBrightness + by_cosine);
 }
 
-EnvironmentMap::Seen EnvironmentMap::look(const glm::dvec3& direction) const {
+EnvironmentMap::DirectionalRadiance EnvironmentMap::evaluate(const glm::dvec3& direction) const {
   const Size size = environment_->image.size();
   if (is_constant()) return {mean_, row_sums_.back() > 0.0 ? 0.25 / kPi : 0.0};
   const double turn = 0.5 + (std::atan2(direction.x, -direction.z) + environment_->rotation_radians) / (2.0 * kPi);
@@ -73,7 +73,7 @@ EnvironmentMap::Seen EnvironmentMap::look(const glm::dvec3& direction) const {
   const int column = std::min(static_cast<int>(s), size.width - 1);
   const int row = std::min(static_cast<int>(t), size.height - 1);
 
-  Seen seen;
+  DirectionalRadiance seen;
   const int x0 = static_cast<int>(std::floor(s - 0.5));
   const int y0 = static_cast<int>(std::floor(t - 0.5));
   const double fx = s - 0.5 - x0;
@@ -92,8 +92,8 @@ EnvironmentMap::Seen EnvironmentMap::look(const glm::dvec3& direction) const {
 
 glm::dvec3 EnvironmentMap::sample(const glm::dvec2& u) const {
   const auto width = static_cast<std::size_t>(environment_->image.width());
-  const Picked row = pick(row_sums_, u.y);
-  const Picked column = pick(std::span(texel_sums_).subspan(row.index * width, width), u.x);
+  const DiscreteSample row = sample_discrete(row_sums_, u.y);
+  const DiscreteSample column = sample_discrete(std::span(texel_sums_).subspan(row.index * width, width), u.x);
   const double y = row_cosines_[row.index] + row.rest * (row_cosines_[row.index + 1] - row_cosines_[row.index]);
   const double turn = (static_cast<double>(column.index) + column.rest) / static_cast<double>(width) - 0.5;
   const double angle = 2.0 * kPi * turn - environment_->rotation_radians;

@@ -16,12 +16,12 @@ class EnvironmentMap {
   /// The environment must outlive this, and have at least one pixel.
   explicit EnvironmentMap(const Environment& environment);
 
-  struct Seen {
+  struct DirectionalRadiance {
     glm::dvec3 radiance{0.0};
     double pdf = 0.0;  ///< of sample(), per solid angle; zero only where the radiance is
   };
   /// `direction` has unit length.
-  [[nodiscard]] Seen look(const glm::dvec3& direction) const;
+  [[nodiscard]] DirectionalRadiance evaluate(const glm::dvec3& direction) const;
   /// A direction of unit length. The environment must not be black.
   [[nodiscard]] glm::dvec3 sample(const glm::dvec2& u) const;
 
@@ -31,9 +31,9 @@ class EnvironmentMap {
   /// Whether radiance is the same in all directions.
   [[nodiscard]] bool is_constant() const { return environment_->is_constant(); }
 
-  /// How much of a matte surface's samples are better spread by the cosine than by brightness: 1 for a constant
+  /// Which fraction of a diffuse surface's samples is better spread by the cosine than by brightness: 1 for a constant
   /// picture, near 0 for one with a sun in it.
-  [[nodiscard]] double cosine_share() const { return cosine_share_; }
+  [[nodiscard]] double cosine_fraction() const { return cosine_fraction_; }
 
  private:
   [[nodiscard]] glm::dvec3 texel(int x, int y) const;
@@ -44,7 +44,7 @@ class EnvironmentMap {
   std::vector<double> row_sums_;     ///< of brightness times solid angle
   std::vector<double> texel_sums_;   ///< of brightness, starting anew in every row
   glm::dvec3 mean_{0.0};
-  double cosine_share_ = 1.0;
+  double cosine_fraction_ = 1.0;
 };
 
 }  // namespace hpr

@@ -54,7 +54,7 @@ double over_the_sphere(const Value& value) {
 TEST(EnvironmentMap, TheDensityIntegratesToOne) {
   for (const Environment& environment : {patterned(), sun(16, 8, 3, 0), sun(9, 4, 8, 3), sun(1, 1, 0, 0)}) {
     const EnvironmentMap map(environment);
-    EXPECT_NEAR(4.0 * kPi * over_the_sphere([&](const glm::dvec3& w) { return map.look(w).pdf; }), 1.0, 3e-3);
+    EXPECT_NEAR(4.0 * kPi * over_the_sphere([&](const glm::dvec3& w) { return map.evaluate(w).pdf; }), 1.0, 3e-3);
   }
 }
 
@@ -66,7 +66,7 @@ TEST(EnvironmentMap, AConstantOneIsSampledAsIfItWereOnePixel) {
     double irradiance = 0.0;
     for (std::uint32_t i = 0; i < kSamples; ++i) {
       const glm::dvec3 w = map.sample(Sampler(1, i).two());
-      const EnvironmentMap::Seen seen = map.look(w);
+      const EnvironmentMap::DirectionalRadiance seen = map.evaluate(w);
       ASSERT_NEAR(seen.pdf * 4.0 * kPi, 1.0, 1e-12);
       ASSERT_NEAR(seen.radiance.r, 2.0, 1e-14);
       irradiance += seen.radiance.r / seen.pdf * std::max(0.0, w.y) / kSamples;
@@ -86,7 +86,7 @@ TEST(EnvironmentMap, SamplesFallWhereTheDensitySays) {
   };
   std::vector<double> expected(std::size_t{kBins} * kBins, 0.0);
   (void)over_the_sphere([&](const glm::dvec3& w) {
-    expected[bin(w)] += map.look(w).pdf * 4.0 * kPi / 2e6 * kSamples;
+    expected[bin(w)] += map.evaluate(w).pdf * 4.0 * kPi / 2e6 * kSamples;
     return 0.0;
   });
   std::vector<double> found(expected.size(), 0.0);
@@ -101,12 +101,12 @@ TEST(EnvironmentMap, SamplesFallWhereTheDensitySays) {
 TEST(EnvironmentMap, ASunOfOnePixelIsFoundByEverySample) {
   const Environment environment = sun(256, 128, 200, 40);
   const EnvironmentMap map(environment);
-  const auto seen_at = [&](const glm::dvec3& w) { return map.look(w).radiance.r; };
+  const auto seen_at = [&](const glm::dvec3& w) { return map.evaluate(w).radiance.r; };
   double sum = 0.0;
   double squares = 0.0;
   for (std::uint32_t i = 0; i < 256; ++i) {
     const glm::dvec3 w = map.sample(Sampler(3, i).two());
-    const EnvironmentMap::Seen seen = map.look(w);
+    const EnvironmentMap::DirectionalRadiance seen = map.evaluate(w);
     ASSERT_GT(seen.pdf, 0.0);
     const double value = seen.radiance.r / seen.pdf;
     sum += value / 256;
@@ -122,27 +122,27 @@ TEST(EnvironmentMap, ASunOfOnePixelIsFoundByEverySample) {
 TEST(EnvironmentMap, LiesAsItsDescriptionSays) {
   // The middle lies along -z, right of it is +x, up is +y.
   const Environment ahead = sun(33, 17, 16, 8);
-  EXPECT_NEAR(EnvironmentMap(ahead).look({0, 0, -1}).radiance.r, 5.0, 1e-12);
-  EXPECT_NEAR(EnvironmentMap(ahead).look({0, 0, 1}).radiance.r, 0.0, 1e-12);
+  EXPECT_NEAR(EnvironmentMap(ahead).evaluate({0, 0, -1}).radiance.r, 5.0, 1e-12);
+  EXPECT_NEAR(EnvironmentMap(ahead).evaluate({0, 0, 1}).radiance.r, 0.0, 1e-12);
   const Environment right = sun(32, 17, 23, 8);
-  EXPECT_GT(EnvironmentMap(right).look({1, 0, 0}).radiance.r, 2.0);
-  EXPECT_EQ(EnvironmentMap(right).look({-1, 0, 0}).radiance.r, 0.0);
+  EXPECT_GT(EnvironmentMap(right).evaluate({1, 0, 0}).radiance.r, 2.0);
+  EXPECT_EQ(EnvironmentMap(right).evaluate({-1, 0, 0}).radiance.r, 0.0);
   const Environment above = sun(1, 5, 0, 0);
-  EXPECT_NEAR(EnvironmentMap(above).look({0, 1, 0}).radiance.r, 5.0, 1e-12);
+  EXPECT_NEAR(EnvironmentMap(above).evaluate({0, 1, 0}).radiance.r, 5.0, 1e-12);
   Environment turned = sun(33, 17, 16, 8);
   turned.rotation_radians = 0.5 * kPi;  // from -z a quarter counterclockwise, seen from above: -x
-  EXPECT_NEAR(EnvironmentMap(turned).look({-1, 0, 0}).radiance.r, 5.0, 1e-12);
+  EXPECT_NEAR(EnvironmentMap(turned).evaluate({-1, 0, 0}).radiance.r, 5.0, 1e-12);
   EXPECT_LT(glm::distance(EnvironmentMap(turned).sample({0.5, 0.5}), {-1, 0, 0}), 0.1);
 }
 
 TEST(EnvironmentMap, ABlackOneOrOddDirectionsGiveNoNan) {
   const Environment black{Image<Rgb>({4, 2})};
-  EXPECT_EQ(EnvironmentMap(black).look({0, 1, 0}).pdf, 0.0);
+  EXPECT_EQ(EnvironmentMap(black).evaluate({0, 1, 0}).pdf, 0.0);
   const Environment environment = patterned();
   const EnvironmentMap map(environment);
   for (const glm::dvec3 w : {glm::dvec3(0, 1, 0), glm::dvec3(0, -1, 0), glm::dvec3(0, 1.0000001, 0),
                              glm::dvec3(-0.0, 0, 1), glm::dvec3(0.0, 0, 1)}) {
-    EXPECT_TRUE(std::isfinite(map.look(w).pdf) && std::isfinite(map.look(w).radiance.r));
+    EXPECT_TRUE(std::isfinite(map.evaluate(w).pdf) && std::isfinite(map.evaluate(w).radiance.r));
   }
   for (const glm::dvec2 u : {glm::dvec2(0.0), glm::dvec2(1.0 - 1e-16)}) {
     EXPECT_NEAR(glm::length(map.sample(u)), 1.0, 1e-12);

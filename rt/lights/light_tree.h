@@ -25,7 +25,7 @@ struct LightBounds {
 /// The bounds of both.
 [[nodiscard]] LightBounds united(const LightBounds& a, const LightBounds& b);
 
-/// LightBounds with all that their importance asks computed once.
+/// LightBounds with all that their importance needs, computed once.
 struct LightCluster {
   glm::dvec3 center{0.0};
   double radius = 0.0;  ///< of the sphere about the box

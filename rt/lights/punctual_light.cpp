@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "rt/sampling/warp.h"
+#include "rt/sampling/sampling.h"
 
 namespace hpr {
 namespace {

@@ -35,7 +35,7 @@ double estimated_irradiance(const Light& light) {
   return sum / kSamples;
 }
 
-/// The same by a grid over the sphere's cone; radiance is I / (pi r^2).
+/// The irradiance of a sphere light by a grid over the sphere's cone; radiance is I / (pi r^2).
 double exact_irradiance(const Light& light) {
   const double distance = glm::length(light.position);
   const glm::dvec3 axis = light.position / distance;

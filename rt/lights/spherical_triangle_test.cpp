@@ -1,5 +1,3 @@
-#include "rt/lights/spherical_triangle.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "rt/lights/triangle_lights.h"
 #include "rt/sampling/sampler.h"
 
 namespace hpr {

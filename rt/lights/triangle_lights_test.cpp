@@ -9,7 +9,6 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 
-#include "rt/lights/spherical_triangle.h"
 #include "rt/sampling/sampler.h"
 #include "rt/test_scene.h"
 

@@ -8,13 +8,13 @@
 #include <glm/mat3x3.hpp>
 #include <numbers>
 
-#include "rt/sampling/warp.h"
+#include "rt/sampling/sampling.h"
 
 namespace hpr {
 namespace {
 
 /// Lobes that are present but give nothing in the viewer's own mirror or refracted direction keep this chance.
-constexpr double kLeastWeight = 1e-3;
+constexpr double kMinWeight = 1e-3;
 /// Cosines below it are edge-on: nothing is seen or lit there, and no quotient of cosines overflows.
 constexpr double kEdgeOn = 1e-9;
 
@@ -296,14 +296,14 @@ glm::dvec3 Bsdf::weight(Lobe lobe) const {
   const bool single = is_delta(lobe);
   if (lobe == Lobe::Reflection) {
     const glm::dvec3 straight = fresnel(normal_view_, dielectric_fresnel(normal_view_));
-    return single ? straight : glm::max(straight, kLeastWeight);
+    return single ? straight : glm::max(straight, kMinWeight);
   }
   if (lobe == Lobe::Diffuse) {
     if (exact_) return (diffuse_ * view_enters_) * base_color_;
-    return (diffuse_ * std::max(1.0 - dielectric_fresnel(normal_view_), kLeastWeight)) * base_color_;
+    return (diffuse_ * std::max(1.0 - dielectric_fresnel(normal_view_), kMinWeight)) * base_color_;
   }
   const double through = 1.0 - dielectric_fresnel(normal_view_);
-  return (single ? through * squeeze_ : std::max(through, kLeastWeight)) * tint_;
+  return (single ? through * squeeze_ : std::max(through, kMinWeight)) * tint_;
 }
 
 bool Bsdf::is_delta(Lobe lobe) const {

@@ -77,7 +77,7 @@ class Bsdf {
   Bsdf() = default;
   /// Copies what it needs. The surface's `inside` says that the viewer's side is inside the volume (solid materials).
   Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried carried = Carried::Radiance);
-  /// The same place as somebody else on the viewer's side sees it, by the normal that is shaded with there.
+  /// This BSDF for another viewer on the same side, with the normal that is shaded with there.
   [[nodiscard]] Bsdf seen_from(const glm::dvec3& to_viewer, const glm::dvec3& normal) const;
 
   /// f of one lobe in 1/sr. Never negative, never NaN; 0 for lobes of one direction, and where the geometric and the
@@ -85,7 +85,7 @@ class Bsdf {
   [[nodiscard]] glm::dvec3 value(Lobe lobe, const glm::dvec3& to_light) const;
   /// The sum over Diffuse and Reflection, or one of them: cheaper than one by one.
   [[nodiscard]] glm::dvec3 reflected(const glm::dvec3& to_light, bool diffuse = true, bool specular = true) const;
-  /// The same for many directions: what it is worked out from. A surface that scatters nothing has black terms.
+  /// The terms that reflected() is computed from, for many directions. A surface that scatters nothing has black terms.
   [[nodiscard]] ReflectionTerms reflection_terms(bool diffuse, bool specular) const;
   /// The density of sample(lobe), per solid angle; 0 where value is 0 by direction, and for lobes of one direction.
   [[nodiscard]] double pdf(Lobe lobe, const glm::dvec3& to_light) const;
@@ -144,7 +144,7 @@ class Bsdf {
   glm::dvec3 base_color_{0.0};
   glm::dvec3 tint_{0.0};  ///< of light let through, metal and share of transmission included
   double normal_view_ = 0.0;
-  double bounded_view_ = 0.0;  ///< the same, bounded as sampled facets are that mirror
+  double bounded_view_ = 0.0;  ///< the cosine to the viewer, bounded as that of sampled facets is
   double view_smith_ = 1.0;    ///< sqrt(alpha^2 + (1 - alpha^2) (n.v)^2)
   double roughness_ = 1.0;
   double alpha2_ = 1.0;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "rt/materials/bsdf_test_tools.h"
+#include "rt/materials/test_bsdf.h"
 #include "rt/sampling/sampler.h"
 
 namespace hpr {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "rt/materials/bsdf_test_tools.h"
+#include "rt/materials/test_bsdf.h"
 #include "rt/sampling/sampler.h"
 
 namespace hpr {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "rt/materials/bsdf_test_tools.h"
+#include "rt/materials/test_bsdf.h"
 
 namespace hpr {
 namespace {

@@ -55,10 +55,10 @@ std::vector<std::uint32_t> left_unentered(const Crossings& crossings, bool leavi
 
 }  // namespace
 
-glm::dvec3 left_of_light(const Media& media, const SurfacePoint& point, const MaterialPoint& material,
-                         const glm::dvec3& to_light, double metres) {
+glm::dvec3 transmittance_to_light(const Media& media, const SurfacePoint& point, const MaterialPoint& material,
+                                  const glm::dvec3& to_light, double metres) {
   if (!std::isfinite(metres)) return glm::dvec3(1.0);
-  return left_after(media_towards(media, point, material, to_light).here, metres);
+  return transmittance(media_towards(media, point, material, to_light).here, metres);
 }
 
 MediumFinder::MediumFinder(const Scene& scene) : scene_(scene) {

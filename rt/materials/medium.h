@@ -22,22 +22,22 @@ namespace hpr {
 /// What a place lies in, 1/m; zero: nothing that absorbs.
 struct Media {
   glm::dvec3 here{0.0};    ///< absorption of the innermost solid
-  glm::dvec3 around{0.0};  ///< of the one about that
+  glm::dvec3 around{0.0};  ///< absorption of the solid that encloses that
 
   bool operator==(const Media&) const = default;
 };
 
-/// What is left of light after `metres` of what absorbs so much.
-[[nodiscard]] inline glm::dvec3 left_after(const glm::dvec3& absorption, double metres) {
+/// The transmittance of `metres` of a medium: the fraction of light that is not absorbed.
+[[nodiscard]] inline glm::dvec3 transmittance(const glm::dvec3& absorption, double metres) {
   return absorption == glm::dvec3(0.0) ? glm::dvec3(1.0) : glm::exp(-absorption * metres);
 }
 
-/// What is left of light along a stretch of `metres` that came through `media` and ends at `point`. Where that is the
+/// The transmittance of a stretch of `metres` that came through `media` and ends at `point`. Where that is the
 /// inside of a solid's wall, the solid itself says what it was. Not for the eye's first stretch: that is in what the
 /// eye is in, as at a silhouette a pixel may show the wall behind.
-[[nodiscard]] inline glm::dvec3 left_at(const Media& media, const SurfacePoint& point, const MaterialPoint& material,
-                                        double metres) {
-  return left_after(point.inside && material.solid ? material.absorption : media.here, metres);
+[[nodiscard]] inline glm::dvec3 transmittance_to(const Media& media, const SurfacePoint& point,
+                                                 const MaterialPoint& material, double metres) {
+  return transmittance(point.inside && material.solid ? material.absorption : media.here, metres);
 }
 
 /// What lies on the side of `point` that `direction` leads to, for who came to it through `media`.
@@ -49,10 +49,11 @@ struct Media {
   return back ? media : Media{material.absorption, media.here};
 }
 
-/// What is left of light that comes to `point` from a light `metres` away. Nothing is taken from endless ways: what
+/// The transmittance from a light `metres` away to `point`. Infinite distances count as 1: what
 /// they lead through has no far wall, or their shadow rays find it.
-[[nodiscard]] glm::dvec3 left_of_light(const Media& media, const SurfacePoint& point, const MaterialPoint& material,
-                                       const glm::dvec3& to_light, double metres);
+[[nodiscard]] glm::dvec3 transmittance_to_light(const Media& media, const SurfacePoint& point,
+                                                const MaterialPoint& material, const glm::dvec3& to_light,
+                                                double metres);
 
 /// Finds the solids places lie in. Costs nothing in scenes without a solid that absorbs, and elsewhere little where a
 /// place is outside of their boxes; else a test of every triangle of the instances whose boxes a line meets.

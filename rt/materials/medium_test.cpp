@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 
 // Beer's law on every stretch within a solid, by the passes and by the reference.
@@ -46,7 +46,7 @@ std::uint32_t add_absorber(Scene& scene, const glm::vec3& left_after_a_metre, fl
   return add_material(scene, solid);
 }
 
-/// Looks straight at -z from (0.1, 0.07, z), where no diagonal of a quad is.
+/// SubpixelOffsets straight at -z from (0.1, 0.07, z), where no diagonal of a quad is.
 glm::dvec3 seen_from(double z, const Scene& scene, RaySettings settings, bool reference, std::uint32_t samples = 1) {
   settings.reference = reference;
   const View view = test::view_from({0.1, 0.07, z}, {0.1, 0.07, z - 1.0}, {1, 1}, scene, 1e-4);
@@ -181,8 +181,8 @@ TEST(Medium, DimsNoNormals) {
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
   TileLayer<Rgb> color(keys.layout());
   TileLayer<Rgb> normal(keys.layout());
-  Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color, .normal = &normal});
+  DeferredShader shader(scene, {});
+  shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color, .normal = &normal});
   EXPECT_EQ(normal.at(0, 0, 0), (Rgb{0.0F, 0.0F, 1.0F}));
 }
 
@@ -207,11 +207,11 @@ TEST(Medium, PassesAndReferenceShowTheSameRoomUnderWater) {
     const View view = test::view_from({0, 0, 0.8}, {0, -0.3, -1}, {8, 8}, scene, 1.2);
     const auto mean = [&](const RaySettings& settings, std::uint32_t samples) {
       const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-      Lighter lighter(scene, settings);
+      DeferredShader shader(scene, settings);
       glm::dvec3 sum(0.0);
       for (std::uint32_t sample = 0; sample < samples; ++sample) {
         TileLayer<Rgb> radiance(keys.layout());
-        lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
+        shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
         for (int pixel = 0; pixel < 64; ++pixel) {
           const Rgb& color = radiance.at(0, pixel % 8, pixel / 8);
           sum += glm::dvec3(color.r, color.g, color.b);

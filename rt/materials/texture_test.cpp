@@ -1,9 +1,9 @@
-#include "rt/materials/texture.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+
+#include "rt/materials/material_point.h"
 
 namespace hpr {
 namespace {

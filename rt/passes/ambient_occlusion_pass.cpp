@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
-#include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 namespace {
@@ -20,32 +20,33 @@ class AmbientOcclusionPass final : public Pass {
     return false;
   }
 
-  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
-    const int count = tile.settings.occlusion_rays;
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& /*next*/) const override {
+    const int count = context.settings.occlusion_rays;
     std::vector<glm::dvec3> light;
-    tile.requests.clear();
-    const double reach = kReach * glm::length(tile.scene.bounds.high - tile.scene.bounds.low) / 2.0;
-    for (std::uint32_t i = 0; i < wave.points.size(); ++i) {
-      const PathPoint& point = wave.points[i];
-      if (point.borrows_light(Component::AmbientOcclusion)) continue;
+    buffers.requests.clear();
+    const double reach = kReach * glm::length(context.scene.bounds.high - context.scene.bounds.low) / 2.0;
+    for (std::uint32_t i = 0; i < wave.vertices.size(); ++i) {
+      const PathVertex& point = wave.vertices[i];
+      if (point.is_upsampled(Component::AmbientOcclusion)) continue;
       if (point.bsdf.weight(Lobe::Diffuse) == glm::dvec3(0.0)) continue;
       Sampler sampler = point.sampler.branch(kBranch);
       for (int ray = 0; ray < count; ++ray) {
         const auto sample = point.bsdf.sample(Lobe::Diffuse, sampler.two());
         if (!sample) continue;
-        tile.requests.push_back(
+        buffers.requests.push_back(
             {ray_origin(point.surface, sample->direction) + point.surface.lift, sample->direction, reach, nullptr, i});
-        light.push_back(point.throughput * sample->weight * point.material.occlusion * tile.settings.ambient /
+        light.push_back(point.throughput * sample->weight * point.material.occlusion * context.settings.ambient /
                         static_cast<double>(count));
-        tile.charge_ray(point.pixel);
+        sums.count_ray(point.pixel);
       }
     }
-    std::vector<float> passed(tile.requests.size());
-    tile.counts[PassId::AmbientOcclusion] += tile.requests.size();
-    tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
+    std::vector<float> passed(buffers.requests.size());
+    buffers.counts[PassId::AmbientOcclusion] += buffers.requests.size();
+    buffers.counts.invalid += context.rays->passed(buffers.requests, passed, buffers.scratch);
     for (std::size_t i = 0; i < passed.size(); ++i) {
-      const PathPoint& point = wave.points[tile.requests[i].owner];
-      tile.add(point.pixel, component_after(point, Component::AmbientOcclusion),
+      const PathVertex& point = wave.vertices[buffers.requests[i].owner];
+      sums.add(point.pixel, component_after(point, Component::AmbientOcclusion),
                static_cast<double>(passed[i]) * light[i]);
     }
   }

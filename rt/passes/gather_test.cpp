@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "rt/hybrid_test_tools.h"
 #include "rt/passes/pass_list.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 // Indirect light along rays, held to the reference as all passes are.

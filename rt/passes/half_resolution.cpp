@@ -1,10 +1,7 @@
 #include "rt/passes/half_resolution.h"
 
 #include <algorithm>
-#include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <span>
 
 #include "core/error.h"
 
@@ -14,137 +11,144 @@ namespace {
 constexpr int kBlockSide = 2;
 constexpr int kBlocksPerRow = kTileSide / kBlockSide;
 
-/// Of one pixel of a block, in the order in which they lend: diagonals first.
-constexpr std::array<int, 4> kLenderX{0, 1, 1, 0};
-constexpr std::array<int, 4> kLenderY{0, 1, 0, 1};
+/// The tap's place in its block, sample after sample: diagonals first.
+constexpr std::array<int, 4> kTapX{0, 1, 1, 0};
+constexpr std::array<int, 4> kTapY{0, 1, 0, 1};
 
 /// Cosine of the largest angle between the normals of pixels that share light.
-constexpr double kLeastCosine = 0.9;
+constexpr double kMinCosine = 0.9;
 /// How far one may lie off the other's tangent plane, in distances between the two: what normals that differ so much
 /// make of a curved surface.
-constexpr double kMostBent = 0.25;
+constexpr double kMaxBend = 0.25;
 /// How far apart they may lie, in distances from the eye.
-constexpr double kMostApart = 0.1;
-/// How many times as much of the light a borrower may scatter.
-constexpr float kMostBrighter = 4.0F;
+constexpr double kMaxDistance = 0.1;
+/// How many times as much of the light a pixel may scatter as the tap.
+constexpr double kMaxRatio = 4.0;
 
-std::size_t block_of(std::uint32_t pixel) {
-  const std::uint32_t x = pixel % kTileSide / kBlockSide;
-  const std::uint32_t y = pixel / kTileSide / kBlockSide;
-  return static_cast<std::size_t>(y) * kBlocksPerRow + x;
-}
+static_assert(kPasses <= FilterCenter<double>::kMaxTerms);
 
-glm::dvec3 made_up_for(const glm::vec3& borrower, const glm::vec3& lender) {
-  const auto ratio = [](float a, float b) { return b > 0.0F ? static_cast<double>(a) / static_cast<double>(b) : 0.0; };
-  return {ratio(borrower.r, lender.r), ratio(borrower.g, lender.g), ratio(borrower.b, lender.b)};
+glm::ivec2 block_of(std::uint32_t pixel) {
+  return {static_cast<int>(pixel % kTileSide) / kBlockSide, static_cast<int>(pixel / kTileSide) / kBlockSide};
 }
 
 }  // namespace
 
-void SharedLight::start(ComponentSet shared, const TileWork& tile, const TileJob& job) {
+void HalfResShading::start(ComponentSet shared, const LightContext& context, const TileJob& job) {
   shared_ = shared;
-  glossy_cutoff_ = tile.settings.glossy_cutoff;
-  const std::size_t turn = job.number.sample % kLenderX.size();
-  lender_x_ = kLenderX.at(turn);
-  lender_y_ = kLenderY.at(turn);
-  eye_ = tile.view->eye;
-  lender_of_.assign(static_cast<std::size_t>(kBlocksPerRow) * kBlocksPerRow, kNobody);
-  lenders_.clear();
-  borrowers_.clear();
-}
-
-SharedLight::Seen SharedLight::look_at(const PathPoint& point) const {
-  Seen seen{.position = point.surface.position,
-            .normal = point.material.normal,
-            .material = point.surface.material,
-            .pixel = point.pixel};
+  passes_.clear();
   for (const PassInfo& pass : all_passes()) {
-    if ((pass.half_resolution.components & shared_) == 0) continue;
-    const glm::vec3 scattered = pass.half_resolution.scattered(point, glossy_cutoff_);
-    for (std::size_t i = 0; i < kComponents; ++i) {
-      if (contains(pass.half_resolution.components, static_cast<Component>(i))) seen.weights.at(i) = scattered;
-    }
+    if ((pass.half_resolution.components & shared) != 0) passes_.push_back(&pass);
   }
-  return seen;
+  glossy_cutoff_ = context.settings.glossy_cutoff;
+  const std::size_t turn = job.number.sample % kTapX.size();
+  tap_x_ = kTapX.at(turn);
+  tap_y_ = kTapY.at(turn);
+  eye_ = context.view->eye;
+  if (!taps_) taps_ = std::make_unique<NeighborFeatures<double>>();
+  taps_->kinds.fill(NeighborFeatures<double>::kNoTap);
+  taps_->scattering.resize(passes_.size());
+  upsampled_.clear();
 }
 
-bool SharedLight::alike(const Seen& lender, const Seen& borrower) const {
-  if (lender.material != borrower.material) return false;
-  if (glm::dot(lender.normal, borrower.normal) < kLeastCosine) return false;
-  const glm::dvec3 apart = borrower.position - lender.position;
-  const double distance = glm::length(apart);
-  if (std::abs(glm::dot(apart, lender.normal)) > kMostBent * distance) return false;
-  if (distance > kMostApart * glm::distance(borrower.position, eye_)) return false;
-  for (std::size_t i = 0; i < kComponents; ++i) {
-    if (!contains(shared_, static_cast<Component>(i))) continue;
-    if (glm::any(glm::greaterThan(borrower.weights[i], kMostBrighter * lender.weights[i]))) return false;
+HalfResShading::Feature HalfResShading::feature_of(const PathVertex& point) const {
+  Feature feature{.position = point.surface.position,
+                  .normal = point.material.normal,
+                  .material = point.surface.material,
+                  .pixel = point.pixel};
+  for (std::size_t i = 0; i < passes_.size(); ++i) {
+    const glm::vec3 scattered = passes_[i]->half_resolution.scattered(point, glossy_cutoff_);
+    feature.scattering.at(i) = scattered;
   }
-  return true;
+  return feature;
 }
 
-void SharedLight::choose(std::vector<PathPoint>& points, int first_row) {
-  // A pixel that sees several surfaces, each in part, keeps to itself.
+void HalfResShading::set_tap(const Feature& feature) {
+  const glm::ivec2 block = block_of(feature.pixel);
+  const std::size_t at = TapPlanes::index(block.x, block.y);
+  taps_->kinds.at(at) = tap_kind(feature.material, false);
+  taps_->position.set(at, feature.position);
+  taps_->normal.set(at, feature.normal);
+  taps_->shading_normal.set(at, feature.normal);
+  for (std::size_t i = 0; i < passes_.size(); ++i) taps_->scattering[i].set(at, glm::dvec3(feature.scattering.at(i)));
+}
+
+FilterCenter<double> HalfResShading::center_of(const Feature& feature) const {
+  const glm::dvec3 from_eye = feature.position - eye_;
+  FilterCenter<double> center;
+  center.material = feature.material;
+  center.position = feature.position;
+  center.normal = feature.normal;
+  center.max_distance2 = kMaxDistance * kMaxDistance * glm::dot(from_eye, from_eye);
+  center.max_bend2 = kMaxBend * kMaxBend;
+  center.sharpness = 0.5 / (1.0 - kMinCosine);
+  for (std::size_t i = 0; i < passes_.size(); ++i) center.terms.at(i) = {i, glm::dvec3(feature.scattering.at(i))};
+  center.term_count = passes_.size();
+  center.max_ratio = kMaxRatio;
+  center.is_box = true;
+  return center;
+}
+
+bool HalfResShading::is_tap(const PathVertex& point) const {
+  return static_cast<int>(point.pixel % kTileSide) % kBlockSide == tap_x_ &&
+         static_cast<int>(point.pixel / kTileSide) % kBlockSide == tap_y_;
+}
+
+void HalfResShading::choose(std::vector<PathVertex>& points, int first_row) {
+  // A pixel that shows several surfaces, each in part, keeps to itself.
   std::array<std::uint8_t, kTilePixels> surfaces{};
-  for (const PathPoint& point : points) surfaces.at(point.pixel) = surfaces.at(point.pixel) == 0 ? 1 : 2;
-  const auto sees_one = [&](const PathPoint& point) {
+  for (const PathVertex& point : points) surfaces.at(point.pixel) = surfaces.at(point.pixel) == 0 ? 1 : 2;
+  const auto shows_one = [&](const PathVertex& point) {
     return surfaces.at(point.pixel) == 1 && point.throughput == glm::dvec3(1.0);
   };
-  const auto lends = [&](const PathPoint& point) {
-    const auto x = static_cast<int>(point.pixel % kTileSide);
-    const auto y = static_cast<int>(point.pixel / kTileSide);
-    return x % kBlockSide == lender_x_ && y % kBlockSide == lender_y_;
-  };
   HPR_CHECK(first_row % kBlockSide == 0);
-  for (const PathPoint& point : points) {
+  for (const PathVertex& point : points) {
     // What glows is no light that falls on it.
-    if (!lends(point) || !sees_one(point) || point.material.emission != glm::dvec3(0.0)) continue;
-    lender_of_[block_of(point.pixel)] = static_cast<std::uint16_t>(lenders_.size());
-    lenders_.push_back(look_at(point));
+    if (is_tap(point) && shows_one(point) && point.material.emission == glm::dvec3(0.0)) set_tap(feature_of(point));
   }
-  for (PathPoint& point : points) {
-    const std::uint16_t lender = lender_of_[block_of(point.pixel)];
-    if (lender != kNobody && !lends(point) && sees_one(point)) borrow(lenders_[lender], point);
-  }
-}
-
-void SharedLight::borrow(const Seen& lender, PathPoint& point) {
-  const Seen seen = look_at(point);
-  if (!alike(lender, seen)) return;
-  borrowers_.push_back(seen);
-  point.borrows = shared_;
-  for (const PassInfo& pass : all_passes()) {
-    if (pass.lobe && point.borrows_light(pass.component)) point.follows.at(static_cast<std::size_t>(*pass.lobe)) = 0.0F;
-  }
-}
-
-SharedLight::Lenders SharedLight::lenders_about(const Seen& borrower) const {
-  // Lenders stand on a lattice two pixels wide: a borrower lies on one of its lines, or half way between two.
-  const int x = static_cast<int>(borrower.pixel % kTileSide) - lender_x_;
-  const int y = static_cast<int>(borrower.pixel / kTileSide) - lender_y_;
-  const int left = x >= 0 ? x / kBlockSide : -1;
-  const int above = y >= 0 ? y / kBlockSide : -1;
-  Lenders found;
-  for (int row = above; row <= above + y - above * kBlockSide; ++row) {
-    for (int column = left; column <= left + x - left * kBlockSide; ++column) {
-      if (row < 0 || column < 0 || row >= kBlocksPerRow || column >= kBlocksPerRow) continue;
-      const std::uint16_t lender =
-          lender_of_[static_cast<std::size_t>(row) * kBlocksPerRow + static_cast<std::size_t>(column)];
-      if (lender != kNobody && alike(lenders_[lender], borrower)) found.at.at(found.count++) = &lenders_[lender];
+  for (PathVertex& point : points) {
+    const glm::ivec2 block = block_of(point.pixel);
+    const bool has_tap = taps_->kinds.at(TapPlanes::index(block.x, block.y)) != NeighborFeatures<double>::kNoTap;
+    if (!has_tap || is_tap(point) || !shows_one(point)) continue;
+    const Feature feature = feature_of(point);
+    FilterCenter<double> center = center_of(feature);
+    center.window.first = block;
+    joint_bilateral_weights(*taps_, center, weights_);
+    if (weights_.sum == 0.0) continue;
+    upsampled_.push_back(feature);
+    point.upsampled = shared_;
+    for (const PassInfo* const pass : passes_) {
+      if (pass->lobe) point.lobe_weights.at(static_cast<std::size_t>(*pass->lobe)) = 0.0F;
     }
   }
-  return found;
 }
 
-void SharedLight::spread(TileWork& tile) const {
-  for (const Seen& borrower : borrowers_) {
-    const Lenders about = lenders_about(borrower);
+/// Taps stand on a lattice two pixels wide: a pixel lies on one of its lines, or half way between two.
+FilterWindow HalfResShading::taps_about(std::uint32_t pixel) const {
+  const glm::ivec2 place(static_cast<int>(pixel % kTileSide) - tap_x_, static_cast<int>(pixel / kTileSide) - tap_y_);
+  const glm::ivec2 first(place.x >= 0 ? place.x / kBlockSide : -1, place.y >= 0 ? place.y / kBlockSide : -1);
+  return {first, 1 + place.x - first.x * kBlockSide, 1 + place.y - first.y * kBlockSide};
+}
+
+void HalfResShading::upsample(PixelSums& sums) {
+  for (const Feature& feature : upsampled_) {
+    FilterCenter<double> center = center_of(feature);
+    center.window = taps_about(feature.pixel);
+    joint_bilateral_weights(*taps_, center, weights_);
     for (std::size_t part = 0; part < kComponents; ++part) {
-      if (!contains(shared_, static_cast<Component>(part))) continue;
-      glm::dvec3 sum(0.0);
-      for (const Seen* const lender : std::span(about.at).first(about.count)) {
-        sum += made_up_for(borrower.weights[part], lender->weights[part]) * tile.components[part][lender->pixel];
-      }
-      tile.add(borrower.pixel, static_cast<Component>(part), sum / static_cast<double>(about.count));
+      const auto component = static_cast<Component>(part);
+      if (!contains(shared_, component)) continue;
+      const auto pass = std::ranges::find_if(
+          passes_, [&](const PassInfo* each) { return contains(each->half_resolution.components, component); });
+      const auto term = static_cast<std::size_t>(pass - passes_.begin());
+      const auto light = [&](std::size_t i) {
+        const auto x = static_cast<int>(i % TapPlanes::kStride) - TapPlanes::kMargin;
+        const auto y = static_cast<int>(i / TapPlanes::kStride) - TapPlanes::kMargin;
+        const int tap = (kBlockSide * y + tap_y_) * kTileSide + kBlockSide * x + tap_x_;
+        // A surface that scatters nothing of such light has none to be scaled.
+        const glm::dvec3 scatters = glm::sign(taps_->scattering[term].at(i));
+        return scatters * sums.components.at(part)[static_cast<std::size_t>(tap)];
+      };
+      sums.add(feature.pixel, component, filtered_mean(weights_, term, light));
     }
   }
 }

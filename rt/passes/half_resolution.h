@@ -1,63 +1,61 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <span>
+#include <memory>
 #include <vector>
 
-#include "rt/passes/first_points.h"
+#include "rt/denoise/joint_bilateral_filter.h"
 #include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
 
 namespace hpr {
 
-/// Light of the first surface that is worked out for one pixel of each 2 x 2 block of a tile, the lender, and spread to
-/// those of its block that see the like: the same material, turned and placed alike, about as bright. All others work
-/// out their own. Blocks begin at even pixels of the screen, which tiles and raster blocks do too, and no light leaves
-/// its tile: so nothing depends on how tiles are spread. From sample to sample another pixel of the block lends.
-class SharedLight {
+/// Light of the first surface that is computed for one pixel of each 2 x 2 block of a tile, the tap, and upsampled by a
+/// joint bilateral filter to those pixels of its block that show a similar surface (Kopf, Cohen, Lischinski,
+/// Uyttendaele, "Joint Bilateral Upsampling", 2007). All others compute their own. Blocks begin at even pixels of the
+/// screen, which tiles and raster blocks do too, and no light leaves its tile: so nothing depends on how tiles are
+/// distributed. From sample to sample another pixel of the block is the tap.
+class HalfResShading {
  public:
   /// Starts a tile. `shared`: see shared_components.
-  void start(ComponentSet shared, const TileWork& tile, const TileJob& job);
+  void start(ComponentSet shared, const LightContext& context, const TileJob& job);
 
-  /// Decides who borrows among the first generation of points of some rows, whole blocks of them: those have
-  /// PathPoint::borrows set and follow no ray of a shared pass.
-  void choose(std::vector<PathPoint>& points, int first_row);
+  /// Decides which pixels are upsampled among the first generation of points of some rows, whole blocks of them: those
+  /// have PathVertex::upsampled set and follow no ray of a shared pass.
+  void choose(std::vector<PathVertex>& points, int first_row);
 
-  /// When all light of the tile is worked out: adds to each borrower the mean of the lenders about it that see the
-  /// like as near, each made up for how much of such light the two surfaces scatter.
-  void spread(TileWork& tile) const;
+  /// Once all light of the tile is computed: adds to each upsampled pixel the mean of the taps about it.
+  void upsample(PixelSums& sums);
 
  private:
-  /// What tells whether two pixels see the like.
-  struct Seen {
+  /// What a pixel shows.
+  struct Feature {
     glm::dvec3 position{0.0};
     glm::dvec3 normal{0.0};  ///< the one shaded with
     std::uint32_t material = 0;
     std::uint32_t pixel = 0;
-    std::array<glm::vec3, kComponents> weights{};  ///< about the share of such light that reaches the eye
-  };
-  static constexpr std::uint16_t kNobody = 0xFFFF;
-
-  /// Lenders next to a borrower that see the like.
-  struct Lenders {
-    std::array<const Seen*, 4> at{};
-    std::size_t count = 0;
+    std::array<glm::vec3, kPasses> scattering{};  ///< of the shared passes: about the fraction that reaches the eye
   };
 
-  [[nodiscard]] Seen look_at(const PathPoint& point) const;
-  [[nodiscard]] bool alike(const Seen& lender, const Seen& borrower) const;
-  void borrow(const Seen& lender, PathPoint& point);
-  [[nodiscard]] Lenders lenders_about(const Seen& borrower) const;
+  [[nodiscard]] Feature feature_of(const PathVertex& point) const;
+  void set_tap(const Feature& feature);
+  /// The center of a pixel; its window is to be set.
+  [[nodiscard]] FilterCenter<double> center_of(const Feature& feature) const;
+  [[nodiscard]] bool is_tap(const PathVertex& point) const;
+  [[nodiscard]] FilterWindow taps_about(std::uint32_t pixel) const;
 
   ComponentSet shared_ = 0;
+  std::vector<const PassInfo*> passes_;  ///< those that share components: the terms of the filter
   double glossy_cutoff_ = 0.0;
-  int lender_x_ = 0;  ///< in its block
-  int lender_y_ = 0;
+  int tap_x_ = 0;  ///< in its block
+  int tap_y_ = 0;
   glm::dvec3 eye_{0.0};
-  std::vector<std::uint16_t> lender_of_;  ///< per block: index into lenders_, or kNobody
-  std::vector<Seen> lenders_;
-  std::vector<Seen> borrowers_;
+  std::unique_ptr<NeighborFeatures<double>> taps_;  ///< one for each block, by block
+  std::vector<Feature> upsampled_;
+  TapWeights<double> weights_;
 };
 
 }  // namespace hpr

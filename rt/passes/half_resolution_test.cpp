@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "rt/hybrid_test_tools.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -40,8 +40,8 @@ TEST(HalfResolution, OneRayInFourFollowsWhatIsShared) {
   const Scene shiny = corner(test::mirror(0.9F));
   const RaySettings settings{.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}};
   const View view = look(shiny);
-  const test::Lit full = test::light(shiny, view, settings);
-  const test::Lit half = test::light(shiny, view, halved(settings, kAll));
+  const test::Shaded full = test::shade(shiny, view, settings);
+  const test::Shaded half = test::shade(shiny, view, halved(settings, kAll));
   const auto share = [](std::uint64_t few, std::uint64_t all) {
     return static_cast<double>(few) / static_cast<double>(all);
   };
@@ -63,9 +63,9 @@ TEST(HalfResolution, RefractionIsShared) {
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
-  const std::uint64_t full = test::light(scene, view).counts[PassId::Refraction];
+  const std::uint64_t full = test::shade(scene, view).counts[PassId::Refraction];
   EXPECT_EQ(full, 64U * 64U);
-  EXPECT_EQ(test::light(scene, view, halved({}, {PassId::Refraction})).counts[PassId::Refraction], full / 4);
+  EXPECT_EQ(test::shade(scene, view, halved({}, {PassId::Refraction})).counts[PassId::Refraction], full / 4);
 }
 
 TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
@@ -80,8 +80,8 @@ TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
   finish_scene(scene);
   const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
   const RaySettings settings{.passes = {PassId::AmbientOcclusion}};
-  const test::Lit full = test::light(scene, view, settings);
-  const test::Lit half = test::light(scene, view, halved(settings, {PassId::AmbientOcclusion}));
+  const test::Shaded full = test::shade(scene, view, settings);
+  const test::Shaded half = test::shade(scene, view, halved(settings, {PassId::AmbientOcclusion}));
   EXPECT_LT(half.counts[PassId::AmbientOcclusion], full.counts[PassId::AmbientOcclusion] * 3 / 10);
   for (std::size_t i = 0; i < full.image.pixels().size(); ++i) {
     ASSERT_NEAR(half.image.pixels()[i].r, full.image.pixels()[i].r, 1e-5) << i;
@@ -100,7 +100,7 @@ TEST(HalfResolution, AnotherMaterialIsNotTheLike) {
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
   const RaySettings settings{.passes = {PassId::AmbientOcclusion}, .occlusion_rays = 1};
-  const test::Lit half = test::light(scene, view, halved(settings, {PassId::AmbientOcclusion}));
+  const test::Shaded half = test::shade(scene, view, halved(settings, {PassId::AmbientOcclusion}));
   EXPECT_EQ(half.counts[PassId::AmbientOcclusion], 32U * 32U + 64U);
 }
 
@@ -109,8 +109,8 @@ TEST(HalfResolution, NoLightCrossesAnEdge) {
   const Scene scene = corner(test::matte(glm::vec3(0.0F)), glm::vec3(1.0F), glm::vec3(0.0F));
   const View view = look(scene);
   const RaySettings settings{.passes = {PassId::AmbientOcclusion}};
-  const Image<Rgb> full = test::light(scene, view, settings).image;
-  const Image<Rgb> half = test::light(scene, view, halved(settings, {PassId::AmbientOcclusion, PassId::Shadow})).image;
+  const Image<Rgb> full = test::shade(scene, view, settings).image;
+  const Image<Rgb> half = test::shade(scene, view, halved(settings, {PassId::AmbientOcclusion, PassId::Shadow})).image;
   for (std::size_t i = 0; i < full.pixels().size(); ++i) {
     const bool black = full.pixels()[i].g == 0.0F;
     ASSERT_EQ(half.pixels()[i].g == 0.0F, black) << i;
@@ -124,13 +124,13 @@ TEST(HalfResolution, HasTheSameBitsHoweverTilesAreSpread) {
   RaySettings settings = halved({.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}}, kAll);
   for (const std::uint32_t sample : {0U, 3U}) {
     TileLayer<Rgb> whole(keys.layout());
-    Lighter one(scene, settings);
-    one.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &whole}, {.sample = sample});
+    DeferredShader one(scene, settings);
+    one.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &whole}, {.sample = sample});
     settings.threads = 3;
     TileLayer<Rgb> parts(keys.layout());
-    Lighter other(scene, settings);
+    DeferredShader other(scene, settings);
     for (std::size_t tile = keys.tiles(); tile-- > 0;) {
-      other.light(std::span(&view, 1), keys, std::span(&tile, 1), {.radiance = &parts}, {.sample = sample});
+      other.shade(std::span(&view, 1), keys, std::span(&tile, 1), {.radiance = &parts}, {.sample = sample});
     }
     EXPECT_EQ(to_image(parts, 0), to_image(whole, 0));
   }
@@ -140,7 +140,8 @@ TEST(HalfResolution, ComponentsStillSumToTheColor) {
   const Scene scene = corner(test::mirror(0.9F));
   const View view = look(scene);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-  Lighter lighter(scene, halved({.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}}, kAll));
+  DeferredShader shader(scene,
+                        halved({.passes = {PassId::Shadow, PassId::Reflection, PassId::AmbientOcclusion}}, kAll));
   TileLayer<Rgb> color(keys.layout());
   std::vector<TileLayer<Rgb>> parts(kComponents);
   LightOutput output{.radiance = &color};
@@ -148,7 +149,7 @@ TEST(HalfResolution, ComponentsStillSumToTheColor) {
     parts[i] = TileLayer<Rgb>(keys.layout());
     output.components.at(i) = &parts[i];
   }
-  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), output);
+  shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), output);
   for (int y = 0; y < kOdd.height; ++y) {
     for (int x = 0; x < kOdd.width; ++x) {
       float sum = 0.0F;

@@ -9,61 +9,65 @@
 #include <span>
 #include <vector>
 
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/passes/pass_list.h"
-#include "rt/photons/photon_search.h"
+#include "rt/passes/pixel_sums.h"
+#include "rt/photons/photon_map.h"
 #include "rt/ray_counts.h"
 #include "rt/ray_settings.h"
 #include "rt/sampling/sampler.h"
-#include "rt/trace/ray_walk.h"
+#include "rt/trace/coverage_traversal.h"
 #include "rt/trace/surfaces.h"
 
 namespace hpr {
 
-/// A surface some pixel sees, directly or after reflections and refractions.
-struct PathPoint {
+/// A vertex of a path from the eye: a surface that a pixel shows, directly or after reflections and refractions (Veach
+/// 1997).
+struct PathVertex {
   SurfacePoint surface;
   MaterialPoint material;
   Bsdf bsdf;
-  glm::dvec3 throughput{1.0};   ///< what of its radiance reaches the pixel
-  Media media;                  ///< on the viewer's side
-  glm::dvec3 seen_from{0.0};    ///< the place before, where lights were sampled
-  glm::dvec3 seen_normal{0.0};  ///< and its normal
-  double seen_pdf = 0.0;        ///< density with which the way here was chosen; 0: it was the only one
+  glm::dvec3 throughput{1.0};         ///< the fraction of its radiance that reaches the pixel
+  Media media;                        ///< on the viewer's side
+  glm::dvec3 previous_position{0.0};  ///< the vertex before, where lights were sampled
+  glm::dvec3 previous_normal{0.0};    ///< the light normal of that vertex
+  /// Density with which the direction here was chosen, per solid angle; 0: it was the only one.
+  double previous_pdf = 0.0;
   /// Per lobe: 0 when no ray follows it, else the inverse of the probability that one does.
-  std::array<float, kLobes.size()> follows{};
-  std::array<bool, kLobes.size()> may_follow{};  ///< whether one might have
+  std::array<float, kLobes.size()> lobe_weights{};
+  std::array<bool, kLobes.size()> may_follow{};  ///< per lobe: whether one might have followed it
   Sampler sampler;
-  double share = 1.0;                       ///< of the pixel that the first surface of the path covers
-  std::uint32_t pixel = 0;                  ///< of TileWork's
+  double coverage = 1.0;                    ///< of the pixel that the first surface of the path covers
+  std::uint32_t pixel = 0;                  ///< index into PixelSums
   std::uint16_t depth = 0;                  ///< bounces from the eye
-  std::uint16_t followed = 0;               ///< of those, by lobes that passes follow one by one
+  std::uint16_t followed = 0;               ///< bounces by lobes that passes follow one by one
   Component component = Component::Direct;  ///< where its light counts
-  ComponentSet borrows = 0;                 ///< that come from neighbours, see SharedLight
-  bool gathered = false;  ///< reached by rays that gather: what is to be looked at only lights nothing
+  ComponentSet upsampled = 0;               ///< components that HalfResShading brings from neighbor taps
+  /// Reached by rays that gather: unlit surfaces and backgrounds are no light for the vertex.
+  bool gathered = false;
 
-  [[nodiscard]] bool borrows_light(Component which) const { return contains(borrows, which); }
+  [[nodiscard]] bool is_upsampled(Component which) const { return contains(upsampled, which); }
 };
 
-/// Light that would fall on a point if nothing stood between.
+/// Light that would fall on a vertex if nothing stood between.
 struct DirectSample {
-  std::uint32_t point = 0;  ///< index into Wave::points
-  float visible = 1.0F;     ///< share that passes what stands between
+  std::uint32_t point = 0;  ///< index into Wavefront::vertices
+  float visible = 1.0F;     ///< fraction that passes what stands between
   LightSample light;
   glm::dvec3 radiance{0.0};  ///< reflected towards the viewer and brought to the pixel
 };
 
-/// Points of one tile that are worked on together, and the light sampled for them, a few lights at a time.
-struct Wave {
-  std::vector<PathPoint> points;
-  std::vector<DirectSample> samples;  ///< light by light, inside a light in the order of points
+/// A wavefront: vertices of one tile that are shaded together, and the light sampled for them, a few lights at a time.
+struct Wavefront {
+  std::vector<PathVertex> vertices;
+  std::vector<DirectSample> samples;  ///< light by light, inside a light in the order of vertices
 };
 
-/// A ray on its way from a point to the next.
-struct Following {
-  const PathPoint* from = nullptr;
+/// A ray along a lobe of a vertex.
+struct LobeRay {
+  const PathVertex* from = nullptr;
   glm::dvec3 throughput{0.0};
   double pdf = 0.0;
   Sampler sampler;
@@ -71,65 +75,36 @@ struct Following {
 
 struct PhotonMaps;
 
-/// What passes need and write while one thread lights one tile.
-struct TileWork {
+/// What passes read while one thread shades one tile: the scene, its lights and rays, the settings, and the view.
+struct LightContext {
   const Scene& scene;
   const Surfaces& surfaces;
-  const RayWalk* rays;  ///< null when no pass needs rays
-  const LightSet& lights;
+  const CoverageTraversal* rays;  ///< null when no pass needs rays
+  const LightSampler& lights;
   const RaySettings& settings;
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
   bool gathers = false;                              ///< whether one runs that follows all the others
+  const PhotonMaps* photons = nullptr;               ///< null when none were traced
+  const View* view = nullptr;                        ///< the tile's view in any sample: the eye's position
+  Media eye_media = {};                              ///< the media that the eye of that view lies in
 
-  /// Whether a lobe is followed for itself, not by whoever follows the rest.
+  /// Whether a pass of its own follows the lobe, and not the one that gathers all others.
   [[nodiscard]] bool follows_for_itself(const Bsdf& bsdf, Lobe lobe) const;
-  const PhotonMaps* photons = nullptr;  ///< null when none were sent
-  const View* view = nullptr;           ///< of the tile at hand, of whatever sample: the eye's place
-  Media eye_media = {};                 ///< what the eye of that view lies in
-  bool wants_components = false;
-  bool wants_matte = false;
-  bool wants_cost = false;
-
-  /// Per pixel of the tile, sample after sample, summed in a fixed order.
-  std::vector<glm::dvec3> radiance = {};
-  std::array<std::vector<glm::dvec3>, kComponents> components = {};  ///< likewise, when wanted
-  /// Of both, what the first surface scatters by lobes that no pass follows for itself, but for what lights bring that
-  /// are sampled: likewise, when wanted.
-  std::vector<glm::dvec3> matte = {};
-  std::array<std::vector<glm::dvec3>, kComponents> matte_components = {};
-  std::vector<float> cost = {};  ///< rays per pixel, when wanted
-  RayCounts counts = {};
-  WalkScratch scratch = {};
-  std::vector<RayRequest> requests = {};
-  std::vector<Following> following = {};
-  std::vector<std::uint32_t> hits = {};
-  FoundPhotons found_photons = {};
-  RecentTriangles triangles = {};
-
-  /// Adds light that reaches a pixel.
-  void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
-    add(pixel, component, light, contains(kDiffuseComponents, component));
-  }
-  void add(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
-    radiance[pixel] += light;
-    if (is_matte && wants_matte) matte[pixel] += light;
-    if (wants_components) add_part(pixel, component, light, is_matte);
-  }
-  /// Adds matte light that something hides, to components that are wanted: as direct light and its shadow.
-  void add_hidden(std::uint32_t pixel, const glm::dvec3& light) {
-    add_part(pixel, Component::Direct, light, true);
-    add_part(pixel, Component::Shadow, -light, true);
-  }
-  void add_part(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_matte) {
-    components[static_cast<std::size_t>(component)][pixel] += light;
-    if (is_matte && wants_matte) matte_components[static_cast<std::size_t>(component)][pixel] += light;
-  }
-  void charge_ray(std::uint32_t pixel) {
-    if (wants_cost) cost[pixel] += 1.0F;
-  }
 };
 
-/// One kind of ray-traced light. Passes see a wave of points at a time and keep no state between calls, so a pass is
+/// Rays that one thread traces together: the requests and what they hit, how many were traced, and the memory that is
+/// kept from call to call.
+struct RayBuffers {
+  std::vector<RayRequest> requests;
+  std::vector<std::uint32_t> hits;  ///< per request: a surface, or kNoSurface
+  std::vector<LobeRay> lobe_rays;   ///< per request of follow_lobe
+  RayCounts counts;
+  TraversalScratch scratch;
+  FoundPhotons found_photons;
+  RecentTriangles triangles;
+};
+
+/// One kind of ray-traced light. Passes process a wavefront at a time and keep no state between calls, so a pass is
 /// shared by all threads.
 class Pass {
  public:
@@ -143,38 +118,14 @@ class Pass {
     return true;
   }
 
-  /// Once per wave: reads its points; may add to the tile's radiance and put the points its rays reach into `next`.
-  virtual void spread(TileWork& /*tile*/, const Wave& /*wave*/, std::vector<PathPoint>& /*next*/) const {}
+  /// Once per wavefront: reads its vertices; may add to the pixels' sums and append the vertices its rays reach to
+  /// `next`.
+  virtual void scatter(const LightContext& /*context*/, const Wavefront& /*wave*/, RayBuffers& /*buffers*/,
+                       PixelSums& /*sums*/, std::vector<PathVertex>& /*next*/) const {}
 
-  /// Once per handful of lights: may hide direct samples of `wave`.
-  virtual void hide(TileWork& /*tile*/, Wave& /*wave*/) const {}
+  /// Once per kLightsAtOnce lights: may set the visibility of direct samples of `wave`.
+  virtual void trace_shadows(const LightContext& /*context*/, RayBuffers& /*buffers*/, PixelSums& /*sums*/,
+                             Wavefront& /*wave*/) const {}
 };
-
-/// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
-/// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
-inline constexpr double kLeastThroughput = 1.0 / 65536.0;
-
-[[nodiscard]] inline double brightness(const glm::dvec3& color) {
-  return std::max({color.r, color.g, color.b});
-}
-
-/// What a path whose throughput is so bright is to be multiplied by: 1, or what roulette makes of it, 0 where it ends.
-[[nodiscard]] inline double survival(double brightness, Sampler& sampler) {
-  if (!(brightness < kLeastThroughput)) return 1.0;
-  const double chance = brightness / kLeastThroughput;
-  return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
-}
-
-/// The component that light from a followed lobe of `point` counts in.
-[[nodiscard]] Component component_after(const PathPoint& point, Component first);
-
-/// Completes a point whose surface, throughput, sampler, depth and media are set: reads its material, takes off what
-/// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
-void finish_point(const TileWork& tile, PathPoint& point, double metres = 0.0);
-
-/// What passes that follow lobes do: a ray per point of the wave that follows `lobe`, and the points those rays reach.
-/// A pass that gathers all lobes sends rays where no other pass follows the lobe for itself: the sky that such rays
-/// find from the first surface counts as direct light, and what hides it as shadow.
-void follow_lobe(TileWork& tile, const Wave& wave, const PassInfo& pass, Lobe lobe, std::vector<PathPoint>& next);
 
 }  // namespace hpr

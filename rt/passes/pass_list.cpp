@@ -9,12 +9,12 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "rt/passes/pass.h"
-#include "rt/photons/photon_gather.h"
+#include "rt/photons/photon_query.h"
 
 namespace hpr {
 namespace {
 
-glm::dvec3 diffuse_and_specular(const PathPoint& point) {
+glm::dvec3 diffuse_and_specular(const PathVertex& point) {
   return point.bsdf.weight(Lobe::Diffuse) + point.bsdf.weight(Lobe::Reflection);
 }
 
@@ -26,7 +26,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .pattern = RayPattern::Shadow,
         .lift = OriginLift::WithTerminatorFix,
         .half_resolution = {set_of(Component::Direct, Component::Shadow),
-                            [](const PathPoint& point, double /*glossy_cutoff*/) {
+                            [](const PathVertex& point, double /*glossy_cutoff*/) {
                               return diffuse_and_specular(point);
                             }},
         .required_by = &Requirements::shadow,
@@ -39,7 +39,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .pattern = RayPattern::Mirror,
         .lobe = Lobe::Reflection,
         .half_resolution = {set_of(Component::Reflection),
-                            [](const PathPoint& point, double /*glossy_cutoff*/) {
+                            [](const PathVertex& point, double /*glossy_cutoff*/) {
                               return point.bsdf.weight(Lobe::Reflection);
                             }},
         .required_by = &Requirements::reflection,
@@ -52,7 +52,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .pattern = RayPattern::Mirror,
         .lobe = Lobe::Transmission,
         .half_resolution = {set_of(Component::Refraction),
-                            [](const PathPoint& point, double /*glossy_cutoff*/) {
+                            [](const PathVertex& point, double /*glossy_cutoff*/) {
                               return point.bsdf.weight(Lobe::Transmission);
                             }},
         .required_by = &Requirements::refraction,
@@ -65,7 +65,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .pattern = RayPattern::Diffuse,
         .lift = OriginLift::Always,
         .half_resolution = {set_of(Component::AmbientOcclusion),
-                            [](const PathPoint& point, double /*glossy_cutoff*/) {
+                            [](const PathVertex& point, double /*glossy_cutoff*/) {
                               return point.bsdf.weight(Lobe::Diffuse) * point.material.occlusion;
                             }},
         .make = make_ambient_occlusion_pass,
@@ -77,7 +77,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .pattern = RayPattern::Diffuse,
         .needs_photons = true,
         .half_resolution = {set_of(Component::Photon),
-                            [](const PathPoint& point, double glossy_cutoff) {
+                            [](const PathVertex& point, double glossy_cutoff) {
                               return is_followed(point.bsdf, Lobe::Reflection, glossy_cutoff)
                                          ? point.bsdf.weight(Lobe::Diffuse)
                                          : diffuse_and_specular(point);

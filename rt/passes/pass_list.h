@@ -13,13 +13,14 @@
 #include "rt/passes/pass_id.h"
 #include "scene/requirements.h"
 
-/// Which ray passes there are. To add one: its file beside this one, its PassId in pass_id.h (a Component too,
-/// where its light has a layer of its own), its row in pass_list.cpp and its line in rt/CMakeLists.txt.
+/// The ray passes there are. To add one: its file beside this one (those that follow lobes share lobe_passes.cpp), its
+/// PassId and maker in pass_id.h (a Component too, where its light has a layer of its own), its row in pass_list.cpp
+/// and its line in rt/CMakeLists.txt.
 namespace hpr {
 
 class Pass;
 enum class Lobe : std::uint8_t;
-struct PathPoint;
+struct PathVertex;
 struct RaySettings;
 
 /// A set of components: bit i stands for component i.
@@ -48,7 +49,7 @@ enum class OriginLift : std::uint8_t { Never, WithTerminatorFix, Always };
 struct HalfResolution {
   ComponentSet components = 0;  ///< of the first surface; empty: its light belongs to single pixels
   /// How much of such light a point scatters towards the eye.
-  glm::dvec3 (*scattered)(const PathPoint& point, double glossy_cutoff) = nullptr;
+  glm::dvec3 (*scattered)(const PathVertex& point, double glossy_cutoff) = nullptr;
 };
 
 /// What there is to know about a pass without running it.
@@ -98,17 +99,9 @@ struct PassInfo {
 /// Whether a pass that runs sends rays from lifted origins.
 [[nodiscard]] bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings);
 
-/// Whether indirect light comes along rays (PassId::Gather) in place of photons: where that is asked for, and where
-/// settings prefer it and do not forbid photons, all indirect light is asked for and an even sky is all the light there
+/// Whether indirect light comes along rays (PassId::Gather) in place of photons: where the settings name the pass, and
+/// where they prefer rays, allow photons and want all indirect light, and a constant environment is all the light there
 /// is.
 [[nodiscard]] bool gathers_by_rays(const Requirements& scene, const RaySettings& settings);
-
-// Each in the pass's own file.
-[[nodiscard]] std::unique_ptr<Pass> make_shadow_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_reflection_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_refraction_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_ambient_occlusion_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_photon_pass();
-[[nodiscard]] std::unique_ptr<Pass> make_gather_pass();
 
 }  // namespace hpr

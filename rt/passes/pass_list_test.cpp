@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 
 namespace hpr {

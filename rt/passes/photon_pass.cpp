@@ -1,6 +1,6 @@
-#include "rt/passes/pass.h"
-#include "rt/photons/photon_gather.h"
-#include "rt/photons/photon_maps.h"
+#include "rt/passes/path_vertex.h"
+#include "rt/photons/photon_query.h"
+#include "rt/photons/photon_tracer.h"
 
 namespace hpr {
 namespace {
@@ -11,31 +11,32 @@ class PhotonPass final : public Pass {
  public:
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     if (gathers_by_rays(scene, settings)) return {false, "rays gather what surfaces scatter on to others"};
-    const bool bundled =
+    const bool focused =
         scene.shadow.needed && (scene.refraction.needed || follows_reflections(scene, settings.glossy_cutoff));
-    if (settings.global_photons && !bundled) return scene.indirect;
-    if (bundled && !may_take_photons(scene, settings.glossy_cutoff)) {
+    if (settings.global_photons && !focused) return scene.indirect;
+    if (focused && !may_take_photons(scene, settings.glossy_cutoff)) {
       return {false, "no material is matte, or as rough as the glossy cutoff, to show caustics"};
     }
-    if (bundled == scene.photon.needed) return scene.photon;
-    return {bundled, bundled ? "lights reach materials smoother than the glossy cutoff, which bundle it into caustics"
+    if (focused == scene.photon.needed) return scene.photon;
+    return {focused, focused ? "lights reach materials smoother than the glossy cutoff, which bundle it into caustics"
                              : "no light is bundled by materials smoother than the glossy cutoff"};
   }
   [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
     return settings.photons > 0 && !gathers_by_rays(scene, settings);
   }
 
-  void spread(TileWork& tile, const Wave& wave, std::vector<PathPoint>& /*next*/) const override {
-    if (tile.photons == nullptr) return;
-    for (const PathPoint& point : wave.points) {
-      if (point.borrows_light(Component::Photon)) continue;
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& /*next*/) const override {
+    if (context.photons == nullptr) return;
+    for (const PathVertex& point : wave.vertices) {
+      if (point.is_upsampled(Component::Photon)) continue;
       glm::dvec3 light(0.0);
-      for (const PhotonMap* map : {&tile.photons->caustic, &tile.photons->global}) {
-        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, tile.settings.glossy_cutoff,
-                                tile.found_photons);
+      for (const PhotonMap* map : {&context.photons->caustic, &context.photons->global}) {
+        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, context.settings.glossy_cutoff,
+                                buffers.found_photons);
       }
       if (light != glm::dvec3(0.0)) {
-        tile.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
+        sums.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
       }
     }
   }

@@ -6,8 +6,8 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
-#include "rt/lighter.h"
-#include "rt/photons/photon_maps.h"
+#include "rt/deferred_shader.h"
+#include "rt/photons/photon_tracer.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -57,16 +57,16 @@ TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
   const RaySettings settings{.photons = 5'000, .global_photons = true};
   const SampleNumber number{.frame = 2, .sample = 3};
   TileLayer<Rgb> alone(keys.layout());
-  Lighter one(scene, settings);
-  one.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &alone}, number);
+  DeferredShader one(scene, settings);
+  one.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &alone}, number);
   EXPECT_GT(one.counts()[PassId::Photon], 5'000U);
   for (const int ranks : {2, 3, 7}) {
     run_local_ranks(ranks, [&](Communicator& comm) {
-      Lighter lighter(scene, settings);
+      DeferredShader shader(scene, settings);
       TileLayer<Rgb> lit(keys.layout());
-      lighter.send_photons(comm, number);
-      lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit}, number);
-      EXPECT_LT(lighter.counts()[PassId::Photon], one.counts()[PassId::Photon]);
+      shader.trace_photons(comm, number);
+      shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit}, number);
+      EXPECT_LT(shader.counts()[PassId::Photon], one.counts()[PassId::Photon]);
       EXPECT_TRUE(std::ranges::equal(lit.tile(0), alone.tile(0)));
     });
   }
@@ -78,7 +78,7 @@ TEST(PhotonPass, RanksOfAHostShareItsMemory) {
   RaySettings settings{.photons = 5'000, .global_photons = true};
   const auto lights = [&] {
     try {
-      (void)test::light(scene, view, settings);
+      (void)test::shade(scene, view, settings);
       return ExitCode::Done;
     } catch (const Error& error) {
       return error.code();
@@ -94,18 +94,18 @@ TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
   const RaySpace space(scene.bounds);
   const Surfaces surfaces(scene, space);
   const RayScene rays(scene, space, 1);
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   RaySettings settings{.photons = 40'000, .global_photons = true};
-  PhotonSender whole(scene, surfaces, space, rays, lights, settings);
-  const auto kept = static_cast<double>(whole.send({}, nullptr).global.size());
+  PhotonMapBuilder whole(scene, surfaces, space, rays, lights, settings);
+  const auto kept = static_cast<double>(whole.build({}, nullptr).global.size());
   // As much memory as holds three quarters of them: all ranks get all.
   const double memory = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
   settings.host_ranks = static_cast<int>(memory / (128.0 * 0.75 * kept));
   for (const int ranks : {1, 2}) {
     EXPECT_THROW(run_local_ranks(ranks,
                                  [&](Communicator& comm) {
-                                   PhotonSender sender(scene, surfaces, space, rays, lights, settings);
-                                   (void)sender.send({}, &comm);
+                                   PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings);
+                                   (void)builder.build({}, &comm);
                                  }),
                  Error)
         << ranks;
@@ -120,8 +120,8 @@ TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
     const View view = test::view_from({0, 0, 0.5 * scale}, {0.1 * scale, 0.2 * scale, -scale}, {8, 8}, scene, 0.5);
     const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
     TileLayer<Rgb> lit(keys.layout());
-    Lighter lighter(scene, settings);
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit});
+    DeferredShader shader(scene, settings);
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit});
     std::vector<float> green;
     for (const Rgb& color : lit.tile(0)) green.push_back(std::ldexp(color.g, -strength));
     return green;
@@ -136,10 +136,10 @@ TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
 TEST(PhotonPass, SendsNothingWhereNobodyAsksAndNoCausticsWhereNothingBundlesLight) {
   const Scene scene = furnace(0.5F, 1.0F);
   const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {4, 4}, scene, 0.5);
-  EXPECT_EQ(test::light(scene, view).counts[PassId::Photon], 0U);
-  EXPECT_EQ(test::light(scene, view, {.photons = 1'000}).counts[PassId::Photon], 0U);
-  EXPECT_GT(test::light(scene, view, {.photons = 1'000, .global_photons = true}).counts[PassId::Photon], 1'000U);
-  EXPECT_EQ(test::light(scene, view, {.passes = {PassId::Photon}}).counts[PassId::Photon], 0U)
+  EXPECT_EQ(test::shade(scene, view).counts[PassId::Photon], 0U);
+  EXPECT_EQ(test::shade(scene, view, {.photons = 1'000}).counts[PassId::Photon], 0U);
+  EXPECT_GT(test::shade(scene, view, {.photons = 1'000, .global_photons = true}).counts[PassId::Photon], 1'000U);
+  EXPECT_EQ(test::shade(scene, view, {.passes = {PassId::Photon}}).counts[PassId::Photon], 0U)
       << "no caustics in a matte box";
 }
 

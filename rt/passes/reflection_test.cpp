@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/materials/bsdf.h"
 #include "rt/test_scene.h"
 
@@ -24,17 +24,17 @@ TEST(Reflection, AMirrorShowsTheColourOfWhatItReflectsTimesItsReflectance) {
   place(scene, add_mesh(scene, quad({-50, 10, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
   finish_scene(scene);
   const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {5, 5}, scene, 1e-4, {0, 0, -1});
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   // The headlight is hidden in the mirror lobe: only the image of the glowing quad is seen.
   EXPECT_NEAR(lit.image.at(2, 2).r, 0.75F, 1e-6F);
   EXPECT_NEAR(lit.image.at(2, 2).g, 0.125F, 1e-6F);
   EXPECT_NEAR(lit.image.at(2, 2).b, 0.03125F, 1e-6F);
-  const test::Lit off = test::light(scene, view, {.passes = {PassId::Shadow}});
+  const test::Shaded off = test::shade(scene, view, {.passes = {PassId::Shadow}});
   EXPECT_EQ(off.image.at(2, 2), Rgb{});
 }
 
 /// A mirror whose normals pretend that it leans towards a glowing wall on its right, seen from above on the left.
-test::Lit leaning_mirror(const glm::dvec3& to_viewer) {
+test::Shaded leaning_mirror(const glm::dvec3& to_viewer) {
   Scene scene;
   add_material(scene, test::mirror(0.5F));
   add_material(scene, test::glowing(glm::vec3(2.0F)));
@@ -43,7 +43,7 @@ test::Lit leaning_mirror(const glm::dvec3& to_viewer) {
   place(scene, add_mesh(scene, mirror));
   place(scene, add_mesh(scene, quad({10, -50, -50}, {0, 100, 0}, {0, 0, 100}, 1)));
   finish_scene(scene);
-  return test::light(scene, test::view_from(3.0 * to_viewer, {0, 0, 0}, {3, 3}, scene, 1e-4));
+  return test::shade(scene, test::view_from(3.0 * to_viewer, {0, 0, 0}, {3, 3}, scene, 1e-4));
 }
 
 double reflected_by_half(double cosine) {
@@ -52,7 +52,7 @@ double reflected_by_half(double cosine) {
 
 TEST(Reflection, AMirrorImageThatASmoothNormalSendsInsideIsBentBackAbove) {
   const glm::dvec3 to_viewer = glm::normalize(glm::dvec3(-0.5, 0.866, 0.0));
-  const test::Lit lit = leaning_mirror(to_viewer);
+  const test::Shaded lit = leaning_mirror(to_viewer);
   EXPECT_EQ(lit.counts[PassId::Reflection], 9U) << "one ray a pixel: none of them meets the mirror again";
   const double cosine = glm::dot(to_viewer, glm::dvec3(std::sin(0.7), std::cos(0.7), 0.0));
   EXPECT_NEAR(lit.image.at(1, 1).r, reflected_by_half(cosine), 1e-4);
@@ -60,7 +60,7 @@ TEST(Reflection, AMirrorImageThatASmoothNormalSendsInsideIsBentBackAbove) {
 
 TEST(Reflection, AMirrorWhoseSmoothNormalTurnsAwayReflectsByItsGeometricOne) {
   const glm::dvec3 to_viewer = glm::normalize(glm::dvec3(-0.94, 0.342, 0.0));
-  const test::Lit lit = leaning_mirror(to_viewer);
+  const test::Shaded lit = leaning_mirror(to_viewer);
   EXPECT_EQ(lit.counts[PassId::Reflection], 9U);
   EXPECT_NEAR(lit.image.at(1, 1).r, reflected_by_half(to_viewer.y), 1e-4);
 }
@@ -116,7 +116,7 @@ TEST(Reflection, AMirrorThatFacesNothingShowsTheBackground) {
   scene.background = {0.5F, 1.0F, 2.0F};
   finish_scene(scene);
   const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {65, 65}, scene, 1.2, {0, 0, -1});
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   EXPECT_NEAR(lit.image.at(32, 32).b, 1.0F, 1e-5F);
   EXPECT_EQ(lit.image.at(0, 0), (Rgb{0.5F, 1.0F, 2.0F}));
 }
@@ -132,7 +132,7 @@ TEST(Reflection, TwoFacingMirrorsSumTheirGeometricSeriesUpToTheDepth) {
   finish_scene(scene);
   const View view = test::view_from({0, 2, 0}, {0, 0, 0}, {3, 3}, scene, 1e-6, {0, 0, -1});
   for (const int depth : {0, 1, 2, 7, 40}) {
-    const test::Lit lit = test::light(scene, view, {.max_depth = depth});
+    const test::Shaded lit = test::shade(scene, view, {.max_depth = depth});
     const double expected = (1.0 - std::pow(kRho, depth + 1)) / (1.0 - kRho);
     EXPECT_NEAR(lit.image.at(1, 1).r, expected, 1e-4) << depth;
     EXPECT_GE(lit.counts[PassId::Reflection], 9U * static_cast<unsigned>(std::min(depth, 38))) << depth;
@@ -152,7 +152,7 @@ TEST(Reflection, ADimMirrorShowsWhatIsBrightEnough) {
   double sum = 0.0;
   constexpr std::uint32_t kSamples = 16;
   for (std::uint32_t sample = 0; sample < kSamples; ++sample) {
-    const test::Lit lit = test::light(scene, view, {.seed = sample + 1});
+    const test::Shaded lit = test::shade(scene, view, {.seed = sample + 1});
     for (int y = 0; y < 64; ++y) {
       for (int x = 0; x < 64; ++x) sum += lit.image.at(x, y).r;
     }
@@ -175,7 +175,7 @@ TEST(Reflection, WhatAMirrorShowsIsLitAndShadowed) {
   sun.direction = {0.0F, -1.0F, 0.0F};
   scene.lights = {sun};
   const View view = test::view_from({0, 0.5, 3}, {0, 0.2, -4}, {64, 64}, scene, 0.3);
-  const test::Lit lit = test::light(scene, view);
+  const test::Shaded lit = test::shade(scene, view);
   // Seen at a slant, a little of the light goes to the specular layer.
   EXPECT_NEAR(lit.image.at(20, 34).r, 1.0 / std::numbers::pi, 1e-3);
   EXPECT_EQ(lit.image.at(44, 34).r, 0.0F);

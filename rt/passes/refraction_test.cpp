@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -102,11 +102,11 @@ TEST(Refraction, CountsItsRaysAndItsShareOfTheColour) {
   LightOutput output{.radiance = &color, .cost = &cost};
   output.components[static_cast<std::size_t>(Component::Refraction)] = &refraction;
   output.components[static_cast<std::size_t>(Component::Reflection)] = &reflection;
-  Lighter lighter(scene, {});
-  lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), output);
-  EXPECT_GE(lighter.counts()[PassId::Refraction], 128U) << "into the slab and out of it, in every pixel";
+  DeferredShader shader(scene, {});
+  shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), output);
+  EXPECT_GE(shader.counts()[PassId::Refraction], 128U) << "into the slab and out of it, in every pixel";
   const auto rays =
-      lighter.counts()[PassId::Shadow] + lighter.counts()[PassId::Reflection] + lighter.counts()[PassId::Refraction];
+      shader.counts()[PassId::Shadow] + shader.counts()[PassId::Reflection] + shader.counts()[PassId::Refraction];
   double charged = 0.0;
   for (int y = 0; y < 8; ++y) {
     for (int x = 0; x < 8; ++x) {

@@ -18,28 +18,29 @@ class ShadowPass final : public Pass {
     return scene.shadow;
   }
 
-  void hide(TileWork& tile, Wave& wave) const override {
-    tile.requests.clear();
+  void trace_shadows(const LightContext& context, RayBuffers& buffers, PixelSums& sums,
+                     Wavefront& wave) const override {
+    buffers.requests.clear();
     for (std::uint32_t i = 0; i < wave.samples.size(); ++i) {
       const DirectSample& sample = wave.samples[i];
       if (!sample.light.casts_shadows) continue;
-      const PathPoint& point = wave.points[sample.point];
-      tile.requests.push_back(towards(tile, point, sample.light));
-      tile.requests.back().owner = i;
-      tile.charge_ray(point.pixel);
+      const PathVertex& point = wave.vertices[sample.point];
+      buffers.requests.push_back(towards(context, point, sample.light));
+      buffers.requests.back().owner = i;
+      sums.count_ray(point.pixel);
     }
-    std::vector<float> passed(tile.requests.size());
-    tile.counts[PassId::Shadow] += tile.requests.size();
-    tile.counts.invalid += tile.rays->passed(tile.requests, passed, tile.scratch);
-    for (std::size_t i = 0; i < passed.size(); ++i) wave.samples[tile.requests[i].owner].visible = passed[i];
+    std::vector<float> passed(buffers.requests.size());
+    buffers.counts[PassId::Shadow] += buffers.requests.size();
+    buffers.counts.invalid += context.rays->passed(buffers.requests, passed, buffers.scratch);
+    for (std::size_t i = 0; i < passed.size(); ++i) wave.samples[buffers.requests[i].owner].visible = passed[i];
   }
 
  private:
-  static RayRequest towards(const TileWork& tile, const PathPoint& point, const LightSample& light) {
+  static RayRequest towards(const LightContext& context, const PathVertex& point, const LightSample& light) {
     RayRequest ray;
     ray.origin = ray_origin(point.surface, light.to_light);
     const bool viewers_side = glm::dot(light.to_light, point.surface.geometric_normal) > 0.0;
-    if (tile.settings.terminator_fix && viewers_side) ray.origin += point.surface.lift;
+    if (context.settings.terminator_fix && viewers_side) ray.origin += point.surface.lift;
     ray.direction = light.to_light;
     ray.reach = light.distance;
     if (!std::isfinite(light.distance)) return ray;
@@ -48,7 +49,7 @@ class ShadowPass final : public Pass {
     const glm::dvec3 way = light.goal - ray.origin;
     const double distance = glm::length(way);
     const double step = kOriginSteps * kFloatStep;
-    ray.reach = std::max(distance * (1.0 - step) - step * tile.rays->size_of(light.goal), 0.0);
+    ray.reach = std::max(distance * (1.0 - step) - step * context.rays->size_of(light.goal), 0.0);
     if (distance > 0.0) ray.direction = way / distance;
     return ray;
   }

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "rt/photons/photon_gather.h"
-#include "rt/photons/photon_test_tools.h"
+#include "rt/photons/photon_query.h"
+#include "rt/photons/test_photons.h"
 
 namespace hpr {
 namespace {

@@ -1,4 +1,4 @@
-// What LightSet::emit sends out: the mean flux is the power, and it comes from where the light is.
+// What LightSampler::emit sends out: the mean flux is the power, and it comes from where the light is.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <set>
 
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/sampling/sampler.h"
 #include "rt/test_scene.h"
 
@@ -29,7 +29,7 @@ Scene room(const glm::vec3& emission) {
   return scene;
 }
 
-PhotonStart photon_of(const LightSet& lights, std::uint32_t index) {
+PhotonStart photon_of(const LightSampler& lights, std::uint32_t index) {
   Sampler sampler(photon_stream({}), index);
   const double u = sampler.one();
   const glm::dvec2 u_place = sampler.two();
@@ -38,7 +38,7 @@ PhotonStart photon_of(const LightSet& lights, std::uint32_t index) {
   return *photon;
 }
 
-glm::dvec3 mean_flux(const LightSet& lights) {
+glm::dvec3 mean_flux(const LightSampler& lights) {
   glm::dvec3 sum(0.0);
   for (std::uint32_t i = 0; i < kPhotons; ++i) sum += photon_of(lights, i).flux;
   return sum / static_cast<double>(kPhotons);
@@ -50,7 +50,7 @@ double mean_of(const glm::dvec3& color) {
 
 TEST(PhotonEmission, OfAnAreaLightIsItsRadianceTimesPiTimesItsAreaOnBothSides) {
   const Scene scene = room({3.0F, 6.0F, 0.0F});
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   const double per_radiance = 2.0 * kPi * 4.0;
   EXPECT_NEAR(lights.power(), 3.0 * per_radiance, 1e-9);
   const glm::dvec3 flux = mean_flux(lights);
@@ -61,7 +61,7 @@ TEST(PhotonEmission, OfAnAreaLightIsItsRadianceTimesPiTimesItsAreaOnBothSides) {
 
 TEST(PhotonEmission, OfAnAreaLightLeavesItsSurfaceWithACosineLobe) {
   const Scene scene = room(glm::vec3(1.0F));
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   glm::dvec3 squared(0.0);
   double cosine = 0.0;
   double down = 0.0;
@@ -88,7 +88,7 @@ TEST(PhotonEmission, OfATexturedEmitterFollowsItsTexture) {
   scene.textures[0].image = Image<Rgba8>({4, 4}, {0, 0, 0, 255});
   for (int i = 0; i < 4; ++i) scene.textures[0].image.at(i, i) = {255, static_cast<std::uint8_t>(60 * i), 0, 255};
   scene.materials[1].emissive_texture.texture = 0;
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   const glm::dvec3 flux = mean_flux(lights);
   // A bilinear picture's mean is that of its texels: a quarter of them are red.
   EXPECT_NEAR(flux.r / (2.0 * kPi * 4.0 * 2.0 * 0.25), 1.0, 0.02);
@@ -112,7 +112,7 @@ TEST(PhotonEmission, OfManyKindsOfLightTogetherIsTheirPower) {
   scene.lights = {point, ball, spot, sun};
   scene.environment = Environment{Image<Rgb>({64, 32}, {0.01F, 0.02F, 0.01F})};
   scene.environment->image.at(23, 9) = {40.0F, 20.0F, 8.0F};
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   const glm::dvec3 flux = mean_flux(lights);
   EXPECT_NEAR(mean_of(flux) / lights.power(), 1.0, 0.01);
   const double radius = 0.5 * glm::distance(scene.bounds.low, scene.bounds.high);
@@ -127,7 +127,7 @@ TEST(PhotonEmission, OfManyKindsOfLightTogetherIsTheirPower) {
 TEST(PhotonEmission, OfAConstantEnvironmentLightsAnUnobstructedSurfaceWithPiTimesItsRadiance) {
   Scene scene = room(glm::vec3(0.0F));
   scene.environment = Environment{Image<Rgb>({1, 1}, {2.0F, 2.0F, 2.0F})};
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   double arriving = 0.0;  // on the upper side of the floor's square
   for (std::uint32_t i = 0; i < kPhotons; ++i) {
     const PhotonStart photon = photon_of(lights, i);
@@ -147,7 +147,7 @@ TEST(PhotonEmission, OfAFewBrightLightsAndManyDimOnesChoosesByPower) {
     light.intensity = glm::vec3(i == 50 ? 100.0F : 0.01F);
     scene.lights.push_back(light);
   }
-  const LightSet lights(scene);
+  const LightSampler lights(scene);
   int bright = 0;
   for (std::uint32_t i = 0; i < 4096; ++i) {
     const PhotonStart photon = photon_of(lights, i);

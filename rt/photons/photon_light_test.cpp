@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "rt/photons/photon_gather.h"
-#include "rt/photons/photon_test_tools.h"
+#include "rt/photons/photon_query.h"
+#include "rt/photons/test_photons.h"
 
 // What photon maps bring to a picture, against brute force that knows nothing of photons.
 namespace hpr {

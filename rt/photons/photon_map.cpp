@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "rt/photons/photon_query.h"
 
 namespace hpr {
 namespace {
@@ -14,15 +15,15 @@ namespace {
 constexpr double kCellPerRadius = 1.0 + 1.0 / 1048576.0;
 
 /// In ray space, where the scene's radius is in [1, 2): below it photons' own positions are too coarse.
-constexpr double kLeastRadius = 0x1p-24;
+constexpr double kMinRadius = 0x1p-24;
 
 /// 1 / p and 1 / p^2 of the plastic number p, in 2^-32: multiples of such a pair keep furthest from whole numbers.
 constexpr std::uint64_t kRowShare = 0xC13FA9A9U;
 constexpr std::uint64_t kLayerShare = 0x91E10DA6U;
-constexpr int kFewestSlotBits = 8;
+constexpr int kMinSlotBits = 8;
 
 /// The words of their lights are counted by 32 bits with a sign.
-constexpr std::size_t kMost = std::size_t{1} << 29U;
+constexpr std::size_t kMaxPhotons = std::size_t{1} << 29U;
 
 /// The octahedron unfolded: a direction as x and y in [-1, 1].
 glm::dvec2 unfold(const glm::dvec3& direction) {
@@ -61,17 +62,17 @@ std::uint32_t pack_facing(const glm::dvec3& normal, std::uint8_t layer) {
 PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, double radius, double flux_unit)
     : space_(space) {
   if (!(radius > 0.0) || !std::isfinite(radius) || photons.empty()) return;
-  if (photons.size() > kMost) {
+  if (photons.size() > kMaxPhotons) {
     throw Error(ExitCode::Limit, "more than 2^29 photons in one map", "send fewer photons in a pass: --photons");
   }
-  const double scaled = std::max(radius * space.scale, kLeastRadius);
+  const double scaled = std::max(radius * space.scale, kMinRadius);
   radius_ = scaled / space.scale;
   density_ = 2.0 / (std::numbers::pi * radius_ * radius_) * flux_unit;
   radius2_ = scaled * scaled;
   inverse_radius2_ = 1.0 / radius2_;
   flatness_ = kFlatness * scaled + 2.0 * kFloatStep;  // what float positions may stray from their plane
   cells_per_unit_ = 1.0 / (scaled * kCellPerRadius);
-  const int bits = std::max(static_cast<int>(std::bit_width(photons.size() - 1)), kFewestSlotBits);
+  const int bits = std::max(static_cast<int>(std::bit_width(photons.size() - 1)), kMinSlotBits);
   slots_ = std::uint32_t{1} << static_cast<unsigned>(bits);
   row_step_ = static_cast<std::uint32_t>((kRowShare << static_cast<unsigned>(bits)) >> 32U);
   layer_step_ = static_cast<std::uint32_t>((kLayerShare << static_cast<unsigned>(bits)) >> 32U);
@@ -140,7 +141,7 @@ void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, std::uin
   search.inverse_radius2 = inverse_radius2_;
   search.cells_per_unit = cells_per_unit_;
   search.flatness = flatness_;
-  search.least_cosine2 = kLeastCosine2;
+  search.min_cosine2 = kMinCosine2;
   find_photons(search, starts_.get(), places_.get(), found);
 }
 
@@ -153,9 +154,9 @@ double progressive_radius(double first, std::uint64_t pass) {
 
 double first_radius(std::span<const Photon> photons, const RaySpace& space, double wanted) {
   const double most = 0.1 * space.radius;
-  constexpr std::size_t kMostThinned = 32768;
+  constexpr std::size_t kMaxThinned = 32768;
   constexpr std::size_t kProbes = 127;
-  const std::size_t stride = photons.size() / kMostThinned + 1;
+  const std::size_t stride = photons.size() / kMaxThinned + 1;
   std::vector<glm::vec3> places;
   for (std::size_t i = 0; i < photons.size(); i += stride) {
     const auto& p = photons[i].position;

@@ -9,10 +9,9 @@
 #include <memory>
 #include <numbers>
 #include <span>
+#include <vector>
 
-#include "rt/photons/photon_reflection.h"
-#include "rt/photons/photon_search.h"
-#include "rt/trace/ray_space.h"
+#include "rt/trace/ray_scene.h"
 
 namespace hpr {
 
@@ -45,6 +44,30 @@ struct Photon {
   bool operator==(const Photon&) const = default;
 };
 static_assert(sizeof(Photon) == 32);
+
+/// The light of a photon of a map.
+struct PhotonLight {
+  std::uint32_t direction = 0;  ///< packed: towards where it came from
+  std::array<float, 3> flux{};  ///< in the map's unit
+};
+static_assert(sizeof(PhotonLight) == 16);
+
+/// Where a photon of a map lies, in ray space.
+struct PhotonPlace {
+  std::array<float, 3> position{};
+  std::uint32_t facing = 0;  ///< packed, see Photon
+};
+static_assert(sizeof(PhotonPlace) == 16);
+
+/// Photons a gather has found: to be used anew for the next, as growing takes time.
+struct FoundPhotons {
+  std::size_t count = 0;
+  std::vector<std::uint32_t> index;  ///< of the map's; `count` of them
+  std::vector<float> weight;         ///< of each
+};
+
+/// So many places behind the last one may be read.
+inline constexpr std::size_t kReadBeyond = 16;
 
 /// Photons in a hash grid whose cells are as wide as the gather radius: with one radius for a whole map, as progressive
 /// photon mapping has it (Knaus and Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", 2011), a gather
@@ -122,7 +145,7 @@ class PhotonMap {
 
   static constexpr double kMiddle = 1073741824.0;  // 2^30 cells each way
   static constexpr double kLast = 2.0 * kMiddle - 2.0;
-  static constexpr double kLeastCosine2 = 0.25;
+  static constexpr double kMinCosine2 = 0.25;
 
   void sort(std::span<const Photon> photons);
 
@@ -143,6 +166,12 @@ class PhotonMap {
   std::unique_ptr<PhotonPlace[]> places_;  ///< and kReadBeyond more
   std::unique_ptr<PhotonLight[]> lights_;
   std::unique_ptr<std::uint32_t[]> starts_;  ///< [slots_ + 3]: where each slot's photons begin
+};
+
+/// The photons of one sample, ready to be gathered.
+struct PhotonMaps {
+  PhotonMap caustic;
+  PhotonMap global;
 };
 
 /// Radius of pass `pass` (from 0) of a progressive estimate: r_i^2 = r_0^2 prod_{k=1..i} (k + a) / (k + 1), a = 2/3

@@ -1,5 +1,7 @@
 #include "rt/photons/photon_tracer.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -11,10 +13,11 @@
 
 #include "cluster/transport/collectives.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "rt/lights/punctual_light.h"
-#include "rt/photons/photon_gather.h"
-#include "rt/trace/denormals.h"
-#include "rt/trace/ray_walk.h"
+#include "rt/photons/photon_query.h"
+#include "rt/trace/coverage_traversal.h"
+#include "rt/trace/ray_scene.h"
 
 namespace hpr {
 namespace {
@@ -81,7 +84,7 @@ struct PhotonTracer::Flight {
   std::uint32_t photon = 0;  ///< of the block
   int bounces = 0;
   int passed = 0;        ///< surfaces since then that do not cover all
-  Passed last;           ///< of those
+  Passed last;           ///< the last of the surfaces passed
   bool followed = true;  ///< has met followed lobes only
   bool endless = false;  ///< still comes from without the scene
 };
@@ -113,7 +116,7 @@ struct PhotonTracer::Block {
 
 namespace {
 
-/// Counts what the threads of a rank keep: memory that is promised and not there ends programs without a word.
+/// Counts what the threads of a rank keep: memory that is overcommitted ends programs without an error message.
 class KeptPhotons {
  public:
   /// 0: any number.
@@ -136,7 +139,7 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
   const std::uint64_t stream = photon_stream(key);
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
-  KeptPhotons kept(settings_.most_kept);
+  KeptPhotons kept(settings_.max_kept);
   rays_.for_each(settings_.threads, count, [&](std::size_t i) {
     const DenormalsAsZero mode;
     Block block;
@@ -229,7 +232,8 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Pas
   const MaterialPoint material = evaluate_material(scene_, surface);
   const double metres = glm::distance(surface.position, flight.place);
   // As to lights: nothing is taken from endless ways.
-  glm::dvec3 flux = flight.endless ? flight.flux : flight.flux * left_at(flight.media, surface, material, metres);
+  glm::dvec3 flux =
+      flight.endless ? flight.flux : flight.flux * transmittance_to(flight.media, surface, material, metres);
   if (flight.bounces == 0) flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
   const Bsdf bsdf(material, surface, Carried::Flux);
   // Whoever gathers counts as much of the surface as there is: all that falls on it is kept, passing or not.
@@ -255,7 +259,7 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Pas
 /// the chance that its light is absorbed.
 bool PhotonTracer::scatter(Flight& flight, const FluxArrival& at) const {
   const SurfacePoint& surface = at.surface;
-  const FluxScatter scatters(scene_, surfaces_, at);
+  const AdjointBsdf scatters(scene_, surfaces_, at);
   std::array<double, kLobes.size()> chances{};
   double total = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
@@ -290,6 +294,97 @@ bool PhotonTracer::scatter(Flight& flight, const FluxArrival& at) const {
 void share_photons(Communicator& comm, TracedPhotons& photons) {
   share(comm, photons.caustic);
   share(comm, photons.global);
+}
+
+namespace {
+
+/// The power of two below what a photon carries in the mean, so that no scene's light leaves the range of floats.
+double flux_unit_of(const LightSampler& lights, const RaySettings& settings) {
+  const double each = lights.power() / settings.photons;
+  return each > 0.0 && std::isfinite(each) ? std::ldexp(1.0, std::ilogb(each)) : 1.0;
+}
+
+/// Photons that a rank's share of this machine's memory holds in all the places they take while maps are made of them.
+std::uint64_t max_in_memory(const RaySettings& settings) {
+  constexpr std::uint64_t kBytes = 128;
+  const auto bytes =
+      static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  return bytes / (kBytes * static_cast<std::uint64_t>(settings.host_ranks));
+}
+
+PhotonSettings tracer_settings(const RaySettings& settings, const LightSampler& lights) {
+  PhotonSettings own;
+  own.glossy_cutoff = settings.glossy_cutoff;
+  own.caustics_only = !settings.global_photons;
+  own.threads = settings.threads;
+  own.flux_unit = flux_unit_of(lights, settings);
+  own.max_kept = std::max<std::uint64_t>(max_in_memory(settings), 1);
+  return own;
+}
+
+}  // namespace
+
+PhotonMapBuilder::PhotonMapBuilder(const Scene& scene, const Surfaces& surfaces, const RaySpace& space,
+                                   const RayScene& rays, const LightSampler& lights, const RaySettings& settings)
+    : space_(space),
+      settings_(settings),
+      tracer_(
+          scene, surfaces, space, rays,
+          [&lights](double choice, const glm::dvec2& place, const glm::dvec2& direction) {
+            return lights.emit(choice, place, direction);
+          },
+          tracer_settings(settings, lights)) {}
+
+void PhotonMapBuilder::settle(Communicator& comm) {
+  if (std::exchange(settled_, true)) return;
+  // The power of lights is a sum of sines and cosines, which other machines may round otherwise.
+  tracer_.set_flux_unit(all_gather_value(comm, tracer_.settings().flux_unit).front());
+  // Every rank gets the photons of all; its own are a share of them.
+  const auto ranks = static_cast<std::uint64_t>(comm.size());
+  tracer_.set_max_kept(std::max<std::uint64_t>(tracer_.settings().max_kept / ranks, 1));
+}
+
+TracedPhotons PhotonMapBuilder::trace(const SampleNumber& number, Communicator* comm) {
+  const std::uint64_t each = settings_.photons;
+  PhotonRange range{each * number.sample, each};
+  if (comm != nullptr) {
+    settle(*comm);
+    range = share_of_rank(range, comm->rank(), comm->size());
+  }
+  TracedPhotons traced = tracer_.trace({settings_.seed, number.frame}, range, each);
+  counts_ += traced.counts;
+  if (comm != nullptr) share_photons(*comm, traced);
+  return traced;
+}
+
+void PhotonMapBuilder::choose_radii(const TracedPhotons& first) {
+  caustic_radius_ = settings_.photon_radius;
+  global_radius_ = settings_.photon_radius;
+  if (settings_.photon_radius > 0.0) return;
+  caustic_radius_ = first_radius(first.caustic, space_);
+  global_radius_ = first_radius(first.global, space_);
+}
+
+const PhotonMaps& PhotonMapBuilder::build(const SampleNumber& number, Communicator* comm) {
+  if (built_ == number) return maps_;
+  // Whatever sample comes first, radii are those of the very first one: a run that is resumed gives the same bits.
+  const bool chooses = caustic_radius_ == 0.0;
+  TracedPhotons traced;
+  if (chooses && number != SampleNumber{}) choose_radii(trace({}, comm));
+  traced = trace(number, comm);
+  if (chooses && number == SampleNumber{}) choose_radii(traced);
+  parallel_for(settings_.threads, 2, [&](std::size_t which) {
+    const std::vector<Photon>& photons = which == 0 ? traced.caustic : traced.global;
+    PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;
+    const double first = which == 0 ? caustic_radius_ : global_radius_;
+    map = PhotonMap(photons, space_, progressive_radius(first, number.sample), tracer_.settings().flux_unit);
+  });
+  built_ = number;
+  return maps_;
+}
+
+PhotonCounts PhotonMapBuilder::take_counts() {
+  return std::exchange(counts_, {});
 }
 
 }  // namespace hpr

@@ -8,25 +8,25 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
-#include "rt/lights/light_set.h"
+#include "rt/deferred_shader.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/materials/bsdf.h"
-#include "rt/photons/flux_scatter.h"
+#include "rt/photons/adjoint_bsdf.h"
 #include "rt/photons/photon_map.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/ray_space.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 
 namespace hpr {
 
 struct PhotonSettings {
-  double glossy_cutoff = 0.25;  ///< specular lobes smoother than it are followed from the eye (photon_gather.h)
+  double glossy_cutoff = 0.25;  ///< specular lobes smoother than it are followed from the eye (photon_query.h)
   bool caustics_only = false;   ///< photons end where they would cease to be caustic ones
   int max_bounces = 1024;       ///< roulette ends paths long before, but for scenes that absorb less than 1 %
   int threads = 1;
-  double flux_unit = 1.0;       ///< W, a power of two: kept fluxes are floats and reach from 2^-126 to 2^127 of it
-  std::uint64_t most_kept = 0;  ///< by one call of trace(); 0: any number
+  double flux_unit = 1.0;      ///< W, a power of two: kept fluxes are floats and reach from 2^-126 to 2^127 of it
+  std::uint64_t max_kept = 0;  ///< by one call of trace(); 0: any number
 };
 
 struct PhotonCounts {
@@ -35,7 +35,7 @@ struct PhotonCounts {
   std::uint64_t global = 0;
   std::uint64_t rays = 0;
   std::uint64_t invalid = 0;  ///< of the rays, those Embree could not bear
-  std::uint64_t cut = 0;      ///< photons that ended among surfaces of partial coverage, see kMostPassed
+  std::uint64_t cut = 0;      ///< photons that ended among surfaces of partial coverage, see kMaxPassed
   std::uint64_t lost = 0;     ///< photons still under way after so many bounces, or no longer finite
 
   PhotonCounts& operator+=(const PhotonCounts& other);
@@ -60,13 +60,13 @@ struct PhotonRange {
 /// The part of `all` that a rank traces: parts follow one another in order of rank.
 [[nodiscard]] PhotonRange share_of_rank(const PhotonRange& all, int rank, int ranks);
 
-/// Where photons come from: LightSet::emit.
+/// Where photons come from: LightSampler::emit.
 using PhotonSource = std::function<std::optional<PhotonStart>(double u_choice, const glm::dvec2& u_place,
                                                               const glm::dvec2& u_direction)>;
 
-/// Sends photons through the scene and keeps them where the eye's paths will ask for them: at every arrival on a
+/// Traces photons through the scene and stores them where paths from the eye will query them: at every arrival on a
 /// surface with a lobe that those do not follow, except straight from the light (Jensen, "Global Illumination using
-/// Photon Maps", 1996, with the partition of photon_gather.h). Light that passes a surface of partial coverage still
+/// Photon Maps", 1996, with the partition of photon_query.h). Light that passes a surface of partial coverage still
 /// comes straight from its light; light that glass lets through does not.
 ///
 /// A photon depends on the key and its index only; threads, ranks and ranges change no bit.
@@ -84,9 +84,9 @@ class PhotonTracer {
         has_coverage_(has_coverage(scene)) {}
 
   [[nodiscard]] const PhotonSettings& settings() const { return settings_; }
-  /// Of the next trace().
+  /// Settings of the next trace().
   void set_flux_unit(double watts) { settings_.flux_unit = watts; }
-  void set_most_kept(std::uint64_t photons) { settings_.most_kept = photons; }
+  void set_max_kept(std::uint64_t photons) { settings_.max_kept = photons; }
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
   /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are
@@ -114,5 +114,40 @@ class PhotonTracer {
 
 /// Collective: every rank's photons on every rank, in order of rank. The counts stay this rank's own.
 void share_photons(Communicator& comm, TracedPhotons& photons);
+
+/// Makes the photon maps of one sample after the other: every sample traces photons of its own, and their radius
+/// shrinks from sample to sample, so that the mean of many has neither noise nor blur (Knaus and Zwicker, "Progressive
+/// Photon Mapping: A Probabilistic Approach", 2011).
+class PhotonMapBuilder {
+ public:
+  /// All that is referred to must outlive this. `rays` holds the whole scene.
+  PhotonMapBuilder(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& rays,
+                   const LightSampler& lights, const RaySettings& settings);
+
+  /// The maps of a sample; kept until another sample is built, or discard(). With a communicator, collective: its
+  /// ranks share the work, and each gets all photons.
+  const PhotonMaps& build(const SampleNumber& number, Communicator* comm);
+
+  /// The next maps are made anew, with the radii of before.
+  void discard() { built_.reset(); }
+
+  /// The counts of this rank since the last call.
+  [[nodiscard]] PhotonCounts take_counts();
+
+ private:
+  void settle(Communicator& comm);
+  [[nodiscard]] TracedPhotons trace(const SampleNumber& number, Communicator* comm);
+  void choose_radii(const TracedPhotons& first);
+
+  RaySpace space_;
+  RaySettings settings_;
+  bool settled_ = false;  ///< what depends on the other ranks
+  PhotonTracer tracer_;
+  std::optional<SampleNumber> built_;
+  double caustic_radius_ = 0.0;  ///< metres, of a frame's first sample; 0: not chosen yet
+  double global_radius_ = 0.0;
+  PhotonMaps maps_;
+  PhotonCounts counts_;
+};
 
 }  // namespace hpr

@@ -7,7 +7,7 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
-#include "rt/photons/photon_test_tools.h"
+#include "rt/photons/test_photons.h"
 
 namespace hpr {
 namespace {
@@ -118,9 +118,9 @@ TEST(PhotonTracerTest, MorePhotonsThanMayBeKeptAreAnError) {
   const PhotonRoom room = matte_room(0.5F);
   const PhotonTracer all = room.tracer(test::glowing_room());
   const std::uint64_t kept = all.trace({}, {0, 5000}, 5000).global.size();
-  const PhotonTracer some = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept});
+  const PhotonTracer some = room.tracer(test::glowing_room(), {.threads = 2, .max_kept = kept});
   EXPECT_EQ(some.trace({}, {0, 5000}, 5000).global.size(), kept);
-  const PhotonTracer few = room.tracer(test::glowing_room(), {.threads = 2, .most_kept = kept * 3 / 4});
+  const PhotonTracer few = room.tracer(test::glowing_room(), {.threads = 2, .max_kept = kept * 3 / 4});
   try {
     (void)few.trace({}, {0, 5000}, 5000);
     FAIL();

@@ -1,8 +1,11 @@
 #include "rt/reference/path_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <limits>
 #include <mutex>
 #include <utility>
@@ -10,11 +13,432 @@
 
 #include "core/error.h"
 #include "core/timing.h"
-#include "rt/passes/path_wave.h"
-#include "rt/trace/denormals.h"
+#include "rt/materials/bsdf.h"
+#include "rt/materials/medium.h"
+#include "rt/photons/photon_query.h"
+#include "rt/trace/coverage_traversal.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/surfaces.h"
 
 namespace hpr {
 namespace {
+
+/// What all paths share.
+struct PathScene {
+  const Scene& scene;
+  const RayScene& rays;
+  const LightSampler& lights;
+  RaySpace space;
+  Surfaces surfaces;
+  PathSettings settings;
+  bool has_coverage = false;  ///< some material lets rays pass by its alpha
+};
+
+/// A path on its way from the eye: the ray it goes next, and what must be known of the place it comes from.
+struct Path {
+  glm::dvec3 origin{0.0};  ///< world
+  glm::dvec3 direction{0.0, 0.0, -1.0};
+  glm::dvec3 throughput{1.0};  ///< what of the radiance met reaches the pixel
+  glm::dvec3 followed{1.0};    ///< the part of throughput that came by lobes the passes follow
+  glm::dvec3 from{0.0};        ///< where it was scattered last, and the normal (light_normal) lights were chosen by
+  glm::dvec3 from_normal{0.0};
+  double pdf = 0.0;             ///< of the direction it was sent in, per solid angle; 0: the only one
+  double radiance_scale = 1.0;  ///< the part of throughput that is radiance squeezed by refraction, not energy lost
+  double travelled = 0.0;       ///< metres before its origin: from the eye to the near plane
+  double reach = 0.0;           ///< metres
+  Media media;                  ///< that the ray goes through
+  Sampler sampler;
+  std::uint32_t pixel = 0;
+  int segments = 1;  ///< including the one ahead
+  int passed = 0;    ///< surfaces since the last scattering, by chance
+  Passed last;       ///< the last of the surfaces passed
+};
+
+/// Light on its way to a path's surface, if nothing stands between.
+struct ShadowRay {
+  glm::dvec3 origin{0.0};  ///< world
+  glm::dvec3 direction{0.0};
+  double reach = 0.0;        ///< metres
+  glm::dvec3 radiance{0.0};  ///< what reaches the pixel
+  std::uint32_t pixel = 0;
+  int passed = 0;  ///< surfaces, by their coverage
+  Passed last;     ///< the last of the surfaces passed
+};
+
+/// The paths of some pixels, all in step: each step traces the rays of every path sorted by the lobe that sent them,
+/// adds the light found, and leaves one ray or none for each path. So there are never more rays in flight than pixels.
+class PathWavefront {
+ public:
+  explicit PathWavefront(const PathScene& shared) : shared_(shared) {}
+
+  /// Starts with black pixels and no paths.
+  void start(const View& view, std::size_t pixels);
+  void add(const Path& path);
+  /// Until every path has ended.
+  void run();
+
+  [[nodiscard]] const glm::dvec3& radiance(std::size_t pixel) const { return radiance_[pixel]; }
+  [[nodiscard]] PathCounts& counts() { return counts_; }
+
+ private:
+  /// In this order rays are traced: neighbours in a packet go about the same way. Those of the eye go first.
+  static constexpr std::size_t kKinds = 1 + kLobes.size();
+  static std::size_t kind_of(Lobe lobe) { return 1 + static_cast<std::size_t>(lobe); }
+
+  void trace_paths();
+  void arrive(Path& path, std::size_t kind, const Passed& met);
+  /// Finds the hits of the batch's rays. Where some materials let rays pass, met_ says what each has passed, and then
+  /// what it met.
+  void find_hits();
+  void miss(const Path& path);
+  void add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface, const glm::dvec3& emission);
+  void scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material);
+  void sample_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
+                    const std::array<double, kLobes.size()>& chances);
+  bool survives_roulette(Path& path);
+  void trace_shadows();
+  void trace_through_coverage();
+
+  const PathScene& shared_;
+  const View* view_ = nullptr;
+  std::array<std::vector<Path>, kKinds> paths_;
+  std::array<std::vector<Path>, kKinds> next_;
+  std::vector<ShadowRay> shadows_;
+  std::vector<glm::dvec3> radiance_;
+  PathCounts counts_;
+  RayBatch batch_;
+  std::vector<std::uint32_t> hits_;
+  std::vector<Passed> met_;  ///< by the same rays; only where some materials let rays pass
+  std::vector<std::uint8_t> blocked_;
+  WorldTriangle triangle_;
+};
+
+/// The power heuristic with exponent 2: the weight of a direction found with density `own` where another technique has
+/// `other`. As a ratio, so that large densities do not overflow.
+double power_heuristic(double own, double other) {
+  const double ratio = other / own;
+  return 1.0 / (1.0 + ratio * ratio);
+}
+
+double largest(const glm::dvec3& v) {
+  return std::max({v.x, v.y, v.z});
+}
+
+/// By how much radiance is squeezed (or, on its way out, stretched) where it is refracted.
+double radiance_scale_of(const MaterialPoint& material, const SurfacePoint& point) {
+  if (!material.solid || !(material.ior > 0.0)) return 1.0;
+  const double squared = material.ior * material.ior;
+  return point.inside ? squared : 1.0 / squared;
+}
+
+/// How likely each lobe is chosen: as much of the path's light as it scatters, by energy: so that clear glass changes
+/// the weight of a path by nothing but the radiance_scale. False when no lobe is there.
+bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double radiance_scale,
+                    std::array<double, kLobes.size()>& chances) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    const glm::dvec3 part = throughput * bsdf.weight(kLobes[i]);
+    chances[i] = part.x + part.y + part.z;
+    if (kLobes[i] == Lobe::Transmission && bsdf.is_delta(kLobes[i])) chances[i] /= radiance_scale;
+    sum += chances[i];
+  }
+  if (!(sum > 0.0) || !std::isfinite(sum)) return false;
+  for (double& chance : chances) chance /= sum;
+  return true;
+}
+
+struct Scattered {
+  Scattering lobes;
+  glm::dvec3 value{0.0};  ///< f, of all lobes with more than one direction
+  double pdf = 0.0;       ///< of choosing such a lobe, and in it this direction
+};
+
+Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
+  Scattered scattered{.lobes = bsdf.scattering(direction)};
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    if (!(chances[i] > 0.0)) continue;
+    scattered.value += scattered.lobes.value[i];
+    scattered.pdf += chances[i] * scattered.lobes.pdf[i];
+  }
+  return scattered;
+}
+
+/// What share of the scattered light comes by lobes that the passes follow.
+glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances,
+                          const Scattered& scattered, double glossy_cutoff) {
+  glm::dvec3 followed(0.0);
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    if (chances[i] > 0.0 && is_followed(bsdf, kLobes[i], glossy_cutoff)) followed += scattered.lobes.value[i];
+  }
+  glm::dvec3 share(0.0);
+  for (int c = 0; c < 3; ++c) share[c] = scattered.value[c] > 0.0 ? followed[c] / scattered.value[c] : 0.0;
+  return share;
+}
+
+std::size_t choose_lobe(const std::array<double, kLobes.size()>& chances, double u) {
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < chances.size(); ++i) {
+    if (!(chances[i] > 0.0)) continue;
+    last = i;
+    if (u < chances[i]) break;
+    u -= chances[i];
+  }
+  return last;
+}
+
+void PathWavefront::start(const View& view, std::size_t pixels) {
+  view_ = &view;
+  radiance_.assign(pixels, glm::dvec3(0.0));
+  for (auto& paths : paths_) paths.clear();
+}
+
+void PathWavefront::add(const Path& path) {
+  paths_[0].push_back(path);
+  ++counts_.paths;
+}
+
+void PathWavefront::run() {
+  const auto some_left = [&] { return std::ranges::any_of(paths_, [](const auto& paths) { return !paths.empty(); }); };
+  while (some_left()) {
+    for (auto& paths : next_) paths.clear();
+    shadows_.clear();
+    trace_paths();
+    trace_shadows();
+    std::swap(paths_, next_);
+  }
+}
+
+void PathWavefront::find_hits() {
+  hits_.resize(batch_.size());
+  counts_.invalid +=
+      shared_.has_coverage ? shared_.rays.closest(batch_, met_, hits_) : shared_.rays.closest(batch_, hits_);
+}
+
+void PathWavefront::trace_paths() {
+  batch_.clear();
+  met_.clear();
+  for (const auto& paths : paths_) {
+    for (const Path& path : paths) {
+      batch_.push(shared_.space.from_world(path.origin), path.direction, path.reach * shared_.space.scale);
+      if (shared_.has_coverage) met_.push_back(path.last);
+    }
+  }
+  find_hits();
+  shared_.surfaces.prefetch(hits_);
+  counts_.primary += paths_[0].size();
+  counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
+  counts_.reflection += paths_[kind_of(Lobe::Reflection)].size();
+  counts_.transmission += paths_[kind_of(Lobe::Transmission)].size();
+  std::size_t ray = 0;
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    for (Path& path : paths_[kind]) {
+      const std::uint32_t surface = hits_[ray];
+      if (surface == kNoSurface) {
+        miss(path);
+      } else {
+        arrive(path, kind, shared_.has_coverage ? met_[ray] : Passed{surface});
+      }
+      ++ray;
+    }
+  }
+}
+
+void PathWavefront::miss(const Path& path) {
+  // A background is a backdrop, to be looked at as unlit surfaces are: no light.
+  const glm::dvec3 light = shared_.lights.environment(path.direction);
+  if (!shared_.scene.environment) {
+    radiance_[path.pixel] += path.throughput * path.followed * light;
+    return;
+  }
+  double weight = 1.0;
+  if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
+    const double by_light = shared_.lights.environment_pdf_any(path.from, path.from_normal, path.direction);
+    if (by_light > 0.0) {
+      weight = shared_.settings.technique == Technique::Lights ? 0.0 : power_heuristic(path.pdf, by_light);
+    }
+  }
+  radiance_[path.pixel] += path.throughput * light * weight;
+}
+
+void PathWavefront::arrive(Path& path, std::size_t kind, const Passed& met) {
+  shared_.surfaces.load(met.surface, triangle_);
+  const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
+  const Material& look = shared_.scene.materials[point.material];
+  if (look.alpha_mode != AlphaMode::Opaque) {
+    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    if (passes_by_chance(coverage, path.sampler)) {
+      const double gained = met.distance - path.last.distance;
+      path.last = met;
+      if (passes_on(path.passed, coverage, gained)) {
+        next_[kind].push_back(path);
+      } else {
+        ++counts_.cut;
+      }
+      return;
+    }
+  }
+  const MaterialPoint material = evaluate_material(shared_.scene, point);
+  const double metres = path.travelled + glm::distance(path.origin, point.position);
+  path.throughput *= path.segments == 1 ? transmittance(path.media.here, metres)
+                                        : transmittance_to(path.media, point, material, metres);
+  if (material.unlit) {
+    // A colour to be looked at, not light: seen, mirrored and seen through glass, as the passes show it.
+    radiance_[path.pixel] += path.throughput * path.followed * material.emission;
+    return;
+  }
+  if (material.emission != glm::dvec3(0.0)) add_emission(path, point, met.surface, material.emission);
+  if (path.segments >= shared_.settings.max_depth) {
+    ++counts_.too_long;
+    return;
+  }
+  scatter(path, point, material);
+}
+
+void PathWavefront::add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface,
+                                 const glm::dvec3& emission) {
+  double weight = 1.0;
+  if (path.pdf > 0.0 && shared_.settings.technique != Technique::Surfaces) {
+    const double by_light = shared_.lights.surface_pdf_any(path.from, path.from_normal, surface, point);
+    if (by_light > 0.0) {
+      weight = shared_.settings.technique == Technique::Lights ? 0.0 : power_heuristic(path.pdf, by_light);
+    }
+  }
+  radiance_[path.pixel] += path.throughput * emission * weight;
+}
+
+void PathWavefront::scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material) {
+  const Bsdf bsdf(material, point);
+  std::array<double, kLobes.size()> chances{};
+  const double radiance_scale = radiance_scale_of(material, point);
+  if (!choose_chances(bsdf, path.throughput, radiance_scale, chances)) return;
+  sample_light(path, point, material, bsdf, chances);
+
+  const std::size_t chosen = choose_lobe(chances, path.sampler.one());
+  const Lobe lobe = kLobes[chosen];
+  const auto sample = bsdf.sample(lobe, next_two(path.sampler, path.segments - 1));
+  if (!sample) return;
+  if (bsdf.is_delta(lobe)) {
+    path.throughput *= sample->weight / chances[chosen];
+    path.pdf = 0.0;
+  } else {
+    const Scattered scattered = evaluate(bsdf, chances, sample->direction);
+    if (!(scattered.pdf > 0.0)) return;
+    const double cosine = std::abs(glm::dot(material.normal, sample->direction));
+    path.throughput *= scattered.value * (cosine / scattered.pdf);
+    path.followed *= followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
+    path.pdf = scattered.pdf;
+  }
+  if (lobe == Lobe::Transmission) path.radiance_scale *= radiance_scale;
+  if (!survives_roulette(path)) return;
+  path.media = media_towards(path.media, point, material, sample->direction);
+  path.origin = ray_origin(point, sample->direction);
+  path.direction = sample->direction;
+  path.reach = std::numeric_limits<double>::infinity();
+  path.from = point.position;
+  path.from_normal = bsdf.light_normal();
+  path.travelled = 0.0;
+  path.passed = 0;
+  path.last = {};
+  ++path.segments;
+  next_[kind_of(lobe)].push_back(path);
+}
+
+void PathWavefront::sample_light(Path& path, const SurfacePoint& point, const MaterialPoint& material, const Bsdf& bsdf,
+                                 const std::array<double, kLobes.size()>& chances) {
+  const double u_choice = path.sampler.one();
+  const glm::dvec2 u = next_two(path.sampler, path.segments - 1);
+  const auto light = shared_.lights.sample_any(point.position, bsdf.light_normal(), *view_, u_choice, u);
+  if (!light || light->weight == glm::dvec3(0.0)) return;
+  const Technique technique = shared_.settings.technique;
+  if (technique == Technique::Surfaces && light->pdf > 0.0) return;
+  const Scattered scattered = evaluate(bsdf, chances, light->to_light);
+  if (scattered.value == glm::dvec3(0.0)) return;
+  double weight = std::abs(glm::dot(material.normal, light->to_light));
+  if (technique == Technique::Both && light->pdf > 0.0) weight *= power_heuristic(light->pdf, scattered.pdf);
+  glm::dvec3 radiance = path.throughput * scattered.value * light->weight * weight;
+  if (!light->casts_shadows) {
+    // The headlight shows what is looked at, as the passes have it: seen, mirrored and seen through glass.
+    radiance_[path.pixel] += path.followed * radiance;
+    return;
+  }
+  radiance *= transmittance_to_light(path.media, point, material, light->to_light, light->distance);
+
+  ShadowRay& ray = shadows_.emplace_back();
+  ray.pixel = path.pixel;
+  ray.radiance = radiance;
+  ray.origin = ray_origin(point, light->to_light);
+  const bool viewers_side = glm::dot(light->to_light, point.geometric_normal) > 0.0;
+  if (shared_.settings.terminator_fix && viewers_side) ray.origin += point.lift;
+  ray.direction = light->to_light;
+  ray.reach = light->distance;
+  if (!std::isfinite(light->distance)) return;
+  // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies on
+  // a surface is not hidden by it.
+  const glm::dvec3 goal = shared_.space.from_world(light->goal);
+  const glm::dvec3 way = light->goal - ray.origin;
+  const double distance = glm::length(way);
+  if (distance > 0.0) ray.direction = way / distance;
+  const double size = std::max(largest(glm::abs(goal)), 1.0) / shared_.space.scale;
+  ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
+}
+
+bool PathWavefront::survives_roulette(Path& path) {
+  if (!(largest(path.throughput) > 0.0)) return false;
+  if (path.segments < shared_.settings.roulette_from) return true;
+  const double chance = largest(path.throughput) / path.radiance_scale;
+  if (chance >= 1.0) return true;
+  if (path.sampler.one() >= chance) return false;
+  path.throughput /= chance;
+  return true;
+}
+
+void PathWavefront::trace_shadows() {
+  while (!shadows_.empty()) {
+    batch_.clear();
+    met_.clear();
+    for (const ShadowRay& ray : shadows_) {
+      batch_.push(shared_.space.from_world(ray.origin), ray.direction, ray.reach * shared_.space.scale);
+      if (shared_.has_coverage) met_.push_back(ray.last);
+    }
+    counts_.shadow += shadows_.size();
+    if (shared_.has_coverage) {
+      trace_through_coverage();
+      continue;
+    }
+    blocked_.resize(batch_.size());
+    counts_.invalid += shared_.rays.occluded(batch_, blocked_);
+    for (std::size_t i = 0; i < shadows_.size(); ++i) {
+      if (blocked_[i] == 0) radiance_[shadows_[i].pixel] += shadows_[i].radiance;
+    }
+    shadows_.clear();
+  }
+}
+
+void PathWavefront::trace_through_coverage() {
+  find_hits();
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < shadows_.size(); ++i) {
+    ShadowRay ray = shadows_[i];
+    if (hits_[i] == kNoSurface) {
+      radiance_[ray.pixel] += ray.radiance;
+      continue;
+    }
+    shared_.surfaces.load(hits_[i], triangle_);
+    const SurfacePoint point = shared_.surfaces.meet(triangle_, ray.origin, ray.direction);
+    const Material& look = shared_.scene.materials[point.material];
+    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
+    ray.radiance *= 1.0 - coverage;
+    if (!(largest(ray.radiance) > 0.0)) continue;
+    const double gained = met_[i].distance - ray.last.distance;
+    ray.last = met_[i];
+    if (passes_on(ray.passed, coverage, gained)) {
+      shadows_[left++] = ray;
+    } else {
+      ++counts_.cut;
+    }
+  }
+  shadows_.resize(left);
+}
 
 /// Paths that go together. Enough to fill packets for some bounces, few enough to stay in the second-level cache.
 constexpr int kRowsAtOnce = 16;
@@ -66,28 +490,28 @@ struct PathTracer::State {
 
   PathScene shared;
   MediumFinder media;
-  std::vector<std::unique_ptr<PathWave>> idle;  ///< kept from tile to tile: fresh pages cost time
+  std::vector<std::unique_ptr<PathWavefront>> idle;  ///< kept from tile to tile: fresh pages cost time
   std::mutex mutex;
   PathCounts counts;
 
-  std::unique_ptr<PathWave> take_wave();
-  void trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
+  std::unique_ptr<PathWavefront> take_wave();
+  void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& place,
                   const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels) const;
 };
 
-std::unique_ptr<PathWave> PathTracer::State::take_wave() {
+std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
   {
     const std::lock_guard lock(mutex);
     if (!idle.empty()) {
-      std::unique_ptr<PathWave> wave = std::move(idle.back());
+      std::unique_ptr<PathWavefront> wave = std::move(idle.back());
       idle.pop_back();
       return wave;
     }
   }
-  return std::make_unique<PathWave>(shared);
+  return std::make_unique<PathWavefront>(shared);
 }
 
-void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media& eye, const TilePlace& place,
+void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& place,
                                    const SampleNumber& number, std::span<const std::uint8_t> wanted,
                                    std::span<Rgb> pixels) const {
   const DenormalsAsZero mode;
@@ -117,7 +541,7 @@ void PathTracer::State::trace_tile(PathWave& wave, const View& view, const Media
   }
 }
 
-PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSet& lights, PathSettings settings)
+PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSampler& lights, PathSettings settings)
     : state_(std::make_unique<State>(PathScene{.scene = scene,
                                                .rays = rays,
                                                .lights = lights,
@@ -146,7 +570,7 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
     const trace::Span span("path trace tile", "tile", tile);
     const TilePlace place = layout.place(tile);
     radiance.set_active(tile);
-    std::unique_ptr<PathWave> wave = state.take_wave();
+    std::unique_ptr<PathWavefront> wave = state.take_wave();
     state.trace_tile(*wave, views[place.screen], eyes[place.screen], place, number, mask_of(wanted, tile),
                      radiance.tile(tile));
     const std::lock_guard lock(state.mutex);

@@ -7,9 +7,8 @@
 
 #include "image/color.h"
 #include "image/tiles.h"
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/sampling/sampler.h"
-#include "rt/screen_pixel.h"
 #include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 #include "scene/view.h"
@@ -20,7 +19,7 @@ namespace hpr {
 enum class Technique : std::uint8_t {
   Both,     ///< lights and lobes are sampled, and weighed by the power heuristic (Veach 1997, section 9.2)
   Lights,   ///< lights are sampled; what lobes with more than one direction meet by chance is left out
-  Surfaces  ///< only lobes are sampled; lights that rays cannot meet are asked all the same
+  Surfaces  ///< only lobes are sampled; lights that rays cannot meet are sampled all the same
 };
 
 struct PathSettings {
@@ -29,7 +28,7 @@ struct PathSettings {
       64;  ///< ray segments of the longest path: 1 shows what emits, 2 adds its light on surfaces, and so on
   int roulette_from = 4;  ///< bounces every path is let make; past max_depth: no roulette
   Technique technique = Technique::Both;
-  double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_gather.h) show unlit surfaces, others do not
+  double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_query.h) show unlit surfaces, others do not
   /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift), as the passes do.
   /// It changes the integral: what is compared with others does without.
   bool terminator_fix = false;
@@ -47,11 +46,11 @@ struct PathCounts {
   std::uint64_t reflection = 0;
   std::uint64_t transmission = 0;
   std::uint64_t shadow = 0;
-  std::uint64_t invalid = 0;     ///< of those above, rays Embree could not bear: they missed
-  std::uint64_t cut = 0;         ///< rays that ended among surfaces of partial coverage, see kMostPassed
+  std::uint64_t invalid = 0;     ///< rays above that Embree cannot trace (is_traceable): they missed
+  std::uint64_t cut = 0;         ///< rays that ended among surfaces of partial coverage, see kMaxPassed
   std::uint64_t too_long = 0;    ///< paths cut at max_depth
   std::uint64_t not_finite = 0;  ///< samples that were no finite number: they are black
-  ScreenPixel first_not_finite;  ///< of those; else kNoPixel
+  ScreenPixel first_not_finite;  ///< the first such pixel; else kNoPixel
 
   PathCounts& operator+=(const PathCounts& other);
   bool operator==(const PathCounts&) const = default;
@@ -66,7 +65,7 @@ struct PathCounts {
 class PathTracer {
  public:
   /// `rays` holds `scene` in RaySpace(scene.bounds). All must outlive this.
-  PathTracer(const Scene& scene, const RayScene& rays, const LightSet& lights, PathSettings settings);
+  PathTracer(const Scene& scene, const RayScene& rays, const LightSampler& lights, PathSettings settings);
   ~PathTracer();
   PathTracer(const PathTracer&) = delete;
   PathTracer& operator=(const PathTracer&) = delete;
@@ -80,7 +79,7 @@ class PathTracer {
   void trace(std::span<const View> views, std::span<const std::size_t> tiles, const SampleNumber& number,
              TileLayer<Rgb>& radiance, const PixelMask* wanted = nullptr);
 
-  /// Of the last trace().
+  /// Counts of the last trace().
   [[nodiscard]] const PathCounts& counts() const;
 
  private:

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rt/reference/path_test_tools.h"
+#include "rt/reference/test_paths.h"
 
 namespace hpr {
 namespace {
@@ -21,14 +21,14 @@ using test::place;
 constexpr Size kSmall{8, 8};
 constexpr int kNoLimit = 1'000'000;
 
-void expect_equal(const Estimate& estimate, double expected, double most_error) {
-  EXPECT_LT(estimate.error, most_error) << "too uncertain to mean anything";
+void expect_equal(const Estimate& estimate, double expected, double max_error) {
+  EXPECT_LT(estimate.error, max_error) << "too uncertain to mean anything";
   EXPECT_NEAR(estimate.mean, expected, 4.0 * estimate.error + 1e-6 * expected) << "+- " << estimate.error;
 }
 
-void expect_equal(const Estimate& one, const Estimate& other, double most_error) {
+void expect_equal(const Estimate& one, const Estimate& other, double max_error) {
   const double error = std::hypot(one.error, other.error);
-  EXPECT_LT(error, most_error * one.mean) << "too uncertain to mean anything";
+  EXPECT_LT(error, max_error * one.mean) << "too uncertain to mean anything";
   EXPECT_NEAR(one.mean, other.mean, 4.0 * error);
 }
 

@@ -46,7 +46,8 @@ std::uint32_t sobol_second_reversed(std::uint32_t index) {
 /// A dimension's generator matrix, its bits reversed: column k says which bits of the number bit k of the index flips.
 using ReversedMatrix = std::array<std::uint32_t, 32>;
 
-/// Of the primitive polynomial of `degree` with the inner coefficients `inner`, and its first direction numbers.
+/// The generator matrix of the primitive polynomial of `degree` with the inner coefficients `inner`, from its first
+/// direction numbers.
 constexpr ReversedMatrix matrix_of(unsigned int degree, std::uint32_t inner, std::array<std::uint32_t, 3> first) {
   std::array<std::uint32_t, 32> m{};
   ReversedMatrix columns{};

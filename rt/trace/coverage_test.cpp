@@ -4,9 +4,9 @@
 #include <numbers>
 #include <string>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
-#include "rt/trace/ray_walk.h"
+#include "rt/trace/coverage_traversal.h"
 
 // Surfaces of partial coverage: alpha MASK and BLEND.
 namespace hpr {
@@ -45,13 +45,13 @@ glm::dvec3 seen_on_average(const Scene& scene, const RaySettings& settings, std:
   const View view = test::view_from({0, 0, 5}, {0, 0, 0}, {1, 1}, scene, 1e-4);
   const TileLayer<Key> keys = opaque_keys(scene, view);
   TileLayer<Rgb> color(keys.layout());
-  Lighter lighter(scene, settings);
+  DeferredShader shader(scene, settings);
   glm::dvec3 sum(0.0);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
-    lighter.light(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color}, {.sample = sample});
+    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color}, {.sample = sample});
     const Rgb& one = color.at(0, 0, 0);
     sum += glm::dvec3(one.r, one.g, one.b);
-    if (counts != nullptr) *counts += lighter.counts();
+    if (counts != nullptr) *counts += shader.counts();
   }
   return sum / static_cast<double>(samples);
 }

@@ -1,6 +1,6 @@
-#include "rt/trace/mesh_parts.h"
-
 #include <gtest/gtest.h>
+
+#include "rt/trace/surfaces.h"
 
 namespace hpr {
 namespace {

@@ -22,10 +22,10 @@ namespace {
 /// enlarge errors at most sixteen times (ray_scene.cpp), and slivers are met somewhat beside where they are.
 constexpr double kRounding = 1.0 / 2048.0;
 /// Past this many boxes looking at each costs more than rays that miss.
-constexpr std::size_t kMostBoxes = 200'000;
+constexpr std::size_t kMaxBoxes = 200'000;
 /// About so many are made of a scene's surfaces, of no fewer triangles each on average.
 constexpr std::size_t kBoxes = 2048;
-constexpr std::size_t kFewestTriangles = 64;
+constexpr std::size_t kMinTriangles = 64;
 
 /// Homogeneous coordinates of the screen's pixels as a linear function of places: x / w and y / w are pixels.
 struct PixelMap {
@@ -57,9 +57,9 @@ struct Shifts {
   glm::dvec2 least{0.0};
   glm::dvec2 most{0.0};
 
-  explicit Shifts(std::span<const View> looks) {
-    for (const View& look : looks) {
-      const glm::dvec2 shift = looks.front().jitter - look.jitter;
+  explicit Shifts(std::span<const View> views) {
+    for (const View& view : views) {
+      const glm::dvec2 shift = views.front().jitter - view.jitter;
       least = glm::min(least, shift);
       most = glm::max(most, shift);
     }
@@ -135,7 +135,7 @@ class Cells {
 }  // namespace
 
 MeshBoxes::MeshBoxes(const Scene& scene) : first{0} {
-  const std::size_t each = std::max(kFewestTriangles, static_cast<std::size_t>(scene.triangles) / kBoxes);
+  const std::size_t each = std::max(kMinTriangles, static_cast<std::size_t>(scene.triangles) / kBoxes);
   for (const Mesh& mesh : scene.meshes) {
     const Cells cells(mesh_bounds(mesh), std::min(mesh.triangles.size() / each, kBoxes));
     std::vector<Bounds> filled(cells.count(), empty_bounds());
@@ -150,17 +150,17 @@ MeshBoxes::MeshBoxes(const Scene& scene) : first{0} {
 }
 
 OccupiedPixels::OccupiedPixels(const Scene& scene, const RayScene& rays, const MeshBoxes& boxes,
-                               std::span<const View> looks, const FrameLayout& layout, std::size_t screen)
-    : first_tile_(layout.tiles_of(screen).first), everywhere_(looks.front().points.has_value()) {
+                               std::span<const View> views, const FrameLayout& layout, std::size_t screen)
+    : first_tile_(layout.tiles_of(screen).first), everywhere_(views.front().points.has_value()) {
   std::size_t count = 0;
   for (const RayGeometry& geometry : rays.geometries()) {
     count += boxes.of(scene.instances[geometry.instance].mesh).size();
   }
-  everywhere_ = everywhere_ || count > kMostBoxes;
+  everywhere_ = everywhere_ || count > kMaxBoxes;
   if (everywhere_) return;
   seen_.resize(layout.tiles_of(screen).count);
-  const View& view = looks.front();
-  const Shifts shifts(looks);
+  const View& view = views.front();
+  const Shifts shifts(views);
   const PixelSlack slack(PixelMap(view, glm::dmat4(1.0)), kRounding / rays.space().scale);
   for (const RayGeometry& geometry : rays.geometries()) {
     const Instance& instance = scene.instances[geometry.instance];

@@ -29,7 +29,7 @@ struct MeshBoxes {
 /// holds: most pictures have much of mere background. Allows for what rounding may do to rays.
 class OccupiedPixels {
  public:
-  OccupiedPixels(const Scene& scene, const RayScene& rays, const MeshBoxes& boxes, std::span<const View> looks,
+  OccupiedPixels(const Scene& scene, const RayScene& rays, const MeshBoxes& boxes, std::span<const View> views,
                  const FrameLayout& layout, std::size_t screen);
 
   /// Sets `mask`, [kTileSide][kTileSide], to 1 at those pixels of a tile of that screen, which lies at `place`, and to

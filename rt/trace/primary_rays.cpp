@@ -13,13 +13,46 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/timing.h"
-#include "rt/trace/denormals.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/occupied_pixels.h"
-#include "rt/trace/ray_key.h"
+#include "rt/trace/ray_scene.h"
+#include "rt/trace/surfaces.h"
 
 namespace hpr {
 namespace {
+
+/// A triangle's key where a ray meets it.
+struct PlacedKey {
+  Key key = kNoKey;         ///< kNoKey before the near plane and past the far one
+  double along_axis = 0.0;  ///< metres from the eye along the view's axis
+};
+
+/// The key of triangle `primitive` of an Embree geometry, for a ray of `view` known to meet it: in double, from the
+/// triangle and the ray alone, so that every rank gets the same.
+PlacedKey key_along(const Scene& scene, const View& view, const Ray& ray, const RayGeometry& geometry,
+                    std::uint32_t primitive) {
+  const Instance& instance = scene.instances[geometry.instance];
+  const Mesh& mesh = scene.mesh_of(instance);
+  const glm::uvec3& corners = mesh.triangles[geometry.first_triangle + primitive];
+  // Edges as differences of the mesh's own coordinates, and all of it relative to the eye: far places cost no digits.
+  const glm::dmat3 linear(instance.to_world);
+  const glm::dvec3 p0(mesh.positions[corners.x]);
+  const glm::dvec3 e1 = linear * (glm::dvec3(mesh.positions[corners.y]) - p0);
+  const glm::dvec3 e2 = linear * (glm::dvec3(mesh.positions[corners.z]) - p0);
+  const glm::dvec3 v0 = linear * p0 + (glm::dvec3(instance.to_world[3]) - view.eye);
+
+  // Moeller and Trumbore 1997, from the ray's origin.
+  const glm::dvec3 from_v0 = (ray.origin - view.eye) - v0;
+  const glm::dvec3 p = glm::cross(ray.direction, e2);
+  const glm::dvec3 q = glm::cross(from_v0, e1);
+  const double determinant = glm::dot(e1, p);
+  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(ray.direction, q) / determinant);
+  const double along_axis = -glm::dot(v0 + at.x * e1 + at.y * e2, view.axes[2]);
+
+  const auto depth = static_cast<float>(reversed_depth(view, along_axis));
+  if (!(depth > 0.0F) || !(depth <= 1.0F)) return {kNoKey, along_axis};
+  return {make_key(depth, geometry.first_surface + primitive), along_axis};
+}
 
 using embree::kWidth;
 // Pixels of a packet.
@@ -143,9 +176,9 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
 /// One thread's work on a tile.
 class TileTracer {
  public:
-  /// Of `looks`, which differ by their jitter only.
-  TileTracer(const Scene& scene, const RayScene& rays, std::span<const View> looks) : rays_(rays), looks_(looks) {
-    const View& view = looks.front();
+  /// `views` differ by their jitter only.
+  TileTracer(const Scene& scene, const RayScene& rays, std::span<const View> views) : rays_(rays), looks_(views) {
+    const View& view = views.front();
     embree::start(search_.context, embree::Rays::Coherent);
     search_.scene = &scene;
     search_.geometries = rays.geometries();
@@ -163,8 +196,8 @@ class TileTracer {
     }
   }
 
-  /// Merges the keys of those of `pixels`, in the tile at (x0, y0), that are set in its `mask`; keys[i] are of look i.
-  /// All looks through a pixel lie together, and pixels square by square: they meet about the same.
+  /// Merges the keys of those of `pixels`, in the tile at (x0, y0), that are set in its `mask`; keys[i] are of view i.
+  /// The rays of all views through a pixel lie together, and pixels square by square: they meet about the same.
   void trace(const Rect& pixels, int x0, int y0, std::span<const std::uint8_t> mask,
              std::span<const std::span<Key>> keys) {
     for_squares(pixels, kSide, kSide, [&](const Rect& square) {
@@ -183,7 +216,7 @@ class TileTracer {
     });
   }
 
-  /// A bit per look in which any surface is seen.
+  /// A bit per view that shows any surface.
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
 
   [[nodiscard]] PrimaryRayStats stats() const {
@@ -203,13 +236,13 @@ class TileTracer {
     }
   }
 
-  /// Every look through a pixel; rays are traced when no lane is free.
+  /// Adds the rays of every view through a pixel; they are traced when no lane is free.
   void add(std::uint32_t pixel, int column, int row, std::span<const std::span<Key>> keys) {
-    for (std::size_t look = 0; look < looks_.size(); ++look) {
+    for (std::size_t view = 0; view < looks_.size(); ++view) {
       if (lanes_ == kLanes) trace(keys);
-      look_[lanes_] = look;
+      look_[lanes_] = view;
       pixel_[lanes_] = pixel;
-      aim(lanes_++, view_ray(looks_[look], column + 0.5, row + 0.5));
+      aim(lanes_++, view_ray(looks_[view], column + 0.5, row + 0.5));
       ++stats_.rays;
     }
   }
@@ -273,8 +306,8 @@ class TileTracer {
     rays.dir_z[i] = static_cast<float>(direction.z);
     const glm::dvec3 size = glm::abs(origin);
     // Comparisons with NaN are false, so NaN fails here too. A direction of unit length needs no more than that.
-    const bool usable = size.x < kFarthestRay && size.y < kFarthestRay && size.z < kFarthestRay && length > 0.0 &&
-                        length < kFarthestRay && reach >= 0.0;
+    const bool usable = size.x < kMaxRayDistance && size.y < kMaxRayDistance && size.z < kMaxRayDistance &&
+                        length > 0.0 && length < kMaxRayDistance && reach >= 0.0;
     if (!usable) {
       leave_out(lane);
       ++stats_.invalid;
@@ -305,7 +338,7 @@ class TileTracer {
 
   /// Reckons the keys still missing; leaves in flight, and returns the number of, the lanes to trace once more.
   std::size_t settle() {
-    // Triangles of neighbouring pixels lie far apart in memory: all are asked for before the first is used.
+    // Triangles of neighbouring pixels lie far apart in memory: all are prefetched before the first is used.
     for (std::size_t lane = 0; lane < lanes_; ++lane) {
       if (!search_.found[lane]) continue;
       const Mesh& mesh = search_.scene->mesh_of(search_.scene->instances[search_.geometry[lane].instance]);
@@ -335,7 +368,7 @@ class TileTracer {
   double outside_ = 0.0;  ///< how far the eye lies outside of what the scene can fill
   Search search_{};
   std::size_t lanes_ = 0;  ///< in use
-  // Where a lane's key goes: to keys[pixel] of a tile, as its look sees it.
+  // Where a lane's key goes: to keys[pixel] of a tile, as its view shows it.
   std::array<std::size_t, kLanes> look_{};
   std::array<std::uint32_t, kLanes> pixel_{};
   std::array<embree::HitPacket, kPackets> packets_{};
@@ -348,17 +381,17 @@ void draw_tile(TileTracer& tracer, std::size_t tile, std::span<const Rect> parts
   const DenormalsAsZero mode;
   const Rect place = layers.front()->layout().place(tile).pixels;
   if (std::ranges::none_of(parts, [&](const Rect& part) { return !intersection(part, place).empty(); })) return;
-  std::array<std::span<Key>, PrimaryRays::kMostLooks> keys;
-  for (std::size_t look = 0; look < layers.size(); ++look) {
-    layers[look]->touch(tile);
-    keys.at(look) = layers[look]->tile(tile);
+  std::array<std::span<Key>, PrimaryRays::kMaxViews> keys;
+  for (std::size_t view = 0; view < layers.size(); ++view) {
+    layers[view]->touch(tile);
+    keys.at(view) = layers[view]->tile(tile);
   }
   for (const Rect& part : parts) {
     const Rect pixels = intersection(part, place);
     if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(layers.size()));
   }
-  for (std::size_t look = 0; look < layers.size(); ++look) {
-    if ((tracer.seen() >> look & 1U) != 0) layers[look]->set_active(tile);
+  for (std::size_t view = 0; view < layers.size(); ++view) {
+    if ((tracer.seen() >> view & 1U) != 0) layers[view]->set_active(tile);
   }
 }
 
@@ -371,17 +404,17 @@ void PrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rec
   draw(std::span(&view, 1), screen, parts, std::array{&layer});
 }
 
-void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
+void PrimaryRays::draw(std::span<const View> views, std::size_t screen, std::span<const Rect> parts,
                        std::span<TileLayer<Key>* const> layers, const PixelMask* wanted) {
-  HPR_CHECK(!looks.empty() && looks.size() <= kMostLooks && looks.size() == layers.size());
-  const View& view = looks.front();
+  HPR_CHECK(!views.empty() && views.size() <= kMaxViews && views.size() == layers.size());
+  const View& view = views.front();
   const FrameLayout& layout = layers.front()->layout();
   HPR_CHECK(screen < layout.screens() && layout.size(screen) == view.size());
   HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
   stats_ = {};
   if (rays_.geometries().empty()) return;
   const TileRun run = layout.tiles_of(screen);
-  const OccupiedPixels occupied(scene_, rays_, boxes_, looks, layout, screen);
+  const OccupiedPixels occupied(scene_, rays_, boxes_, views, layout, screen);
   std::mutex mutex;
   parallel_for(threads_, run.count, [&](std::size_t i) {
     std::array<std::uint8_t, kTilePixels> mask;
@@ -390,7 +423,7 @@ void PrimaryRays::draw(std::span<const View> looks, std::size_t screen, std::spa
     const std::span<const std::uint8_t> asked = mask_of(wanted, tile);
     if (!asked.empty()) std::ranges::transform(mask, asked, mask.begin(), std::bit_and<>());
     if (std::ranges::find(mask, std::uint8_t{1}) == mask.end()) return;
-    TileTracer tracer(scene_, rays_, looks);
+    TileTracer tracer(scene_, rays_, views);
     draw_tile(tracer, tile, parts, mask, layers);
     const std::lock_guard lock(mutex);
     stats_ += tracer.stats();

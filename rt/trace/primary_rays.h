@@ -17,7 +17,7 @@ namespace hpr {
 
 /// Makes keys by one ray through each pixel's centre: what Rasterizer makes, from Embree.
 ///
-/// A key's depth is reckoned in double from the triangle and the pixel's ray, and the largest key among the triangles
+/// A key's depth is computed in double from the triangle and the pixel's ray, and the largest key among the triangles
 /// the ray meets stays, exactly as compositing would have it. So the same screen gives the same keys however its area
 /// is cut into parts, however its triangles are dealt to ranks, and with any number of threads. Against the
 /// rasteriser's, other surfaces are seen in the pixels whose centre lies on an edge but for rounding.
@@ -33,12 +33,12 @@ class PrimaryRays {
   /// Merges (maximum) the keys of `parts` of the layer's `screen` into `layer`; tiles become active where something is
   /// seen. `view` is as large as that screen; parts are in its pixels and may reach past it.
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
-  /// The same for several views that differ by their jitter only, kMostLooks at most, together: rays through one pixel
-  /// are quicker in one another's company. Keys of looks[i] go to layers[i]; they are those each draw() would make.
-  /// Where pixels are not `wanted`, which is all of them when null, there are none.
-  void draw(std::span<const View> looks, std::size_t screen, std::span<const Rect> parts,
+  /// Draws several views together that differ by their jitter only, at most kMaxViews: rays through one pixel are
+  /// quicker in one packet. Keys of views[i] go to layers[i]; they are those that draw() of each view would make. Where
+  /// pixels are not `wanted`, which is all of them when null, there are none.
+  void draw(std::span<const View> views, std::size_t screen, std::span<const Rect> parts,
             std::span<TileLayer<Key>* const> layers, const PixelMask* wanted = nullptr);
-  static constexpr std::size_t kMostLooks = 16;
+  static constexpr std::size_t kMaxViews = 16;
 
   /// Of the last draw().
   [[nodiscard]] const PrimaryRayStats& stats() const { return stats_; }

@@ -103,7 +103,7 @@ TEST(PrimaryRays, SeeWhatASearchThroughAllTrianglesSees) {
   EXPECT_EQ(drawn.stats.invalid, 0U);
 }
 
-/// The same from so many ranks' shares of the scene, `run` surfaces at a time, cut without regard for meshes and
+/// Keys from so many ranks' shares of the scene, `run` surfaces at a time, cut without regard for meshes and
 /// instances.
 Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t shares, std::uint32_t run) {
   TileLayer<Key> layer(FrameLayout({view.size()}));
@@ -166,23 +166,23 @@ TEST(PrimaryRays, LooksTogetherSeeWhatEachSeesAloneAndMissesNothing) {
   const Scene scene = floating_scene();
   const RayScene rays(scene, RaySpace(scene.bounds), 2);
   PrimaryRays primary(scene, rays, 2);
-  std::vector<View> looks(11, front_view(scene));
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    looks[i].jitter = {0.9 * std::sin(5.0 * static_cast<double>(i)), 1.7 * std::cos(3.0 * static_cast<double>(i))};
+  std::vector<View> views(11, front_view(scene));
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].jitter = {0.9 * std::sin(5.0 * static_cast<double>(i)), 1.7 * std::cos(3.0 * static_cast<double>(i))};
   }
-  const FrameLayout layout({looks.front().size()});
+  const FrameLayout layout({views.front().size()});
   std::vector<TileLayer<Key>> layers;
-  for (std::size_t i = 0; i < looks.size(); ++i) layers.emplace_back(layout);
+  for (std::size_t i = 0; i < views.size(); ++i) layers.emplace_back(layout);
   std::vector<TileLayer<Key>*> together;
   for (TileLayer<Key>& layer : layers) together.push_back(&layer);
-  const Rect all = whole(looks.front());
-  primary.draw(looks, 0, std::span(&all, 1), together);
-  for (std::size_t i = 0; i < looks.size(); ++i) {
+  const Rect all = whole(views.front());
+  primary.draw(views, 0, std::span(&all, 1), together);
+  for (std::size_t i = 0; i < views.size(); ++i) {
     TileLayer<Key> alone(layout);
-    primary.draw(looks[i], 0, std::span(&all, 1), alone);
+    primary.draw(views[i], 0, std::span(&all, 1), alone);
     EXPECT_TRUE(to_image(alone, 0) == to_image(layers[i], 0)) << "look " << i;
     if (i < 2) {
-      EXPECT_LT(disagreement(scene, looks[i], to_image(alone, 0)), 2e-4) << "look " << i;
+      EXPECT_LT(disagreement(scene, views[i], to_image(alone, 0)), 2e-4) << "look " << i;
     }
     EXPECT_LT(primary.stats().rays, all.area() / 2) << "background is left out";
     EXPECT_GT(covered(to_image(alone, 0)), all.area() / 20);

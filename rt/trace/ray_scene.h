@@ -1,26 +1,70 @@
 #pragma once
 
+#include <xmmintrin.h>
+
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
-#include "rt/trace/ray_build.h"
-#include "rt/trace/ray_space.h"
 #include "scene/scene.h"
 
 struct RTCSceneTy;
 
 namespace hpr {
 
+/// The float coordinates rays are traced in: world metres relative to the scene's centre, scaled by a power of two so
+/// that the scene's radius lies in [1, 2). Both steps are done in double; the scale is exact, so a scene scaled by a
+/// power of two gives the same bits.
+struct RaySpace {
+  glm::dvec3 origin{0.0};
+  double scale = 1.0;
+  double radius = 1.0;  ///< the scene's, in ray space: [1, 2)
+
+  RaySpace() = default;
+  explicit RaySpace(const Bounds& bounds) {
+    const glm::dvec3 half = 0.5 * bounds.high - 0.5 * bounds.low;
+    const double extent = std::max({half.x, half.y, half.z});
+    if (!std::isfinite(extent)) return;
+    origin = 0.5 * bounds.high + 0.5 * bounds.low;
+    if (!(extent > 0.0)) return;
+    scale = std::ldexp(1.0, std::clamp(-std::ilogb(extent), -1000, 1000));
+    radius = extent * scale;
+  }
+
+  [[nodiscard]] glm::dvec3 from_world(const glm::dvec3& world) const { return (world - origin) * scale; }
+};
+
+/// One unit in the last place of a float near 1: what a coordinate may lose on its way into Embree.
+inline constexpr double kFloatStep = 1.1920928955078125e-7;
+
+/// How many such steps a ray's origin is moved off its surface. Measured over object radii of 1e-9 to 1e9 and offsets
+/// of the centre up to 1e4 radii: no surface hits itself (Embree's triangle test needs about three).
+inline constexpr double kOriginSteps = 4.0;
+
+/// Denormal numbers read and written as zero while it lives, as Embree advises; the thread's own mode returns after.
+class DenormalsAsZero {
+ public:
+  DenormalsAsZero() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040U); }
+  ~DenormalsAsZero() { _mm_setcsr(before_); }
+  DenormalsAsZero(const DenormalsAsZero&) = delete;
+  DenormalsAsZero& operator=(const DenormalsAsZero&) = delete;
+
+ private:
+  unsigned int before_;
+};
+
 inline constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
 
 /// Embree's own limit is the square root of the largest float; past it (or at NaN) builds with assertions abort.
-inline constexpr float kFarthestRay = 1.8e18F;
+inline constexpr float kMaxRayDistance = 1.8e18F;
 
 /// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
 class RayBatch {
@@ -83,10 +127,11 @@ class RayBatch {
   std::vector<Packet> packets_;
 };
 
-/// Whether Embree can bear it: finite, with a direction, within kFarthestRay.
-[[nodiscard]] bool is_bearable(const RayBatch::Ray& ray);
+/// Whether Embree can trace it: finite, with a direction, within kMaxRayDistance.
+[[nodiscard]] bool is_traceable(const RayBatch::Ray& ray);
 
-/// Whether rays that share a packet go the same way; Embree is quicker when told so rightly. No answer depends on it.
+/// Whether rays that share a packet go the same way; a hint that makes Embree quicker where it is right and changes no
+/// result.
 enum class Coherence { Low, High };
 
 /// What a ray has met and passed, if it is sent once more from where it began: it then meets what comes next by
@@ -106,7 +151,7 @@ struct RayGeometry {
   std::uint32_t first_surface = 0;
 };
 
-class TravellingRays;
+class RayForwarding;
 
 /// The scene as Embree holds it: meshes used once go in as world triangles, shared ones as instances of a sub-scene.
 ///
@@ -129,24 +174,26 @@ class RayScene {
   /// surfaces[i] = the first surface ray i meets, or kNoSurface. Returns how many rays were invalid.
   [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<std::uint32_t> surfaces,
                                       Coherence coherence = Coherence::Low) const;
-  /// The same for rays that may have passed surfaces: passed[i] says which, and is set to what ray i meets now.
+  /// Finds the first surface of rays that may have passed surfaces before: passed[i] says which, and is set to what ray
+  /// i meets now.
   [[nodiscard]] std::uint64_t closest(const RayBatch& rays, std::span<Passed> passed,
                                       std::span<std::uint32_t> surfaces) const;
 
-  /// This is one rank's part of a scene of which the others hold the rest: from now on answers are of all of it, and
-  /// may be asked for inside for_each() only. Ranks call it alike, scene by scene. `others` outlives this.
-  void share(TravellingRays& others);
+  /// Declares this one rank's part of a scene of which the other ranks hold the rest: from now on queries answer for
+  /// all of it, and may be called inside for_each() only. Collective: ranks call it scene by scene in one order.
+  /// `forwarding` outlives this.
+  void share(RayForwarding& forwarding);
   /// Calls body(i) for i in [0, count) by `threads` threads, as parallel_for; collective where the scene is shared.
   void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const;
-  /// Of this rank's part alone.
-  [[nodiscard]] std::uint64_t occluded_here(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
-  [[nodiscard]] std::uint64_t closest_here(const RayBatch& rays, std::span<Passed> passed,
-                                           std::span<std::uint32_t> surfaces) const;
+  /// Queries of this rank's part alone.
+  [[nodiscard]] std::uint64_t occluded_local(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
+  [[nodiscard]] std::uint64_t closest_local(const RayBatch& rays, std::span<Passed> passed,
+                                            std::span<std::uint32_t> surfaces) const;
 
   /// Triangles left out because their world positions are beyond what float holds.
   [[nodiscard]] std::uint64_t skipped_triangles() const;
 
-  /// For those in rt/ who ask Embree themselves. Geometry ids of its top level index geometries(); where it holds
+  /// For code in rt/ that calls Embree itself. Geometry ids of its top level index geometries(); where it holds
   /// instances, only instance ids do.
   [[nodiscard]] RTCSceneTy* embree() const;
   [[nodiscard]] std::span<const RayGeometry> geometries() const;
@@ -157,8 +204,8 @@ class RayScene {
                              Coherence coherence) const;
 
   struct Embree;
-  TravellingRays* others_ = nullptr;  ///< null: this is the whole scene
-  std::uint32_t part_ = 0;            ///< its number there
+  RayForwarding* forwarding_ = nullptr;  ///< null: this is the whole scene
+  std::uint32_t part_ = 0;               ///< its number there
   RaySpace space_;
   std::unique_ptr<Embree> embree_;
 };

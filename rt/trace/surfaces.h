@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -10,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "rt/trace/ray_space.h"
+#include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -28,7 +30,7 @@ struct WorldTriangle {
   double offset = 0.0;                  ///< metres by which ray origins must leave it
 };
 
-/// Where a ray meets a surface, and all that shading asks of the place. World coordinates, metres.
+/// Where a ray meets a surface, and all that shading needs of the place. World coordinates, metres.
 struct SurfacePoint {
   glm::dvec3 position{0.0};          ///< v0 + u e1 + v e2
   glm::dvec3 to_viewer{0.0};         ///< unit length, against the ray
@@ -121,5 +123,18 @@ class RecentTriangles {
   std::vector<WorldTriangle> triangles_ = std::vector<WorldTriangle>(kPlaces);
   std::uint32_t instance_ = 0;  ///< of the last one loaded, which the next mostly shares
 };
+
+/// Which part of its mesh each triangle belongs to: triangles are of one part that share a place, by whatever vertices.
+/// Numbers from 0, in the order of each part's first triangle. O(n log n).
+[[nodiscard]] std::vector<std::uint32_t> parts_of(const Mesh& mesh);
+
+/// Barycentric coordinates moved onto the triangle; its middle where they are undefined (a triangle seen edge-on).
+[[nodiscard]] inline glm::dvec2 onto_triangle(double u, double v) {
+  if (!std::isfinite(u) || !std::isfinite(v)) return glm::dvec2(1.0 / 3.0);
+  u = std::max(u, 0.0);
+  v = std::max(v, 0.0);
+  const double sum = std::max(u + v, 1.0);
+  return {u / sum, v / sum};
+}
 
 }  // namespace hpr

@@ -14,7 +14,7 @@
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "rt/passes/pass_list.h"
 #include "scene/view.h"
 #include "tools/bench/bench_bare_gl.h"
@@ -116,7 +116,7 @@ class Bench {
   void draw(int frames) {
     Progress silent("none", "sample", 0);
     for (int frame = -1; frame < frames; ++frame) {
-      session_.lighter(plan_.rays).forget_photons();  // of the same sample, in the frame before
+      session_.shader(plan_.rays).discard_photons();  // of the same sample, in the frame before
       const Stopwatch watch;
       FrameSampler sampler(session_, plan_, sampling_, 0, false);
       (void)sampler.draw(blocks_.views, {}, silent);  // it stops before its goal for a checkpoint only

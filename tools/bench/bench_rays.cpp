@@ -14,7 +14,6 @@
 #include "core/error.h"
 #include "image/tiles.h"
 #include "rt/passes/pass_list.h"
-#include "rt/trace/denormals.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"

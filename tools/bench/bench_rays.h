@@ -2,7 +2,6 @@
 
 #include <vector>
 
-#include "rt/trace/ray_build.h"
 #include "rt/trace/ray_scene.h"
 #include "scene/scene.h"
 #include "scene/view.h"

@@ -16,7 +16,7 @@
 #include "engine/output.h"
 #include "engine/session.h"
 #include "engine/wall/wall_displays.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "tools/bench/bench_times.h"
 #include "tools/report/lists.h"
 #include "walls/config/wall_file.h"
@@ -75,7 +75,7 @@ class WallBench {
 
   Times draw_one() {
     CountingCommunicator& comm = session_.comm();
-    session_.lighter(plan_.rays).forget_photons();  // of the same sample, in the frame before
+    session_.shader(plan_.rays).discard_photons();  // of the same sample, in the frame before
     barrier(comm);
     const std::size_t bytes_before = comm.bytes_sent();
     const double start = comm.seconds();

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "rt/trace/ray_space.h"
+#include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/generators/shapes.h"
 #include "tools/stability/cases.h"
@@ -125,7 +125,8 @@ class SunnyFloor {
   /// What the floor's pixels show is named by keys, so that the cover does not hide it from the eye.
   [[nodiscard]] std::size_t lit_pixels(const Scene& scene) const {
     TileLayer<Rgb> radiance(keys_.layout());
-    Lighter(scene, settings_).light(std::span(&view_, 1), keys_, all_tiles(keys_.layout()), {.radiance = &radiance});
+    DeferredShader(scene, settings_)
+        .shade(std::span(&view_, 1), keys_, all_tiles(keys_.layout()), {.radiance = &radiance});
     const Image<Rgb> image = to_image(radiance, 0);
     return static_cast<std::size_t>(
         std::ranges::count_if(image.pixels(), [](const Rgb& color) { return color.r > 0.0F; }));

@@ -2,7 +2,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 

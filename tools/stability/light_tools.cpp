@@ -11,7 +11,6 @@
 #include "core/parallel.h"
 #include "rt/trace/primary_rays.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/ray_space.h"
 #include "tools/stability/tools.h"
 
 namespace hpr::stability {
@@ -80,10 +79,10 @@ LitPicture lit_picture(const Scene& scene, const View& view, const RaySettings& 
   const Rect whole{0, 0, size.width, size.height};
   PrimaryRays(scene, rays, settings.threads).draw(view, 0, std::span(&whole, 1), picture.keys);
   TileLayer<Rgb> radiance(picture.keys.layout());
-  Lighter lighter(scene, settings);
-  lighter.light(std::span(&view, 1), picture.keys, all_tiles(picture.keys.layout()), {.radiance = &radiance});
+  DeferredShader shader(scene, settings);
+  shader.shade(std::span(&view, 1), picture.keys, all_tiles(picture.keys.layout()), {.radiance = &radiance});
   picture.image = to_image(radiance, 0);
-  picture.counts = lighter.counts();
+  picture.counts = shader.counts();
   return picture;
 }
 

@@ -12,7 +12,7 @@
 #include "image/image.h"
 #include "image/key.h"
 #include "image/tiles.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 #include "tools/stability/stability.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cluster/transport/local_communicator.h"
-#include "rt/lights/light_set.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/photons/photon_map.h"
 #include "rt/photons/photon_tracer.h"
 #include "rt/trace/ray_scene.h"
@@ -85,7 +85,7 @@ class PhotonRoom {
   RaySpace space_;
   Surfaces surfaces_;
   RayScene rays_;
-  LightSet lights_;
+  LightSampler lights_;
 };
 
 /// How far the light of photons [first, first + kSlice) of `all`, each kept once, is from their share of `power`.

@@ -13,7 +13,7 @@
 #include "image/key.h"
 #include "image/tiles.h"
 #include "raster/gl_context.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 

@@ -8,7 +8,6 @@
 
 #include "core/parallel.h"
 #include "rt/trace/ray_scene.h"
-#include "rt/trace/ray_space.h"
 #include "rt/trace/surfaces.h"
 #include "scene/generators/shapes.h"
 #include "tools/stability/cases.h"

@@ -10,7 +10,7 @@
 #include "app/doctor/doctor.h"
 #include "engine/render_settings.h"
 #include "image/image.h"
-#include "rt/lighter.h"
+#include "rt/deferred_shader.h"
 #include "tools/diff/diff_colors.h"
 
 namespace hpr {

@@ -267,7 +267,7 @@ TradeoffPoint measure_point(Session& session, const RenderSettings& settings, co
   // What the first frame of new settings makes for all that follow is not a frame's own cost: where frames are quick,
   // one goes before those that count.
   for (int frame = 0; frame <= how.frames && (frame == 0 || spent < kLongEnoughMs); ++frame) {
-    if (setup.plan.lit) session.lighter(setup.plan.rays).forget_photons();  // of the same sample, in the frame before
+    if (setup.plan.lit) session.shader(setup.plan.rays).discard_photons();  // of the same sample, in the frame before
     const std::size_t sent_before = session.comm().bytes_sent();
     const Stopwatch watch;
     Progress silent("none", "sample", 0);

@@ -1,0 +1,486 @@
+#include "rt/deferred_shader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <mutex>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "core/error.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/timing.h"
+#include "rt/denoise/coverage_fragments.h"
+#include "rt/denoise/denoiser.h"
+#include "rt/lights/direct_light.h"
+#include "rt/passes/half_resolution.h"
+#include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
+#include "rt/passes/pixel_sums.h"
+#include "rt/photons/photon_tracer.h"
+#include "rt/reference/path_tracer.h"
+#include "rt/trace/ray_scene.h"
+
+namespace hpr {
+namespace {
+
+void check_sizes(std::span<const ShadedSample> samples) {
+  const FrameLayout& layout = samples.front().keys->layout();
+  for (const ShadedSample& sample : samples) {
+    HPR_CHECK(sample.keys->layout() == layout && sample.views.size() == layout.screens());
+    for (std::size_t i = 0; i < sample.views.size(); ++i) HPR_CHECK(sample.views[i].size() == layout.size(i));
+  }
+}
+
+// Where each step's time stands.
+constexpr std::size_t kSurfaceStep = 0;
+constexpr std::size_t kDirectStep = 1;
+constexpr std::size_t kFirstPassStep = 2;
+
+struct RunningPass {
+  const PassInfo& info;
+  std::unique_ptr<Pass> pass;
+};
+
+bool gathers_all_lobes(std::span<const PassPlan> plan) {
+  return runs_pass(plan, [](const PassInfo& pass) { return pass.gathers_all_lobes; });
+}
+
+/// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
+struct Scratch {
+  explicit Scratch(std::size_t times) : ms(times, 0.0) {}
+
+  PixelSums sums;
+  RayBuffers buffers;
+  HalfResShading shared;
+  Denoiser denoiser;
+  FragmentFinder finder;
+  std::vector<std::vector<PathVertex>> waiting;  ///< by depth
+  Wavefront wave;
+  std::vector<double> ms;  ///< spent on each step
+};
+
+/// What all steps took so far.
+double spent_ms(const Scratch& scratch) {
+  return std::accumulate(scratch.ms.begin(), scratch.ms.end(), 0.0);
+}
+
+/// While rays are forwarded, more threads run than there are cores, and most of them wait: scales the times of the
+/// steps to the time that was spent.
+void share_out(double spent, std::vector<double>& ms) {
+  const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
+  for (double& step : ms) step *= sum > 0.0 ? spent / sum : 0.0;
+}
+
+}  // namespace
+
+RayCounts& RayCounts::operator+=(const RayCounts& other) {
+  primary += other.primary;
+  for (std::size_t i = 0; i < kPasses; ++i) passes[i] += other.passes[i];
+  invalid += other.invalid;
+  cut += other.cut;
+  not_finite += other.not_finite;
+  first_not_finite = std::min(first_not_finite, other.first_not_finite);
+  return *this;
+}
+
+struct DeferredShader::State {
+  const Scene& scene;
+  RaySettings settings;
+  std::vector<PassPlan> plan;
+  RaySpace space;
+  Surfaces surfaces;
+  LightSampler lights;
+  MediumFinder media;
+  std::vector<RunningPass> passes;
+  ComponentSet shared = 0;  ///< see HalfResShading
+  std::array<bool, kLobes.size()> followed_lobes{};
+  bool gathers;
+  std::optional<RayScene> own_opaque;
+  const RayScene* opaque = nullptr;
+  std::optional<RayScene> alpha_tested;
+  std::optional<CoverageTraversal> rays;
+  std::optional<RayScene> whole;  ///< for photons; only where `opaque` is not all
+  std::optional<PhotonMapBuilder> photons;
+  std::optional<PathTracer> reference;
+  CoverageFragments fragments;  ///< of the pixels that denoising samples again
+  std::vector<std::unique_ptr<Scratch>> idle;
+  std::mutex mutex;
+  RayCounts counts;
+  double photon_ms = 0.0;   ///< spent on tracing photons, since the last gather_counts()
+  bool has_warned = false;  ///< that rays were cut
+  std::vector<PassTime> times;
+
+  RayForwarding* forwarding;
+
+  State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
+        RayForwarding* others);
+  void build_rays(const RaySource& source);
+  const RayScene& build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects);
+  void build_photons();
+  void build_reference();
+  void for_each(std::size_t count, const std::function<void(std::size_t)>& body) const;
+  /// What rays meet that decide about coverage themselves.
+  const RayScene& whole_scene();
+  void trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles);
+  const PhotonMaps* trace_photons(const SampleNumber& number, Communicator* comm);
+  void warn_of_cut_rays();
+  std::unique_ptr<Scratch> take_scratch();
+  void shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+                  std::span<const ShadedSample> samples);
+  void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
+  void gather_counts(double spent_ms);
+  void shade_waiting(const LightContext& context, Scratch& scratch) const;
+  void shade_wavefront(const LightContext& context, Scratch& scratch) const;
+};
+
+DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
+                             const RaySource& source, RayForwarding* others)
+    : scene(lit),
+      settings(std::move(chosen)),
+      plan(plan_passes(requirements, settings)),
+      space(lit.bounds),
+      surfaces(lit, space, lifts_origins(plan, settings)),
+      lights(lit, gathers_all_lobes(plan) ? ConstantEnvironment::LeftToRays : ConstantEnvironment::Sampled),
+      media(lit),
+      shared(shared_components(settings)),
+      gathers(gathers_all_lobes(plan)),
+      forwarding(others) {
+  for (const PassPlan& planned : plan) {
+    if (!planned.runs) continue;
+    const PassInfo& info = info_of(planned.pass);
+    if (info.lobe) followed_lobes.at(static_cast<std::size_t>(*info.lobe)) = true;
+    passes.push_back({info, info.make()});
+  }
+  if (!passes.empty() || settings.reference || settings.denoise || !covering_surfaces(lit, true).empty()) {
+    build_rays(source);
+  }
+  if (runs_pass(plan, [](const PassInfo& pass) { return pass.needs_photons; })) build_photons();
+  if (settings.reference) build_reference();
+}
+
+/// Builds the ray scene of this rank's part of `objects`.
+const RayScene& DeferredShader::State::build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects) {
+  if (settings.part) objects = common_ranges(merged_ranges(*settings.part, scene.triangles), objects);
+  made.emplace(scene, space, settings.threads, objects, settings.build);
+  if (forwarding != nullptr) made->share(*forwarding);
+  return *made;
+}
+
+void DeferredShader::State::for_each(std::size_t count, const std::function<void(std::size_t)>& body) const {
+  if (opaque != nullptr) {
+    opaque->for_each(settings.threads, count, body);
+  } else {
+    parallel_for(settings.threads, count, body);
+  }
+}
+
+void DeferredShader::State::build_rays(const RaySource& source) {
+  opaque = source ? &source() : &build(own_opaque, covering_surfaces(scene, false));
+  std::uint64_t skipped = opaque->skipped_triangles();
+  if (const auto with_alpha = covering_surfaces(scene, true); !with_alpha.empty()) {
+    (void)build(alpha_tested, with_alpha);
+    skipped += alpha_tested->skipped_triangles();
+  }
+  rays.emplace(scene, surfaces, space, *opaque, alpha_tested ? &*alpha_tested : nullptr);
+  if (skipped > 0) log::warning("{} triangles lie beyond what rays can reach; no ray meets them", skipped);
+}
+
+void DeferredShader::State::build_photons() {
+  if (settings.photons == 0) settings.photons = kPhotons;
+  photons.emplace(scene, surfaces, space, whole_scene(), lights, settings);
+}
+
+void DeferredShader::State::build_reference() {
+  PathSettings own;
+  own.seed = settings.seed;
+  own.max_depth = settings.max_depth;
+  own.glossy_cutoff = settings.glossy_cutoff;
+  own.terminator_fix = settings.terminator_fix;
+  own.spread_in_pixel = false;  // views are jittered
+  own.threads = settings.threads;
+  reference.emplace(scene, whole_scene(), lights, own);
+}
+
+const RayScene& DeferredShader::State::whole_scene() {
+  if (!alpha_tested) return *opaque;
+  return whole ? *whole : build(whole, {SurfaceRange{0, scene.triangles}});
+}
+
+void DeferredShader::State::trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles) {
+  const Stopwatch watch;
+  reference->trace(sample.views, tiles, sample.number, *sample.output.radiance, sample.wanted);
+  const PathCounts& traced = reference->counts();
+  counts = {};
+  counts.primary = traced.primary;
+  counts[PassId::Shadow] = traced.shadow;
+  counts[PassId::Reflection] = traced.diffuse + traced.reflection;
+  counts[PassId::Refraction] = traced.transmission;
+  counts.invalid = traced.invalid;
+  counts.cut = traced.cut;
+  counts.not_finite = traced.not_finite;
+  counts.first_not_finite = traced.first_not_finite;
+  times = {{"reference", watch.ms() * settings.threads}};
+}
+
+const PhotonMaps* DeferredShader::State::trace_photons(const SampleNumber& number, Communicator* comm) {
+  if (!photons) return nullptr;
+  const Stopwatch watch;
+  const PhotonMaps& maps = photons->build(number, comm);
+  photon_ms += watch.ms();
+  return &maps;
+}
+
+void DeferredShader::State::warn_of_cut_rays() {
+  if (counts.cut == 0 || std::exchange(has_warned, true)) return;
+  log::warning("{} rays of a sample or a few passed {} surfaces that cover in part; what is behind is not all seen",
+               counts.cut, kMaxPassed);
+}
+
+std::unique_ptr<Scratch> DeferredShader::State::take_scratch() {
+  {
+    const std::lock_guard lock(mutex);
+    if (!idle.empty()) {
+      std::unique_ptr<Scratch> scratch = std::move(idle.back());
+      idle.pop_back();
+      return scratch;
+    }
+  }
+  return std::make_unique<Scratch>(kFirstPassStep + passes.size() + 1);
+}
+
+void DeferredShader::State::shade_wavefront(const LightContext& context, Scratch& scratch) const {
+  PixelSums& sums = scratch.sums;
+  RayBuffers& buffers = scratch.buffers;
+  Wavefront& wave = scratch.wave;
+  Stopwatch watch;
+  const auto charge = [&](std::size_t step) {
+    scratch.ms[step] += watch.ms();
+    watch.restart();
+  };
+  const auto for_each_pass = [&](const auto& body) {
+    for (std::size_t i = 0; i < passes.size(); ++i) {
+      body(*passes[i].pass);
+      charge(kFirstPassStep + i);
+    }
+  };
+  add_emission(context, wave, sums);
+  charge(kDirectStep);
+  const std::size_t depth = wave.vertices.front().depth + 1U;
+  if (scratch.waiting.size() <= depth) scratch.waiting.resize(depth + 1);
+  for_each_pass([&](const Pass& pass) { pass.scatter(context, wave, buffers, sums, scratch.waiting[depth]); });
+  for (DirectLight light(context, wave); light.sample_next();) {
+    charge(kDirectStep);
+    for_each_pass([&](const Pass& pass) { pass.trace_shadows(context, buffers, sums, wave); });
+    add_samples(wave, sums);
+    charge(kDirectStep);
+  }
+}
+
+/// Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
+void DeferredShader::State::shade_waiting(const LightContext& context, Scratch& scratch) const {
+  while (true) {
+    const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
+                                              [](const auto& points) { return !points.empty(); });
+    if (deepest == scratch.waiting.rend()) return;
+    if (deepest->size() <= kWavefrontVertices) {
+      scratch.wave.vertices.clear();
+      std::swap(scratch.wave.vertices, *deepest);
+    } else {
+      const auto first = deepest->end() - static_cast<std::ptrdiff_t>(kWavefrontVertices);
+      scratch.wave.vertices.assign(first, deepest->end());
+      deepest->erase(first, deepest->end());
+    }
+    shade_wavefront(context, scratch);
+  }
+}
+
+/// Light of neighbours in place of a sample's own, once that is known.
+void DeferredShader::State::denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                    std::size_t index) {
+  const Stopwatch watch;
+  const double before = spent_ms(scratch);
+  const TileFragments& tile_fragments =
+      fragments.of_tile(context, scratch.buffers, jobs.front(), index, scratch.finder);
+  for (const TileJob& job : jobs) {
+    if (job.number.sample >= kDenoisedSamples) break;
+    scratch.denoiser.resample_edges(context, job, tile_fragments, scratch.buffers, scratch.sums, scratch.waiting[0]);
+    shade_waiting(context, scratch);
+    scratch.denoiser.resolve(context, job, tile_fragments, scratch.sums);
+  }
+  scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
+}
+
+/// Shades some rows of one sample after those of another: what one sample has read the next one finds in the cache.
+void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                       std::size_t index, std::span<const ShadedSample> samples) {
+  const trace::Span span("light tile", "tile", index);
+  const DenormalsAsZero mode;
+  PixelSums& sums = scratch.sums;
+  const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
+  sums.clear(index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises);
+  if (denoises) scratch.denoiser.start(jobs.size(), sums.wants_components);
+  if (scratch.waiting.empty()) scratch.waiting.resize(1);
+  if (shared != 0) scratch.shared.start(shared, context, jobs.front());
+  const int height = jobs.front().place.height();
+  for (RowRange rows; rows.first < height; rows.first = rows.end) {
+    rows.end = end_of_wavefront(jobs.front(), rows.first);
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      const Stopwatch watch;
+      find_primary_vertices(context, jobs[i], rows, scratch.buffers, sums, scratch.waiting[0]);
+      add_first_surfaces(scratch.waiting[0], index, samples[i].output);
+      if (shared != 0) scratch.shared.choose(scratch.waiting[0], rows.first);
+      if (denoises) scratch.denoiser.add_vertices(context, scratch.waiting[0]);
+      scratch.ms[kSurfaceStep] += watch.ms();
+      shade_waiting(context, scratch);
+    }
+  }
+  if (shared != 0) scratch.shared.upsample(sums);
+  if (denoises) denoise(context, scratch, jobs, index);
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);
+  }
+}
+
+/// Counts and times of what was lit, gathered from the threads' memory.
+void DeferredShader::State::gather_counts(double spent_ms) {
+  counts = {};
+  std::vector<double> ms(kFirstPassStep + passes.size() + 1, 0.0);
+  for (const auto& scratch : idle) {
+    counts += std::exchange(scratch->buffers.counts, {});
+    counts.cut += std::exchange(scratch->buffers.scratch.cut, 0);
+    for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
+  }
+  if (forwarding != nullptr) share_out(spent_ms, ms);
+  if (photons) {
+    const PhotonCounts sent = photons->take_counts();
+    for (const RunningPass& running : passes) {
+      if (running.info.needs_photons) counts[running.info.id] = sent.rays;
+    }
+    counts.invalid += sent.invalid;
+    counts.cut += sent.cut;
+  }
+  warn_of_cut_rays();
+  times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
+  for (std::size_t i = 0; i < passes.size(); ++i) {
+    double& spent = ms[kFirstPassStep + i];
+    // Threads send together what they gather one by one: times are summed over threads.
+    const PassInfo& info = passes[i].info;
+    if (info.needs_photons) spent += std::exchange(photon_ms, 0.0) * settings.threads;
+    times.push_back({std::string(info.name), spent, info.id});
+  }
+  if (settings.denoise) times.push_back({"denoise", ms.back()});
+}
+
+DeferredShader::DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements,
+                               const RaySource& rays, RayForwarding* forwarding)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, forwarding)) {}
+DeferredShader::~DeferredShader() = default;
+DeferredShader::DeferredShader(DeferredShader&&) noexcept = default;
+DeferredShader& DeferredShader::operator=(DeferredShader&&) noexcept = default;
+
+const RayCounts& DeferredShader::counts() const {
+  return state_->counts;
+}
+const std::vector<PassTime>& DeferredShader::times() const {
+  return state_->times;
+}
+
+bool DeferredShader::shades_one_by_one() const {
+  return state_->reference || state_->photons || state_->shared != 0;
+}
+
+void DeferredShader::shade(std::span<const View> views, const TileLayer<Key>& keys, std::span<const std::size_t> tiles,
+                           const LightOutput& output, const SampleNumber& number) {
+  const ShadedSample only{views, &keys, output, number};
+  shade(std::span(&only, 1), tiles);
+}
+
+void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles) {
+  HPR_CHECK(samples.size() == 1 || (!samples.empty() && !shades_one_by_one()));
+  check_sizes(samples);
+  const ShadedSample& first = samples.front();
+  const FrameLayout& layout = first.keys->layout();
+  State& state = *state_;
+  if (state.reference) {
+    state.trace_reference(first, tiles);
+    state.warn_of_cut_rays();
+    return;
+  }
+  const PhotonMaps* const photons = state.trace_photons(first.number, nullptr);
+  const std::vector<Media> eyes = state.media.of_eyes(first.views);
+  const Stopwatch watch;
+  if (state.settings.denoise) state.fragments.prepare(layout, first.views, state.settings);
+  const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
+  state.for_each(order.size(), [&](std::size_t i) {
+    const std::size_t tile = order[i];
+    const TilePlace place = layout.place(tile);
+    const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
+    if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
+    std::vector<TileJob> jobs;
+    for (const ShadedSample& sample : samples) {
+      set_active(sample.output, tile);
+      jobs.push_back({place.pixels, sample.number, sample.keys->tile(tile), &sample.views[place.screen],
+                      static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
+    }
+    std::unique_ptr<Scratch> scratch = state.take_scratch();
+    const LightContext context{.scene = state.scene,
+                               .surfaces = state.surfaces,
+                               .rays = state.rays ? &*state.rays : nullptr,
+                               .lights = state.lights,
+                               .settings = state.settings,
+                               .followed_lobes = state.followed_lobes,
+                               .gathers = state.gathers,
+                               .photons = photons,
+                               .view = &first.views[place.screen],
+                               .eye_media = eyes[place.screen]};
+    state.shade_tile(context, *scratch, jobs, tile, samples);
+    const std::lock_guard lock(state.mutex);
+    state.idle.push_back(std::move(scratch));
+  });
+  state.gather_counts(watch.ms() * state.settings.threads);
+}
+
+void DeferredShader::trace_photons(Communicator& comm, const SampleNumber& number) {
+  (void)state_->trace_photons(number, &comm);
+}
+
+void DeferredShader::discard_photons() {
+  if (state_->photons) state_->photons->discard();
+}
+
+void shade_local(DeferredShader& shader, std::span<const View> views, TileLayer<Key>& keys,
+                 std::span<const std::size_t> tiles, const SampleNumber& number) {
+  TileLayer<Rgb> radiance(keys.layout());
+  shader.shade(views, keys, tiles, {.radiance = &radiance}, number);
+  for (const std::size_t tile : tiles) {
+    const std::span<const Rgb> colors = radiance.tile(tile);
+    const std::span<Key> words = keys.tile(tile);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (words[i] != kNoKey) words[i] = make_color_key(key_depth(words[i]), to_word(to_srgb(colors[i])));
+    }
+  }
+}
+
+void shade_empty(DeferredShader& shader, std::span<const View> views, const TileLayer<Key>& keys,
+                 std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number) {
+  std::vector<std::size_t> open;
+  std::ranges::copy_if(tiles, std::back_inserter(open),
+                       [&](std::size_t tile) { return std::ranges::count(keys.tile(tile), kNoKey) > 0; });
+  // Keys that carry colours name no surfaces: pixels that have one are lit as if they were empty, and left out.
+  const TileLayer<Key> empty(keys.layout());
+  TileLayer<Rgb> behind(keys.layout());
+  shader.shade(views, empty, open, {.radiance = &behind}, number);
+  for (const std::size_t tile : open) {
+    const std::span<const Key> words = keys.tile(tile);
+    const std::span<const Rgb> from = behind.tile(tile);
+    const std::span<Rgb> to = radiance.tile(tile);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (words[i] == kNoKey) to[i] = from[i];
+    }
+  }
+}
+
+}  // namespace hpr

@@ -1,0 +1,82 @@
+#include <algorithm>
+
+#include "rt/passes/path_vertex.h"
+#include "rt/photons/photon_query.h"
+
+/// The passes that follow lobes of surfaces by rays.
+namespace hpr {
+namespace {
+
+/// Mirror images, sharp and blurred: one ray per point along its specular reflection.
+class ReflectionPass final : public Pass {
+ public:
+  /// Settings may follow rougher surfaces than those that mirror to the eye, or smoother ones alone; what is followed
+  /// takes no photons.
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    const bool followed = follows_reflections(scene, settings.glossy_cutoff);
+    if (followed == scene.reflection.needed) return scene.reflection;
+    return {followed, followed ? "materials are smoother than the glossy cutoff"
+                               : "no material is smoother than the glossy cutoff"};
+  }
+
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& next) const override {
+    const PassInfo& pass = info_of(PassId::Reflection);
+    follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
+  }
+};
+
+/// What is seen through surfaces, bent by solids and straight through sheets, clear and frosted: one ray per point.
+class RefractionPass final : public Pass {
+ public:
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& /*settings*/) const override {
+    return scene.refraction;
+  }
+
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& next) const override {
+    const PassInfo& pass = info_of(PassId::Refraction);
+    follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
+  }
+};
+
+/// Indirect light along rays: lobes that no other pass follows are followed too, so that paths go on until they leave
+/// the scene. What photons do where lights are small, without their blur; the light of a constant environment comes
+/// that way too.
+class GatherPass final : public Pass {
+ public:
+  [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
+    if (!scene.indirect.needed || gathers_by_rays(scene, settings)) return scene.indirect;
+    return {false, "photons are to bring what light surfaces scatter on, if anything is"};
+  }
+  [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
+    return gathers_by_rays(scene, settings);
+  }
+
+  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
+               std::vector<PathVertex>& next) const override {
+    for (const Lobe lobe : kLobes) follow_lobe(context, wave, info_of(PassId::Gather), lobe, buffers, sums, next);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Pass> make_reflection_pass() {
+  return std::make_unique<ReflectionPass>();
+}
+
+std::unique_ptr<Pass> make_refraction_pass() {
+  return std::make_unique<RefractionPass>();
+}
+
+bool gathers_by_rays(const Requirements& scene, const RaySettings& settings) {
+  if (std::ranges::find(settings.passes, PassId::Gather) != settings.passes.end()) return true;
+  return settings.photons > 0 && settings.passes.empty() && (settings.auto_passes || settings.all_passes) &&
+         settings.global_photons && settings.gather && scene.constant_environment && settings.half_resolution.empty();
+}
+
+std::unique_ptr<Pass> make_gather_pass() {
+  return std::make_unique<GatherPass>();
+}
+
+}  // namespace hpr

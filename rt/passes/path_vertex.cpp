@@ -1,0 +1,347 @@
+#include "rt/passes/path_vertex.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "rt/lights/direct_light.h"
+#include "rt/passes/pass.h"
+#include "rt/photons/photon_query.h"
+#include "rt/sampling/sampling.h"
+
+namespace hpr {
+namespace {
+
+Sampler sampler_of(const LightContext& context, const TileJob& job, int x, int y) {
+  const View& view = *job.view;
+  return {pixel_stream({context.settings.seed, job.number.frame}, view.screen_number, view.block.x0 + job.place.x0 + x,
+                       view.block.y0 + job.place.y0 + y),
+          job.number.sample};
+}
+
+/// See find_primary_vertices. Points are finished once all are found: by then the memory has what materials read.
+class PrimaryVertices {
+ public:
+  PrimaryVertices(const LightContext& context, const TileJob& job, const RowRange& rows, RayBuffers& buffers,
+                  PixelSums& sums, std::vector<PathVertex>& points)
+      : context_(context), job_(job), rows_(rows), buffers_(buffers), sums_(sums), points_(points) {}
+
+  void find() {
+    const std::size_t before = points_.size();
+    find_surfaces();
+    for (PathVertex& point : std::span(points_).subspan(before)) finish_vertex(context_, point);
+  }
+
+ private:
+  void find_surfaces() {
+    if (context_.rays != nullptr && context_.rays->has_alpha_tested()) trace_alpha_tested();
+    const std::optional<glm::dvec3> even = context_.lights.constant_environment();
+    prefetch(rows_.first);
+    for (int y = rows_.first; y < rows_.end; ++y) {
+      if (y + 1 < rows_.end) prefetch(y + 1);
+      for (int x = 0; x < job_.place.width(); ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+        const double share = left_.empty() ? 1.0 : left_[pixel];
+        if (!(share > 0.0) || !job_.wants(pixel)) continue;
+        if (job_.keys[pixel] != kNoKey) {
+          find_surface(x, y, job_.keys[pixel], share);
+          continue;
+        }
+        const glm::dvec3 light = even ? *even : context_.lights.environment(glm::normalize(ray_of(x, y).direction));
+        sums_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, share * light);
+      }
+    }
+  }
+
+  void find_surface(int x, int y, Key key, double share) {
+    const Ray ray = ray_of(x, y);
+    const WorldTriangle& triangle = buffers_.triangles.load(context_.surfaces, key_surface(key));
+    PathVertex& point = points_.emplace_back();
+    point.surface = context_.surfaces.meet(triangle, ray.origin, ray.direction);
+    start_vertex(context_, job_, x, y, share, point);
+  }
+
+  void prefetch(int y) const {
+    std::array<std::uint32_t, kTileSide> ids;
+    const std::span<const Key> row = job_.keys.subspan(static_cast<std::size_t>(y) * kTileSide, kTileSide);
+    std::ranges::transform(row, ids.begin(), [](Key key) { return key == kNoKey ? kNoSurface : key_surface(key); });
+    context_.surfaces.prefetch(ids);
+  }
+
+  [[nodiscard]] Ray ray_of(int x, int y) const {
+    return view_ray(*job_.view, job_.place.x0 + x + 0.5, job_.place.y0 + y + 0.5);
+  }
+
+  /// Rays go from the near plane to the surface the key names: what they meet covers a share of what lies behind.
+  void trace_alpha_tested() {
+    left_.assign(kTilePixels, 1.0);
+    buffers_.requests.clear();
+    WorldTriangle triangle;
+    for (int y = rows_.first; y < rows_.end; ++y) {
+      for (int x = 0; x < job_.place.width(); ++x) {
+        const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
+        if (!job_.wants(pixel)) continue;
+        const Ray ray = ray_of(x, y);
+        RayRequest request = eye_ray(*job_.view, job_, x + 0.5, y + 0.5);
+        if (job_.keys[pixel] != kNoKey) {
+          context_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
+          const SurfacePoint behind = context_.surfaces.meet(triangle, ray.origin, ray.direction);
+          request.reach = std::max(0.0, glm::dot(behind.position - request.origin, request.direction));
+        }
+        request.owner = pixel;
+        buffers_.requests.push_back(request);
+        sums_.count_ray(job_.first_pixel + pixel);
+      }
+    }
+    buffers_.counts.primary += buffers_.requests.size();
+    std::vector<RayRequest> rays = std::move(buffers_.requests);
+    context_.rays->visit_alpha_tested(rays, buffers_.scratch,
+                                      [&](std::size_t i, const SurfacePoint& surface, double coverage) {
+                                        const std::uint32_t pixel = rays[i].owner;
+                                        const int x = static_cast<int>(pixel) % kTileSide;
+                                        const int y = static_cast<int>(pixel) / kTileSide;
+                                        Sampler sampler = sampler_of(context_, job_, x, y).branch(surface.surface);
+                                        const double covered = left_[pixel] * coverage;
+                                        const double share = covered * russian_roulette_weight(covered, sampler);
+                                        if (share > 0.0) {
+                                          PathVertex& point = points_.emplace_back();
+                                          point.surface = surface;
+                                          start_vertex(context_, job_, x, y, share, point);
+                                        }
+                                        left_[pixel] *= 1.0 - coverage;
+                                        left_[pixel] *= russian_roulette_weight(left_[pixel], sampler);
+                                        return left_[pixel] > 0.0;
+                                      });
+    buffers_.requests = std::move(rays);
+  }
+
+  const LightContext& context_;
+  const TileJob& job_;
+  RowRange rows_;
+  RayBuffers& buffers_;
+  PixelSums& sums_;
+  std::vector<PathVertex>& points_;
+  std::vector<double> left_;  ///< per pixel: the share not yet covered; empty where nothing covers in part
+};
+
+}  // namespace
+
+void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double share, PathVertex& point) {
+  point.coverage = share;
+  point.media = context.eye_media;
+  point.throughput = share * transmittance(point.media.here, glm::distance(job.view->eye, point.surface.position));
+  point.sampler = sampler_of(context, job, x, y);
+  point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
+  prefetch_material(context.scene, point.surface);
+}
+
+RayRequest eye_ray(const View& view, const TileJob& job, double x, double y) {
+  const Ray ray = view_ray(view, job.place.x0 + x, job.place.y0 + y);
+  RayRequest request;
+  request.origin = ray.origin + ray.direction * view.near_distance;
+  request.direction = glm::normalize(ray.direction);
+  request.reach = view.orthographic ? view.far_distance - view.near_distance : std::numeric_limits<double>::infinity();
+  return request;
+}
+
+std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const TileLayer<Key>& keys, int threads) {
+  constexpr std::size_t kManyPerThread = 64;
+  std::vector<std::size_t> order(tiles.begin(), tiles.end());
+  if (threads < 2 || order.size() > kManyPerThread * static_cast<std::size_t>(threads)) return order;
+  std::vector<std::pair<std::ptrdiff_t, std::size_t>> empty;  // pixels, of every fourth row
+  for (const std::size_t tile : order) {
+    std::ptrdiff_t pixels = keys.active(tile) ? 0 : kTilePixels;
+    for (std::size_t row = 0; keys.active(tile) && row < kTilePixels; row += 4 * std::size_t{kTileSide}) {
+      pixels += std::ranges::count(keys.tile(tile).subspan(row, kTileSide), kNoKey);
+    }
+    empty.emplace_back(pixels, tile);
+  }
+  std::ranges::sort(empty);
+  std::ranges::transform(empty, order.begin(), [](const auto& each) { return each.second; });
+  return order;
+}
+
+int end_of_wavefront(const TileJob& job, int first) {
+  if (job.wanted.empty()) return std::min(first + static_cast<int>(kWavefrontVertices) / kTileSide, job.place.height());
+  std::size_t points = 0;
+  int row = first;
+  do {
+    const auto pixels = job.wanted.subspan(static_cast<std::size_t>(row) * kTileSide, kTileSide);
+    points += static_cast<std::size_t>(std::ranges::count(pixels, std::uint8_t{1}));
+  } while (++row < job.place.height() && points + kTileSide <= kWavefrontVertices);
+  return row;
+}
+
+void find_primary_vertices(const LightContext& context, const TileJob& job, const RowRange& rows, RayBuffers& buffers,
+                           PixelSums& sums, std::vector<PathVertex>& points) {
+  PrimaryVertices(context, job, rows, buffers, sums, points).find();
+}
+
+namespace {
+
+/// From here on a point that could be followed in two ways is followed in one, by chance: else the rays of nested glass
+/// would double with every surface.
+constexpr int kChoosingDepth = 2;
+
+/// Paths that may go on for ever are ended by roulette from here on, by what is left of their throughput.
+constexpr int kRouletteDepth = 3;
+/// And at the latest here; what white rooms would have beyond is less than roulette leaves.
+constexpr int kMaxGathered = 256;
+
+/// Where all lobes are followed: each from what the eye sees, and then one of them by chance, in proportion to the
+/// light it scatters.
+void choose_lobes(const LightContext& context, PathVertex& point) {
+  std::array<double, kLobes.size()> sums{};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+    const bool ends = point.followed >= context.settings.max_depth && context.follows_for_itself(point.bsdf, kLobes[i]);
+    if (point.depth == 0) {
+      point.may_follow[i] = !ends && point.bsdf.present(kLobes[i]);
+      point.lobe_weights[i] = point.may_follow[i] ? 1.0F : 0.0F;
+      continue;
+    }
+    const double bright = ends ? 0.0 : brightness(point.throughput * point.bsdf.weight(kLobes[i]));
+    point.may_follow[i] = bright > 0.0;
+    sums[i] = sum += bright;
+  }
+  if (!(sum > 0.0)) return;
+  const double chance = point.depth < kRouletteDepth ? 1.0 : std::min(sum, 1.0);
+  const double u = point.sampler.one() / chance;
+  if (!(u < 1.0)) return;
+  const DiscreteSample picked = sample_discrete(sums, u);
+  point.lobe_weights[picked.index] = static_cast<float>(1.0 / (picked.probability * chance));
+}
+
+/// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
+glm::dvec3 sky_along(const LightContext& context, const LobeRay& ray, const glm::dvec3& direction,
+                     const PassInfo& pass) {
+  const PathVertex& from = *ray.from;
+  if (!context.scene.environment && (pass.gathers_all_lobes || from.gathered))
+    return glm::dvec3(0.0);  // a backdrop is no light
+  const double light_pdf =
+      ray.pdf > 0.0 ? context.lights.environment_pdf(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
+  return balance_heuristic(context, ray.pdf, light_pdf) * ray.throughput * context.lights.environment(direction);
+}
+
+/// Makes a ray per point of the wave that follows the lobe: buffers.following and buffers.requests.
+void make_lobe_rays(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
+                    RayBuffers& buffers, PixelSums& sums) {
+  std::vector<LobeRay>& rays = buffers.lobe_rays;
+  rays.clear();
+  buffers.requests.clear();
+  for (const PathVertex& point : wave.vertices) {
+    const double factor = point.lobe_weights[static_cast<std::size_t>(lobe)];
+    if (factor == 0.0) continue;
+    if (context.gathers && context.follows_for_itself(point.bsdf, lobe) == pass.gathers_all_lobes) continue;
+    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
+    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
+    if (!sample) continue;
+    glm::dvec3 throughput = factor * point.throughput * sample->weight;
+    throughput *= russian_roulette_weight(brightness(throughput), sampler);
+    if (throughput == glm::dvec3(0.0)) continue;
+    rays.push_back({&point, throughput, sample->pdf, sampler});
+    buffers.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
+                                std::numeric_limits<double>::infinity(), nullptr, 0});
+    sums.count_ray(point.pixel);
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i) buffers.requests[i].sampler = &rays[i].sampler;
+}
+
+/// What ray i finds of the sky; of rays that gather from the first surface also what it would have found, as direct
+/// light less its shadow.
+void add_sky(const LightContext& context, const RayBuffers& buffers, std::size_t i, const PassInfo& pass,
+             PixelSums& sums) {
+  const LobeRay& ray = buffers.lobe_rays[i];
+  const PathVertex& from = *ray.from;
+  const bool leaves = buffers.hits[i] == kNoSurface;
+  const bool shows_sky = pass.gathers_all_lobes && from.depth == 0;
+  if (!leaves && !(shows_sky && sums.wants_components)) return;
+  const glm::dvec3 sky = sky_along(context, ray, buffers.requests[i].direction, pass);
+  if (!shows_sky) return sums.add(from.pixel, component_after(from, pass.component), sky);
+  if (leaves) return sums.add(from.pixel, Component::Direct, sky, true);
+  sums.add_shadowed(from.pixel, sky);
+}
+
+/// Sets the point that ray i reaches, but for what finish_vertex does.
+void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i, const PassInfo& pass,
+                 PathVertex& reached) {
+  const LobeRay& ray = buffers.lobe_rays[i];
+  const RayRequest& request = buffers.requests[i];
+  const PathVertex& from = *ray.from;
+  const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.hits[i]);
+  reached.surface = context.surfaces.meet(triangle, request.origin, request.direction);
+  reached.throughput = ray.throughput;
+  reached.media = media_towards(from.media, from.surface, from.material, request.direction);
+  reached.previous_position = from.surface.position;
+  reached.previous_normal = from.bsdf.light_normal();
+  reached.previous_pdf = ray.pdf;
+  reached.sampler = ray.sampler;
+  reached.pixel = from.pixel;
+  reached.depth = static_cast<std::uint16_t>(from.depth + 1);
+  reached.followed = static_cast<std::uint16_t>(from.followed + (pass.gathers_all_lobes ? 0 : 1));
+  reached.gathered = from.gathered || pass.gathers_all_lobes;
+  reached.component = component_after(from, pass.component);
+}
+
+}  // namespace
+
+bool LightContext::follows_for_itself(const Bsdf& bsdf, Lobe lobe) const {
+  return followed_lobes[static_cast<std::size_t>(lobe)] && is_followed(bsdf, lobe, settings.glossy_cutoff);
+}
+
+Component component_after(const PathVertex& point, Component first) {
+  return point.depth == 0 ? first : point.component;
+}
+
+void finish_vertex(const LightContext& context, PathVertex& point, double metres) {
+  point.material = evaluate_material(context.scene, point.surface);
+  if (metres > 0.0) point.throughput *= transmittance_to(point.media, point.surface, point.material, metres);
+  point.bsdf = Bsdf(point.material, point.surface);
+  if (context.gathers) {
+    if (point.depth < kMaxGathered) choose_lobes(context, point);
+    return;
+  }
+  if (point.depth >= context.settings.max_depth) return;
+  std::array<double, kLobes.size()> bright{};
+  for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
+    const auto i = static_cast<std::size_t>(lobe);
+    if (!context.follows_for_itself(point.bsdf, lobe)) continue;
+    bright[i] = brightness(point.throughput * point.bsdf.weight(lobe));
+    point.may_follow[i] = bright[i] > 0.0;
+    point.lobe_weights[i] = static_cast<float>(russian_roulette_weight(bright[i], point.sampler));
+  }
+  const auto reflection = static_cast<std::size_t>(Lobe::Reflection);
+  const auto transmission = static_cast<std::size_t>(Lobe::Transmission);
+  if (point.depth < kChoosingDepth || !point.may_follow[reflection] || !point.may_follow[transmission]) return;
+  const double share = std::clamp(bright[reflection] / (bright[reflection] + bright[transmission]), 0.1, 0.9);
+  const bool reflects = point.sampler.one() < share;
+  point.lobe_weights[reflection] *= reflects ? static_cast<float>(1.0 / share) : 0.0F;
+  point.lobe_weights[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - share));
+}
+
+void follow_lobe(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
+                 RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& next) {
+  make_lobe_rays(context, wave, pass, lobe, buffers, sums);
+  buffers.hits.resize(buffers.lobe_rays.size());
+  buffers.counts[pass.id] += buffers.lobe_rays.size();
+  buffers.counts.invalid += context.rays->closest(buffers.requests, buffers.hits, buffers.scratch);
+
+  const std::size_t before = next.size();
+  for (std::size_t i = 0; i < buffers.lobe_rays.size(); ++i) {
+    add_sky(context, buffers, i, pass, sums);
+    if (buffers.hits[i] == kNoSurface) continue;
+    make_vertex(context, buffers, i, pass, next.emplace_back());
+    prefetch_material(context.scene, next.back().surface);
+  }
+  // By now the memory has what materials read.
+  for (PathVertex& reached : std::span(next).subspan(before)) {
+    finish_vertex(context, reached, glm::distance(reached.surface.position, reached.previous_position));
+  }
+}
+
+}  // namespace hpr

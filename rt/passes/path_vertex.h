@@ -1,0 +1,84 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "image/key.h"
+#include "image/tiles.h"
+#include "rt/passes/pass.h"
+
+namespace hpr {
+
+/// One sample of a tile: its pixels, its view and its keys.
+struct TileJob {
+  Rect place;
+  SampleNumber number;
+  std::span<const Key> keys;
+  const View* view = nullptr;
+  std::uint32_t first_pixel = 0;              ///< index into PixelSums: those of other samples come before
+  std::span<const std::uint8_t> wanted = {};  ///< 1 at the pixels that are shaded; empty: all
+
+  [[nodiscard]] bool wants(std::size_t pixel) const { return wanted.empty() || wanted[pixel] != 0; }
+};
+
+/// Orders `tiles` so that threads end at about the same time: those that show most surfaces first. Leaves them as they
+/// are where there are so many that the last ones hardly matter.
+[[nodiscard]] std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const TileLayer<Key>& keys,
+                                                     int threads);
+
+/// Rows of a tile, from its own first one.
+struct RowRange {
+  int first = 0;
+  int end = 0;
+};
+
+/// Vertices that are shaded together: enough to fill packets, few enough for the second-level cache.
+inline constexpr std::size_t kWavefrontVertices = 512;
+
+/// The ray through (x, y) of the tile, in pixels from its upper left corner, from the near plane to the far one.
+/// `view`: the job's, at any jitter.
+[[nodiscard]] RayRequest eye_ray(const View& view, const TileJob& job, double x, double y);
+
+/// Past the last of the rows, `first` and on, whose pixels make a wavefront.
+[[nodiscard]] int end_of_wavefront(const TileJob& job, int first);
+
+/// Initializes a vertex whose surface is set, shown at pixel (x, y) of the tile, of which it covers `share`.
+void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double share, PathVertex& point);
+
+/// Finds the primary vertices in some rows of a tile: the surfaces its keys name, and those of partial coverage before
+/// them, each with the share of the pixel it covers. Adds the background where neither is.
+void find_primary_vertices(const LightContext& context, const TileJob& job, const RowRange& rows, RayBuffers& buffers,
+                           PixelSums& sums, std::vector<PathVertex>& points);
+
+/// Below it a path changes an 8-bit sRGB picture of scenes whose radiance is below 10 by less than half of its darkest
+/// step, 1 / (2 * 255 * 12.92): by roulette it ends there, or counts for those that did.
+inline constexpr double kMinThroughput = 1.0 / 65536.0;
+
+[[nodiscard]] inline double brightness(const glm::dvec3& color) {
+  return std::max({color.r, color.g, color.b});
+}
+
+/// Russian roulette below kMinThroughput: the factor of a path whose throughput is so bright; 0 where it ends.
+[[nodiscard]] inline double russian_roulette_weight(double brightness, Sampler& sampler) {
+  if (!(brightness < kMinThroughput)) return 1.0;
+  const double chance = brightness / kMinThroughput;
+  return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
+}
+
+/// The component that light from a followed lobe of `point` counts in.
+[[nodiscard]] Component component_after(const PathVertex& point, Component first);
+
+/// Completes a vertex whose surface, throughput, sampler, depth and media are set: reads its material, takes off what
+/// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
+void finish_vertex(const LightContext& context, PathVertex& point, double metres = 0.0);
+
+/// Traces a ray per vertex of the wavefront that follows `lobe`, and appends the vertices those rays reach to `next`.
+/// A pass that gathers all lobes traces rays where no other pass follows the lobe for itself: the sky that such rays
+/// find from the first surface counts as direct light, and what hides it as shadow.
+void follow_lobe(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
+                 RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& next);
+
+}  // namespace hpr

@@ -1,0 +1,134 @@
+#include "rt/passes/pixel_sums.h"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "rt/passes/path_vertex.h"
+
+namespace hpr {
+namespace {
+
+Rgb to_rgb(const glm::dvec3& sum) {
+  return {static_cast<float>(sum.r), static_cast<float>(sum.g), static_cast<float>(sum.b)};
+}
+
+bool is_finite(const Rgb& color) {
+  if (std::isfinite(color.r + color.g + color.b)) return true;  // what is not finite makes the sum so
+  return std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b);
+}
+
+/// Calls `body` with each pixel of the tile that is lit.
+template <typename Body>
+void each_lit(const TileJob& job, const Body& body) {
+  for (int y = 0; y < job.place.height(); ++y) {
+    for (int x = 0; x < job.place.width(); ++x) {
+      const auto pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+      if (job.wants(pixel)) body(pixel);
+    }
+  }
+}
+
+/// Counts a pixel whose radiance is no finite number.
+void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) {
+  ++counts.not_finite;
+  const Rect& block = job.view->block;
+  const auto x = static_cast<int>(pixel % kTileSide);
+  const auto y = static_cast<int>(pixel / kTileSide);
+  counts.first_not_finite =
+      std::min(counts.first_not_finite,
+               ScreenPixel{job.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
+}
+
+/// Sets the sums of so many pixels, tile after tile, to 0 where they are wanted: everywhere when the mask is empty.
+void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::span<const std::uint8_t> wanted) {
+  if (wanted.empty()) {
+    sums.assign(pixels, glm::dvec3(0.0));
+    return;
+  }
+  sums.resize(pixels);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    if (wanted[pixel % kTilePixels] != 0) sums[pixel] = glm::dvec3(0.0);
+  }
+}
+
+}  // namespace
+
+void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, bool all_components, bool with_diffuse) {
+  const LightOutput& output = samples.front().output;  // all want the same
+  wants_components =
+      all_components || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
+  wants_diffuse = with_diffuse;
+  wants_cost = output.cost != nullptr;
+  const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, tile);
+  const std::size_t pixels = (samples.size() + (with_diffuse ? 1 : 0)) * kTilePixels;
+  clear_sums(radiance, pixels, wanted);
+  if (wants_diffuse) clear_sums(diffuse, pixels, wanted);
+  for (std::size_t i = 0; wants_components && i < kComponents; ++i) {
+    clear_sums(components.at(i), pixels, wanted);
+    if (wants_diffuse) clear_sums(diffuse_components.at(i), pixels, wanted);
+  }
+  if (wants_cost) cost.assign(pixels, 0.0F);
+  for (const ShadedSample& sample : samples) {
+    for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
+      if (layer != nullptr) std::ranges::fill(layer->tile(tile), Rgb{});
+    }
+  }
+}
+
+bool fits_floats(const glm::dvec3& light) {
+  return is_finite(to_rgb(light));
+}
+
+void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& output, RayCounts& counts) const {
+  const auto start = [&](auto* layer) {
+    const auto pixels = layer->tile(tile);
+    if (job.wanted.empty()) std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
+    return pixels;
+  };
+  const auto colors = start(output.radiance);
+  const std::size_t first = job.first_pixel;
+  each_lit(job, [&](std::size_t i) {
+    const Rgb color = to_rgb(radiance[first + i]);
+    colors[i] = is_finite(color) ? color : Rgb{};
+    if (!is_finite(color)) count_not_finite(job, i, counts);
+  });
+  for (std::size_t part = 0; part < kComponents; ++part) {
+    if (output.components.at(part) == nullptr) continue;
+    const auto pixels = start(output.components.at(part));
+    each_lit(job, [&](std::size_t i) {
+      const Rgb color = to_rgb(components[part][first + i]);
+      if (is_finite(color) && is_finite(to_rgb(radiance[first + i]))) pixels[i] = color;
+    });
+  }
+  if (output.cost != nullptr) {
+    const auto pixels = start(output.cost);
+    each_lit(job, [&](std::size_t i) { pixels[i] = cost[first + i]; });
+  }
+}
+
+void add_first_surfaces(const std::vector<PathVertex>& points, std::size_t tile, const LightOutput& output) {
+  for (TileLayer<Rgb>* layer : {output.normal, output.albedo}) {
+    if (layer == nullptr) continue;
+    const auto pixels = layer->tile(tile);
+    for (const PathVertex& point : points) {
+      const glm::dvec3 value = layer == output.normal ? point.material.normal : point.material.base_color;
+      const Rgb part = to_rgb(point.coverage * value);
+      Rgb& sum = pixels[point.pixel % kTilePixels];
+      sum = {sum.r + part.r, sum.g + part.g, sum.b + part.b};
+    }
+  }
+}
+
+void set_active(const LightOutput& output, std::size_t tile) {
+  const auto activate = [&](auto* layer) {
+    if (layer != nullptr) layer->set_active(tile);
+  };
+  activate(output.radiance);
+  for (TileLayer<Rgb>* layer : output.components) activate(layer);
+  activate(output.normal);
+  activate(output.albedo);
+  activate(output.cost);
+}
+
+}  // namespace hpr

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "rt/deferred_shader.h"
+#include "rt/passes/pass_list.h"
+
+namespace hpr {
+
+struct TileJob;
+
+/// Light summed per pixel of one tile, sample after sample, in an order that no thread changes: what passes add to.
+class PixelSums {
+ public:
+  /// Sets all sums of tile `tile` to 0 where `samples` want them, and what the samples store directly (normal, albedo).
+  /// `all_components`: also those that no sample wants. `with_diffuse`: also the diffuse part of each, and
+  /// there is room for one more sample behind those given (a denoiser's).
+  void clear(std::size_t tile, std::span<const ShadedSample> samples, bool all_components, bool with_diffuse);
+
+  /// Adds light that reaches a pixel.
+  void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
+    add(pixel, component, light, contains(kDiffuseComponents, component));
+  }
+  void add(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_diffuse) {
+    radiance[pixel] += light;
+    if (is_diffuse && wants_diffuse) diffuse[pixel] += light;
+    if (wants_components) add_to_component(pixel, component, light, is_diffuse);
+  }
+  /// Adds diffuse light that something hides, to components that are wanted: as direct light and its shadow.
+  void add_shadowed(std::uint32_t pixel, const glm::dvec3& light) {
+    add_to_component(pixel, Component::Direct, light, true);
+    add_to_component(pixel, Component::Shadow, -light, true);
+  }
+  /// Counts a ray that was traced for a pixel.
+  void count_ray(std::uint32_t pixel) {
+    if (wants_cost) cost[pixel] += 1.0F;
+  }
+
+  /// Stores the sums of a sample as pixels of tile `tile`. Light that is no finite number is black, in all layers, and
+  /// counted in `counts`.
+  void store(const TileJob& job, std::size_t tile, const LightOutput& output, RayCounts& counts) const;
+
+  bool wants_components = false;
+  bool wants_diffuse = false;
+  bool wants_cost = false;
+
+  // Per pixel of the tile, sample after sample; all but the radiance only when wanted.
+  std::vector<glm::dvec3> radiance;
+  std::array<std::vector<glm::dvec3>, kComponents> components;
+  /// The diffuse part of the radiance: what the first surface scatters by lobes that no pass follows for itself,
+  /// without the light of sampled lights; then the diffuse part of each component.
+  std::vector<glm::dvec3> diffuse;
+  std::array<std::vector<glm::dvec3>, kComponents> diffuse_components;
+  std::vector<float> cost;  ///< rays traced
+
+ private:
+  void add_to_component(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_diffuse) {
+    components[static_cast<std::size_t>(component)][pixel] += light;
+    if (is_diffuse && wants_diffuse) diffuse_components[static_cast<std::size_t>(component)][pixel] += light;
+  }
+};
+
+/// Whether a pixel of floats can hold the light; what does not fit is stored as black.
+[[nodiscard]] bool fits_floats(const glm::dvec3& light);
+
+/// Adds normal and base color of what each pixel sees to tile `tile`, of several surfaces each by its share.
+void add_first_surfaces(const std::vector<PathVertex>& points, std::size_t tile, const LightOutput& output);
+
+/// Makes the tile active in all layers there are.
+void set_active(const LightOutput& output, std::size_t tile);
+
+}  // namespace hpr

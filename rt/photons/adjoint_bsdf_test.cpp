@@ -1,0 +1,163 @@
+#include "rt/photons/adjoint_bsdf.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <optional>
+#include <string>
+#include <tuple>
+
+#include "rt/materials/test_bsdf.h"
+#include "rt/sampling/sampling.h"
+#include "rt/test_scene.h"
+
+// Light that is carried from lamps against light that is looked for from the eye, where normals lean.
+namespace hpr {
+namespace {
+
+struct Leaning {
+  double degrees;  ///< the shading normal's, towards +x
+  bool mapped;     ///< by a normal map, on top of a smooth normal that leans half as far towards -y
+};
+
+/// A place in the plane z = 0 with one material.
+struct Place {
+  Scene scene;
+  std::optional<Surfaces> surfaces;
+  WorldTriangle triangle;
+
+  Place(const Material& material, const Leaning& leaning) {
+    const std::uint32_t used = test::add_material(scene, material);
+    const double angle = glm::radians(leaning.degrees);
+    Mesh mesh = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, used);
+    mesh.normals.assign(
+        4, leaning.mapped ? test::direction(0.5 * angle, glm::radians(-90.0)) : test::direction(angle, 0.0));
+    if (leaning.mapped) {
+      const auto byte = [](double value) { return static_cast<std::uint8_t>(std::lround(127.5 + 127.5 * value)); };
+      Texture map;
+      map.image = Image<Rgba8>({1, 1});
+      map.image.at(0, 0) = {byte(std::sin(angle)), 128, byte(std::cos(angle)), 255};
+      scene.textures.push_back(std::move(map));
+      scene.materials[used].normal_texture.texture = 0;
+    }
+    test::place(scene, test::add_mesh(scene, std::move(mesh)));
+    finish_scene(scene);
+    surfaces.emplace(scene, RaySpace(scene.bounds));
+    surfaces->load(0, triangle);
+  }
+
+  [[nodiscard]] SurfacePoint from(const glm::dvec3& direction) const {
+    const glm::dvec3 place(0.2, -0.3, 0.0);
+    return surfaces->meet(triangle, place + direction, -direction);
+  }
+};
+
+Material surface_of(float metallic, float roughness) {
+  Material material;
+  material.base_color = {0.8F, 0.6F, 0.4F, 1.0F};
+  material.metallic = metallic;
+  material.roughness = roughness;
+  return material;
+}
+
+/// What lamps shine, by direction, and what an eye is worth: light and eye must agree on the sum, whatever these are.
+std::array<double, 3> brightness_of(const glm::dvec3& direction) {
+  return {1.0, direction.x > 0.3 ? 1.0 : 0.0, std::abs(direction.z) < 0.5 ? direction.y + 1.0 : 0.0};
+}
+std::array<double, 3> worth_of(const glm::dvec3& direction) {
+  return {1.0, direction.y > 0.1 ? 1.0 : 0.0, std::abs(direction.z) < 0.4 ? 2.0 : 0.5 * std::abs(direction.x)};
+}
+
+using Sums = std::array<std::array<double, 3>, 3>;  ///< [lamp][eye]
+
+/// Adds `amount`, in a direction chosen evenly on the sphere.
+void add(Sums& sums, double amount, const glm::dvec3& lamp, const glm::dvec3& eye) {
+  const auto brightness = brightness_of(lamp);
+  const auto worth = worth_of(eye);
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) sums.at(i).at(j) += amount * brightness.at(i) * worth.at(j);
+  }
+}
+
+constexpr std::uint32_t kSamples = 1U << 19U;
+
+/// Eyes that look for light by the lobe.
+Sums by_eyes(const Place& place, Lobe lobe) {
+  Sums sums{};
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    Sampler sampler(7, i);
+    const glm::dvec3 eye = warp::on_sphere(sampler.two());
+    const SurfacePoint surface = place.from(eye);
+    const Bsdf bsdf(evaluate_material(place.scene, surface), surface);
+    const auto sample = bsdf.sample(lobe, sampler.two());
+    if (sample) add(sums, sample->weight.r * std::abs(eye.z) / kSamples, sample->direction, eye);
+  }
+  return sums;
+}
+
+/// Light that looks for eyes.
+Sums by_light(const Place& place, Lobe lobe) {
+  Sums sums{};
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    Sampler sampler(8, i);
+    const glm::dvec3 light = warp::on_sphere(sampler.two());
+    const SurfacePoint surface = place.from(light);
+    const MaterialPoint material = evaluate_material(place.scene, surface);
+    const Bsdf bsdf(material, surface, Carried::Flux);
+    const FluxArrival arrival{surface, material, bsdf, place.triangle};
+    const AdjointBsdf scatters(place.scene, *place.surfaces, arrival);
+    const auto sample = scatters.sample(lobe, sampler);
+    EXPECT_TRUE(!sample || sample->weight.r == 0.0 || scatters.weight(lobe).r > 0.0);
+    if (!sample) continue;
+    EXPECT_TRUE(std::isfinite(sample->weight.r) && sample->weight.r >= 0.0);
+    EXPECT_NEAR(glm::length(sample->direction), 1.0, 1e-9);
+    // What refraction squeezes is radiance: flux counts as much of it as an eye sees.
+    add(sums, sample->weight.r * std::abs(light.z) / kSamples, light, sample->direction);
+  }
+  return sums;
+}
+
+Material glass(float roughness, float thickness) {
+  Material material = test::clear_glass(1.5F, thickness);
+  material.roughness = roughness;
+  return material;
+}
+
+class AdjointBsdf : public testing::TestWithParam<Leaning> {};
+
+TEST_P(AdjointBsdf, SendsOnWhatEyesSee) {
+  const std::array cases{std::tuple("matte", Lobe::Diffuse, surface_of(0.0F, 0.6F)),
+                         std::tuple("rough metal", Lobe::Reflection, surface_of(1.0F, 0.5F)),
+                         std::tuple("rough varnish", Lobe::Reflection, surface_of(0.0F, 0.9F)),
+                         std::tuple("mirror", Lobe::Reflection, surface_of(1.0F, 0.0F)),
+                         std::tuple("frosted sheet", Lobe::Transmission, glass(0.5F, 0.0F)),
+                         std::tuple("clear sheet", Lobe::Transmission, glass(0.0F, 0.0F)),
+                         std::tuple("frosted solid", Lobe::Transmission, glass(0.4F, 1.0F)),
+                         std::tuple("clear solid", Lobe::Transmission, glass(0.0F, 1.0F))};
+  for (const auto& [name, lobe, material] : cases) {
+    const Place place(material, GetParam());
+    const Sums seen = by_eyes(place, lobe);
+    const Sums sent = by_light(place, lobe);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) {
+        EXPECT_NEAR(sent.at(i).at(j), seen.at(i).at(j), 0.002 + 0.015 * seen.at(i).at(j))
+            << name << ", lamp " << i << ", eye " << j;
+      }
+    }
+  }
+}
+
+std::string name_of(const testing::TestParamInfo<Leaning>& info) {
+  return std::to_string(std::lround(info.param.degrees)) + (info.param.mapped ? "DegreesMapped" : "DegreesSmooth");
+}
+
+INSTANTIATE_TEST_SUITE_P(Normals, AdjointBsdf,
+                         testing::Values(Leaning{0, false}, Leaning{10, false}, Leaning{40, false}, Leaning{70, false},
+                                         Leaning{25, true}, Leaning{58, true}),
+                         name_of);
+
+}  // namespace
+}  // namespace hpr
