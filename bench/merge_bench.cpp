@@ -91,8 +91,8 @@ std::vector<Pixel> random_colors(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Pixel> pixels(kKeys1080p);
   using Channel = decltype(Pixel::a);
-  const auto up_to = [&](Channel most) {
-    return static_cast<Channel>(static_cast<double>(most) * static_cast<double>(random() % 1000) / 1000.0);
+  const auto up_to = [&](Channel max) {
+    return static_cast<Channel>(static_cast<double>(max) * static_cast<double>(random() % 1000) / 1000.0);
   };
   constexpr Channel kOne = sizeof(Channel) == 1 ? Channel{255} : Channel{1};
   for (Pixel& pixel : pixels) {

@@ -19,41 +19,41 @@ constexpr std::size_t kPhotons = 1'000'000;
 constexpr double kGathered = 50.0;
 constexpr double kGlossyCutoff = 0.3;
 
-struct Place {
+struct SurfaceSample {
   glm::dvec3 position;
   glm::dvec3 normal;
 };
 
 /// On the faces of the cube [-1, 1]^3, from inside.
-Place random_place(std::mt19937_64& random) {
+SurfaceSample random_position(std::mt19937_64& random) {
   std::uniform_real_distribution<double> side(-1.0, 1.0);
   const auto axis = static_cast<int>(random() % 3);
-  Place place{{side(random), side(random), side(random)}, glm::dvec3(0.0)};
-  place.position[axis] = random() % 2 == 0 ? -1.0 : 1.0;
-  place.normal[axis] = -place.position[axis];
-  return place;
+  SurfaceSample sample{{side(random), side(random), side(random)}, glm::dvec3(0.0)};
+  sample.position[axis] = random() % 2 == 0 ? -1.0 : 1.0;
+  sample.normal[axis] = -sample.position[axis];
+  return sample;
 }
 
 std::vector<hpr::Photon> photons_of_a_room() {
   std::mt19937_64 random(1);
   std::vector<hpr::Photon> photons(kPhotons);
   for (hpr::Photon& photon : photons) {
-    const Place place = random_place(random);
+    const SurfaceSample sample = random_position(random);
     for (int axis = 0; axis < 3; ++axis)
-      photon.position[static_cast<std::size_t>(axis)] = static_cast<float>(place.position[axis]);
-    photon.facing = hpr::pack_facing(place.normal);
-    photon.direction = hpr::pack_direction(place.normal - 0.5 * place.position);
+      photon.position[static_cast<std::size_t>(axis)] = static_cast<float>(sample.position[axis]);
+    photon.facing = hpr::pack_facing(sample.normal);
+    photon.direction = hpr::pack_direction(sample.normal - 0.5 * sample.position);
     photon.flux = {1e-6F, 2e-6F, 3e-6F};
   }
   return photons;
 }
 
 /// A place as the picture shows it, of rough plastic: seen from in front, a little from the side.
-struct Seen {
-  explicit Seen(const Place& place) {
-    surface.position = place.position;
-    surface.geometric_normal = surface.shading_normal = material.normal = place.normal;
-    surface.to_viewer = glm::normalize(2.0 * place.normal - place.position);
+struct ShadedPoint {
+  explicit ShadedPoint(const SurfaceSample& sample) {
+    surface.position = sample.position;
+    surface.geometric_normal = surface.shading_normal = material.normal = sample.normal;
+    surface.to_viewer = glm::normalize(2.0 * sample.normal - sample.position);
     material.roughness = 0.5;
     bsdf = hpr::Bsdf(material, surface);
   }
@@ -96,26 +96,26 @@ BENCHMARK(photon_scattered_copy)->Unit(benchmark::kMillisecond);
 void photon_gather(benchmark::State& state) {
   const hpr::PhotonMap map(photons_of_a_room(), room_space(), room_radius());
   std::mt19937_64 random(3);
-  std::vector<Place> places(1 << 16);
-  for (Place& place : places) place = random_place(random);
+  std::vector<SurfaceSample> positions(1 << 16);
+  for (SurfaceSample& sample : positions) sample = random_position(random);
   if (state.range(0) != 0) {
     // As neighbouring pixels come: a walk over one wall.
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t i = 0; i < positions.size(); ++i) {
       const std::size_t row = i / 256;
       const double across = static_cast<double>(i % 256) / 128.0 - 1.0;
-      places[i] = {{across, -1.0, static_cast<double>(row) / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
+      positions[i] = {{across, -1.0, static_cast<double>(row) / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
     }
   }
   std::size_t gathered = 0;
-  for (const Place& place : places) gathered += map.count(place.position, place.normal);
+  for (const SurfaceSample& sample : positions) gathered += map.count(sample.position, sample.normal);
   hpr::FoundPhotons found;
   std::size_t i = 0;
   for (auto _ : state) {
-    const Seen seen(places[i++ % places.size()]);
+    const ShadedPoint point(positions[i++ % positions.size()]);
     benchmark::DoNotOptimize(
-        hpr::gather_photons(map, seen.surface, seen.bsdf, seen.material.normal, kGlossyCutoff, found));
+        hpr::gather_photons(map, point.surface, point.bsdf, point.material.normal, kGlossyCutoff, found));
   }
-  state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(places.size());
+  state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(positions.size());
 }
 BENCHMARK(photon_gather)->ArgName("neighbours")->Arg(0)->Arg(1);
 

@@ -6,7 +6,7 @@
 
 #include "image/filter.h"
 #include "rt/passes/pass_id.h"
-#include "rt/trace/ray_scene.h"
+#include "rt/trace/ray_build.h"
 #include "scene/scene.h"
 
 namespace hpr {

@@ -15,7 +15,7 @@
 #include "rt/trace/primary_rays.h"
 #include "rt/trace/surfaces.h"
 #include "scene/load_scene.h"
-#include "tools/bench/bench_times.h"
+#include "tools/sweep.h"
 
 // Keys by OpenGL against keys by rays. HPR_AGREEMENT="SCENE SCENE ..." compares, and times, those scenes at 1920x1080.
 namespace hpr {

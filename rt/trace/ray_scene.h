@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rt/trace/ray_build.h"
 #include "scene/scene.h"
 
 struct RTCSceneTy;

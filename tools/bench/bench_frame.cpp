@@ -10,25 +10,25 @@
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
 #include "core/progress.h"
+#include "core/timing.h"
 #include "engine/checkpoint.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
 #include "rt/deferred_shader.h"
 #include "rt/passes/pass_list.h"
-#include "scene/view.h"
-#include "tools/bench/bench_bare_gl.h"
+#include "tools/bench/bench.h"
+#include "tools/bench/bench_raster.h"
 #include "tools/bench/bench_rays.h"
-#include "tools/bench/bench_rows.h"
-#include "tools/bench/bench_times.h"
 #include "tools/report/lists.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 namespace {
 
 constexpr Size kRayPicture{512, 512};
 /// The bare loop has them all in one buffer, instances written out.
-constexpr std::uint32_t kMostBareTriangles = 30'000'000;
+constexpr std::uint32_t kMaxBareTriangles = 30'000'000;
 
 /// What one frame took.
 struct Measured {
@@ -39,7 +39,7 @@ struct Measured {
 
 /// The median of what `of` takes out of each frame.
 template <typename Of>
-double middle(const std::vector<Measured>& frames, const Of& of) {
+double median_of(const std::vector<Measured>& frames, const Of& of) {
   std::vector<double> values;
   values.reserve(frames.size());
   for (const Measured& frame : frames) values.push_back(of(frame));
@@ -67,26 +67,16 @@ double bare_gl_ms(const Globals& globals, int threads, const WorldMesh& mesh, co
   const auto context =
       make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
   BareGl bare(*context, mesh.positions, mesh.triangles, glm::mat4(clip_from_world(view, {0.0, 0.0, 0.0})), view.size());
-  std::vector<double> times;
-  for (int frame = -2; frame < frames; ++frame) {  // two to warm up: shaders are compiled at the first draw
-    const Stopwatch watch;
-    bare.frame();
-    if (frame >= 0) times.push_back(watch.ms());
-  }
+  // Two frames to warm up: shaders are compiled at the first draw.
+  const double ms = median_times({[&] { bare.frame(); }}, {2, frames}).front();
   check_gl(context->gl(), "measuring");
-  return median(std::move(times));
+  return ms;
 }
 
 double copy_ms(std::size_t bytes) {
   const std::vector<std::byte> from(bytes, std::byte{1});
   std::vector<std::byte> into(bytes);
-  std::vector<double> times;
-  for (int i = 0; i < 9; ++i) {
-    const Stopwatch watch;
-    std::memcpy(into.data(), from.data(), bytes);
-    times.push_back(watch.ms());
-  }
-  return median(std::move(times));
+  return median_times({[&] { std::memcpy(into.data(), from.data(), bytes); }}, {0, 9}).front();
 }
 
 BenchRow row_of(std::string name, double ours, double floor) {
@@ -115,15 +105,15 @@ class Bench {
 
   void draw(int frames) {
     Progress silent("none", "sample", 0);
-    for (int frame = -1; frame < frames; ++frame) {
+    measure_in_turns(1, {1, frames}, [&](std::size_t /*contender*/, bool counts) {
       session_.shader(plan_.rays).discard_photons();  // of the same sample, in the frame before
       const Stopwatch watch;
       FrameSampler sampler(session_, plan_, sampling_, 0, false);
       (void)sampler.draw(blocks_.views, {}, silent);  // it stops before its goal for a checkpoint only
       const double drawn = watch.ms();
       (void)bring_to_screens(session_, sampler.frame(), blocks_, {{view_.screen}, {0}, exposure_});
-      if (frame >= 0) frames_.push_back({sampler.times(), watch.ms() - drawn, watch.ms()});
-    }
+      if (counts) frames_.push_back({sampler.times(), watch.ms() - drawn, watch.ms()});
+    });
   }
 
   /// `bare_keys_ms`: of BareGl, where keys are not made by rays; 0: it was not measured.
@@ -133,13 +123,13 @@ class Bench {
     const auto pixels = static_cast<double>(drawn_view().size().area());
     std::vector<BenchRow> rows{keys_row(by_rays() ? pixels / rate_of(rates, RayPattern::Primary) : bare_keys_ms)};
     for (const PassTime& pass : frames_.front().times.passes) rows.push_back(pass_row(pass, rates));
-    rows.push_back(row_of("to the screen", middle(frames_, [](const Measured& frame) { return frame.screen_ms; }),
+    rows.push_back(row_of("to the screen", median_of(frames_, [](const Measured& frame) { return frame.screen_ms; }),
                           copy_ms(view_.screen.area() * sizeof(Rgba8))));
     double floor = 0.0;
     for (const BenchRow& row : rows) floor += row.floor;
     rows.push_back(row_of(fmt::format("the frame, {}x{}, {:g} sample{}", view_.screen.width, view_.screen.height,
                                       samples, samples == 1.0 ? "" : "s"),
-                          middle(frames_, [](const Measured& frame) { return frame.frame_ms; }), floor));
+                          median_of(frames_, [](const Measured& frame) { return frame.frame_ms; }), floor));
     return rows;
   }
 
@@ -168,13 +158,13 @@ class Bench {
 
   [[nodiscard]] BenchRow keys_row(double floor_ms_of_sample) const {
     return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles, by_rays() ? " by rays" : ""),
-                  middle(frames_, [](const Measured& frame) { return frame.times.primary_ms; }),
+                  median_of(frames_, [](const Measured& frame) { return frame.times.primary_ms; }),
                   floor_ms_of_sample * frames_.front().times.samples);
   }
 
   [[nodiscard]] BenchRow pass_row(const PassTime& step, const Rates& rates) const {
     const double ours =
-        middle(frames_, [&](const Measured& frame) { return ms_of(frame.times, step.name) / session_.threads(); });
+        median_of(frames_, [&](const Measured& frame) { return ms_of(frame.times, step.name) / session_.threads(); });
     if (!step.pass) return row_of(step.name, ours, 0.0);
     const auto rays = static_cast<double>(frames_.front().times.rays[*step.pass]);
     const double rate = rate_of(rates, info_of(*step.pass).pattern);
@@ -234,7 +224,7 @@ class BenchFrameCommand final : public Command {
       Session session(comm, globals.session(), [&] { return load_scene(scene_, settings, globals); });
       Bench bench(session, settings, size);
       bench.draw(frames_);
-      const bool draws = !bench.by_rays() && session.scene().triangles <= kMostBareTriangles;
+      const bool draws = !bench.by_rays() && session.scene().triangles <= kMaxBareTriangles;
       rows = bench.rows(
           draws ? bare_gl_ms(globals, session.threads(), WorldMesh(session.scene()), bench.drawn_view(), frames_)
                 : 0.0);

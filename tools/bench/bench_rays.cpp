@@ -11,14 +11,19 @@
 #include <numbers>
 #include <span>
 
+#include "app/command.h"
+#include "app/doctor/doctor.h"
+#include "app/options/render_options.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "image/tiles.h"
 #include "rt/passes/pass_list.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/view.h"
-#include "tools/bench/bench_times.h"
+#include "tools/bench/bench.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 namespace {
@@ -33,34 +38,34 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 struct BenchRay {
   glm::dvec3 origin{0.0};
   glm::dvec3 direction{0.0};
-  double reach = kInfinity;
+  double max_distance = kInfinity;
 };
 
-enum class Question { Closest, Occluded };
+enum class Query { Closest, Occluded };
 
 struct RaySet {
   RayPattern pattern;
-  Question question;
+  Query query;
   embree::Rays kind;
   std::vector<BenchRay> rays;
 };
 
 /// Answers of either side, summed so that no work can be left out.
-using Answers = std::uint64_t;
+using Hits = std::uint64_t;
 
 class OurRays {
  public:
   OurRays(const RayScene& scene, const RaySet& set) : scene_(scene), set_(set), hits_(kBatch), blocked_(kBatch) {}
 
-  Answers trace(std::size_t begin, std::size_t end) {
-    Answers sum = 0;
+  Hits trace(std::size_t begin, std::size_t end) {
+    Hits sum = 0;
     for (std::size_t first = begin; first < end; first += kBatch) {
       batch_.clear();
       const std::size_t count = std::min(kBatch, end - first);
       for (const BenchRay& ray : std::span(set_.rays).subspan(first, count)) {
-        batch_.push(ray.origin, ray.direction, ray.reach);
+        batch_.push(ray.origin, ray.direction, ray.max_distance);
       }
-      if (set_.question == Question::Closest) {
+      if (set_.query == Query::Closest) {
         const std::span<std::uint32_t> hits(hits_.data(), count);
         (void)scene_.closest(batch_, hits, set_.kind == embree::Rays::Coherent ? Coherence::High : Coherence::Low);
         for (const std::uint32_t hit : hits) sum += hit != kNoSurface ? 1U : 0U;
@@ -98,7 +103,7 @@ class BareRays {
       to.dir_y[lane] = static_cast<float>(ray.direction.y);
       to.dir_z[lane] = static_cast<float>(ray.direction.z);
       to.tnear[lane] = 0.0F;
-      to.tfar[lane] = used ? static_cast<float>(ray.reach) : -1.0F;
+      to.tfar[lane] = used ? static_cast<float>(ray.max_distance) : -1.0F;
       to.time[lane] = 0.0F;
       to.mask[lane] = 0xFFFFFFFFU;
       to.id[lane] = 0;
@@ -107,13 +112,13 @@ class BareRays {
     }
   }
 
-  Answers trace(std::size_t begin, std::size_t end) {
+  Hits trace(std::size_t begin, std::size_t end) {
     embree::Context context;
     embree::start(context, set_.kind);
-    Answers sum = 0;
+    Hits sum = 0;
     for (std::size_t i = begin / kWidth; i * kWidth < end; ++i) {
       const int* const valid = valid_[i].lanes.data();
-      if (set_.question == Question::Closest) {
+      if (set_.query == Query::Closest) {
         RTCRayHit16 packet;
         packet.ray = packets_[i];
         std::ranges::fill(packet.hit.geomID, RTC_INVALID_GEOMETRY_ID);
@@ -153,14 +158,14 @@ BenchRow compare(const RayScene& scene, const RaySet& set) {
     double floor_best = kInfinity;
     for (int i = 0; i < kTries; ++i) {
       const double start = thread_ms();
-      const Answers answers = ours.trace(begin, end);
-      const double middle = thread_ms();
-      const Answers expected = bare.trace(begin, end);
-      our_best = std::min(our_best, middle - start);
-      floor_best = std::min(floor_best, thread_ms() - middle);
-      if (answers != expected) {
+      const Hits our_hits = ours.trace(begin, end);
+      const double between = thread_ms();
+      const Hits expected = bare.trace(begin, end);
+      our_best = std::min(our_best, between - start);
+      floor_best = std::min(floor_best, thread_ms() - between);
+      if (our_hits != expected) {
         throw Error(ExitCode::CheckFailed, fmt::format("{} rays: {} met something, but {} in Embree alone",
-                                                       name_of(set.pattern), answers, expected));
+                                                       name_of(set.pattern), our_hits, expected));
       }
     }
     our_ms += our_best;
@@ -173,19 +178,19 @@ BenchRow compare(const RayScene& scene, const RaySet& set) {
 /// What primary rays meet, and the rays that go on from there, in the order of the primary ones.
 std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const View& view) {
   const RaySpace& space = rays.space();
-  std::vector<RaySet> sets{{RayPattern::Primary, Question::Closest, embree::Rays::Coherent, {}},
-                           {RayPattern::Shadow, Question::Occluded, embree::Rays::Incoherent, {}},
-                           {RayPattern::Mirror, Question::Closest, embree::Rays::Incoherent, {}},
-                           {RayPattern::Diffuse, Question::Closest, embree::Rays::Incoherent, {}}};
+  std::vector<RaySet> sets{{RayPattern::Primary, Query::Closest, embree::Rays::Coherent, {}},
+                           {RayPattern::Shadow, Query::Occluded, embree::Rays::Incoherent, {}},
+                           {RayPattern::Mirror, Query::Closest, embree::Rays::Incoherent, {}},
+                           {RayPattern::Diffuse, Query::Closest, embree::Rays::Incoherent, {}}};
   RayBatch batch;
-  std::vector<Ray> seen;
+  std::vector<Ray> view_rays;
   const Size size = view.size();
   for (int i = 0; i < size.width * size.height; ++i) {
     // Squares of four by four, square after square in a row of them.
     const int x = i / 16 % (size.width / 4) * 4 + i % 4;
     const int y = i / (size.width * 4) * 4 + i / 4 % 4;
     const Ray ray = view_ray(view, x + 0.5, y + 0.5);
-    seen.push_back(ray);
+    view_rays.push_back(ray);
     sets[0].rays.push_back({space.from_world(ray.origin), glm::normalize(ray.direction), kInfinity});
     batch.push(sets[0].rays.back().origin, sets[0].rays.back().direction, kInfinity);
   }
@@ -198,7 +203,7 @@ std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const Vi
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (hits[i] == kNoSurface) continue;
     surfaces.load(hits[i], triangle);
-    const SurfacePoint point = surfaces.meet(triangle, seen[i].origin, seen[i].direction);
+    const SurfacePoint point = surfaces.meet(triangle, view_rays[i].origin, view_rays[i].direction);
     const glm::dvec3& normal = point.geometric_normal;
     const glm::dvec3 origin = space.from_world(point.position + point.offset * normal);
     const glm::dvec3 to_light = space.from_world(light) - origin;
@@ -215,13 +220,53 @@ std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const Vi
   return sets;
 }
 
-}  // namespace
-
-std::vector<BenchRow> bench_rays(const Scene& scene, int side, const RayBuild& build) {
+/// bench_rays of a picture of `side` x `side` pixels by the scene's first camera.
+std::vector<BenchRow> bench_picture(const Scene& scene, int side, const RayBuild& build) {
   const RayScene rays(scene, RaySpace(scene.bounds), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
   const Camera camera = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
   return bench_rays(scene, rays, make_view(camera, {side, side}, scene.bounds));
 }
+
+class BenchRaysCommand final : public Command {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "rays"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "rays of one thread as passes trace them, against a bare Embree loop";
+  }
+
+  void declare(const OptionSet& options) override {
+    const Option scene = options.option("scene", scene_, "another scene to trace");
+    options.option("--triangles", triangles_, "of the largest mesh of the scene made for it")
+        .range(std::uint64_t{100}, std::uint64_t{100'000'000})
+        .show_default()
+        .excludes(scene);
+    options.option("--side", side_, "pixels of the square picture, a multiple of 64").range(64, 8192).show_default();
+    for (const char* const name : {"embree-quality", "deterministic"}) {
+      declare_setting(options, settings_, *find_setting(name));
+    }
+    options.flag("--json", json_, "one JSON document");
+  }
+
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    const RayBuild build = settings_.frame.rays.build;
+    if (side_ % kTileSide != 0) {
+      throw Error(ExitCode::Usage, fmt::format("--side {} is no multiple of {}", side_, kTileSide),
+                  fmt::format("use --side {}", side_ / kTileSide * kTileSide));
+    }
+    const Scene scene = scene_.empty() ? ray_bench_scene(triangles_) : load_scene(scene_, globals.scene_limits());
+    print_bench(bench_picture(scene, side_, build), this_machine().cpu, json_);
+    return ExitCode::Done;
+  }
+
+ private:
+  std::string scene_;
+  std::uint64_t triangles_ = 1'000'000;
+  int side_ = 1024;
+  RenderSettings settings_;
+  bool json_ = false;
+};
+
+}  // namespace
 
 std::vector<BenchRow> bench_rays(const Scene& scene, const RayScene& rays, const View& view) {
   const DenormalsAsZero mode;
@@ -230,6 +275,10 @@ std::vector<BenchRow> bench_rays(const Scene& scene, const RayScene& rays, const
     if (!set.rays.empty()) rows.push_back(compare(rays, set));
   }
   return rows;
+}
+
+std::unique_ptr<Command> make_bench_rays_command() {
+  return std::make_unique<BenchRaysCommand>();
 }
 
 }  // namespace hpr

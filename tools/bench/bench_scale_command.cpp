@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <iterator>
 #include <numeric>
 #include <optional>
@@ -11,33 +10,25 @@
 
 #include "app/command.h"
 #include "app/doctor/doctor.h"
-#include "app/launch/launcher.h"
 #include "app/launch/run_ranks.h"
 #include "app/options/render_options.h"
-#include "app/results.h"
-#include "cluster/transport/collectives.h"
-#include "core/file.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/parallel.h"
-#include "core/progress.h"
 #include "core/text.h"
-#include "engine/output.h"
 #include "scene/view.h"
 #include "tools/bench/bench_scale.h"
-#include "tools/bench/bench_scale_html.h"
-#include "tools/bench/bench_scale_report.h"
 #include "tools/report/lists.h"
+#include "tools/sweep.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
 namespace {
 
-/// Set for the jobs that are measured: "THREADS FRAMES QUIET TRACED". Rank 0 prints its runs for the process that
-/// started it. Open MPI takes variables of this prefix to other hosts.
+/// Set for the jobs that are measured: "THREADS FRAMES QUIET TRACED". Rank 0 hands over its runs.
 constexpr const char* kJobVariable = "OMPI_HPR_BENCH_SCALE_JOB";
-/// Jobs of each size, with a share of the frames each, in an order by chance: what slows the machine down for a while
-/// does not fall on one size alone.
+/// Jobs of each size, each with a part of the frames, in random order: what slows the machine down for a while then
+/// does not affect one size alone.
 constexpr int kRounds = 3;
 
 struct JobOrder {
@@ -48,11 +39,12 @@ struct JobOrder {
 };
 
 std::optional<JobOrder> job_order() {
-  const char* const text = std::getenv(kJobVariable);  // NOLINT(concurrency-mt-unsafe): nothing sets variables
+  const std::optional<std::string> text = job_request(kJobVariable);
   JobOrder order;
-  if (text == nullptr ||
-      std::sscanf(text, "%d %d %d %d", &order.threads, &order.frames, &order.quiet, &order.traced) != 4)
+  if (!text ||
+      std::sscanf(text->c_str(), "%d %d %d %d", &order.threads, &order.frames, &order.quiet, &order.traced) != 4) {
     return {};
+  }
   return order;
 }
 
@@ -65,11 +57,11 @@ std::vector<int> each_once(const std::vector<int>& counts) {
   return once;
 }
 
-/// 1, 2, 4 .. and `most`.
-std::vector<int> doubled_up_to(int most) {
+/// 1, 2, 4 .. and `max`.
+std::vector<int> powers_of_two_up_to(int max) {
   std::vector<int> counts;
-  for (int count = 1; count < most; count *= 2) counts.push_back(count);
-  counts.push_back(most);
+  for (int count = 1; count < max; count *= 2) counts.push_back(count);
+  counts.push_back(max);
   return counts;
 }
 
@@ -93,9 +85,9 @@ class BenchScaleCommand final : public Command {
 
   [[nodiscard]] ScaleInput make_input(const Globals& globals) const;
   void check_files(const Globals& globals) const;
-  /// Empty: nothing was said.
-  [[nodiscard]] std::vector<int> ranks_said(const Globals& globals) const;
-  [[nodiscard]] std::vector<int> threads_said(const Globals& globals) const;
+  /// Empty: none were given.
+  [[nodiscard]] std::vector<int> given_ranks(const Globals& globals) const;
+  [[nodiscard]] std::vector<int> given_threads(const Globals& globals) const;
   [[nodiscard]] std::vector<Job> jobs(const Globals& globals) const;
   [[nodiscard]] ExitCode run_in_job(const Globals& globals, const ScaleInput& input) const;
   [[nodiscard]] ExitCode run_jobs(const Globals& globals, const ScaleInput& input) const;
@@ -133,29 +125,29 @@ void BenchScaleCommand::declare(const OptionSet& options) {
   options.flag("--json", json_, "one JSON document");
 }
 
-std::vector<int> BenchScaleCommand::ranks_said(const Globals& globals) const {
+std::vector<int> BenchScaleCommand::given_ranks(const Globals& globals) const {
   if (!ranks_.empty()) return each_once(parse_counts(ranks_, "--ranks"));
   return globals.ranks > 0 ? std::vector{globals.ranks} : std::vector<int>{};
 }
 
-std::vector<int> BenchScaleCommand::threads_said(const Globals& globals) const {
+std::vector<int> BenchScaleCommand::given_threads(const Globals& globals) const {
   if (!threads_.empty()) return each_once(parse_counts(threads_, "--threads"));
   return globals.threads > 0 ? std::vector{globals.threads} : std::vector<int>{};
 }
 
 std::vector<BenchScaleCommand::Job> BenchScaleCommand::jobs(const Globals& globals) const {
   const int cores = usable_cores();
-  const std::vector<int> said_ranks = ranks_said(globals);
-  const std::vector<int> said_threads = threads_said(globals);
-  const bool all_said = !said_threads.empty() || !said_ranks.empty();
-  const std::vector<int> ranks = said_ranks.empty() ? doubled_up_to(cores) : said_ranks;
-  const std::vector<int> threads = !said_threads.empty() ? said_threads
-                                   : !said_ranks.empty() ? std::vector{1}
-                                                         : doubled_up_to(cores);
+  const std::vector<int> ranks_given = given_ranks(globals);
+  const std::vector<int> threads_given = given_threads(globals);
+  const bool all_given = !threads_given.empty() || !ranks_given.empty();
+  const std::vector<int> ranks = ranks_given.empty() ? powers_of_two_up_to(cores) : ranks_given;
+  const std::vector<int> threads = !threads_given.empty() ? threads_given
+                                   : !ranks_given.empty() ? std::vector{1}
+                                                          : powers_of_two_up_to(cores);
   std::vector<Job> jobs;
   for (const int thread_count : threads) {
     for (const int rank_count : ranks) {
-      if (all_said || rank_count * thread_count <= cores) jobs.push_back({rank_count, thread_count});
+      if (all_given || rank_count * thread_count <= cores) jobs.push_back({rank_count, thread_count});
     }
   }
   return jobs;
@@ -183,12 +175,7 @@ ScaleInput BenchScaleCommand::make_input(const Globals& globals) const {
 }
 
 void BenchScaleCommand::check_files(const Globals& globals) const {
-  const std::vector<std::string> results{csv_, html_};
-  check_distinct(results, globals.trace);
-  check_spared(scene_, globals.scene_limits(), std::span(&settings_.environment, 1), results);
-  for (const std::string& path : results) {
-    if (!path.empty()) check_writable(path, globals.force);
-  }
+  check_result_files(globals, scene_, {settings_.environment}, {csv_, html_});
 }
 
 ExitCode BenchScaleCommand::run(const Globals& globals) {
@@ -206,29 +193,24 @@ ExitCode BenchScaleCommand::run_in_job(const Globals& globals, const ScaleInput&
   if (order && order->traced == 0) job.trace.clear();
   if (order && order->quiet != 0 && globals.verbosity == 0) log::configure(log::Level::Error, "");
   return run_ranks(job, [&](Communicator& comm) {
-    const std::vector<int> wanted = ranks_said(globals);
-    if (!order && !wanted.empty() && wanted != std::vector{comm.size()}) {
-      throw Error(ExitCode::Usage,
-                  fmt::format("--ranks {} inside an MPI job of {} ranks", fmt::join(wanted, ","), comm.size()),
-                  "leave --ranks away, or mpirun");
-    }
+    const std::vector<int> wanted = given_ranks(globals);
+    if (!order) check_job_ranks(wanted, fmt::format("{}", fmt::join(wanted, ",")), comm.size());
     std::vector<ScaleRun> runs;
     if (order) {
       runs = measure_scale(comm, job, input, order->frames);
     } else {
-      std::vector<int> threads = threads_said(globals);
+      std::vector<int> threads = given_threads(globals);
       if (threads.empty()) threads.push_back(0);  // each rank's share of its host's cores
       for (const int count : threads) {
         job.threads = count;
         std::ranges::move(measure_scale(comm, job, input, frames_), std::back_inserter(runs));
       }
     }
-    const auto verdict = on_root(comm, [&] {
-      if (!order) return std::vector{static_cast<std::byte>(finish(globals, input, std::move(runs)))};
-      std::fputs(scale_runs_to_json(runs).c_str(), stdout);
-      return std::vector{static_cast<std::byte>(ExitCode::Done)};
+    return decide_on_root(comm, [&] {
+      if (!order) return finish(globals, input, std::move(runs));
+      hand_over(scale_job_columns(), std::span<const ScaleRun>(runs));
+      return ExitCode::Done;
     });
-    return static_cast<ExitCode>(verdict.at(0));
   });
 }
 
@@ -236,30 +218,31 @@ ExitCode BenchScaleCommand::run_jobs(const Globals& globals, const ScaleInput& i
   const std::vector<Job> sizes = jobs(globals);
   const int rounds = std::min(kRounds, frames_);
   std::vector<std::vector<ScaleRun>> of_size(sizes.size());
-  std::vector<std::size_t> order(sizes.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::mt19937_64 chance(globals.seed);
-  Progress progress(globals.progress, "job", sizes.size() * static_cast<std::size_t>(rounds));
-  bool quiet = false;
+  std::vector<std::size_t> order;  // of the jobs of all rounds
+  std::mt19937_64 random(globals.seed);
+  std::vector<std::size_t> of_round(sizes.size());
+  std::iota(of_round.begin(), of_round.end(), std::size_t{0});
   for (int round = 0; round < rounds; ++round) {
-    std::ranges::shuffle(order, chance);
-    const int frames = frames_ / rounds + (round < frames_ % rounds ? 1 : 0);
-    for (const std::size_t index : order) {
-      const Job& job = sizes[index];
-      std::string output;
-      const bool last = round + 1 == rounds && index == order.back();
-      const std::string words = fmt::format("{} {} {:d} {:d}", job.threads, frames, quiet, last);
-      const int code = run_mpiexec(
-          job.ranks, globals.args,
-          {.captured_stdout = &output, .environment = {{kJobVariable, words}}, .hang_limit = globals.hang_limit()});
-      // Its ranks have said on stderr what went wrong.
-      if (code != static_cast<int>(ExitCode::Done)) return static_cast<ExitCode>(code);
-      append_frames(of_size[index], scale_runs_from_json(output));
-      quiet = true;
-      progress.step(fmt::format("{} ranks of {} cores", job.ranks, job.threads));
-    }
+    std::ranges::shuffle(of_round, random);
+    order.insert(order.end(), of_round.begin(), of_round.end());
   }
-  progress.end();
+  ExitCode failed = ExitCode::Done;
+  const auto run_job = [&](std::size_t i) {
+    const Job& size = sizes[order[i]];
+    const int round = static_cast<int>(i / sizes.size());
+    const int frames = frames_ / rounds + (round < frames_ % rounds ? 1 : 0);
+    const JobResult job =
+        run_measuring_job(globals, size.ranks, globals.args, kJobVariable,
+                          fmt::format("{} {} {:d} {:d}", size.threads, frames, i > 0, i + 1 == order.size()));
+    failed = job.code;
+    if (failed == ExitCode::Done) append_frames(of_size[order[i]], rows_from_job(scale_job_columns(), job.rows));
+    return CaseResult{.failed = failed != ExitCode::Done};
+  };
+  const auto describe = [&](std::size_t i) {
+    return fmt::format("{} ranks of {} cores", sizes[order[i]].ranks, sizes[order[i]].threads);
+  };
+  (void)measure_cases({globals.progress, "job", order.size()}, describe, run_job);
+  if (failed != ExitCode::Done) return failed;
   std::vector<ScaleRun> runs;
   for (std::size_t grid = 0; grid < input.grids.size(); ++grid) {
     for (std::vector<ScaleRun>& size : of_size) runs.push_back(std::move(size.at(grid)));
@@ -270,8 +253,8 @@ ExitCode BenchScaleCommand::run_jobs(const Globals& globals, const ScaleInput& i
 ExitCode BenchScaleCommand::finish(const Globals& globals, const ScaleInput& input, std::vector<ScaleRun> runs) const {
   const ScaleReport report{
       "hpr " + shell_line(globals.args), this_machine(), scene_, input.size, globals.seed, std::move(runs)};
-  if (!csv_.empty()) write_file_atomically(csv_, scale_csv(report));
-  if (!html_.empty()) write_file_atomically(html_, scale_html(report));
+  write_if_named(csv_, [&] { return scale_csv(report); });
+  write_if_named(html_, [&] { return scale_html(report); });
   std::fputs((json_ ? scale_json(report) : scale_table(report)).c_str(), stdout);
   for (const std::string& sentence : slow_ranks(report)) log::warning("{}", sentence);
   if (pictures_agree(report)) return ExitCode::Done;

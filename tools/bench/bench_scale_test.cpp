@@ -5,8 +5,7 @@
 #include <algorithm>
 
 #include "core/json.h"
-#include "tools/bench/bench_scale_html.h"
-#include "tools/bench/bench_scale_report.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 namespace {
@@ -81,7 +80,9 @@ TEST(BenchScale, PicturesOfAWallAreToAgree) {
 
 TEST(BenchScale, FramesOfSeveralJobsAreOneRun) {
   std::vector<ScaleRun> runs;
-  append_frames(runs, scale_runs_from_json(scale_runs_to_json({run_of({2, 1}, 2, 3, {1.5, 2.5})})));
+  const std::vector<ScaleRun> first{run_of({2, 1}, 2, 3, {1.5, 2.5})};
+  const std::string handed_over = Table(scale_job_columns(), std::span(first)).json().dump();
+  append_frames(runs, rows_from_job(scale_job_columns(), handed_over));
   append_frames(runs, {run_of({2, 1}, 2, 3, {4.0})});
   ASSERT_EQ(runs.size(), 1U);
   EXPECT_EQ(runs[0].ms, (std::vector{1.5, 2.5, 4.0}));

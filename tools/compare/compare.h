@@ -11,6 +11,7 @@
 #include "image/image.h"
 #include "image/key.h"
 #include "image/tiles.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 
@@ -44,17 +45,8 @@ enum class CompareOperator {
 
 struct CompareSettings {
   std::vector<std::string> strategies;  ///< names; each must fit the number of ranks
-  int frames = 10;
-  int warmup = 2;  ///< frames before the measured ones
+  Repetitions frames{2, 10};
   CompareOperator operation = CompareOperator::Nearest;
-};
-
-/// Milliseconds over the measured frames.
-struct Spread {
-  double min = 0.0;
-  double median = 0.0;
-  double p95 = 0.0;
-  double max = 0.0;
 };
 
 /// One strategy on one number of ranks.
@@ -63,7 +55,7 @@ struct CompareRun {
   int ranks = 1;
   std::string transport;
   int frames = 0;
-  Spread ms;                  ///< composite and collect on rank 0, slowest rank of each frame
+  Spread ms;                  ///< over frames: composite and collect on rank 0, slowest rank of each
   double ms_composite = 0.0;  ///< median of the slowest rank's
   double ms_collect = 0.0;
   std::uint64_t bytes_total = 0;     ///< sent in one frame by all ranks
@@ -74,14 +66,14 @@ struct CompareRun {
                                        ///< other keys, or colours further off than rounding explains
   std::optional<double> max_error;  ///< `over`: largest difference of a channel to the serial result, 1 is full light
   std::optional<double> predicted_ms;  ///< what the strategy expected of `ms`
-  std::string chosen;                  ///< the strategy at work, where another one chose it
+  std::string chosen;                  ///< the strategy at work, where `strategy` chose another
   std::string frame_xxh64;             ///< of the RGBA8 frame where keys are colours, else of the keys
 };
 
 struct CompareResult {
   std::vector<CompareRun> runs;  ///< in order of settings.strategies
   Image<Key> frame;              ///< the wall as the first strategy composited it; empty for `over`
-  Image<Rgba8> picture;          ///< `over`: the same as it is shown on black
+  Image<Rgba8> picture;          ///< `over`: the first strategy's wall as it is shown on black
 };
 
 /// Collective. Composites the same layers with every strategy, frame after frame in turns so that what disturbs the

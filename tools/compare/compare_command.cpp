@@ -3,40 +3,102 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include "app/command.h"
-#include "app/launch/launcher.h"
 #include "app/launch/run_ranks.h"
 #include "app/results.h"
-#include "cluster/transport/collectives.h"
+#include "cluster/transport/communicator_wrappers.h"
+#include "cluster/transport/local_communicator.h"
+#include "cluster/transport/simulated_communicator.h"
 #include "compositing/model/synthetic.h"
 #include "compositing/plugin.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/text.h"
+#include "engine/frame.h"
 #include "engine/output.h"
+#include "engine/render_settings.h"
+#include "engine/session.h"
 #include "image/image_io.h"
 #include "scene/view.h"
 #include "tools/compare/compare.h"
-#include "tools/compare/compare_html.h"
 #include "tools/compare/compare_options.h"
 #include "tools/compare/compare_report.h"
-#include "tools/compare/compare_scene.h"
-#include "tools/compare/compare_threads.h"
 #include "tools/report/lists.h"
+#include "tools/sweep.h"
+#include "walls/config/wall_file.h"
+#include "walls/geometry/geometry.h"
 
 namespace hpr {
 namespace {
 
-/// Set for the MPI jobs `hpr compare` starts: rank 0 prints its runs as JSON for the process that started the job. Open
-/// MPI takes variables of this prefix to other hosts.
-constexpr const char* kHandOverVariable = "OMPI_HPR_COMPARE_HAND_OVER";
+/// Set for the MPI jobs `hpr compare` starts, whose rank 0 hands over its runs.
+constexpr const char* kJobVariable = "OMPI_HPR_COMPARE_HAND_OVER";
 
 bool hands_over() {
-  return std::getenv(kHandOverVariable) != nullptr;  // NOLINT(concurrency-mt-unsafe): nothing sets variables
+  return job_request(kJobVariable).has_value();
+}
+
+/// Collective: the part of a frame that this rank draws.
+DrawnTiles draw_part(Communicator& comm, const std::string& scene, const Wall& wall, const Globals& globals,
+                     const FrameSettings& settings) {
+  Session session(comm, globals.session(), [&] { return load_scene(scene, globals.scene_limits()); });
+  const std::vector<View> views =
+      wall_views(wall, choose_camera(CameraChoice{}, session.scene()), session.scene().bounds);
+  FramePlan plan = plan_frame(session, settings, views);
+  plan.lit = false;
+  TileLayer<Key> layer(plan.layout);
+  (void)draw_layer(session, plan, views, layer);
+  return {std::move(layer), plan.tiles};
+}
+
+/// The layers of `hpr compare SCENE`: each rank's objects of the scene (sort-last), drawn over a wall of `grid` screens
+/// of `screen` pixels. With `local_shading` each rank lights its own, once per pixel and as render does by default, and
+/// the keys carry colors.
+CompareInput scene_layers(const std::string& scene, Size screen, Size grid, bool local_shading,
+                          const Globals& globals) {
+  const Wall wall = load_wall(wall_of(grid, screen));
+  CompareInput input;
+  input.name = scene;
+  input.screen = screen;
+  input.grid = grid;
+  input.colors = local_shading;
+  FrameSettings settings = resolve(RenderSettings{}, globals.seed).frame;
+  settings.shading = local_shading ? Shading::Local : Shading::Deferred;
+  settings.distribution = Distribution::SortLast;
+  input.layer = [=](Communicator& comm) { return draw_part(comm, scene, wall, globals, settings).layer; };
+  settings.distribution = Distribution::SortFirst;
+  input.sort_first = [=](Communicator& comm) { return draw_part(comm, scene, wall, globals, settings); };
+  return input;
+}
+
+/// compare_strategies with `ranks` threads of this process as ranks, on a simulated cluster (parse_simulation) unless
+/// `simulate` is empty.
+CompareResult compare_on_threads(int ranks, const std::string& simulate, std::chrono::nanoseconds hang_timeout,
+                                 const CompareInput& input, const CompareSettings& settings) {
+  CompareResult result;
+  const auto compare = [&](Communicator& untraced) {
+    TracingCommunicator comm(untraced);
+    CompareResult here = compare_strategies(comm, input, settings);
+    if (comm.rank() == 0) result = std::move(here);
+  };
+  LocalRanks local{.size = ranks, .hang_timeout = hang_timeout};
+  if (simulate.empty()) {
+    run_local_ranks(local, compare);
+    return result;
+  }
+  const SimulatedCluster cluster = parse_simulation(simulate);
+  local.ranks_per_host = cluster.ranks_per_host();
+  run_local_ranks(local, [&](Communicator& comm) {
+    SimulatedCommunicator simulated(comm, cluster);
+    compare(simulated);
+  });
+  return result;
 }
 
 class CompareCommand final : public Command {
@@ -52,7 +114,7 @@ class CompareCommand final : public Command {
   ExitCode run(const Globals& globals) override {
     if (!options_.plugin.empty()) load_compositor_plugin(options_.plugin);
     const CompareInput input = make_input(globals);
-    options_.settle();
+    options_.resolve();
     // The process that started this job has looked already.
     if (!hands_over()) options_.check_files(globals);
     return inside_mpi_job() ? run_in_job(globals, input) : run_here(globals, input);
@@ -85,22 +147,14 @@ class CompareCommand final : public Command {
     Globals job = globals;
     job.ranks = 0;
     return run_ranks(job, [&](Communicator& comm) {
-      const std::vector<int> wanted = options_.rank_counts();
-      if (!wanted.empty() && wanted != std::vector<int>{comm.size()}) {
-        throw Error(ExitCode::Usage,
-                    fmt::format("--ranks {} inside an MPI job of {} ranks", options_.ranks, comm.size()),
-                    "leave --ranks away, or mpirun");
-      }
+      check_job_ranks(options_.rank_counts(), options_.ranks, comm.size());
       CompareResult result = compare_strategies(comm, input, options_.settings_for(comm.size()));
-      const auto verdict = on_root(comm, [&] {
-        if (!hands_over()) {
-          return std::vector{static_cast<std::byte>(finish(globals, input, std::move(result)))};
-        }
+      return decide_on_root(comm, [&] {
+        if (!hands_over()) return finish(globals, input, std::move(result));
         write_frame(result, input);
-        std::fputs(runs_to_json(result.runs).c_str(), stdout);
-        return std::vector{static_cast<std::byte>(verdict_on(result.runs))};
+        hand_over(compare_columns(), std::span<const CompareRun>(result.runs));
+        return verdict_on(result.runs);
       });
-      return static_cast<ExitCode>(verdict.at(0));
     });
   }
 
@@ -124,16 +178,10 @@ class CompareCommand final : public Command {
         result.frame = std::move(here.frame);
         result.picture = std::move(here.picture);
       } else {
-        std::string output;
-        const int code = run_mpiexec(ranks, job_arguments(globals, ranks, i + 1 == counts.size()),
-                                     {.captured_stdout = &output,
-                                      .environment = {{kHandOverVariable, "1"}},
-                                      .hang_limit = globals.hang_limit()});
-        // Its ranks have said on stderr what went wrong.
-        if (code != static_cast<int>(ExitCode::Done) && code != static_cast<int>(ExitCode::CheckFailed)) {
-          return static_cast<ExitCode>(code);
-        }
-        runs = runs_from_json(output);
+        const bool last = i + 1 == counts.size();
+        const JobResult job = run_measuring_job(globals, ranks, job_arguments(globals, ranks, last), kJobVariable, "1");
+        if (!job.measured()) return job.code;
+        runs = rows_from_job(compare_columns(), job.rows);
       }
       result.runs.insert(result.runs.end(), runs.begin(), runs.end());
     }
@@ -159,7 +207,7 @@ class CompareCommand final : public Command {
 
   /// What a job needs to run `ranks` of the rank counts; `last`: it also writes the frame.
   [[nodiscard]] std::vector<std::string> job_arguments(const Globals& globals, int ranks, bool last) const {
-    std::vector<std::string> arguments = options_.words(globals);
+    std::vector<std::string> arguments = options_.arguments(globals);
     const auto add = [&](const std::string& option, const std::string& value) {
       arguments.push_back(option);
       arguments.push_back(value);
@@ -202,16 +250,15 @@ class CompareCommand final : public Command {
     for (const CompareRun& run : result.runs) {
       if (counts.empty() || counts.back() != run.ranks) counts.push_back(run.ranks);
     }
-    std::vector<std::string> words = options_.words(globals);
+    std::vector<std::string> arguments = options_.arguments(globals);
     if (options_.simulate.empty()) {
-      words.insert(words.end(), {"--ranks", fmt::format("{}", fmt::join(counts, ","))});
+      arguments.insert(arguments.end(), {"--ranks", fmt::format("{}", fmt::join(counts, ","))});
     }
-    report.command = "hpr " + shell_line(words);
+    report.command = "hpr " + shell_line(arguments);
     report.runs = std::move(result.runs);
     write_frame(result, input);
-    if (!options_.csv.empty()) write_file_atomically(options_.csv, compare_csv(report));
-    if (!options_.html.empty())
-      write_file_atomically(options_.html, compare_html(report, draw_strategies(report.runs)));
+    write_if_named(options_.csv, [&] { return compare_csv(report); });
+    write_if_named(options_.html, [&] { return compare_html(report, draw_strategies(report.runs)); });
     std::fputs((options_.json ? compare_json(report) : compare_table(report)).c_str(), stdout);
     return verdict_on(report.runs);
   }

@@ -1,10 +1,7 @@
-#include "tools/compare/compare_html.h"
-
 #include <gtest/gtest.h>
 
-#include "tools/compare/compare_plots.h"
+#include "tools/compare/compare_report.h"
 #include "tools/compare/schedule_drawing.h"
-#include "tools/report/markup.h"
 
 namespace hpr {
 namespace {
@@ -36,21 +33,6 @@ std::size_t count(std::string_view text, std::string_view part) {
   std::size_t found = 0;
   for (std::size_t at = text.find(part); at != std::string_view::npos; at = text.find(part, at + 1)) ++found;
   return found;
-}
-
-TEST(EscapeMarkup, LeavesNoMarkupAndNoCharacterXmlDoesNotKnow) {
-  EXPECT_EQ(escape_markup("a<b>&\"c'"), "a&lt;b&gt;&amp;&quot;c&#39;");
-  EXPECT_EQ(escape_markup("ä–\xF0\x9F\x98\x80\n"), "ä–\xF0\x9F\x98\x80\n");
-  const std::string bad = "\xEF\xBF\xBD";
-  EXPECT_EQ(escape_markup(std::string_view("\0\x1B", 2)), bad + bad);
-  EXPECT_EQ(escape_markup("\x80"), bad);                                // continues nothing
-  EXPECT_EQ(escape_markup("\xC3"), bad);                                // ends early
-  EXPECT_EQ(escape_markup("\xC3<"), bad + "&lt;");                      // does not swallow what follows
-  EXPECT_EQ(escape_markup("\xC0\xAF"), bad + bad);                      // longer than need be
-  EXPECT_EQ(escape_markup("\xE0\x80\xAF"), bad + bad + bad);            // also
-  EXPECT_EQ(escape_markup("\xED\xA0\x80"), bad + bad + bad);            // half a surrogate pair
-  EXPECT_EQ(escape_markup("\xEF\xBF\xBF"), bad + bad + bad);            // U+FFFF
-  EXPECT_EQ(escape_markup("\xF4\x90\x80\x80"), bad + bad + bad + bad);  // past the last character
 }
 
 TEST(CompareHtml, NothingFromOutsideIsMarkup) {

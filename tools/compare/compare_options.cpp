@@ -5,16 +5,12 @@
 #include <algorithm>
 #include <charconv>
 
-#include "app/results.h"
 #include "compositing/compositor.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/job_environment.h"
 #include "core/text.h"
-#include "engine/output.h"
-#include "rt/passes/pass_list.h"
-#include "tools/compare/simulate_option.h"
 #include "tools/report/lists.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 namespace {
@@ -27,7 +23,90 @@ std::vector<std::string> names_of(const Strategies& strategies) {
   return names;
 }
 
+constexpr int kMaxSimulatedRanks = 4096;
+
+[[noreturn]] void refuse(std::string_view key, std::string_view value, const char* wanted) {
+  throw Error(ExitCode::Usage, fmt::format("--simulate: {}={} is no {}", key, printable(value), wanted),
+              "write it like hosts=64,ranks=512,latency=2us,bandwidth=12.5GB/s");
+}
+
+int whole_number(std::string_view key, std::string_view value) {
+  int number = 0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+  if (error != std::errc() || end != value.data() + value.size() || number < 1 || number > kMaxSimulatedRanks) {
+    refuse(key, value, "number from 1 to 4096");
+  }
+  return number;
+}
+
+double duration(std::string_view key, std::string_view value) {
+  const auto time = parse_duration(value);
+  if (!time) refuse(key, value, "duration");
+  return std::chrono::duration<double>(*time).count();
+}
+
+double rate(std::string_view key, std::string_view value) {
+  const std::string_view amount = value.ends_with("/s") ? value.substr(0, value.size() - 2) : value;
+  const auto bytes = parse_bytes(amount);
+  if (!bytes || *bytes == 0) refuse(key, value, "rate of bytes per second");
+  return static_cast<double>(*bytes);
+}
+
+void apply(SimulatedCluster& cluster, std::string_view key, std::string_view value) {
+  struct Count {
+    const char* name;
+    int* value;
+  };
+  struct Amount {
+    const char* name;
+    double* value;
+    double (*parse)(std::string_view, std::string_view);
+  };
+  const std::vector<Count> counts{{"hosts", &cluster.hosts}, {"ranks", &cluster.ranks}, {"cores", &cluster.cores}};
+  const std::vector<Amount> amounts{{"latency", &cluster.latency, duration},
+                                    {"bandwidth", &cluster.bandwidth, rate},
+                                    {"overhead", &cluster.overhead, duration},
+                                    {"local-latency", &cluster.local_latency, duration},
+                                    {"local-bandwidth", &cluster.local_bandwidth, rate},
+                                    {"merge", &cluster.merge, rate}};
+  std::vector<std::string> names;
+  for (const Count& count : counts) {
+    names.emplace_back(count.name);
+    if (key != count.name) continue;
+    *count.value = whole_number(key, value);
+    return;
+  }
+  for (const Amount& amount : amounts) {
+    names.emplace_back(amount.name);
+    if (key != amount.name) continue;
+    *amount.value = amount.parse(key, value);
+    return;
+  }
+  throw Error(ExitCode::Usage, fmt::format("--simulate: a cluster has no '{}'", printable(key)),
+              unknown_name_hint(printable(key), names));
+}
+
 }  // namespace
+
+SimulatedCluster parse_simulation(std::string_view text) {
+  SimulatedCluster cluster;
+  for (std::string_view rest = text;;) {
+    const auto comma = rest.find(',');
+    const std::string_view item = rest.substr(0, comma);
+    const auto equals = item.find('=');
+    if (equals == std::string_view::npos) refuse(item, "", "key with a value");
+    apply(cluster, item.substr(0, equals), item.substr(equals + 1));
+    if (comma == std::string_view::npos) break;
+    rest.remove_prefix(comma + 1);
+  }
+  if (cluster.ranks < cluster.hosts) {
+    throw Error(ExitCode::Usage,
+                fmt::format("--simulate: {} ranks cannot be spread over {} hosts", cluster.ranks, cluster.hosts),
+                "say ranks=N with at least one for every host");
+  }
+  cluster.bandwidth /= cluster.ranks_per_host();
+  return cluster;
+}
 
 std::vector<std::string> split_strategies(std::string_view list) {
   std::vector<std::string> names;
@@ -76,7 +155,7 @@ void CompareOptions::declare(const OptionSet& options) {
   options.option("--raw", raw, "write that frame's keys: per pixel uint64, row 0 at the top").type("FILE");
 }
 
-void CompareOptions::settle() {
+void CompareOptions::resolve() {
   if (!simulate.empty() && !frames_option_->specified()) frames = warmup = 1;  // simulated frames are all alike
   check_transport();
   check_operator();
@@ -92,12 +171,7 @@ void CompareOptions::check_files(const Globals& globals) const {
   if (!picture.empty() && !picture.ends_with(".png")) {
     throw Error(ExitCode::Usage, fmt::format("-o: '{}' does not end in .png", printable(picture)), "name a .png file");
   }
-  const std::vector<std::string> results{csv, html, picture, raw};
-  check_distinct(results, globals.trace);
-  check_spared(scene, globals.scene_limits(), {}, results);
-  for (const std::string& path : results) {
-    if (!path.empty()) check_writable(path, globals.force);
-  }
+  check_result_files(globals, scene, {}, {csv, html, picture, raw});
 }
 
 void CompareOptions::check_transport() const {
@@ -205,28 +279,28 @@ bool CompareOptions::fits(const std::string& name, int count) const {
 }
 
 CompareSettings CompareOptions::settings_for(int count) const {
-  return {strategies_for(count), frames, warmup, operation()};
+  return {strategies_for(count), {warmup, frames}, operation()};
 }
 
-std::vector<std::string> CompareOptions::words(const Globals& globals) const {
-  std::vector<std::string> arguments{"compare"};
-  if (!scene.empty()) arguments.push_back(scene);
-  if (!synthetic.empty()) arguments.insert(arguments.end(), {"--synthetic", synthetic});
-  if (!plugin.empty()) arguments.insert(arguments.end(), {"--plugin", plugin});
-  arguments.insert(arguments.end(), {"--size", size, "--tiles", tiles, "--strategies", strategies});
-  if (local_shading()) arguments.insert(arguments.end(), {"--shading", shading});
-  if (operation() != CompareOperator::Nearest) arguments.insert(arguments.end(), {"--operator", operator_name});
-  arguments.insert(arguments.end(), {"--frames", std::to_string(frames), "--warmup", std::to_string(warmup)});
+std::vector<std::string> CompareOptions::arguments(const Globals& globals) const {
+  std::vector<std::string> all{"compare"};
+  if (!scene.empty()) all.push_back(scene);
+  if (!synthetic.empty()) all.insert(all.end(), {"--synthetic", synthetic});
+  if (!plugin.empty()) all.insert(all.end(), {"--plugin", plugin});
+  all.insert(all.end(), {"--size", size, "--tiles", tiles, "--strategies", strategies});
+  if (local_shading()) all.insert(all.end(), {"--shading", shading});
+  if (operation() != CompareOperator::Nearest) all.insert(all.end(), {"--operator", operator_name});
+  all.insert(all.end(), {"--frames", std::to_string(frames), "--warmup", std::to_string(warmup)});
   if (simulate.empty()) {
-    arguments.insert(arguments.end(), {"--transport", transport});
+    all.insert(all.end(), {"--transport", transport});
   } else {
-    arguments.insert(arguments.end(), {"--simulate", simulate});
+    all.insert(all.end(), {"--simulate", simulate});
   }
-  arguments.insert(arguments.end(), {"--seed", std::to_string(globals.seed)});
-  if (globals.backend != "auto") arguments.insert(arguments.end(), {"--backend", globals.backend});
-  if (globals.device >= 0) arguments.insert(arguments.end(), {"--device", std::to_string(globals.device)});
-  if (globals.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(globals.threads)});
-  return arguments;
+  all.insert(all.end(), {"--seed", std::to_string(globals.seed)});
+  if (globals.backend != "auto") all.insert(all.end(), {"--backend", globals.backend});
+  if (globals.device >= 0) all.insert(all.end(), {"--device", std::to_string(globals.device)});
+  if (globals.threads > 0) all.insert(all.end(), {"--threads", std::to_string(globals.threads)});
+  return all;
 }
 
 }  // namespace hpr

@@ -1,21 +1,28 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "app/options/globals.h"
 #include "app/options/option_set.h"
+#include "cluster/transport/simulated_communicator.h"
 #include "image/image.h"
 #include "tools/compare/compare.h"
 
-/// The options of `hpr compare`, and how their values are written. What is written otherwise throws Error (Usage).
+/// The options of `hpr compare`, and how their values are written. Functions throw Error (Usage) for other values.
 namespace hpr {
 
 /// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".
 [[nodiscard]] std::vector<std::string> split_strategies(std::string_view list);
 
-/// What the user said, and what follows from it alone.
+/// "hosts=64,ranks=512,latency=2us,bandwidth=12.5GB/s" and, as far as given, cores, overhead, local-latency,
+/// local-bandwidth, merge (SimulatedCluster). `bandwidth` is a host's, which its ranks share. Throws Error (Usage) on
+/// unknown keys, with the nearest one, and on values that make no sense.
+[[nodiscard]] SimulatedCluster parse_simulation(std::string_view text);
+
+/// The options' values, and what follows from them alone.
 struct CompareOptions {
   std::string scene;
   std::string synthetic;
@@ -37,9 +44,9 @@ struct CompareOptions {
   std::string raw;
 
   void declare(const OptionSet& options);
-  /// What is left open is settled by what was said. Throws Error for what can be refused before any rank starts, but
+  /// Completes defaults that depend on other options. Throws Error for what can be refused before any rank starts, but
   /// for the names of files.
-  void settle();
+  void resolve();
   void check_files(const Globals& globals) const;
 
   [[nodiscard]] bool on_threads() const { return transport == "threads" || !simulate.empty(); }
@@ -48,8 +55,8 @@ struct CompareOptions {
   /// Empty inside an MPI job unless --ranks is given.
   [[nodiscard]] std::vector<int> rank_counts() const;
   [[nodiscard]] CompareSettings settings_for(int count) const;
-  /// The words after `hpr` that decide the result and on what it is measured, without the number of ranks.
-  [[nodiscard]] std::vector<std::string> words(const Globals& globals) const;
+  /// The arguments after `hpr` that decide the result and on what it is measured, without the number of ranks.
+  [[nodiscard]] std::vector<std::string> arguments(const Globals& globals) const;
 
  private:
   void check_transport() const;

@@ -14,7 +14,6 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/json.h"
-#include "tools/compare/compare_measure.h"
 #include "tools/compare/compare_report.h"
 
 namespace hpr {
@@ -39,7 +38,7 @@ CompareResult compare_on_threads(int ranks, const CompareInput& input, const Com
 }
 
 const CompareSettings kAllStrategies = [] {
-  CompareSettings settings{{}, 2, 1};
+  CompareSettings settings{{}, {1, 2}};
   for (const auto& compositor : all_compositors()) settings.strategies.emplace_back(compositor->name());
   return settings;
 }();
@@ -82,7 +81,7 @@ TEST(Compare, CountsWhatIsSentInOneFrame) {
   // 16 dense tiles of 32 KiB; a head is 16 bytes and 2 for each. Serial sends two layers, and its collect nothing but
   // two empty messages.
   const auto result = compare_on_threads(3, synthetic_input(SyntheticKind::Dense, {256, 256}, {1, 1}),
-                                         {{"serial", "mpi-reduce"}, 3, 0});
+                                         {{"serial", "mpi-reduce"}, {0, 3}});
   const CompareRun& serial = result.runs.front();
   EXPECT_EQ(serial.bytes_total, 2U * (16 * 32768 + 16 + 32));
   EXPECT_EQ(serial.bytes_max_rank, 16U * 32768 + 16 + 32);
@@ -103,7 +102,7 @@ TEST(Compare, PredictsNothingOfARankThatHasNobodyToComposeWith) {
 TEST(Compare, SurfaceKeysAreHashedWhole) {
   CompareInput input = synthetic_input(SyntheticKind::Sparse, {100, 50}, {1, 1});
   input.colors = false;
-  const auto result = compare_on_threads(2, input, {{"tree"}, 1, 0});
+  const auto result = compare_on_threads(2, input, {{"tree"}, {0, 1}});
   EXPECT_EQ(result.runs.front().frame_xxh64, hex16(xxh64(std::as_bytes(result.frame.pixels()))));
 }
 
@@ -145,7 +144,7 @@ TEST(Compare, CountsThePixelsAStrategyGetsWrong) {
   run_local_ranks(2, [](Communicator& comm) {
     DamagingCommunicator damaging(comm);
     const auto result = compare_strategies(damaging, synthetic_input(SyntheticKind::Dense, {128, 64}, {1, 1}),
-                                           {{"serial", "tree", "binary-swap", "mpi-reduce"}, 2, 1});
+                                           {{"serial", "tree", "binary-swap", "mpi-reduce"}, {1, 2}});
     for (const CompareRun& run : result.runs) EXPECT_EQ(run.differing_pixels, run.strategy == "binary-swap" ? 2U : 0U);
   });
 }
@@ -170,7 +169,7 @@ TEST(Compare, SortFirstIsCheckedAgainstTheSameFrame) {
   for (const std::size_t missing : {std::size_t{99}, std::size_t{4}}) {
     CompareInput input = synthetic_input(SyntheticKind::Dense, {256, 128}, {1, 1});
     input.sort_first = [&](Communicator& comm) { return every_third_tile(comm, {256, 128}, missing); };
-    const CompareResult result = compare_on_threads(3, input, {{"serial", kSortFirst}, 2, 1});
+    const CompareResult result = compare_on_threads(3, input, {{"serial", kSortFirst}, {1, 2}});
     EXPECT_EQ(result.runs[0].differing_pixels, 0U);
     EXPECT_EQ(result.runs[1].strategy, "sort-first");
     EXPECT_EQ(result.runs[1].differing_pixels, missing == 4 ? kTilePixels : 0U);
@@ -179,7 +178,7 @@ TEST(Compare, SortFirstIsCheckedAgainstTheSameFrame) {
 }
 
 CompareSettings every_blender(CompareOperator operation) {
-  CompareSettings settings{{}, 2, 1, operation};
+  CompareSettings settings{{}, {1, 2}, operation};
   for (const auto& blender : all_blenders<RgbaPremultiplied>()) settings.strategies.emplace_back(blender->name());
   return settings;
 }
@@ -210,26 +209,12 @@ TEST(Compare, CountsTheTranslucentPixelsAStrategyGetsWrong) {
     DamagingCommunicator damaging(comm);
     for (const CompareOperator operation : {CompareOperator::Over8, CompareOperator::OverFloat}) {
       const auto result = compare_strategies(damaging, synthetic_input(SyntheticKind::Dense, {128, 64}, {1, 1}),
-                                             {{"serial", "tree", "binary-swap"}, 2, 1, operation});
+                                             {{"serial", "tree", "binary-swap"}, {1, 2}, operation});
       for (const CompareRun& run : result.runs) {
         EXPECT_EQ(run.differing_pixels > 0, run.strategy == "binary-swap") << run.strategy;
       }
     }
   });
-}
-
-TEST(SpreadOf, TakesTheMiddleAndTheNearestRank) {
-  const Spread one = spread_of({3.0});
-  EXPECT_EQ(one.min, 3.0);
-  EXPECT_EQ(one.p95, 3.0);
-  const Spread even = spread_of({4.0, 1.0, 3.0, 2.0});
-  EXPECT_EQ(even.median, 2.5);
-  std::vector<double> many;
-  for (int i = 100; i >= 1; --i) many.push_back(i);
-  const Spread hundred = spread_of(many);
-  EXPECT_EQ(hundred.min, 1.0);
-  EXPECT_EQ(hundred.p95, 95.0);
-  EXPECT_EQ(hundred.max, 100.0);
 }
 
 CompareReport example_report() {
@@ -287,17 +272,18 @@ TEST(CompareReport, JsonHasTheErrorOfTranslucentFrames) {
   EXPECT_EQ(json.at("runs")[0].at("max_error"), 0.25);
 }
 
-TEST(CompareReport, RunsSurviveTheWayFromAJobToItsStarter) {
+TEST(CompareReport, RunsSurviveFromAJobToItsStarter) {
   CompareReport report = example_report();
   report.runs.push_back(report.runs.front());
   report.runs.back().strategy = "serial";
   report.runs.back().ms.median = 0.1 + 0.2;
   report.runs.back().max_error = 0.3;
   CompareReport back = report;
-  back.runs = runs_from_json(runs_to_json(report.runs));
+  const std::string text = Table(compare_columns(), std::span<const CompareRun>(report.runs)).json().dump();
+  back.runs = rows_from_job(compare_columns(), text);
   EXPECT_EQ(compare_json(back), compare_json(report));
-  for (const char* text : {"", "[]", "{\"runs\": [{}]}", "{\"runs\": [{\"strategy\": 1}]}", "{\"runs\": "}) {
-    EXPECT_THROW((void)runs_from_json(text), Error) << text;
+  for (const char* wrong : {"", "{}", "[{}]", "[{\"strategy\": 1}]", "["}) {
+    EXPECT_THROW((void)rows_from_job(compare_columns(), wrong), Error) << wrong;
   }
 }
 

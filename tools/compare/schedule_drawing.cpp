@@ -9,7 +9,8 @@
 #include <optional>
 #include <vector>
 
-#include "tools/report/markup.h"
+#include "compositing/compositor.h"
+#include "tools/report/canvas.h"
 
 namespace hpr {
 namespace {
@@ -19,8 +20,9 @@ constexpr double kLeft = 62.0;      ///< room for the ranks' names
 constexpr double kTop = 44.0;       ///< for the rounds'
 constexpr double kBetween = 22.0;   ///< from compositing to collecting
 constexpr double kLineHeight = 14;  ///< of text
-constexpr std::size_t kMostDescribed = 64;
-// Of Okabe and Ito's palette, which the colour-blind can tell apart; besides, lines differ in their dashes.
+constexpr std::size_t kMaxDescribed = 64;
+constexpr int kMaxRanksDrawn = 16;
+// Colors of Okabe and Ito's palette, which color-blind people distinguish; lines differ in their dashes too.
 constexpr std::string_view kTiles = "#0072B2";
 constexpr std::string_view kSmall = "#6b6b6b";
 constexpr std::string_view kReduced = "#A03C00";
@@ -48,17 +50,17 @@ std::vector<Column> columns_of(const Schedule& schedule, std::string_view phase)
 
 /// Messages of about one size, as a column's caption counts them.
 std::string count_of(const std::vector<std::size_t>& bytes) {
-  const std::size_t least = *std::ranges::min_element(bytes);
-  const std::size_t most = *std::ranges::max_element(bytes);
-  if (most == 0) return fmt::format("{} × empty", bytes.size());
-  if (most < kTileBytes) {
-    return least == most ? fmt::format("{} × {} B", bytes.size(), most)
-                         : fmt::format("{} × {}–{} B", bytes.size(), least, most);
+  const std::size_t min_bytes = *std::ranges::min_element(bytes);
+  const std::size_t max_bytes = *std::ranges::max_element(bytes);
+  if (max_bytes == 0) return fmt::format("{} × empty", bytes.size());
+  if (max_bytes < kTileBytes) {
+    return min_bytes == max_bytes ? fmt::format("{} × {} B", bytes.size(), max_bytes)
+                                  : fmt::format("{} × {}–{} B", bytes.size(), min_bytes, max_bytes);
   }
-  const std::size_t few = least / kTileBytes;
-  const std::size_t many = most / kTileBytes;
-  if (few == many) return fmt::format("{} × {} tile{}", bytes.size(), many, many == 1 ? "" : "s");
-  return fmt::format("{} × {}–{} tiles", bytes.size(), few, many);
+  const std::size_t min_tiles = min_bytes / kTileBytes;
+  const std::size_t max_tiles = max_bytes / kTileBytes;
+  if (min_tiles == max_tiles) return fmt::format("{} × {} tile{}", bytes.size(), max_tiles, max_tiles == 1 ? "" : "s");
+  return fmt::format("{} × {}–{} tiles", bytes.size(), min_tiles, max_tiles);
 }
 
 /// Lines of text below a column: whole tiles, then what is smaller, then what is empty.
@@ -81,22 +83,22 @@ std::vector<std::string> captions(const Column& column) {
 }
 
 double width_of(const Column& column) {
-  std::size_t longest = 0;
-  for (const std::string& caption : captions(column)) longest = std::max(longest, caption.size());
+  std::size_t max_length = 0;
+  for (const std::string& caption : captions(column)) max_length = std::max(max_length, caption.size());
   const double arrows = 50.0 + std::min(110.0, 1.6 * static_cast<double>(column.transfers.size()));
-  return std::max(arrows, 6.4 * static_cast<double>(longest) + 6.0);
+  return std::max(arrows, 6.4 * static_cast<double>(max_length) + 6.0);
 }
 
 /// "round 1: 0 to 1 and 1 to 0 (32 tiles); ..." for those who cannot see the drawing.
 std::string describe(const std::vector<Column>& columns) {
   std::string text;
-  std::size_t told = 0;
+  std::size_t described = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const Column& column = columns[i];
     if (!column.phase.empty()) text += fmt::format("{}: ", column.phase);
     text += fmt::format("round {}: {}", i + 1, fmt::join(captions(column), ", "));
-    told += column.transfers.size();
-    if (told <= kMostDescribed) {
+    described += column.transfers.size();
+    if (described <= kMaxDescribed) {
       for (const Transfer& transfer : column.transfers) text += fmt::format(", {} to {}", transfer.from, transfer.to);
     }
     text += "; ";
@@ -121,16 +123,16 @@ class Sheet {
     std::size_t lines = 0;
     for (const Column& column : columns_) lines = std::max(lines, captions(column).size());
     height_ = kTop + row_height() * ranks_ + kLineHeight * static_cast<double>(lines) + 12.0;
-    drawing_.emplace(width_, height_, fmt::format("{} on {} ranks: who sends what to whom", name, ranks_),
-                     describe(columns_));
+    canvas_.emplace(width_, height_, fmt::format("{} on {} ranks: who sends what to whom", name, ranks_),
+                    describe(columns_));
     layer_bytes_ = static_cast<double>(frame.tiles * kTileBytes);
   }
 
   std::string draw() {
     draw_rows();
     for (std::size_t i = 0; i < columns_.size(); ++i) draw_column(i);
-    if (columns_.empty()) drawing_->text({kLeft + 8, kTop + 4}, "nothing is sent");
-    return drawing_->str();
+    if (columns_.empty()) canvas_->text({kLeft + 8, kTop + 4}, "nothing is sent");
+    return canvas_->str();
   }
 
  private:
@@ -138,11 +140,11 @@ class Sheet {
   [[nodiscard]] double y_of(int rank) const { return kTop + row_height() * (rank + 0.5); }
 
   void draw_rows() {
-    if (!columns_.empty()) drawing_->text({kLeft - 10, 34}, "round", Anchor::End, 11);
+    if (!columns_.empty()) canvas_->text({kLeft - 10, 34}, "round", Anchor::End, 11);
     for (int rank = 0; rank < ranks_; ++rank) {
       const std::string name = fmt::format("rank {}", rank);
-      drawing_->text({kLeft - 10, y_of(rank) + 4}, name, Anchor::End);
-      drawing_->line({kLeft - 6, y_of(rank)}, {width_ - 8, y_of(rank)}, {kFaint, 1.0});
+      canvas_->text({kLeft - 10, y_of(rank) + 4}, name, Anchor::End);
+      canvas_->line({kLeft - 6, y_of(rank)}, {width_ - 8, y_of(rank)}, {kFaint, 1.0});
     }
   }
 
@@ -152,22 +154,22 @@ class Sheet {
     const double width = width_of(column);
     const double bottom = y_of(ranks_ - 1) + row_height() / 2;
     if (!column.phase.empty()) {
-      drawing_->text({left, 16}, column.phase, Anchor::Start, 12, true);
-      if (index > 0) drawing_->line({left - kBetween / 2, 6}, {left - kBetween / 2, bottom}, {kSmall, 1.0, "4 3"});
+      canvas_->text({left, 16}, column.phase, Anchor::Start, 12, true);
+      if (index > 0) canvas_->line({left - kBetween / 2, 6}, {left - kBetween / 2, bottom}, {kSmall, 1.0, "4 3"});
     }
-    const double middle = left + width / 2;
-    drawing_->text({middle, 34}, fmt::format("{}", index + 1), Anchor::Middle, 11);
-    for (const Barrier& barrier : column.barriers) draw_barrier(barrier, middle);
-    for (const InPlaceWork& work : column.works) draw_work(work, middle);
+    const double center = left + width / 2;
+    canvas_->text({center, 34}, fmt::format("{}", index + 1), Anchor::Middle, 11);
+    for (const Barrier& barrier : column.barriers) draw_barrier(barrier, center);
+    for (const InPlaceWork& work : column.works) draw_work(work, center);
     // The wide ones first, so that none hides.
     std::vector<Transfer> transfers = column.transfers;
     std::ranges::stable_sort(transfers, std::greater{}, &Transfer::bytes);
     for (const Transfer& transfer : transfers) {
-      drawing_->arrow({left + 7, y_of(transfer.from)}, {left + width - 7, y_of(transfer.to)}, stroke_of(transfer));
+      canvas_->arrow({left + 7, y_of(transfer.from)}, {left + width - 7, y_of(transfer.to)}, stroke_of(transfer));
     }
     double y = bottom + kLineHeight;
     for (const std::string& line : captions(column)) {
-      drawing_->text({middle, y}, line, Anchor::Middle, 11);
+      canvas_->text({center, y}, line, Anchor::Middle, 11);
       y += kLineHeight;
     }
   }
@@ -181,16 +183,16 @@ class Sheet {
   void draw_barrier(const Barrier& barrier, double x) {
     const double top = y_of(barrier.ranks.front());
     const double bottom = y_of(barrier.ranks.back());
-    drawing_->line({x, top - 6}, {x, bottom + 6}, {kHostEdge, 3.0});
-    for (const int rank : barrier.ranks) drawing_->circle({x, y_of(rank)}, 4.5, kHost, {kHostEdge, 1.5});
+    canvas_->line({x, top - 6}, {x, bottom + 6}, {kHostEdge, 3.0});
+    for (const int rank : barrier.ranks) canvas_->circle({x, y_of(rank)}, 4.5, kHost, {kHostEdge, 1.5});
   }
 
   void draw_work(const InPlaceWork& work, double x) {
     const double top = y_of(work.ranks.front()) - 9;
     const double bottom = y_of(work.ranks.back()) + 9;
-    drawing_->rectangle({x - 14, top}, 28, bottom - top, kHost, {kHostEdge, 1.5});
+    canvas_->rectangle({x - 14, top}, 28, bottom - top, kHost, {kHostEdge, 1.5});
     const bool tall = bottom - top > 100;
-    drawing_->upright_text({x + 4, (top + bottom) / 2}, tall ? "merge in place" : "merge", 11);
+    canvas_->upright_text({x + 4, (top + bottom) / 2}, tall ? "merge in place" : "merge", 11);
   }
 
   int ranks_;
@@ -199,13 +201,54 @@ class Sheet {
   double width_ = 0.0;
   double height_ = 0.0;
   double layer_bytes_ = 1.0;
-  std::optional<SvgDrawing> drawing_;
+  std::optional<SvgCanvas> canvas_;
 };
+
+/// What to draw a strategy on: the most ranks it was compared on, 16 in place of more; 0 when it does not run on those.
+int ranks_to_draw(const Compositor& compositor, const std::vector<CompareRun>& runs) {
+  int ranks_drawn = 0;
+  for (const CompareRun& run : runs) {
+    const int ranks = std::min(run.ranks, kMaxRanksDrawn);
+    if (run.strategy == compositor.name() && compositor.fits(ranks)) ranks_drawn = std::max(ranks_drawn, ranks);
+  }
+  return ranks_drawn;
+}
+
+/// "tree, ring": what a strategy chose in its place, on whatever number of ranks.
+std::string choices_of(std::string_view strategy, const std::vector<CompareRun>& runs) {
+  std::vector<std::string> choices;
+  for (const CompareRun& run : runs) {
+    if (run.strategy != strategy || run.chosen.empty()) continue;
+    if (std::ranges::find(choices, run.chosen) == choices.end()) choices.push_back(run.chosen);
+  }
+  return fmt::format("{}", fmt::join(choices, ", "));
+}
+
+StrategyDrawing draw_strategy(const std::string& strategy, const std::vector<CompareRun>& runs) {
+  if (strategy == kSortFirst) return {strategy, 0, {}, "Every rank draws tiles of its own: only the collect is left."};
+  const std::string choices = choices_of(strategy, runs);
+  if (!choices.empty()) return {strategy, 0, {}, fmt::format("It chose {}.", choices)};
+  const auto make = [&] { return make_compositor(strategy); };
+  const int ranks = ranks_to_draw(*make(), runs);
+  if (ranks == 0) {
+    return {strategy, 0, {}, fmt::format("It runs on no number of ranks up to {} compared here.", kMaxRanksDrawn)};
+  }
+  return {strategy, ranks, draw_schedule(strategy, record_frame(make, {.size = ranks})), {}};
+}
 
 }  // namespace
 
 std::string draw_schedule(std::string_view name, const RecordedFrame& frame) {
   return Sheet(name, frame).draw();
+}
+
+std::vector<StrategyDrawing> draw_strategies(const std::vector<CompareRun>& runs) {
+  std::vector<StrategyDrawing> drawings;
+  for (const CompareRun& run : runs) {
+    if (std::ranges::find(drawings, run.strategy, &StrategyDrawing::strategy) != drawings.end()) continue;
+    drawings.push_back(draw_strategy(run.strategy, runs));
+  }
+  return drawings;
 }
 
 }  // namespace hpr

@@ -13,22 +13,154 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/json.h"
-#include "tools/diff/diff_values.h"
+#include "core/text.h"
+#include "image/color.h"
+#include "image/flip.h"
+#include "image/metrics.h"
+#include "tools/report/canvas.h"
+#include "tools/report/table.h"
 
 namespace hpr {
 namespace {
+
+std::size_t not_finite_pixels(std::span<const float> a, std::span<const float> b) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size(); i += 3) {
+    if (!all_finite(a.subspan(i, 3)) || !all_finite(b.subspan(i, 3))) ++count;
+  }
+  return count;
+}
+
+/// The levels that pictures of 8 and 16 bits are compared in: levels of 8 bits are 257 of them apart.
+constexpr std::uint32_t kMaxLevels = 0xFFFF;
+
+std::string describe(const FloatImage& picture) {
+  return fmt::format("{}x{} {}", picture.size.width, picture.size.height, fmt::join(picture.channels, ","));
+}
+
+std::size_t channel_index(const FloatImage& picture, const std::string& channel) {
+  return static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin());
+}
+
+/// The level that `value` stands for, of kMaxLevels.
+double level_of(float value, std::uint32_t levels) {
+  const std::uint32_t apart = kMaxLevels / levels;
+  return std::round(static_cast<double>(value) * levels) * apart;
+}
+
+/// One channel of `image` - `reference` into every `stride`th value.
+void subtract(const FloatImage& image, const FloatImage& reference, const std::string& channel,
+              std::span<double> differences) {
+  const std::size_t stride = reference.channels.size();
+  const std::size_t from = channel_index(image, channel);
+  const std::size_t to = channel_index(reference, channel);
+  const bool leveled = image.levels > 0 && reference.levels > 0;
+  const auto integers = image.integers.find(channel);
+  for (std::size_t pixel = 0; pixel < reference.size.area(); ++pixel) {
+    double& difference = differences[pixel * stride + to];
+    const float a = image.values[pixel * stride + from];
+    const float b = reference.values[pixel * stride + to];
+    if (integers != image.integers.end()) {
+      difference =
+          static_cast<double>(integers->second[pixel]) - static_cast<double>(reference.integers.at(channel)[pixel]);
+    } else if (leveled) {
+      difference = (level_of(a, image.levels) - level_of(b, reference.levels)) / kMaxLevels;
+    } else {
+      difference = difference_of(a, b);
+    }
+  }
+}
+
+/// Whether `picture` has all channels of `other` but its alpha.
+bool lacks_alpha(const FloatImage& picture, const FloatImage& other) {
+  std::vector<std::string> with = picture.channels;
+  with.emplace_back("A");
+  return std::ranges::find(picture.channels, "A") == picture.channels.end() &&
+         std::ranges::is_permutation(with, other.channels);
+}
+
+/// The picture with an alpha of 1.
+FloatImage opaque(const FloatImage& picture) {
+  FloatImage result = picture;
+  const std::size_t channels = picture.channels.size();
+  result.channels.emplace_back("A");
+  result.values.clear();
+  result.values.reserve(picture.size.area() * (channels + 1));
+  for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
+    const auto from = picture.values.begin() + static_cast<std::ptrdiff_t>(pixel * channels);
+    result.values.insert(result.values.end(), from, from + static_cast<std::ptrdiff_t>(channels));
+    result.values.push_back(1.0F);
+  }
+  return result;
+}
+
+/// Whether both are made of levels, 8 bits of them in one and 16 in the other.
+bool differ_in_levels(const FloatImage& a, const FloatImage& b) {
+  return a.levels > 0 && b.levels > 0 && a.levels != b.levels;
+}
+
+/// The picture, of 8 or 16 bits, with values and levels as 16 bits have them.
+FloatImage on_max_levels(const FloatImage& picture) {
+  FloatImage result = picture;
+  result.levels = kMaxLevels;
+  std::ranges::transform(picture.values, result.values.begin(),
+                         [&](float value) { return static_cast<float>(level_of(value, picture.levels) / kMaxLevels); });
+  return result;
+}
+
+[[noreturn]] void throw_other_kind(const std::string& a, const std::string& b) {
+  throw Error(
+      ExitCode::BadInput, fmt::format("{} and {} are of different kinds", a, b),
+      "compare keys (FILE.keys) with keys, linear EXR and Radiance with one another, and sRGB PNG and JPEG likewise");
+}
+
+/// Throws Error (BadInput), naming both, unless sizes, channels and what these hold are the same.
+void check_comparable(const FloatImage& a, const std::string& name_a, const FloatImage& b, const std::string& name_b) {
+  if (a.size != b.size || !std::ranges::is_permutation(a.channels, b.channels)) {
+    throw Error(ExitCode::BadInput, fmt::format("{} is {}, {} is {}", name_a, describe(a), name_b, describe(b)),
+                "only pictures of the same size and channels can be compared");
+  }
+  if (a.linear != b.linear) throw_other_kind(name_a, name_b);
+  for (const std::string& channel : a.channels) {
+    if (a.integers.contains(channel) == b.integers.contains(channel)) continue;
+    const bool first = a.integers.contains(channel);
+    throw Error(ExitCode::BadInput,
+                fmt::format("channel {} holds integers in {} and other numbers in {}", printable(channel),
+                            first ? name_a : name_b, first ? name_b : name_a),
+                "write both pictures by the same program");
+  }
+}
+
+/// image - reference (difference_of), [height][width][channels] in the order of the reference's channels, rounded once:
+/// levels and integers are subtracted as such; a difference of integers is a whole number.
+std::vector<double> picture_differences(const FloatImage& image, const FloatImage& reference) {
+  std::vector<double> differences(reference.values.size());
+  for (const std::string& channel : reference.channels) subtract(image, reference, channel, differences);
+  return differences;
+}
+
+/// [pixels][3] of [pixels][channels]: the values at these places of each pixel.
+std::vector<double> only(std::span<const double> values, std::size_t channels,
+                         const std::array<std::size_t, 3>& indices) {
+  std::vector<double> chosen;
+  chosen.reserve(values.size() / channels * indices.size());
+  for (std::size_t first = 0; first < values.size(); first += channels) {
+    for (const std::size_t index : indices) chosen.push_back(values[first + index]);
+  }
+  return chosen;
+}
 
 bool within(std::size_t beyond, std::size_t pixels, double percent) {
   return 100.0 * static_cast<double>(beyond) <= percent * static_cast<double>(pixels);
 }
 
-double share(std::size_t part, std::size_t whole) {
+double percentage(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
 std::vector<Key> read_keys(const std::filesystem::path& path) {
-  constexpr std::uint64_t kLargestFile = std::uint64_t{32} << 30U;
-  const std::vector<std::byte> bytes = read_file(path, kLargestFile);
+  constexpr std::uint64_t kMaxFileBytes = std::uint64_t{32} << 30U;
+  const std::vector<std::byte> bytes = read_file(path, kMaxFileBytes);
   if (bytes.empty() || bytes.size() % sizeof(Key) != 0) {
     throw Error(ExitCode::BadInput,
                 bytes.empty()
@@ -101,7 +233,7 @@ std::string picture_value(const DiffReport& report, const std::string& metric) {
     return d.differing == 0 ? largest : fmt::format("{} at {},{}", largest, worst_x(report), worst_y(report));
   }
   if (metric == "differing") {
-    return fmt::format("{} of {} pixels ({:.4g} %)", d.differing, d.pixels, share(d.differing, d.pixels));
+    return fmt::format("{} of {} pixels ({:.4g} %)", d.differing, d.pixels, percentage(d.differing, d.pixels));
   }
   if (metric == "mean") {
     const std::string mean = fmt::format("{:+.6g}", d.mean);
@@ -112,22 +244,58 @@ std::string picture_value(const DiffReport& report, const std::string& metric) {
 
 }  // namespace
 
+std::optional<std::array<std::size_t, 3>> color_channels(const FloatImage& picture) {
+  const auto index = [&](const char* channel) {
+    return static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin());
+  };
+  const std::size_t none = picture.channels.size();
+  std::array<std::size_t, 3> indices{index("R"), index("G"), index("B")};
+  if (std::ranges::count(indices, none) != 0) indices.fill(index("Y"));
+  if (indices[0] == none) return std::nullopt;
+  return indices;
+}
+
+std::vector<float> colors_of(const FloatImage& picture) {
+  const auto indices = color_channels(picture);
+  if (!indices) return {};
+  std::vector<float> colors;
+  colors.reserve(picture.size.area() * indices->size());
+  for (std::size_t pixel = 0; pixel < picture.size.area(); ++pixel) {
+    for (const std::size_t index : *indices) colors.push_back(picture.values[pixel * picture.channels.size() + index]);
+  }
+  return colors;
+}
+
+bool asks_for(std::span<const std::string> metrics, std::string_view metric) {
+  return std::ranges::find(metrics, metric) != metrics.end();
+}
+
+bool asks_for_colors(std::span<const std::string> metrics) {
+  return asks_for(metrics, "relmse") || asks_for(metrics, "ssim") || asks_for(metrics, "flip");
+}
+
+std::optional<ColorErrors> compare_colors(const FloatImage& a, const FloatImage& b,
+                                          std::span<const std::string> metrics, int threads) {
+  std::vector<float> reference = colors_of(a);
+  std::vector<float> image = colors_of(b);
+  if (reference.empty() && a.size.area() > 0) return std::nullopt;
+  ColorErrors errors;
+  errors.not_finite = not_finite_pixels(reference, image);
+  if (errors.not_finite > 0) return errors;
+  if (asks_for(metrics, "relmse")) errors.relative = relative_error(image, reference, 3);
+  if (a.linear) {
+    for (std::vector<float>* const values : {&reference, &image})
+      std::ranges::transform(*values, values->begin(), encode_srgb);
+  }
+  if (asks_for(metrics, "ssim")) errors.ssim = ssim(image, reference, a.size, threads);
+  if (asks_for(metrics, "flip")) errors.flip = flip_error(image, reference, a.size, threads).mean;
+  return errors;
+}
+
 bool is_keys(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
   return extension == ".keys";
-}
-
-Rgba8 heat_color(double share) {
-  constexpr std::array<std::array<double, 3>, 6> kStops{
-      {{0, 0, 0}, {52, 18, 108}, {133, 26, 110}, {208, 65, 62}, {247, 148, 34}, {252, 250, 192}}};
-  const double place = std::clamp(share, 0.0, 1.0) * (kStops.size() - 1);
-  const std::size_t stop = std::min(static_cast<std::size_t>(place), kStops.size() - 2);
-  const double f = place - static_cast<double>(stop);
-  const auto level = [&](std::size_t channel) {
-    return static_cast<std::uint8_t>(std::lround((1.0 - f) * kStops[stop][channel] + f * kStops[stop + 1][channel]));
-  };
-  return {level(0), level(1), level(2), 255};
 }
 
 const std::vector<std::string>& diff_metrics() {
@@ -146,7 +314,7 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
   if (lacks_alpha(a, b)) return diff_pictures(opaque(a), name_a, b, name_b, tolerance, metrics, threads);
   if (lacks_alpha(b, a)) return diff_pictures(a, name_a, opaque(b), name_b, tolerance, metrics, threads);
   if (differ_in_levels(a, b))
-    return diff_pictures(on_most_levels(a), name_a, on_most_levels(b), name_b, tolerance, metrics, threads);
+    return diff_pictures(on_max_levels(a), name_a, on_max_levels(b), name_b, tolerance, metrics, threads);
   check_comparable(a, name_a, b, name_b);
   DiffReport report;
   report.size = a.size;
@@ -155,12 +323,12 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
   if (asks_for_colors(metrics)) report.colors = compare_colors(a, b, metrics, threads);
   const std::vector<double> differences = picture_differences(b, a);
   report.difference = summarize_differences(differences, channels);
-  if (const auto places = color_places(a)) {
-    const Difference seen = summarize_differences(only(differences, channels, *places), places->size());
-    report.difference.rmse = seen.rmse;
-    report.difference.psnr = seen.psnr;
-    report.difference.mean = seen.mean;
-    report.difference.mean_error = seen.mean_error;
+  if (const auto indices = color_channels(a)) {
+    const Difference color_difference = summarize_differences(only(differences, channels, *indices), indices->size());
+    report.difference.rmse = color_difference.rmse;
+    report.difference.psnr = color_difference.psnr;
+    report.difference.mean = color_difference.mean;
+    report.difference.mean_error = color_difference.mean_error;
   }
   report.largest.reserve(report.difference.pixels);
   for (std::size_t first = 0; first < differences.size(); first += channels) {
@@ -223,34 +391,37 @@ Image<Rgba8> heat_map(const DiffReport& report) {
   for (std::size_t i = 0; i < report.largest.size(); ++i) {
     const double value = report.largest[i];
     // Even the least difference is seen: colours start a fifth up the ramp.
-    constexpr double kLeast = 0.2;
+    constexpr double kMinFraction = 0.2;
     image.pixels()[i] = value == 0.0            ? Rgba8{0, 0, 0, 255}
                         : !std::isfinite(value) ? Rgba8{0, 255, 255, 255}
-                                                : heat_color(kLeast + (1.0 - kLeast) * (value / top));
+                                                : heat_color(kMinFraction + (1.0 - kMinFraction) * (value / top));
   }
   return image;
 }
 
 std::string diff_table(const DiffReport& report, std::span<const std::string> metrics) {
   const Difference& d = report.difference;
-  std::string text;
-  const auto row = [&](const char* name, const std::string& value) { text += fmt::format("{:<10} {}\n", name, value); };
+  using Row = std::pair<std::string, std::string>;
+  std::vector<Row> rows;
+  const auto row = [&](std::string name, std::string value) { rows.emplace_back(std::move(name), std::move(value)); };
   if (report.keys) {
     if (asks_for(metrics, "max")) row("max", fmt::format("{:.6g} of depth", d.max));
     if (asks_for(metrics, "differing")) {
       row("differing", fmt::format("{} of {} keys ({:.4g} %), {} of them another surface", d.differing, d.pixels,
-                                   share(d.differing, d.pixels), report.other_surface));
+                                   percentage(d.differing, d.pixels), report.other_surface));
     }
   } else {
     row("size", fmt::format("{}x{} {}", report.size.width, report.size.height, fmt::join(report.channels, ",")));
     for (const std::string& metric : diff_metrics()) {
-      if (asks_for(metrics, metric)) row(metric.c_str(), picture_value(report, metric));
+      if (asks_for(metrics, metric)) row(metric, picture_value(report, metric));
     }
   }
   if (!report.keys || report.beyond != d.differing)
     row("beyond", fmt::format("{} pixels exceed --fail", report.beyond));
   row("verdict", d.differing == 0 ? "equal" : report.passed ? "within tolerance" : "different");
-  return text;
+  const std::vector<Column<Row>> columns{field<Row>("name", &Row::first, {.align = Align::Left, .width = 10}),
+                                         field<Row>("value", &Row::second, {.align = Align::Left})};
+  return Table(columns, std::span<const Row>(rows)).text({"name", "value"});
 }
 
 std::string diff_json(const DiffReport& report, std::span<const std::string> metrics, const std::string& name_a,

@@ -1,18 +1,45 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "image/image_io.h"
 #include "image/key.h"
 #include "image/metrics.h"
-#include "tools/diff/diff_colors.h"
 
 namespace hpr {
+
+/// How the colours of two pictures differ, for those metrics that were asked for; the others stay NaN.
+struct ColorErrors {
+  std::size_t not_finite = 0;  ///< pixels where either colour is not; unless there are none, all below is NaN
+  RelativeError relative{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+  double ssim = std::numeric_limits<double>::quiet_NaN();
+  double flip = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// The indices of channels R, G and B, or three times that of Y. None for pictures that have neither.
+[[nodiscard]] std::optional<std::array<std::size_t, 3>> color_channels(const FloatImage& picture);
+
+/// [height][width][3]: channels R, G and B, or three times Y. Empty for pictures that have neither.
+[[nodiscard]] std::vector<float> colors_of(const FloatImage& picture);
+
+/// Whether `metric` is one of `metrics`.
+[[nodiscard]] bool asks_for(std::span<const std::string> metrics, std::string_view metric);
+
+/// Whether any of `metrics` is about colours: relmse, ssim or flip.
+[[nodiscard]] bool asks_for_colors(std::span<const std::string> metrics);
+
+/// Compares `b` with `a`, of the same size and channels: relmse of the values as they are; ssim and flip of display
+/// values, which linear pictures are clamped and encoded to. None for pictures without channels R, G and B, or Y.
+[[nodiscard]] std::optional<ColorErrors> compare_colors(const FloatImage& a, const FloatImage& b,
+                                                        std::span<const std::string> metrics, int threads);
 
 /// What may differ before two files count as different.
 struct DiffTolerance {
@@ -35,11 +62,8 @@ struct DiffReport {
 
 /// The metrics by name: rmse, psnr, max, differing, mean, relmse, ssim, flip.
 [[nodiscard]] const std::vector<std::string>& diff_metrics();
-/// Those that take no longer than reading the pictures.
+/// The metrics that take no longer than reading the pictures.
 [[nodiscard]] std::vector<std::string> quick_diff_metrics();
-
-/// From black for 0 to pale yellow for 1, in equal steps of lightness.
-[[nodiscard]] Rgba8 heat_color(double share);
 
 /// Compares `b` with `a` value by value (integers by their bits, levels of 8 and 16 bits as such), channels by name,
 /// and colours as far as `metrics` asks for them. Where only one has alpha, the other's is 1. rmse, psnr and mean are
@@ -55,8 +79,8 @@ struct DiffReport {
 /// Whether a file is one of keys, by its extension: .keys, in letters of any size.
 [[nodiscard]] bool is_keys(const std::filesystem::path& file);
 
-/// The same for files: of keys (a uint64 per pixel, little-endian) or pictures. Throws Error (Io,
-/// BadInput, Limit, and Usage for a tolerance of values between keys).
+/// Compares two files of keys (a uint64 per pixel, little-endian), or two of pictures. Throws Error (Io, BadInput,
+/// Limit, and Usage for a tolerance of values between keys).
 [[nodiscard]] DiffReport diff_files(const std::filesystem::path& a, const std::filesystem::path& b,
                                     const DiffTolerance& tolerance, const ImageLimits& limits,
                                     std::span<const std::string> metrics = diff_metrics(), int threads = 1);

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/json.h"
+#include "tools/report/canvas.h"
 
 namespace hpr {
 namespace {

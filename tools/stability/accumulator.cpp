@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "engine/film.h"
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 // A million samples in a film: what its sums lose against sums in twice the digits.
@@ -105,9 +104,7 @@ class LongExposure {
   std::array<long double, kColors> negative_{};
 };
 
-}  // namespace
-
-std::vector<StabilityFinding> accumulator(const Globals& globals) {
+std::vector<StabilityFinding> measure_accumulator(const Globals& globals) {
   StabilityFinding sums = finding("accumulator/sums", "1e3 .. 1e6 samples over 12 decades, 6 % of them negative",
                                   0.5 * kSamples * kDoubleRounding, "relative to the sum of sizes",
                                   "n / 2 additions to each of two sums, 2^-53 each");
@@ -133,6 +130,12 @@ std::vector<StabilityFinding> accumulator(const Globals& globals) {
   narrow.expose(100'000);
   alike.measured = narrow.errors().sum;
   return {sums, mean, alike};
+}
+
+}  // namespace
+
+StabilityCase accumulator_case() {
+  return {"accumulator", "a million samples of a pixel: what the film's sums lose", measure_accumulator};
 }
 
 }  // namespace hpr::stability

@@ -6,11 +6,12 @@
 #include <numbers>
 #include <vector>
 
+#include "rt/deferred_shader.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/generators/shapes.h"
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
+#include "tools/stability/tools.h"
 
 // Surfaces that shadow themselves, and light that gets through a cover: both sides of how far a shadow ray's origin is
 // moved off its surface.
@@ -38,10 +39,10 @@ Light sun(double angle_from_z) {
 Scene grazed(const Placement& at) {
   Scene scene;
   const glm::dmat4 to_world = shapes::placed(at.center, at.size);
-  add_placed(scene, parallelogram({-2, -1.5, 0}, {4, 0, 0}, {0, 3, 0}), matte(), to_world);
+  add_placed(scene, parallelogram({-2, -1.5, 0}, {4, 0, 0}, {0, 3, 0}), diffuse(), to_world);
   Mesh ball = shapes::icosphere(4);
   for (glm::vec3& p : ball.positions) p += glm::vec3(0.0F, 0.0F, 1.5F);
-  add_placed(scene, std::move(ball), matte(), to_world);
+  add_placed(scene, std::move(ball), diffuse(), to_world);
   scene.lights = {sun(kGrazing)};
   return scene;
 }
@@ -49,7 +50,7 @@ Scene grazed(const Placement& at) {
 /// Two slips of paper that make the scene of radius 1 about the origin.
 void widen(Scene& scene) {
   for (const double corner : {-1.0, 1.0}) {
-    add_placed(scene, parallelogram(glm::dvec3(corner), {-corner * 1e-3, 0, 0}, {0, -corner * 1e-3, 0}), matte(),
+    add_placed(scene, parallelogram(glm::dvec3(corner), {-corner * 1e-3, 0, 0}, {0, -corner * 1e-3, 0}), diffuse(),
                glm::dmat4(1.0));
   }
 }
@@ -101,7 +102,7 @@ std::size_t shadowed_in_a_wide_scene(double size, int threads) {
 class SunnyFloor {
  public:
   SunnyFloor(double size, int threads) : to_world_(shapes::placed({}, size)) {
-    add_placed(floor_, parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), matte(), to_world_);
+    add_placed(floor_, parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), diffuse(), to_world_);
     floor_.lights = {sun(0.7)};
     finish_scene(floor_);
     view_ = view_of(floor_, {size, {}}, {0.2, 0.1, 2.5});
@@ -116,7 +117,7 @@ class SunnyFloor {
   [[nodiscard]] std::size_t lit_under_cover(double gap) const {
     if (!shows_light_) return kPicture.area();
     Scene covered = floor_;
-    add_placed(covered, parallelogram({-1.5, -1.5, gap}, {3, 0, 0}, {0, 3, 0}), matte(), to_world_);
+    add_placed(covered, parallelogram({-1.5, -1.5, gap}, {3, 0, 0}, {0, 3, 0}), diffuse(), to_world_);
     finish_scene(covered);
     return lit_pixels(covered);
   }
@@ -140,9 +141,7 @@ class SunnyFloor {
   bool shows_light_ = false;
 };
 
-}  // namespace
-
-std::vector<StabilityFinding> acne(const Globals& globals) {
+std::vector<StabilityFinding> measure_acne(const Globals& globals) {
   const int threads = threads_of(globals);
   StabilityFinding terminator =
       finding("acne/terminator", "wall and smooth sphere lit at 89.9 degrees, scales 1e-3 .. 1e3", 0.0,
@@ -187,6 +186,12 @@ std::vector<StabilityFinding> acne(const Globals& globals) {
   }
   thin.breaks_at = breaking_point_if_any(2.0 * kOffset, 1e-9, 0.05, [&](double gap) { return worst_lit(gap) == 0.0; });
   return {terminator, scales, small, thin};
+}
+
+}  // namespace
+
+StabilityCase acne_case() {
+  return {"acne", "light at 89.9 degrees and covers close above floors: no false shadow, no leak", measure_acne};
 }
 
 }  // namespace hpr::stability

@@ -8,7 +8,7 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
-#include "tools/stability/cases.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 namespace hpr::stability {
@@ -36,8 +36,8 @@ Mesh gridded(std::uint32_t i) {
   Mesh mesh;
   for (std::uint32_t row = 0; row <= n; ++row) {
     for (std::uint32_t column = 0; column <= n; ++column) {
-      const glm::vec2 share = glm::vec2(static_cast<float>(column), static_cast<float>(row)) / static_cast<float>(n);
-      mesh.positions.emplace_back(low + share * (high - low), 0.0F);
+      const glm::vec2 fraction = glm::vec2(static_cast<float>(column), static_cast<float>(row)) / static_cast<float>(n);
+      mesh.positions.emplace_back(low + fraction * (high - low), 0.0F);
     }
   }
   for (std::uint32_t row = 0; row < n; ++row) {
@@ -103,16 +103,16 @@ Quads make_quads(Kind kind) {
 }
 
 /// One layer per rank: the quads dealt out in turn, from the first rank on or from the last.
-std::vector<TileLayer<Key>> draw_shares(Drawer& drawer, const Quads& quads, const View& view, int ranks,
-                                        bool backwards) {
-  std::vector<std::vector<SurfaceRange>> shares(static_cast<std::size_t>(ranks));
+std::vector<TileLayer<Key>> draw_parts(Drawer& drawer, const Quads& quads, const View& view, int ranks,
+                                       bool backwards) {
+  std::vector<std::vector<SurfaceRange>> parts(static_cast<std::size_t>(ranks));
   for (std::size_t i = 0; i < quads.surfaces.size(); ++i) {
-    const std::size_t rank = i % shares.size();
-    shares[backwards ? shares.size() - 1 - rank : rank].push_back(quads.surfaces[i]);
+    const std::size_t rank = i % parts.size();
+    parts[backwards ? parts.size() - 1 - rank : rank].push_back(quads.surfaces[i]);
   }
   std::vector<TileLayer<Key>> layers;
-  layers.reserve(shares.size());
-  for (const auto& share : shares) layers.push_back(drawer.draw(quads.scene, view, share));
+  layers.reserve(parts.size());
+  for (const auto& part : parts) layers.push_back(drawer.draw(quads.scene, view, part));
   return layers;
 }
 
@@ -146,7 +146,7 @@ Compared compare(Drawer& drawer, const Quads& quads, const View& view, const Til
   Compared result;
   for (const int ranks : {2, 3, 4, 7}) {
     for (const bool backwards : {false, true}) {
-      const auto layers = draw_shares(drawer, quads, view, ranks, backwards);
+      const auto layers = draw_parts(drawer, quads, view, ranks, backwards);
       for (const auto& strategy : all_compositors()) {
         if (!strategy->fits(ranks)) continue;
         result.differing += composited_differences(layers, std::string(strategy->name()), expected);
@@ -183,9 +183,7 @@ std::size_t broken_ties(const Image<Key>& keys) {
   return broken;
 }
 
-}  // namespace
-
-std::vector<StabilityFinding> coplanar(const Globals& globals) {
+std::vector<StabilityFinding> measure_coplanar(const Globals& globals) {
   Drawer drawer(globals);
   const View view = head_on(kSize, 1.0, 0.0625);
   std::vector<StabilityFinding> findings;
@@ -217,6 +215,13 @@ std::vector<StabilityFinding> coplanar(const Globals& globals) {
   }
   findings.push_back(ties);
   return findings;
+}
+
+}  // namespace
+
+StabilityCase coplanar_case() {
+  return {"coplanar", "64 surfaces in one plane: the picture is the same on any ranks, by any strategy",
+          measure_coplanar};
 }
 
 }  // namespace hpr::stability

@@ -6,13 +6,13 @@
 #include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "tools/stability/cases.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 namespace hpr::stability {
 namespace {
 
-constexpr double kNear = 1e-3;
+constexpr double kDepthNear = 1e-3;
 constexpr double kFar = 1e7;  // of the standard mapping it is compared with
 constexpr double kPromisedGap = 1e-6;
 constexpr int kPairs = 64;
@@ -20,7 +20,7 @@ constexpr int kPairPixels = 16;
 using Gaps = std::array<double, kPairs>;
 
 double distance_of(int pair) {
-  return kNear * std::pow(kFar / kNear, pair / (kPairs - 1.0));
+  return kDepthNear * std::pow(kFar / kDepthNear, pair / (kPairs - 1.0));
 }
 
 /// Pair j in its own columns of the screen at its own distance, the second surface behind the first by a share gaps[j]
@@ -47,7 +47,7 @@ struct Score {
   std::array<int, kPairs> wrong{};
   int pixels = 0;  ///< of all pairs
 
-  [[nodiscard]] double share() const {
+  [[nodiscard]] double fraction() const {
     int sum = 0;
     for (const int count : wrong) sum += count;
     return static_cast<double>(sum) / pixels;
@@ -55,15 +55,15 @@ struct Score {
 };
 
 Score score(Drawer& drawer, const Gaps& gaps) {
-  const View view = head_on({kPairs * kPairPixels, kPairPixels}, 1.0, kNear);
+  const View view = head_on({kPairs * kPairPixels, kPairPixels}, 1.0, kDepthNear);
   const Image<Key> keys = drawer.draw(pairs_of(gaps), view);
   Score result;
   for (int pair = 0; pair < kPairs; ++pair) {
     const auto first_front = static_cast<std::uint32_t>(2 * (kPairs + pair));
     for (int y = 0; y < kPairPixels; ++y) {
       for (int x = pair * kPairPixels + 4; x < pair * kPairPixels + 12; ++x) {
-        const std::uint32_t seen = key_surface(keys.at(x, y));
-        const bool right = keys.at(x, y) != kNoKey && (seen == first_front || seen == first_front + 1);
+        const std::uint32_t surface = key_surface(keys.at(x, y));
+        const bool right = keys.at(x, y) != kNoKey && (surface == first_front || surface == first_front + 1);
         result.wrong.at(static_cast<std::size_t>(pair)) += right ? 0 : 1;
         ++result.pixels;
       }
@@ -83,11 +83,11 @@ Gaps break_gaps(Drawer& drawer) {
   Gaps holds = equal_gaps(1e-2);
   Gaps breaks = equal_gaps(1e-9);
   for (int step = 0; step < 12; ++step) {
-    Gaps middle{};
-    for (std::size_t i = 0; i < middle.size(); ++i) middle.at(i) = std::sqrt(holds.at(i) * breaks.at(i));
-    const Score found = score(drawer, middle);
-    for (std::size_t i = 0; i < middle.size(); ++i) {
-      (found.wrong.at(i) == 0 ? holds : breaks).at(i) = middle.at(i);
+    Gaps midpoint{};
+    for (std::size_t i = 0; i < midpoint.size(); ++i) midpoint.at(i) = std::sqrt(holds.at(i) * breaks.at(i));
+    const Score found = score(drawer, midpoint);
+    for (std::size_t i = 0; i < midpoint.size(); ++i) {
+      (found.wrong.at(i) == 0 ? holds : breaks).at(i) = midpoint.at(i);
     }
   }
   return breaks;
@@ -95,14 +95,15 @@ Gaps break_gaps(Drawer& drawer) {
 
 /// The depth a standard [0, 1] mapping stores, as OpenGL computes it from floats: in float, or in 24 bits.
 double standard_depth(double z, bool fixed_point) {
-  const auto scale = static_cast<float>(kFar / (kFar - kNear));
-  const auto offset = static_cast<float>(-kFar * kNear / (kFar - kNear));
+  const auto scale = static_cast<float>(kFar / (kFar - kDepthNear));
+  const auto offset = static_cast<float>(-kFar * kDepthNear / (kFar - kDepthNear));
   const auto w = static_cast<float>(z);
   const float depth = (scale * w + offset) * (1.0F / w);
   return fixed_point ? std::round(double{depth} * 16777215.0) : double{depth};
 }
 
-/// Whether surfaces a share `gap` apart are told apart, at 64 distances near `z`: at one of them rounding may help.
+/// Whether surfaces a fraction `gap` of their distance apart keep their order at 64 distances near `z`: at one of them
+/// rounding may help.
 bool standard_order_kept(double z, double gap, bool fixed_point) {
   for (int i = 0; i < 64; ++i) {
     const double near_z = z * (1.0 + 1e-3 * i);
@@ -123,18 +124,18 @@ StabilityFinding reach(const Gaps& breaks) {
   StabilityFinding finding;
   finding.name = "depth-order/reach";
   finding.parameter =
-      fmt::format("a relative gap of 1e-6, near {:g} m; standard mapping, far {:g} m, computed", kNear, kFar);
+      fmt::format("a relative gap of 1e-6, near {:g} m; standard mapping, far {:g} m, computed", kDepthNear, kFar);
   finding.unit = "times as far as a standard mapping in float or 24 bits";
   finding.bound = Bound::AtLeast;
   // Order holds to the farthest pair; depth n / z in steps of 2^-24 resolves gaps of z 2^-24 / n.
-  finding.limit = distance_of(kPairs - 1) / (2.0 * kPromisedGap * kNear / kFloatRounding);
+  finding.limit = distance_of(kPairs - 1) / (2.0 * kPromisedGap * kDepthNear / kFloatRounding);
   finding.why = "A standard mapping has steps of 2^-24 in n / z, twice as fine nearer than 2 n in float.";
   finding.curve.x = "distance, m";
   for (int pair = 0; pair < kPairs; ++pair) {
     const double z = distance_of(pair);
     finding.curve.points.emplace_back(
         z, breaking_point(1e12, 1e-9, 0.01, [&](double gap) { return standard_order_kept(z, gap, false); }));
-    finding.curve.expected.emplace_back(z, z * kFloatRounding / kNear);
+    finding.curve.expected.emplace_back(z, z * kFloatRounding / kDepthNear);
   }
   const auto standard = [&](bool fixed_point) {
     return reach_of([&](int pair) { return standard_order_kept(distance_of(pair), kPromisedGap, fixed_point); });
@@ -144,20 +145,19 @@ StabilityFinding reach(const Gaps& breaks) {
   return finding;
 }
 
-}  // namespace
-
-std::vector<StabilityFinding> depth_order(const Globals& globals) {
+std::vector<StabilityFinding> measure_depth_order(const Globals& globals) {
   Drawer drawer(globals);
   StabilityFinding order;
   order.name = "depth-order/reversed-z";
-  order.parameter = fmt::format("relative gap 1e-2 .. 1e-6 at 1e-3 .. 1e7 m, {} distances, near {:g} m", kPairs, kNear);
+  order.parameter =
+      fmt::format("relative gap 1e-2 .. 1e-6 at 1e-3 .. 1e7 m, {} distances, near {:g} m", kPairs, kDepthNear);
   order.unit = "share of pixels";
   order.why = "Depth n / w takes three roundings: two surfaces keep their order from 6 x 2^-24 = 3.6e-7 on.";
   order.curve.x = "relative gap";
   for (const double gap : {1e-8, 3e-8, 6e-8, 1e-7, 1.3e-7, 1.6e-7, 2e-7, 4e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2}) {
-    const double share = score(drawer, equal_gaps(gap)).share();
-    order.curve.points.emplace_back(gap, share);
-    if (gap >= kPromisedGap) order.measured = std::max(order.measured, share);
+    const double fraction = score(drawer, equal_gaps(gap)).fraction();
+    order.curve.points.emplace_back(gap, fraction);
+    if (gap >= kPromisedGap) order.measured = std::max(order.measured, fraction);
   }
 
   StabilityFinding gap;
@@ -175,6 +175,140 @@ std::vector<StabilityFinding> depth_order(const Globals& globals) {
   gap.measured = *std::ranges::max_element(breaks);
   order.breaks_at = gap.measured;
   return {order, gap, reach(breaks)};
+}
+
+constexpr Size kCrossingSize{1024, 16};
+constexpr double kCrossingNear = 0.01;
+
+/// How far from the line in which they cross a pixel shows the farther of two planes: one faces the eye at `distance`,
+/// the other is turned by `angle` about an upright line beside the middle.
+double line_error(Drawer& drawer, double distance, double angle) {
+  const double line = 0.137 * distance;
+  const auto placed = [&](double turned) {
+    const glm::dmat4 moved = glm::translate(glm::dmat4(1.0), {line, 0.0, -distance});
+    return glm::scale(glm::rotate(moved, turned, glm::dvec3(0.0, 1.0, 0.0)), glm::dvec3(distance));
+  };
+  Scene scene;
+  add(scene, rectangle({-1.4F, -0.5F}, {1.4F, 0.5F}), placed(0.0));
+  add(scene, rectangle({-1.4F, -0.5F}, {1.4F, 0.5F}), placed(angle));
+  finish_scene(scene);
+  const View view = head_on(kCrossingSize, 1.0, kCrossingNear);
+  const Image<Key> keys = drawer.draw(scene, view);
+  double farthest = 0.0;
+  for (int y = 0; y < kCrossingSize.height; ++y) {
+    for (int x = 0; x < kCrossingSize.width; ++x) {
+      // Where the pixel's ray meets the turned plane: `along` from the line, nearer than the other plane if negative.
+      const double slope = -1.0 + 2.0 * (x + 0.5) / kCrossingSize.width;
+      const double along = (slope * distance - line) / (std::cos(angle) - slope * std::sin(angle));
+      const bool turned_seen = keys.at(x, y) != kNoKey && key_surface(keys.at(x, y)) >= 2;
+      const bool turned_nearer = along < 0.0;
+      if (keys.at(x, y) == kNoKey || turned_seen != turned_nearer) farthest = std::max(farthest, std::abs(along));
+    }
+  }
+  return farthest;
+}
+
+/// Roundings, in units of 2^-24, in the depths of the two planes: docs/numerics.md.
+double roundings(double angle) {
+  return 13.0 + 60.0 * std::sin(angle);
+}
+
+std::vector<StabilityFinding> measure_crossing_planes(const Globals& globals) {
+  Drawer drawer(globals);
+  StabilityFinding finding;
+  finding.name = "crossing/line";
+  finding.parameter = "angle 1e-1 .. 1e-5 rad at 1, 100 and 10 000 m: distance from the true line x sin(angle) / depth";
+  finding.unit = "relative";
+  finding.limit = roundings(0.1) * kFloatRounding;
+  finding.why = "The planes lie x sin(angle) apart beside their line; depth takes 13 + 60 sin(angle) roundings.";
+  finding.curve.x = "angle, rad";
+  for (const double angle : {1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1}) {
+    double worst = 0.0;
+    for (const double distance : {1.0, 100.0, 1e4}) {
+      worst = std::max(worst, line_error(drawer, distance, angle) * std::sin(angle) / distance);
+    }
+    finding.curve.points.emplace_back(angle, worst);
+    finding.curve.expected.emplace_back(angle, roundings(angle) * kFloatRounding);
+    finding.measured = std::max(finding.measured, worst);
+  }
+  return {finding};
+}
+
+constexpr int kRows = 512;
+constexpr Size kSlantedSize{16, kRows};
+constexpr double kSlantedNear = 1e-3;
+constexpr double kNearEdge = 0.5;  // where the ground begins, metres along the view axis
+constexpr double kFarEdge = 1e7;
+
+/// A strip of ground as wide as the view, from before the picture's lower edge to where no row is left.
+Mesh ground() {
+  Mesh mesh;
+  for (const double z : {kNearEdge, kFarEdge}) {
+    for (const double side : {-1.0, 1.0}) mesh.positions.emplace_back(glm::dvec3(0.05 * z * side, -1.0, -z));
+  }
+  mesh.triangles = {{0, 1, 3}, {0, 3, 2}};
+  return mesh;
+}
+
+/// Per row below the horizon whether it shows the nearer of two grounds, the farther being the nearer one enlarged
+/// about the eye: along each ray it lies farther by a share `gap` of the distance.
+std::vector<bool> right_rows(Drawer& drawer, double gap) {
+  Scene scene;
+  add(scene, ground(), glm::scale(glm::dmat4(1.0), glm::dvec3(1.0 + gap)));
+  add(scene, ground());
+  finish_scene(scene);
+  View view = head_on(kSlantedSize, 1.0 / 32.0, kSlantedNear);
+  view.top = 1.0;
+  view.bottom = -1.0;
+  const Image<Key> keys = drawer.draw(scene, view);
+  std::vector<bool> right;
+  for (int y = kRows / 2; y < kRows; ++y) {
+    right.push_back(std::ranges::all_of(keys.row(y), [](Key key) { return key != kNoKey && key_surface(key) >= 2; }));
+  }
+  return right;
+}
+
+std::vector<StabilityFinding> measure_slanted_planes(const Globals& globals) {
+  Drawer drawer(globals);
+  constexpr int kGaps = 60;
+  std::vector<double> lost(kRows / 2, 0.0);  // per row the largest gap that is lost
+  for (int i = 0; i < kGaps; ++i) {
+    const double gap = 1e-8 * std::pow(10.0, 6.0 * i / (kGaps - 1.0));
+    const std::vector<bool> right = right_rows(drawer, gap);
+    for (std::size_t row = 0; row < lost.size(); ++row) {
+      if (!right[row]) lost[row] = gap;
+    }
+  }
+  // Of each triangle's depth, at most: 42 roundings of its plane and 10 of its corners and of the sum;
+  // docs/numerics.md.
+  constexpr double kRoundings = 2.0 * 52.0;
+  StabilityFinding finding;
+  finding.name = "slanted/ground";
+  finding.parameter = "ground from 0.5 to 1e7 m, seen from 1 m up: the gap that is lost x nearest depth / distance";
+  finding.unit = "relative to the nearest corner's depth";
+  finding.limit = kRoundings * kFloatRounding;
+  finding.why = "Depth is interpolated in floats from corner to corner, so it rounds as the largest depth does.";
+  finding.curve.x = "distance, m";
+  for (std::size_t row = lost.size(); row-- > 0;) {
+    const double z = 0.5 * kRows / (static_cast<double>(row) + 0.5);
+    finding.measured = std::max(finding.measured, lost[row] * kNearEdge / z);
+    finding.curve.points.emplace_back(z, lost[row] * kNearEdge / z);
+  }
+  return {finding};
+}
+
+}  // namespace
+
+StabilityCase depth_order_case() {
+  return {"depth-order", "pairs of close surfaces from 1 mm to 10 000 km: the nearer one is seen", measure_depth_order};
+}
+
+StabilityCase crossing_planes_case() {
+  return {"crossing", "two planes that cross at a small angle: the line lies where it should", measure_crossing_planes};
+}
+
+StabilityCase slanted_planes_case() {
+  return {"slanted", "ground to the horizon: what its depth resolves", measure_slanted_planes};
 }
 
 }  // namespace hpr::stability

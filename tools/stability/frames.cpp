@@ -8,7 +8,7 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
-#include "tools/stability/cases.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 namespace hpr::stability {
@@ -24,7 +24,7 @@ std::uint64_t mix_bits(std::uint64_t bits) {
 }
 
 /// Places of a screen at which arithmetic would go wrong first: at its corners, in its middle, and scattered.
-std::vector<std::array<int, 2>> places(Size size, std::uint64_t seed) {
+std::vector<std::array<int, 2>> test_positions(Size size, std::uint64_t seed) {
   const int right = size.width - 1;
   const int bottom = size.height - 1;
   std::vector<std::array<int, 2>> all{{0, 0}, {right, 0}, {0, bottom}, {right, bottom}, {right / 2, bottom / 2}};
@@ -50,14 +50,14 @@ std::size_t wrong_tiles(std::size_t screens) {
                ? 0U
                : 1U;
   for (std::size_t screen = 0; screen < screens; ++screen) {
-    for (const auto& [x, y] : places(kScreen, screen)) {
+    for (const auto& [x, y] : test_positions(kScreen, screen)) {
       const auto column = static_cast<std::uint64_t>(x) / kTileSide;
       const auto row = static_cast<std::uint64_t>(y) / kTileSide;
       const std::size_t tile = layout.tile_at(screen, x, y);
-      const TilePlace place = layout.place(tile);
+      const TilePlace tile_place = layout.place(tile);
       const bool named = tile == screen * kTiles + row * kColumns + column;
-      const bool names = place.screen == screen && place.pixels.x0 == static_cast<int>(column) * kTileSide &&
-                         place.pixels.y0 == static_cast<int>(row) * kTileSide;
+      const bool names = tile_place.screen == screen && tile_place.pixels.x0 == static_cast<int>(column) * kTileSide &&
+                         tile_place.pixels.y0 == static_cast<int>(row) * kTileSide;
       wrong += named && names ? 0U : 1U;
     }
   }
@@ -113,7 +113,7 @@ double wrong_composites(const FrameLayout& layout, const std::vector<std::size_t
 StabilityFinding composited_far_out() {
   const FrameLayout layout(std::vector<Size>(2, Size{16384, 16384}));
   std::vector<std::size_t> tiles;
-  for (const std::size_t share : {0U, 1U, 31U, 32U, 33U, 63U}) tiles.push_back(layout.tiles() / 64 * share);
+  for (const std::size_t index_of_64 : {0U, 1U, 31U, 32U, 33U, 63U}) tiles.push_back(layout.tiles() / 64 * index_of_64);
   tiles.push_back(layout.tiles() - 1);
   StabilityFinding finding;
   finding.name = "frames/composited";
@@ -131,7 +131,7 @@ StabilityFinding composited_far_out() {
   return finding;
 }
 
-/// Bytes the system says can still be had.
+/// Bytes of memory that the system reports as available.
 std::uint64_t available_memory() {
   std::ifstream meminfo("/proc/meminfo");
   std::string name;
@@ -179,10 +179,14 @@ StabilityFinding long_message() {
   return finding;
 }
 
+std::vector<StabilityFinding> measure_frames(const Globals& /*globals*/) {
+  return {layout_arithmetic(), composited_far_out(), long_message()};
+}
+
 }  // namespace
 
-std::vector<StabilityFinding> frames(const Globals& /*globals*/) {
-  return {layout_arithmetic(), composited_far_out(), long_message()};
+StabilityCase frames_case() {
+  return {"frames", "frames and messages past 2^31 bytes", measure_frames};
 }
 
 }  // namespace hpr::stability

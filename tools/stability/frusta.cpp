@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "tools/stability/cases.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 #include "walls/geometry/geometry.h"
 
@@ -64,7 +64,7 @@ double corner_error(const Beside& beside, double distance) {
 std::size_t wrong_pixels(Drawer& drawer, const Beside& beside, double distance) {
   const View view = view_of(beside, distance);
   Scene scene;
-  // Corners relative to the eye, so that what is drawn tells of the frustum alone.
+  // Corners are relative to the eye, so that what is drawn depends on the frustum alone.
   const auto placed = [&](double x, double y) {
     const glm::dmat4 moved = glm::translate(glm::dmat4(1.0), {x, y, 0.0});
     return glm::scale(moved, glm::dvec3(1.0));
@@ -88,9 +88,7 @@ std::size_t wrong_pixels(Drawer& drawer, const Beside& beside, double distance) 
   return wrong;
 }
 
-}  // namespace
-
-std::vector<StabilityFinding> frusta(const Globals& globals) {
+std::vector<StabilityFinding> measure_frusta(const Globals& globals) {
   Drawer drawer(globals);
   std::vector<StabilityFinding> findings;
   StabilityFinding drawn;
@@ -125,6 +123,12 @@ std::vector<StabilityFinding> frusta(const Globals& globals) {
   std::ranges::reverse(drawn.curve.points);
   findings.push_back(drawn);
   return findings;
+}
+
+}  // namespace
+
+StabilityCase frusta_case() {
+  return {"frusta", "the eye nears the plane of a screen: its corners stay", measure_frusta};
 }
 
 }  // namespace hpr::stability

@@ -8,7 +8,7 @@
 #include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
 #include "compositing/kernels.h"
-#include "tools/stability/cases.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 namespace hpr::stability {
@@ -20,8 +20,8 @@ constexpr double kSpacing = 1e-3;
 /// Layer i from the front: premultiplied, in [0, 1].
 RgbaPremultiplied layer_color(int i) {
   const float alpha = 0.02F + 0.06F * static_cast<float>(i * 29 % kLayers) / static_cast<float>(kLayers);
-  const auto share = [&](int k) { return alpha * static_cast<float>((i * k + 7) % 17) / 16.0F; };
-  return {share(3), share(5), share(11), alpha};
+  const auto channel = [&](int k) { return alpha * static_cast<float>((i * k + 7) % 17) / 16.0F; };
+  return {channel(3), channel(5), channel(11), alpha};
 }
 
 std::vector<int> shuffled() {
@@ -122,10 +122,14 @@ StabilityFinding blended() {
   return finding;
 }
 
+std::vector<StabilityFinding> measure_layers(const Globals& globals) {
+  return {veils(globals), blended()};
+}
+
 }  // namespace
 
-std::vector<StabilityFinding> layers(const Globals& globals) {
-  return {veils(globals), blended()};
+StabilityCase layers_case() {
+  return {"layers", "64 translucent layers in any order: the exact mixture", measure_layers};
 }
 
 }  // namespace hpr::stability

@@ -4,8 +4,7 @@
 #include <numbers>
 #include <vector>
 
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 // Lights where formulas have their poles and zeros: on a surface, as small as a point from afar, and at the horizon.
@@ -17,7 +16,7 @@ constexpr double kPi = std::numbers::pi;
 /// A white floor, y = 0, two metres wide.
 Scene floor_under(const Light& light) {
   Scene scene;
-  add_placed(scene, parallelogram({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), matte(), glm::dmat4(1.0));
+  add_placed(scene, parallelogram({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), diffuse(), glm::dmat4(1.0));
   scene.lights = {light};
   finish_scene(scene);
   return scene;
@@ -77,8 +76,8 @@ StabilityFinding on_surface(int threads) {
 /// A sphere or a triangle of `size` metres, one metre from the floor at 45 degrees, against a point light there.
 double off_the_point(bool sphere, double size) {
   Light light;
-  const glm::dvec3 place = glm::normalize(glm::dvec3(1.0, 1.0, 0.0));
-  light.position = place;
+  const glm::dvec3 position = glm::normalize(glm::dvec3(1.0, 1.0, 0.0));
+  light.position = position;
   const Scene point = floor_under(light);
   double expected = floors_radiance(point, {});
   if (sphere) {
@@ -89,16 +88,16 @@ double off_the_point(bool sphere, double size) {
   const glm::dvec3 a = glm::normalize(glm::dvec3(1.0, -1.0, 0.0)) * size;
   const glm::dvec3 b = glm::dvec3(0.0, 0.0, 1.0) * size;
   Scene scene;
-  add_placed(scene, parallelogram({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), matte(), glm::dmat4(1.0));
+  add_placed(scene, parallelogram({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), diffuse(), glm::dmat4(1.0));
   Mesh triangle;
   triangle.positions = {glm::vec3(0.0F), glm::vec3(a), glm::vec3(b)};
   triangle.triangles = {{0, 1, 2}};
-  Material glowing = matte(glm::vec3(0.0F));
+  Material glowing = diffuse(glm::vec3(0.0F));
   const auto area = static_cast<float>(0.5 * size * size);
   glowing.emissive = glm::vec3(1.0F / area);
-  glm::dmat4 to_place(1.0);
-  to_place[3] = glm::dvec4(place - (a + b) / 3.0, 1.0);
-  add_placed(scene, std::move(triangle), glowing, to_place);
+  glm::dmat4 to_position(1.0);
+  to_position[3] = glm::dvec4(position - (a + b) / 3.0, 1.0);
+  add_placed(scene, std::move(triangle), glowing, to_position);
   finish_scene(scene);
   return relative(floors_radiance(scene, {}), expected);
 }
@@ -110,17 +109,17 @@ StabilityFinding far_away(bool sphere) {
                                  "one sample of a light of size q sees cosine and distance off by q");
   // d(cos / r^2) <= (tan 45 + 2) q to first order, corners reaching up to sqrt(2) q about the middle; then floats.
   const auto limit = [](double q) { return 3.0 * std::sqrt(2.0) * q * (1.0 + 2.0 * q) + 8.0 * kFloatRounding; };
-  constexpr double kSmallest = 1e-6;
+  constexpr double kMinSize = 1e-6;
   far.curve.x = "size over distance";
-  for (const double q : {1e-9, kSmallest, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
+  for (const double q : {1e-9, kMinSize, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
     const double off = off_the_point(sphere, q);
-    if (q >= kSmallest) far.measured = worse(far.measured, off / limit(q));
+    if (q >= kMinSize) far.measured = worse(far.measured, off / limit(q));
     far.curve.points.emplace_back(q, off);
     far.curve.expected.emplace_back(q, limit(q));
   }
   // Smaller lights still are points.
-  const auto holds = [&](double q) { return off_the_point(sphere, q) <= limit(kSmallest); };
-  far.breaks_at = breaking_point_if_any(kSmallest, 1e-18, 0.2, holds);
+  const auto holds = [&](double q) { return off_the_point(sphere, q) <= limit(kMinSize); };
+  far.breaks_at = breaking_point_if_any(kMinSize, 1e-18, 0.2, holds);
   return far;
 }
 
@@ -147,10 +146,14 @@ StabilityFinding horizon() {
   return low;
 }
 
+std::vector<StabilityFinding> measure_lights(const Globals& globals) {
+  return {near_surface(), on_surface(threads_of(globals)), far_away(true), far_away(false), horizon()};
+}
+
 }  // namespace
 
-std::vector<StabilityFinding> lights(const Globals& globals) {
-  return {near_surface(), on_surface(threads_of(globals)), far_away(true), far_away(false), horizon()};
+StabilityCase lights_case() {
+  return {"lights", "lights on a surface, as small as a point, at the horizon", measure_lights};
 }
 
 }  // namespace hpr::stability

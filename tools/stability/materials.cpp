@@ -10,13 +10,13 @@
 #include "rt/materials/bsdf.h"
 #include "rt/sampling/sampler.h"
 #include "scene/generators/shapes.h"
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
-// Roughness 0 and 1, an index of refraction of 1, and the way there.
 namespace hpr::stability {
 namespace {
+
+// Roughness 0 and 1, an index of refraction of 1, and the way there.
 
 constexpr std::uint32_t kSamples = 1U << 12U;
 constexpr Size kPicture{96, 96};
@@ -111,17 +111,17 @@ StabilityFinding smooth() {
     const double alpha = roughness * roughness;
     return 0.5 * std::numbers::pi * alpha * (1.0 + std::tan(polar)) + 1024.0 * kDoubleRounding;
   };
-  constexpr double kLeast = 1.0001 * Bsdf::kDeltaRoughness;
+  constexpr double kMinRoughness = 1.0001 * Bsdf::kDeltaRoughness;
   StabilityFinding jump =
       finding("materials/mirror-limit", "white metal just above the roughness of a mirror, from 0 to 80 degrees",
-              limit(kLeast, kSteepest), "radiance", "GGX of alpha turns directions by pi alpha in the mean");
+              limit(kMinRoughness, kSteepest), "radiance", "GGX of alpha turns directions by pi alpha in the mean");
   jump.curve.x = "roughness";
-  for (const double roughness : {kLeast, 2e-3, 5e-3, 0.01, 0.03, 0.1}) {
+  for (const double roughness : {kMinRoughness, 2e-3, 5e-3, 0.01, 0.03, 0.1}) {
     double worst = 0.0;
     for (const double polar : {0.0, 0.5, 1.0, kSteepest}) {
       worst = worse(worst, std::abs(shown(roughness, polar) - shown(0.0, polar)));
     }
-    if (roughness == kLeast) jump.measured = worst;
+    if (roughness == kMinRoughness) jump.measured = worst;
     jump.curve.points.emplace_back(roughness, worst);
     jump.curve.expected.emplace_back(roughness, limit(roughness, kSteepest));
   }
@@ -131,9 +131,9 @@ StabilityFinding smooth() {
 /// A lit wall five metres behind the eye's focus, with or without a ball of clear glass before it.
 Scene wall_behind(double ior) {
   Scene scene;
-  add_placed(scene, parallelogram({-6, -6, -3}, {12, 0, 0}, {0, 12, 0}), matte(), glm::dmat4(1.0));
+  add_placed(scene, parallelogram({-6, -6, -3}, {12, 0, 0}, {0, 12, 0}), diffuse(), glm::dmat4(1.0));
   if (ior > 0.0) {
-    Material glass = matte();
+    Material glass = diffuse();
     glass.roughness = 0.0F;
     glass.transmission = 1.0F;
     glass.thickness = 1.0F;
@@ -156,15 +156,15 @@ double difference(double ior, int threads) {
   View view = make_view(look_at({0.0, 0.0, 4.0}, {0.0, 0.0, 0.0}, {0, 1, 0}, 0.33), kPicture, without.bounds);
   view.near_distance = 0.1;
   const LitPicture bare = lit_picture(without, view, only({}, threads));
-  const LitPicture seen = lit_picture(with, view, only({PassId::Reflection, PassId::Refraction}, threads));
+  const LitPicture reflected = lit_picture(with, view, only({PassId::Reflection, PassId::Refraction}, threads));
   double worst = 0.0;
   for (int y = 0; y < kPicture.height; ++y) {
     for (int x = 0; x < kPicture.width; ++x) {
       const double expected = bare.image.at(x, y).r;
-      worst = worse(worst, std::abs(static_cast<double>(seen.image.at(x, y).r) - expected) / expected);
+      worst = worse(worst, std::abs(static_cast<double>(reflected.image.at(x, y).r) - expected) / expected);
     }
   }
-  return seen.counts[PassId::Refraction] > 0 ? worst : std::numeric_limits<double>::infinity();
+  return reflected.counts[PassId::Refraction] > 0 ? worst : std::numeric_limits<double>::infinity();
 }
 
 std::vector<StabilityFinding> indices(int threads) {
@@ -190,12 +190,82 @@ std::vector<StabilityFinding> indices(int threads) {
   return {none, weak};
 }
 
-}  // namespace
-
-std::vector<StabilityFinding> materials(const Globals& globals) {
+std::vector<StabilityFinding> measure_materials(const Globals& globals) {
   std::vector<StabilityFinding> all{energy(), kept_energy(), smooth()};
   for (StabilityFinding& one : indices(threads_of(globals))) all.push_back(std::move(one));
   return all;
+}
+
+// Two mirrors face one another. A ray that goes from one to the other leaves them after as many reflections as its
+// slant allows, each of which takes its share, and then meets an even sky.
+
+constexpr int kMaxDepth = 64;
+constexpr float kReflectance = 0.9F;
+
+/// Mirrors in the planes z = 0 and z = 1, for x up to 1.
+Scene facing_mirrors() {
+  Scene scene;
+  add_placed(scene, parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), mirror(kReflectance), glm::dmat4(1.0));
+  add_placed(scene, parallelogram({-1, -1, 1}, {0, 2, 0}, {2, 0, 0}), mirror(kReflectance), glm::dmat4(1.0));
+  Environment sky;
+  sky.image = Image<Rgb>({1, 1}, {1.0F, 1.0F, 1.0F});
+  scene.environment = sky;
+  finish_scene(scene);
+  return scene;
+}
+
+struct Reflected {
+  double radiance = 0.0;
+  double expected = 0.0;  ///< without a cap
+};
+
+/// From half way between the mirrors, by so many reflections: reflection k lies at x = (k - 1/2) / reflections.
+Reflected reflect_times(const Scene& scene, int reflections, int max_depth) {
+  const double slope = 1.0 / reflections;
+  RaySettings settings = only({PassId::Reflection});
+  settings.max_depth = max_depth;
+  const View view = glance(scene, {0.0, 0.0, 0.5}, {0.5 * slope, 0.0, 1.0});
+  const double cosine = 1.0 / std::sqrt(1.0 + slope * slope);
+  const double rho = kReflectance;
+  const double each = rho + (1.0 - rho) * std::pow(1.0 - cosine, 5.0);  // Schlick's term
+  return {glanced(scene, view, settings), std::pow(each, reflections)};
+}
+
+std::vector<StabilityFinding> measure_mirrors(const Globals& /*globals*/) {
+  const Scene scene = facing_mirrors();
+  StabilityFinding falls = finding("mirrors/decay", "1 .. 64 reflections between facing mirrors of 0.9", 0.0,
+                                   "relative", "each reflection rounds in double, the picture once to float");
+  falls.limit = kFloatRounding + 32.0 * kMaxDepth * kDoubleRounding;
+  falls.curve.x = "reflections";
+  for (int depth = 1; depth <= kMaxDepth; ++depth) {
+    const Reflected reflected = reflect_times(scene, depth, kMaxDepth);
+    const double error = std::abs(reflected.radiance / reflected.expected - 1.0);
+    falls.measured = worse(falls.measured, error);
+    falls.curve.points.emplace_back(depth, error);
+  }
+  // Deeper than any option asks for; paths end where hardly any light is left.
+  int depth = kMaxDepth + 1;
+  while (depth < 256 && reflect_times(scene, depth, 256).radiance > 0.0) ++depth;
+  falls.breaks_at = depth;
+
+  StabilityFinding cap = finding("mirrors/cap", "max depth 1, 2, 16, 63 and one reflection more", 0.0, "radiance",
+                                 "past the cap nothing is followed");
+  for (const int most : {1, 2, 16, 63}) {
+    cap.measured = worse(cap.measured, reflect_times(scene, most + 1, most).radiance);
+    const Reflected last = reflect_times(scene, most, most);
+    if (!(last.radiance > 0.5 * last.expected)) cap.measured = worse(cap.measured, last.expected);
+  }
+  return {falls, cap};
+}
+
+}  // namespace
+
+StabilityCase materials_case() {
+  return {"materials", "roughness and index at their ends: no energy is made, nothing jumps", measure_materials};
+}
+
+StabilityCase mirrors_case() {
+  return {"mirrors", "facing mirrors: radiance falls by the same share at every reflection", measure_mirrors};
 }
 
 }  // namespace hpr::stability

@@ -15,8 +15,8 @@
 #include "image/image_codec.h"
 #include "image/image_io.h"
 #include "scene/load_scene.h"
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
+#include "tools/stability/tools.h"
 
 // Numbers that are none, in files and out of sums too large for a float: refused, or counted and replaced, and never in
 // a picture.
@@ -121,7 +121,7 @@ StabilityFinding environment(const TemporaryFile& file, int threads) {
 /// A floor that glows, lit by 8 lights of the same radiance.
 RayCounts glare(double radiance, int threads) {
   Scene scene;
-  Material material = matte();
+  Material material = diffuse();
   material.emissive = glm::vec3(static_cast<float>(radiance));
   add_placed(scene, parallelogram({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), material, glm::dmat4(1.0));
   for (int i = 0; i < 8; ++i) {
@@ -160,14 +160,18 @@ std::vector<StabilityFinding> overflow() {
   return {bright, named};
 }
 
-}  // namespace
-
-std::vector<StabilityFinding> not_finite(const Globals& globals) {
+std::vector<StabilityFinding> measure_not_finite(const Globals& globals) {
   const int threads = threads_of(globals);
   const TemporaryFile file;
   std::vector<StabilityFinding> all{geometry(file), attributes(file, threads), environment(file, threads)};
   for (StabilityFinding& one : overflow()) all.push_back(std::move(one));
   return all;
+}
+
+}  // namespace
+
+StabilityCase not_finite_case() {
+  return {"not-finite", "NaN and infinities in files and sums: refused or counted, never shown", measure_not_finite};
 }
 
 }  // namespace hpr::stability

@@ -17,8 +17,7 @@
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/generators/generators.h"
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
 #include "tools/stability/tools.h"
 
 // Photons, from none to more than 32 bits count: who sends them changes no bit, their light adds up to what was sent,
@@ -47,7 +46,7 @@ Scene white_room(double power) {
       for (const glm::uvec3& triangle : wall.triangles) room.triangles.push_back(triangle + first);
     }
   }
-  add_placed(scene, std::move(room), matte(), glm::dmat4(1.0));
+  add_placed(scene, std::move(room), diffuse(), glm::dmat4(1.0));
   Light light;
   light.intensity = glm::vec3(static_cast<float>(power / (4.0 * std::numbers::pi)));
   scene.lights = {light};
@@ -69,8 +68,8 @@ class PhotonRoom {
                                     const PhotonSettings& settings) const {
     const PhotonTracer tracer(
         scene_, surfaces_, space_, rays_,
-        [this](double choice, const glm::dvec2& place, const glm::dvec2& direction) {
-          return lights_.emit(choice, place, direction);
+        [this](double choice, const glm::dvec2& position, const glm::dvec2& direction) {
+          return lights_.emit(choice, position, direction);
         },
         settings);
     return tracer.trace({}, range, pass_photons);
@@ -168,7 +167,7 @@ StabilityFinding who_sends() {
   return same;
 }
 
-StabilityFinding shares() {
+StabilityFinding split_among_ranks() {
   StabilityFinding whole = finding("photons/shares", "0, 1, 1e8, 2^32 + 5, 2^62 photons among 1 .. 1000 ranks", 0.0,
                                    "photons sent twice or by nobody", "shares follow one another");
   for (const std::uint64_t count : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{100'000'000},
@@ -177,10 +176,10 @@ StabilityFinding shares() {
       const PhotonRange all{7, count};
       std::uint64_t next = all.first;
       for (int rank = 0; rank < ranks; ++rank) {
-        const PhotonRange share = share_of_rank(all, rank, ranks);
-        whole.measured += share.first == next ? 0.0 : 1.0;
-        whole.measured += share.count <= count / static_cast<std::uint64_t>(ranks) + 1 ? 0.0 : 1.0;
-        next = share.first + share.count;
+        const PhotonRange range = share_of_rank(all, rank, ranks);
+        whole.measured += range.first == next ? 0.0 : 1.0;
+        whole.measured += range.count <= count / static_cast<std::uint64_t>(ranks) + 1 ? 0.0 : 1.0;
+        next = range.first + range.count;
       }
       whole.measured += next == all.first + count ? 0.0 : 1.0;
     }
@@ -188,22 +187,22 @@ StabilityFinding shares() {
   return whole;
 }
 
-/// As many photons as there are, in one place: a gather is the longest sum there can be.
-StabilityFinding longest_sum(std::uint64_t seed) {
-  constexpr std::size_t kMost = 1'000'000;
+/// All photons at one position: gathering them is the longest sum there can be.
+StabilityFinding max_sum(std::uint64_t seed) {
+  constexpr std::size_t kMaxPhotons = 1'000'000;
   StabilityFinding sum = finding("photons/longest-sum", "1e3 .. 1e6 photons in one place, fluxes over 12 decades",
-                                 (kMost + 4.0) * kDoubleRounding, "relative",
+                                 (kMaxPhotons + 4.0) * kDoubleRounding, "relative",
                                  "one addition each, 2^-53 each: 1e8 photons would lose 1.1e-8");
   sum.curve.x = "photons";
   RandomStream random(seed);
-  std::vector<Photon> photons(kMost);
+  std::vector<Photon> photons(kMaxPhotons);
   for (Photon& photon : photons) {
     photon.facing = pack_facing({0.0, 0.0, 1.0});
     photon.direction = pack_direction({0.0, 0.0, 1.0});
     photon.flux.fill(static_cast<float>(std::pow(10.0, 12.0 * random.one() - 6.0)));
   }
   const RaySpace space(Bounds{glm::dvec3(-1.0), glm::dvec3(1.0)});
-  for (const std::size_t count : {std::size_t{1'000}, std::size_t{10'000}, std::size_t{100'000}, kMost}) {
+  for (const std::size_t count : {std::size_t{1'000}, std::size_t{10'000}, std::size_t{100'000}, kMaxPhotons}) {
     const PhotonMap map(std::span<const Photon>(photons).first(count), space, 0.5);
     const glm::dvec3 found = map.gather({}, {0.0, 0.0, 1.0}, [](const glm::dvec3&) { return glm::dvec3(1.0); });
     ExactSum exact;
@@ -243,11 +242,16 @@ StabilityFinding few(const Globals& globals) {
   return odd;
 }
 
+std::vector<StabilityFinding> measure_photons(const Globals& globals) {
+  const int threads = threads_of(globals);
+  return {few(globals), power(threads), faint(threads), who_sends(), split_among_ranks(), max_sum(globals.seed)};
+}
+
 }  // namespace
 
-std::vector<StabilityFinding> photons(const Globals& globals) {
-  const int threads = threads_of(globals);
-  return {few(globals), power(threads), faint(threads), who_sends(), shares(), longest_sum(globals.seed)};
+StabilityCase photons_case() {
+  return {"photons", "photons from none to more than 32 bits count: senders change no bit, no light is lost",
+          measure_photons};
 }
 
 }  // namespace hpr::stability

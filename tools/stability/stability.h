@@ -20,7 +20,7 @@ enum class Bound { AtMost, AtLeast };
 struct StabilityCurve {
   std::string x;                                    ///< what runs along the axis, with its unit
   std::vector<std::pair<double, double>> points;    ///< (parameter, measured), ascending
-  std::vector<std::pair<double, double>> expected;  ///< what the derivation in docs/numerics.md says; may be empty
+  std::vector<std::pair<double, double>> expected;  ///< by the derivation in docs/numerics.md; may be empty
 };
 
 /// One number about one extreme. `limit` is what HPR promises and docs/numerics.md derives; `breaks_at` where along the
@@ -39,7 +39,7 @@ struct StabilityFinding {
   [[nodiscard]] bool holds() const { return bound == Bound::AtMost ? measured <= limit : measured >= limit; }
 };
 
-/// One extreme: one file in app/stability/, listed in all_stability_cases().
+/// One extreme. Its file in tools/stability/ defines stability::NAME_case(), and the list in stability.cpp names it.
 struct StabilityCase {
   std::string_view name;   ///< kebab-case
   std::string_view about;  ///< one line: what is driven to its extreme, and what must not move
@@ -55,13 +55,15 @@ struct StabilityCase {
 /// relative) times.
 [[nodiscard]] double breaking_point(double good, double bad, double relative, const std::function<bool(double)>& holds);
 
-/// The same where it is not known that `good` holds and `bad` does not: nullopt unless it is so.
+/// breaking_point(), or nullopt unless `good` holds and `bad` does not.
 [[nodiscard]] std::optional<double> breaking_point_if_any(double good, double bad, double relative,
                                                           const std::function<bool(double)>& holds);
 
-/// The report as schema hpr.stability/1, as a table for people, and as one HTML page with a plot for each curve.
+/// Schema hpr.stability/1.
 [[nodiscard]] std::string stability_json(std::span<const StabilityFinding> findings);
+/// A table for people.
 [[nodiscard]] std::string stability_table(std::span<const StabilityFinding> findings);
+/// The report as one HTML page with a plot for each curve.
 [[nodiscard]] std::string stability_html(std::span<const StabilityFinding> findings);
 
 }  // namespace hpr

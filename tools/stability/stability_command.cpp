@@ -11,9 +11,9 @@
 #include "core/file.h"
 #include "core/json.h"
 #include "core/log.h"
-#include "core/progress.h"
 #include "core/text.h"
 #include "tools/stability/stability.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 namespace {
@@ -46,7 +46,7 @@ class StabilityCommand final : public Command {
     }
     if (!html_.empty()) check_writable(html_, globals.force);
     const std::vector<StabilityFinding> findings = measure(cases, globals);
-    if (!html_.empty()) write_file_atomically(html_, stability_html(findings));
+    write_if_named(html_, [&] { return stability_html(findings); });
     const std::string text = json_ ? stability_json(findings) : stability_table(findings);
     std::fputs(text.c_str(), stdout);
     const bool all_hold = std::ranges::all_of(findings, &StabilityFinding::holds);
@@ -97,13 +97,13 @@ class StabilityCommand final : public Command {
   }
 
   static std::vector<StabilityFinding> measure(const std::vector<StabilityCase>& cases, const Globals& globals) {
-    Progress progress(globals.progress, "case", cases.size());
     std::vector<StabilityFinding> findings;
-    for (const StabilityCase& one : cases) {
-      const std::vector<StabilityFinding> found = findings_of(one, globals);
-      findings.insert(findings.end(), found.begin(), found.end());
-      progress.step(std::string(one.name));
-    }
+    (void)measure_cases(
+        {globals.progress, "case", cases.size()}, [&](std::size_t i) { return std::string(cases[i].name); },
+        [&](std::size_t i) {
+          std::ranges::move(findings_of(cases[i], globals), std::back_inserter(findings));
+          return CaseResult{};
+        });
     return findings;
   }
 

@@ -6,22 +6,65 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <random>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "app/options/globals.h"
 #include "image/color.h"
+#include "image/image.h"
 #include "image/key.h"
 #include "image/tiles.h"
 #include "raster/gl_context.h"
 #include "rt/deferred_shader.h"
 #include "scene/scene.h"
 #include "scene/view.h"
+#include "tools/stability/stability.h"
 
-/// What the cases about geometry share: small scenes, their keys and pictures, and how far two of them are apart.
+/// What cases share: small scenes, their keys and pictures, and how far two of them are apart.
 namespace hpr::stability {
+
+// Numbers.
 
 /// The unit roundoff of a float, 2^-24.
 inline constexpr double kFloatRounding = 0x1p-24;
+
+/// Random numbers that are equal on every machine.
+class RandomStream {
+ public:
+  explicit RandomStream(std::uint64_t seed) : bits_(seed) {}
+
+  /// In [0, 1).
+  [[nodiscard]] double one() { return static_cast<double>(bits_() >> 11U) * 0x1p-53; }
+  [[nodiscard]] std::size_t below(std::size_t count) { return bits_() % count; }
+  [[nodiscard]] glm::dvec3 on_sphere();
+  [[nodiscard]] glm::dvec3 in_ball();
+
+ private:
+  std::mt19937_64 bits_;
+};
+
+/// The unit roundoff of a double, 2^-53.
+inline constexpr double kDoubleRounding = 0x1p-53;
+
+/// A sum that loses nothing to speak of: Kahan's compensation on top of 64 bits.
+struct ExactSum {
+  long double sum = 0.0L;
+  long double rest = 0.0L;
+
+  void add(long double value) {
+    const long double term = value - rest;
+    const long double next = sum + term;
+    rest = (next - sum) - term;
+    sum = next;
+  }
+};
+
+/// The worse of two measured numbers, of which larger is worse: a NaN is the worst there is.
+[[nodiscard]] double worse(double a, double b);
+
+// Keys and pictures of scenes, drawn with OpenGL.
 
 /// Adds the mesh, with normals if it has none, and an instance of it.
 void add(Scene& scene, Mesh mesh, const glm::dmat4& to_world = glm::dmat4(1.0));
@@ -38,7 +81,7 @@ class Drawer {
   explicit Drawer(const Globals& globals);
 
   [[nodiscard]] Image<Key> draw(const Scene& scene, const View& view);
-  /// A share of the scene.
+  /// The surfaces of `objects` alone.
   [[nodiscard]] TileLayer<Key> draw(const Scene& scene, const View& view, std::span<const SurfaceRange> objects);
   /// The whole scene, one part of the screen after the other.
   [[nodiscard]] TileLayer<Key> draw_parts(const Scene& scene, const View& view, std::span<const Rect> parts);
@@ -79,5 +122,61 @@ struct Picture {
 [[nodiscard]] double other_colors(const Image<Rgb>& a, const Image<Rgb>& b);
 /// The share of pixels with a neighbour, of four, whose display colour is off by more than one level.
 [[nodiscard]] double color_edges(const Image<Rgb>& colors);
+
+// Light without OpenGL.
+
+/// A finding whose measured value is still 0.
+[[nodiscard]] StabilityFinding finding(std::string name, std::string parameter, double limit, std::string unit,
+                                       std::string why);
+
+/// Threads a case may use.
+[[nodiscard]] int threads_of(const Globals& globals);
+
+/// White Lambert without a specular layer.
+[[nodiscard]] Material diffuse(const glm::vec3& color = glm::vec3(1.0F));
+/// A metal that reflects so much in one direction.
+[[nodiscard]] Material mirror(float reflectance);
+
+/// Adds `mesh` with one instance of it. Returns the mesh's index.
+std::uint32_t add_placed(Scene& scene, Mesh mesh, const Material& material, const glm::dmat4& to_world);
+/// The parallelogram corner, corner + a, corner + a + b, corner + b; its normal is a x b.
+[[nodiscard]] Mesh parallelogram(const glm::dvec3& corner, const glm::dvec3& a, const glm::dvec3& b);
+
+/// A picture and what it took.
+struct LitPicture {
+  TileLayer<Key> keys;
+  Image<Rgb> image;
+  RayCounts counts;
+};
+/// One sample of a finished scene, its keys made by primary rays.
+[[nodiscard]] LitPicture lit_picture(const Scene& scene, const View& view, const RaySettings& settings);
+
+/// A view of one pixel, whose ray goes from `eye` through `at`.
+[[nodiscard]] View glance(const Scene& scene, const glm::dvec3& eye, const glm::dvec3& at);
+/// The red of the pixel of a view of one pixel.
+[[nodiscard]] double glanced(const Scene& scene, const View& view, const RaySettings& settings);
+/// Settings that run these passes and no others.
+[[nodiscard]] RaySettings only(std::vector<PassId> passes, int threads = 1);
+
+// One small scene with something of everything that light does, to be moved and scaled.
+
+/// On a floor of 6 m: a diffuse sphere, a mirror, a ball of tinted glass and a box, lit by a small lamp, the sun and a
+/// glowing panel. Positions are multiples of 1 / `steps_per_metre`, if that is not 0.
+[[nodiscard]] Scene exhibits(double steps_per_metre = 0.0);
+/// The view of exhibits(), 256 x 192 pixels; positions are multiples of 1 / `steps_per_metre`, if that is not 0.
+[[nodiscard]] View exhibits_view(double steps_per_metre = 0.0);
+/// Settings for exhibits(): all passes, and photons.
+[[nodiscard]] RaySettings exhibits_light();
+
+/// Scales the scene by `factor` about the world's origin, in its placements.
+void scale_placements(Scene& scene, double factor);
+/// scale_placements() in the scene's vertices: exact where `factor` is a power of two.
+void scale_vertices(Scene& scene, double factor);
+void scale_view(View& view, double factor);
+
+/// Moves the scene by `offset` in its placements.
+void move_placements(Scene& scene, const glm::dvec3& offset);
+/// Moves the scene by `offset` in its vertices, which then are world coordinates in floats.
+void move_vertices(Scene& scene, const glm::dvec3& offset);
 
 }  // namespace hpr::stability

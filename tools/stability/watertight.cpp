@@ -10,8 +10,8 @@
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/generators/shapes.h"
-#include "tools/stability/cases.h"
-#include "tools/stability/light_tools.h"
+#include "tools/stability/stability.h"
+#include "tools/stability/tools.h"
 
 // A closed mesh has no gaps. Rays are aimed at the places where two or more triangles meet, from both sides, and every
 // crossing is counted as passes walk it: to the first surface, off it by the origin rule, and on.
@@ -23,11 +23,12 @@ constexpr std::uint64_t kRays = 10'000'000;
 constexpr std::uint64_t kTrialRays = 250'000;
 constexpr std::uint64_t kBlockRays = 4096;
 /// The least cosine at which rays meet the ball from outside.
-constexpr double kLeastCosine = 0.1;
-/// Radii of the ball: docs/numerics.md, "Watertight": rays that stay so far from all vertices cannot leak.
+constexpr double kMinCosine = 0.1;
+/// In radii of the ball: rays that stay as far from all vertices cannot leak (docs/numerics.md, "Watertight").
 constexpr double kClearOfVertices = 4e-5;
-/// Of the scene's radius: the smallest ball whose vertices, rounded to float, still make the same closed surface.
-constexpr double kSmallestBall = 1e-4;
+/// The radius of the smallest ball, as a fraction of the scene's radius, whose vertices rounded to float still make the
+/// same closed surface.
+constexpr double kMinBallRadius = 1e-4;
 
 enum class Aim { Edge, Vertex };
 enum class From { Inside, Outside };
@@ -105,7 +106,7 @@ class BallScene {
   };
 
   /// Rays [first, last) of `all`.
-  struct Share {
+  struct RayPart {
     std::uint64_t first = 0;
     std::uint64_t last = 0;
     std::uint64_t all = 0;
@@ -113,10 +114,10 @@ class BallScene {
 
   static Scene build(const Ball& ball, const Mesh& mesh) {
     Scene scene;
-    add_placed(scene, mesh, matte(), shapes::placed(ball.center, ball.radius));
+    add_placed(scene, mesh, diffuse(), shapes::placed(ball.center, ball.radius));
     if (ball.radius < 0.1) {  // slips of paper in two corners, further off than any ray goes
       for (const double corner : {-1.0, 1.0}) {
-        add_placed(scene, parallelogram(glm::dvec3(corner), {-corner * 1e-3, 0, 0}, {0, -corner * 1e-3, 0}), matte(),
+        add_placed(scene, parallelogram(glm::dvec3(corner), {-corner * 1e-3, 0, 0}, {0, -corner * 1e-3, 0}), diffuse(),
                    glm::dmat4(1.0));
       }
     }
@@ -125,43 +126,43 @@ class BallScene {
   }
 
   /// Place `number` of `all` of those rays are aimed at: neighbours follow one another.
-  glm::dvec3 place_of(Aim aim, std::uint64_t number, std::uint64_t all, RandomStream& random) const {
+  glm::dvec3 position_of(Aim aim, std::uint64_t number, std::uint64_t all, RandomStream& random) const {
     const auto vertex = [&](std::size_t i) { return world_position(scene_.instances[0], mesh_.positions[i]); };
     if (aim == Aim::Vertex) return vertex(number * mesh_.positions.size() / all);
     const auto& [a, b] = edges_[number * edges_.size() / all];
     return glm::mix(vertex(a), vertex(b), random.one());
   }
 
-  Flight aim_at(const Target& target, const glm::dvec3& place, RandomStream& random) const {
+  Flight aim_at(const Target& target, const glm::dvec3& position, RandomStream& random) const {
     Flight flight;
     if (target.from == From::Inside) {
       flight.origin = ball_.center + 0.5 * ball_.radius * random.in_ball();
     } else {
-      const glm::dvec3 normal = glm::normalize(place - ball_.center);
+      const glm::dvec3 normal = glm::normalize(position - ball_.center);
       glm::dvec3 out = random.on_sphere();
-      while (std::abs(glm::dot(out, normal)) < kLeastCosine) out = random.on_sphere();
+      while (std::abs(glm::dot(out, normal)) < kMinCosine) out = random.on_sphere();
       if (glm::dot(out, normal) < 0.0) out = -out;
-      flight.origin = place + ball_.radius * (0.5 + 1.5 * random.one()) * out;
+      flight.origin = position + ball_.radius * (0.5 + 1.5 * random.one()) * out;
     }
-    flight.direction = glm::normalize(place - flight.origin);
+    flight.direction = glm::normalize(position - flight.origin);
     if (target.beside > 0.0) {
       const glm::dvec3 aside = glm::normalize(glm::cross(flight.direction, random.on_sphere()));
-      flight.direction = glm::normalize(place + target.beside * ball_.radius * aside - flight.origin);
+      flight.direction = glm::normalize(position + target.beside * ball_.radius * aside - flight.origin);
     }
     return flight;
   }
 
-  Crossings count_block(const Target& target, const Share& share, RandomStream& random) const {
+  Crossings count_block(const Target& target, const RayPart& part, RandomStream& random) const {
     const double reach = 6.0 * ball_.radius * space_.scale;
     const int expected = target.from == From::Inside ? 1 : 2;
-    const std::uint64_t rays = share.last - share.first;
+    const std::uint64_t rays = part.last - part.first;
     Crossings crossings;
     crossings.rays = rays;
     std::vector<Flight> flights;
     RayBatch batch;
-    for (std::uint64_t i = share.first; i < share.last; ++i) {
-      const glm::dvec3 place = place_of(target.aim, i, share.all, random);
-      const Flight& flight = flights.emplace_back(aim_at(target, place, random));
+    for (std::uint64_t i = part.first; i < part.last; ++i) {
+      const glm::dvec3 position = position_of(target.aim, i, part.all, random);
+      const Flight& flight = flights.emplace_back(aim_at(target, position, random));
       batch.push(space_.from_world(flight.origin), flight.direction, reach);
     }
     std::vector<std::uint8_t> blocked(rays);
@@ -215,9 +216,7 @@ BallScene small_ball(double radius) {
   return BallScene({radius, {0.7, -0.6, 0.5}});
 }
 
-}  // namespace
-
-std::vector<StabilityFinding> watertight(const Globals& globals) {
+std::vector<StabilityFinding> measure_watertight(const Globals& globals) {
   const BallScene scene(Ball{});
   const Crossings edges = both_sides(scene, Aim::Edge, 0.0, kRays / 2, globals);
   const Crossings vertices = both_sides(scene, Aim::Vertex, kClearOfVertices, kRays / 2, globals);
@@ -231,13 +230,13 @@ std::vector<StabilityFinding> watertight(const Globals& globals) {
     const Crossings small = both_sides(small_ball(radius), Aim::Edge, 0.0, kTrialRays, globals);
     return static_cast<double>(small.missed()) / static_cast<double>(kTrialRays);
   };
-  for (const double radius : {1e-6, 1e-5, kSmallestBall, 1e-2}) {
+  for (const double radius : {1e-6, 1e-5, kMinBallRadius, 1e-2}) {
     const double missed = missed_by_size(radius);
-    if (radius >= kSmallestBall) at_edges.measured += missed * static_cast<double>(kTrialRays);
+    if (radius >= kMinBallRadius) at_edges.measured += missed * static_cast<double>(kTrialRays);
     at_edges.curve.points.emplace_back(radius, missed);
   }
   at_edges.breaks_at =
-      breaking_point_if_any(kSmallestBall, 1e-7, 0.2, [&](double r) { return missed_by_size(r) == 0.0; });
+      breaking_point_if_any(kMinBallRadius, 1e-7, 0.2, [&](double r) { return missed_by_size(r) == 0.0; });
 
   StabilityFinding at_vertices = finding("watertight/vertices", both + ", past vertices at 4e-5 radii", 0.0, "1",
                                          "only next to a vertex may rounding let every triangle refuse a ray");
@@ -257,6 +256,13 @@ std::vector<StabilityFinding> watertight(const Globals& globals) {
                                      "a ray that leaves a surface by the origin rule does not meet it again");
   doubles.measured = static_cast<double>(edges.doubles + vertices.doubles);
   return {at_edges, at_vertices, doubles};
+}
+
+}  // namespace
+
+StabilityCase watertight_case() {
+  return {"watertight", "rays aimed at shared edges and vertices of a closed mesh: none gets through",
+          measure_watertight};
 }
 
 }  // namespace hpr::stability

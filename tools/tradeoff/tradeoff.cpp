@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "engine/settings_table.h"
+#include "tools/sweep.h"
 
 namespace hpr {
 namespace {
@@ -129,11 +130,7 @@ double badness(const std::string& metric, double value) {
 }
 
 double TradeoffPoint::median_ms() const {
-  HPR_CHECK(!ms.empty());
-  std::vector<double> sorted = ms;
-  std::ranges::sort(sorted);
-  const std::size_t middle = sorted.size() / 2;
-  return sorted.size() % 2 == 1 ? sorted[middle] : 0.5 * (sorted[middle - 1] + sorted[middle]);
+  return median(ms);
 }
 
 void mark_pareto(std::span<TradeoffPoint> points, const std::string& metric) {
@@ -172,7 +169,7 @@ TradeoffBudget parse_budget(const std::string& text) {
 std::optional<std::size_t> best_within(std::span<const TradeoffPoint> points, const TradeoffBudget& budget,
                                        const std::string& metric) {
   std::optional<std::size_t> best;
-  std::pair<double, double> least;  // of what is asked for, and of two alike the other
+  std::pair<double, double> best_value;  // of what is asked for, and of two alike the other
   for (std::size_t i = 0; i < points.size(); ++i) {
     const TradeoffPoint& point = points[i];
     const std::string& judged = budget.ms ? metric : budget.metric;
@@ -181,9 +178,9 @@ std::optional<std::size_t> best_within(std::span<const TradeoffPoint> points, co
         budget.ms ? point.median_ms() <= *budget.ms && !std::isnan(error) : error <= badness(judged, budget.error);
     const auto value =
         budget.ms ? std::pair(error, point.median_ms()) : std::pair(point.median_ms(), std::isnan(error) ? 0.0 : error);
-    if (within && (!best || value < least)) {
+    if (within && (!best || value < best_value)) {
       best = i;
-      least = value;
+      best_value = value;
     }
   }
   return best;

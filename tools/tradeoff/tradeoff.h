@@ -11,7 +11,6 @@
 #include "engine/render_settings.h"
 #include "image/image.h"
 #include "rt/deferred_shader.h"
-#include "tools/diff/diff_colors.h"
 
 namespace hpr {
 
@@ -52,7 +51,7 @@ struct PictureError {
 
 /// The metrics a sweep may be judged by: relmse, rmse, psnr, ssim, flip.
 [[nodiscard]] const std::vector<std::string>& tradeoff_metrics();
-/// How much worse `metric` says a picture is: 0 for equal pictures, larger is worse. 1 - ssim, 10^(-psnr / 20), the
+/// An error by `metric`, 0 for equal pictures, of which more is worse: 1 - ssim, 10^(-psnr / 20), the
 /// others as they are.
 [[nodiscard]] double badness(const std::string& metric, double value);
 

@@ -12,19 +12,18 @@
 #include "app/command.h"
 #include "app/launch/run_ranks.h"
 #include "app/options/render_options.h"
-#include "app/results.h"
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/progress.h"
 #include "core/signals.h"
 #include "core/text.h"
-#include "core/timing.h"
 #include "engine/output.h"
+#include "engine/session.h"
 #include "scene/view.h"
+#include "tools/diff/diff.h"
 #include "tools/report/lists.h"
-#include "tools/tradeoff/tradeoff_html.h"
+#include "tools/sweep.h"
 #include "tools/tradeoff/tradeoff_measure.h"
 #include "tools/tradeoff/tradeoff_report.h"
 
@@ -33,22 +32,23 @@ namespace {
 
 constexpr int kCropSide = 128;
 constexpr double kQuickMs = 200.0;
-constexpr std::uint64_t kLargestState = std::uint64_t{1} << 32U;
+constexpr std::uint64_t kMaxStateBytes = std::uint64_t{1} << 32U;
 
-/// What the command line says that a frame of `hpr render` would take as well, but for what a sweep has of its own or
-/// varies, and what changes neither pictures nor times. The same for any order and spelling of the options.
-std::vector<std::string> base_words(const OptionSet& options, std::span<const std::string> varied) {
-  static const std::set<std::string> left_out{"vary",     "metric",       "reference", "reference-spp", "budget",
+/// The options given that a frame of `hpr render` takes as well, in an order and spelling that do not depend on those
+/// of the command line; without those that a sweep has of its own or varies, and those that change neither pictures nor
+/// times.
+std::vector<std::string> base_options(const OptionSet& options, std::span<const std::string> varied) {
+  static const std::set<std::string> excluded{"vary",     "metric",       "reference", "reference-spp", "budget",
                                               "frames",   "html",         "csv",       "size",          "json",
                                               "progress", "hang-timeout", "limit-mem", "limit-image",   "trace",
                                               "resume",   "force",        "strict",    "quiet",         "verbose"};
-  std::vector<std::string> words;
+  std::vector<std::string> arguments;
   for (const GivenOption& option : options.specified()) {
-    if (left_out.contains(option.name) || std::ranges::find(varied, option.name) != varied.end()) continue;
+    if (excluded.contains(option.name) || std::ranges::find(varied, option.name) != varied.end()) continue;
     const bool is_set_flag = option.is_flag && option.value == "true";
-    words.push_back(is_set_flag ? "--" + option.name : fmt::format("--{}={}", option.name, option.value));
+    arguments.push_back(is_set_flag ? "--" + option.name : fmt::format("--{}={}", option.name, option.value));
   }
-  return words;
+  return arguments;
 }
 
 class TradeoffCommand final : public Command {
@@ -118,26 +118,21 @@ class TradeoffCommand final : public Command {
       metrics_.push_back(report_.budget->metric);
     }
     how_.metrics = metrics_;
-    const std::vector<std::string> results{csv_, html_};
-    check_distinct(results, globals.trace);
-    check_spared(scene_, globals.scene_limits(), std::vector{settings_.environment, how_.reference}, results);
-    for (const std::string& path : results) {
-      if (!path.empty()) check_writable(path, globals.force);
-    }
+    check_result_files(globals, scene_, {settings_.environment, how_.reference}, {csv_, html_});
   }
 
   ExitCode sweep(Session& session, const Globals& globals) {
-    const bool speaks = session.rank() == 0;
+    const bool is_root = session.rank() == 0;
     std::filesystem::path cache;
     agree_on_failure(session.comm(), [&] {
-      if (speaks) cache = cache_folder();
+      if (is_root) cache = cache_folder();
     });
     const auto reference = find_reference(session, settings_, how_, globals, cache);
     if (!reference) {
-      if (speaks) log::info("stopped: the reference's samples are kept; the same command goes on with them");
+      if (is_root) log::info("stopped: the reference's samples are kept; the same command goes on with them");
       return ExitCode::Stopped;
     }
-    const Rect crop = speaks ? most_detail(reference->radiance, kCropSide) : Rect{};
+    const Rect crop = is_root ? most_detail(reference->radiance, kCropSide) : Rect{};
     const std::string identity = sweep_identity(session, *reference, globals);
     const std::filesystem::path state =
         cache / fmt::format("tradeoff-{}.json", hex16(xxh64(std::as_bytes(std::span(identity)))));
@@ -146,17 +141,17 @@ class TradeoffCommand final : public Command {
     const MeasuredPoint measure = [&](const KnobValues& values, bool first) {
       done.push_back(measured_point(session, values, globals, *reference, crop, first));
       agree_on_failure(session.comm(), [&] {
-        if (speaks) write_file_atomically(state, encode_points(identity, done));
+        if (is_root) write_file_atomically(state, encode_points(identity, done));
       });
     };
     if (!measure_all(session, globals, done, measure)) return ExitCode::Stopped;
     agree_on_failure(session.comm(), [&] {
-      if (!speaks) return;
+      if (!is_root) return;
       finish(session, *reference, crop, globals);
       forget(state, identity, std::move(done));
     });
     const auto broken = [](const TradeoffPoint& point) { return point.rays.not_finite > 0; };
-    const int fails = settings_.strict && speaks && std::ranges::any_of(report_.points, broken) ? 1 : 0;
+    const int fails = settings_.strict && is_root && std::ranges::any_of(report_.points, broken) ? 1 : 0;
     return all_gather_value(session.comm(), fails).front() == 1 ? ExitCode::CheckFailed : ExitCode::Done;
   }
 
@@ -167,30 +162,30 @@ class TradeoffCommand final : public Command {
   /// when it was asked to stop before the last one.
   [[nodiscard]] bool measure_all(Session& session, const Globals& globals, const std::vector<TradeoffPoint>& done,
                                  const MeasuredPoint& measure) {
-    const bool speaks = session.rank() == 0;
-    Progress progress(speaks ? globals.progress : "none", "point", all_.size());
-    const Stopwatch watch;
+    const bool is_root = session.rank() == 0;
     std::size_t measured = 0;
-    for (const KnobValues& values : all_) {
-      const auto known = std::ranges::find(done, values, &TradeoffPoint::knobs);
+    const auto measure_case = [&](std::size_t i) {
+      const auto known = std::ranges::find(done, all_[i], &TradeoffPoint::knobs);
       const bool skips = all_gather_value(session.comm(), known != done.end() ? 1 : 0).front() == 1;
       if (skips) {
-        report_.points.push_back(speaks ? *known : TradeoffPoint{});
+        report_.points.push_back(is_root ? *known : TradeoffPoint{});
       } else {
-        measure(values, measured++ == 0);
+        measure(all_[i], measured++ == 0);
         report_.points.push_back(done.back());
       }
-      const std::size_t left = all_.size() - report_.points.size();
-      progress.step(describe(values) + time_left(left, measured, watch.ms()));
       const std::vector<Request> requests = all_gather_value(session.comm(), take_request());
-      if (std::ranges::max(requests) != Request::Stop || left == 0) continue;
-      if (speaks) log::info("stopped after {} of {} points: --resume goes on", report_.points.size(), all_.size());
-      return false;
-    }
-    return true;
+      return CaseResult{.measured = !skips, .stop = std::ranges::max(requests) == Request::Stop};
+    };
+    const SweepSettings settings{is_root ? globals.progress : "none", "point", all_.size(), true};
+    if (measure_cases(
+            settings, [&](std::size_t i) { return describe(all_[i]); }, measure_case))
+      return true;
+    if (is_root) log::info("stopped after {} of {} points: --resume goes on", report_.points.size(), all_.size());
+    return false;
   }
 
-  /// Those of such a sweep that an earlier run measured, on rank 0; without --resume this one measures its own anew.
+  /// Collective: on rank 0 the points that an earlier run of this sweep measured; without --resume those of other
+  /// values alone.
   [[nodiscard]] std::vector<TradeoffPoint> kept_points(Communicator& comm, const std::filesystem::path& state,
                                                        const std::string& identity) const {
     std::vector<TradeoffPoint> kept;
@@ -198,7 +193,7 @@ class TradeoffCommand final : public Command {
       try {
         std::error_code ignored;
         if (std::filesystem::exists(state, ignored)) {
-          const auto bytes = read_file(state, kLargestState);
+          const auto bytes = read_file(state, kMaxStateBytes);
           kept = decode_points({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, state.string(), identity);
         }
       } catch (const Error&) {
@@ -216,8 +211,8 @@ class TradeoffCommand final : public Command {
   [[nodiscard]] TradeoffPoint measured_point(Session& session, const KnobValues& values, const Globals& globals,
                                              const ReferencePicture& reference, const Rect& crop, bool first) const {
     TradeoffPoint point = measure_point(session, settings_, values, how_, globals, reference, crop);
-    const double took = all_gather_value(session.comm(), point.median_ms()).front();
-    if (!first || took >= kQuickMs) return point;
+    const double elapsed_ms = all_gather_value(session.comm(), point.median_ms()).front();
+    if (!first || elapsed_ms >= kQuickMs) return point;
     return measure_point(session, settings_, values, how_, globals, reference, crop);
   }
 
@@ -227,7 +222,7 @@ class TradeoffCommand final : public Command {
                        kVersion, kCommit, hex16(content_hash(session.scene())), how_.size.width, how_.size.height,
                        globals.seed, session.comm().size(), session.threads(),
                        hex16(xxh64(std::as_bytes(reference.radiance.pixels()))), fmt::join(metrics_, ","), how_.frames,
-                       fmt::join(base_words(*options_, report_.knobs), " "), fmt::join(report_.knobs, " "));
+                       fmt::join(base_options(*options_, report_.knobs), " "), fmt::join(report_.knobs, " "));
   }
 
   /// What is done needs no going on; what an earlier run of other values kept stays. The sweep is done all the same
@@ -246,13 +241,6 @@ class TradeoffCommand final : public Command {
     }
   }
 
-  /// Nothing before a point was measured.
-  [[nodiscard]] static std::string time_left(std::size_t points, std::size_t measured, double ms) {
-    if (measured == 0) return "";
-    return fmt::format(", about {:.0f} s left",
-                       1e-3 * ms * static_cast<double>(points) / static_cast<double>(measured));
-  }
-
   [[nodiscard]] bool is_mine(const TradeoffPoint& point) const {
     return std::ranges::find(all_, point.knobs) != all_.end();
   }
@@ -267,12 +255,12 @@ class TradeoffCommand final : public Command {
     report_.seed = globals.seed;
     report_.reference = reference.about;
     report_.metrics = metrics_;
-    report_.base_options = base_words(*options_, report_.knobs);
+    report_.base_options = base_options(*options_, report_.knobs);
     report_.reference_crop_png = crop_as_png(reference.radiance, crop, reference.linear);
     mark_pareto(report_.points, metrics_.front());
     if (report_.budget) report_.best = best_within(report_.points, *report_.budget, metrics_.front());
-    if (!csv_.empty()) write_file_atomically(csv_, tradeoff_csv(report_));
-    if (!html_.empty()) write_file_atomically(html_, tradeoff_html(report_));
+    write_if_named(csv_, [&] { return tradeoff_csv(report_); });
+    write_if_named(html_, [&] { return tradeoff_html(report_); });
     std::fputs((json_ ? tradeoff_json(report_) : tradeoff_table(report_)).c_str(), stdout);
     if (std::fflush(stdout) != 0) {
       throw Error(ExitCode::Io, "the result could not be written to standard output",

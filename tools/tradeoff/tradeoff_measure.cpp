@@ -16,11 +16,14 @@
 #include "engine/checkpoint.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
+#include "engine/session.h"
 #include "engine/settings_table.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/metrics.h"
+#include "rt/deferred_shader.h"
 #include "tools/diff/diff.h"
+#include "tools/report/canvas.h"
 
 namespace hpr {
 namespace {
@@ -38,9 +41,9 @@ struct Setup {
   RenderSettings settings;  ///< resolved
 };
 
-Setup set_up(Session& session, const RenderSettings& given, Size size, std::uint64_t seed) {
+Setup set_up(Session& session, const RenderSettings& unresolved, Size size, std::uint64_t seed) {
   Setup setup;
-  setup.settings = resolve(given, seed);
+  setup.settings = resolve(unresolved, seed);
   const RenderSettings& settings = setup.settings;
   const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
   setup.blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.frame.resolution_scale));
@@ -96,12 +99,12 @@ ReferencePicture read_reference(const std::string& path, Size size, const Global
   reference.about.relmse = std::numeric_limits<double>::quiet_NaN();
   reference.linear = file.linear;
   reference.radiance = Image<Rgb>(size);
-  const auto place = [&](const char* channel) {
+  const auto channel_index = [&](const char* channel) {
     return static_cast<std::size_t>(std::ranges::find(file.channels, channel) - file.channels.begin());
   };
-  const std::size_t r = place("R");
-  const std::size_t g = place("G");
-  const std::size_t b = place("B");
+  const std::size_t r = channel_index("R");
+  const std::size_t g = channel_index("G");
+  const std::size_t b = channel_index("B");
   const std::size_t channels = file.channels.size();
   if (std::max({r, g, b}) == channels) {
     throw Error(ExitCode::BadInput, fmt::format("{} has no channels R, G and B", path), "name a picture in colours");
@@ -118,7 +121,7 @@ ReferencePicture read_reference(const std::string& path, Size size, const Global
   return reference;
 }
 
-void tell_of_more(std::uint32_t samples, std::uint32_t asked_for) {
+void report_extra_samples(std::uint32_t samples, std::uint32_t asked_for) {
   if (samples <= asked_for) return;
   log::info("the truth has {} samples, of an earlier run, where {} were asked for", samples, asked_for);
 }
@@ -211,7 +214,7 @@ std::optional<ReferencePicture> find_reference(Session& session, const RenderSet
     if (!draw(kept, *sampler)) return std::nullopt;
   }
   const SampleProgress reached = sampler->sample_progress();
-  if (speaks) tell_of_more(reached.samples, how.reference_spp);
+  if (speaks) report_extra_samples(reached.samples, how.reference_spp);
   reference.radiance = collect(session, sampler->frame(), setup.blocks, how.size, ColorFormat::Float32);
   reference.about = {.how = passes ? "passes at best" : "path tracing",
                      .spp = reached.samples,
@@ -226,7 +229,7 @@ Rect most_detail(const Image<Rgb>& picture, int side) {
   const int height = std::min(side, picture.height());
   const auto steps = [](int extent, int part) { return part > 0 ? std::max(1, 2 * (extent - part) / part + 1) : 1; };
   Rect best{0, 0, width, height};
-  double most = -1.0;
+  double max_detail = -1.0;
   for (int row = 0; row <= steps(picture.height(), height); ++row) {
     for (int column = 0; column <= steps(picture.width(), width); ++column) {
       const int x0 = std::min(column * width / 2, picture.width() - width);
@@ -239,8 +242,8 @@ Rect most_detail(const Image<Rgb>& picture, int side) {
           detail += std::abs(a.r - b.r) + std::abs(a.g - b.g) + std::abs(a.b - b.b);
         }
       }
-      if (detail > most) {
-        most = detail;
+      if (detail > max_detail) {
+        max_detail = detail;
         best = {x0, y0, x0 + width, y0 + height};
       }
     }

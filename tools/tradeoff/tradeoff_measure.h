@@ -29,9 +29,9 @@ struct ReferencePicture {
   bool linear = true;   ///< false: display values of a PNG
 };
 
-/// Collective. Reads or renders the truth. Rendered ones are kept in `cache` under a name that says what they are of,
-/// and gone on with where they have too few samples; where they have more, all count. None when a signal stopped it:
-/// its samples are in `cache` then. Throws Error: Usage, Io, BadInput for a picture of another size.
+/// Collective. Reads or renders the truth. Rendered ones are kept in `cache` under a name that depends on what they
+/// show, and gone on with where they have too few samples; where they have more, all count. None when a signal stopped
+/// it: its samples are in `cache` then. Throws Error: Usage, Io, BadInput for a picture of another size.
 [[nodiscard]] std::optional<ReferencePicture> find_reference(Session& session, const RenderSettings& settings,
                                                              const TradeoffMeasurement& how, const Globals& globals,
                                                              const std::filesystem::path& cache);

@@ -25,7 +25,7 @@ TradeoffPoint point(double ms, double flip, KnobValues knobs = {}) {
   return made;
 }
 
-TEST(Knobs, AreSetOnTopOfOtherSettings) {
+TEST(KnobValues, AreSetOnTopOfOtherSettings) {
   RenderSettings base;
   set_setting(base, "quality", "best");
   const RenderSettings settings = with_knobs(base, {{"spp", "7"}, {"passes", "shadow+photon"}, {"reference", "true"}});
@@ -36,7 +36,7 @@ TEST(Knobs, AreSetOnTopOfOtherSettings) {
   EXPECT_FALSE(with_knobs(settings, {{"reference", "false"}}).frame.rays.reference);
 }
 
-TEST(Knobs, UnknownOnesAndBadValuesAreRefused) {
+TEST(KnobValues, UnknownOnesAndBadValuesAreRefused) {
   for (const auto& [knob, value] : KnobValues{{"ssp", "1"}, {"max-depth", "0"}, {"max-depth", "many"}}) {
     EXPECT_THROW((void)with_knobs({}, {{knob, value}}), Error) << knob;
   }

@@ -1,0 +1,129 @@
+#include "tools/sweep.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+
+#include "app/launch/launcher.h"
+#include "app/results.h"
+#include "cluster/transport/collectives.h"
+#include "core/file.h"
+#include "core/progress.h"
+#include "core/timing.h"
+#include "engine/output.h"
+
+namespace hpr {
+namespace {
+
+/// ", about 12 s left"; empty before a case was measured.
+std::string time_left(std::size_t cases, std::size_t measured, double ms) {
+  if (measured == 0) return "";
+  return fmt::format(", about {:.0f} s left", 1e-3 * ms * static_cast<double>(cases) / static_cast<double>(measured));
+}
+
+}  // namespace
+
+Spread spread_of(std::vector<double> values) {
+  HPR_CHECK(!values.empty());
+  std::ranges::sort(values);
+  const std::size_t count = values.size();
+  const double median = (values[(count - 1) / 2] + values[count / 2]) / 2.0;
+  const auto nearest_rank = static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(count)));
+  return {values.front(), median, values[nearest_rank - 1], values.back()};
+}
+
+double median(std::vector<double> values) {
+  return spread_of(std::move(values)).median;
+}
+
+double thread_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+double wall_ms() {
+  return 1e-6 * static_cast<double>(trace::now_ns());
+}
+
+std::vector<double> median_times(const std::vector<std::function<void()>>& contenders, Repetitions repetitions,
+                                 double (*clock)()) {
+  std::vector<std::vector<double>> times(contenders.size());
+  measure_in_turns(contenders.size(), repetitions, [&](std::size_t contender, bool counts) {
+    const double start = clock();
+    contenders[contender]();
+    if (counts) times[contender].push_back(clock() - start);
+  });
+  std::vector<double> medians;
+  for (std::vector<double>& of_one : times) medians.push_back(median(std::move(of_one)));
+  return medians;
+}
+
+bool measure_cases(const SweepSettings& settings, const std::function<std::string(std::size_t)>& name,
+                   const std::function<CaseResult(std::size_t)>& measure) {
+  Progress progress(settings.progress, settings.what, settings.cases);
+  const Stopwatch watch;
+  std::size_t measured = 0;
+  for (std::size_t i = 0; i < settings.cases; ++i) {
+    const CaseResult result = measure(i);
+    if (result.failed) return false;
+    if (result.measured) ++measured;
+    const std::size_t left = settings.cases - i - 1;
+    progress.step(name(i) + (settings.time_left ? time_left(left, measured, watch.ms()) : ""));
+    if (result.stop && left > 0) return false;
+  }
+  return true;
+}
+
+std::optional<std::string> job_request(const char* variable) {
+  const char* const text = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): nothing sets variables
+  return text == nullptr ? std::nullopt : std::optional<std::string>(text);
+}
+
+JobResult run_measuring_job(const Globals& globals, int ranks, const std::vector<std::string>& arguments,
+                            const char* variable, const std::string& request) {
+  JobResult result;
+  const int code = run_mpiexec(
+      ranks, arguments,
+      {.captured_stdout = &result.rows, .environment = {{variable, request}}, .hang_limit = globals.hang_limit()});
+  result.code = static_cast<ExitCode>(code);
+  return result;
+}
+
+void throw_nothing_handed_over(const JsonError& error) {
+  throw Error(ExitCode::Internal, fmt::format("an MPI job did not hand over its runs: {}", error.what()));
+}
+
+ExitCode decide_on_root(Communicator& comm, const std::function<ExitCode()>& body) {
+  const auto code = on_root(comm, [&] { return std::vector{static_cast<std::byte>(body())}; });
+  return static_cast<ExitCode>(code.at(0));
+}
+
+void check_job_ranks(const std::vector<int>& wanted, std::string_view text, int job_ranks) {
+  if (wanted.empty() || wanted == std::vector{job_ranks}) return;
+  throw Error(ExitCode::Usage, fmt::format("--ranks {} inside an MPI job of {} ranks", text, job_ranks),
+              "leave --ranks away, or mpirun");
+}
+
+void check_result_files(const Globals& globals, const std::string& scene, const std::vector<std::string>& inputs,
+                        const std::vector<std::string>& results) {
+  check_distinct(results, globals.trace);
+  check_spared(scene, globals.scene_limits(), inputs, results);
+  for (const std::string& path : results) {
+    if (!path.empty()) check_writable(path, globals.force);
+  }
+}
+
+void write_if_named(const std::string& file, const std::function<std::string()>& text) {
+  if (!file.empty()) write_file_atomically(file, text());
+}
+
+Json machine_json(const Machine& machine) {
+  return {{"cpu", machine.cpu}, {"cores", machine.cores}, {"mpi", machine.mpi}};
+}
+
+}  // namespace hpr

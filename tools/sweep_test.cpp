@@ -1,0 +1,65 @@
+#include "tools/sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace hpr {
+namespace {
+
+TEST(SpreadOf, TakesTheMiddleAndTheNearestRank) {
+  const Spread one = spread_of({3.0});
+  EXPECT_EQ(one.min, 3.0);
+  EXPECT_EQ(one.p95, 3.0);
+  const Spread even = spread_of({4.0, 1.0, 3.0, 2.0});
+  EXPECT_EQ(even.median, 2.5);
+  std::vector<double> many;
+  for (int i = 100; i >= 1; --i) many.push_back(i);
+  const Spread hundred = spread_of(many);
+  EXPECT_EQ(hundred.min, 1.0);
+  EXPECT_EQ(hundred.p95, 95.0);
+  EXPECT_EQ(hundred.max, 100.0);
+}
+
+TEST(Median, IsTheMeanOfTheTwoInTheMiddle) {
+  EXPECT_EQ(median({5.0, 1.0, 3.0}), 3.0);
+  EXPECT_EQ(median({4.0, 1.0, 3.0, 8.0}), 3.5);
+}
+
+TEST(MeasureInTurns, EachContenderRunsOnceARoundAndWarmUpDoesNotCount) {
+  std::vector<std::pair<std::size_t, bool>> calls;
+  measure_in_turns(2, {1, 2}, [&](std::size_t contender, bool counts) { calls.emplace_back(contender, counts); });
+  EXPECT_EQ(calls, (std::vector<std::pair<std::size_t, bool>>{
+                       {0, false}, {1, false}, {0, true}, {1, true}, {0, true}, {1, true}}));
+}
+
+TEST(MedianTimes, AreOfEachContenderOnTheClockThatIsGiven) {
+  static double now = 0.0;
+  const auto clock = [] { return now; };
+  const std::vector<double> medians =
+      median_times({[] { now += 2.0; }, [] { now += 5.0; }}, {1, 3}, static_cast<double (*)()>(clock));
+  EXPECT_EQ(medians, (std::vector{2.0, 5.0}));
+}
+
+TEST(MeasureCases, EndWhereOneStopsOrFails) {
+  const auto count = [](std::size_t stops_at, bool failed) {
+    std::vector<std::size_t> named;
+    const bool all = measure_cases(
+        {"none", "case", 4},
+        [&](std::size_t i) {
+          named.push_back(i);
+          return std::to_string(i);
+        },
+        [&](std::size_t i) { return CaseResult{.stop = i == stops_at && !failed, .failed = i == stops_at && failed}; });
+    return std::pair(all, named.size());
+  };
+  EXPECT_EQ(count(9, false), std::pair(true, std::size_t{4}));
+  EXPECT_EQ(count(1, false), std::pair(false, std::size_t{2})) << "it was measured";
+  EXPECT_EQ(count(1, true), std::pair(false, std::size_t{1})) << "it was not";
+  EXPECT_EQ(count(3, false), std::pair(true, std::size_t{4})) << "nothing was left";
+}
+
+}  // namespace
+}  // namespace hpr
