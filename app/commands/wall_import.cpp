@@ -38,7 +38,7 @@ class WallImportCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
     const auto extent = parse_extent(pixels_);
-    if (!extent || extent->first > kMostScreenSide || extent->second > kMostScreenSide) {
+    if (!extent || extent->first > kMaxScreenSide || extent->second > kMaxScreenSide) {
       throw Error(ExitCode::Usage, fmt::format("--pixels: '{}' is no size of a screen", pixels_),
                   "write e.g. 1920x1080");
     }

@@ -48,8 +48,8 @@ int number_of(std::string_view digits, std::string_view list) {
 }
 
 void check_count(std::size_t count, std::string_view list) {
-  if (count <= static_cast<std::size_t>(kMostScreens)) return;
-  refuse(list, fmt::format("it has more than {} hosts", kMostScreens));
+  if (count <= static_cast<std::size_t>(kMaxScreens)) return;
+  refuse(list, fmt::format("it has more than {} hosts", kMaxScreens));
 }
 
 /// What a bracket's text "01-03,07" stands for.

@@ -10,12 +10,9 @@
 namespace hpr {
 namespace {
 
-/// Farther than any wall: metres. Keeps squares and quotients of coordinates finite.
-constexpr double kMetresLimit = 1e6;
-
 bool is_name(std::string_view text) {
-  constexpr std::size_t kLongest = 64;
-  if (text.empty() || text.size() > kLongest || text.front() == '.' || text.front() == '-') return false;
+  constexpr std::size_t kMaxLength = 64;
+  if (text.empty() || text.size() > kMaxLength || text.front() == '.' || text.front() == '-') return false;
   return std::ranges::all_of(text, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||
            c == '_';
@@ -145,7 +142,7 @@ std::optional<std::vector<double>> TableReader::reals(std::string_view key, std:
 }
 
 std::optional<glm::dvec3> TableReader::point(std::string_view key) {
-  const auto numbers = reals(key, 3, kMetresLimit);
+  const auto numbers = reals(key, 3, kMaxMeters);
   if (!numbers) return std::nullopt;
   return glm::dvec3((*numbers)[0], (*numbers)[1], (*numbers)[2]);
 }
@@ -184,8 +181,7 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
 }
 
 std::optional<Rect> TableReader::rect(std::string_view key) {
-  constexpr int kFar = 1 << 20;
-  const auto numbers = integers(key, 4, -kFar, kFar);
+  const auto numbers = integers(key, 4, -kMaxPixelPlace, kMaxPixelPlace);
   if (!numbers) return std::nullopt;
   const int width = (*numbers)[2];
   const int height = (*numbers)[3];

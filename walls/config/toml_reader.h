@@ -12,6 +12,11 @@
 
 namespace hpr {
 
+/// Farther than any wall: keeps squares and quotients of coordinates finite.
+inline constexpr double kMaxMeters = 1e6;
+/// Of places on a display, on both sides of its origin, and of sizes there.
+inline constexpr int kMaxPixelPlace = 1 << 20;
+
 /// Reads one table key by key. What is wrong goes into the findings, and the key counts as absent; asking for a key
 /// makes it a known one, so that finish() can report the keys nobody asked for.
 class TableReader {
@@ -21,6 +26,7 @@ class TableReader {
       : table_(table), what_(std::move(what)), findings_(findings) {}
 
   [[nodiscard]] const std::string& what() const { return what_; }
+  [[nodiscard]] Findings& findings() const { return findings_; }
   [[nodiscard]] TextPlace place() const { return table_.place; }
   /// Of the value, else of the table.
   [[nodiscard]] TextPlace place(std::string_view key) const;

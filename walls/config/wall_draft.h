@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -35,9 +36,9 @@ struct DraftScreen {
 
 struct DraftSurface {
   std::string id;
-  TextPlace place;
-  std::string viewer;  ///< id; empty: the first
-  TextPlace viewer_place;
+  std::string viewer = {};  ///< id; empty: the first
+  TextPlace place = {};
+  TextPlace viewer_place = {};
 };
 
 struct DraftViewer {
@@ -63,24 +64,38 @@ struct WallDraft {
   TextPlace stereo_place;
 };
 
-/// Reads `surfaces`: grids are expanded, in order. Files are looked for in `folder`.
-void read_surfaces(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
+/// Metres a screen's sides have at least.
+inline constexpr double kMinSide_m = 1e-6;
 
-/// Reads what a panel is sent besides the picture: mirror, eye, colour, edge_blend_m, and its turn, which is called
-/// `turn` there.
-void read_look(TableReader& reader, std::string_view turn, WallScreen& screen, Findings& findings);
+/// A grid as its table has it.
+struct DraftGrid {
+  std::optional<int> columns = {};
+  std::optional<int> rows = {};
+  std::optional<Size> tile_pixels = {};
+  std::optional<std::vector<double>> tile_size_m = {};  ///< width, height
+  std::optional<std::vector<double>> gap_m = {};        ///< x, y
+  glm::dvec3 center{0.0};
+  WallScreen tile = {};  ///< how all of them are mounted and lit
+  std::optional<std::vector<std::string>> windows = {};
+  std::optional<std::vector<double>> column_gaps_m = {};
+  std::optional<std::vector<double>> row_gaps_m = {};
+  std::optional<double> radius_m = {};
+  std::optional<double> angle_degrees = {};
+  int max_screens = 0;  ///< that the wall may have besides those there are
+
+  [[nodiscard]] std::int64_t screens() const { return std::int64_t{columns.value_or(1)} * rows.value_or(1); }
+  [[nodiscard]] bool is_countable() const { return columns && rows && screens() <= max_screens; }
+  [[nodiscard]] bool is_sized() const {
+    return tile_size_m && (*tile_size_m)[0] >= kMinSide_m && (*tile_size_m)[1] >= kMinSide_m;
+  }
+};
+
+/// Reads all keys of a wall file (wall_keys.h): into `draft` the tables whose places matter later, all else into
+/// `wall`. Grids are expanded, in order. Files are looked for in `folder`.
+void read_document(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Wall& wall);
 
 /// Reads the `warp` of a screen, whose pixels are known, and its files.
-void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen, Findings& findings);
-
-/// Reads `viewers` and `stereo`, and `test` as far as it is about them and the gaps. Files are looked for in `folder`.
-void read_viewers(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
-void read_test(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Rgba8& gap_color,
-               Findings& findings);
-void read_monitors(TableReader& document, WallDraft& draft, Findings& findings);
-
-/// Metres a screen's sides have at least.
-inline constexpr double kSmallestSide_m = 1e-6;
+void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen);
 
 /// The screens of a grid with their corners; pure, so that the shorthand uses it as well.
 struct WallGrid {
@@ -109,10 +124,10 @@ struct WallGrid {
 /// `id` is to be a picture's name.
 void check_file_name(const std::string& id, const TextPlace& place, Findings& findings);
 
-/// The same for viewers, stereo and monitors.
+/// Checks what viewers, stereo and monitors refer to, and settles which viewer sees which screen.
 void link_viewers(WallDraft& draft, Findings& findings);
 
-/// Of linked viewers: what they see of the points of position maps.
+/// Checks what linked viewers see of the points of position maps.
 void check_position_maps(const WallDraft& draft, Findings& findings);
 
 /// Warns about viewers who stand behind what they look at.

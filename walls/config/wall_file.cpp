@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <filesystem>
 #include <limits>
@@ -13,61 +12,12 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "walls/config/wall_draft.h"
+#include "walls/config/wall_keys.h"
 #include "walls/config/wall_override.h"
 #include "walls/geometry/geometry.h"
 
 namespace hpr {
 namespace {
-
-constexpr int kMostRanks = 1 << 20;
-
-void read_nodes(TableReader& document, WallDraft& draft, Findings& findings) {
-  for (const TomlValue* const table : document.tables("nodes")) {
-    TableReader reader(*table, "node", findings);
-    DraftNode draft_node{{}, table->place};
-    WallNode& node = draft_node.node;
-    reader.require("id", "\"n0\"");
-    node.id = reader.id("id").value_or("");
-    node.host = reader.text("host").value_or("localhost");
-    node.ranks = reader.integer("ranks", 1, kMostRanks).value_or(0);
-    for (const TomlValue* const gpu_table : reader.tables("gpus")) {
-      TableReader gpu(*gpu_table, "gpu", findings);
-      gpu.require("id", "\"g0\"");
-      if (auto id = gpu.id("id")) node.gpus.push_back(std::move(*id));
-      gpu.ignore({"backend", "egl_device", "cpu_affinity"});
-      gpu.finish();
-    }
-    reader.ignore({"nic"});
-    reader.finish();
-    draft.nodes.push_back(std::move(draft_node));
-  }
-}
-
-void read_windows(TableReader& document, WallDraft& draft, Findings& findings) {
-  for (const TomlValue* const table : document.tables("windows")) {
-    TableReader reader(*table, "window", findings);
-    DraftWindow draft_window{{}, table->place, reader.place("node"), reader.place("gpu"), reader.place("rank")};
-    WallWindow& window = draft_window.window;
-    reader.require("id", "\"w0\"");
-    window.id = reader.id("id").value_or("");
-    window.node = reader.text("node").value_or("");
-    window.gpu = reader.text("gpu").value_or("");
-    window.display = reader.text("display").value_or("");
-    window.monitor = reader.text("monitor").value_or("");
-    window.rank = reader.integer("rank", 0, kMostRanks - 1).value_or(-1);
-    window.rect = reader.rect("rect").value_or(Rect{});
-    window.fullscreen = reader.boolean("fullscreen").value_or(false);
-    reader.ignore({"swap_group"});
-    reader.finish();
-    draft.windows.push_back(std::move(draft_window));
-  }
-}
-
-void read_version(TableReader& document) {
-  const TomlValue* const version = document.require("hpr_wall", "1");
-  if (version == nullptr || (version->type == TomlValue::Type::Integer && version->integer == 1)) return;
-  document.error("hpr_wall", "is not 1", "this program reads version 1 of wall files: hpr_wall = 1");
-}
 
 /// The largest int for what is larger than that.
 int to_number(std::string_view digits) {
@@ -91,13 +41,11 @@ std::optional<std::pair<int, int>> pair_of(std::string_view text) {
   return std::pair(to_number(a), to_number(b));
 }
 
-/// What neighbours' files and later versions may hold.
-constexpr std::array<std::string_view, 4> kNotActedOn{"sync", "render", "transport", "fault"};
-
 /// A file may hold more than is acted on; what is asked for on the command line must not be lost.
 void refuse_without_effect(const std::string& override, Findings& findings) {
   const std::string section = override.substr(0, override.find_first_of(".="));
-  if (std::ranges::find(kNotActedOn, section) == kNotActedOn.end()) return;
+  const auto key = std::ranges::find(wall_keys().keys, section, &TableKey<Wall>::name);
+  if (key == wall_keys().keys.end() || !key->kind.is_ignored) return;
   findings.error({}, fmt::format("--set {}: this version acts on nothing of '{}'", printable(override), section),
                  "hpr wall run has options for it: --strategy, --quality, --codec, --swap-timeout...");
 }
@@ -139,16 +87,8 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   const std::filesystem::path folder = std::filesystem::path(name).parent_path();
   apply_overrides(std::get<TomlValue>(parsed), overrides, findings);
   TableReader document(std::get<TomlValue>(parsed), "the wall", findings);
-  read_version(document);
-  wall.name = document.text("name").value_or(std::filesystem::path(name).stem().string());
-  read_nodes(document, draft, findings);
-  read_windows(document, draft, findings);
-  read_surfaces(document, folder, draft, findings);
-  read_viewers(document, folder, draft, findings);
-  read_test(document, folder, draft, wall.gap_color, findings);
-  read_monitors(document, draft, findings);
-  for (const std::string_view section : kNotActedOn) document.ignore({section});
-  document.finish();
+  wall.name = std::filesystem::path(name).stem().string();
+  read_document(document, folder, draft, wall);
   for (const std::string& override : overrides) refuse_without_effect(override, findings);
   if (link_wall(draft, findings)) {
     link_viewers(draft, findings);
@@ -168,7 +108,6 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   for (DraftMonitor& monitor : draft.monitors) wall.monitors.push_back(std::move(monitor.monitor));
   if (!draft.viewers.empty()) wall.viewers.clear();
   for (DraftViewer& viewer : draft.viewers) wall.viewers.push_back(std::move(viewer.viewer));
-  wall.stereo = draft.stereo;
   finish_wall(wall);
   return reading;
 }
@@ -182,17 +121,17 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
   if (!grid_size || !pixels) return std::nullopt;
   const auto [columns, rows] = *grid_size;
   const bool none = columns < 1 || rows < 1;
-  if (none || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
+  if (none || columns > kMaxScreens || rows > kMaxScreens || columns * rows > kMaxScreens) {
     throw Error(none ? ExitCode::Usage : ExitCode::Limit,
                 fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
-                fmt::format("columns times rows must be from 1 to {}", kMostScreens));
+                fmt::format("columns times rows must be from 1 to {}", kMaxScreens));
   }
   const Size size{pixels->first, pixels->second};
   const bool empty = size.width < 1 || size.height < 1;
-  if (empty || size.width > kMostScreenSide || size.height > kMostScreenSide) {
+  if (empty || size.width > kMaxScreenSide || size.height > kMaxScreenSide) {
     throw Error(empty ? ExitCode::Usage : ExitCode::Limit,
                 fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
-                fmt::format("sides must be from 1 to {} pixels", kMostScreenSide));
+                fmt::format("sides must be from 1 to {} pixels", kMaxScreenSide));
   }
   WallGrid grid;
   grid.columns = columns;

@@ -11,8 +11,8 @@
 namespace hpr {
 
 /// Limits of what a wall file may ask for.
-inline constexpr int kMostScreens = 4096;
-inline constexpr int kMostScreenSide = 65536;  ///< pixels
+inline constexpr int kMaxScreens = 4096;
+inline constexpr int kMaxScreenSide = 65536;  ///< pixels
 
 /// A wall as far as it could be read, and everything wrong or odd about it.
 struct WallReading {

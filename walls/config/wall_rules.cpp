@@ -41,7 +41,7 @@ class Linker {
 
  private:
   void check_counts() {
-    const auto most = static_cast<std::size_t>(kMostScreens);
+    const auto most = static_cast<std::size_t>(kMaxScreens);
     const std::size_t largest = std::max({draft_.nodes.size(), draft_.windows.size(), draft_.screens.size(),
                                           draft_.surfaces.size(), draft_.viewers.size(), draft_.monitors.size()});
     too_many_ = largest > most;
@@ -51,7 +51,7 @@ class Linker {
         fmt::format("the wall has {} nodes, {} windows, {} screens, {} surfaces, {} viewers and {} monitors",
                     draft_.nodes.size(), draft_.windows.size(), draft_.screens.size(), draft_.surfaces.size(),
                     draft_.viewers.size(), draft_.monitors.size()),
-        fmt::format("it may have {} of each", kMostScreens));
+        fmt::format("it may have {} of each", kMaxScreens));
   }
 
   void check_node_ids() {

@@ -42,14 +42,14 @@ Numbers numbers_of(const WallTemplate& wall) {
 
 void check(const WallTemplate& wall, const Numbers& numbers) {
   const std::int64_t screens = std::int64_t{wall.columns} * wall.rows;
-  if (wall.columns < 1 || wall.rows < 1 || screens > kMostScreens) {
+  if (wall.columns < 1 || wall.rows < 1 || screens > kMaxScreens) {
     throw Error(ExitCode::Usage, fmt::format("a wall cannot have {} x {} screens", wall.columns, wall.rows),
-                fmt::format("columns times rows must be from 1 to {}", kMostScreens));
+                fmt::format("columns times rows must be from 1 to {}", kMaxScreens));
   }
   const auto [width, height] = numbers.pixels;
-  if (width < 1 || height < 1 || width > kMostScreenSide || height > kMostScreenSide) {
+  if (width < 1 || height < 1 || width > kMaxScreenSide || height > kMaxScreenSide) {
     throw Error(ExitCode::Usage, fmt::format("a screen cannot have {} x {} pixels", width, height),
-                fmt::format("sides must be from 1 to {}", kMostScreenSide));
+                fmt::format("sides must be from 1 to {}", kMaxScreenSide));
   }
   const auto possible = [&](double size, double gap) {
     constexpr double kLargest_m = 1000.0;

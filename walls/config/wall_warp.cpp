@@ -161,11 +161,10 @@ class MapChecker {
 
 }  // namespace
 
-void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen,
-               Findings& findings) {
+void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen) {
   const TomlValue* const table = screen_reader.table("warp");
   if (table == nullptr) return;
-  WarpReader(*table, folder, findings).read(screen);
+  WarpReader(*table, folder, screen_reader.findings()).read(screen);
 }
 
 void check_position_maps(const WallDraft& draft, Findings& findings) {

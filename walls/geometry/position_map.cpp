@@ -71,8 +71,8 @@ Layout read_layout(Header& header, const std::string& name) {
   const auto height = header.number<int>();
   const auto scale = header.number<double>();
   if (!width || !height || !scale || !std::isfinite(*scale) || *scale == 0.0) fail(name, "a header that is no PFM's");
-  if (*width < 1 || *height < 1 || *width > kMostScreenSide || *height > kMostScreenSide) {
-    fail(name, fmt::format("{} x {} texels; it may have 1 to {} a side", *width, *height, kMostScreenSide));
+  if (*width < 1 || *height < 1 || *width > kMaxScreenSide || *height > kMaxScreenSide) {
+    fail(name, fmt::format("{} x {} texels; it may have 1 to {} a side", *width, *height, kMaxScreenSide));
   }
   return {{*width, *height}, *scale > 0.0};
 }

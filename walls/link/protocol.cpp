@@ -127,13 +127,13 @@ Hello decode_hello(std::span<const std::byte> block) {
   hello.session = reader.u64();
   hello.rank = reader.u32();
   const std::uint32_t screens = reader.u32();
-  if (screens > static_cast<std::uint32_t>(kMostScreens)) throw LinkError("a handshake names too many screens");
+  if (screens > static_cast<std::uint32_t>(kMaxScreens)) throw LinkError("a handshake names too many screens");
   for (std::uint32_t i = 0; i < screens; ++i) {
     LinkScreen screen;
     screen.id = reader.text(kLongestText);
     const std::uint32_t width = reader.u32();
     const std::uint32_t height = reader.u32();
-    if (std::max(width, height) > static_cast<std::uint32_t>(kMostScreenSide)) {
+    if (std::max(width, height) > static_cast<std::uint32_t>(kMaxScreenSide)) {
       throw LinkError("a handshake names too large a screen");
     }
     screen.size = {static_cast<int>(width), static_cast<int>(height)};

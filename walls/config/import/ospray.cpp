@@ -41,18 +41,18 @@ WallScreen read_screen(const JsonFile& file, const Json& entry, const std::strin
   screen.lower_right = bottom_right - mullion("mullionRight", width) * right + from_bottom * up;
   screen.upper_left = top_left + from_left * right - mullion("mullionTop", height) * up;
   square_corners(screen);
-  screen.pixels = {file.integer(entry, path, "screenWidth", 1, kMostScreenSide),
-                   file.integer(entry, path, "screenHeight", 1, kMostScreenSide)};
+  screen.pixels = {file.integer(entry, path, "screenWidth", 1, kMaxScreenSide),
+                   file.integer(entry, path, "screenHeight", 1, kMaxScreenSide)};
   screen.viewport = {0, 0, screen.pixels.width, screen.pixels.height};
   return screen;
 }
 
 WallWindow read_window(const JsonFile& file, const Json& entry, const std::string& path, Size pixels) {
   WallWindow window;
-  const int x = file.integer(entry, path, "screenX", -kMostScreenSide, kMostScreenSide, 0);
-  const int y = file.integer(entry, path, "screenY", -kMostScreenSide, kMostScreenSide, 0);
+  const int x = file.integer(entry, path, "screenX", -kMaxScreenSide, kMaxScreenSide, 0);
+  const int y = file.integer(entry, path, "screenY", -kMaxScreenSide, kMaxScreenSide, 0);
   window.rect = {x, y, x + pixels.width, y + pixels.height};
-  window.display = fmt::format(":0.{}", file.integer(entry, path, "display", 0, kMostScreens, 0));
+  window.display = fmt::format(":0.{}", file.integer(entry, path, "display", 0, kMaxScreens, 0));
   return window;
 }
 

@@ -42,7 +42,7 @@ Machine read_machine(const XmlFile& file, const Element& element) {
   int used = 0;
   const int read = std::sscanf(geometry.c_str(), "%6dx%6d%7d%7d%n", &width, &height, &x, &y, &used);
   const bool whole = read == 4 && static_cast<std::size_t>(used) == geometry.size();
-  if (!whole || width < 1 || height < 1 || width > kMostScreenSide || height > kMostScreenSide) {
+  if (!whole || width < 1 || height < 1 || width > kMaxScreenSide || height > kMaxScreenSide) {
     file.fail(element, fmt::format("Geometry is '{}'", printable(geometry)), "write e.g. Geometry=\"1920x1080+0+0\"");
   }
   machine.window = {x, y, x + width, y + height};
@@ -83,11 +83,11 @@ void import_tiles(const XmlFile& file, const Element& process, const std::vector
                   const ImportSettings& settings, ImportedWall& into) {
   ForeignGrid grid;
   // As pvserver takes them: of two, the one that is not given is 1.
-  grid.columns = std::max(1, option_value(file, process, "tile-dimensions-x", 0, kMostScreens));
-  grid.rows = std::max(1, option_value(file, process, "tile-dimensions-y", 0, kMostScreens));
-  if (grid.columns * grid.rows > kMostScreens) {
+  grid.columns = std::max(1, option_value(file, process, "tile-dimensions-x", 0, kMaxScreens));
+  grid.rows = std::max(1, option_value(file, process, "tile-dimensions-y", 0, kMaxScreens));
+  if (grid.columns * grid.rows > kMaxScreens) {
     file.fail(process, fmt::format("the wall has {}x{} tiles", grid.columns, grid.rows),
-              fmt::format("it may have {}", kMostScreens));
+              fmt::format("it may have {}", kMaxScreens));
   }
   grid.panel = settings.pixels;
   const bool told = !machines.empty() && !machines.front().window.empty();
@@ -97,8 +97,8 @@ void import_tiles(const XmlFile& file, const Element& process, const std::vector
         fmt::format("The file does not tell the tiles' pixels: they are {}x{} here, or as --pixels says.",
                     grid.panel.width, grid.panel.height));
   }
-  grid.gap_x_pixels = option_value(file, process, "tile-mullion-x", 1 - grid.panel.width, kMostScreenSide);
-  grid.gap_y_pixels = option_value(file, process, "tile-mullion-y", 1 - grid.panel.height, kMostScreenSide);
+  grid.gap_x_pixels = option_value(file, process, "tile-mullion-x", 1 - grid.panel.width, kMaxScreenSide);
+  grid.gap_y_pixels = option_value(file, process, "tile-mullion-y", 1 - grid.panel.height, kMaxScreenSide);
   grid.pitch_m = settings.pitch_m;
   into.remarks.push_back(pitch_remark(settings));
   std::vector<ForeignTile> tiles;
@@ -152,7 +152,7 @@ void import_corners(const XmlFile& file, const std::vector<Machine>& machines, c
     if (machine.window.empty()) {
       assumed = true;
       const double width = settings.pixels.height * screen_width(screen) / screen_height(screen);
-      const bool sound = std::isfinite(width) && width >= 1.0 && width <= kMostScreenSide;
+      const bool sound = std::isfinite(width) && width >= 1.0 && width <= kMaxScreenSide;
       screen.pixels = {sound ? static_cast<int>(std::lround(width)) : settings.pixels.width, settings.pixels.height};
     } else {
       screen.pixels = {machine.window.width(), machine.window.height()};

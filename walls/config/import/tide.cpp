@@ -33,7 +33,7 @@ class TideReader {
 
  private:
   int count(const Json& surface, const std::string& path, const char* key, const char* newer_key) const {
-    return file_.integer(surface, path, surface.contains(newer_key) ? newer_key : key, 1, kMostScreens);
+    return file_.integer(surface, path, surface.contains(newer_key) ? newer_key : key, 1, kMaxScreens);
   }
 
   void read_surface(const Json& surface) {
@@ -43,18 +43,18 @@ class TideReader {
     if (!grids_.empty()) grid.surface = fmt::format("surface{}", grids_.size());
     grid.columns = count(surface, path, "numScreensX", "screenCountX");
     grid.rows = count(surface, path, "numScreensY", "screenCountY");
-    grid.panel = {file_.integer(surface, path, "displayWidth", 1, kMostScreenSide),
-                  file_.integer(surface, path, "displayHeight", 1, kMostScreenSide)};
-    grid.panels = {file_.integer(surface, path, "displaysPerScreenX", 1, kMostScreens, 1),
-                   file_.integer(surface, path, "displaysPerScreenY", 1, kMostScreens, 1)};
+    grid.panel = {file_.integer(surface, path, "displayWidth", 1, kMaxScreenSide),
+                  file_.integer(surface, path, "displayHeight", 1, kMaxScreenSide)};
+    grid.panels = {file_.integer(surface, path, "displaysPerScreenX", 1, kMaxScreens, 1),
+                   file_.integer(surface, path, "displaysPerScreenY", 1, kMaxScreens, 1)};
     const double panels = 1.0 * grid.columns * grid.rows * grid.panels.width * grid.panels.height;
     panels_ += panels;
-    if (panels_ > kMostScreens) {
+    if (panels_ > kMaxScreens) {
       file_.fail(path, fmt::format("up to here the wall has {:g} displays", panels_),
-                 fmt::format("it may have {}", kMostScreens));
+                 fmt::format("it may have {}", kMaxScreens));
     }
-    grid.gap_x_pixels = file_.integer(surface, path, "bezelWidth", 1 - grid.panel.width, kMostScreenSide, 0);
-    grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMostScreenSide, 0);
+    grid.gap_x_pixels = file_.integer(surface, path, "bezelWidth", 1 - grid.panel.width, kMaxScreenSide, 0);
+    grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMaxScreenSide, 0);
     grid.pitch_m = 1.0;
     const double width_pixels = grid_width(grid);
     const std::vector<Json>& metres = file_.array(surface, path, "dimensions");
@@ -90,8 +90,8 @@ class TideReader {
     tile.fullscreen = file_.boolean(screen, path, "fullscreen");
     tile.column = file_.integer(screen, path, "i", 0, grid.columns - 1, 0);
     tile.row = file_.integer(screen, path, "j", 0, grid.rows - 1, 0);
-    tile.x = file_.integer(screen, path, "x", -kMostScreenSide, kMostScreenSide, 0);
-    tile.y = file_.integer(screen, path, "y", -kMostScreenSide, kMostScreenSide, 0);
+    tile.x = file_.integer(screen, path, "x", -kMaxScreenSide, kMaxScreenSide, 0);
+    tile.y = file_.integer(screen, path, "y", -kMaxScreenSide, kMaxScreenSide, 0);
     const auto [other, fresh] = places_.emplace(std::array{surface, tile.column, tile.row}, path);
     if (!fresh) {
       file_.fail(path, fmt::format("screen i {}, j {} is driven twice", tile.column, tile.row),
