@@ -32,7 +32,7 @@
 #include "engine/wall/wall_status.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
-#include "walls/displays/file_display.h"
+#include "walls/displays/display.h"
 #include "walls/drawing/assemble.h"
 #include "walls/geometry/geometry.h"
 #include "walls/link/sender.h"

@@ -27,18 +27,31 @@ class Coder {
   virtual void decode(std::span<const std::byte> bytes, int error, Image<Rgba8>& picture) = 0;
 };
 
-[[nodiscard]] std::unique_ptr<Coder> make_raw_coder();
-[[nodiscard]] std::unique_ptr<Coder> make_lz4_coder(const CodecSettings& settings);
-[[nodiscard]] std::unique_ptr<Coder> make_zstd_coder(const CodecSettings& settings);
-[[nodiscard]] std::unique_ptr<Coder> make_jpeg_coder(const CodecSettings& settings);
-
-/// One place per coder; its index is its number on the wire.
+/// How to make a coder; defined in the file of its name.
 struct CoderKind {
-  std::string_view name;
+  std::string_view name;  ///< of the codec that sends what it encodes
   std::unique_ptr<Coder> (*make)(const CodecSettings& settings);
   bool lossy = false;  ///< even where no error is allowed
 };
+
+/// Every coder, in the order in which they trade speed for size: X(raw) stands for raw.cpp, which defines raw_coder().
+/// A coder's place in the list is its number in messages.
+#define HPR_CODERS(X) \
+  X(raw)              \
+  X(lz4)              \
+  X(zstd)             \
+  X(jpeg)
+
+#define HPR_DECLARE_CODER(name) [[nodiscard]] CoderKind name##_coder();
+HPR_CODERS(HPR_DECLARE_CODER)
+#undef HPR_DECLARE_CODER
+
 [[nodiscard]] std::span<const CoderKind> all_coders();
+
+template <typename Implementation>
+[[nodiscard]] std::unique_ptr<Coder> make_coder(const CodecSettings& settings) {
+  return std::make_unique<Implementation>(settings);
+}
 
 /// "the picture's bytes are damaged: WHAT", BadInput.
 [[noreturn]] void throw_damaged(std::string_view what);

@@ -145,8 +145,8 @@ class JpegCoder final : public Coder {
 
 }  // namespace
 
-std::unique_ptr<Coder> make_jpeg_coder(const CodecSettings& settings) {
-  return std::make_unique<JpegCoder>(settings);
+CoderKind jpeg_coder() {
+  return {"jpeg", make_coder<JpegCoder>, true};
 }
 
 }  // namespace hpr

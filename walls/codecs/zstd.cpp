@@ -43,8 +43,8 @@ class ZstdCoder final : public Coder {
 
 }  // namespace
 
-std::unique_ptr<Coder> make_zstd_coder(const CodecSettings& settings) {
-  return std::make_unique<ZstdCoder>(settings);
+CoderKind zstd_coder() {
+  return {"zstd", make_coder<ZstdCoder>};
 }
 
 }  // namespace hpr

@@ -1,5 +1,3 @@
-#include "walls/displays/file_display.h"
-
 #include <fmt/format.h>
 
 #include <map>
@@ -11,6 +9,7 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "image/image_io.h"
+#include "walls/displays/display.h"
 #include "walls/drawing/scan_out.h"
 
 namespace hpr {
@@ -48,6 +47,8 @@ std::string panel_file_of(const WallScreen& screen) {
   return screen.id + ".panel.png";
 }
 
+/// PNG files: folder/<screen id>.png is the latest frame. With keep_frames, folder/frame-000042/<screen id>.png is
+/// frame 42, too. Each file is complete or untouched.
 class FileDisplay final : public Display {
  public:
   FileDisplay(const Wall& wall, const DisplayOptions& options)
@@ -95,6 +96,19 @@ class FileDisplay final : public Display {
   std::vector<ScreenCost> costs_;
 };
 
+std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options) {
+  return std::make_unique<FileDisplay>(wall, options);
+}
+
+void check_file_display(const Wall& wall, const DisplayOptions& options) {
+  const std::filesystem::path folder = options.folder.empty() ? "." : options.folder;
+  check_folder(folder);
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) return;  // it will be made
+  for (const auto& file : files_of_display(wall, folder)) check_writable(file, options.overwrite);
+  if (options.keep_frames && !options.overwrite) refuse_kept_frames(folder);
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> files_of_display(const Wall& wall, const std::filesystem::path& folder) {
@@ -107,17 +121,8 @@ std::vector<std::filesystem::path> files_of_display(const Wall& wall, const std:
   return files;
 }
 
-std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options) {
-  return std::make_unique<FileDisplay>(wall, options);
-}
-
-void check_file_display(const Wall& wall, const DisplayOptions& options) {
-  const std::filesystem::path folder = options.folder.empty() ? "." : options.folder;
-  check_folder(folder);
-  std::error_code error;
-  if (!std::filesystem::exists(folder, error)) return;  // it will be made
-  for (const auto& file : files_of_display(wall, folder)) check_writable(file, options.overwrite);
-  if (options.keep_frames && !options.overwrite) refuse_kept_frames(folder);
+DisplayKind file_display() {
+  return {.name = "file", .monitors = true, .make = make_file_display, .check = check_file_display};
 }
 
 }  // namespace hpr

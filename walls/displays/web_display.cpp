@@ -1,5 +1,4 @@
-#include "walls/displays/web_display.h"
-
+#include "walls/displays/display.h"
 #include "walls/displays/web_hub.h"
 #include "walls/displays/web_request.h"
 #include "walls/displays/web_server.h"
@@ -7,6 +6,7 @@
 namespace hpr {
 namespace {
 
+/// A page for browsers with the assembled wall, or one screen; the mouse moves the camera (WebServer).
 class WebDisplay final : public Display {
  public:
   WebDisplay(const Wall& wall, const WebAddress& address) : hub_(wall), server_(hub_, address) {}
@@ -26,8 +26,6 @@ class WebDisplay final : public Display {
   WebServer server_;
 };
 
-}  // namespace
-
 std::unique_ptr<Display> make_web_display(const Wall& wall, const DisplayOptions& options) {
   auto display = std::make_unique<WebDisplay>(wall, parse_web_address(options.web_address));
   if (options.announce) options.announce(display->url());
@@ -37,6 +35,12 @@ std::unique_ptr<Display> make_web_display(const Wall& wall, const DisplayOptions
 void check_web_display(const Wall& /*wall*/, const DisplayOptions& options) {
   const WebAddress address = parse_web_address(options.web_address);
   if (address.port != 0) check_listening(address);
+}
+
+}  // namespace
+
+DisplayKind web_display() {
+  return {.name = "web", .whole_wall = true, .interactive = true, .make = make_web_display, .check = check_web_display};
 }
 
 }  // namespace hpr

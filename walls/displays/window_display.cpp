@@ -1,5 +1,3 @@
-#include "walls/displays/window_display.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "walls/displays/display.h"
 #include "walls/displays/window_thread.h"
 #include "walls/drawing/scan_out.h"
 
@@ -38,6 +37,8 @@ void choose_x_display(const std::vector<WindowPlan>& plans) {
   if (!wanted.empty()) setenv("DISPLAY", wanted.c_str(), 1);
 }
 
+/// Windows on this host's desktop, by GLFW: one per window of the wall file, or one per screen. Closing one, or Escape,
+/// ends the run; the mouse moves the camera.
 class WindowDisplay final : public Display {
  public:
   WindowDisplay(const Wall& wall, const std::vector<WindowPlan>& plans) : wall_(wall), plans_(plans), windows_(plans) {}
@@ -67,8 +68,6 @@ class WindowDisplay final : public Display {
   WindowThread windows_;
 };
 
-}  // namespace
-
 std::unique_ptr<Display> make_window_display(const Wall& wall, const DisplayOptions& options) {
   const std::vector<WindowPlan> plans = plan_windows(wall, screens_or_all(wall, options));
   choose_x_display(plans);
@@ -82,6 +81,8 @@ void check_window_display(const Wall& wall, const DisplayOptions& /*options*/) {
   const WindowThread no_windows(std::vector<WindowPlan>{});
 }
 
+}  // namespace
+
 bool has_desktop() {
   try {
     constexpr std::chrono::seconds kToAnswer{10};  // there is another way to show things
@@ -91,6 +92,10 @@ bool has_desktop() {
     log::debug("{}", error.what());
     return false;
   }
+}
+
+DisplayKind window_display() {
+  return {.name = "window", .interactive = true, .make = make_window_display, .check = check_window_display};
 }
 
 }  // namespace hpr

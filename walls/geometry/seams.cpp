@@ -7,8 +7,8 @@
 namespace hpr {
 namespace {
 
-/// A screen in the wall's plane, metres.
-struct Box {
+/// A screen in the plane of the wall, in meters.
+struct SeamBox {
   glm::dvec3 low{0.0};
   glm::dvec3 high{0.0};
   double pitch = 0.0;
@@ -44,7 +44,7 @@ WallSeams wall_seams(const Wall& wall) {
   WallSeams seams;
   if (!extent.flat) return seams;
   const glm::dmat3 inside = glm::transpose(extent.axes);
-  std::vector<Box> boxes;
+  std::vector<SeamBox> boxes;
   const bool has_left = std::ranges::any_of(wall.screens, [](const WallScreen& s) { return s.eye == Eye::Left; });
   for (const WallScreen& screen : wall.screens) {
     if (has_left && screen.eye == Eye::Right) continue;  // where the left eye's are
@@ -57,13 +57,13 @@ WallSeams wall_seams(const Wall& wall) {
   SeamCounter counter(seams);
   for (const int axis : {0, 1}) {
     const int across = 1 - axis;
-    const auto line_of = [&](const Box& box) {
+    const auto line_of = [&](const SeamBox& box) {
       return std::pair(std::llround(box.low[across] / step), std::llround(box.high[across] / step));
     };
-    std::ranges::sort(boxes, {}, [&](const Box& box) { return std::pair(line_of(box), box.low[axis]); });
+    std::ranges::sort(boxes, {}, [&](const SeamBox& box) { return std::pair(line_of(box), box.low[axis]); });
     for (std::size_t i = 1; i < boxes.size(); ++i) {
-      const Box& before = boxes[i - 1];
-      const Box& box = boxes[i];
+      const SeamBox& before = boxes[i - 1];
+      const SeamBox& box = boxes[i];
       const bool neighbours = line_of(before) == line_of(box) && std::abs(before.pitch - box.pitch) < 1e-6 * box.pitch;
       if (neighbours) {
         counter.add(box.low[axis] - before.high[axis], box.pitch);

@@ -7,6 +7,7 @@
 #include "walls/config/wall_file.h"
 
 namespace hpr {
+namespace {
 
 /// DisplayCluster (Johnson, Abram, Westing, Navratil, Gaither: "DisplayCluster: An Interactive Visualization
 /// Environment for Tiled Displays", 2012): equal tiles, mullions in pixels, one process per group of tiles.
@@ -53,6 +54,12 @@ ImportedWall import_displaycluster(std::string_view text, const std::string& nam
   }
   add_grid(grid, tiles, imported);
   return imported;
+}
+
+}  // namespace
+
+WallImporter displaycluster_importer() {
+  return {"displaycluster", "displaycluster", "DisplayCluster's configuration.xml", import_displaycluster};
 }
 
 }  // namespace hpr

@@ -32,13 +32,10 @@ void drop_overlaps(ImportedWall& imported) {
 }  // namespace
 
 std::span<const WallImporter> all_importers() {
-  static constexpr std::array kImporters{
-      WallImporter{"paraview", "pvx", "ParaView's .pvx: CAVE corners, or tiles and mullions", import_paraview},
-      WallImporter{"tide", "tide", "Tide's configuration.json", import_tide},
-      WallImporter{"ospray", "osprstudio", "OSPRay Studio's display_settings.json", import_ospray},
-      WallImporter{"displaycluster", "displaycluster", "DisplayCluster's configuration.xml", import_displaycluster},
-  };
-  return kImporters;
+#define HPR_LIST_IMPORTER(name) name##_importer(),
+  static const std::array importers{HPR_IMPORTERS(HPR_LIST_IMPORTER)};
+#undef HPR_LIST_IMPORTER
+  return importers;
 }
 
 const std::vector<std::string>& importer_names() {

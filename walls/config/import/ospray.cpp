@@ -56,8 +56,6 @@ WallWindow read_window(const JsonFile& file, const Json& entry, const std::strin
   return window;
 }
 
-}  // namespace
-
 /// OSPRay Studio's branch for immersive walls (Nam, TACC): one entry per MPI rank, metres.
 ImportedWall import_ospray(std::string_view text, const std::string& name, const ImportSettings& /*settings*/) {
   const JsonFile file(text, name);
@@ -97,6 +95,12 @@ ImportedWall import_ospray(std::string_view text, const std::string& name, const
   if (several_eyes) imported.remarks.emplace_back("Screens have different eyes: the first one's is the viewer.");
   imported.remarks.emplace_back("\"display\" is a monitor's number there: it became the screen of X display :0.");
   return imported;
+}
+
+}  // namespace
+
+WallImporter ospray_importer() {
+  return {"ospray", "osprstudio", "OSPRay Studio's display_settings.json", import_ospray};
 }
 
 }  // namespace hpr

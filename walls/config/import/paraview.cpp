@@ -175,8 +175,6 @@ void import_corners(const XmlFile& file, const std::vector<Machine>& machines, c
   }
 }
 
-}  // namespace
-
 ImportedWall import_paraview(std::string_view text, const std::string& name, const ImportSettings& settings) {
   const XmlFile file(text, name);
   const Element& process = server_process(file.root("pvx"));
@@ -198,6 +196,12 @@ ImportedWall import_paraview(std::string_view text, const std::string& name, con
               R"(add what pvserver was told: <Option Name="tile-dimensions-x" Value="3"/>)");
   }
   return imported;
+}
+
+}  // namespace
+
+WallImporter paraview_importer() {
+  return {"paraview", "pvx", "ParaView's .pvx: CAVE corners, or tiles and mullions", import_paraview};
 }
 
 }  // namespace hpr

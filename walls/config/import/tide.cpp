@@ -129,10 +129,14 @@ class TideReader {
   int right_eyes_ = 0;
 };
 
-}  // namespace
-
 ImportedWall import_tide(std::string_view text, const std::string& name, const ImportSettings& settings) {
   return TideReader(text, name, settings).read();
+}
+
+}  // namespace
+
+WallImporter tide_importer() {
+  return {"tide", "tide", "Tide's configuration.json", import_tide};
 }
 
 }  // namespace hpr
