@@ -16,9 +16,8 @@
 #include "image/key.h"
 #include "walls/config/wall_file.h"
 #include "walls/drawing/plan.h"
+#include "walls/geometry/curved.h"
 #include "walls/geometry/geometry.h"
-#include "walls/geometry/stereo.h"
-#include "walls/geometry/warp_figures.h"
 
 namespace hpr {
 namespace {

@@ -11,9 +11,8 @@
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
 #include "walls/config/wall_keys.h"
-#include "walls/drawing/heat.h"
 #include "walls/drawing/plan.h"
-#include "walls/manifest/manifest_file.h"
+#include "walls/manifest/manifest.h"
 
 namespace hpr {
 

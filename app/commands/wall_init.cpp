@@ -9,7 +9,6 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "engine/output.h"
-#include "walls/config/host_list.h"
 #include "walls/config/wall_file.h"
 #include "walls/config/wall_template.h"
 

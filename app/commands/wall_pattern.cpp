@@ -14,7 +14,6 @@
 #include "engine/signals.h"
 #include "engine/wall/remote_displays.h"
 #include "walls/config/wall_file.h"
-#include "walls/drawing/frame_counter.h"
 #include "walls/drawing/pattern.h"
 #include "walls/link/hosts.h"
 #include "walls/link/sender.h"

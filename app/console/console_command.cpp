@@ -17,7 +17,7 @@
 #include "core/text.h"
 #include "engine/wall/hearing.h"
 #include "engine/wall/recoverable.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "core/bytes.h"
 #include "core/log.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {

@@ -8,8 +8,7 @@
 #include "cluster/transport/collectives.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "walls/link/bytes.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 #include "walls/manifest/run_journal.h"
 
 namespace hpr {

@@ -15,8 +15,8 @@
 #include "core/timing.h"
 #include "engine/wall/hearing.h"
 #include "engine/wall/recoverable.h"
-#include "walls/link/bytes.h"
 #include "walls/link/hosts.h"
+#include "walls/link/protocol.h"
 #include "walls/link/socket.h"
 
 namespace hpr {

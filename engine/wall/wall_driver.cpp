@@ -21,7 +21,7 @@
 #include "engine/wall/wall_status.h"
 #include "walls/geometry/geometry.h"
 #include "walls/link/sender.h"
-#include "walls/manifest/manifest_file.h"
+#include "walls/manifest/manifest.h"
 #include "walls/manifest/run_journal.h"
 
 namespace hpr {

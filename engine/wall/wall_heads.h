@@ -7,7 +7,7 @@
 #include "core/timing.h"
 #include "walls/config/wall.h"
 #include "walls/manifest/manifest.h"
-#include "walls/tracking/head.h"
+#include "walls/tracking/head_path.h"
 #include "walls/tracking/tracker.h"
 
 namespace hpr {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/error.h"
 #include "core/log.h"
 #include "core/timing.h"
 #include "walls/codecs/coder.h"
@@ -13,6 +14,17 @@ namespace {
 constexpr std::size_t kTriesEach = 2;  // the first one also pays for fresh memory
 
 }  // namespace
+
+double seconds_per_byte(const CodecRate& rate, const CodecLink& link) {
+  HPR_CHECK(link.bytes_per_second > 0.0 && link.cores > 0);
+  return (rate.encode_s_per_byte + rate.decode_s_per_byte) / link.cores + rate.size / link.bytes_per_second;
+}
+
+std::string choose_codec(std::span<const CodecRate> rates, const CodecLink& link) {
+  HPR_CHECK(!rates.empty());
+  return std::ranges::min_element(rates, {}, [&](const CodecRate& rate) { return seconds_per_byte(rate, link); })
+      ->codec;
+}
 
 AutoCodec::AutoCodec(const CodecSettings& settings) : settings_(settings) {
   for (const CoderKind& kind : all_coders()) {

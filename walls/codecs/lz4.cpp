@@ -5,7 +5,6 @@
 
 #include "core/error.h"
 #include "walls/codecs/coder.h"
-#include "walls/codecs/pixel_planes.h"
 
 namespace hpr {
 namespace {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "walls/config/findings.h"
+#include "walls/config/toml_reader.h"
 #include "walls/config/wall.h"
 
 namespace hpr {

@@ -12,8 +12,7 @@
 #include "image/image_io.h"
 #include "walls/config/wall_draft.h"
 #include "walls/geometry/curved.h"
-#include "walls/geometry/position_map.h"
-#include "walls/geometry/warp_mesh.h"
+#include "walls/geometry/warping.h"
 
 namespace hpr {
 namespace {

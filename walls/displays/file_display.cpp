@@ -10,7 +10,7 @@
 #include "core/timing.h"
 #include "image/image_io.h"
 #include "walls/displays/display.h"
-#include "walls/drawing/scan_out.h"
+#include "walls/drawing/panel_transform.h"
 
 namespace hpr {
 namespace {

@@ -7,8 +7,7 @@
 #include "core/file.h"
 #include "core/text.h"
 #include "walls/displays/display.h"
-#include "walls/displays/sink.h"
-#include "walls/displays/y4m.h"
+#include "walls/displays/pipe_stream.h"
 #include "walls/drawing/assemble.h"
 
 namespace hpr {

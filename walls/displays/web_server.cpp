@@ -14,7 +14,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "walls/displays/web_page.h"
+#include "walls/displays/web_request.h"
 #include "walls/link/socket.h"
 
 namespace hpr {

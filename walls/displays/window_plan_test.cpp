@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "walls/config/wall_file.h"
-#include "walls/drawing/scan_out.h"
+#include "walls/drawing/panel_transform.h"
 
 namespace hpr {
 namespace {

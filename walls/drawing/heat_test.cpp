@@ -1,5 +1,3 @@
-#include "walls/drawing/heat.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "image/color.h"
 #include "image/image.h"
@@ -14,5 +15,15 @@ namespace hpr {
 /// it and at which output; room for draw_frame_counter; and a circle and two diagonals that belong to all screens of
 /// the plane and run on behind the gaps. Throws Error (Limit) for a screen beyond 32767 pixels a side.
 [[nodiscard]] Image<Rgba8> wall_pattern(const Wall& wall, std::size_t screen);
+
+/// Draws the number of a frame into a pattern, over the one before: 16 bars, white for 1 and black for 0, the highest
+/// bit at the left, and the number itself. Of two screens in one photograph the bars tell whether they show the same
+/// frame.
+void draw_frame_counter(Image<Rgba8>& pattern, std::uint64_t frame);
+
+/// Bar `bit` (0 is the lowest, the rightmost) of a pattern of this size, in its pixels; empty where it is too small.
+[[nodiscard]] Rect frame_counter_bar(Size pattern, int bit);
+
+inline constexpr int kFrameCounterBits = 16;
 
 }  // namespace hpr

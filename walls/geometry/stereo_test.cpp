@@ -1,5 +1,3 @@
-#include "walls/geometry/stereo.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -14,11 +14,9 @@
 #include "core/file.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
-#include "walls/drawing/level_table.h"
-#include "walls/drawing/scan_out.h"
-#include "walls/geometry/position_map.h"
-#include "walls/geometry/warp_mesh.h"
+#include "walls/drawing/panel_transform.h"
 #include "walls/geometry/warp_test_tools.h"
+#include "walls/geometry/warping.h"
 
 namespace hpr {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/text.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {

@@ -2,8 +2,11 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <span>
 #include <string>
 #include <system_error>
 
@@ -25,6 +28,21 @@ bool later(int code) {
 }
 
 }  // namespace
+
+double link_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void ClockOffset::add(double sent, double arrived, double answered, double received) {
+  const double round_trip = std::max(0.0, (received - sent) - (answered - arrived));
+  samples_.at(count_ % samples_.size()) = {((arrived - sent) + (answered - received)) / 2.0, round_trip};
+  ++count_;
+}
+
+ClockOffset::Sample ClockOffset::best() const {
+  if (count_ == 0) return {};
+  return std::ranges::min(std::span(samples_).first(std::min(count_, samples_.size())), {}, &Sample::round_trip);
+}
 
 void Connection::send() {
   while (!unsent_.empty()) {

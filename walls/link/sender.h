@@ -15,7 +15,7 @@
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
 #include "walls/link/client_link.h"
-#include "walls/link/clock.h"
+#include "walls/link/connection.h"
 #include "walls/link/hosts.h"
 #include "walls/link/swap_barrier.h"
 

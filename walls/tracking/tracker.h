@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "walls/config/wall.h"
-#include "walls/tracking/head.h"
+#include "walls/tracking/head_path.h"
 
 namespace hpr {
 

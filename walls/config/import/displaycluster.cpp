@@ -3,7 +3,6 @@
 #include <map>
 
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/xml_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

@@ -4,7 +4,6 @@
 #include <glm/geometric.hpp>
 
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/json_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

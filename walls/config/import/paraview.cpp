@@ -5,7 +5,6 @@
 
 #include "core/text.h"
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/xml_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {

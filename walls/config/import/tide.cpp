@@ -5,7 +5,6 @@
 #include <set>
 
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/json_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
