@@ -15,7 +15,7 @@ std::vector<Image<Rgba8>> WallMonitors::draw(Communicator& comm, std::span<const
     const MonitorLayout& layout = layouts_[m];
     std::vector<Image<Rgba8>> parts(layout.screens.size());
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      const Size size{layout.places[i].width(), layout.places[i].height()};
+      const Size size{layout.rects[i].width(), layout.rects[i].height()};
       const int from = shown_by[layout.screens[i]];
       if (comm.rank() == from) parts[i] = resample(pictures[layout.screens[i]], size);
       if (from == 0) continue;

@@ -43,7 +43,7 @@ std::vector<std::byte> AutoCodec::encode(const Image<Rgba8>& picture) {
 std::vector<std::byte> AutoCodec::try_next(const Image<Rgba8>& picture) {
   const std::size_t turn = tries_++ % codecs_.size();
   Codec& codec = *codecs_[turn];
-  codec.restart();  // whole pictures tell most, and what the receiver saw last came by another codec
+  codec.restart();  // whole pictures measure best, and what the receiver saw last came by another codec
   const auto pixel_bytes = static_cast<double>(picture.pixels().size_bytes());
   const Stopwatch encoding;
   std::vector<std::byte> bytes = codec.encode(picture);

@@ -14,7 +14,7 @@
 namespace hpr {
 namespace {
 
-constexpr int kLargestSide = 65500;  // libjpeg's
+constexpr int kMaxSide = 65500;  // libjpeg's
 
 struct FreeTurbo {
   void operator()(void* handle) const { tjDestroy(handle); }
@@ -40,8 +40,8 @@ class StepTable {
 
  private:
   [[nodiscard]] static std::size_t index(int difference) {
-    const int place = 255 + difference;
-    return static_cast<std::size_t>(place);
+    const int shifted = 255 + difference;
+    return static_cast<std::size_t>(shifted);
   }
 
   std::array<std::uint8_t, 511> steps_{};
@@ -51,7 +51,7 @@ std::uint8_t corrected(std::uint8_t level, std::uint8_t steps, int step) {
   return static_cast<std::uint8_t>(std::clamp(level + static_cast<std::int8_t>(steps) * step, 0, 255));
 }
 
-/// With a bound, what the receiver will see is looked at here, and a second part corrects it: per pixel the steps of
+/// JPEG, and where an error is bounded a second part that corrects what the receiver decodes: per pixel the steps of
 /// 2 error + 1 that bring r, g and b within the bound, mostly 0, and what alpha lacks, as one Zstandard frame.
 class JpegCoder final : public Coder {
  public:
@@ -159,7 +159,7 @@ JpegEncoder::JpegEncoder() : compressor_(tjInitCompress()) {
 
 void JpegEncoder::append(const Image<Rgba8>& picture, int quality, std::vector<std::byte>& into) {
   HPR_CHECK(!picture.pixels().empty());
-  if (std::max(picture.width(), picture.height()) > kLargestSide) {
+  if (std::max(picture.width(), picture.height()) > kMaxSide) {
     throw Error(ExitCode::Limit,
                 fmt::format("jpeg cannot take a picture of {}x{} pixels", picture.width(), picture.height()),
                 "use zstd");

@@ -28,7 +28,7 @@ std::size_t down(Size picture) {
 }
 
 /// Where tile `index` lies in a picture.
-Rect place_of(std::size_t index, Size picture) {
+Rect rect_of(std::size_t index, Size picture) {
   const int x = static_cast<int>(index % across(picture)) * kDeltaSide;
   const int y = static_cast<int>(index / across(picture)) * kDeltaSide;
   return {x, y, std::min(x + kDeltaSide, picture.width), std::min(y + kDeltaSide, picture.height)};
@@ -39,9 +39,9 @@ std::span<Pixel> part(std::span<Pixel> row, int from, int count) {
   return row.subspan(static_cast<std::size_t>(from), static_cast<std::size_t>(count));
 }
 
-bool differs(const Image<Rgba8>& before, const Image<Rgba8>& now, const Rect& place, int error) {
-  for (int y = place.y0; y < place.y1; ++y) {
-    if (!all_within(part(before.row(y), place.x0, place.width()), part(now.row(y), place.x0, place.width()), error)) {
+bool differs(const Image<Rgba8>& before, const Image<Rgba8>& now, const Rect& rect, int error) {
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    if (!all_within(part(before.row(y), rect.x0, rect.width()), part(now.row(y), rect.x0, rect.width()), error)) {
       return true;
     }
   }
@@ -56,7 +56,7 @@ void throw_damaged(std::string_view what) {
 
 void seal(Envelope& envelope, std::vector<std::byte>& bytes) {
   HPR_CHECK(bytes.size() >= sizeof(Envelope));
-  envelope.body_bytes = bytes.size() - sizeof(Envelope);
+  envelope.payload_bytes = bytes.size() - sizeof(Envelope);
   std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
   envelope.checksum = checksum_of(bytes);
   std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
@@ -66,14 +66,14 @@ Opened open_envelope(std::span<const std::byte> bytes, Size size) {
   if (bytes.size() < sizeof(Envelope)) throw_damaged(fmt::format("it has only {} bytes", bytes.size()));
   Envelope envelope;
   std::memcpy(&envelope, bytes.data(), sizeof(Envelope));
-  const std::span<const std::byte> body = bytes.subspan(sizeof(Envelope));
+  const std::span<const std::byte> payload = bytes.subspan(sizeof(Envelope));
   if (envelope.magic != Envelope{}.magic) throw_damaged("it does not begin as one");
   if (envelope.version != Envelope{}.version) {
     throw Error(ExitCode::BadInput, fmt::format("an encoded picture is of version {}, not 1", envelope.version),
                 "run the same version of hpr on all hosts");
   }
-  if (envelope.body_bytes != body.size()) {
-    throw_damaged(fmt::format("{} bytes follow, not {}", body.size(), envelope.body_bytes));
+  if (envelope.payload_bytes != payload.size()) {
+    throw_damaged(fmt::format("{} bytes follow, not {}", payload.size(), envelope.payload_bytes));
   }
   if (envelope.checksum != checksum_of(bytes)) throw_damaged("its checksum differs");
   if (Size{static_cast<int>(envelope.width), static_cast<int>(envelope.height)} != size) {
@@ -83,7 +83,7 @@ Opened open_envelope(std::span<const std::byte> bytes, Size size) {
                 "use the same wall file on both sides");
   }
   if (envelope.coder >= all_coders().size()) throw_damaged("its codec is unknown");
-  return {envelope, body};
+  return {envelope, payload};
 }
 
 std::size_t delta_tile_count(Size picture) {
@@ -94,7 +94,7 @@ std::vector<std::size_t> changed_tiles(const Image<Rgba8>& before, const Image<R
   HPR_CHECK(before.size() == now.size());
   std::vector<std::size_t> changed;
   for (std::size_t tile = 0; tile < delta_tile_count(now.size()); ++tile) {
-    if (differs(before, now, place_of(tile, now.size()), error)) changed.push_back(tile);
+    if (differs(before, now, rect_of(tile, now.size()), error)) changed.push_back(tile);
   }
   return changed;
 }
@@ -110,8 +110,8 @@ Size packed_size(Size picture, std::size_t tiles) {
 Image<Rgba8> pack_tiles(const Image<Rgba8>& picture, std::span<const std::size_t> tiles) {
   Image<Rgba8> packed(packed_size(picture.size(), tiles.size()));
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const Rect from = place_of(tiles[i], picture.size());
-    const Rect into = place_of(i, packed.size());
+    const Rect from = rect_of(tiles[i], picture.size());
+    const Rect into = rect_of(i, packed.size());
     for (int y = 0; y < from.height(); ++y) {
       std::ranges::copy(part(picture.row(from.y0 + y), from.x0, from.width()),
                         part(packed.row(into.y0 + y), into.x0, from.width()).begin());
@@ -123,8 +123,8 @@ Image<Rgba8> pack_tiles(const Image<Rgba8>& picture, std::span<const std::size_t
 void unpack_tiles(const Image<Rgba8>& packed, std::span<const std::size_t> tiles, Image<Rgba8>& picture) {
   HPR_CHECK(packed.size() == packed_size(picture.size(), tiles.size()));
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const Rect from = place_of(i, packed.size());
-    const Rect into = place_of(tiles[i], picture.size());
+    const Rect from = rect_of(i, packed.size());
+    const Rect into = rect_of(tiles[i], picture.size());
     for (int y = 0; y < into.height(); ++y) {
       std::ranges::copy(part(packed.row(from.y0 + y), from.x0, into.width()),
                         part(picture.row(into.y0 + y), into.x0, into.width()).begin());
@@ -213,8 +213,8 @@ void StreamCodec::decode(std::span<const std::byte> bytes, Image<Rgba8>& picture
   if (envelope.has(Envelope::kTiles)) {
     decode_tiles(opened, picture);
   } else if (!picture.pixels().empty()) {
-    coder(envelope.coder).decode(opened.body, envelope.error, picture);
-  } else if (!opened.body.empty()) {
+    coder(envelope.coder).decode(opened.payload, envelope.error, picture);
+  } else if (!opened.payload.empty()) {
     throw_damaged("it has no pixels, but bytes");
   }
   received_.known = envelope.has(Envelope::kKeep);
@@ -234,9 +234,9 @@ void StreamCodec::decode_tiles(const Opened& opened, Image<Rgba8>& picture) {
         "have the sender restart");
   }
   const std::size_t bits = tile_bits_size(picture.size());
-  if (opened.body.size() < bits) throw_damaged("its list of tiles is cut short");
-  const std::vector<std::size_t> tiles = read_bits(opened.body.first(bits), picture.size());
-  const std::span<const std::byte> coded = opened.body.subspan(bits);
+  if (opened.payload.size() < bits) throw_damaged("its list of tiles is cut short");
+  const std::vector<std::size_t> tiles = read_bits(opened.payload.first(bits), picture.size());
+  const std::span<const std::byte> coded = opened.payload.subspan(bits);
   if (!tiles.empty()) {
     Image<Rgba8> packed(packed_size(picture.size(), tiles.size()));
     coder(envelope.coder).decode(coded, envelope.error, packed);

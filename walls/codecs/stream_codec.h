@@ -24,22 +24,22 @@ struct Envelope {
   std::uint8_t error = 0;  ///< of the encoder's settings
   std::uint32_t width = 0;
   std::uint32_t height = 0;
-  std::uint64_t number = 0;      ///< of the picture in its stream, from 1
-  std::uint64_t base = 0;        ///< with kTiles: the checksum of the picture this one builds on
-  std::uint64_t body_bytes = 0;  ///< what follows
-  std::uint64_t checksum = 0;    ///< xxh64 of all above and of the body
+  std::uint64_t number = 0;         ///< of the picture in its stream, from 1
+  std::uint64_t base = 0;           ///< with kTiles: the checksum of the picture this one builds on
+  std::uint64_t payload_bytes = 0;  ///< what follows
+  std::uint64_t checksum = 0;       ///< xxh64 of all above and of the payload
 
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
 };
 static_assert(sizeof(Envelope) == 48);
 
-/// `bytes` begins with room for an envelope; the rest is the body. Fills in size and checksum of `envelope` and writes
-/// it there.
+/// `bytes` begins with room for an envelope; the rest is the payload. Fills in size and checksum of `envelope` and
+/// writes it there.
 void seal(Envelope& envelope, std::vector<std::byte>& bytes);
 
 struct Opened {
   Envelope envelope;
-  std::span<const std::byte> body;
+  std::span<const std::byte> payload;
 };
 
 /// Throws Error (BadInput) unless every bit is as it was sealed and the picture is of `size`.

@@ -50,7 +50,7 @@ struct KeyKind {
   std::string initial = {};                         ///< for docs
   bool is_ignored = false;                          ///< valid and not acted on
   std::vector<KeyDescription> inner = {};           ///< of tables: their keys; KeyDescription::table is from the key on
-  /// Of the outermost table: what is written as [tables] of their own, after all values.
+  /// Of the keys of the outermost table: what is written as [tables] of their own, after all values.
   std::function<std::string(const T&)> write_blocks = {};
 };
 
@@ -60,8 +60,7 @@ struct TableKey {
   std::string_view name;
   KeyKind<T> kind;
   std::string_view help;
-  std::string_view example =
-      {};  ///< of a required key: what is suggested where it is missing; empty: it may be missing
+  std::string_view example = {};  ///< not empty: the key is required, and this is suggested where it is missing
   std::string_view initial = {};  ///< for docs, where the kind does not know it
 };
 
@@ -70,7 +69,7 @@ template <typename T>
 struct KeyTable {
   std::string_view name;  ///< in messages: "window"
   std::vector<TableKey<T>> keys;
-  /// Of the schema: "oneOf", "anyOf" or "not", and the keys it is about.
+  /// A rule of the schema: "oneOf", "anyOf" or "not", and the keys it is about.
   std::string_view combination = {};
   std::vector<std::string_view> combined = {};
 };
@@ -311,9 +310,9 @@ KeyKind<T> size(Member T::*member, int max) {
 /// [x, y, width, height] in pixels.
 [[nodiscard]] inline Json rect_schema() {
   Json schema{{"type", "array"}, {"minItems", 4}, {"maxItems", 4}};
-  const Json place = schema::whole(-kMaxPixelPlace, kMaxPixelPlace);
-  const Json side = schema::whole(1, kMaxPixelPlace);
-  schema["prefixItems"] = Json::array({place, place, side, side});
+  const Json coordinate = schema::whole(-kMaxPixelPosition, kMaxPixelPosition);
+  const Json side = schema::whole(1, kMaxPixelPosition);
+  schema["prefixItems"] = Json::array({coordinate, coordinate, side, side});
   return schema;
 }
 template <typename T>

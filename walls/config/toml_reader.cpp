@@ -34,27 +34,28 @@ bool is_name(std::string_view text) {
 }  // namespace
 
 /// What an expansion has wrong comes of the overrides, and all of them may have a part in it.
-std::string Findings::where(TextPlace place) const {
+std::string Findings::where(TextPosition position) const {
   const std::string wall = kind_ == WallText::Expansion ? fmt::format("{} with ", printable(name_)) : "";
-  if (place.option > 0) {
-    return fmt::format("{}--set {}: ", wall, printable(overrides_.at(static_cast<std::size_t>(place.option - 1))));
+  if (position.option > 0) {
+    return fmt::format("{}--set {}: ", wall, printable(overrides_.at(static_cast<std::size_t>(position.option - 1))));
   }
   if (kind_ == WallText::Expansion && !overrides_.empty()) {
     return fmt::format("{}--set {}: ", wall, printable(fmt::format("{}", fmt::join(overrides_, " --set ")), 200));
   }
-  return place.line > 0 ? fmt::format("{}:{}:{}: ", name_, place.line, place.column) : fmt::format("{}: ", name_);
+  return position.line > 0 ? fmt::format("{}:{}:{}: ", name_, position.line, position.column)
+                           : fmt::format("{}: ", name_);
 }
 
-void Findings::add(bool error, TextPlace place, std::string_view what, std::string hint) {
+void Findings::add(bool error, TextPosition position, std::string_view what, std::string hint) {
   constexpr std::size_t kLineLimit = 200;
-  const std::string where = this->where(place);
-  if (kind_ == WallText::Expansion) place.line = place.column = 0;
-  const std::string line = place.line > 0 ? printable(line_of(text_, place.line), kLineLimit) : std::string();
-  findings_.push_back({error, place, where + std::string(what), line, std::move(hint)});
+  const std::string where = this->where(position);
+  if (kind_ == WallText::Expansion) position.line = position.column = 0;
+  const std::string line = position.line > 0 ? printable(line_of(text_, position.line), kLineLimit) : std::string();
+  findings_.push_back({error, position, where + std::string(what), line, std::move(hint)});
 }
 
-void Findings::ignore(TextPlace place, const std::string& key) {
-  if (ignored_.empty()) first_ignored_ = place;
+void Findings::ignore(TextPosition position, const std::string& key) {
+  if (ignored_.empty()) first_ignored_ = position;
   if (std::ranges::find(ignored_, key) == ignored_.end()) ignored_.push_back(key);
 }
 
@@ -69,7 +70,8 @@ std::vector<WallFinding> Findings::take() {
     ignored_.clear();
   }
   std::ranges::stable_sort(findings_, [](const WallFinding& a, const WallFinding& b) {
-    return a.place.line != b.place.line ? a.place.line < b.place.line : a.place.column < b.place.column;
+    return a.position.line != b.position.line ? a.position.line < b.position.line
+                                              : a.position.column < b.position.column;
   });
   return std::move(findings_);
 }
@@ -80,25 +82,26 @@ const TomlValue* TableReader::find(std::string_view key) {
   return entry == table_.entries.end() ? nullptr : &entry->value;
 }
 
-TextPlace TableReader::place(std::string_view key) const {
+TextPosition TableReader::position(std::string_view key) const {
   const auto entry = std::ranges::find(table_.entries, key, &TomlEntry::key);
-  return entry == table_.entries.end() ? table_.place : entry->value.place;
+  return entry == table_.entries.end() ? table_.position : entry->value.position;
 }
 
 const TomlValue* TableReader::require(std::string_view key, std::string_view example) {
   const TomlValue* const value = find(key);
   if (value == nullptr) {
-    findings_.error(table_.place, fmt::format("{} has no '{}'", what_, key), fmt::format("add {} = {}", key, example));
+    findings_.error(table_.position, fmt::format("{} has no '{}'", what_, key),
+                    fmt::format("add {} = {}", key, example));
   }
   return value;
 }
 
 void TableReader::error(std::string_view key, std::string_view problem, std::string hint) {
-  findings_.error(place(key), fmt::format("'{}' of {} {}", key, what_, problem), std::move(hint));
+  findings_.error(position(key), fmt::format("'{}' of {} {}", key, what_, problem), std::move(hint));
 }
 
 void TableReader::wrong_type(const TomlValue& value, std::string_view key, std::string_view wanted) {
-  findings_.error(value.place, fmt::format("'{}' of {} is {}", key, what_, describe(value.type)),
+  findings_.error(value.position, fmt::format("'{}' of {} is {}", key, what_, describe(value.type)),
                   fmt::format("it must be {}", wanted));
 }
 
@@ -170,7 +173,7 @@ std::optional<double> TableReader::real_from(std::string_view key, double low, d
 
 bool TableReader::check_count(const TomlValue& value, std::string_view key, std::size_t count, std::string_view of) {
   if (value.items.size() == count) return true;
-  findings_.error(value.place, fmt::format("'{}' of {} has {} values", key, what_, value.items.size()),
+  findings_.error(value.position, fmt::format("'{}' of {} has {} values", key, what_, value.items.size()),
                   fmt::format("it must have {} {}", count, of));
   return false;
 }
@@ -185,7 +188,7 @@ std::optional<std::vector<double>> TableReader::reals(std::string_view key, std:
       return std::nullopt;
     }
     if (!(std::abs(item.real) <= limit)) {
-      findings_.error(item.place, fmt::format("'{}' of {} holds {}", key, what_, item.real),
+      findings_.error(item.position, fmt::format("'{}' of {} holds {}", key, what_, item.real),
                       fmt::format("numbers there must be finite and within {} of zero", limit));
       return std::nullopt;
     }
@@ -210,7 +213,7 @@ std::optional<std::vector<int>> TableReader::integers(std::string_view key, std:
       return std::nullopt;
     }
     if (item.integer < low || item.integer > high) {
-      findings_.error(item.place, fmt::format("'{}' of {} holds {}", key, what_, item.integer),
+      findings_.error(item.position, fmt::format("'{}' of {} holds {}", key, what_, item.integer),
                       fmt::format("it must be from {} to {}", low, high));
       return std::nullopt;
     }
@@ -234,7 +237,7 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
 }
 
 std::optional<Rect> TableReader::rect(std::string_view key) {
-  const auto numbers = integers(key, 4, -kMaxPixelPlace, kMaxPixelPlace);
+  const auto numbers = integers(key, 4, -kMaxPixelPosition, kMaxPixelPosition);
   if (!numbers) return std::nullopt;
   const int width = (*numbers)[2];
   const int height = (*numbers)[3];
@@ -265,14 +268,14 @@ std::vector<const TomlValue*> TableReader::tables(std::string_view key) {
 
 void TableReader::ignore(std::initializer_list<std::string_view> keys) {
   for (const std::string_view key : keys) {
-    if (const TomlValue* const value = find(key)) findings_.ignore(value->place, std::string(key));
+    if (const TomlValue* const value = find(key)) findings_.ignore(value->position, std::string(key));
   }
 }
 
 void TableReader::finish() {
   for (const TomlEntry& entry : table_.entries) {
     if (entry.key.starts_with("x_") || std::ranges::find(known_, entry.key) != known_.end()) continue;
-    findings_.error(entry.place, fmt::format("{} has no key '{}'", what_, printable(entry.key)),
+    findings_.error(entry.position, fmt::format("{} has no key '{}'", what_, printable(entry.key)),
                     unknown_name_hint(entry.key, known_) + " (x_... is free for your own data)");
   }
 }

@@ -17,7 +17,7 @@ namespace hpr {
 /// Something wrong or odd in a wall file.
 struct WallFinding {
   bool error = true;  ///< false: a warning
-  TextPlace place;
+  TextPosition position;
   std::string what;  ///< with its place: "wall.toml:14:10: ..."
   std::string line;  ///< the offending line; empty when there is none
   std::string hint;
@@ -37,32 +37,36 @@ class Findings {
            WallText kind = WallText::File)
       : name_(std::move(name)), text_(text), overrides_(std::move(overrides)), kind_(kind) {}
 
-  void error(TextPlace place, std::string_view what, std::string hint) { add(true, place, what, std::move(hint)); }
-  void warning(TextPlace place, std::string_view what, std::string hint) { add(false, place, what, std::move(hint)); }
+  void error(TextPosition position, std::string_view what, std::string hint) {
+    add(true, position, what, std::move(hint));
+  }
+  void warning(TextPosition position, std::string_view what, std::string hint) {
+    add(false, position, what, std::move(hint));
+  }
   /// Notes a valid key nobody acts on; all of them end in one warning.
-  void ignore(TextPlace place, const std::string& key);
+  void ignore(TextPosition position, const std::string& key);
 
   [[nodiscard]] bool any_errors() const;
   /// In the order of the text.
   [[nodiscard]] std::vector<WallFinding> take();
 
  private:
-  void add(bool error, TextPlace place, std::string_view what, std::string hint);
-  [[nodiscard]] std::string where(TextPlace place) const;
+  void add(bool error, TextPosition position, std::string_view what, std::string hint);
+  [[nodiscard]] std::string where(TextPosition position) const;
 
   std::string name_;
   std::string_view text_;
   std::vector<std::string> overrides_;
   WallText kind_;
   std::vector<WallFinding> findings_;
-  TextPlace first_ignored_;
+  TextPosition first_ignored_;
   std::vector<std::string> ignored_;
 };
 
 /// Farther than any wall: keeps squares and quotients of coordinates finite.
 inline constexpr double kMaxMeters = 1e6;
-/// Of places on a display, on both sides of its origin, and of sizes there.
-inline constexpr int kMaxPixelPlace = 1 << 20;
+/// The largest position on a display, on both sides of its origin, and the largest size there, in pixels.
+inline constexpr int kMaxPixelPosition = 1 << 20;
 
 /// Reads one table key by key. What is wrong goes into the findings, and the key counts as absent; asking for a key
 /// makes it a known one, so that finish() can report the keys nobody asked for.
@@ -74,13 +78,13 @@ class TableReader {
 
   [[nodiscard]] const std::string& what() const { return what_; }
   [[nodiscard]] Findings& findings() const { return findings_; }
-  [[nodiscard]] TextPlace place() const { return table_.place; }
-  /// Of the value, else of the table.
-  [[nodiscard]] TextPlace place(std::string_view key) const;
+  [[nodiscard]] TextPosition position() const { return table_.position; }
+  /// The position of the key's value; where it is absent that of the table.
+  [[nodiscard]] TextPosition position(std::string_view key) const;
   /// The value whatever its type; null when absent.
   [[nodiscard]] const TomlValue* find(std::string_view key);
   [[nodiscard]] bool has(std::string_view key) { return find(key) != nullptr; }
-  /// As find, and an error when absent.
+  /// Finds the value of a key that has to be there; its absence is an error, and null is returned.
   const TomlValue* require(std::string_view key, std::string_view example);
 
   [[nodiscard]] std::optional<std::string> text(std::string_view key);

@@ -16,7 +16,7 @@ int scaled(int pixels, double factor) {
   return static_cast<int>(std::lround(std::clamp(pixels * factor, 1.0, kMaxPixels)));
 }
 
-/// Edges are scaled, not sizes, so that neighbours stay neighbours.
+/// Edges are scaled, not sizes, so that neighbors stay neighbors.
 Rect scaled(const Rect& r, double factor, Size at_least) {
   const auto edge = [&](int at) { return static_cast<int>(std::lround(at * factor)); };
   const int x = edge(r.x0);
@@ -65,8 +65,8 @@ Wall scale_wall(Wall wall, double factor) {
     if (screen.eye == Eye::Both && wall.stereo == StereoMode::TopBottom)
       screen.pixels.height = std::max(2, screen.pixels.height);
     const Size shown = panel_pixels(screen);
-    const Rect place = scaled(screen.viewport, factor, shown);
-    screen.viewport = {place.x0, place.y0, place.x0 + shown.width, place.y0 + shown.height};
+    const Rect viewport = scaled(screen.viewport, factor, shown);
+    screen.viewport = {viewport.x0, viewport.y0, viewport.x0 + shown.width, viewport.y0 + shown.height};
   }
   for (WallMonitor& monitor : wall.monitors) {
     monitor.pixels = {scaled(monitor.pixels.width, factor), scaled(monitor.pixels.height, factor)};

@@ -16,42 +16,42 @@ namespace hpr {
 
 struct DraftNode {
   WallNode node;
-  TextPlace place;
+  TextPosition position;
 };
 
 struct DraftWindow {
   WallWindow window;
-  TextPlace place;       ///< of the table
-  TextPlace node_place;  ///< of the node's name
-  TextPlace gpu_place;
-  TextPlace rank_place;
+  TextPosition position;       ///< of the table
+  TextPosition node_position;  ///< of the node's name
+  TextPosition gpu_position;
+  TextPosition rank_position;
 };
 
 struct DraftScreen {
   WallScreen screen;  ///< node, rank and viewport are settled by link_wall
-  TextPlace place;
-  TextPlace window_place;
-  TextPlace warp_place;
+  TextPosition position;
+  TextPosition window_position;
+  TextPosition warp_position;
   bool has_corners = false;  ///< and they are sound
 };
 
 struct DraftSurface {
   std::string id;
   std::string viewer = {};  ///< id; empty: the first
-  TextPlace place = {};
-  TextPlace viewer_place = {};
+  TextPosition position = {};
+  TextPosition viewer_position = {};
 };
 
 struct DraftViewer {
   WallViewer viewer;
-  TextPlace place;
+  TextPosition position;
   bool placed = false;  ///< has a position_m, sound or not
 };
 
 struct DraftMonitor {
   WallMonitor monitor;
-  TextPlace place;
-  TextPlace surface_place;
+  TextPosition position;
+  TextPosition surface_position;
 };
 
 struct WallDraft {
@@ -62,7 +62,7 @@ struct WallDraft {
   std::vector<DraftViewer> viewers;
   std::vector<DraftMonitor> monitors;
   StereoMode stereo = StereoMode::None;
-  TextPlace stereo_place;
+  TextPosition stereo_position;
 };
 
 /// Metres a screen's sides have at least.
@@ -123,7 +123,7 @@ struct WallGrid {
 [[nodiscard]] bool link_wall(WallDraft& draft, Findings& findings);
 
 /// `id` is to be a picture's name.
-void check_file_name(const std::string& id, const TextPlace& place, Findings& findings);
+void check_file_name(const std::string& id, const TextPosition& position, Findings& findings);
 
 /// Checks what viewers, stereo and monitors refer to, and settles which viewer sees which screen.
 void link_viewers(WallDraft& draft, Findings& findings);
@@ -135,7 +135,7 @@ void check_position_maps(const WallDraft& draft, Findings& findings);
 void warn_about_viewers(const WallDraft& draft, Findings& findings);
 
 /// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
-void warn_about_neighbours(const WallDraft& draft, Findings& findings);
+void warn_about_neighbors(const WallDraft& draft, Findings& findings);
 
 /// Fills in a wall whose screens are sound: the default viewer and the hash.
 void finish_wall(Wall& wall);

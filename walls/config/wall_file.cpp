@@ -23,12 +23,12 @@ namespace {
 
 constexpr std::string_view kForm = "write PATH=VALUE, e.g. viewers.0.position_m=[0,1.6,0.5] or stereo.mode=anaglyph";
 
-void set_place(TomlValue& value, TextPlace place) {
-  value.place = place;
-  for (TomlValue& item : value.items) set_place(item, place);
+void set_position(TomlValue& value, TextPosition position) {
+  value.position = position;
+  for (TomlValue& item : value.items) set_position(item, position);
   for (TomlEntry& entry : value.entries) {
-    entry.place = place;
-    set_place(entry.value, place);
+    entry.position = position;
+    set_position(entry.value, position);
   }
 }
 
@@ -70,8 +70,8 @@ std::optional<std::size_t> index_of(const std::string& step) {
 /// Goes from a value to the one a step below; what is missing is made.
 class Walker {
  public:
-  Walker(TomlValue& document, TextPlace place, Findings& findings)
-      : value_(&document), place_(place), findings_(findings) {}
+  Walker(TomlValue& document, TextPosition position, Findings& findings)
+      : value_(&document), position_(position), findings_(findings) {}
 
   /// False, and a finding, where there is no such step.
   bool step(const std::string& name) {
@@ -83,14 +83,14 @@ class Walker {
   }
 
   void put(TomlValue value) {
-    set_place(value, place_);
+    set_position(value, position_);
     *value_ = std::move(value);
   }
 
  private:
   [[nodiscard]] TomlValue made() const {
     TomlValue value;
-    value.place = place_;
+    value.position = position_;
     return value;
   }
 
@@ -108,7 +108,7 @@ class Walker {
     const auto entry = std::ranges::find(value_->entries, name, &TomlEntry::key);
     fresh_ = entry == value_->entries.end();
     if (fresh_) {
-      value_->entries.push_back({name, place_, made()});
+      value_->entries.push_back({name, position_, made()});
       value_ = &value_->entries.back().value;
     } else {
       value_ = &entry->value;
@@ -117,12 +117,12 @@ class Walker {
   }
 
   bool refuse(const std::string& name, std::string_view why) {
-    findings_.error(place_, fmt::format("'{}' of the path {}", printable(name), why), std::string(kForm));
+    findings_.error(position_, fmt::format("'{}' of the path {}", printable(name), why), std::string(kForm));
     return false;
   }
 
   TomlValue* value_;
-  TextPlace place_;
+  TextPosition position_;
   Findings& findings_;
   bool fresh_ = false;  ///< value_ was made by the last step
 };
@@ -163,7 +163,7 @@ void refuse_without_effect(const std::string& override, Findings& findings) {
 void apply_overrides(TomlValue& document, std::span<const std::string> overrides, Findings& findings) {
   for (std::size_t i = 0; i < overrides.size(); ++i) {
     const std::string_view text = overrides[i];
-    const TextPlace place{0, 0, static_cast<int>(i) + 1};
+    const TextPosition position{0, 0, static_cast<int>(i) + 1};
     const std::size_t equals = text.find('=');
     const std::string_view path = text.substr(0, equals);
     auto value = equals == std::string_view::npos ? std::nullopt : value_of(text.substr(equals + 1));
@@ -174,7 +174,7 @@ void apply_overrides(TomlValue& document, std::span<const std::string> overrides
                               value ? "a key of the path is empty" : "the value is neither TOML nor a word"),
                   std::string(kForm));
     }
-    Walker walker(document, place, findings);
+    Walker walker(document, position, findings);
     if (std::ranges::all_of(steps, [&](const std::string& step) { return walker.step(step); })) {
       walker.put(std::move(*value));
     }
@@ -186,9 +186,9 @@ bool WallReading::ok() const {
 }
 
 void finish_wall(Wall& wall) {
-  if (!wall.viewers.front().given) {
+  if (!wall.viewers.front().has_position) {
     const WallExtent extent = wall_extent(wall);
-    wall.viewers.front().position = extent.middle + extent.axes[2] * extent.height;
+    wall.viewers.front().position = extent.centroid + extent.axes[2] * extent.height;
   }
   Wall nameless = wall;
   nameless.name.clear();
@@ -207,7 +207,7 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   WallReading reading;
   auto parsed = parse_toml(text);
   if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
-    findings.error(failure->place, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
+    findings.error(failure->position, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
     reading.findings = findings.take();
     return reading;
   }
@@ -225,7 +225,7 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   }
   if (!findings.any_errors()) {
     warn_about_viewers(draft, findings);
-    warn_about_neighbours(draft, findings);
+    warn_about_neighbors(draft, findings);
   }
 
   const bool sound = !findings.any_errors();
@@ -278,7 +278,7 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
 }
 
 WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides) {
-  constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 20;
+  constexpr std::uint64_t kMaxFileBytes = std::uint64_t{16} << 20;
   if (auto wall = wall_from_shorthand(spec)) {
     if (overrides.empty()) return {std::move(*wall), {}};
     return parse_wall(expand_wall(*wall), spec, overrides, WallText::Expansion);
@@ -288,15 +288,15 @@ WallReading read_wall(const std::string& spec, const std::vector<std::string>& o
     throw Error(ExitCode::Io, fmt::format("there is no wall file '{}'", printable(spec)),
                 "a wall is a TOML file, or columns x rows such as 3x2 or 3x2@1920x1080");
   }
-  const std::vector<std::byte> bytes = read_file(spec, kLargestFile);
+  const std::vector<std::byte> bytes = read_file(spec, kMaxFileBytes);
   return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec, overrides);
 }
 
-Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides, bool tells_warnings) {
+Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides, bool logs_warnings) {
   WallReading reading = read_wall(spec, overrides);
   const auto first = std::ranges::find_if(reading.findings, &WallFinding::error);
   if (first != reading.findings.end()) throw Error(ExitCode::BadInput, first->what, first->hint, first->line);
-  if (!tells_warnings) return std::move(reading.wall);
+  if (!logs_warnings) return std::move(reading.wall);
   for (const WallFinding& finding : reading.findings) log::warning("{} ({})", finding.what, finding.hint);
   return std::move(reading.wall);
 }

@@ -310,11 +310,11 @@ KeyKind<WallViewer> position() {
   KeyKind<WallViewer> kind = point(&WallViewer::position);
   kind.read = [](const KeySource& source, WallViewer& into) {
     const auto position = source.reader.point(source.key);
-    into.given = position.has_value();
+    into.has_position = position.has_value();
     into.position = position.value_or(into.position);
   };
   kind.initial.clear();
-  return when([](const WallViewer& viewer) { return viewer.given; }, std::move(kind));
+  return when([](const WallViewer& viewer) { return viewer.has_position; }, std::move(kind));
 }
 
 /// A monitor's size by the place it has elsewhere.

@@ -23,7 +23,7 @@ namespace hpr {
 [[nodiscard]] const KeyTable<WallMonitor>& monitor_keys();
 
 /// What a wall file may hold as a JSON Schema (draft 2020-12), for editors and other programs: every key, its type and
-/// range. What spans tables (names that must exist, screens that must not overlap) only reading a file tells.
+/// range. What spans tables (names that must exist, screens that must not overlap) only reading a file finds.
 [[nodiscard]] std::string wall_schema();
 
 /// The tables of keys of docs/walls.md.

@@ -14,13 +14,14 @@
 namespace hpr {
 namespace {
 
-/// Of the angle between a screen's sides. A picture on skewed corners would need a warp; this much is measuring noise.
+/// The largest cosine of the angle between a screen's sides. A picture on skewed corners would need a warp; this much
+/// is measuring noise.
 constexpr double kMaxCosine = 1e-6;
 
 void read_nodes(TableReader& document, const std::filesystem::path& folder, WallDraft& draft) {
   for (const TomlValue* const table : document.tables("nodes")) {
     TableReader reader(*table, std::string(node_keys().name), document.findings());
-    DraftNode draft_node{{}, table->place};
+    DraftNode draft_node{{}, table->position};
     draft_node.node.host = "localhost";
     read_keys(node_keys(), reader, folder, draft_node.node);
     draft.nodes.push_back(std::move(draft_node));
@@ -30,7 +31,8 @@ void read_nodes(TableReader& document, const std::filesystem::path& folder, Wall
 void read_windows(TableReader& document, const std::filesystem::path& folder, WallDraft& draft) {
   for (const TomlValue* const table : document.tables("windows")) {
     TableReader reader(*table, std::string(window_keys().name), document.findings());
-    DraftWindow draft_window{{}, table->place, reader.place("node"), reader.place("gpu"), reader.place("rank")};
+    DraftWindow draft_window{
+        {}, table->position, reader.position("node"), reader.position("gpu"), reader.position("rank")};
     read_keys(window_keys(), reader, folder, draft_window.window);
     draft.windows.push_back(std::move(draft_window));
   }
@@ -59,7 +61,7 @@ std::optional<double> check_curve(TableReader& reader, const DraftGrid& draft, c
   constexpr double kDegree = std::numbers::pi / 180.0;
   TableReader curve(*table, "curve", reader.findings());
   if (curve.has("radius_m") == curve.has("angle_degrees")) {
-    reader.findings().error(table->place, "curve has either radius_m or angle_degrees",
+    reader.findings().error(table->position, "curve has either radius_m or angle_degrees",
                             "write e.g. curve = { radius_m = 3.0 } or curve = { angle_degrees = 90 }");
     return std::nullopt;
   }
@@ -135,7 +137,7 @@ void read_grid(TableReader& surface_reader, const std::string& surface, const st
   const TomlValue* const list = reader.find("windows");
   std::vector<WallScreen> screens = expand_grid(*grid, surface);
   for (std::size_t i = 0; i < screens.size(); ++i) {
-    DraftScreen screen{tiles.tile, table->place, table->place, table->place, true};
+    DraftScreen screen{tiles.tile, table->position, table->position, table->position, true};
     screen.screen.id = std::move(screens[i].id);
     screen.screen.surface = surface;
     screen.screen.pixels = screens[i].pixels;
@@ -145,7 +147,7 @@ void read_grid(TableReader& surface_reader, const std::string& surface, const st
     screen.screen.viewport = screens[i].viewport;
     if (tiles.windows) {
       screen.screen.window = (*tiles.windows)[i];
-      screen.window_place = list->items[i].place;
+      screen.window_position = list->items[i].position;
     }
     draft.screens.push_back(std::move(screen));
   }
@@ -187,7 +189,7 @@ void warn_about_pixel_shape(const DraftScreen& draft, Findings& findings) {
   if (std::abs(x / y - 1.0) <= kSquareEnough) return;
   const double turned = screen_width(screen) / screen.pixels.height / (screen_height(screen) / screen.pixels.width);
   findings.warning(
-      draft.place,
+      draft.position,
       fmt::format("the pixels of screen \"{}\" are {:.4g} x {:.4g} mm, not square", screen.id, 1000.0 * x, 1000.0 * y),
       std::abs(turned - 1.0) <= kSquareEnough
           ? "give the pixels of the upright picture, width along ll to lr: swap the two numbers"
@@ -200,14 +202,14 @@ void read_screens(TableReader& surface, const std::string& surface_id, const std
   const bool has_grid = surface.has("grid");
   const std::size_t before = draft.screens.size();
   if (has_grid == surface.has("screens")) {
-    surface.findings().error(surface.place(),
+    surface.findings().error(surface.position(),
                              fmt::format("surface \"{}\" has {}", surface_id,
                                          has_grid ? "both a grid and screens" : "neither a grid nor screens"),
                              "give either grid = { ... } or screens = [ ... ]");
   }
   for (const TomlValue* const table : surface.tables("screens")) {
     TableReader reader(*table, std::string(screen_keys().name), surface.findings());
-    DraftScreen draft_screen{{}, table->place, reader.place("window"), reader.place("warp"), false};
+    DraftScreen draft_screen{{}, table->position, reader.position("window"), reader.position("warp"), false};
     WallScreen& screen = draft_screen.screen;
     screen.surface = surface_id;
     screen.lower_left = screen.lower_right = screen.upper_left = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
@@ -236,7 +238,7 @@ void read_surfaces(TableReader& document, const std::filesystem::path& folder, W
   for (const TomlValue* const table : surfaces) {
     TableReader reader(*table, std::string(surface_keys().name), findings);
     if (surfaces.size() > 1) reader.require("id", "\"wall\"");
-    DraftSurface surface{.id = "wall", .place = table->place, .viewer_place = reader.place("viewer")};
+    DraftSurface surface{.id = "wall", .position = table->position, .viewer_position = reader.position("viewer")};
     const std::size_t before = draft.screens.size();
     read_keys(surface_keys(), reader, folder, surface, [&](std::string_view key) {
       if (key == "grid") read_grid(reader, surface.id, folder, draft);
@@ -255,7 +257,7 @@ void read_viewers(TableReader& document, const std::filesystem::path& folder, Wa
     TableReader reader(*table, std::string(viewer_keys().name), document.findings());
     WallViewer viewer;
     read_keys(viewer_keys(), reader, folder, viewer);
-    draft.viewers.push_back({std::move(viewer), table->place, reader.has("position_m")});
+    draft.viewers.push_back({std::move(viewer), table->position, reader.has("position_m")});
   }
 }
 
@@ -265,24 +267,24 @@ void read_viewer_path(TableReader& document, const std::filesystem::path& folder
   if (table == nullptr || table->type != TomlValue::Type::Table) return;
   TableReader reader(*table, "test", document.findings());
   if (!reader.has("viewer_path")) return;
-  if (draft.viewers.empty()) draft.viewers.push_back({{}, table->place});
+  if (draft.viewers.empty()) draft.viewers.push_back({{}, table->position});
   WallTracker recorded;
   read_head_recording({reader, "viewer_path", folder}, recorded);
   draft.viewers.front().viewer.tracker = recorded;
 }
 
-TextPlace place_of_stereo(TableReader& document) {
+TextPosition position_of_stereo(TableReader& document) {
   const TomlValue* const stereo = document.find("stereo");
-  return stereo == nullptr ? TextPlace{} : TableReader(*stereo, "stereo", document.findings()).place("mode");
+  return stereo == nullptr ? TextPosition{} : TableReader(*stereo, "stereo", document.findings()).position("mode");
 }
 
 void read_monitors(TableReader& document, const std::filesystem::path& folder, WallDraft& draft) {
   for (const TomlValue* const table : document.tables("monitors")) {
     TableReader reader(*table, std::string(monitor_keys().name), document.findings());
-    DraftMonitor monitor{{}, table->place, reader.place("surface")};
+    DraftMonitor monitor{{}, table->position, reader.position("surface")};
     read_keys(monitor_keys(), reader, folder, monitor.monitor);
     if (reader.has("rect") == reader.has("pixels")) {
-      document.findings().error(table->place, "a monitor has either a rect or pixels",
+      document.findings().error(table->position, "a monitor has either a rect or pixels",
                                 "write rect = [x, y, width, height] on its display, or pixels = [1920, 540]");
     }
     const Size size = monitor.monitor.pixels;
@@ -302,7 +304,7 @@ void read_document(TableReader& document, const std::filesystem::path& folder, W
     if (key == "windows") read_windows(document, folder, draft);
     if (key == "surfaces") read_surfaces(document, folder, draft);
     if (key == "viewers") read_viewers(document, folder, draft);
-    if (key == "stereo") draft.stereo_place = place_of_stereo(document);
+    if (key == "stereo") draft.stereo_position = position_of_stereo(document);
     if (key == "test") read_viewer_path(document, folder, draft);
     if (key == "monitors") read_monitors(document, folder, draft);
   });

@@ -24,8 +24,8 @@ struct Numbers {
   bool measured = false;  ///< size and gap are the user's
 };
 
-double to_tenths_of_mm(double metres) {
-  return std::round(metres * 1e4) / 1e4;
+double to_tenths_of_mm(double meters) {
+  return std::round(meters * 1e4) / 1e4;
 }
 
 Numbers numbers_of(const WallTemplate& wall) {
@@ -34,8 +34,8 @@ Numbers numbers_of(const WallTemplate& wall) {
   const bool here = wall.hosts.empty();
   Numbers numbers{wall.tile_pixels.value_or(here ? Size{640, 360} : Size{1920, 1080}), {}, {}, true};
   const glm::dvec2 shape(numbers.pixels.width, numbers.pixels.height);
-  const double metres_per_pixel = here ? kDesktopHeight_m / shape.y : kDiagonal_m / std::hypot(shape.x, shape.y);
-  const glm::dvec2 guess(to_tenths_of_mm(shape.x * metres_per_pixel), to_tenths_of_mm(shape.y * metres_per_pixel));
+  const double meters_per_pixel = here ? kDesktopHeight_m / shape.y : kDiagonal_m / std::hypot(shape.x, shape.y);
+  const glm::dvec2 guess(to_tenths_of_mm(shape.x * meters_per_pixel), to_tenths_of_mm(shape.y * meters_per_pixel));
   numbers.size_m = wall.tile_size_m.value_or(guess);
   numbers.gap_m = wall.gap_m.value_or(here ? glm::dvec2(0.006) : glm::dvec2(0.0055));
   numbers.measured = wall.tile_size_m && wall.gap_m;
@@ -54,8 +54,8 @@ void check(const WallTemplate& wall, const Numbers& numbers) {
                 fmt::format("sides must be from 1 to {}", kMaxScreenSide));
   }
   const auto possible = [&](double size, double gap) {
-    constexpr double kLargest_m = 1000.0;
-    return size > 0.0 && size <= kLargest_m && gap > -size && gap <= kLargest_m;
+    constexpr double kMaxLength_m = 1000.0;
+    return size > 0.0 && size <= kMaxLength_m && gap > -size && gap <= kMaxLength_m;
   };
   if (possible(numbers.size_m.x, numbers.gap_m.x) && possible(numbers.size_m.y, numbers.gap_m.y)) return;
   throw Error(ExitCode::Usage,
@@ -95,7 +95,7 @@ std::string window_id(const WallTemplate& wall, std::size_t screen) {
 }
 
 std::string tables_of_hosts(const WallTemplate& wall, Size pixels) {
-  constexpr std::int64_t kWidestDesktop = 32767;
+  constexpr std::int64_t kMaxDesktopSide = 32767;
   std::string text =
       "\n# One node per computer. host: its name, as `hostname` prints it there. ranks: render processes to run on "
       "it.\n"
@@ -115,7 +115,7 @@ std::string tables_of_hosts(const WallTemplate& wall, Size pixels) {
                         toml_quote(wall.hosts[owners[screen]]));
     // Beyond the largest X screen nobody can say where it stands.
     const std::int64_t x = std::int64_t{beside} * pixels.width;
-    if (x + pixels.width <= kWidestDesktop) {
+    if (x + pixels.width <= kMaxDesktopSide) {
       text += fmt::format(", rect = [{}, 0, {}, {}], fullscreen = true", x, pixels.width, pixels.height);
     }
     text += " },\n";
@@ -129,8 +129,8 @@ std::string windows_of_grid(const WallTemplate& wall) {
   for (int row = 0; row < wall.rows; ++row) {
     text += "  ";
     for (int column = 0; column < wall.columns; ++column) {
-      const int place = row * wall.columns + column;
-      const auto screen = static_cast<std::size_t>(place);
+      const int index = row * wall.columns + column;
+      const auto screen = static_cast<std::size_t>(index);
       text += fmt::format("\"{}\",{}", window_id(wall, screen), column + 1 < wall.columns ? " " : "\n");
     }
   }
@@ -220,8 +220,8 @@ std::vector<std::string> expand(std::string_view word, std::string_view list) {
 }
 
 bool is_host(std::string_view name) {
-  constexpr std::size_t kLongest = 64;  // as the system has it
-  return !name.empty() && name.size() <= kLongest && name.front() != '-' && name.front() != '.' &&
+  constexpr std::size_t kMaxNameBytes = 64;  // as the system has it
+  return !name.empty() && name.size() <= kMaxNameBytes && name.front() != '-' && name.front() != '.' &&
          std::ranges::all_of(name, [](char c) {
            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.' ||
                   c == '_';

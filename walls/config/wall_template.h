@@ -10,7 +10,7 @@
 
 namespace hpr {
 
-/// A wall of equal panels, as one tells somebody else about it.
+/// A wall of equal panels, described by a few numbers.
 struct WallTemplate {
   int columns = 1;
   int rows = 1;

@@ -17,7 +17,7 @@
 
 namespace hpr {
 
-/// A screen's finished picture, upright; sRGB. A display sends its panel what ScanOut makes of it.
+/// A screen's finished picture, upright; sRGB. A display sends its panel what PanelTransform makes of it.
 struct ScreenPicture {
   std::size_t screen = 0;  ///< index into Wall::screens
   const Image<Rgba8>& image;
@@ -104,7 +104,7 @@ struct DisplayOptions {
   PipeOptions pipe = {};
   std::optional<std::vector<std::size_t>> screens = {};  ///< for `window`: those this process shows; none: all
   std::string web_address = {};                          ///< for `web`: ADDR:PORT; empty: loopback, a free port
-  std::function<void(const std::string& line)> announce = nullptr;  ///< told where `web` is found
+  std::function<void(const std::string& line)> announce = nullptr;  ///< called with the address of `web`
 };
 
 /// One way to show a wall; defined in the file of its name.
@@ -117,7 +117,7 @@ struct DisplayKind {
   /// Throws Error: Usage for options that do not fit, Io when what is to be written to cannot be or holds what may not
   /// be overwritten, NoDevice without a desktop for windows. `wall` must outlive the display.
   std::unique_ptr<Display> (*make)(const Wall& wall, const DisplayOptions& options) = nullptr;
-  /// Throws what `make` would, as far as that can be told without opening anything; asked before long work.
+  /// Throws what `make` would, as far as that can be known without opening anything; asked before long work.
   void (*check)(const Wall& wall, const DisplayOptions& options) = nullptr;
 };
 

@@ -75,10 +75,11 @@ class FileDisplay final : public Display {
       const Stopwatch watch;
       bytes = 0;
       // Made where it is needed: this process shows few of the wall's screens.
-      const ScanOut& scan_out = scan_outs_.try_emplace(picture.screen, wall_, picture.screen).first->second;
+      const PanelTransform& panel_transform =
+          panel_transforms_.try_emplace(picture.screen, wall_, picture.screen).first->second;
       const WallScreen& screen = wall_.screens[picture.screen];
       write(file_of(screen), picture.image);
-      if (!scan_out.trivial()) write(panel_file_of(screen), scan_out.apply(picture.image));
+      if (!panel_transform.is_identity()) write(panel_file_of(screen), panel_transform.apply(picture.image));
       costs_.push_back({picture.screen, watch.ms(), bytes});
     }
     for (const MonitorPicture& picture : frame.monitors) {
@@ -92,7 +93,7 @@ class FileDisplay final : public Display {
   const Wall& wall_;
   std::filesystem::path folder_;
   bool keeps_frames_;
-  std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
+  std::map<std::size_t, PanelTransform> panel_transforms_;  ///< by screen
   std::vector<ScreenCost> costs_;
 };
 

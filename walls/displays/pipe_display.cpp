@@ -35,7 +35,7 @@ class PipeDisplay final : public Display {
       : wall_(wall),
         format_(options.format),
         screen_(screen_of(wall, options.screen)),
-        picture_(wall_picture(wall, kLargestPicture)),
+        picture_(wall_picture(wall, kMaxPictureSide)),
         latest_(wall.screens.size()),
         sink_(open_sink(options)) {
     if (screen_) latest_[*screen_] = Image<Rgba8>(wall.screens[*screen_].pixels, {0, 0, 0, 255});

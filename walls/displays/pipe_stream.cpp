@@ -40,7 +40,7 @@ void ignore_broken_pipes() {
   if (::sigaction(SIGPIPE, nullptr, &now) == 0 && now.sa_handler == SIG_DFL) std::signal(SIGPIPE, SIG_IGN);
 }
 
-/// What posix_spawn is told; destroyed on every way out.
+/// The attributes and actions of posix_spawn; destroyed on every way out.
 struct SpawnPlan {
   SpawnPlan() {
     posix_spawn_file_actions_init(&actions);
@@ -68,8 +68,8 @@ int spawn_shell(const std::string& command, int standard_input, pid_t& child) {
   posix_spawnattr_setflags(&plan.attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   std::string shell = "sh";
   std::string option = "-c";
-  std::string words = command;
-  const std::array<char*, 4> arguments{shell.data(), option.data(), words.data(), nullptr};
+  std::string script = command;
+  const std::array<char*, 4> arguments{shell.data(), option.data(), script.data(), nullptr};
   return ::posix_spawn(&child, "/bin/sh", &plan.actions, &plan.attributes, arguments.data(), environ);
 }
 
@@ -206,7 +206,7 @@ void Sink::wait_until_writable() const {
     }
     pollfd waiting{.fd = file_, .events = POLLOUT, .revents = 0};
     const int ready = ::poll(&waiting, 1, static_cast<int>(std::min(left, 60'000.0)) + 1);
-    if (ready > 0) return;  // writable, or broken as the write will tell
+    if (ready > 0) return;  // writable, or broken, which the write finds
   }
 }
 

@@ -30,7 +30,7 @@ class Sink {
   Sink& operator=(Sink&&) = delete;
   Sink(const Sink&) = delete;
   Sink& operator=(const Sink&) = delete;
-  /// Without finish(): removes an unfinished file, ends the command.
+  /// Removes an unfinished file and ends the command where finish() was not called.
   ~Sink();
 
   void write(std::span<const std::byte> bytes);

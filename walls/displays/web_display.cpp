@@ -49,7 +49,7 @@ void check_web_display(const Wall& /*wall*/, const DisplayOptions& options) {
 }  // namespace
 
 WebHub::WebHub(const Wall& wall)
-    : wall_(wall), assembled_(wall_picture(wall, kLargestPicture)), pictures_(1 + wall.screens.size()) {
+    : wall_(wall), assembled_(wall_picture(wall, kMaxPictureSide)), pictures_(1 + wall.screens.size()) {
   auto nothing = std::make_shared<Frame>();
   nothing->screens.resize(wall.screens.size());
   newest_ = std::move(nothing);

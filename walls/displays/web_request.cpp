@@ -184,7 +184,7 @@ std::string_view cookie_in(std::string_view header, std::string_view name) {
 }
 
 std::optional<OrbitInput> parse_motion(std::string_view body) {
-  constexpr double kLargest = 100.0;
+  constexpr double kMaxMotion = 100.0;
   const auto document = Json::try_parse(body);
   if (!document || !document->is_object()) return std::nullopt;
   OrbitInput motion;
@@ -195,7 +195,7 @@ std::optional<OrbitInput> parse_motion(std::string_view body) {
     motion.dolly = dolly->get<double>();
   }
   for (const double value : {motion.turn_right, motion.turn_up, motion.pan_right, motion.pan_up, motion.dolly}) {
-    if (!(std::abs(value) <= kLargest)) return std::nullopt;
+    if (!(std::abs(value) <= kMaxMotion)) return std::nullopt;
   }
   return motion;
 }

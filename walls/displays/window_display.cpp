@@ -18,18 +18,18 @@ namespace hpr {
 namespace {
 
 /// Larger desktops are rare; windows are placed on it, not scaled.
-constexpr int kLargestDesktop = 1 << 16;
+constexpr int kMaxDesktopSide = 1 << 16;
 
 Rect at(int x, int y, Size size) {
   return {x, y, x + size.width, y + size.height};
 }
 
-/// As large as its screens where the wall file gives no size.
+/// The rectangle of a window on its desktop: as large as its screens where the wall file gives no size.
 Rect around(const std::vector<Pane>& panes) {
   Rect rect;
   for (const Pane& pane : panes) {
-    rect.x1 = std::max(rect.x1, pane.place.x1);
-    rect.y1 = std::max(rect.y1, pane.place.y1);
+    rect.x1 = std::max(rect.x1, pane.rect.x1);
+    rect.y1 = std::max(rect.y1, pane.rect.y1);
   }
   return rect;
 }
@@ -71,8 +71,9 @@ class WindowDisplay final : public Display {
       for (std::size_t pane = 0; pane < panes.size(); ++pane) {
         const auto found = std::ranges::find(frame.screens, panes[pane].screen, &ScreenPicture::screen);
         if (found == frame.screens.end()) continue;
-        const ScanOut& scan_out = scan_outs_.try_emplace(found->screen, wall_, found->screen).first->second;
-        pictures.push_back({window, pane, scan_out.apply(found->image)});
+        const PanelTransform& panel_transform =
+            panel_transforms_.try_emplace(found->screen, wall_, found->screen).first->second;
+        pictures.push_back({window, pane, panel_transform.apply(found->image)});
       }
     }
     windows_.present(std::move(pictures));
@@ -82,7 +83,7 @@ class WindowDisplay final : public Display {
 
  private:
   const Wall& wall_;
-  std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
+  std::map<std::size_t, PanelTransform> panel_transforms_;  ///< by screen
   std::vector<WindowPlan> plans_;
   WindowThread windows_;
 };
@@ -103,7 +104,7 @@ void check_window_display(const Wall& wall, const DisplayOptions& /*options*/) {
 }  // namespace
 
 std::vector<WindowPlan> plan_windows(const Wall& wall, const std::vector<std::size_t>& screens) {
-  const WallPicture picture = wall_picture(wall, kLargestDesktop);
+  const WallPicture picture = wall_picture(wall, kMaxDesktopSide);
   const double wall_height = std::max(wall_extent(wall).height, 1e-9);
   std::vector<WindowPlan> plans;
   for (const std::size_t index : screens) {
@@ -112,11 +113,11 @@ std::vector<WindowPlan> plan_windows(const Wall& wall, const std::vector<std::si
               screen_height(screen) / screen.pixels.height / wall_height};
     const auto window = std::ranges::find(wall.windows, screen.window, &WallWindow::id);
     if (screen.window.empty() || window == wall.windows.end()) {
-      const Rect place = picture.screens[index];
-      pane.place = at(0, 0, panel_pixels(screen));
+      const Rect on_wall = picture.screens[index];
+      pane.rect = at(0, 0, panel_pixels(screen));
       plans.push_back({.title = screen.id,
                        .window = {},
-                       .rect = at(place.x0, place.y0, panel_pixels(screen)),
+                       .rect = at(on_wall.x0, on_wall.y0, panel_pixels(screen)),
                        .decorated = true,
                        .monitor = {},
                        .display = {},
@@ -143,16 +144,16 @@ std::vector<WindowPlan> plan_windows(const Wall& wall, const std::vector<std::si
   return plans;
 }
 
-std::optional<std::size_t> pane_at(const WindowPlan& plan, const glm::dvec2& place) {
+std::optional<std::size_t> pane_at(const WindowPlan& plan, const glm::dvec2& position) {
   for (std::size_t i = 0; i < plan.panes.size(); ++i) {
-    const Rect& pane = plan.panes[i].place;
-    if (place.x >= pane.x0 && place.x < pane.x1 && place.y >= pane.y0 && place.y < pane.y1) return i;
+    const Rect& pane = plan.panes[i].rect;
+    if (position.x >= pane.x0 && position.x < pane.x1 && position.y >= pane.y0 && position.y < pane.y1) return i;
   }
   return std::nullopt;
 }
 
-glm::dvec2 upright(const Pane& pane, const glm::dvec2& way) {
-  glm::dvec2 turned = way;
+glm::dvec2 upright(const Pane& pane, const glm::dvec2& motion) {
+  glm::dvec2 turned = motion;
   if (pane.mirror == Mirror::Horizontal) turned.x = -turned.x;
   if (pane.mirror == Mirror::Vertical) turned.y = -turned.y;
   // A clockwise quarter turn takes what goes right in the picture down on the pane.

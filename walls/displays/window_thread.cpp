@@ -127,18 +127,17 @@ void PaneWindow::make_textures() {
   gl_.GenTextures(static_cast<GLsizei>(textures_.size()), textures_.data());
   gl_.GenFramebuffers(1, &framebuffer_);
   for (std::size_t i = 0; i < textures_.size(); ++i) {
-    const Rect& place = plan_.panes[i].place;
-    if (place.width() > largest || place.height() > largest) {
+    const Rect& rect = plan_.panes[i].rect;
+    if (rect.width() > largest || rect.height() > largest) {
       throw Error(
           ExitCode::NoDevice,
           fmt::format("the window '{}' shows a screen of {} x {} pixels, OpenGL's pictures have at most {} a side",
-                      plan_.title, place.width(), place.height(), largest),
+                      plan_.title, rect.width(), rect.height(), largest),
           "show less of it with --scale");
     }
     gl_.BindTexture(GL_TEXTURE_2D, textures_[i]);
-    const std::vector<Rgba8> black(place.area(), {0, 0, 0, 255});
-    gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, place.width(), place.height(), 0, GL_RGBA, GL_UNSIGNED_BYTE,
-                   black.data());
+    const std::vector<Rgba8> black(rect.area(), {0, 0, 0, 255});
+    gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, rect.width(), rect.height(), 0, GL_RGBA, GL_UNSIGNED_BYTE, black.data());
   }
   if (gl_.GetError() != GL_NO_ERROR) {
     throw Error(ExitCode::NoDevice, fmt::format("the window '{}' has no memory for its pictures", plan_.title),
@@ -147,7 +146,7 @@ void PaneWindow::make_textures() {
 }
 
 void PaneWindow::upload(std::size_t pane, const Image<Rgba8>& image) {
-  HPR_CHECK(image.width() == plan_.panes[pane].place.width() && image.height() == plan_.panes[pane].place.height());
+  HPR_CHECK(image.width() == plan_.panes[pane].rect.width() && image.height() == plan_.panes[pane].rect.height());
   glfwMakeContextCurrent(handle());
   gl_.BindTexture(GL_TEXTURE_2D, textures_[pane]);
   gl_.TexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, image.width(), image.height(), GL_RGBA, GL_UNSIGNED_BYTE,
@@ -168,11 +167,11 @@ void PaneWindow::draw() {
   gl_.Clear(GL_COLOR_BUFFER_BIT);
   gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
   for (std::size_t i = 0; i < textures_.size(); ++i) {
-    const Rect& place = plan_.panes[i].place;
+    const Rect& rect = plan_.panes[i].rect;
     gl_.FramebufferTexture2D(GL_READ_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, textures_[i], 0);
     // The texture's first row is the picture's upper one; GL's windows count from below.
-    gl_.BlitFramebuffer(0, 0, place.width(), place.height(), edge(place.x0, across), height - edge(place.y0, down),
-                        edge(place.x1, across), height - edge(place.y1, down), GL_COLOR_BUFFER_BIT,
+    gl_.BlitFramebuffer(0, 0, rect.width(), rect.height(), edge(rect.x0, across), height - edge(rect.y0, down),
+                        edge(rect.x1, across), height - edge(rect.y1, down), GL_COLOR_BUFFER_BIT,
                         across == 1.0 && down == 1.0 ? GL_NEAREST : GL_LINEAR);
   }
   gl_.Finish();
@@ -255,7 +254,7 @@ class WindowThread::State::Mouse {
  private:
   static Mouse& of(GLFWwindow* window) { return *static_cast<Mouse*>(glfwGetWindowUserPointer(window)); }
 
-  /// Of what the wall file calls the window's pixels, which the user may have resized.
+  /// The scale of what the wall file calls the window's pixels, which the user may have resized.
   [[nodiscard]] glm::dvec2 scale() const {
     int width = 0;
     int height = 0;
@@ -360,18 +359,18 @@ void WindowThread::State::serve(const std::stop_token& stop) {
   show(windows, {});
   set(&State::open);
 
-  constexpr double kLongestSleep_s = 0.1;  // the stop token wakes nobody
+  constexpr double kMaxSleep_s = 0.1;  // the stop token wakes nobody
   while (!stop.stop_requested()) {
-    glfwWaitEventsTimeout(kLongestSleep_s);
-    std::vector<PanePicture> taken;
+    glfwWaitEventsTimeout(kMaxSleep_s);
+    std::vector<PanePicture> arrived;
     bool draw = false;
     {
       const std::lock_guard lock(mutex);
       draw = std::exchange(redraw, false) || !presented;
-      taken = std::exchange(pictures, {});
+      arrived = std::exchange(pictures, {});
     }
     if (!draw) continue;
-    show(windows, taken);
+    show(windows, arrived);
     {
       const std::lock_guard lock(mutex);
       presented = pictures.empty();

@@ -104,11 +104,11 @@ Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<c
   for (const bool right_eye : {true, false}) {
     for (std::size_t i = 0; i < screens.size(); ++i) {
       if ((wall.screens[i].eye == Eye::Right) != right_eye) continue;
-      const Rect place = picture.screens[i];
-      const Size size{place.width(), place.height()};
+      const Rect rect = picture.screens[i];
+      const Size size{rect.width(), rect.height()};
       const bool there = screens[i] != nullptr && screens[i]->size().area() > 0;
       const Image<Rgba8> shown = there ? resample(*screens[i], size) : Image<Rgba8>(size, {0, 0, 0, 255});
-      paste(shown, place.x0, place.y0, result);
+      paste(shown, rect.x0, rect.y0, result);
     }
   }
   return result;
@@ -142,7 +142,7 @@ MonitorLayout monitor_layout(const Wall& wall, const WallMonitor& monitor) {
                                 static_cast<double>(monitor.pixels.height) / picture.size.height);
   const double left = 0.5 * (monitor.pixels.width - scale * picture.size.width);
   const double top = 0.5 * (monitor.pixels.height - scale * picture.size.height);
-  const auto place = [&](const Rect& rect) {
+  const auto scaled = [&](const Rect& rect) {
     const auto edge = [](double at, int most) { return std::clamp(static_cast<int>(std::lround(at)), 0, most); };
     Rect result;
     result.x0 = edge(left + scale * rect.x0, monitor.pixels.width - 1);
@@ -151,21 +151,21 @@ MonitorLayout monitor_layout(const Wall& wall, const WallMonitor& monitor) {
     result.y1 = std::max(result.y0 + 1, edge(top + scale * rect.y1, monitor.pixels.height));
     return result;
   };
-  layout.surface = place({0, 0, picture.size.width, picture.size.height});
-  std::ranges::transform(picture.screens, std::back_inserter(layout.places), place);
+  layout.surface = scaled({0, 0, picture.size.width, picture.size.height});
+  std::ranges::transform(picture.screens, std::back_inserter(layout.rects), scaled);
   return layout;
 }
 
 Image<Rgba8> draw_monitor(const Wall& wall, const WallMonitor& monitor, const MonitorLayout& layout,
                           std::span<const Image<Rgba8>> pictures) {
-  HPR_CHECK(pictures.size() == layout.places.size());
+  HPR_CHECK(pictures.size() == layout.rects.size());
   Image<Rgba8> result(monitor.pixels, {0, 0, 0, 255});
   const Rect& surface = layout.surface;
   paste(Image<Rgba8>({surface.width(), surface.height()}, wall.gap_color), surface.x0, surface.y0, result);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const Rect& place = layout.places[i];
+    const Rect& rect = layout.rects[i];
     if (pictures[i].size().area() == 0) continue;
-    paste(resample(pictures[i], {place.width(), place.height()}), place.x0, place.y0, result);
+    paste(resample(pictures[i], {rect.width(), rect.height()}), rect.x0, rect.y0, result);
   }
   return result;
 }

@@ -15,7 +15,7 @@ namespace hpr {
 /// leaves its place black. Of two screens for different eyes in one place the left eye's is seen.
 [[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
                                      std::span<const Image<Rgba8>> screens);
-/// The same; a null picture leaves its place black.
+/// The assembled wall of pictures that need not be there: a null one leaves its place black.
 [[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
                                      std::span<const Image<Rgba8>* const> screens);
 
@@ -29,7 +29,7 @@ namespace hpr {
 struct MonitorLayout {
   Rect surface;                      ///< all of it, gaps included
   std::vector<std::size_t> screens;  ///< indices into Wall::screens; of two for different eyes in one place, the left
-  std::vector<Rect> places;          ///< one each, none empty
+  std::vector<Rect> rects;           ///< one each, none empty
 };
 
 [[nodiscard]] MonitorLayout monitor_layout(const Wall& wall, const WallMonitor& monitor);

@@ -21,7 +21,7 @@ using Fades = std::array<double, 4>;
 
 /// More than measuring noise: screens that only touch do not overlap.
 bool overlaps(const PlanarBox& box, const WallScreen& screen) {
-  return shared_metres(box, screen) > 1e-6 * (screen_width(screen) + screen_height(screen));
+  return overlap_meters(box, screen) > 1e-6 * (screen_width(screen) + screen_height(screen));
 }
 
 /// Widens `fades` to how far `other` reaches over each side of `screen`.
@@ -51,7 +51,7 @@ Fades fades_of(const Wall& wall, const WallScreen& screen) {
   return fades;
 }
 
-/// From 0 at the edge to 1 at `width` from it.
+/// A ramp that rises from 0 at the edge to 1 at `width` from it.
 double rise(double distance, double width, double gamma) {
   if (width <= 0.0) return 1.0;
   const double t = std::clamp(distance / width, 0.0, 1.0);
@@ -77,29 +77,29 @@ std::uint8_t& value_of(Rgba8& color, int channel) {
   return channel == 0 ? color.r : channel == 1 ? color.g : color.b;
 }
 
-/// The same place of a picture that is a part of a larger one.
-SourcePlace moved(const SourcePlace& place, int x, int y) {
-  return {place.x + (static_cast<std::uint32_t>(x) << 16U), place.y + (static_cast<std::uint32_t>(y) << 16U)};
+/// A position in a picture as one of the larger picture of which it is a part, at (x, y).
+SourcePosition moved(const SourcePosition& source, int x, int y) {
+  return {source.x + (static_cast<std::uint32_t>(x) << 16U), source.y + (static_cast<std::uint32_t>(y) << 16U)};
 }
 
-/// The same places of a picture that stands as a part in a larger one.
-void put(const Image<SourcePlace>& part, const Rect& place, Image<SourcePlace>& whole) {
+/// Writes the positions of a part into those of the whole picture, at `rect`.
+void put(const Image<SourcePosition>& part, const Rect& rect, Image<SourcePosition>& whole) {
   for (int y = 0; y < part.height(); ++y) {
-    std::ranges::transform(part.row(y), whole.row(place.y0 + y).begin() + place.x0, [&](const SourcePlace& source) {
-      return source == kNoSource ? kNoSource : moved(source, place.x0, place.y0);
+    std::ranges::transform(part.row(y), whole.row(rect.y0 + y).begin() + rect.x0, [&](const SourcePosition& source) {
+      return source == kNoSource ? kNoSource : moved(source, rect.x0, rect.y0);
     });
   }
 }
 
 /// Per pixel of a part of the screen what it shows of that part, through a mesh or its own.
-Image<SourcePlace> sources_in(const ScreenWarp& warp, const Rect& place) {
-  const Size size{place.width(), place.height()};
+Image<SourcePosition> sources_in(const ScreenWarp& warp, const Rect& rect) {
+  const Size size{rect.width(), rect.height()};
   if (warp.grid) return mesh_sources(*warp.grid, size);
-  Image<SourcePlace> sources(size, kNoSource);
+  Image<SourcePosition> sources(size, kNoSource);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const bool lit = warp.points->at((x + 0.5) / size.width, (y + 0.5) / size.height).has_value();
-      if (lit) sources.at(x, y) = source_place(x + 0.5, y + 0.5, size);
+      if (lit) sources.at(x, y) = source_position(x + 0.5, y + 0.5, size);
     }
   }
   return sources;
@@ -108,8 +108,8 @@ Image<SourcePlace> sources_in(const ScreenWarp& warp, const Rect& place) {
 /// `map`, which holds for each of a screen's pictures, on the pixels of the screen.
 Image<Rgb> on_screen(const Image<Rgb>& map, const Wall& wall, std::size_t screen) {
   Image<Rgb> result(wall.screens[screen].pixels);
-  for (const Rect& place : eye_places(wall, screen)) {
-    paste(enlarge(map, {place.width(), place.height()}, 1), place.x0, place.y0, result);
+  for (const Rect& rect : eye_rects(wall, screen)) {
+    paste(enlarge(map, {rect.width(), rect.height()}, 1), rect.x0, rect.y0, result);
   }
   return result;
 }
@@ -142,7 +142,7 @@ void BlendWeights::add(const Wall& wall, const WallScreen& screen, const PlanarB
     area.fade_low[here] = fades[2 * axis + (with ? 0 : 1)];
     area.fade_high[here] = fades[2 * axis + (with ? 1 : 0)];
   }
-  trivial_ = trivial_ && std::ranges::max(fades) <= 0.0;
+  is_identity_ = is_identity_ && std::ranges::max(fades) <= 0.0;
   areas_.push_back(area);
 }
 
@@ -157,7 +157,7 @@ double BlendWeights::ramp(const Area& area, double u, double v) {
 }
 
 double BlendWeights::at(double x, double y) const {
-  if (trivial_) return 1.0;
+  if (is_identity_) return 1.0;
   const double u = x / pixels_.width * width_;
   const double v = (1.0 - y / pixels_.height) * height_;
   const double own = ramp(areas_.front(), u, v);
@@ -178,7 +178,7 @@ double panel_level(const PanelColor& color, int channel, double light, double we
   return corrected(color, channel, static_cast<double>(encode_srgb(static_cast<float>(shown))));
 }
 
-Image<Rgba8> mirrored(const Image<Rgba8>& image, Mirror mirror) {
+Image<Rgba8> flip(const Image<Rgba8>& image, Mirror mirror) {
   Image<Rgba8> result = image;
   for (int y = 0; y < image.height(); ++y) {
     if (mirror == Mirror::Vertical) std::ranges::copy(image.row(image.height() - 1 - y), result.row(y).begin());
@@ -187,11 +187,11 @@ Image<Rgba8> mirrored(const Image<Rgba8>& image, Mirror mirror) {
   return result;
 }
 
-ScanOut::ScanOut(const Wall& wall, std::size_t screen)
+PanelTransform::PanelTransform(const Wall& wall, std::size_t screen)
     : color_(wall.screens.at(screen).color),
       rotate_(wall.screens[screen].rotate),
       mirror_(wall.screens[screen].mirror),
-      parts_(eye_places(wall, screen)) {
+      parts_(eye_rects(wall, screen)) {
   read_blend(wall, screen);
   read_warp(wall, screen);
   shades_ =
@@ -202,19 +202,19 @@ ScanOut::ScanOut(const Wall& wall, std::size_t screen)
   }
 }
 
-void ScanOut::read_blend(const Wall& wall, std::size_t screen) {
+void PanelTransform::read_blend(const Wall& wall, std::size_t screen) {
   const ScreenWarp& warp = wall.screens[screen].warp;
   if (warp.light) weights_ = on_screen(*warp.light, wall, screen);
   const BlendWeights edges(wall, screen);
-  if (edges.trivial()) return;
+  if (edges.is_identity()) return;
   if (!warp.light) weights_ = Image<Rgb>(wall.screens[screen].pixels, {1.0F, 1.0F, 1.0F});
-  for (const Rect& place : eye_places(wall, screen)) {
+  for (const Rect& rect : eye_rects(wall, screen)) {
     // Each of two pictures fills the panel once it is shown.
-    const double wider = static_cast<double>(weights_.width()) / place.width();
-    const double higher = static_cast<double>(weights_.height()) / place.height();
-    for (int y = place.y0; y < place.y1; ++y) {
-      for (int x = place.x0; x < place.x1; ++x) {
-        const auto weight = static_cast<float>(edges.at((x - place.x0 + 0.5) * wider, (y - place.y0 + 0.5) * higher));
+    const double wider = static_cast<double>(weights_.width()) / rect.width();
+    const double higher = static_cast<double>(weights_.height()) / rect.height();
+    for (int y = rect.y0; y < rect.y1; ++y) {
+      for (int x = rect.x0; x < rect.x1; ++x) {
+        const auto weight = static_cast<float>(edges.at((x - rect.x0 + 0.5) * wider, (y - rect.y0 + 0.5) * higher));
         Rgb& pixel = weights_.at(x, y);
         pixel = {pixel.r * weight, pixel.g * weight, pixel.b * weight};
       }
@@ -222,40 +222,40 @@ void ScanOut::read_blend(const Wall& wall, std::size_t screen) {
   }
 }
 
-void ScanOut::read_warp(const Wall& wall, std::size_t screen) {
+void PanelTransform::read_warp(const Wall& wall, std::size_t screen) {
   const ScreenWarp& warp = wall.screens[screen].warp;
   const Size size = wall.screens[screen].pixels;
   if (warp.floor) floors_ = on_screen(*warp.floor, wall, screen);
   if (!warp.grid && !warp.points) return;
-  Image<SourcePlace> sources(size);
-  for (const Rect& place : eye_places(wall, screen)) put(sources_in(warp, place), place, sources);
+  Image<SourcePosition> sources(size);
+  for (const Rect& rect : eye_rects(wall, screen)) put(sources_in(warp, rect), rect, sources);
   if (std::ranges::find(sources.pixels(), kNoSource) != sources.pixels().end()) {
     dark_ = Image<std::uint8_t>(size);
     std::ranges::transform(sources.pixels(), dark_.pixels().begin(),
-                           [](const SourcePlace& place) { return static_cast<std::uint8_t>(place == kNoSource); });
+                           [](const SourcePosition& source) { return static_cast<std::uint8_t>(source == kNoSource); });
   }
   if (warp.grid) sources_ = std::move(sources);
 }
 
-Image<Rgba8> ScanOut::apply(const Image<Rgba8>& picture) const {
+Image<Rgba8> PanelTransform::apply(const Image<Rgba8>& picture) const {
   Image<Rgba8> sent = sources_.size().area() > 0 ? warped(picture, sources_, 1) : picture;
   for (int channel = 0; shades_ && channel < 3; ++channel) shade(sent, channel);
   if (parts_.size() < 2) return mounted(std::move(sent));
   // Each eye's picture is turned in its place: left stays left.
   Image<Rgba8> joined = sent;
-  for (const Rect& place : parts_) {
-    paste(mounted(cut(sent, place)), place.x0, place.y0, joined);
+  for (const Rect& rect : parts_) {
+    paste(mounted(cut(sent, rect)), rect.x0, rect.y0, joined);
   }
   return joined;
 }
 
-Image<Rgba8> ScanOut::mounted(Image<Rgba8> picture) const {
+Image<Rgba8> PanelTransform::mounted(Image<Rgba8> picture) const {
   if (rotate_ != 0) picture = turn_clockwise(picture, rotate_);
-  if (mirror_ != Mirror::None) picture = mirrored(picture, mirror_);
+  if (mirror_ != Mirror::None) picture = flip(picture, mirror_);
   return picture;
 }
 
-void ScanOut::shade(Image<Rgba8>& picture, int channel) const {
+void PanelTransform::shade(Image<Rgba8>& picture, int channel) const {
   const LevelTable& to_level = to_level_[static_cast<std::size_t>(channel)];
   const auto level = [&](std::uint8_t value, float weight, float floor) {
     return to_level(static_cast<float>(shown_light(color_, channel, static_cast<double>(srgb_to_linear(value)),

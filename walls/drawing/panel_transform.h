@@ -13,7 +13,7 @@
 
 namespace hpr {
 
-/// The share of a wall's light each of some overlapping screens gives.
+/// The fraction of a wall's light that each of some overlapping screens gives.
 ///
 /// A screen's ramp rises from 0 at a faded edge to 1 within the blend's width: with the power p of blend.gamma it is
 /// (2t)^p / 2 up to the middle of the width and 1 - (2 - 2t)^p / 2 beyond it, so that two ramps across one overlap sum
@@ -22,11 +22,12 @@ namespace hpr {
 /// other keeps its ramp.
 class BlendWeights {
  public:
-  /// Of screen `screen` among those of its plane and eye that fade their edges. `wall` must outlive this.
+  /// Makes the weights of screen `screen` among those of its plane and eye that fade their edges. `wall` must outlive
+  /// this.
   BlendWeights(const Wall& wall, std::size_t screen);
 
-  /// All weights are 1.
-  [[nodiscard]] bool trivial() const { return trivial_; }
+  /// Whether all weights are 1.
+  [[nodiscard]] bool is_identity() const { return is_identity_; }
   /// At (x, y) of the screen, in pixels of its upright picture from the upper left corner; in [0, 1], of linear light.
   [[nodiscard]] double at(double x, double y) const;
 
@@ -48,19 +49,19 @@ class BlendWeights {
   double height_ = 0.0;
   Size pixels_;
   std::vector<Area> areas_;  ///< the first is the screen itself
-  bool trivial_ = true;
+  bool is_identity_ = true;
 };
 
 /// What a screen's panel is sent: the upright picture through the screen's warp mesh, with faded edges and the panel's
-/// colours, turned clockwise and then mirrored as the panel is mounted. The same for every frame, so made once per
-/// screen.
-class ScanOut {
+/// colours, turned clockwise and then mirrored as the panel is mounted. It does not change from frame to frame, so it
+/// is made once per screen.
+class PanelTransform {
  public:
   /// `wall` must outlive this.
-  ScanOut(const Wall& wall, std::size_t screen);
+  PanelTransform(const Wall& wall, std::size_t screen);
 
-  /// The panel is sent the picture as it is.
-  [[nodiscard]] bool trivial() const {
+  /// Whether the panel is sent the picture as it is.
+  [[nodiscard]] bool is_identity() const {
     return !shades_ && sources_.size().area() == 0 && rotate_ == 0 && mirror_ == Mirror::None;
   }
 
@@ -74,10 +75,10 @@ class ScanOut {
   void read_warp(const Wall& wall, std::size_t screen);
   void shade(Image<Rgba8>& picture, int channel) const;
 
-  Image<SourcePlace> sources_;  ///< empty: each pixel shows its own place
-  Image<Rgb> weights_;          ///< of linear light; empty: all 1
-  Image<Rgb> floors_;           ///< linear light shown at least; empty: all 0
-  Image<std::uint8_t> dark_;    ///< 1 where no light falls; empty: nowhere
+  Image<SourcePosition> sources_;  ///< empty: each pixel shows its own place
+  Image<Rgb> weights_;             ///< of linear light; empty: all 1
+  Image<Rgb> floors_;              ///< linear light shown at least; empty: all 0
+  Image<std::uint8_t> dark_;       ///< 1 where no light falls; empty: nowhere
   PanelColor color_;
   int rotate_ = 0;
   Mirror mirror_ = Mirror::None;
@@ -87,7 +88,7 @@ class ScanOut {
 };
 
 /// `image` as in a mirror: left and right swap for Horizontal, top and bottom for Vertical.
-[[nodiscard]] Image<Rgba8> mirrored(const Image<Rgba8>& image, Mirror mirror);
+[[nodiscard]] Image<Rgba8> flip(const Image<Rgba8>& image, Mirror mirror);
 
 /// The sRGB level in [0, 1] a panel is sent for `light` in linear [0, 1], faded by `weight`, on top of a `floor` that
 /// only this place has; `channel` 0 to 2.

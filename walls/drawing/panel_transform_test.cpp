@@ -32,10 +32,10 @@ Wall parsed(const std::string& text) {
 }
 
 /// Screens of 1 m x 1 m and 100 x 100 pixels at these places of their lower left corners.
-Wall overlapped(const std::vector<glm::dvec2>& places, const std::string& blend) {
+Wall overlapped(const std::vector<glm::dvec2>& rects, const std::string& blend) {
   std::string text = "hpr_wall = 1\n[[surfaces]]\nscreens = [\n";
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto [x, y] = std::pair(places[i].x, places[i].y);
+  for (std::size_t i = 0; i < rects.size(); ++i) {
+    const auto [x, y] = std::pair(rects[i].x, rects[i].y);
     text += fmt::format(
         "{{ id = \"s{}\", pixels = [100, 100], edge_blend_m = {}, corners_m = {{ ll = [{}, {}, 0.0], lr = [{}, {}, "
         "0.0], ul = [{}, {}, 0.0] }} }},\n",
@@ -53,28 +53,28 @@ double weight_at(const Wall& wall, std::size_t screen, double u, double v) {
   return BlendWeights(wall, screen).at(x, y);
 }
 
-TEST(ScanOut, TurnsFirstAndThenMirrors) {
+TEST(PanelTransform, TurnsFirstAndThenMirrors) {
   Wall wall = load_wall("1x1@3x2");
   const Image<Rgba8> image = marked({3, 2});
-  EXPECT_TRUE(ScanOut(wall, 0).trivial());
-  EXPECT_EQ(ScanOut(wall, 0).apply(image), image);
+  EXPECT_TRUE(PanelTransform(wall, 0).is_identity());
+  EXPECT_EQ(PanelTransform(wall, 0).apply(image), image);
   wall.screens[0].mirror = Mirror::Horizontal;
-  EXPECT_FALSE(ScanOut(wall, 0).trivial());
-  EXPECT_EQ(ScanOut(wall, 0).apply(image).at(2, 0), image.at(0, 0));
-  EXPECT_EQ(ScanOut(wall, 0).apply(image).at(2, 1), image.at(0, 1));
+  EXPECT_FALSE(PanelTransform(wall, 0).is_identity());
+  EXPECT_EQ(PanelTransform(wall, 0).apply(image).at(2, 0), image.at(0, 0));
+  EXPECT_EQ(PanelTransform(wall, 0).apply(image).at(2, 1), image.at(0, 1));
   wall.screens[0].mirror = Mirror::Vertical;
-  EXPECT_EQ(ScanOut(wall, 0).apply(image).at(0, 1), image.at(0, 0));
-  EXPECT_EQ(ScanOut(wall, 0).apply(image).at(2, 1), image.at(2, 0));
+  EXPECT_EQ(PanelTransform(wall, 0).apply(image).at(0, 1), image.at(0, 0));
+  EXPECT_EQ(PanelTransform(wall, 0).apply(image).at(2, 1), image.at(2, 0));
   wall.screens[0].rotate = 90;
   wall.screens[0].mirror = Mirror::Horizontal;
-  const Image<Rgba8> panel = ScanOut(wall, 0).apply(image);
+  const Image<Rgba8> panel = PanelTransform(wall, 0).apply(image);
   EXPECT_EQ(panel.size(), (Size{2, 3}));
   EXPECT_EQ(panel.size(), panel_pixels(wall.screens[0]));
   EXPECT_EQ(panel.at(0, 0), image.at(0, 0));  // turned it stands at (1, 0)
   EXPECT_EQ(panel.at(0, 2), image.at(2, 0));
 }
 
-TEST(ScanOut, ColoursFollowTheFormulaPerChannel) {
+TEST(PanelTransform, ColoursFollowTheFormulaPerChannel) {
   PanelColor color;
   EXPECT_NEAR(panel_level(color, 0, 0.2, 1.0), encode_srgb(0.2F), 1e-6);
   color.gain = {0.5, 1.0, 2.0};
@@ -89,7 +89,7 @@ TEST(ScanOut, ColoursFollowTheFormulaPerChannel) {
   EXPECT_NEAR(panel_level(color, 2, 0.1, 1.0), std::pow(encode_srgb(0.2F), 2.0), 1e-6);
 }
 
-TEST(ScanOut, PanelsAreSentWhatTheFormulaSays) {
+TEST(PanelTransform, PanelsAreSentWhatTheFormulaSays) {
   Wall wall = load_wall("1x1@256x1");
   PanelColor& color = wall.screens.front().color;
   color.gain = {0.5, 1.0, 1.7};
@@ -100,7 +100,7 @@ TEST(ScanOut, PanelsAreSentWhatTheFormulaSays) {
     const auto level = static_cast<std::uint8_t>(x);
     ramp.at(x, 0) = {level, level, level, 255};
   }
-  const Image<Rgba8> sent = ScanOut(wall, 0).apply(ramp);
+  const Image<Rgba8> sent = PanelTransform(wall, 0).apply(ramp);
   for (int x = 0; x < 256; ++x) {
     const auto light = static_cast<double>(srgb_to_linear(static_cast<std::uint8_t>(x)));
     const auto wanted = [&](int channel) { return std::lround(255.0 * panel_level(color, channel, light, 1.0)); };
@@ -110,15 +110,15 @@ TEST(ScanOut, PanelsAreSentWhatTheFormulaSays) {
   }
 }
 
-TEST(ScanOut, APanelWithPlainColoursIsSentTheSameBits) {
+TEST(PanelTransform, APanelWithPlainColoursIsSentTheSameBits) {
   const Wall wall = parsed(
       "hpr_wall = 1\n[[surfaces]]\n[surfaces.grid]\ncolumns = 1\nrows = 1\ntile_pixels = [256, 2]\ntile_size_m = "
       "[2.56, 0.02]\ncolour = { gamma = 1.0, gain = [1, 1, 1], black = 0 }\n");
-  EXPECT_TRUE(ScanOut(wall, 0).trivial());
+  EXPECT_TRUE(PanelTransform(wall, 0).is_identity());
   const Image<Rgba8> image = marked({256, 2});
   Wall shaded = wall;
   shaded.screens[0].color.gain.b = 0.5;  // forces every channel through the tables
-  const Image<Rgba8> panel = ScanOut(shaded, 0).apply(image);
+  const Image<Rgba8> panel = PanelTransform(shaded, 0).apply(image);
   for (int x = 0; x < 256; ++x) EXPECT_EQ(panel.at(x, 0).r, image.at(x, 0).r);
 }
 
@@ -166,14 +166,14 @@ TEST(EdgeBlend, FadesOverTheOverlapAndNowhereElse) {
               1e-12);
   // Alone it keeps its ramp, towards whatever lies beside the wall.
   EXPECT_NEAR(weight_at(overlapped({{0.0, 0.0}}, "0.2"), 0, 0.05, 0.5), 0.25, 1e-12);
-  EXPECT_TRUE(BlendWeights(overlapped({{0.0, 0.0}}, "\"auto\""), 0).trivial());
+  EXPECT_TRUE(BlendWeights(overlapped({{0.0, 0.0}}, "\"auto\""), 0).is_identity());
 }
 
 TEST(EdgeBlend, ThePicturesOfTwoProjectorsAddUpToTheFlatPicture) {
   const Wall wall = overlapped({{0.0, 0.0}, {0.8, 0.0}}, "{ auto = true, gamma = 1.8 }");
   const Image<Rgba8> gray({100, 100}, {180, 180, 180, 255});
-  const Image<Rgba8> left = ScanOut(wall, 0).apply(gray);
-  const Image<Rgba8> right = ScanOut(wall, 1).apply(gray);
+  const Image<Rgba8> left = PanelTransform(wall, 0).apply(gray);
+  const Image<Rgba8> right = PanelTransform(wall, 1).apply(gray);
   const double light = srgb_to_linear(180);
   for (int x = 80; x < 100; ++x) {
     const double sum = srgb_to_linear(left.at(x, 50).r) + srgb_to_linear(right.at(x - 80, 50).r);
@@ -196,23 +196,23 @@ TEST(EdgeBlend, ATurnedNeighbourFadesAtItsOwnEdges) {
 }
 
 /// A panel that splits what it is sent shows each eye's half in full: nothing of one eye may reach the other's.
-TEST(ScanOut, TwoEyesPicturesAreMountedEachInItsPlace) {
-  const auto wall_of = [](const std::string& mode, const std::string& look) {
+TEST(PanelTransform, TwoEyesPicturesAreMountedEachInItsPlace) {
+  const auto wall_of = [](const std::string& mode, const std::string& mounting) {
     return parsed("hpr_wall = 1\nstereo = { mode = \"" + mode +
                   "\" }\nviewers = [{ ipd_m = 0.06 }]\n[[surfaces]]\nscreens = [{ id = \"s\", pixels = [8, 6], " +
-                  look + ", corners_m = { ll = [0, 0, 0], lr = [0.8, 0, 0], ul = [0, 0.6, 0] } }]\n");
+                  mounting + ", corners_m = { ll = [0, 0, 0], lr = [0.8, 0, 0], ul = [0, 0.6, 0] } }]\n");
   };
   const Image<Rgba8> picture = marked({8, 6});
   const Wall beside = wall_of("side-by-side", "mirror = \"horizontal\"");
-  const Image<Rgba8> mirrored_beside = ScanOut(beside, 0).apply(picture);
+  const Image<Rgba8> mirrored_beside = PanelTransform(beside, 0).apply(picture);
   EXPECT_EQ(mirrored_beside.at(0, 0), picture.at(3, 0));
   EXPECT_EQ(mirrored_beside.at(4, 5), picture.at(7, 5));
   const Wall turned = wall_of("top-bottom", "rotate = 180");
-  const Image<Rgba8> turned_above = ScanOut(turned, 0).apply(picture);
+  const Image<Rgba8> turned_above = PanelTransform(turned, 0).apply(picture);
   EXPECT_EQ(turned_above.at(0, 0), picture.at(7, 2));
   EXPECT_EQ(turned_above.at(0, 3), picture.at(7, 5));
   const Wall faded = wall_of("side-by-side", "edge_blend_m = { left = 0.4 }");
-  const ScanOut fades(faded, 0);
+  const PanelTransform fades(faded, 0);
   const Image<Rgba8> white(Size{8, 6}, Rgba8{255, 255, 255, 255});
   const Image<Rgba8> shown = fades.apply(white);
   for (int x = 0; x < 4; ++x) EXPECT_EQ(shown.at(x, 0), shown.at(x + 4, 0)) << x;

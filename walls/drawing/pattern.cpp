@@ -109,13 +109,13 @@ void draw_tick(Canvas& canvas, bool across, double at, int number, double unit, 
 /// Along the top edge from the left and the left edge from the top; every tenth tick is long and numbered.
 void draw_rulers(Canvas& canvas, const WallScreen& screen) {
   const glm::dvec2 size(screen.pixels.width, screen.pixels.height);
-  const double metres = screen_width(screen);
-  const double pixels_per_mm = size.x / (1000.0 * metres);
+  const double meters = screen_width(screen);
+  const double pixels_per_mm = size.x / (1000.0 * meters);
   const double step = tick_mm(pixels_per_mm);
   const double unit = std::min(size.x, size.y) / 100.0;
   if (unit < 1.0) return;
   for (const bool across : {true, false}) {
-    const double length_mm = 1000.0 * (across ? metres : screen_height(screen));
+    const double length_mm = 1000.0 * (across ? meters : screen_height(screen));
     for (int i = 1; i * step < length_mm; ++i) {
       draw_tick(canvas, across, std::round(i * step * (across ? pixels_per_mm : size.y / length_mm)), i, unit, step);
     }
@@ -128,9 +128,9 @@ void draw_neighbours(Canvas& canvas, const Wall& wall, std::size_t index) {
   const double arrow = 0.035 * std::min(size.x, size.y);
   const double height = 0.9 * arrow;
   if (height < 4.0) return;
-  const auto neighbours = adjacent_screens(wall, index);
+  const auto neighbors = adjacent_screens(wall, index);
   const auto label = [&](Side side) -> std::string {
-    const auto found = neighbours.at(static_cast<std::size_t>(side));
+    const auto found = neighbors.at(static_cast<std::size_t>(side));
     return found ? wall.screens[*found].id : "";
   };
   const auto draw = [&](Side side, glm::dvec2 tip, glm::dvec2 back, bool upright) {

@@ -23,7 +23,7 @@ struct WallHeat {
 };
 
 /// What a plan can be coloured by: "ms" (the median) and "bytes" (the mean) of handing over a screen's picture; and
-/// the share of the frames in which it was "stale" or "lost".
+/// the fraction of the frames in which it was "stale" or "lost".
 [[nodiscard]] const std::vector<std::string>& heat_names();
 
 /// Throws Error: BadInput where the manifest is of another wall or has nothing of the kind, Usage for an unknown name.
@@ -32,9 +32,10 @@ struct WallHeat {
                                  std::string_view by);
 
 /// The plan of a wall, for people: its screens as they stand, to scale, with their ids, sizes in pixels and
-/// millimetres and owners (host, rank, window), gaps hatched, and the wall from above with its viewer.
+/// millimeters and owners (host, rank, window), gaps hatched, and the wall from above with its viewer.
 /// Both forms come from the same drawing code.
-/// With `heat` screens are coloured by what a run measured of them instead of by their owners, and a scale tells how.
+/// With `heat` screens are coloured by what a run measured of them instead of by their owners, and a scale shows the
+/// values.
 [[nodiscard]] std::string wall_plan_svg(const Wall& wall, const WallHeat* heat = nullptr);
 [[nodiscard]] Image<Rgba8> wall_plan_image(const Wall& wall, const WallHeat* heat = nullptr);
 

@@ -42,7 +42,7 @@ struct Placement {
 
 Placement place_viewer(const Wall& wall, const WallExtent& extent, const Camera& camera) {
   const WallViewer& first = wall.viewers.front();
-  if (first.given || !extent.flat) return {camera.axes, first.position, std::nullopt, extent.height};
+  if (first.has_position || !extent.flat) return {camera.axes, first.position, std::nullopt, extent.height};
   double distance = extent.height;
   if (const auto* const lens = std::get_if<PerspectiveLens>(&camera.lens)) {
     distance = 0.5 * extent.height / std::tan(0.5 * lens->vertical_fov_radians);
@@ -99,7 +99,7 @@ bool same_plane(const WallScreen& a, const WallScreen& b) {
          std::abs(glm::dot(normal, b.lower_left - a.lower_left)) < 1e-6 * size;
 }
 
-/// From straight ahead, clockwise seen from above.
+/// The angle from straight ahead, clockwise seen from above, in radians.
 double heading_of(const glm::dvec3& towards, const glm::dvec3& ahead) {
   return std::atan2(towards.z * ahead.x - towards.x * ahead.z, towards.x * ahead.x + towards.z * ahead.z);
 }
@@ -184,9 +184,9 @@ int rounded(double value) {
   return static_cast<int>(std::floor(value + 0.5 + 1e-6));
 }
 
-Rect rounded(const Box& box, double per_metre) {
-  return {rounded(box.x * per_metre), rounded(box.y * per_metre), rounded((box.x + box.width) * per_metre),
-          rounded((box.y + box.height) * per_metre)};
+Rect rounded(const Box& box, double per_meter) {
+  return {rounded(box.x * per_meter), rounded(box.y * per_meter), rounded((box.x + box.width) * per_meter),
+          rounded((box.y + box.height) * per_meter)};
 }
 
 /// A screen in the plane of the wall, in meters.
@@ -245,18 +245,18 @@ std::vector<ScreenEye> screen_eyes(const Wall& wall) {
   return pictures;
 }
 
-std::vector<Rect> eye_places(const Wall& wall, std::size_t screen) {
+std::vector<Rect> eye_rects(const Wall& wall, std::size_t screen) {
   const Size size = wall.screens.at(screen).pixels;
-  std::vector<Rect> places;
+  std::vector<Rect> rects;
   for (const ScreenEye& picture : screen_eyes(wall)) {
     if (picture.screen != screen) continue;
     if (picture.pixels == size) return {{0, 0, size.width, size.height}};
-    const bool first = places.empty();
+    const bool first = rects.empty();
     const int x = first ? 0 : size.width - picture.pixels.width;
     const int y = first ? 0 : size.height - picture.pixels.height;
-    places.push_back({x, y, x + picture.pixels.width, y + picture.pixels.height});
+    rects.push_back({x, y, x + picture.pixels.width, y + picture.pixels.height});
   }
-  return places;
+  return rects;
 }
 
 Image<Rgba8> compose_eyes(StereoMode mode, const Image<Rgba8>& left, const Image<Rgba8>& right) {
@@ -328,7 +328,7 @@ WallExtent wall_extent(std::span<const WallScreen> screens) {
   glm::dvec3 normal(0.0);
   for (const WallScreen& screen : screens) {
     normal += screen_axes(screen)[2];
-    extent.middle += screen_center(screen) / static_cast<double>(screens.size());
+    extent.centroid += screen_center(screen) / static_cast<double>(screens.size());
   }
   // Screens all round the viewer cancel out; then the first one says where the front is.
   const glm::dmat3 first = screen_axes(screens.front());
@@ -344,7 +344,7 @@ WallExtent wall_extent(std::span<const WallScreen> screens) {
   for (const WallScreen& screen : screens) {
     for (const glm::dvec3& corner : corners_of(screen)) {
       // Relative to the middle, so that a wall far from the origin loses no digits.
-      const glm::dvec3 inside = extent_from_wall * (corner - extent.middle);
+      const glm::dvec3 inside = extent_from_wall * (corner - extent.centroid);
       low = glm::min(low, inside);
       high = glm::max(high, inside);
     }
@@ -353,7 +353,7 @@ WallExtent wall_extent(std::span<const WallScreen> screens) {
   extent.width = high.x - low.x;
   extent.height = high.y - low.y;
   if (high.z - low.z > kFlatness * (extent.width + extent.height)) extent.flat = false;
-  extent.center = extent.middle + extent.axes * (0.5 * (low + high));
+  extent.center = extent.centroid + extent.axes * (0.5 * (low + high));
   return extent;
 }
 
@@ -441,17 +441,17 @@ WallPicture wall_picture(const Wall& wall, int max_side) {
   const double finest = finest_pitch(wall);
   const double longest = std::max(layout.width, layout.height) / finest;
   const bool scaled = std::ceil(longest) > max_side;
-  const double per_metre = scaled ? max_side / (longest * finest) : 1.0 / finest;
+  const double per_meter = scaled ? max_side / (longest * finest) : 1.0 / finest;
   const bool native = !scaled && std::ranges::all_of(wall.screens, [&](const WallScreen& screen) {
     return std::abs(pixel_pitch(screen) - finest) < 1e-9 * finest;
   });
 
   WallPicture picture;
-  picture.size = {std::max(1, rounded(layout.width * per_metre)), std::max(1, rounded(layout.height * per_metre))};
+  picture.size = {std::max(1, rounded(layout.width * per_meter)), std::max(1, rounded(layout.height * per_meter))};
   for (std::size_t i = 0; i < layout.boxes.size(); ++i) {
     const Box& box = layout.boxes[i];
     const Size pixels = wall.screens[i].pixels;
-    Rect rect = rounded(box, per_metre);
+    Rect rect = rounded(box, per_meter);
     // Rounding moves whole screens then, and never squeezes one by a pixel.
     const bool upright = std::abs(box.width - screen_width(wall.screens[i])) < 1e-6 * box.width;
     if (native && upright) rect = {rect.x0, rect.y0, rect.x0 + pixels.width, rect.y0 + pixels.height};
@@ -462,7 +462,7 @@ WallPicture wall_picture(const Wall& wall, int max_side) {
     picture.screens.push_back(rect);
   }
   for (const Box& box : layout.planes) {
-    picture.planes.push_back(intersection(rounded(box, per_metre), {0, 0, picture.size.width, picture.size.height}));
+    picture.planes.push_back(intersection(rounded(box, per_meter), {0, 0, picture.size.width, picture.size.height}));
   }
   return picture;
 }
@@ -492,8 +492,8 @@ WallSeams wall_seams(const Wall& wall) {
     for (std::size_t i = 1; i < boxes.size(); ++i) {
       const SeamBox& before = boxes[i - 1];
       const SeamBox& box = boxes[i];
-      const bool neighbours = line_of(before) == line_of(box) && std::abs(before.pitch - box.pitch) < 1e-6 * box.pitch;
-      if (neighbours) {
+      const bool neighbors = line_of(before) == line_of(box) && std::abs(before.pitch - box.pitch) < 1e-6 * box.pitch;
+      if (neighbors) {
         counter.add(box.low[axis] - before.high[axis], box.pitch);
       } else {
         counter.start_line();

@@ -31,7 +31,7 @@ struct ScreenEye {
 [[nodiscard]] std::vector<ScreenEye> screen_eyes(const Wall& wall);
 
 /// Which parts of a screen's pixels its pictures take, in the order of screen_eyes(); one part where they share it.
-[[nodiscard]] std::vector<Rect> eye_places(const Wall& wall, std::size_t screen);
+[[nodiscard]] std::vector<Rect> eye_rects(const Wall& wall, std::size_t screen);
 
 /// What the screen shows of two eyes' pictures of the sizes of screen_eyes(). Anaglyph: red of the left eye, green and
 /// blue of the right one.
@@ -42,12 +42,12 @@ struct ScreenEye {
 
 /// The rectangle all screens lie in, seen along their mean normal.
 struct WallExtent {
-  glm::dmat3 axes{1.0};    ///< columns: right, up, towards the viewer; wall space, orthonormal
-  glm::dvec3 center{0.0};  ///< of the rectangle, wall space
-  double width = 0.0;      ///< metres
-  double height = 0.0;     ///< metres
-  bool flat = true;        ///< all screens face the same way in one plane (to 1e-6 of the extent)
-  glm::dvec3 middle{0.0};  ///< mean of the screens' centres, wall space
+  glm::dmat3 axes{1.0};      ///< columns: right, up, towards the viewer; wall space, orthonormal
+  glm::dvec3 center{0.0};    ///< of the rectangle, wall space
+  double width = 0.0;        ///< metres
+  double height = 0.0;       ///< metres
+  bool flat = true;          ///< all screens face the same way in one plane (to 1e-6 of the extent)
+  glm::dvec3 centroid{0.0};  ///< mean of the screens' centres, wall space
 };
 
 [[nodiscard]] WallExtent wall_extent(std::span<const WallScreen> screens);
@@ -77,7 +77,7 @@ struct WallExtent {
 /// position map is looked at through its points, by an eye that stays where it is.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
                                            const Bounds& bounds);
-/// With heads at rest.
+/// The views of heads at rest.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds);
 
 /// Screens (by index) that lie in one plane and face the same way; plane after plane from left to right as the viewer
@@ -95,14 +95,14 @@ struct WallPicture {
 };
 
 /// Pixels a side of an assembled wall that is looked at, or encoded: most programs take no larger picture well.
-inline constexpr int kLargestPicture = 8192;
+inline constexpr int kMaxPictureSide = 8192;
 
 /// A flat wall as it stands, at its finest screen's pixels; any other wall plane by plane: upright ones side by side
 /// from left to right, ceilings above, floors below. Scaled down when a side would exceed `max_side` pixels. Edges are
 /// rounded to whole pixels; where all screens have one pitch, and nothing is scaled, each keeps its size.
 [[nodiscard]] WallPicture wall_picture(const Wall& wall, int max_side);
 
-/// What lies between neighbours of one pitch in the rows and columns of a flat wall, and how far that is from whole
+/// What lies between neighbors of one pitch in the rows and columns of a flat wall, and how far that is from whole
 /// pixels: the error a wall description with bezels in whole pixels would make.
 struct WallSeams {
   int count = 0;
@@ -116,7 +116,7 @@ struct WallSeams {
 /// Metres per pixel along the screen's width.
 [[nodiscard]] double pixel_pitch(const WallScreen& screen);
 
-/// Of the screen with the smallest pixels.
+/// Meters per pixel of the screen with the smallest pixels.
 [[nodiscard]] double finest_pitch(const Wall& wall);
 
 }  // namespace hpr

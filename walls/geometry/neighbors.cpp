@@ -60,7 +60,7 @@ std::optional<PlanarBox> seen_from(const WallScreen& other, const WallScreen& sc
   return box;
 }
 
-double shared_metres(const PlanarBox& box, const WallScreen& screen) {
+double overlap_meters(const PlanarBox& box, const WallScreen& screen) {
   const auto along = [&](std::size_t axis, double size) {
     return std::min(box.high[axis], size) - std::max(box.low[axis], 0.0);
   };

@@ -18,11 +18,12 @@ struct PlanarBox {
   std::array<int, 2> along{{1, 1}};  ///< directions of its right and up: 1 or -1
 };
 
-/// None for screens of other planes, eyes or viewers, and for those turned by other than right angles.
+/// The box of `other` as `screen` sees it; none for screens of other planes, eyes or viewers, and for those turned by
+/// other than right angles.
 [[nodiscard]] std::optional<PlanarBox> seen_from(const WallScreen& other, const WallScreen& screen);
 
 /// Metres by which `box` and the screen it is seen from share an axis, in the narrower direction; negative: the gap.
-[[nodiscard]] double shared_metres(const PlanarBox& box, const WallScreen& screen);
+[[nodiscard]] double overlap_meters(const PlanarBox& box, const WallScreen& screen);
 
 /// Pairs of screens, by index, the lower first, that are no farther apart than `reach` of their sizes: a quick choice
 /// of those worth a closer look.

@@ -28,9 +28,9 @@ namespace {
 
 constexpr double kParts = 65536.0;
 
-std::uint32_t along(double place, int count) {
-  const double from_middle = std::clamp(place - 0.5, 0.0, static_cast<double>(count - 1));
-  return static_cast<std::uint32_t>(std::llround(from_middle * kParts));
+std::uint32_t along(double position, int count) {
+  const double from_center = std::clamp(position - 0.5, 0.0, static_cast<double>(count - 1));
+  return static_cast<std::uint32_t>(std::llround(from_center * kParts));
 }
 
 const LevelTable& srgb_levels() {
@@ -43,11 +43,11 @@ class Reader {
  public:
   explicit Reader(const Image<Rgba8>& picture) : picture_(picture), to_level_(srgb_levels()) {}
 
-  [[nodiscard]] Rgba8 at(const SourcePlace& place) const {
-    const int x = static_cast<int>(place.x >> 16U);
-    const int y = static_cast<int>(place.y >> 16U);
-    const float right = static_cast<float>(place.x & 0xFFFFU) / 65536.0F;
-    const float down = static_cast<float>(place.y & 0xFFFFU) / 65536.0F;
+  [[nodiscard]] Rgba8 at(const SourcePosition& position) const {
+    const int x = static_cast<int>(position.x >> 16U);
+    const int y = static_cast<int>(position.y >> 16U);
+    const float right = static_cast<float>(position.x & 0xFFFFU) / 65536.0F;
+    const float down = static_cast<float>(position.y & 0xFFFFU) / 65536.0F;
     const Rgba8 nearest = picture_.at(x, y);
     if (right == 0.0F && down == 0.0F) return nearest;
     const int beside = right > 0.0F ? x + 1 : x;
@@ -84,8 +84,8 @@ class Header {
 
   /// Empty where there is none.
   std::string_view word() {
-    constexpr std::size_t kLongest = 32;
-    const std::size_t end = rest_.substr(0, kLongest).find_first_of(" \t\r\n");
+    constexpr std::size_t kMaxBytes = 32;
+    const std::size_t end = rest_.substr(0, kMaxBytes).find_first_of(" \t\r\n");
     if (end == std::string_view::npos) return {};
     const std::string_view word = rest_.substr(0, end);
     const bool two = rest_.substr(end).starts_with("\r\n");
@@ -135,7 +135,7 @@ float float_at(const char* bytes, bool swapped) {
   return std::bit_cast<float>(swapped ? __builtin_bswap32(word) : word);
 }
 
-constexpr std::size_t kMostVertices = std::size_t{1} << 24U;
+constexpr std::size_t kMaxVertices = std::size_t{1} << 24U;
 
 constexpr std::string_view kCsvHint =
     "a line is x,y,u,v: a place on the screen and one of the picture, all from 0 to 1, row after row of one length";
@@ -158,7 +158,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Each line that says something, with its number.
+/// Calls `visit` for each line that is neither empty nor a comment, with its number.
 void each_line(std::string_view text, const std::function<void(std::string_view line, int number)>& visit) {
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
@@ -190,33 +190,33 @@ std::optional<Number> number_of(std::string_view word) {
 }
 
 /// Two numbers from 0 to 1.
-glm::dvec2 place_of(std::span<const std::string_view> words, const Source& source, int line) {
-  glm::dvec2 place;
+glm::dvec2 position_of(std::span<const std::string_view> words, const Source& source, int line) {
+  glm::dvec2 position;
   for (int i = 0; i < 2; ++i) {
     const std::string_view word = words[static_cast<std::size_t>(i)];
     const auto number = number_of<double>(word);
     if (!number) source.fail(line, fmt::format("'{}' is no number", printable(word)));
     if (!(*number >= 0.0 && *number <= 1.0)) source.fail(line, fmt::format("{} is not from 0 to 1", *number));
-    place[i] = *number;
+    position[i] = *number;
   }
-  return place;
+  return position;
 }
 
 /// Twice the area of a triangle on the screen; negative when its corners go round clockwise.
 double area_of(const WarpMesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
-  const glm::dvec2 a = mesh.vertices[triangle[0]].place;
-  const glm::dvec2 b = mesh.vertices[triangle[1]].place - a;
-  const glm::dvec2 c = mesh.vertices[triangle[2]].place - a;
+  const glm::dvec2 a = mesh.vertices[triangle[0]].position;
+  const glm::dvec2 b = mesh.vertices[triangle[1]].position - a;
+  const glm::dvec2 c = mesh.vertices[triangle[2]].position - a;
   return b.x * c.y - b.y * c.x;
 }
 
-/// Of the box around a triangle, as far as it lies on the screen.
+/// The area of the box around a triangle, as far as it lies on the screen.
 double box_area_of(const WarpMesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
   glm::dvec2 low(1.0);
   glm::dvec2 high(0.0);
   for (const std::uint32_t vertex : triangle) {
-    low = glm::min(low, mesh.vertices[vertex].place);
-    high = glm::max(high, mesh.vertices[vertex].place);
+    low = glm::min(low, mesh.vertices[vertex].position);
+    high = glm::max(high, mesh.vertices[vertex].position);
   }
   const glm::dvec2 size = glm::max(glm::min(high, glm::dvec2(1.0)) - glm::max(low, glm::dvec2(0.0)), glm::dvec2(0.0));
   return size.x * size.y;
@@ -227,19 +227,19 @@ constexpr double kNoArea = 1e-14;
 /// `line_of`: where a triangle is in the text.
 void check_mesh(const WarpMesh& mesh, const Source& source, const std::function<int(std::size_t)>& line_of) {
   // What is worth drawing covers each place once or, as boxes around triangles overlap, a few times.
-  constexpr double kMostCover = 64.0;
+  constexpr double kMaxCover = 64.0;
   double orientation = 0.0;
   double cover = 0.0;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const double area = area_of(mesh, mesh.triangles[i]);
     if (std::abs(area) <= kNoArea) continue;
     if (orientation * area < 0.0) {
-      const glm::dvec2 at = mesh.vertices[mesh.triangles[i][0]].place;
+      const glm::dvec2 at = mesh.vertices[mesh.triangles[i][0]].position;
       source.fail(line_of(i), fmt::format("the mesh folds over at {:.4g}, {:.4g} of the screen", at.x, at.y));
     }
     orientation = area;
     cover += box_area_of(mesh, mesh.triangles[i]);
-    if (cover > kMostCover) source.fail(line_of(i), "the triangles cover the screen many times over");
+    if (cover > kMaxCover) source.fail(line_of(i), "the triangles cover the screen many times over");
   }
   if (orientation == 0.0) source.fail(1, "the mesh covers nothing of the screen");
 }
@@ -255,10 +255,10 @@ class CsvReader {
     if (names) return;
     const std::vector<std::string_view> words = split(line, ",;");
     if (words.size() != 4) source_.fail(number, fmt::format("{} values where four are wanted", words.size()));
-    if (lines_.size() == kMostVertices) source_.fail(number, fmt::format("more than {} vertices", kMostVertices));
-    const WarpMesh::Vertex vertex{place_of(std::span(words).first(2), source_, number),
-                                  place_of(std::span(words).subspan(2), source_, number)};
-    count(!lines_.empty() && vertex.place.x <= mesh_.vertices.back().place.x, number);
+    if (lines_.size() == kMaxVertices) source_.fail(number, fmt::format("more than {} vertices", kMaxVertices));
+    const WarpMesh::Vertex vertex{position_of(std::span(words).first(2), source_, number),
+                                  position_of(std::span(words).subspan(2), source_, number)};
+    count(!lines_.empty() && vertex.position.x <= mesh_.vertices.back().position.x, number);
     mesh_.vertices.push_back(vertex);
     lines_.push_back(number);
   }
@@ -305,12 +305,12 @@ class ObjReader {
   void add(std::string_view line, int number) {
     const std::vector<std::string_view> words = split(line, " \t");
     if (words.front() == "f") return add_face(words, number);
-    const bool place = words.front() == "v";
-    if (!place && words.front() != "vt") return;
-    std::vector<glm::dvec2>& list = place ? places_ : sources_;
+    const bool position = words.front() == "v";
+    if (!position && words.front() != "vt") return;
+    std::vector<glm::dvec2>& list = position ? positions_ : sources_;
     if (words.size() < 3) source_.fail(number, "two numbers are wanted");
-    if (list.size() == kMostVertices) source_.fail(number, fmt::format("more than {} vertices", kMostVertices));
-    list.push_back(place_of(std::span(words).subspan(1, 2), source_, number));
+    if (list.size() == kMaxVertices) source_.fail(number, fmt::format("more than {} vertices", kMaxVertices));
+    list.push_back(position_of(std::span(words).subspan(1, 2), source_, number));
   }
 
   WarpMesh take() {
@@ -335,12 +335,12 @@ class ObjReader {
   void add_face(const std::vector<std::string_view>& words, int number) {
     if (words.size() < 4) source_.fail(number, "a face has three corners or more");
     const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
-    if (first + words.size() > kMostVertices) source_.fail(number, fmt::format("more than {} corners", kMostVertices));
+    if (first + words.size() > kMaxVertices) source_.fail(number, fmt::format("more than {} corners", kMaxVertices));
     for (std::size_t i = 1; i < words.size(); ++i) {
       const std::vector<std::string_view> parts = split(words[i], "/");
       if (parts.size() < 2 || parts[1].empty()) source_.fail(number, "a corner of a face has no vt");
       mesh_.vertices.push_back(
-          {places_[index(parts[0], places_.size(), number)], sources_[index(parts[1], sources_.size(), number)]});
+          {positions_[index(parts[0], positions_.size(), number)], sources_[index(parts[1], sources_.size(), number)]});
     }
     for (std::uint32_t i = 2; i + 1 < words.size(); ++i) {
       mesh_.triangles.push_back({first, first + i - 1, first + i});
@@ -349,7 +349,7 @@ class ObjReader {
   }
 
   Source source_;
-  std::vector<glm::dvec2> places_;
+  std::vector<glm::dvec2> positions_;
   std::vector<glm::dvec2> sources_;
   WarpMesh mesh_;
   std::vector<int> lines_;  ///< per triangle
@@ -365,11 +365,11 @@ LevelTable::LevelTable(const std::function<double(float light)>& level) {
   for (std::size_t k = 0; k < 256; ++k) {
     std::uint32_t to = kOne + 1;
     while (from < to) {
-      const std::uint32_t middle = from + (to - from) / 2;
-      if (rounded(std::bit_cast<float>(middle)) >= static_cast<long>(k)) {
-        to = middle;
+      const std::uint32_t midpoint = from + (to - from) / 2;
+      if (rounded(std::bit_cast<float>(midpoint)) >= static_cast<long>(k)) {
+        to = midpoint;
       } else {
-        from = middle + 1;
+        from = midpoint + 1;
       }
     }
     least_.at(k) = from > kOne ? std::numeric_limits<float>::infinity() : std::bit_cast<float>(from);
@@ -390,11 +390,11 @@ std::uint8_t LevelTable::operator()(float light) const {
   return static_cast<std::uint8_t>(level);
 }
 
-SourcePlace source_place(double x, double y, Size size) {
+SourcePosition source_position(double x, double y, Size size) {
   return {along(x, size.width), along(y, size.height)};
 }
 
-Image<Rgba8> warped(const Image<Rgba8>& picture, const Image<SourcePlace>& sources, int threads) {
+Image<Rgba8> warped(const Image<Rgba8>& picture, const Image<SourcePosition>& sources, int threads) {
   HPR_CHECK(picture.size().area() > 0);
   const Reader reader(picture);
   Image<Rgba8> result(sources.size(), {0, 0, 0, 255});
@@ -409,7 +409,7 @@ Image<Rgba8> warped(const Image<Rgba8>& picture, const Image<SourcePlace>& sourc
 }
 
 PositionMap parse_position_map(std::span<const std::byte> bytes, const std::string& name) {
-  constexpr float kFarthest = 1e6F;
+  constexpr float kMaxCoordinate = 1e6F;
   Header header({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const Layout layout = read_layout(header, name);
   const Size size = layout.size;
@@ -427,7 +427,7 @@ PositionMap parse_position_map(std::span<const std::byte> bytes, const std::stri
       for (int i = 0; i < 3; ++i, at += sizeof(float)) point[i] = float_at(at, layout.swapped);
       if (!is_finite(point)) continue;
       const float farthest = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
-      if (farthest > kFarthest) {
+      if (farthest > kMaxCoordinate) {
         fail(name, fmt::format("a point at {} m; write NaN where no light falls", farthest));
       }
       any = true;
@@ -449,19 +449,19 @@ WarpMesh parse_warp_obj(std::string_view text, const std::string& name) {
   return reader.take();
 }
 
-Image<SourcePlace> mesh_sources(const WarpMesh& mesh, Size size) {
+Image<SourcePosition> mesh_sources(const WarpMesh& mesh, Size size) {
   // Centres on an edge belong to both sides, and on the screen's own edge to the mesh, whatever rounding says.
   constexpr double kOnEdge = -1e-9;
-  Image<SourcePlace> sources(size, kNoSource);
+  Image<SourcePosition> sources(size, kNoSource);
   const glm::dvec2 scale(size.width, size.height);
-  const auto in_pixels = [&](const glm::dvec2& place) { return glm::dvec2(place.x, 1.0 - place.y) * scale; };
+  const auto in_pixels = [&](const glm::dvec2& position) { return glm::dvec2(position.x, 1.0 - position.y) * scale; };
   for (const auto& triangle : mesh.triangles) {
     const auto& [v0, v1, v2] =
         std::tie(mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]);
     if (std::abs(area_of(mesh, triangle)) <= kNoArea) continue;
-    const glm::dvec2 a = in_pixels(v0.place);
-    const glm::dvec2 b = in_pixels(v1.place) - a;
-    const glm::dvec2 c = in_pixels(v2.place) - a;
+    const glm::dvec2 a = in_pixels(v0.position);
+    const glm::dvec2 b = in_pixels(v1.position) - a;
+    const glm::dvec2 c = in_pixels(v2.position) - a;
     const double area = b.x * c.y - b.y * c.x;
     const auto [left, right] = std::minmax({a.x, a.x + b.x, a.x + c.x});
     const auto [top, bottom] = std::minmax({a.y, a.y + b.y, a.y + c.y});
@@ -476,7 +476,7 @@ Image<SourcePlace> mesh_sources(const WarpMesh& mesh, Size size) {
         if (towards_b < kOnEdge || towards_c < kOnEdge || 1.0 - towards_b - towards_c < kOnEdge) continue;
         const glm::dvec2 source = v0.source + towards_b * (v1.source - v0.source) + towards_c * (v2.source - v0.source);
         const glm::dvec2 at = in_pixels(source);
-        sources.at(x, y) = source_place(at.x, at.y, size);
+        sources.at(x, y) = source_position(at.x, at.y, size);
       }
     }
   }

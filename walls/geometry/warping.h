@@ -33,27 +33,27 @@ class LevelTable {
 };
 
 /// A place in a picture, in 65536ths of a pixel from the middle of its upper left one to the right and down.
-struct SourcePlace {
+struct SourcePosition {
   std::uint32_t x = 0;
   std::uint32_t y = 0;
 
-  bool operator==(const SourcePlace&) const = default;
+  bool operator==(const SourcePosition&) const = default;
 };
 
-/// Pixels a side that places are told of.
-inline constexpr int kLargestSource = 65536;
+/// Pixels a side of the largest picture that a SourcePosition can point into.
+inline constexpr int kMaxSourceSide = 65536;
 
 /// Nothing of the picture: no light.
-inline constexpr SourcePlace kNoSource{0xFFFFFFFFU, 0xFFFFFFFFU};
+inline constexpr SourcePosition kNoSource{0xFFFFFFFFU, 0xFFFFFFFFU};
 
 /// The place nearest to (x, y), in pixels from the picture's upper left corner; beyond the middles of the outermost
-/// pixels that of these. `size` of the picture, at most kLargestSource a side.
-[[nodiscard]] SourcePlace source_place(double x, double y, Size size);
+/// pixels that of these. `size` of the picture, at most kMaxSourceSide a side.
+[[nodiscard]] SourcePosition source_position(double x, double y, Size size);
 
 /// What a picture shows at these places: bilinear between the middles of its four nearest pixels, in linear light,
 /// rounded to sRGB levels; in the middle of a pixel that pixel, bit by bit. Black, and opaque, where there is none. The
 /// same bits for any number of threads.
-[[nodiscard]] Image<Rgba8> warped(const Image<Rgba8>& picture, const Image<SourcePlace>& sources, int threads);
+[[nodiscard]] Image<Rgba8> warped(const Image<Rgba8>& picture, const Image<SourcePosition>& sources, int threads);
 
 /// A PFM of three channels (Debevec's portable float map: "PF", width and height, a scale whose sign tells the byte
 /// order, then rows from the bottom up): per texel a point in metres, wall space; NaN or infinite where no light falls.
@@ -65,8 +65,8 @@ inline constexpr SourcePlace kNoSource{0xFFFFFFFFU, 0xFFFFFFFFU};
 /// corner, y up; between corners of a triangle the source is linear.
 struct WarpMesh {
   struct Vertex {
-    glm::dvec2 place{0.0};   ///< on the screen
-    glm::dvec2 source{0.0};  ///< of the picture
+    glm::dvec2 position{0.0};  ///< on the screen
+    glm::dvec2 source{0.0};    ///< of the picture
   };
 
   std::vector<Vertex> vertices;
@@ -85,6 +85,6 @@ struct WarpMesh {
 
 /// Per pixel of a screen the place of a picture of that size it shows: of its centre, in the first triangle that holds
 /// it; kNoSource outside of all.
-[[nodiscard]] Image<SourcePlace> mesh_sources(const WarpMesh& mesh, Size size);
+[[nodiscard]] Image<SourcePosition> mesh_sources(const WarpMesh& mesh, Size size);
 
 }  // namespace hpr

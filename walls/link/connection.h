@@ -79,13 +79,13 @@ class Connection {
 
  private:
   [[nodiscard]] std::span<const std::byte> arrived() const;
-  void drop_taken();
+  void drop_consumed();
 
   Socket socket_;
   std::deque<LinkMessage> unsent_;
   std::size_t sent_of_first_ = 0;
   ByteBuffer in_;
-  std::size_t taken_ = 0;  ///< of in_
+  std::size_t consumed_ = 0;  ///< of in_
 };
 
 }  // namespace hpr

@@ -70,9 +70,9 @@ class ByteReader {
   [[nodiscard]] double real() { return std::bit_cast<double>(u64()); }
   [[nodiscard]] std::span<const std::byte> raw(std::size_t count) {
     if (count > bytes_.size()) throw LinkError("a message ends too early");
-    const auto taken = bytes_.first(count);
+    const auto first = bytes_.first(count);
     bytes_ = bytes_.subspan(count);
-    return taken;
+    return first;
   }
   /// At most `limit` bytes long.
   [[nodiscard]] std::string text(std::size_t limit) {
@@ -101,7 +101,7 @@ class ByteReader {
 };
 
 inline constexpr std::uint32_t kLinkProtocol = 1;
-inline constexpr std::size_t kMostBlockBytes = 1 << 20;
+inline constexpr std::size_t kMaxBlockBytes = 1 << 20;
 inline constexpr std::size_t kPacketHeaderBytes = 52;
 
 using LinkNonce = std::array<std::byte, 16>;
@@ -145,11 +145,11 @@ struct Reply {
 [[nodiscard]] std::vector<std::byte> encode(const Hello& hello);
 [[nodiscard]] std::vector<std::byte> encode(const Reply& reply);
 
-/// The bytes a block takes as soon as `begin`, what has arrived, tells; none before. Throws LinkError when this is no
-/// block of HPR, or one of another protocol or byte order.
+/// The bytes a block takes as soon as `begin`, what has arrived, holds its length; none before. Throws LinkError when
+/// this is no block of HPR, or one of another protocol or byte order.
 [[nodiscard]] std::optional<std::size_t> block_bytes(std::span<const std::byte> begin);
 
-/// Of one whole block. All throw LinkError.
+/// Decode one whole block. All throw LinkError.
 [[nodiscard]] Greeting decode_greeting(std::span<const std::byte> block);
 [[nodiscard]] Hello decode_hello(std::span<const std::byte> block);
 [[nodiscard]] Reply decode_reply(std::span<const std::byte> block);
@@ -175,7 +175,7 @@ struct PacketHeader {
 };
 
 /// The longest payload a screen's picture may have, bytes; longer ones are not even received.
-[[nodiscard]] std::size_t longest_picture(Size size);
+[[nodiscard]] std::size_t max_picture_bytes(Size size);
 
 /// A header and its payload, ready to be sent; fills in length and hash.
 [[nodiscard]] std::vector<std::byte> encode_packet(PacketHeader header, std::span<const std::byte> payload = {});

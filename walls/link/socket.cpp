@@ -81,7 +81,7 @@ constexpr int kBacklog = 64;
 /// A TCP peer that acknowledges nothing for so long is gone.
 constexpr unsigned kUnacknowledgedMs = 10'000;
 
-std::string words(int code) {
+std::string error_text(int code) {
   return std::generic_category().message(code);
 }
 
@@ -104,7 +104,7 @@ bool same_user(int descriptor) {
 }
 
 /// What a killed process left is removed; what a living one listens on is not.
-void clear_way(const LinkAddress& address) {
+void remove_stale_socket(const LinkAddress& address) {
   struct stat found {};
   if (::lstat(address.text.c_str(), &found) != 0) return;
   if (!S_ISSOCK(found.st_mode)) {
@@ -176,7 +176,7 @@ void forget_removal(const std::string& path) {
 void make_private_folder(const std::filesystem::path& folder) {
   struct stat found {};
   if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-    throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), words(errno)),
+    throw Error(ExitCode::Io, fmt::format("cannot make the folder '{}': {}", folder.string(), error_text(errno)),
                 "set XDG_RUNTIME_DIR to a folder of yours, or use --listen");
   }
   if (::lstat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) {
@@ -199,7 +199,7 @@ Listener::Listener(const LinkAddress& address) : tcp_(address.tcp), address_(add
   if (!tcp_) {
     const std::filesystem::path folder = std::filesystem::path(address.text).parent_path();
     make_private_folder(folder.empty() ? "." : folder);
-    clear_way(address);
+    remove_stale_socket(address);
   }
   socket_ = Socket(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
@@ -207,23 +207,23 @@ Listener::Listener(const LinkAddress& address) : tcp_(address.tcp), address_(add
   if (!socket_ || ::bind(socket_.descriptor(), plain(address), address.length) != 0) {
     const int code = errno;
     throw Error(code == EADDRINUSE ? ExitCode::Usage : ExitCode::Io,
-                fmt::format("cannot listen on '{}': {}", address.text, words(code)),
+                fmt::format("cannot listen on '{}': {}", address.text, error_text(code)),
                 "name another place with --listen");
   }
   if ((!tcp_ && ::chmod(address.text.c_str(), 0600) != 0) || ::listen(socket_.descriptor(), kBacklog) != 0) {
-    throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, words(errno)));
+    throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, error_text(errno)));
   }
   if (!tcp_) {
     remove_when_ended(address.text);
     return;
   }
-  sockaddr_storage taken{};
-  socklen_t size = sizeof taken;
-  if (::getsockname(socket_.descriptor(), reinterpret_cast<sockaddr*>(&taken), &size) != 0) {
-    throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, words(errno)));
+  sockaddr_storage bound{};
+  socklen_t size = sizeof bound;
+  if (::getsockname(socket_.descriptor(), reinterpret_cast<sockaddr*>(&bound), &size) != 0) {
+    throw Error(ExitCode::Io, fmt::format("cannot listen on '{}': {}", address.text, error_text(errno)));
   }
-  const in_port_t port = taken.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(taken).sin6_port
-                                                     : reinterpret_cast<const sockaddr_in&>(taken).sin_port;
+  const in_port_t port = bound.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(bound).sin6_port
+                                                     : reinterpret_cast<const sockaddr_in&>(bound).sin_port;
   address_ = fmt::format("{}:{}", address.text.substr(0, address.text.rfind(':')), ntohs(port));
 }
 
@@ -249,10 +249,10 @@ std::optional<Socket> Listener::accept() const {
 
 Socket start_connecting(const LinkAddress& address) {
   Socket socket(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (!socket) throw LinkError(words(errno), errno);
+  if (!socket) throw LinkError(error_text(errno), errno);
   if (address.tcp) tune(socket);
   if (::connect(socket.descriptor(), plain(address), address.length) != 0 && errno != EINPROGRESS) {
-    throw LinkError(words(errno), errno);
+    throw LinkError(error_text(errno), errno);
   }
   return socket;
 }
@@ -261,7 +261,7 @@ void finish_connecting(const Socket& socket, bool tcp) {
   int code = 0;
   socklen_t size = sizeof code;
   if (::getsockopt(socket.descriptor(), SOL_SOCKET, SO_ERROR, &code, &size) != 0) code = errno;
-  if (code != 0) throw LinkError(words(code), code);
+  if (code != 0) throw LinkError(error_text(code), code);
   if (!tcp && !same_user(socket.descriptor())) throw LinkError("the socket belongs to another user");
 }
 
@@ -273,7 +273,7 @@ bool has_left(int descriptor) {
 
 Socket make_alarm() {
   Socket alarm(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-  if (!alarm) throw Error(ExitCode::Io, fmt::format("no file descriptor is left: {}", words(errno)));
+  if (!alarm) throw Error(ExitCode::Io, fmt::format("no file descriptor is left: {}", error_text(errno)));
   return alarm;
 }
 

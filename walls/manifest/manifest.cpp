@@ -96,7 +96,7 @@ bool is_hash(const Json& value) {
   return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-bool tells_of(const Json& record, const WallScreen& screen) {
+bool matches(const Json& record, const WallScreen& screen) {
   return record["id"] == screen.id && record["width"] == screen.pixels.width &&
          record["height"] == screen.pixels.height && is_hash(record["xxh64"]);
 }
@@ -165,9 +165,9 @@ std::string to_json(const WallStatusRecord& status) {
 void check_records(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name) {
   for (std::size_t i = 0; i < file.frames.size(); ++i) {
     const Json frame = Json::parse(file.frames[i]);
-    const Json& told = frame["screens"];
+    const Json& listed = frame["screens"];
     const bool numbered = frame["frame"] == i;
-    if (numbered && told.is_array() && std::ranges::equal(told.elements(), screens, tells_of)) continue;
+    if (numbered && listed.is_array() && std::ranges::equal(listed.elements(), screens, matches)) continue;
     throw Error(ExitCode::BadInput,
                 fmt::format("{}: its record {} is not frame {} of this wall's screens at their sizes",
                             printable(name, 200), i, i),
@@ -197,8 +197,8 @@ ManifestFile parse_manifest(std::string_view text, const std::string& name) {
 }
 
 ManifestFile load_manifest(const std::string& path) {
-  constexpr std::uint64_t kLargest = std::uint64_t{1} << 30;
-  const std::vector<std::byte> bytes = read_file(path, kLargest);
+  constexpr std::uint64_t kMaxFileBytes = std::uint64_t{1} << 30;
+  const std::vector<std::byte> bytes = read_file(path, kMaxFileBytes);
   return parse_manifest({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, path);
 }
 

@@ -27,7 +27,7 @@ struct ScreenRecord {
   Size size;                ///< pixels
   std::uint64_t xxh64 = 0;  ///< of the RGBA8 pixels, row by row
   ScreenState state = ScreenState::Fresh;
-  int rank = -1;                            ///< that handed it over; -1: not told
+  int rank = -1;                            ///< that handed it over; -1: not known
   std::optional<double> ms = {};            ///< handing it over: encoding, writing
   std::optional<std::uint64_t> bytes = {};  ///< of what was handed over
 };
@@ -129,7 +129,7 @@ struct ManifestFile {
 /// Throws Error (BadInput) unless the frames are 0, 1, ... of these screens, in their order.
 void check_records(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name);
 
-/// The same of a file, up to 1 GiB. Throws Error (Io) too.
+/// Reads a manifest's file of at most 1 GiB, as parse_manifest does its text. Throws Error: Io too.
 [[nodiscard]] ManifestFile load_manifest(const std::string& path);
 
 }  // namespace hpr

@@ -24,7 +24,7 @@ struct HeadSample {
   HeadPose pose;
 };
 
-/// A recorded way of a head: straight between samples, turning along the shortest arc (Shoemake, "Animating Rotation
+/// A recorded path of a head: straight between samples, turning along the shortest arc (Shoemake, "Animating Rotation
 /// with Quaternion Curves", 1985).
 class HeadPath {
  public:

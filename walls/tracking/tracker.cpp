@@ -42,7 +42,7 @@ struct Report {
 std::optional<Report> report_of(std::string_view text) {
   std::vector<double> numbers;
   constexpr std::string_view kSpace = " \t\r\n";
-  constexpr std::size_t kMost = 8;
+  constexpr std::size_t kMaxNumbers = 8;
   while (true) {
     const std::size_t begin = text.find_first_not_of(kSpace);
     if (begin == std::string_view::npos) break;
@@ -51,7 +51,7 @@ std::optional<Report> report_of(std::string_view text) {
     const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     const auto used = static_cast<std::size_t>(stop - text.data());
     const bool whole = used == text.size() || kSpace.find(text[used]) != std::string_view::npos;
-    if (error != std::errc() || !whole || numbers.size() == kMost) return std::nullopt;
+    if (error != std::errc() || !whole || numbers.size() == kMaxNumbers) return std::nullopt;
     numbers.push_back(value);
     text.remove_prefix(used);
   }
@@ -103,9 +103,9 @@ class UdpTracker final : public Tracker {
 
   [[nodiscard]] HeadPose sample(double time) override {
     // More than a tracker sends in any frame, and an end to what a flood of datagrams can take.
-    constexpr int kMostInOneFrame = 10'000;
+    constexpr int kMaxDatagramsAFrame = 10'000;
     std::array<char, 512> bytes{};
-    for (int i = 0; i < kMostInOneFrame; ++i) {
+    for (int i = 0; i < kMaxDatagramsAFrame; ++i) {
       const auto count = socket_.receive(bytes);
       if (!count) break;
       const auto report = report_of({bytes.data(), *count});

@@ -47,16 +47,16 @@ double grid_width(const ForeignGrid& grid) {
 }
 
 void add_grid(const ForeignGrid& grid, const std::vector<ForeignTile>& tiles, ImportedWall& into) {
-  WallGrid metres;
-  metres.columns = grid.columns * grid.panels.width;
-  metres.rows = grid.rows * grid.panels.height;
-  metres.tile_pixels = grid.panel;
-  metres.tile_width_m = grid.panel.width * grid.pitch_m;
-  metres.tile_height_m = grid.panel.height * grid.pitch_m;
-  metres.column_gaps_m.assign(static_cast<std::size_t>(metres.columns) - 1, grid.gap_x_pixels * grid.pitch_m);
-  metres.row_gaps_m.assign(static_cast<std::size_t>(metres.rows) - 1, grid.gap_y_pixels * grid.pitch_m);
-  metres.center.x = grid.left_m + 0.5 * grid_width(grid);
-  std::vector<WallScreen> screens = expand_grid(metres, grid.surface);
+  WallGrid metric;
+  metric.columns = grid.columns * grid.panels.width;
+  metric.rows = grid.rows * grid.panels.height;
+  metric.tile_pixels = grid.panel;
+  metric.tile_width_m = grid.panel.width * grid.pitch_m;
+  metric.tile_height_m = grid.panel.height * grid.pitch_m;
+  metric.column_gaps_m.assign(static_cast<std::size_t>(metric.columns) - 1, grid.gap_x_pixels * grid.pitch_m);
+  metric.row_gaps_m.assign(static_cast<std::size_t>(metric.rows) - 1, grid.gap_y_pixels * grid.pitch_m);
+  metric.center.x = grid.left_m + 0.5 * grid_width(grid);
+  std::vector<WallScreen> screens = expand_grid(metric, grid.surface);
   for (const ForeignTile& tile : tiles) {
     WallWindow window;
     window.id = fmt::format("{}-w{}-{}", grid.surface, tile.row, tile.column);
@@ -68,8 +68,8 @@ void add_grid(const ForeignGrid& grid, const std::vector<ForeignTile>& tiles, Im
       for (int px = 0; px < grid.panels.width; ++px) {
         const int column = tile.column * grid.panels.width + px;
         const int row = tile.row * grid.panels.height + py;
-        const int place = row * metres.columns + column;
-        WallScreen& screen = screens[static_cast<std::size_t>(place)];
+        const int index = row * metric.columns + column;
+        WallScreen& screen = screens[static_cast<std::size_t>(index)];
         const int x = px * (grid.panel.width + grid.gap_x_pixels);
         const int y = py * (grid.panel.height + grid.gap_y_pixels);
         screen.window = window.id;

@@ -30,7 +30,7 @@ struct ForeignTile {
   int x = 0;            ///< on it, pixels
   int y = 0;
   bool fullscreen = false;
-  bool placed = true;  ///< x and y are told
+  bool placed = true;  ///< x and y are known
 };
 
 /// A grid measured in pixels.

@@ -12,7 +12,7 @@ namespace hpr {
 
 /// What other systems' files leave open.
 struct ImportSettings {
-  Size pixels{1920, 1080};   ///< of a screen where the file does not tell
+  Size pixels{1920, 1080};   ///< of a screen where the file has none
   double pitch_m = 0.00025;  ///< metres from pixel to pixel where the file counts in pixels only
 };
 

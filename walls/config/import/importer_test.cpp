@@ -105,7 +105,7 @@ TEST(ImportParaView, CornersAndWindowsOfACave) {
   EXPECT_EQ(wall.screens[1].upper_left, glm::dvec3(-1.5, 1, -1)) << "older files have the upper left corner";
   EXPECT_EQ(wall.screens[1].pixels, (Size{1620, 1080})) << "square pixels, as high as --pixels says";
   EXPECT_EQ(wall.nodes[1].host, "front");
-  EXPECT_TRUE(wall.viewers.front().given);
+  EXPECT_TRUE(wall.viewers.front().has_position);
   EXPECT_EQ(wall.viewers.front().position, glm::dvec3(0));
 }
 
@@ -123,7 +123,7 @@ TEST(ImportParaView, TilesAndMullionsRowByRow) {
   EXPECT_EQ(wall.screens[2].node, "n2");
   EXPECT_EQ(wall.screens[3].node, "n0");
   EXPECT_EQ(wall.nodes[0].ranks, 2);
-  EXPECT_FALSE(wall.viewers.front().given);
+  EXPECT_FALSE(wall.viewers.front().has_position);
 }
 
 TEST(ImportParaView, MachinesWithoutNamesAreHostsOfTheirOwn) {
@@ -231,7 +231,7 @@ TEST(ImportOspray, MullionsShrinkTheScreen) {
   EXPECT_NEAR(screen.lower_left.z, 0.6134 - 0.011326, 1e-12);
   EXPECT_EQ(wall.windows[0].rect, (Rect{30, 40, 3870, 2200}));
   EXPECT_EQ(wall.nodes[0].host, "r07");
-  EXPECT_TRUE(wall.viewers.front().given);
+  EXPECT_TRUE(wall.viewers.front().has_position);
   EXPECT_EQ(wall.viewers.front().position, glm::dvec3(0, 0, 0.5));
 }
 

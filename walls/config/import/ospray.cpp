@@ -82,10 +82,10 @@ ImportedWall import_ospray(std::string_view text, const std::string& name, const
     window.node = node_of_host(wall, file.text(entry, path, "hostName", "localhost"));
     if (entry.contains("eye")) {
       const glm::dvec3 eye = read_point(file, entry, path, "eye");
-      several_eyes =
-          several_eyes || (wall.viewers.front().given && glm::distance(eye, wall.viewers.front().position) > 1e-9);
-      if (!wall.viewers.front().given) wall.viewers.front().position = eye;
-      wall.viewers.front().given = true;
+      several_eyes = several_eyes ||
+                     (wall.viewers.front().has_position && glm::distance(eye, wall.viewers.front().position) > 1e-9);
+      if (!wall.viewers.front().has_position) wall.viewers.front().position = eye;
+      wall.viewers.front().has_position = true;
     }
     wall.windows.push_back(std::move(window));
     wall.screens.push_back(std::move(screen));

@@ -15,7 +15,7 @@ using Element = tinyxml2::XMLElement;
 /// A server process of ParaView with the window it opens.
 struct Machine {
   const Element* element = nullptr;
-  std::string host;     ///< may be empty: processes are told apart by their rank alone
+  std::string host;     ///< may be empty: then only their ranks distinguish processes
   std::string display;  ///< may be empty
   Rect window;          ///< may be empty
 };
@@ -48,7 +48,7 @@ Machine read_machine(const XmlFile& file, const Element& element) {
   return machine;
 }
 
-/// The one that says where servers draw; the file's root where there is none.
+/// The element of the process that draws; the file's root where there is none.
 const Element& server_process(const Element& root) {
   const Element* chosen = &root;
   for (const Element* const process : XmlFile::children(root, "Process")) {
@@ -89,9 +89,9 @@ void import_tiles(const XmlFile& file, const Element& process, const std::vector
               fmt::format("it may have {}", kMaxScreens));
   }
   grid.panel = settings.pixels;
-  const bool told = !machines.empty() && !machines.front().window.empty();
-  if (told) grid.panel = {machines.front().window.width(), machines.front().window.height()};
-  if (!told) {
+  const bool has_size = !machines.empty() && !machines.front().window.empty();
+  if (has_size) grid.panel = {machines.front().window.width(), machines.front().window.height()};
+  if (!has_size) {
     into.remarks.push_back(
         fmt::format("The file does not tell the tiles' pixels: they are {}x{} here, or as --pixels says.",
                     grid.panel.width, grid.panel.height));
@@ -102,23 +102,23 @@ void import_tiles(const XmlFile& file, const Element& process, const std::vector
   into.remarks.push_back(pitch_remark(settings));
   std::vector<ForeignTile> tiles;
   for (std::size_t i = 0; i < machines.size(); ++i) {
-    const int place = static_cast<int>(i);
-    if (place >= grid.columns * grid.rows) {
+    const int index = static_cast<int>(i);
+    if (index >= grid.columns * grid.rows) {
       into.remarks.push_back(fmt::format("The last {} machines drive no tile and were left out.", machines.size() - i));
       break;
     }
     const Machine& machine = machines[i];
     const Size size{machine.window.width(), machine.window.height()};
-    if (told && size != grid.panel) {
+    if (has_size && size != grid.panel) {
       file.fail(*machine.element, "its Geometry has another size than the first machine's", "tiles are of one size");
     }
-    tiles.push_back({.column = place % grid.columns,
-                     .row = place / grid.columns,
+    tiles.push_back({.column = index % grid.columns,
+                     .row = index / grid.columns,
                      .node = node_of(into.wall, machine),
                      .display = machine.display,
                      .x = machine.window.x0,
                      .y = machine.window.y0,
-                     .placed = told});
+                     .placed = has_size});
   }
   add_grid(grid, tiles, into);
 }
@@ -166,7 +166,7 @@ void import_corners(const XmlFile& file, const std::vector<Machine>& machines, c
     into.wall.windows.push_back(std::move(window));
     into.wall.screens.push_back(std::move(screen));
   }
-  into.wall.viewers.front().given = true;  // ParaView's stands where its corners are measured from
+  into.wall.viewers.front().has_position = true;  // ParaView's stands where its corners are measured from
   if (assumed) {
     into.remarks.push_back(
         fmt::format("The file does not tell all screens' pixels: those have square ones, {} high, or as --pixels says.",

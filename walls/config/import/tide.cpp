@@ -56,9 +56,9 @@ class TideReader {
     grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMaxScreenSide, 0);
     grid.pitch_m = 1.0;
     const double width_pixels = grid_width(grid);
-    const std::vector<Json>& metres = file_.array(surface, path, "dimensions");
-    if (metres.size() == 2 && metres[0].is_number() && metres[0].get<double>() > 0.0) {
-      grid.pitch_m = metres[0].get<double>() / width_pixels;
+    const std::vector<Json>& size_m = file_.array(surface, path, "dimensions");
+    if (size_m.size() == 2 && size_m[0].is_number() && size_m[0].get<double>() > 0.0) {
+      grid.pitch_m = size_m[0].get<double>() / width_pixels;
     } else {
       grid.pitch_m = settings_.pitch_m;
       by_pitch_ = true;
@@ -91,7 +91,7 @@ class TideReader {
     tile.row = file_.integer(screen, path, "j", 0, grid.rows - 1, 0);
     tile.x = file_.integer(screen, path, "x", -kMaxScreenSide, kMaxScreenSide, 0);
     tile.y = file_.integer(screen, path, "y", -kMaxScreenSide, kMaxScreenSide, 0);
-    const auto [other, fresh] = places_.emplace(std::array{surface, tile.column, tile.row}, path);
+    const auto [other, fresh] = positions_.emplace(std::array{surface, tile.column, tile.row}, path);
     if (!fresh) {
       file_.fail(path, fmt::format("screen i {}, j {} is driven twice", tile.column, tile.row),
                  fmt::format("the other one is {}", other->second));
@@ -122,7 +122,7 @@ class TideReader {
   std::vector<ForeignGrid> grids_;
   double panels_ = 0.0;                          ///< of all surfaces
   std::vector<std::vector<ForeignTile>> tiles_;  ///< of grids_
-  std::map<std::array<int, 3>, std::string> places_;
+  std::map<std::array<int, 3>, std::string> positions_;
   double right_m_ = 0.0;  ///< where the next surface begins
   bool by_pitch_ = false;
   int right_eyes_ = 0;
