@@ -4,7 +4,7 @@
 usage: docs_test.py HPR ROOT [--write]
 
 docs/cli.md holds `hpr help --markdown`, docs/knobs.md `hpr help knobs --markdown`, docs/quality.md `hpr help quality
---markdown`, each between its first table's line and the next heading of the file, or its end. Every option of every
+--markdown`, docs/walls.md `hpr wall schema --markdown`, each between two marks. Every option of every
 command's --help stands in docs/cli.md. --write puts the program's words into the files.
 """
 
@@ -15,7 +15,7 @@ import sys
 from program import expect, failures, run
 
 GENERATED = {"cli.md": ["help", "--markdown"], "knobs.md": ["help", "knobs", "--markdown"],
-             "quality.md": ["help", "quality", "--markdown"]}
+             "quality.md": ["help", "quality", "--markdown"], "walls.md": ["wall", "schema", "--markdown"]}
 OPTION = re.compile(r"^ {2}(?:-\w,)?(--[a-z-]+)", re.MULTILINE)
 COMMAND = re.compile(r"^ {2}([a-z]+) {2,}", re.MULTILINE)
 

@@ -16,7 +16,7 @@
 #include "walls/config/wall_file.h"
 #include "walls/link/display_process.h"
 #include "walls/link/hosts.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {

@@ -2,7 +2,7 @@
 #include "app/command.h"
 #include "app/commands/wall_run.h"
 #include "core/job_environment.h"
-#include "walls/displays/window_display.h"
+#include "walls/displays/display.h"
 
 namespace hpr {
 namespace {

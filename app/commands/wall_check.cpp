@@ -16,9 +16,8 @@
 #include "image/key.h"
 #include "walls/config/wall_file.h"
 #include "walls/drawing/plan.h"
+#include "walls/geometry/curved.h"
 #include "walls/geometry/geometry.h"
-#include "walls/geometry/stereo.h"
-#include "walls/geometry/warp_figures.h"
 
 namespace hpr {
 namespace {
@@ -115,7 +114,7 @@ std::string describe_memory(const Wall& wall) {
 std::string describe_first_viewer(const Wall& wall, bool flat) {
   const WallViewer& viewer = wall.viewers.front();
   const glm::dvec3 at = viewer.position;
-  if (viewer.given) {
+  if (viewer.has_position) {
     return fmt::format("viewer: at {:g}, {:g}, {:g} m; the wall is a window into the scene\n", at.x, at.y, at.z);
   }
   if (flat) return "viewer: none given; the wall shows what the camera sees\n";
@@ -237,8 +236,8 @@ std::string check_json(const WallCheck& check) {
   Json findings = Json::array();
   for (const WallFinding& finding : check.reading.findings) {
     findings.push_back({{"severity", finding.error ? "error" : "warning"},
-                        {"line", finding.place.line},
-                        {"column", finding.place.column},
+                        {"line", finding.position.line},
+                        {"column", finding.position.column},
                         {"what", finding.what},
                         {"text", finding.line},
                         {"hint", finding.hint}});
@@ -259,7 +258,7 @@ std::string check_json(const WallCheck& check) {
     document["seams"] = {{"count", figures.seams.count},
                          {"whole_pixel_error_px", figures.seams.largest_error_px},
                          {"accumulated_error_px", figures.seams.accumulated_error_px}};
-    document["viewer_given"] = wall.viewers.front().given;
+    document["viewer_given"] = wall.viewers.front().has_position;
     document["viewers"] = wall.viewers.size();
     document["stereo"] = stereo_names().at(static_cast<std::size_t>(wall.stereo));
     document["pictures"] = screen_eyes(wall).size();

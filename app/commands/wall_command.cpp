@@ -10,10 +10,9 @@
 #include "core/text.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
-#include "walls/config/wall_schema.h"
-#include "walls/drawing/heat.h"
+#include "walls/config/wall_keys.h"
 #include "walls/drawing/plan.h"
-#include "walls/manifest/manifest_file.h"
+#include "walls/manifest/manifest.h"
 
 namespace hpr {
 
@@ -103,10 +102,17 @@ class WallSchemaCommand final : public Command {
     return "what a wall file may hold, as a JSON Schema (draft 2020-12)";
   }
 
+  void declare(const OptionSet& options) override {
+    options.flag("--markdown", markdown_, "the tables of keys of docs/walls.md instead");
+  }
+
   [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
-    fmt::print("{}", wall_schema());
+    fmt::print("{}", markdown_ ? wall_keys_markdown() : wall_schema());
     return ExitCode::Done;
   }
+
+ private:
+  bool markdown_ = false;
 };
 
 class WallCommand final : public CommandGroup {

@@ -10,7 +10,6 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "engine/output.h"
-#include "walls/config/host_list.h"
 #include "walls/config/import/importer.h"
 #include "walls/config/wall_file.h"
 #include "walls/config/wall_template.h"
@@ -46,7 +45,7 @@ class WallInitCommand final : public Command {
     options.option("--hosts", hosts_, "as Slurm writes them: wall0[1-9] or a[01-03,07],b2 (default: this machine)")
         .type("LIST");
     options.option("--tiles-per-host", wall_.tiles_per_host, "neighbours each drives (default: shared out evenly)")
-        .range(1, kMostScreens);
+        .range(1, kMaxScreens);
     options.option("--ranks-per-host", wall_.ranks_per_host, "render processes on each").range(1, 4096).show_default();
     options.option("--tile-pixels", pixels_, "of a screen (default: 1920x1080; on this machine 640x360)").type("WxH");
     options.option("--tile-size-m", size_, "a screen's lit area in metres (default: of a 46 inch panel)").type("WxH");
@@ -126,7 +125,7 @@ class WallImportCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
     const auto extent = parse_extent(pixels_);
-    if (!extent || extent->first > kMostScreenSide || extent->second > kMostScreenSide) {
+    if (!extent || extent->first > kMaxScreenSide || extent->second > kMaxScreenSide) {
       throw Error(ExitCode::Usage, fmt::format("--pixels: '{}' is no size of a screen", pixels_),
                   "write e.g. 1920x1080");
     }

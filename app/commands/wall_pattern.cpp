@@ -13,7 +13,6 @@
 #include "engine/output.h"
 #include "engine/wall/wall_displays.h"
 #include "walls/config/wall_file.h"
-#include "walls/drawing/frame_counter.h"
 #include "walls/drawing/pattern.h"
 #include "walls/link/hosts.h"
 #include "walls/link/sender.h"

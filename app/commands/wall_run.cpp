@@ -30,7 +30,7 @@
 #include "image/image_io.h"
 #include "rt/passes/pass_list.h"
 #include "walls/config/wall_file.h"
-#include "walls/displays/file_display.h"
+#include "walls/displays/display.h"
 #include "walls/drawing/assemble.h"
 #include "walls/geometry/geometry.h"
 #include "walls/link/sender.h"
@@ -81,7 +81,7 @@ void write_results(const WallJob& job, const WallDriver& driver, const RunStats&
   const WallOutputs& outputs = job.outputs;
   if (!outputs.assembled.empty() || !outputs.picture.empty()) {
     const std::vector<std::byte> picture =
-        encode_png(draw_wall(job.wall, wall_picture(job.wall, kLargestPicture), pictures));
+        encode_png(draw_wall(job.wall, wall_picture(job.wall, kMaxPictureSide), pictures));
     if (!outputs.assembled.empty()) write_file_atomically(outputs.assembled, picture);
     if (!outputs.picture.empty()) write_file_atomically(outputs.picture, picture);
   }

@@ -7,8 +7,8 @@
 #include "app/results.h"
 #include "core/text.h"
 #include "engine/output.h"
-#include "walls/config/host_list.h"
 #include "walls/config/wall_file.h"
+#include "walls/config/wall_template.h"
 #include "walls/displays/display.h"
 #include "walls/link/hosts.h"
 

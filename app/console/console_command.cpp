@@ -28,7 +28,7 @@
 #include "engine/wall/command_table.h"
 #include "engine/wall/controls.h"
 #include "engine/wall/line_source.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 

@@ -14,7 +14,7 @@
 #include "core/text.h"
 #include "walls/codecs/codec.h"
 #include "walls/link/hosts.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {

@@ -13,7 +13,7 @@
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
 #include "core/log.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {

@@ -17,8 +17,8 @@
 #include "engine/session.h"
 #include "engine/wall/command_table.h"
 #include "engine/wall/line_source.h"
-#include "walls/link/bytes.h"
 #include "walls/link/hosts.h"
+#include "walls/link/protocol.h"
 #include "walls/link/socket.h"
 
 namespace hpr {

@@ -10,7 +10,7 @@
 
 #include "core/timing.h"
 #include "scene/scene.h"
-#include "walls/tracking/head.h"
+#include "walls/tracking/head_path.h"
 
 namespace hpr {
 

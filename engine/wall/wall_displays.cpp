@@ -13,9 +13,8 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "walls/drawing/assemble.h"
-#include "walls/link/bytes.h"
+#include "walls/link/protocol.h"
 #include "walls/link/sender.h"
-#include "walls/link/token.h"
 #include "walls/manifest/manifest.h"
 #include "walls/manifest/run_journal.h"
 
@@ -187,7 +186,7 @@ std::vector<Image<Rgba8>> WallMonitors::draw(Communicator& comm, std::span<const
     const MonitorLayout& layout = layouts_[m];
     std::vector<Image<Rgba8>> parts(layout.screens.size());
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      const Size size{layout.places[i].width(), layout.places[i].height()};
+      const Size size{layout.rects[i].width(), layout.rects[i].height()};
       const int from = shown_by[layout.screens[i]];
       if (comm.rank() == from) parts[i] = resample(pictures[layout.screens[i]], size);
       if (from == 0) continue;

@@ -7,7 +7,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
-#include "walls/geometry/monitors.h"
+#include "walls/drawing/assemble.h"
 
 namespace hpr {
 

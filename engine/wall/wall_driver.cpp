@@ -25,7 +25,7 @@
 #include "raster/gl_context.h"
 #include "walls/geometry/geometry.h"
 #include "walls/link/sender.h"
-#include "walls/manifest/manifest_file.h"
+#include "walls/manifest/manifest.h"
 #include "walls/manifest/run_journal.h"
 
 namespace hpr {

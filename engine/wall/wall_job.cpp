@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "walls/geometry/stereo.h"
+#include "walls/geometry/geometry.h"
 
 namespace hpr {
 namespace {

@@ -34,7 +34,7 @@ View view_of(const Beside& beside, double distance) {
   Wall wall;
   wall.screens = {screen};
   wall.viewers.front().position = {beside.x, beside.y, distance};
-  wall.viewers.front().given = true;
+  wall.viewers.front().has_position = true;
   wall.viewers.front().near_m = 0.5 * distance;
   wall.viewers.front().clamp_distance_m = 0.5 * distance;
   Camera camera;

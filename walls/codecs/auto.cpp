@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/error.h"
 #include "core/log.h"
 #include "core/timing.h"
 #include "walls/codecs/coder.h"
@@ -13,6 +14,17 @@ namespace {
 constexpr std::size_t kTriesEach = 2;  // the first one also pays for fresh memory
 
 }  // namespace
+
+double seconds_per_byte(const CodecRate& rate, const CodecLink& link) {
+  HPR_CHECK(link.bytes_per_second > 0.0 && link.cores > 0);
+  return (rate.encode_s_per_byte + rate.decode_s_per_byte) / link.cores + rate.size / link.bytes_per_second;
+}
+
+std::string choose_codec(std::span<const CodecRate> rates, const CodecLink& link) {
+  HPR_CHECK(!rates.empty());
+  return std::ranges::min_element(rates, {}, [&](const CodecRate& rate) { return seconds_per_byte(rate, link); })
+      ->codec;
+}
 
 AutoCodec::AutoCodec(const CodecSettings& settings) : settings_(settings) {
   for (const CoderKind& kind : all_coders()) {
@@ -31,7 +43,7 @@ std::vector<std::byte> AutoCodec::encode(const Image<Rgba8>& picture) {
 std::vector<std::byte> AutoCodec::try_next(const Image<Rgba8>& picture) {
   const std::size_t turn = tries_++ % codecs_.size();
   Codec& codec = *codecs_[turn];
-  codec.restart();  // whole pictures tell most, and what the receiver saw last came by another codec
+  codec.restart();  // whole pictures measure best, and what the receiver saw last came by another codec
   const auto pixel_bytes = static_cast<double>(picture.pixels().size_bytes());
   const Stopwatch encoding;
   std::vector<std::byte> bytes = codec.encode(picture);

@@ -14,13 +14,10 @@
 namespace hpr {
 
 std::span<const CoderKind> all_coders() {
-  static constexpr std::array kKinds{
-      CoderKind{"raw", [](const CodecSettings&) { return make_raw_coder(); }},
-      CoderKind{"lz4", make_lz4_coder},
-      CoderKind{"zstd", make_zstd_coder},
-      CoderKind{"jpeg", make_jpeg_coder, true},
-  };
-  return kKinds;
+#define HPR_LIST_CODER(name) name##_coder(),
+  static const std::array kinds{HPR_CODERS(HPR_LIST_CODER)};
+#undef HPR_LIST_CODER
+  return kinds;
 }
 
 const std::vector<std::string>& all_codecs() {
@@ -44,7 +41,7 @@ std::unique_ptr<Codec> make_codec(std::string_view name, const CodecSettings& se
     throw Error(ExitCode::Usage, "a link has bytes per second and a codec has cores", "say more than 0");
   }
   if (name == "auto") return std::make_unique<AutoCodec>(settings);
-  const auto kinds = all_coders();
+  const std::span<const CoderKind> kinds = all_coders();
   const auto found = std::ranges::find(kinds, name, &CoderKind::name);
   if (found != kinds.end()) {
     return std::make_unique<StreamCodec>(static_cast<std::size_t>(found - kinds.begin()), settings);

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "walls/codecs/envelope.h"
+#include "walls/codecs/stream_codec.h"
 
 namespace hpr {
 namespace {

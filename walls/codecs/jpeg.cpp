@@ -1,3 +1,6 @@
+#include "walls/codecs/jpeg.h"
+
+#include <fmt/format.h>
 #include <turbojpeg.h>
 
 #include <algorithm>
@@ -5,12 +8,13 @@
 #include <cstring>
 #include <new>
 
+#include "core/error.h"
 #include "walls/codecs/coder.h"
-#include "walls/codecs/jpeg_encoder.h"
-#include "walls/codecs/zstd_stream.h"
 
 namespace hpr {
 namespace {
+
+constexpr int kMaxSide = 65500;  // libjpeg's
 
 struct FreeTurbo {
   void operator()(void* handle) const { tjDestroy(handle); }
@@ -36,8 +40,8 @@ class StepTable {
 
  private:
   [[nodiscard]] static std::size_t index(int difference) {
-    const int place = 255 + difference;
-    return static_cast<std::size_t>(place);
+    const int shifted = 255 + difference;
+    return static_cast<std::size_t>(shifted);
   }
 
   std::array<std::uint8_t, 511> steps_{};
@@ -47,7 +51,7 @@ std::uint8_t corrected(std::uint8_t level, std::uint8_t steps, int step) {
   return static_cast<std::uint8_t>(std::clamp(level + static_cast<std::int8_t>(steps) * step, 0, 255));
 }
 
-/// With a bound, what the receiver will see is looked at here, and a second part corrects it: per pixel the steps of
+/// JPEG, and where an error is bounded a second part that corrects what the receiver decodes: per pixel the steps of
 /// 2 error + 1 that bring r, g and b within the bound, mostly 0, and what alpha lacks, as one Zstandard frame.
 class JpegCoder final : public Coder {
  public:
@@ -145,8 +149,37 @@ class JpegCoder final : public Coder {
 
 }  // namespace
 
-std::unique_ptr<Coder> make_jpeg_coder(const CodecSettings& settings) {
-  return std::make_unique<JpegCoder>(settings);
+void JpegEncoder::Destroy::operator()(void* handle) const {
+  tjDestroy(handle);
+}
+
+JpegEncoder::JpegEncoder() : compressor_(tjInitCompress()) {
+  if (!compressor_) throw std::bad_alloc();
+}
+
+void JpegEncoder::append(const Image<Rgba8>& picture, int quality, std::vector<std::byte>& into) {
+  HPR_CHECK(!picture.pixels().empty());
+  if (std::max(picture.width(), picture.height()) > kMaxSide) {
+    throw Error(ExitCode::Limit,
+                fmt::format("jpeg cannot take a picture of {}x{} pixels", picture.width(), picture.height()),
+                "use zstd");
+  }
+  const std::size_t start = into.size();
+  unsigned long size = tjBufSize(picture.width(), picture.height(), TJSAMP_444);
+  into.resize(start + size);
+  auto* into_bytes = reinterpret_cast<unsigned char*>(into.data() + start);
+  const int failed = tjCompress2(compressor_.get(), reinterpret_cast<const unsigned char*>(picture.pixels().data()),
+                                 picture.width(), 0, picture.height(), TJPF_RGBX, &into_bytes, &size, TJSAMP_444,
+                                 quality, TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT);
+  if (failed != 0) {
+    throw Error(ExitCode::Internal,
+                fmt::format("libjpeg-turbo cannot compress a picture: {}", tjGetErrorStr2(compressor_.get())));
+  }
+  into.resize(start + size);
+}
+
+CoderKind jpeg_coder() {
+  return {"jpeg", make_coder<JpegCoder>, true};
 }
 
 }  // namespace hpr

@@ -5,7 +5,6 @@
 
 #include "core/error.h"
 #include "walls/codecs/coder.h"
-#include "walls/codecs/pixel_planes.h"
 
 namespace hpr {
 namespace {
@@ -86,8 +85,8 @@ class Lz4Coder final : public Coder {
 
 }  // namespace
 
-std::unique_ptr<Coder> make_lz4_coder(const CodecSettings& settings) {
-  return std::make_unique<Lz4Coder>(settings);
+CoderKind lz4_coder() {
+  return {"lz4", make_coder<Lz4Coder>};
 }
 
 }  // namespace hpr

@@ -1,9 +1,8 @@
-#include "walls/codecs/pixel_planes.h"
-
 #include <algorithm>
 #include <cstddef>
 
 #include "core/error.h"
+#include "walls/codecs/coder.h"
 
 // Highway compiles this file once per instruction set by including it again.
 #undef HWY_TARGET_INCLUDE

@@ -1,9 +1,9 @@
-#include "walls/codecs/pixel_planes.h"
-
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
 #include <functional>
+
+#include "walls/codecs/coder.h"
 
 namespace hpr {
 namespace {

@@ -8,6 +8,8 @@ namespace {
 /// The pixels as they are.
 class RawCoder final : public Coder {
  public:
+  explicit RawCoder(const CodecSettings& /*settings*/) {}
+
   [[nodiscard]] std::string_view name() const override { return "raw"; }
 
   void encode(const Image<Rgba8>& picture, std::vector<std::byte>& into, Image<Rgba8>* seen) override {
@@ -25,8 +27,8 @@ class RawCoder final : public Coder {
 
 }  // namespace
 
-std::unique_ptr<Coder> make_raw_coder() {
-  return std::make_unique<RawCoder>();
+CoderKind raw_coder() {
+  return {"raw", make_coder<RawCoder>};
 }
 
 }  // namespace hpr

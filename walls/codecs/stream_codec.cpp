@@ -3,11 +3,155 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 
+#include "core/bytes.h"
 #include "core/error.h"
-#include "walls/codecs/changed_tiles.h"
+#include "walls/codecs/coder.h"
 
 namespace hpr {
+namespace {
+
+std::uint64_t checksum_of(std::span<const std::byte> bytes) {
+  ContentHash hash;
+  hash.add(bytes.first(offsetof(Envelope, checksum)));
+  hash.add(bytes.subspan(sizeof(Envelope)));
+  return hash.value();
+}
+
+std::size_t across(Size picture) {
+  return static_cast<std::size_t>((picture.width + kDeltaSide - 1) / kDeltaSide);
+}
+
+std::size_t down(Size picture) {
+  return static_cast<std::size_t>((picture.height + kDeltaSide - 1) / kDeltaSide);
+}
+
+/// Where tile `index` lies in a picture.
+Rect rect_of(std::size_t index, Size picture) {
+  const int x = static_cast<int>(index % across(picture)) * kDeltaSide;
+  const int y = static_cast<int>(index / across(picture)) * kDeltaSide;
+  return {x, y, std::min(x + kDeltaSide, picture.width), std::min(y + kDeltaSide, picture.height)};
+}
+
+template <typename Pixel>
+std::span<Pixel> part(std::span<Pixel> row, int from, int count) {
+  return row.subspan(static_cast<std::size_t>(from), static_cast<std::size_t>(count));
+}
+
+bool differs(const Image<Rgba8>& before, const Image<Rgba8>& now, const Rect& rect, int error) {
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    if (!all_within(part(before.row(y), rect.x0, rect.width()), part(now.row(y), rect.x0, rect.width()), error)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+void throw_damaged(std::string_view what) {
+  throw Error(ExitCode::BadInput, fmt::format("an encoded picture is damaged: {}", what), "have the sender restart");
+}
+
+void seal(Envelope& envelope, std::vector<std::byte>& bytes) {
+  HPR_CHECK(bytes.size() >= sizeof(Envelope));
+  envelope.payload_bytes = bytes.size() - sizeof(Envelope);
+  std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
+  envelope.checksum = checksum_of(bytes);
+  std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
+}
+
+Opened open_envelope(std::span<const std::byte> bytes, Size size) {
+  if (bytes.size() < sizeof(Envelope)) throw_damaged(fmt::format("it has only {} bytes", bytes.size()));
+  Envelope envelope;
+  std::memcpy(&envelope, bytes.data(), sizeof(Envelope));
+  const std::span<const std::byte> payload = bytes.subspan(sizeof(Envelope));
+  if (envelope.magic != Envelope{}.magic) throw_damaged("it does not begin as one");
+  if (envelope.version != Envelope{}.version) {
+    throw Error(ExitCode::BadInput, fmt::format("an encoded picture is of version {}, not 1", envelope.version),
+                "run the same version of hpr on all hosts");
+  }
+  if (envelope.payload_bytes != payload.size()) {
+    throw_damaged(fmt::format("{} bytes follow, not {}", payload.size(), envelope.payload_bytes));
+  }
+  if (envelope.checksum != checksum_of(bytes)) throw_damaged("its checksum differs");
+  if (Size{static_cast<int>(envelope.width), static_cast<int>(envelope.height)} != size) {
+    throw Error(ExitCode::BadInput,
+                fmt::format("an encoded picture is of {}x{} pixels, but {}x{} are expected", envelope.width,
+                            envelope.height, size.width, size.height),
+                "use the same wall file on both sides");
+  }
+  if (envelope.coder >= all_coders().size()) throw_damaged("its codec is unknown");
+  return {envelope, payload};
+}
+
+std::size_t delta_tile_count(Size picture) {
+  return across(picture) * down(picture);
+}
+
+std::vector<std::size_t> changed_tiles(const Image<Rgba8>& before, const Image<Rgba8>& now, int error) {
+  HPR_CHECK(before.size() == now.size());
+  std::vector<std::size_t> changed;
+  for (std::size_t tile = 0; tile < delta_tile_count(now.size()); ++tile) {
+    if (differs(before, now, rect_of(tile, now.size()), error)) changed.push_back(tile);
+  }
+  return changed;
+}
+
+Size packed_size(Size picture, std::size_t tiles) {
+  // No wider than the picture, so that what a codec takes as a picture it takes as tiles.
+  const std::size_t columns = std::min(tiles, across(picture));
+  if (columns == 0) return {};
+  const std::size_t rows = (tiles + columns - 1) / columns;
+  return {static_cast<int>(columns) * kDeltaSide, static_cast<int>(rows) * kDeltaSide};
+}
+
+Image<Rgba8> pack_tiles(const Image<Rgba8>& picture, std::span<const std::size_t> tiles) {
+  Image<Rgba8> packed(packed_size(picture.size(), tiles.size()));
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const Rect from = rect_of(tiles[i], picture.size());
+    const Rect into = rect_of(i, packed.size());
+    for (int y = 0; y < from.height(); ++y) {
+      std::ranges::copy(part(picture.row(from.y0 + y), from.x0, from.width()),
+                        part(packed.row(into.y0 + y), into.x0, from.width()).begin());
+    }
+  }
+  return packed;
+}
+
+void unpack_tiles(const Image<Rgba8>& packed, std::span<const std::size_t> tiles, Image<Rgba8>& picture) {
+  HPR_CHECK(packed.size() == packed_size(picture.size(), tiles.size()));
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const Rect from = rect_of(i, packed.size());
+    const Rect into = rect_of(tiles[i], picture.size());
+    for (int y = 0; y < into.height(); ++y) {
+      std::ranges::copy(part(packed.row(from.y0 + y), from.x0, into.width()),
+                        part(picture.row(into.y0 + y), into.x0, into.width()).begin());
+    }
+  }
+}
+
+std::size_t tile_bits_size(Size picture) {
+  return (delta_tile_count(picture) + 7) / 8;
+}
+
+void append_bits(std::span<const std::size_t> tiles, Size picture, std::vector<std::byte>& into) {
+  const std::size_t start = into.size();
+  into.resize(start + tile_bits_size(picture));
+  for (const std::size_t tile : tiles) into[start + tile / 8] |= std::byte{1} << (tile % 8);
+}
+
+std::vector<std::size_t> read_bits(std::span<const std::byte> bytes, Size picture) {
+  HPR_CHECK(bytes.size() == tile_bits_size(picture));
+  std::vector<std::size_t> tiles;
+  for (std::size_t bit = 0; bit < bytes.size() * 8; ++bit) {
+    if ((bytes[bit / 8] & (std::byte{1} << (bit % 8))) == std::byte{0}) continue;
+    if (bit >= delta_tile_count(picture)) throw_damaged("it names tiles the picture does not have");
+    tiles.push_back(bit);
+  }
+  return tiles;
+}
 
 StreamCodec::StreamCodec(std::size_t coder, const CodecSettings& settings)
     : own_(coder), settings_(settings), coders_(all_coders().size()) {}
@@ -69,8 +213,8 @@ void StreamCodec::decode(std::span<const std::byte> bytes, Image<Rgba8>& picture
   if (envelope.has(Envelope::kTiles)) {
     decode_tiles(opened, picture);
   } else if (!picture.pixels().empty()) {
-    coder(envelope.coder).decode(opened.body, envelope.error, picture);
-  } else if (!opened.body.empty()) {
+    coder(envelope.coder).decode(opened.payload, envelope.error, picture);
+  } else if (!opened.payload.empty()) {
     throw_damaged("it has no pixels, but bytes");
   }
   received_.known = envelope.has(Envelope::kKeep);
@@ -90,9 +234,9 @@ void StreamCodec::decode_tiles(const Opened& opened, Image<Rgba8>& picture) {
         "have the sender restart");
   }
   const std::size_t bits = tile_bits_size(picture.size());
-  if (opened.body.size() < bits) throw_damaged("its list of tiles is cut short");
-  const std::vector<std::size_t> tiles = read_bits(opened.body.first(bits), picture.size());
-  const std::span<const std::byte> coded = opened.body.subspan(bits);
+  if (opened.payload.size() < bits) throw_damaged("its list of tiles is cut short");
+  const std::vector<std::size_t> tiles = read_bits(opened.payload.first(bits), picture.size());
+  const std::span<const std::byte> coded = opened.payload.subspan(bits);
   if (!tiles.empty()) {
     Image<Rgba8> packed(packed_size(picture.size(), tiles.size()));
     coder(envelope.coder).decode(coded, envelope.error, packed);

@@ -1,12 +1,71 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
+#include "image/color.h"
+#include "image/image.h"
 #include "walls/codecs/codec.h"
 #include "walls/codecs/coder.h"
-#include "walls/codecs/envelope.h"
 
 namespace hpr {
+
+/// What stands before every encoded picture; little-endian.
+struct Envelope {
+  static constexpr std::uint8_t kTiles = 1;  ///< flag: holds only the tiles that differ from `base`
+  static constexpr std::uint8_t kKeep = 2;   ///< flag: a later picture may build on this one
+
+  std::uint32_t magic = 0x43525048;  ///< "HPRC"
+  std::uint8_t version = 1;
+  std::uint8_t coder = 0;  ///< index into all_coders()
+  std::uint8_t flags = 0;
+  std::uint8_t error = 0;  ///< of the encoder's settings
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint64_t number = 0;         ///< of the picture in its stream, from 1
+  std::uint64_t base = 0;           ///< with kTiles: the checksum of the picture this one builds on
+  std::uint64_t payload_bytes = 0;  ///< what follows
+  std::uint64_t checksum = 0;       ///< xxh64 of all above and of the payload
+
+  [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
+};
+static_assert(sizeof(Envelope) == 48);
+
+/// `bytes` begins with room for an envelope; the rest is the payload. Fills in size and checksum of `envelope` and
+/// writes it there.
+void seal(Envelope& envelope, std::vector<std::byte>& bytes);
+
+struct Opened {
+  Envelope envelope;
+  std::span<const std::byte> payload;
+};
+
+/// Throws Error (BadInput) unless every bit is as it was sealed and the picture is of `size`.
+[[nodiscard]] Opened open_envelope(std::span<const std::byte> bytes, Size size);
+
+/// Squares of 64 pixels a side, row by row; those at the right and lower border may be smaller.
+constexpr int kDeltaSide = 64;
+
+[[nodiscard]] std::size_t delta_tile_count(Size picture);
+
+/// Indices of the tiles of `now` with a pixel outside `error` of `before` (all_within); equal sizes.
+[[nodiscard]] std::vector<std::size_t> changed_tiles(const Image<Rgba8>& before, const Image<Rgba8>& now, int error);
+
+/// The size of a picture that holds so many tiles of a picture side by side.
+[[nodiscard]] Size packed_size(Size picture, std::size_t tiles);
+
+/// These tiles side by side; what they do not fill is 0.
+[[nodiscard]] Image<Rgba8> pack_tiles(const Image<Rgba8>& picture, std::span<const std::size_t> tiles);
+/// Back into their places.
+void unpack_tiles(const Image<Rgba8>& packed, std::span<const std::size_t> tiles, Image<Rgba8>& picture);
+
+/// One bit per tile, set for `tiles`, and back. Throws Error (BadInput) for bits past the last tile; `bytes` has the
+/// length of what append_bits appended.
+[[nodiscard]] std::size_t tile_bits_size(Size picture);
+void append_bits(std::span<const std::size_t> tiles, Size picture, std::vector<std::byte>& into);
+[[nodiscard]] std::vector<std::size_t> read_bits(std::span<const std::byte> bytes, Size picture);
 
 /// One coder's pictures in envelopes, whole or as the tiles that changed.
 class StreamCodec final : public Codec {

@@ -68,15 +68,15 @@ std::optional<double> radius_of_arc(const WallGrid& grid, double angle) {
   double low = 0.5 * grid.tile_width_m;
   if (turned_by(grid, low) < angle) return std::nullopt;
   double high = low;
-  constexpr double kStraightest = 1e9;
+  constexpr double kMaxRadius = 1e9;
   while (turned_by(grid, high) > angle) {
     high *= 2.0;
-    if (high > kStraightest) return std::nullopt;
+    if (high > kMaxRadius) return std::nullopt;
   }
   constexpr int kHalvings = 200;
   for (int i = 0; i < kHalvings; ++i) {
-    const double middle = 0.5 * (low + high);
-    (turned_by(grid, middle) > angle ? low : high) = middle;
+    const double radius = 0.5 * (low + high);
+    (turned_by(grid, radius) > angle ? low : high) = radius;
   }
   return 0.5 * (low + high);
 }

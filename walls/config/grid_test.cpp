@@ -82,7 +82,7 @@ TEST(CurvedGrid, AHardlyCurvedWallIsTheFlatOne) {
 TEST(CurvedGrid, FrustaGoThroughItsCorners) {
   Wall wall = curved("curve = { angle_degrees = 120 }");
   wall.viewers.front().position = {0.4, 1.6, -0.3};
-  wall.viewers.front().given = true;
+  wall.viewers.front().has_position = true;
   Camera camera;
   camera.lens = PerspectiveLens{1.0, 0.1};
   const std::vector<View> views = wall_views(wall, camera, {});

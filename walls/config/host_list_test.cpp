@@ -1,8 +1,7 @@
-#include "walls/config/host_list.h"
-
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "walls/config/wall_template.h"
 
 namespace hpr {
 namespace {

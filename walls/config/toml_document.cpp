@@ -16,24 +16,24 @@
 namespace hpr {
 namespace {
 
-TextPlace place_of(const toml::source_region& region) {
+TextPosition position_of(const toml::source_region& region) {
   return {static_cast<int>(region.begin.line), static_cast<int>(region.begin.column)};
 }
 
-bool before(const TextPlace& a, const TextPlace& b) {
+bool before(const TextPosition& a, const TextPosition& b) {
   return a.line != b.line ? a.line < b.line : a.column < b.column;
 }
 
 TomlValue convert(const toml::node& node) {
   using Type = TomlValue::Type;
   TomlValue value;
-  value.place = place_of(node.source());
+  value.position = position_of(node.source());
   if (const auto* const table = node.as_table()) {
     value.type = Type::Table;
     for (const auto& [key, child] : *table) {
-      value.entries.push_back({std::string(key.str()), place_of(key.source()), convert(child)});
+      value.entries.push_back({std::string(key.str()), position_of(key.source()), convert(child)});
     }
-    std::ranges::stable_sort(value.entries, before, &TomlEntry::place);
+    std::ranges::stable_sort(value.entries, before, &TomlEntry::position);
   } else if (const auto* const array = node.as_array()) {
     value.type = Type::Array;
     for (const auto& item : *array) value.items.push_back(convert(item));
@@ -62,7 +62,7 @@ std::variant<TomlValue, TomlFailure> parse_toml(std::string_view text) {
   try {
     return convert(toml::parse(text));
   } catch (const toml::parse_error& error) {
-    return TomlFailure{place_of(error.source()), std::string(error.description())};
+    return TomlFailure{position_of(error.source()), std::string(error.description())};
   }
 }
 

@@ -10,7 +10,7 @@
 namespace hpr {
 
 /// Where something stands in a text, both from 1; 0: nowhere.
-struct TextPlace {
+struct TextPosition {
   int line = 0;
   int column = 0;
   int option = 0;  ///< from 1: not in the text, but in this override of it
@@ -23,7 +23,7 @@ struct TomlValue {
   enum class Type { Table, Array, Text, Integer, Real, Boolean, Time };
 
   Type type = Type::Table;
-  TextPlace place;
+  TextPosition position;
   std::string text;
   std::int64_t integer = 0;
   double real = 0.0;  ///< also set for an Integer
@@ -34,13 +34,13 @@ struct TomlValue {
 
 struct TomlEntry {
   std::string key;
-  TextPlace place;  ///< of the key
+  TextPosition position;  ///< of the key
   TomlValue value;
 };
 
 /// Why a text is no TOML.
 struct TomlFailure {
-  TextPlace place;
+  TextPosition position;
   std::string what;
 };
 

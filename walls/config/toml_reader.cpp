@@ -1,6 +1,7 @@
 #include "walls/config/toml_reader.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,12 +11,20 @@
 namespace hpr {
 namespace {
 
-/// Farther than any wall: metres. Keeps squares and quotients of coordinates finite.
-constexpr double kMetresLimit = 1e6;
+std::string_view line_of(std::string_view text, int line) {
+  for (; line > 1; --line) {
+    const std::size_t end = text.find('\n');
+    if (end == std::string_view::npos) return {};
+    text.remove_prefix(end + 1);
+  }
+  text = text.substr(0, text.find('\n'));
+  if (text.ends_with('\r')) text.remove_suffix(1);
+  return text;
+}
 
 bool is_name(std::string_view text) {
-  constexpr std::size_t kLongest = 64;
-  if (text.empty() || text.size() > kLongest || text.front() == '.' || text.front() == '-') return false;
+  constexpr std::size_t kMaxLength = 64;
+  if (text.empty() || text.size() > kMaxLength || text.front() == '.' || text.front() == '-') return false;
   return std::ranges::all_of(text, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||
            c == '_';
@@ -24,31 +33,75 @@ bool is_name(std::string_view text) {
 
 }  // namespace
 
+/// What an expansion has wrong comes of the overrides, and all of them may have a part in it.
+std::string Findings::where(TextPosition position) const {
+  const std::string wall = kind_ == WallText::Expansion ? fmt::format("{} with ", printable(name_)) : "";
+  if (position.option > 0) {
+    return fmt::format("{}--set {}: ", wall, printable(overrides_.at(static_cast<std::size_t>(position.option - 1))));
+  }
+  if (kind_ == WallText::Expansion && !overrides_.empty()) {
+    return fmt::format("{}--set {}: ", wall, printable(fmt::format("{}", fmt::join(overrides_, " --set ")), 200));
+  }
+  return position.line > 0 ? fmt::format("{}:{}:{}: ", name_, position.line, position.column)
+                           : fmt::format("{}: ", name_);
+}
+
+void Findings::add(bool error, TextPosition position, std::string_view what, std::string hint) {
+  constexpr std::size_t kLineLimit = 200;
+  const std::string where = this->where(position);
+  if (kind_ == WallText::Expansion) position.line = position.column = 0;
+  const std::string line = position.line > 0 ? printable(line_of(text_, position.line), kLineLimit) : std::string();
+  findings_.push_back({error, position, where + std::string(what), line, std::move(hint)});
+}
+
+void Findings::ignore(TextPosition position, const std::string& key) {
+  if (ignored_.empty()) first_ignored_ = position;
+  if (std::ranges::find(ignored_, key) == ignored_.end()) ignored_.push_back(key);
+}
+
+bool Findings::any_errors() const {
+  return std::ranges::any_of(findings_, &WallFinding::error);
+}
+
+std::vector<WallFinding> Findings::take() {
+  if (!ignored_.empty()) {
+    warning(first_ignored_, fmt::format("not acted on by this version: {}", fmt::join(ignored_, ", ")),
+            "the wall is used without them");
+    ignored_.clear();
+  }
+  std::ranges::stable_sort(findings_, [](const WallFinding& a, const WallFinding& b) {
+    return a.position.line != b.position.line ? a.position.line < b.position.line
+                                              : a.position.column < b.position.column;
+  });
+  return std::move(findings_);
+}
+
 const TomlValue* TableReader::find(std::string_view key) {
   if (std::ranges::find(known_, key) == known_.end()) known_.emplace_back(key);
   const auto entry = std::ranges::find(table_.entries, key, &TomlEntry::key);
   return entry == table_.entries.end() ? nullptr : &entry->value;
 }
 
-TextPlace TableReader::place(std::string_view key) const {
+TextPosition TableReader::position(std::string_view key) const {
   const auto entry = std::ranges::find(table_.entries, key, &TomlEntry::key);
-  return entry == table_.entries.end() ? table_.place : entry->value.place;
+  return entry == table_.entries.end() ? table_.position : entry->value.position;
 }
 
 const TomlValue* TableReader::require(std::string_view key, std::string_view example) {
   const TomlValue* const value = find(key);
   if (value == nullptr) {
-    findings_.error(table_.place, fmt::format("{} has no '{}'", what_, key), fmt::format("add {} = {}", key, example));
+    findings_.error(table_.position, fmt::format("{} has no '{}'", what_, key),
+                    fmt::format("add {} = {}", key, example));
   }
   return value;
 }
 
 void TableReader::error(std::string_view key, std::string_view problem, std::string hint) {
-  findings_.error(place(key), fmt::format("'{}' of {} {}", key, what_, problem), std::move(hint));
+  findings_.error(position(key), fmt::format("'{}' of {} {}", key, what_, problem), std::move(hint));
 }
 
 void TableReader::wrong_type(const TomlValue& value, std::string_view key, std::string_view wanted) {
-  findings_.error(value.place, fmt::format("'{}' of {} is {}", key, what_, describe(value.type)),
+  findings_.error(value.position, fmt::format("'{}' of {} is {}", key, what_, describe(value.type)),
                   fmt::format("it must be {}", wanted));
 }
 
@@ -120,7 +173,7 @@ std::optional<double> TableReader::real_from(std::string_view key, double low, d
 
 bool TableReader::check_count(const TomlValue& value, std::string_view key, std::size_t count, std::string_view of) {
   if (value.items.size() == count) return true;
-  findings_.error(value.place, fmt::format("'{}' of {} has {} values", key, what_, value.items.size()),
+  findings_.error(value.position, fmt::format("'{}' of {} has {} values", key, what_, value.items.size()),
                   fmt::format("it must have {} {}", count, of));
   return false;
 }
@@ -135,7 +188,7 @@ std::optional<std::vector<double>> TableReader::reals(std::string_view key, std:
       return std::nullopt;
     }
     if (!(std::abs(item.real) <= limit)) {
-      findings_.error(item.place, fmt::format("'{}' of {} holds {}", key, what_, item.real),
+      findings_.error(item.position, fmt::format("'{}' of {} holds {}", key, what_, item.real),
                       fmt::format("numbers there must be finite and within {} of zero", limit));
       return std::nullopt;
     }
@@ -145,7 +198,7 @@ std::optional<std::vector<double>> TableReader::reals(std::string_view key, std:
 }
 
 std::optional<glm::dvec3> TableReader::point(std::string_view key) {
-  const auto numbers = reals(key, 3, kMetresLimit);
+  const auto numbers = reals(key, 3, kMaxMeters);
   if (!numbers) return std::nullopt;
   return glm::dvec3((*numbers)[0], (*numbers)[1], (*numbers)[2]);
 }
@@ -160,7 +213,7 @@ std::optional<std::vector<int>> TableReader::integers(std::string_view key, std:
       return std::nullopt;
     }
     if (item.integer < low || item.integer > high) {
-      findings_.error(item.place, fmt::format("'{}' of {} holds {}", key, what_, item.integer),
+      findings_.error(item.position, fmt::format("'{}' of {} holds {}", key, what_, item.integer),
                       fmt::format("it must be from {} to {}", low, high));
       return std::nullopt;
     }
@@ -184,8 +237,7 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
 }
 
 std::optional<Rect> TableReader::rect(std::string_view key) {
-  constexpr int kFar = 1 << 20;
-  const auto numbers = integers(key, 4, -kFar, kFar);
+  const auto numbers = integers(key, 4, -kMaxPixelPosition, kMaxPixelPosition);
   if (!numbers) return std::nullopt;
   const int width = (*numbers)[2];
   const int height = (*numbers)[3];
@@ -216,14 +268,14 @@ std::vector<const TomlValue*> TableReader::tables(std::string_view key) {
 
 void TableReader::ignore(std::initializer_list<std::string_view> keys) {
   for (const std::string_view key : keys) {
-    if (const TomlValue* const value = find(key)) findings_.ignore(value->place, std::string(key));
+    if (const TomlValue* const value = find(key)) findings_.ignore(value->position, std::string(key));
   }
 }
 
 void TableReader::finish() {
   for (const TomlEntry& entry : table_.entries) {
     if (entry.key.starts_with("x_") || std::ranges::find(known_, entry.key) != known_.end()) continue;
-    findings_.error(entry.place, fmt::format("{} has no key '{}'", what_, printable(entry.key)),
+    findings_.error(entry.position, fmt::format("{} has no key '{}'", what_, printable(entry.key)),
                     unknown_name_hint(entry.key, known_) + " (x_... is free for your own data)");
   }
 }

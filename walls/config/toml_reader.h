@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <initializer_list>
 #include <optional>
@@ -7,10 +8,65 @@
 #include <string_view>
 #include <vector>
 
+#include "core/error.h"
 #include "image/image.h"
-#include "walls/config/findings.h"
+#include "walls/config/toml_document.h"
 
 namespace hpr {
+
+/// Something wrong or odd in a wall file.
+struct WallFinding {
+  bool error = true;  ///< false: a warning
+  TextPosition position;
+  std::string what;  ///< with its place: "wall.toml:14:10: ..."
+  std::string line;  ///< the offending line; empty when there is none
+  std::string hint;
+};
+
+/// Where the text of a wall comes from.
+enum class WallText : std::uint8_t {
+  File,
+  Expansion,  ///< of a shorthand: nobody has seen its lines
+};
+
+/// Collects findings about one text.
+class Findings {
+ public:
+  /// `overrides` are named where a place is in one of them.
+  Findings(std::string name, std::string_view text, std::vector<std::string> overrides = {},
+           WallText kind = WallText::File)
+      : name_(std::move(name)), text_(text), overrides_(std::move(overrides)), kind_(kind) {}
+
+  void error(TextPosition position, std::string_view what, std::string hint) {
+    add(true, position, what, std::move(hint));
+  }
+  void warning(TextPosition position, std::string_view what, std::string hint) {
+    add(false, position, what, std::move(hint));
+  }
+  /// Notes a valid key nobody acts on; all of them end in one warning.
+  void ignore(TextPosition position, const std::string& key);
+
+  [[nodiscard]] bool any_errors() const;
+  /// In the order of the text.
+  [[nodiscard]] std::vector<WallFinding> take();
+
+ private:
+  void add(bool error, TextPosition position, std::string_view what, std::string hint);
+  [[nodiscard]] std::string where(TextPosition position) const;
+
+  std::string name_;
+  std::string_view text_;
+  std::vector<std::string> overrides_;
+  WallText kind_;
+  std::vector<WallFinding> findings_;
+  TextPosition first_ignored_;
+  std::vector<std::string> ignored_;
+};
+
+/// Farther than any wall: keeps squares and quotients of coordinates finite.
+inline constexpr double kMaxMeters = 1e6;
+/// The largest position on a display, on both sides of its origin, and the largest size there, in pixels.
+inline constexpr int kMaxPixelPosition = 1 << 20;
 
 /// Reads one table key by key. What is wrong goes into the findings, and the key counts as absent; asking for a key
 /// makes it a known one, so that finish() can report the keys nobody asked for.
@@ -21,13 +77,14 @@ class TableReader {
       : table_(table), what_(std::move(what)), findings_(findings) {}
 
   [[nodiscard]] const std::string& what() const { return what_; }
-  [[nodiscard]] TextPlace place() const { return table_.place; }
-  /// Of the value, else of the table.
-  [[nodiscard]] TextPlace place(std::string_view key) const;
+  [[nodiscard]] Findings& findings() const { return findings_; }
+  [[nodiscard]] TextPosition position() const { return table_.position; }
+  /// The position of the key's value; where it is absent that of the table.
+  [[nodiscard]] TextPosition position(std::string_view key) const;
   /// The value whatever its type; null when absent.
   [[nodiscard]] const TomlValue* find(std::string_view key);
   [[nodiscard]] bool has(std::string_view key) { return find(key) != nullptr; }
-  /// As find, and an error when absent.
+  /// Finds the value of a key that has to be there; its absence is an error, and null is returned.
   const TomlValue* require(std::string_view key, std::string_view example);
 
   [[nodiscard]] std::optional<std::string> text(std::string_view key);

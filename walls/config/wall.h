@@ -118,7 +118,7 @@ struct WallViewer {
   std::string id;
   glm::dvec3 position{0.0};  ///< of the head, wall space; where it rests when it is tracked
   /// The file places the viewer: the wall is a window into the scene. Otherwise a flat wall shows what the camera sees.
-  bool given = false;
+  bool has_position = false;
   double ipd_m = 0.0;              ///< between the pupils
   glm::dvec3 eye_offset{0.0};      ///< of the eyes' middle from the head's position, in the head's axes
   double near_m = 0.0;             ///< 0: the camera's

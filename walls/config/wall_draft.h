@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "walls/config/findings.h"
+#include "walls/config/toml_document.h"
 #include "walls/config/toml_reader.h"
 #include "walls/config/wall.h"
 
@@ -14,42 +16,42 @@ namespace hpr {
 
 struct DraftNode {
   WallNode node;
-  TextPlace place;
+  TextPosition position;
 };
 
 struct DraftWindow {
   WallWindow window;
-  TextPlace place;       ///< of the table
-  TextPlace node_place;  ///< of the node's name
-  TextPlace gpu_place;
-  TextPlace rank_place;
+  TextPosition position;       ///< of the table
+  TextPosition node_position;  ///< of the node's name
+  TextPosition gpu_position;
+  TextPosition rank_position;
 };
 
 struct DraftScreen {
   WallScreen screen;  ///< node, rank and viewport are settled by link_wall
-  TextPlace place;
-  TextPlace window_place;
-  TextPlace warp_place;
+  TextPosition position;
+  TextPosition window_position;
+  TextPosition warp_position;
   bool has_corners = false;  ///< and they are sound
 };
 
 struct DraftSurface {
   std::string id;
-  TextPlace place;
-  std::string viewer;  ///< id; empty: the first
-  TextPlace viewer_place;
+  std::string viewer = {};  ///< id; empty: the first
+  TextPosition position = {};
+  TextPosition viewer_position = {};
 };
 
 struct DraftViewer {
   WallViewer viewer;
-  TextPlace place;
+  TextPosition position;
   bool placed = false;  ///< has a position_m, sound or not
 };
 
 struct DraftMonitor {
   WallMonitor monitor;
-  TextPlace place;
-  TextPlace surface_place;
+  TextPosition position;
+  TextPosition surface_position;
 };
 
 struct WallDraft {
@@ -60,27 +62,41 @@ struct WallDraft {
   std::vector<DraftViewer> viewers;
   std::vector<DraftMonitor> monitors;
   StereoMode stereo = StereoMode::None;
-  TextPlace stereo_place;
+  TextPosition stereo_position;
 };
 
-/// Reads `surfaces`: grids are expanded, in order. Files are looked for in `folder`.
-void read_surfaces(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
+/// Metres a screen's sides have at least.
+inline constexpr double kMinSide_m = 1e-6;
 
-/// Reads what a panel is sent besides the picture: mirror, eye, colour, edge_blend_m, and its turn, which is called
-/// `turn` there.
-void read_look(TableReader& reader, std::string_view turn, WallScreen& screen, Findings& findings);
+/// A grid as its table has it.
+struct DraftGrid {
+  std::optional<int> columns = {};
+  std::optional<int> rows = {};
+  std::optional<Size> tile_pixels = {};
+  std::optional<std::vector<double>> tile_size_m = {};  ///< width, height
+  std::optional<std::vector<double>> gap_m = {};        ///< x, y
+  glm::dvec3 center{0.0};
+  WallScreen tile = {};  ///< how all of them are mounted and lit
+  std::optional<std::vector<std::string>> windows = {};
+  std::optional<std::vector<double>> column_gaps_m = {};
+  std::optional<std::vector<double>> row_gaps_m = {};
+  std::optional<double> radius_m = {};
+  std::optional<double> angle_degrees = {};
+  int max_screens = 0;  ///< that the wall may have besides those there are
+
+  [[nodiscard]] std::int64_t screens() const { return std::int64_t{columns.value_or(1)} * rows.value_or(1); }
+  [[nodiscard]] bool is_countable() const { return columns && rows && screens() <= max_screens; }
+  [[nodiscard]] bool is_sized() const {
+    return tile_size_m && (*tile_size_m)[0] >= kMinSide_m && (*tile_size_m)[1] >= kMinSide_m;
+  }
+};
+
+/// Reads all keys of a wall file (wall_keys.h): into `draft` the tables whose places matter later, all else into
+/// `wall`. Grids are expanded, in order. Files are looked for in `folder`.
+void read_document(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Wall& wall);
 
 /// Reads the `warp` of a screen, whose pixels are known, and its files.
-void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen, Findings& findings);
-
-/// Reads `viewers` and `stereo`, and `test` as far as it is about them and the gaps. Files are looked for in `folder`.
-void read_viewers(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Findings& findings);
-void read_test(TableReader& document, const std::filesystem::path& folder, WallDraft& draft, Rgba8& gap_color,
-               Findings& findings);
-void read_monitors(TableReader& document, WallDraft& draft, Findings& findings);
-
-/// Metres a screen's sides have at least.
-inline constexpr double kSmallestSide_m = 1e-6;
+void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen);
 
 /// The screens of a grid with their corners; pure, so that the shorthand uses it as well.
 struct WallGrid {
@@ -107,21 +123,28 @@ struct WallGrid {
 [[nodiscard]] bool link_wall(WallDraft& draft, Findings& findings);
 
 /// `id` is to be a picture's name.
-void check_file_name(const std::string& id, const TextPlace& place, Findings& findings);
+void check_file_name(const std::string& id, const TextPosition& position, Findings& findings);
 
-/// The same for viewers, stereo and monitors.
+/// Checks what viewers, stereo and monitors refer to, and settles which viewer sees which screen.
 void link_viewers(WallDraft& draft, Findings& findings);
 
-/// Of linked viewers: what they see of the points of position maps.
+/// Checks what linked viewers see of the points of position maps.
 void check_position_maps(const WallDraft& draft, Findings& findings);
 
 /// Warns about viewers who stand behind what they look at.
 void warn_about_viewers(const WallDraft& draft, Findings& findings);
 
 /// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
-void warn_about_neighbours(const WallDraft& draft, Findings& findings);
+void warn_about_neighbors(const WallDraft& draft, Findings& findings);
 
 /// Fills in a wall whose screens are sound: the default viewer and the hash.
 void finish_wall(Wall& wall);
+
+/// Puts values over those of a wall file: each override is PATH=VALUE, a path of keys and places in arrays (from 0)
+/// between dots, e.g. viewers.0.position_m=[0,1.6,0.5]. What is not there is made; the place after an array's last
+/// appends. A value is TOML, or a bare word that stands for a string. Places of such values name the override by its
+/// number, from 1. A path that leads nowhere is a finding.
+/// Throws Error (Usage) for what is no override.
+void apply_overrides(TomlValue& document, std::span<const std::string> overrides, Findings& findings);
 
 }  // namespace hpr

@@ -3,71 +3,129 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <filesystem>
 #include <limits>
+#include <optional>
+#include <vector>
 
 #include "core/bytes.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "walls/config/wall_draft.h"
-#include "walls/config/wall_override.h"
+#include "walls/config/wall_keys.h"
 #include "walls/geometry/geometry.h"
 
 namespace hpr {
 namespace {
 
-constexpr int kMostRanks = 1 << 20;
+constexpr std::string_view kForm = "write PATH=VALUE, e.g. viewers.0.position_m=[0,1.6,0.5] or stereo.mode=anaglyph";
 
-void read_nodes(TableReader& document, WallDraft& draft, Findings& findings) {
-  for (const TomlValue* const table : document.tables("nodes")) {
-    TableReader reader(*table, "node", findings);
-    DraftNode draft_node{{}, table->place};
-    WallNode& node = draft_node.node;
-    reader.require("id", "\"n0\"");
-    node.id = reader.id("id").value_or("");
-    node.host = reader.text("host").value_or("localhost");
-    node.ranks = reader.integer("ranks", 1, kMostRanks).value_or(0);
-    for (const TomlValue* const gpu_table : reader.tables("gpus")) {
-      TableReader gpu(*gpu_table, "gpu", findings);
-      gpu.require("id", "\"g0\"");
-      if (auto id = gpu.id("id")) node.gpus.push_back(std::move(*id));
-      gpu.ignore({"backend", "egl_device", "cpu_affinity"});
-      gpu.finish();
+void set_position(TomlValue& value, TextPosition position) {
+  value.position = position;
+  for (TomlValue& item : value.items) set_position(item, position);
+  for (TomlEntry& entry : value.entries) {
+    entry.position = position;
+    set_position(entry.value, position);
+  }
+}
+
+/// None when the text is neither TOML nor a bare word.
+std::optional<TomlValue> value_of(std::string_view text) {
+  auto parsed = parse_toml(fmt::format("v = {}", text));
+  if (auto* const table = std::get_if<TomlValue>(&parsed)) {
+    if (table->entries.size() == 1) return std::move(table->entries.front().value);
+    return std::nullopt;
+  }
+  const bool bare = !text.empty() && std::ranges::all_of(text, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view("-_./:").find(c) != std::string_view::npos;
+  });
+  if (!bare) return std::nullopt;
+  TomlValue word;
+  word.type = TomlValue::Type::Text;
+  word.text = std::string(text);
+  return word;
+}
+
+std::vector<std::string> steps_of(std::string_view path) {
+  std::vector<std::string> steps;
+  while (true) {
+    const std::size_t dot = path.find('.');
+    steps.emplace_back(path.substr(0, dot));
+    if (dot == std::string_view::npos) return steps;
+    path.remove_prefix(dot + 1);
+  }
+}
+
+std::optional<std::size_t> index_of(const std::string& step) {
+  std::size_t index = 0;
+  const auto [stop, error] = std::from_chars(step.data(), step.data() + step.size(), index);
+  if (error != std::errc() || stop != step.data() + step.size()) return std::nullopt;
+  return index;
+}
+
+/// Goes from a value to the one a step below; what is missing is made.
+class Walker {
+ public:
+  Walker(TomlValue& document, TextPosition position, Findings& findings)
+      : value_(&document), position_(position), findings_(findings) {}
+
+  /// False, and a finding, where there is no such step.
+  bool step(const std::string& name) {
+    const auto index = index_of(name);
+    if (fresh_) value_->type = index ? TomlValue::Type::Array : TomlValue::Type::Table;
+    if (value_->type == TomlValue::Type::Array) return index ? into_array(*index) : refuse(name, "takes a number");
+    if (value_->type == TomlValue::Type::Table) return into_table(name);
+    return refuse(name, fmt::format("is inside {}", describe(value_->type)));
+  }
+
+  void put(TomlValue value) {
+    set_position(value, position_);
+    *value_ = std::move(value);
+  }
+
+ private:
+  [[nodiscard]] TomlValue made() const {
+    TomlValue value;
+    value.position = position_;
+    return value;
+  }
+
+  bool into_array(std::size_t index) {
+    if (index > value_->items.size()) {
+      return refuse(std::to_string(index), fmt::format("is beyond the {} there are", value_->items.size()));
     }
-    reader.ignore({"nic"});
-    reader.finish();
-    draft.nodes.push_back(std::move(draft_node));
+    fresh_ = index == value_->items.size();
+    if (fresh_) value_->items.push_back(made());
+    value_ = &value_->items[index];
+    return true;
   }
-}
 
-void read_windows(TableReader& document, WallDraft& draft, Findings& findings) {
-  for (const TomlValue* const table : document.tables("windows")) {
-    TableReader reader(*table, "window", findings);
-    DraftWindow draft_window{{}, table->place, reader.place("node"), reader.place("gpu"), reader.place("rank")};
-    WallWindow& window = draft_window.window;
-    reader.require("id", "\"w0\"");
-    window.id = reader.id("id").value_or("");
-    window.node = reader.text("node").value_or("");
-    window.gpu = reader.text("gpu").value_or("");
-    window.display = reader.text("display").value_or("");
-    window.monitor = reader.text("monitor").value_or("");
-    window.rank = reader.integer("rank", 0, kMostRanks - 1).value_or(-1);
-    window.rect = reader.rect("rect").value_or(Rect{});
-    window.fullscreen = reader.boolean("fullscreen").value_or(false);
-    reader.ignore({"swap_group"});
-    reader.finish();
-    draft.windows.push_back(std::move(draft_window));
+  bool into_table(const std::string& name) {
+    const auto entry = std::ranges::find(value_->entries, name, &TomlEntry::key);
+    fresh_ = entry == value_->entries.end();
+    if (fresh_) {
+      value_->entries.push_back({name, position_, made()});
+      value_ = &value_->entries.back().value;
+    } else {
+      value_ = &entry->value;
+    }
+    return true;
   }
-}
 
-void read_version(TableReader& document) {
-  const TomlValue* const version = document.require("hpr_wall", "1");
-  if (version == nullptr || (version->type == TomlValue::Type::Integer && version->integer == 1)) return;
-  document.error("hpr_wall", "is not 1", "this program reads version 1 of wall files: hpr_wall = 1");
-}
+  bool refuse(const std::string& name, std::string_view why) {
+    findings_.error(position_, fmt::format("'{}' of the path {}", printable(name), why), std::string(kForm));
+    return false;
+  }
+
+  TomlValue* value_;
+  TextPosition position_;
+  Findings& findings_;
+  bool fresh_ = false;  ///< value_ was made by the last step
+};
 
 /// The largest int for what is larger than that.
 int to_number(std::string_view digits) {
@@ -91,27 +149,46 @@ std::optional<std::pair<int, int>> pair_of(std::string_view text) {
   return std::pair(to_number(a), to_number(b));
 }
 
-/// What neighbours' files and later versions may hold.
-constexpr std::array<std::string_view, 4> kNotActedOn{"sync", "render", "transport", "fault"};
-
 /// A file may hold more than is acted on; what is asked for on the command line must not be lost.
 void refuse_without_effect(const std::string& override, Findings& findings) {
   const std::string section = override.substr(0, override.find_first_of(".="));
-  if (std::ranges::find(kNotActedOn, section) == kNotActedOn.end()) return;
+  const auto key = std::ranges::find(wall_keys().keys, section, &TableKey<Wall>::name);
+  if (key == wall_keys().keys.end() || !key->kind.is_ignored) return;
   findings.error({}, fmt::format("--set {}: this version acts on nothing of '{}'", printable(override), section),
                  "hpr wall run has options for it: --strategy, --quality, --codec, --swap-timeout...");
 }
 
 }  // namespace
 
+void apply_overrides(TomlValue& document, std::span<const std::string> overrides, Findings& findings) {
+  for (std::size_t i = 0; i < overrides.size(); ++i) {
+    const std::string_view text = overrides[i];
+    const TextPosition position{0, 0, static_cast<int>(i) + 1};
+    const std::size_t equals = text.find('=');
+    const std::string_view path = text.substr(0, equals);
+    auto value = equals == std::string_view::npos ? std::nullopt : value_of(text.substr(equals + 1));
+    const std::vector<std::string> steps = steps_of(path);
+    if (!value || std::ranges::any_of(steps, &std::string::empty)) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("--set {}: {}", printable(text),
+                              value ? "a key of the path is empty" : "the value is neither TOML nor a word"),
+                  std::string(kForm));
+    }
+    Walker walker(document, position, findings);
+    if (std::ranges::all_of(steps, [&](const std::string& step) { return walker.step(step); })) {
+      walker.put(std::move(*value));
+    }
+  }
+}
+
 bool WallReading::ok() const {
   return std::ranges::none_of(findings, &WallFinding::error);
 }
 
 void finish_wall(Wall& wall) {
-  if (!wall.viewers.front().given) {
+  if (!wall.viewers.front().has_position) {
     const WallExtent extent = wall_extent(wall);
-    wall.viewers.front().position = extent.middle + extent.axes[2] * extent.height;
+    wall.viewers.front().position = extent.centroid + extent.axes[2] * extent.height;
   }
   Wall nameless = wall;
   nameless.name.clear();
@@ -130,7 +207,7 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   WallReading reading;
   auto parsed = parse_toml(text);
   if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
-    findings.error(failure->place, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
+    findings.error(failure->position, failure->what, "wall files are TOML 1.0; inline tables stand on one line");
     reading.findings = findings.take();
     return reading;
   }
@@ -139,16 +216,8 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   const std::filesystem::path folder = std::filesystem::path(name).parent_path();
   apply_overrides(std::get<TomlValue>(parsed), overrides, findings);
   TableReader document(std::get<TomlValue>(parsed), "the wall", findings);
-  read_version(document);
-  wall.name = document.text("name").value_or(std::filesystem::path(name).stem().string());
-  read_nodes(document, draft, findings);
-  read_windows(document, draft, findings);
-  read_surfaces(document, folder, draft, findings);
-  read_viewers(document, folder, draft, findings);
-  read_test(document, folder, draft, wall.gap_color, findings);
-  read_monitors(document, draft, findings);
-  for (const std::string_view section : kNotActedOn) document.ignore({section});
-  document.finish();
+  wall.name = std::filesystem::path(name).stem().string();
+  read_document(document, folder, draft, wall);
   for (const std::string& override : overrides) refuse_without_effect(override, findings);
   if (link_wall(draft, findings)) {
     link_viewers(draft, findings);
@@ -156,7 +225,7 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   }
   if (!findings.any_errors()) {
     warn_about_viewers(draft, findings);
-    warn_about_neighbours(draft, findings);
+    warn_about_neighbors(draft, findings);
   }
 
   const bool sound = !findings.any_errors();
@@ -168,7 +237,6 @@ WallReading parse_wall(std::string_view text, const std::string& name, const std
   for (DraftMonitor& monitor : draft.monitors) wall.monitors.push_back(std::move(monitor.monitor));
   if (!draft.viewers.empty()) wall.viewers.clear();
   for (DraftViewer& viewer : draft.viewers) wall.viewers.push_back(std::move(viewer.viewer));
-  wall.stereo = draft.stereo;
   finish_wall(wall);
   return reading;
 }
@@ -182,17 +250,17 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
   if (!grid_size || !pixels) return std::nullopt;
   const auto [columns, rows] = *grid_size;
   const bool none = columns < 1 || rows < 1;
-  if (none || columns > kMostScreens || rows > kMostScreens || columns * rows > kMostScreens) {
+  if (none || columns > kMaxScreens || rows > kMaxScreens || columns * rows > kMaxScreens) {
     throw Error(none ? ExitCode::Usage : ExitCode::Limit,
                 fmt::format("wall '{}' has an impossible number of screens", printable(spec)),
-                fmt::format("columns times rows must be from 1 to {}", kMostScreens));
+                fmt::format("columns times rows must be from 1 to {}", kMaxScreens));
   }
   const Size size{pixels->first, pixels->second};
   const bool empty = size.width < 1 || size.height < 1;
-  if (empty || size.width > kMostScreenSide || size.height > kMostScreenSide) {
+  if (empty || size.width > kMaxScreenSide || size.height > kMaxScreenSide) {
     throw Error(empty ? ExitCode::Usage : ExitCode::Limit,
                 fmt::format("wall '{}' has screens of an impossible size", printable(spec)),
-                fmt::format("sides must be from 1 to {} pixels", kMostScreenSide));
+                fmt::format("sides must be from 1 to {} pixels", kMaxScreenSide));
   }
   WallGrid grid;
   grid.columns = columns;
@@ -210,7 +278,7 @@ std::optional<Wall> wall_from_shorthand(std::string_view spec) {
 }
 
 WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides) {
-  constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 20;
+  constexpr std::uint64_t kMaxFileBytes = std::uint64_t{16} << 20;
   if (auto wall = wall_from_shorthand(spec)) {
     if (overrides.empty()) return {std::move(*wall), {}};
     return parse_wall(expand_wall(*wall), spec, overrides, WallText::Expansion);
@@ -220,15 +288,15 @@ WallReading read_wall(const std::string& spec, const std::vector<std::string>& o
     throw Error(ExitCode::Io, fmt::format("there is no wall file '{}'", printable(spec)),
                 "a wall is a TOML file, or columns x rows such as 3x2 or 3x2@1920x1080");
   }
-  const std::vector<std::byte> bytes = read_file(spec, kLargestFile);
+  const std::vector<std::byte> bytes = read_file(spec, kMaxFileBytes);
   return parse_wall({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, spec, overrides);
 }
 
-Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides, bool tells_warnings) {
+Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides, bool logs_warnings) {
   WallReading reading = read_wall(spec, overrides);
   const auto first = std::ranges::find_if(reading.findings, &WallFinding::error);
   if (first != reading.findings.end()) throw Error(ExitCode::BadInput, first->what, first->hint, first->line);
-  if (!tells_warnings) return std::move(reading.wall);
+  if (!logs_warnings) return std::move(reading.wall);
   for (const WallFinding& finding : reading.findings) log::warning("{} ({})", finding.what, finding.hint);
   return std::move(reading.wall);
 }

@@ -5,14 +5,14 @@
 #include <string_view>
 #include <vector>
 
-#include "walls/config/findings.h"
+#include "walls/config/toml_reader.h"
 #include "walls/config/wall.h"
 
 namespace hpr {
 
 /// Limits of what a wall file may ask for.
-inline constexpr int kMostScreens = 4096;
-inline constexpr int kMostScreenSide = 65536;  ///< pixels
+inline constexpr int kMaxScreens = 4096;
+inline constexpr int kMaxScreenSide = 65536;  ///< pixels
 
 /// A wall as far as it could be read, and everything wrong or odd about it.
 struct WallReading {
@@ -27,18 +27,18 @@ struct WallReading {
 [[nodiscard]] WallReading parse_wall(std::string_view text, const std::string& name,
                                      const std::vector<std::string>& overrides = {}, WallText kind = WallText::File);
 
-/// "6x3", or "6x3@1920x1080": a grid of equal screens (640 x 360 unless told) on whichever hosts there are, 0.36 m
-/// high, gaps of 6 mm, without a viewer. None when `spec` has another form. Throws Error for impossible
-/// numbers: Usage where nothing would be left, Limit where there are too many.
+/// "6x3", or "6x3@1920x1080": a grid of equal screens (640 x 360 pixels where the shorthand has none) on whichever
+/// hosts there are, 0.36 m high, gaps of 6 mm, without a viewer. None when `spec` has another form. Throws Error for
+/// impossible numbers: Usage where nothing would be left, Limit where there are too many.
 [[nodiscard]] std::optional<Wall> wall_from_shorthand(std::string_view spec);
 
 /// A shorthand or a TOML file, with all its findings. Throws Error: Io when the file cannot be read, Usage or Limit
 /// for an impossible shorthand, Usage for malformed overrides.
 [[nodiscard]] WallReading read_wall(const std::string& spec, const std::vector<std::string>& overrides = {});
 
-/// The same for those who want the wall: logs warnings (unless another process of the run does), throws the first error
-/// (BadInput) with file:line:column, the offending line and a hint.
+/// The wall of a shorthand or a TOML file, for those who need a sound one: logs warnings (unless another process of the
+/// run does), throws the first error (BadInput) with file:line:column, the offending line and a hint.
 [[nodiscard]] Wall load_wall(const std::string& spec, const std::vector<std::string>& overrides = {},
-                             bool tells_warnings = true);
+                             bool logs_warnings = true);
 
 }  // namespace hpr

@@ -78,7 +78,7 @@ TEST(WallFile, ASoundWallHasNoFindings) {
   EXPECT_EQ(b.pixels, (Size{64, 36}));
   EXPECT_EQ(b.lower_right, glm::dvec3(3.6, 0.0, 0.0));
   EXPECT_EQ(b.viewport, (Rect{0, 0, 64, 36}));
-  EXPECT_TRUE(reading.wall.viewers.front().given);
+  EXPECT_TRUE(reading.wall.viewers.front().has_position);
   EXPECT_EQ(reading.wall.viewers.front().position, glm::dvec3(1.0, 0.5, 2.0));
 }
 
@@ -100,7 +100,7 @@ TEST_P(WallFileErrors, NameTheirPlaceTheLineAndAHint) {
   EXPECT_EQ(first->what.substr(0, std::string(bad.finding).size()), bad.finding);
   EXPECT_NE(first->hint.find(bad.hint), std::string::npos) << first->hint;
   // The rule about windows and screens points at the screen.
-  if (first->place.line == bad.line) {
+  if (first->position.line == bad.line) {
     EXPECT_EQ(first->line, bad.text);
   }
   EXPECT_FALSE(first->line.empty());
@@ -230,7 +230,7 @@ TEST(WallFile, AGridIsExpandedFromTheTopLeftWithItsGapsInMetres) {
   EXPECT_NEAR(screens[5].lower_right.x, 0.778, 1e-15);
   EXPECT_NEAR(screens[5].lower_right.y, 1.2 - 0.298, 1e-15);
   EXPECT_EQ(screens[5].lower_right.z, -1.0);
-  EXPECT_FALSE(reading.wall.viewers.front().given);
+  EXPECT_FALSE(reading.wall.viewers.front().has_position);
   // One wall height before the middle.
   EXPECT_NEAR(glm::distance(reading.wall.viewers.front().position, glm::dvec3(0.0, 1.2, -1.0 + 0.596)), 0.0, 1e-14);
 }
@@ -305,7 +305,7 @@ TEST(WallFile, AShorthandIsAGridWithoutViewer) {
   const Wall wall = load_wall("3x2");
   ASSERT_EQ(wall.screens.size(), 6U);
   EXPECT_EQ(wall.screens[4].pixels, (Size{640, 360}));
-  EXPECT_FALSE(wall.viewers.front().given);
+  EXPECT_FALSE(wall.viewers.front().has_position);
   EXPECT_TRUE(wall.screens[0].window.empty());
   EXPECT_NEAR(wall.screens[1].lower_left.x - wall.screens[0].lower_right.x, 0.006, 1e-15);
   EXPECT_EQ(load_wall("1x1@1x65536").screens[0].pixels, (Size{1, 65536}));

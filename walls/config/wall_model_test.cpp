@@ -293,7 +293,7 @@ TEST(WallOverrides, PutValuesOverTheFiles) {
   EXPECT_EQ(wall({"monitors.1={ id = \"two\", surface = \"arc\", pixels = [8, 4] }"}).monitors.size(), 2U);
   EXPECT_EQ(wall({"surfaces.0.grid.columns=2", "surfaces.0.grid.columns=4"}).screens.size(), 6U);
   const Wall grid = load_wall("2x1", {"viewers.0.position_m=[0,0,2]"});
-  EXPECT_TRUE(grid.viewers[0].given);
+  EXPECT_TRUE(grid.viewers[0].has_position);
   EXPECT_NE(grid.hash, load_wall("2x1").hash);
 }
 
@@ -332,7 +332,7 @@ TEST(WallOverrides, ErrorsOfAShorthandNameItAndNoLineOfItsExpansion) {
   EXPECT_TRUE(skewed.what.starts_with("2x2 with --set surfaces.0.screens.0.corners_m.ll=[5,5,5]: 'corners_m'"))
       << skewed.what;
   EXPECT_EQ(skewed.line, "");
-  EXPECT_EQ(skewed.place.line, 0);
+  EXPECT_EQ(skewed.position.line, 0);
   const WallFinding grid = finding("surfaces.0.grid.gap_m=[1,2,3]");
   EXPECT_TRUE(grid.what.starts_with("2x2 with --set surfaces.0.grid.gap_m=[1,2,3]: ")) << grid.what;
 }

@@ -3,13 +3,14 @@
 #include <glm/vec2.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "image/image.h"
 
 namespace hpr {
 
-/// A wall of equal panels, as one tells somebody else about it.
+/// A wall of equal panels, described by a few numbers.
 struct WallTemplate {
   int columns = 1;
   int rows = 1;
@@ -26,5 +27,10 @@ struct WallTemplate {
 /// The wall file of it, as TOML with comments that say what to measure and to change. Throws Error (Usage) where
 /// screens and hosts do not fit together or a number is impossible.
 [[nodiscard]] std::string write_wall_template(const WallTemplate& wall);
+
+/// The hosts of a list as Slurm writes them, in its order: "wall0[1-9]", "a[01-03,07],b2", "rack[1-2]n[0-3]" (the last
+/// bracket counts fastest). Numbers are as wide as the range's first one, so that [08-10] is 08, 09, 10. Throws Error
+/// (Usage) for what is no such list, names a host twice, or has more than kMaxScreens hosts.
+[[nodiscard]] std::vector<std::string> parse_host_list(std::string_view text);
 
 }  // namespace hpr

@@ -61,9 +61,9 @@ TEST(WallTemplate, SixByThreeOnNineHostsDrivesTwoNeighboursEach) {
 
 TEST(WallTemplate, SharesOutEvenlyUnlessTold) {
   const Wall wall = sound({.columns = 5, .rows = 2, .hosts = hosts(4)});
-  std::map<std::string, int> shares;
-  for (const WallScreen& screen : wall.screens) ++shares[screen.node];
-  EXPECT_EQ(shares, (std::map<std::string, int>{{"wall0", 3}, {"wall1", 2}, {"wall2", 3}, {"wall3", 2}}));
+  std::map<std::string, int> counts;
+  for (const WallScreen& screen : wall.screens) ++counts[screen.node];
+  EXPECT_EQ(counts, (std::map<std::string, int>{{"wall0", 3}, {"wall1", 2}, {"wall2", 3}, {"wall3", 2}}));
   // The last host may have fewer.
   EXPECT_EQ(sound({.columns = 7, .rows = 1, .hosts = hosts(4), .tiles_per_host = 2}).screens.back().node, "wall3");
 }

@@ -12,13 +12,12 @@
 #include "image/image_io.h"
 #include "walls/config/wall_draft.h"
 #include "walls/geometry/curved.h"
-#include "walls/geometry/position_map.h"
-#include "walls/geometry/warp_mesh.h"
+#include "walls/geometry/warping.h"
 
 namespace hpr {
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t{2} << 30U;
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{2} << 30U;
 
 /// Reads one of a warp's files; what is wrong with it is a finding of its key.
 class WarpReader {
@@ -32,7 +31,7 @@ class WarpReader {
     with_file("blend", warp.blend, [&](const std::string& file) { warp.light = read_levels("blend", file, screen); });
     with_file("black", warp.black, [&](const std::string& file) { warp.floor = read_levels("black", file, screen); });
     if (!reader_.has("mesh") && !reader_.has("blend") && !reader_.has("black")) {
-      findings_.error(reader_.place(), "warp names no file",
+      findings_.error(reader_.position(), "warp names no file",
                       R"(write warp = { mesh = "a.pfm", blend = "a_alpha.png", black = "a_beta.png" }, or some of it)");
     }
     reader_.finish();
@@ -46,7 +45,7 @@ class WarpReader {
     if (path->empty()) return reader_.error(key, "is \"\"", "name a file, beside the wall file unless it says where");
     const std::string found = (folder_ / *path).lexically_normal().string();
     try {
-      bytes_ = read_file(found, kLargestFile);
+      bytes_ = read_file(found, kMaxFileBytes);
       file = {*path, xxh64(bytes_)};
       read(found);
     } catch (const Error& error) {
@@ -72,16 +71,16 @@ class WarpReader {
     }
   }
 
-  /// Levels as they stand in the file; the same for all channels where it is grey.
+  /// Levels as they stand in the file; the same for all channels where it is gray.
   std::shared_ptr<const Image<Rgb>> read_levels(std::string_view key, const std::string& file,
                                                 const WallScreen& screen) {
     const FloatImage image = read_image(file, {});
     const std::size_t channels = image.channels.size();
-    const bool grey = channels < 3;
+    const bool gray = channels < 3;
     Image<Rgb> levels(image.size);
     for (std::size_t i = 0; i < levels.pixels().size(); ++i) {
       const float* const values = &image.values[i * channels];
-      const Rgb level = grey ? Rgb{values[0], values[0], values[0]} : Rgb{values[0], values[1], values[2]};
+      const Rgb level = gray ? Rgb{values[0], values[0], values[0]} : Rgb{values[0], values[1], values[2]};
       for (const float value : {level.r, level.g, level.b}) {
         if (value >= 0.0F && value <= 1.0F) continue;
         reader_.error(key, fmt::format("holds {}", value), "it is a factor from 0 to 1; a PNG holds nothing else");
@@ -95,12 +94,12 @@ class WarpReader {
 
   /// A file of another shape than the picture is likely to be another screen's.
   void compare_shape(std::string_view key, Size size, const WallScreen& screen) {
-    constexpr double kAlike = 0.02;
+    constexpr double kMaxRatio = 0.02;
     if (screen.pixels.area() == 0 || std::min(size.width, size.height) < 64) return;
     const double own = static_cast<double>(screen.pixels.width) / screen.pixels.height;
     const double its = static_cast<double>(size.width) / size.height;
-    if (std::abs(its / own - 1.0) <= kAlike) return;
-    findings_.warning(reader_.place(key),
+    if (std::abs(its / own - 1.0) <= kMaxRatio) return;
+    findings_.warning(reader_.position(key),
                       fmt::format("'{}' of warp has {} x {} pixels, another shape than the screen's {} x {}", key,
                                   size.width, size.height, screen.pixels.width, screen.pixels.height),
                       "it is stretched over the whole upright picture; check that it is this screen's");
@@ -112,7 +111,7 @@ class WarpReader {
   std::vector<std::byte> bytes_;  ///< of the file at hand
 };
 
-/// What the viewer's eye makes of a position map: of its points, and of cells of four neighbours.
+/// What the viewer's eye makes of a position map: of its points, and of cells of four neighbors.
 struct MapCheck {
   std::size_t points = 0;
   std::size_t hidden = 0;  ///< of them: behind the eye, or too far aside
@@ -126,7 +125,7 @@ class MapChecker {
 
   MapCheck check() {
     for (int y = 0; y < map_.height(); ++y) {
-      for (int x = 0; x < map_.width(); ++x) look_at(x, y);
+      for (int x = 0; x < map_.width(); ++x) check_cell(x, y);
     }
     return check_;
   }
@@ -138,7 +137,7 @@ class MapChecker {
     return lit(x, y) ? points_.seen(glm::dvec3(map_.at(x, y))) : std::nullopt;
   }
 
-  void look_at(int x, int y) {
+  void check_cell(int x, int y) {
     if (!lit(x, y)) return;
     ++check_.points;
     const auto here = seen(x, y);
@@ -161,11 +160,10 @@ class MapChecker {
 
 }  // namespace
 
-void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen,
-               Findings& findings) {
+void read_warp(TableReader& screen_reader, const std::filesystem::path& folder, WallScreen& screen) {
   const TomlValue* const table = screen_reader.table("warp");
   if (table == nullptr) return;
-  WarpReader(*table, folder, findings).read(screen);
+  WarpReader(*table, folder, screen_reader.findings()).read(screen);
 }
 
 void check_position_maps(const WallDraft& draft, Findings& findings) {
@@ -173,7 +171,7 @@ void check_position_maps(const WallDraft& draft, Findings& findings) {
     const WallScreen& screen = draft_screen.screen;
     if (!screen.warp.points || !draft_screen.has_corners) continue;
     if (draft.viewers.empty() || !draft.viewers.front().placed) {
-      findings.error(draft_screen.warp_place,
+      findings.error(draft_screen.warp_position,
                      fmt::format("screen \"{}\" has a position map, and no viewer a place", screen.id),
                      "add [[viewers]] with position_m = [x, y, z]: what a point shows is what the eye sees through it");
       continue;
@@ -183,14 +181,14 @@ void check_position_maps(const WallDraft& draft, Findings& findings) {
     const PixelPoints points = pixel_points(screen, viewer.position + viewer.eye_offset);
     const MapCheck check = MapChecker(points).check();
     if (check.hidden == check.points) {
-      findings.error(draft_screen.warp_place,
+      findings.error(draft_screen.warp_position,
                      fmt::format("all points of screen \"{}\" lie behind the viewer's eye, or 85 degrees and more off "
                                  "its normal",
                                  screen.id),
                      "check position_m, corners_m and the map: all are metres (not millimetres) of one space, and "
                      "corners_m face the viewer");
     } else if (check.hidden > 0) {
-      findings.warning(draft_screen.warp_place,
+      findings.warning(draft_screen.warp_position,
                        fmt::format("{} of {} points of screen \"{}\" lie behind the viewer's eye, or 85 degrees and "
                                    "more off its normal",
                                    check.hidden, check.points, screen.id),
@@ -198,11 +196,11 @@ void check_position_maps(const WallDraft& draft, Findings& findings) {
     }
     if (check.folded > check.straight) {
       findings.warning(
-          draft_screen.warp_place,
+          draft_screen.warp_position,
           fmt::format("the points of screen \"{}\" are in mirror image as the viewer sees them", screen.id),
           "rows of a PFM go from the bottom to the top; ignore this where a mirror is in the light's way");
     } else if (check.folded > 0) {
-      findings.warning(draft_screen.warp_place,
+      findings.warning(draft_screen.warp_position,
                        fmt::format("the points of screen \"{}\" fold over, in {} of {} cells, as the viewer sees them",
                                    screen.id, check.folded, check.folded + check.straight),
                        "places that are lit twice show the scene twice; is the map smooth?");

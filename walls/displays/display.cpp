@@ -6,11 +6,6 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "walls/displays/file_display.h"
-#include "walls/displays/no_display.h"
-#include "walls/displays/pipe_display.h"
-#include "walls/displays/web_display.h"
-#include "walls/displays/window_display.h"
 
 namespace hpr {
 
@@ -24,13 +19,9 @@ OrbitInput& OrbitInput::operator+=(const OrbitInput& other) {
 }
 
 const std::vector<DisplayKind>& display_kinds() {
-  static const std::vector<DisplayKind> kinds{
-      {.name = "file", .monitors = true, .make = make_file_display, .check = check_file_display},
-      {.name = "window", .interactive = true, .make = make_window_display, .check = check_window_display},
-      {.name = "web", .whole_wall = true, .interactive = true, .make = make_web_display, .check = check_web_display},
-      {.name = "pipe", .whole_wall = true, .stream = true, .make = make_pipe_display, .check = check_pipe_display},
-      {.name = "none", .make = make_no_display, .check = check_no_display},
-  };
+#define HPR_LIST_DISPLAY(name) name##_display(),
+  static const std::vector<DisplayKind> kinds{HPR_DISPLAYS(HPR_LIST_DISPLAY)};
+#undef HPR_LIST_DISPLAY
   return kinds;
 }
 

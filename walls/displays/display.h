@@ -17,7 +17,7 @@
 
 namespace hpr {
 
-/// A screen's finished picture, upright; sRGB. A display sends its panel what ScanOut makes of it.
+/// A screen's finished picture, upright; sRGB. A display sends its panel what PanelTransform makes of it.
 struct ScreenPicture {
   std::size_t screen = 0;  ///< index into Wall::screens
   const Image<Rgba8>& image;
@@ -104,10 +104,10 @@ struct DisplayOptions {
   PipeOptions pipe = {};
   std::optional<std::vector<std::size_t>> screens = {};  ///< for `window`: those this process shows; none: all
   std::string web_address = {};                          ///< for `web`: ADDR:PORT; empty: loopback, a free port
-  std::function<void(const std::string& line)> announce = nullptr;  ///< told where `web` is found
+  std::function<void(const std::string& line)> announce = nullptr;  ///< called with the address of `web`
 };
 
-/// One way to show a wall; all of them stand in one list.
+/// One way to show a wall; defined in the file of its name.
 struct DisplayKind {
   std::string_view name;
   bool whole_wall = false;   ///< one process shows all screens, whichever rank the wall file names
@@ -117,9 +117,22 @@ struct DisplayKind {
   /// Throws Error: Usage for options that do not fit, Io when what is to be written to cannot be or holds what may not
   /// be overwritten, NoDevice without a desktop for windows. `wall` must outlive the display.
   std::unique_ptr<Display> (*make)(const Wall& wall, const DisplayOptions& options) = nullptr;
-  /// Throws what `make` would, as far as that can be told without opening anything; asked before long work.
+  /// Throws what `make` would, as far as that can be known without opening anything; asked before long work.
   void (*check)(const Wall& wall, const DisplayOptions& options) = nullptr;
 };
+
+/// Every display, in the order in which help lists them: X(file) stands for file_display.cpp, which defines
+/// file_display().
+#define HPR_DISPLAYS(X) \
+  X(file)               \
+  X(window)             \
+  X(web)                \
+  X(pipe)               \
+  X(none)
+
+#define HPR_DECLARE_DISPLAY(name) [[nodiscard]] DisplayKind name##_display();
+HPR_DISPLAYS(HPR_DECLARE_DISPLAY)
+#undef HPR_DECLARE_DISPLAY
 
 /// "file" (of the latest frame folder/<screen id>.png, where its panel is sent another picture also
 /// folder/<screen id>.panel.png, and folder/<monitor id>.png; each file complete or untouched), "window", "web", "pipe"
@@ -129,5 +142,12 @@ struct DisplayKind {
 
 /// Throws Error (Usage) for an unknown name, with the choices and `further` ones that the caller has.
 [[nodiscard]] const DisplayKind& find_display(std::string_view name, std::span<const std::string> further = {});
+
+/// The files of the latest frame that the display `file` writes.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_display(const Wall& wall,
+                                                                  const std::filesystem::path& folder);
+
+/// Whether this process can reach a desktop for windows.
+[[nodiscard]] bool has_desktop();
 
 }  // namespace hpr

@@ -1,5 +1,3 @@
-#include "walls/displays/file_display.h"
-
 #include <fmt/format.h>
 
 #include <map>
@@ -11,7 +9,8 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "image/image_io.h"
-#include "walls/drawing/scan_out.h"
+#include "walls/displays/display.h"
+#include "walls/drawing/panel_transform.h"
 
 namespace hpr {
 namespace {
@@ -48,6 +47,8 @@ std::string panel_file_of(const WallScreen& screen) {
   return screen.id + ".panel.png";
 }
 
+/// PNG files: folder/<screen id>.png is the latest frame. With keep_frames, folder/frame-000042/<screen id>.png is
+/// frame 42, too. Each file is complete or untouched.
 class FileDisplay final : public Display {
  public:
   FileDisplay(const Wall& wall, const DisplayOptions& options)
@@ -74,10 +75,11 @@ class FileDisplay final : public Display {
       const Stopwatch watch;
       bytes = 0;
       // Made where it is needed: this process shows few of the wall's screens.
-      const ScanOut& scan_out = scan_outs_.try_emplace(picture.screen, wall_, picture.screen).first->second;
+      const PanelTransform& panel_transform =
+          panel_transforms_.try_emplace(picture.screen, wall_, picture.screen).first->second;
       const WallScreen& screen = wall_.screens[picture.screen];
       write(file_of(screen), picture.image);
-      if (!scan_out.trivial()) write(panel_file_of(screen), scan_out.apply(picture.image));
+      if (!panel_transform.is_identity()) write(panel_file_of(screen), panel_transform.apply(picture.image));
       costs_.push_back({picture.screen, watch.ms(), bytes});
     }
     for (const MonitorPicture& picture : frame.monitors) {
@@ -91,9 +93,22 @@ class FileDisplay final : public Display {
   const Wall& wall_;
   std::filesystem::path folder_;
   bool keeps_frames_;
-  std::map<std::size_t, ScanOut> scan_outs_;  ///< by screen
+  std::map<std::size_t, PanelTransform> panel_transforms_;  ///< by screen
   std::vector<ScreenCost> costs_;
 };
+
+std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options) {
+  return std::make_unique<FileDisplay>(wall, options);
+}
+
+void check_file_display(const Wall& wall, const DisplayOptions& options) {
+  const std::filesystem::path folder = options.folder.empty() ? "." : options.folder;
+  check_folder(folder);
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) return;  // it will be made
+  for (const auto& file : files_of_display(wall, folder)) check_writable(file, options.overwrite);
+  if (options.keep_frames && !options.overwrite) refuse_kept_frames(folder);
+}
 
 }  // namespace
 
@@ -107,17 +122,8 @@ std::vector<std::filesystem::path> files_of_display(const Wall& wall, const std:
   return files;
 }
 
-std::unique_ptr<Display> make_file_display(const Wall& wall, const DisplayOptions& options) {
-  return std::make_unique<FileDisplay>(wall, options);
-}
-
-void check_file_display(const Wall& wall, const DisplayOptions& options) {
-  const std::filesystem::path folder = options.folder.empty() ? "." : options.folder;
-  check_folder(folder);
-  std::error_code error;
-  if (!std::filesystem::exists(folder, error)) return;  // it will be made
-  for (const auto& file : files_of_display(wall, folder)) check_writable(file, options.overwrite);
-  if (options.keep_frames && !options.overwrite) refuse_kept_frames(folder);
+DisplayKind file_display() {
+  return {.name = "file", .monitors = true, .make = make_file_display, .check = check_file_display};
 }
 
 }  // namespace hpr

@@ -1,5 +1,3 @@
-#include "walls/displays/pipe_display.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +6,8 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
-#include "walls/displays/sink.h"
-#include "walls/displays/y4m.h"
+#include "walls/displays/display.h"
+#include "walls/displays/pipe_stream.h"
 #include "walls/drawing/assemble.h"
 
 namespace hpr {
@@ -29,13 +27,15 @@ Sink open_sink(const PipeOptions& options) {
                                  : Sink::to_command(options.command, options.time_limit);
 }
 
+/// Frames as raw RGBA or YUV4MPEG2, one after the other, to another program: the assembled wall with its gaps, or one
+/// screen. Every frame has the size of the first.
 class PipeDisplay final : public Display {
  public:
   PipeDisplay(const Wall& wall, const PipeOptions& options)
       : wall_(wall),
         format_(options.format),
         screen_(screen_of(wall, options.screen)),
-        picture_(wall_picture(wall, kLargestPicture)),
+        picture_(wall_picture(wall, kMaxPictureSide)),
         latest_(wall.screens.size()),
         sink_(open_sink(options)) {
     if (screen_) latest_[*screen_] = Image<Rgba8>(wall.screens[*screen_].pixels, {0, 0, 0, 255});
@@ -81,16 +81,6 @@ class PipeDisplay final : public Display {
   std::vector<std::byte> bytes_;  ///< the stream's header before its first frame; reused
 };
 
-}  // namespace
-
-PipeFormat parse_pipe_format(const std::string& name) {
-  const std::vector<std::string> names{"rgba", "y4m"};
-  if (name == names[0]) return PipeFormat::Rgba;
-  if (name == names[1]) return PipeFormat::Y4m;
-  throw Error(ExitCode::Usage, fmt::format("unknown pipe format '{}'", printable(name)),
-              unknown_name_hint(name, names));
-}
-
 std::unique_ptr<Display> make_pipe_display(const Wall& wall, const DisplayOptions& options) {
   return std::make_unique<PipeDisplay>(wall, options.pipe);
 }
@@ -111,6 +101,20 @@ void check_pipe_display(const Wall& wall, const DisplayOptions& options) {
   }
   const bool stream = std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
   if (!stream) check_writable(pipe.file, options.overwrite);
+}
+
+}  // namespace
+
+PipeFormat parse_pipe_format(const std::string& name) {
+  const std::vector<std::string> names{"rgba", "y4m"};
+  if (name == names[0]) return PipeFormat::Rgba;
+  if (name == names[1]) return PipeFormat::Y4m;
+  throw Error(ExitCode::Usage, fmt::format("unknown pipe format '{}'", printable(name)),
+              unknown_name_hint(name, names));
+}
+
+DisplayKind pipe_display() {
+  return {.name = "pipe", .whole_wall = true, .stream = true, .make = make_pipe_display, .check = check_pipe_display};
 }
 
 }  // namespace hpr

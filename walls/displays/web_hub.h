@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/timing.h"
-#include "walls/codecs/jpeg_encoder.h"
+#include "walls/codecs/jpeg.h"
 #include "walls/displays/display.h"
 #include "walls/geometry/geometry.h"
 

@@ -4,10 +4,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "walls/displays/display.h"
 
-/// What of a browser's request is believed.
+/// What of a browser's request is believed, and the page that makes such requests.
 namespace hpr {
 
 /// Where to listen.
@@ -31,5 +32,17 @@ struct WebAddress {
 /// {"turn": [right, up], "pan": [right, up], "dolly": d}, each as OrbitInput has it, none needed; none where it is
 /// anything else, or a number is not within 100.
 [[nodiscard]] std::optional<OrbitInput> parse_motion(std::string_view body);
+
+/// The one page of the web display.
+struct WebPage {
+  std::string title;
+  std::string stream;                ///< path of the pictures
+  double wall_heights = 1.0;         ///< how high the picture is, in heights of the wall
+  std::vector<std::string> screens;  ///< ids: each has a page of its own
+  std::string nonce;                 ///< of its script and style, as its Content-Security-Policy names it
+};
+
+/// HTML, complete in itself.
+[[nodiscard]] std::string to_html(const WebPage& page);
 
 }  // namespace hpr

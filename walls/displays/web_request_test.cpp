@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "walls/displays/web_page.h"
 
 namespace hpr {
 namespace {

@@ -14,7 +14,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "walls/displays/web_page.h"
+#include "walls/displays/web_request.h"
 #include "walls/link/socket.h"
 
 namespace hpr {
@@ -31,9 +31,9 @@ using Task = asio::awaitable<Value>;
 using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
-constexpr int kMostConnections = 8;
-constexpr std::uint64_t kLargestBody_bytes = 4096;
-constexpr std::uint32_t kLargestHeader_bytes = 8192;
+constexpr int kMaxConnections = 8;
+constexpr std::uint64_t kMaxBody_bytes = 4096;
+constexpr std::uint32_t kMaxHeader_bytes = 8192;
 constexpr seconds kToRead{10};  ///< a request, and between two of a connection
 constexpr std::size_t kPiece_bytes = 65536;
 constexpr seconds kBetweenParts{2};  ///< the longest: what does not change is sent again, which finds viewers that left
@@ -84,7 +84,7 @@ void listen(tcp::acceptor& acceptor, const WebAddress& address) {
               "choose another port, or let hpr choose one with --display web");
 }
 
-/// Of a coroutine nobody waits for.
+/// Ends a coroutine that nobody waits for; logs what it threw.
 void warn_of(const std::exception_ptr& failure) {
   try {
     if (failure) std::rethrow_exception(failure);
@@ -124,19 +124,19 @@ class WebServer::Implementation {
 
  private:
   /// One of the connections that are counted.
-  class Place {
+  class ConnectionSlot {
    public:
-    explicit Place(int& taken) : taken_(&taken) { ++*taken_; }
-    Place(const Place&) = delete;
-    Place(Place&& other) noexcept : taken_(std::exchange(other.taken_, nullptr)) {}
-    Place& operator=(const Place&) = delete;
-    Place& operator=(Place&&) = delete;
-    ~Place() {
-      if (taken_ != nullptr) --*taken_;
+    explicit ConnectionSlot(int& used) : used_(&used) { ++*used_; }
+    ConnectionSlot(const ConnectionSlot&) = delete;
+    ConnectionSlot(ConnectionSlot&& other) noexcept : used_(std::exchange(other.used_, nullptr)) {}
+    ConnectionSlot& operator=(const ConnectionSlot&) = delete;
+    ConnectionSlot& operator=(ConnectionSlot&&) = delete;
+    ~ConnectionSlot() {
+      if (used_ != nullptr) --*used_;
     }
 
    private:
-    int* taken_;
+    int* used_;
   };
 
   Task<void> accept() {
@@ -150,10 +150,10 @@ class WebServer::Implementation {
       }
       socket.set_option(tcp::no_delay(true), error);
       beast::tcp_stream stream(std::move(socket));
-      if (connections_ < kMostConnections) {
-        asio::co_spawn(io_, serve(std::move(stream), Place(connections_)), warn_of);
-      } else if (refused_ < kMostConnections) {
-        asio::co_spawn(io_, turn_away(std::move(stream), Place(refused_)), warn_of);
+      if (connections_ < kMaxConnections) {
+        asio::co_spawn(io_, serve(std::move(stream), ConnectionSlot(connections_)), warn_of);
+      } else if (refused_ < kMaxConnections) {
+        asio::co_spawn(io_, turn_away(std::move(stream), ConnectionSlot(refused_)), warn_of);
       }
     }
   }
@@ -161,8 +161,8 @@ class WebServer::Implementation {
   /// Reads one request within its limits; false when the connection is to end, after an answer that says why.
   Task<bool> read(beast::tcp_stream& stream, beast::flat_buffer& buffer, Request& request) {
     http::request_parser<http::string_body> parser;
-    parser.header_limit(kLargestHeader_bytes);
-    parser.body_limit(kLargestBody_bytes);
+    parser.header_limit(kMaxHeader_bytes);
+    parser.body_limit(kMaxBody_bytes);
     boost::system::error_code error;
     stream.expires_after(kToRead);
     co_await http::async_read(stream, buffer, parser, asio::redirect_error(asio::use_awaitable, error));
@@ -206,16 +206,16 @@ class WebServer::Implementation {
     boost::system::error_code error;
     stream.socket().shutdown(tcp::socket::shutdown_send, error);
     std::array<char, 4096> scrap{};
-    constexpr int kMostReads = 16;
+    constexpr int kMaxReads = 16;
     stream.expires_after(seconds(1));
-    for (int i = 0; i < kMostReads && !error; ++i) {
+    for (int i = 0; i < kMaxReads && !error; ++i) {
       const auto buffer = asio::buffer(scrap);
       co_await stream.async_read_some(buffer, asio::redirect_error(asio::use_awaitable, error));
     }
   }
 
-  Task<void> turn_away(beast::tcp_stream stream, Place /*place*/) {
-    beast::flat_buffer buffer(kLargestHeader_bytes + kLargestBody_bytes);
+  Task<void> turn_away(beast::tcp_stream stream, ConnectionSlot /*place*/) {
+    beast::flat_buffer buffer(kMaxHeader_bytes + kMaxBody_bytes);
     Request request;
     if (!co_await read(stream, buffer, request)) co_return;
     Response response = refusal(request, http::status::service_unavailable, "eight connections are open already");
@@ -223,8 +223,8 @@ class WebServer::Implementation {
     co_await end(stream, std::move(response));
   }
 
-  Task<void> serve(beast::tcp_stream stream, Place /*place*/) {
-    beast::flat_buffer buffer(kLargestHeader_bytes + kLargestBody_bytes);
+  Task<void> serve(beast::tcp_stream stream, ConnectionSlot /*place*/) {
+    beast::flat_buffer buffer(kMaxHeader_bytes + kMaxBody_bytes);
     while (true) {
       Request request;
       if (!co_await read(stream, buffer, request)) co_return;
@@ -350,7 +350,7 @@ class WebServer::Implementation {
       std::shared_ptr<const WebPicture> next = hub_.picture(which);
       if (next == last) {
         const bool news = co_await wait_for_news();
-        // Before the first picture nothing is written that would tell.
+        // Before the first picture nothing is written whose failure would show it.
         if (next == nullptr && !news && has_left(stream.socket().native_handle())) co_return;
         if (news || next == nullptr) continue;
       }

@@ -14,7 +14,7 @@ namespace hpr {
 void check_listening(const WebAddress& address);
 
 /// Shows a hub's frames to browsers, from a thread of its own. HTTP/1.1, GET and one POST, to whoever has the key: it
-/// stands in the address that is told to the user, and becomes a cookie. Eight connections; each request is read
+/// stands in the address that is announced to the user, and becomes a cookie. Eight connections; each request is read
 /// within a time limit and up to 4 KiB of body; a viewer that reads slowly misses frames, one that takes no 64 KiB
 /// within `to_write` is let go.
 class WebServer {

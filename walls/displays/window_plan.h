@@ -13,7 +13,7 @@ namespace hpr {
 /// A screen in a window.
 struct Pane {
   std::size_t screen = 0;        ///< index into Wall::screens
-  Rect place;                    ///< in the window's pixels
+  Rect rect;                     ///< in the window's pixels
   int rotate = 0;                ///< degrees by which the upright picture is turned clockwise
   Mirror mirror = Mirror::None;  ///< after turning
   double wall_heights_per_pixel = 0.0;
@@ -36,9 +36,9 @@ struct WindowPlan {
 [[nodiscard]] std::vector<WindowPlan> plan_windows(const Wall& wall, const std::vector<std::size_t>& screens);
 
 /// Index of the pane at this place of the window, in its pixels.
-[[nodiscard]] std::optional<std::size_t> pane_at(const WindowPlan& plan, const glm::dvec2& place);
+[[nodiscard]] std::optional<std::size_t> pane_at(const WindowPlan& plan, const glm::dvec2& position);
 
-/// A way of (right, down) pixels on the pane as it goes in the upright picture.
-[[nodiscard]] glm::dvec2 upright(const Pane& pane, const glm::dvec2& way);
+/// A motion of (right, down) pixels on the pane as it goes in the upright picture.
+[[nodiscard]] glm::dvec2 upright(const Pane& pane, const glm::dvec2& motion);
 
 }  // namespace hpr

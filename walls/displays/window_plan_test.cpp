@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "walls/config/wall_file.h"
-#include "walls/drawing/scan_out.h"
+#include "walls/drawing/panel_transform.h"
 
 namespace hpr {
 namespace {
@@ -19,7 +19,7 @@ TEST(WindowPlan, ScreensOfAGridHaveWindowsPlacedAsTheyHang) {
     EXPECT_EQ(plans[i].rect.width(), 40);
     EXPECT_EQ(plans[i].rect.height(), 30);
     ASSERT_EQ(plans[i].panes.size(), 1U);
-    EXPECT_EQ(plans[i].panes[0].place, (Rect{0, 0, 40, 30}));
+    EXPECT_EQ(plans[i].panes[0].rect, (Rect{0, 0, 40, 30}));
     EXPECT_TRUE(plans[i].decorated);
   }
   EXPECT_GE(plans[1].rect.x0, plans[0].rect.x1);
@@ -39,7 +39,7 @@ TEST(WindowPlan, ScreensOfOneWindowShareItAndTurnedOnesAreShownTurned) {
   EXPECT_EQ(plans[0].display, ":7");
   EXPECT_FALSE(plans[0].decorated);
   ASSERT_EQ(plans[0].panes.size(), 2U);
-  EXPECT_EQ(plans[0].panes[1].place, (Rect{40, 0, 70, 40}));
+  EXPECT_EQ(plans[0].panes[1].rect, (Rect{40, 0, 70, 40}));
   EXPECT_EQ(plans[0].panes[1].rotate, 90);
 }
 
@@ -58,8 +58,8 @@ TEST(WindowPlan, AWindowCalledAsAScreenWithoutOneHasItsOwnScreensOnly) {
 TEST(WindowPlan, APlaceIsInThePaneThatCoversIt) {
   WindowPlan plan;
   plan.panes.resize(2);
-  plan.panes[0].place = {0, 0, 40, 30};
-  plan.panes[1].place = {40, 0, 70, 40};
+  plan.panes[0].rect = {0, 0, 40, 30};
+  plan.panes[1].rect = {40, 0, 70, 40};
   EXPECT_EQ(pane_at(plan, {39.9, 0.0}), 0U);
   EXPECT_EQ(pane_at(plan, {40.0, 35.0}), 1U);
   EXPECT_EQ(pane_at(plan, {10.0, 35.0}), std::nullopt);
@@ -70,7 +70,7 @@ TEST(WindowPlan, APlaceIsInThePaneThatCoversIt) {
 glm::dvec2 on_panel(const Wall& wall, int x, int y) {
   Image<Rgba8> picture(wall.screens[0].pixels);
   picture.at(x, y) = {255, 255, 255, 255};
-  const Image<Rgba8> sent = ScanOut(wall, 0).apply(picture);
+  const Image<Rgba8> sent = PanelTransform(wall, 0).apply(picture);
   const auto found = std::ranges::find(sent.pixels(), Rgba8{255, 255, 255, 255});
   const auto index = static_cast<int>(found - sent.pixels().begin());
   return {index % sent.width(), index / sent.width()};
@@ -82,9 +82,10 @@ TEST(WindowPlan, AWayOnThePanelIsTheOneItsPicturesPixelsGo) {
     for (const Mirror mirror : {Mirror::None, Mirror::Horizontal, Mirror::Vertical}) {
       wall.screens[0].rotate = rotate;
       wall.screens[0].mirror = mirror;
-      const glm::dvec2 way = on_panel(wall, 13, 12) - on_panel(wall, 10, 7);
+      const glm::dvec2 motion = on_panel(wall, 13, 12) - on_panel(wall, 10, 7);
       const Pane pane = plan_windows(wall, {0})[0].panes[0];
-      EXPECT_EQ(upright(pane, way), glm::dvec2(3.0, 5.0)) << rotate << " degrees, mirror " << static_cast<int>(mirror);
+      EXPECT_EQ(upright(pane, motion), glm::dvec2(3.0, 5.0))
+          << rotate << " degrees, mirror " << static_cast<int>(mirror);
     }
   }
 }

@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "core/error.h"
 #include "image/image.h"
+#include "walls/geometry/geometry.h"
 
 namespace hpr {
 namespace {
@@ -40,6 +42,22 @@ std::array<float, 256> linear_levels() {
   std::array<float, 256> levels{};
   for (std::size_t i = 0; i < levels.size(); ++i) levels[i] = srgb_to_linear(static_cast<std::uint8_t>(i));
   return levels;
+}
+
+/// The surface alone.
+Wall surface_of(const Wall& wall, const std::string& surface, std::vector<std::size_t>& indices) {
+  const auto on_it = [&](const WallScreen& screen) { return screen.surface == surface; };
+  const bool any_other = std::ranges::any_of(
+      wall.screens, [&](const WallScreen& screen) { return on_it(screen) && screen.eye != Eye::Right; });
+  Wall part = wall;
+  part.screens.clear();
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    const WallScreen& screen = wall.screens[i];
+    if (!on_it(screen) || (any_other && screen.eye == Eye::Right)) continue;
+    part.screens.push_back(screen);
+    indices.push_back(i);
+  }
+  return part;
 }
 
 }  // namespace
@@ -86,11 +104,11 @@ Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<c
   for (const bool right_eye : {true, false}) {
     for (std::size_t i = 0; i < screens.size(); ++i) {
       if ((wall.screens[i].eye == Eye::Right) != right_eye) continue;
-      const Rect place = picture.screens[i];
-      const Size size{place.width(), place.height()};
+      const Rect rect = picture.screens[i];
+      const Size size{rect.width(), rect.height()};
       const bool there = screens[i] != nullptr && screens[i]->size().area() > 0;
       const Image<Rgba8> shown = there ? resample(*screens[i], size) : Image<Rgba8>(size, {0, 0, 0, 255});
-      paste(shown, place.x0, place.y0, result);
+      paste(shown, rect.x0, rect.y0, result);
     }
   }
   return result;
@@ -109,6 +127,45 @@ Image<Rgba8> turn_clockwise(const Image<Rgba8>& image, int degrees) {
       if (degrees == 180) result.at(w - 1 - x, h - 1 - y) = pixel;
       if (degrees == 270) result.at(y, w - 1 - x) = pixel;
     }
+  }
+  return result;
+}
+
+MonitorLayout monitor_layout(const Wall& wall, const WallMonitor& monitor) {
+  // Finer than any monitor, so that scaling its whole pixels rounds to the right ones.
+  constexpr int kFine = 1 << 24;
+  MonitorLayout layout;
+  const Wall part = surface_of(wall, monitor.surface, layout.screens);
+  HPR_CHECK(!part.screens.empty());
+  const WallPicture picture = wall_picture(part, kFine);
+  const double scale = std::min(static_cast<double>(monitor.pixels.width) / picture.size.width,
+                                static_cast<double>(monitor.pixels.height) / picture.size.height);
+  const double left = 0.5 * (monitor.pixels.width - scale * picture.size.width);
+  const double top = 0.5 * (monitor.pixels.height - scale * picture.size.height);
+  const auto scaled = [&](const Rect& rect) {
+    const auto edge = [](double at, int most) { return std::clamp(static_cast<int>(std::lround(at)), 0, most); };
+    Rect result;
+    result.x0 = edge(left + scale * rect.x0, monitor.pixels.width - 1);
+    result.y0 = edge(top + scale * rect.y0, monitor.pixels.height - 1);
+    result.x1 = std::max(result.x0 + 1, edge(left + scale * rect.x1, monitor.pixels.width));
+    result.y1 = std::max(result.y0 + 1, edge(top + scale * rect.y1, monitor.pixels.height));
+    return result;
+  };
+  layout.surface = scaled({0, 0, picture.size.width, picture.size.height});
+  std::ranges::transform(picture.screens, std::back_inserter(layout.rects), scaled);
+  return layout;
+}
+
+Image<Rgba8> draw_monitor(const Wall& wall, const WallMonitor& monitor, const MonitorLayout& layout,
+                          std::span<const Image<Rgba8>> pictures) {
+  HPR_CHECK(pictures.size() == layout.rects.size());
+  Image<Rgba8> result(monitor.pixels, {0, 0, 0, 255});
+  const Rect& surface = layout.surface;
+  paste(Image<Rgba8>({surface.width(), surface.height()}, wall.gap_color), surface.x0, surface.y0, result);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const Rect& rect = layout.rects[i];
+    if (pictures[i].size().area() == 0) continue;
+    paste(resample(pictures[i], {rect.width(), rect.height()}), rect.x0, rect.y0, result);
   }
   return result;
 }

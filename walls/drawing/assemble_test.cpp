@@ -36,9 +36,9 @@ TEST(DrawWall, PlacesEveryPixelAndPaintsTheGaps) {
         ++gaps;
         continue;
       }
-      const Rect place = picture.screens.at(pixel.b - 1U);
-      ASSERT_EQ(x, place.x0 + pixel.r);
-      ASSERT_EQ(y, place.y0 + pixel.g);
+      const Rect rect = picture.screens.at(pixel.b - 1U);
+      ASSERT_EQ(x, rect.x0 + pixel.r);
+      ASSERT_EQ(y, rect.y0 + pixel.g);
     }
   }
   EXPECT_EQ(gaps, drawn.size().area() - 6 * 50 * 40);

@@ -112,11 +112,11 @@ struct PixelCanvas::Surface {
 };
 
 PixelCanvas::PixelCanvas(Size size) {
-  constexpr int kLargestSide = 32767;
+  constexpr int kMaxSide = 32767;
   HPR_CHECK(size.width > 0 && size.height > 0);
-  if (size.width > kLargestSide || size.height > kLargestSide) {
+  if (size.width > kMaxSide || size.height > kMaxSide) {
     throw Error(ExitCode::Limit, fmt::format("cannot draw a picture of {} x {} pixels", size.width, size.height),
-                fmt::format("pictures may have {} pixels a side", kLargestSide));
+                fmt::format("pictures may have {} pixels a side", kMaxSide));
   }
   surface_ = std::make_unique<Surface>(size);
   if (cairo_surface_status(surface_->surface) != CAIRO_STATUS_SUCCESS) {

@@ -1,5 +1,3 @@
-#include "walls/drawing/heat.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -76,9 +74,9 @@ TEST(WallHeat, ThePlanHasAScaleAndTheWorstScreenItsLastColour) {
     EXPECT_NE(svg.find(part), std::string::npos) << part;
   }
   const auto pixels = [&](const Image<Rgba8>& image, Rgba8 color) { return std::ranges::count(image.pixels(), color); };
-  constexpr Rgba8 kMost{240, 110, 90, 255};
-  EXPECT_GT(pixels(wall_plan_image(wall, &heat), kMost), 100'000);
-  EXPECT_EQ(pixels(wall_plan_image(wall), kMost), 0);
+  constexpr Rgba8 kHottest{240, 110, 90, 255};
+  EXPECT_GT(pixels(wall_plan_image(wall, &heat), kHottest), 100'000);
+  EXPECT_EQ(pixels(wall_plan_image(wall), kHottest), 0);
 }
 
 }  // namespace

@@ -9,10 +9,11 @@
 #include <numbers>
 #include <vector>
 
+#include "image/image.h"
 #include "walls/drawing/canvas.h"
 #include "walls/drawing/plan.h"
-#include "walls/geometry/adjacent.h"
 #include "walls/geometry/geometry.h"
+#include "walls/geometry/neighbors.h"
 
 namespace hpr {
 namespace {
@@ -108,13 +109,13 @@ void draw_tick(Canvas& canvas, bool across, double at, int number, double unit, 
 /// Along the top edge from the left and the left edge from the top; every tenth tick is long and numbered.
 void draw_rulers(Canvas& canvas, const WallScreen& screen) {
   const glm::dvec2 size(screen.pixels.width, screen.pixels.height);
-  const double metres = screen_width(screen);
-  const double pixels_per_mm = size.x / (1000.0 * metres);
+  const double meters = screen_width(screen);
+  const double pixels_per_mm = size.x / (1000.0 * meters);
   const double step = tick_mm(pixels_per_mm);
   const double unit = std::min(size.x, size.y) / 100.0;
   if (unit < 1.0) return;
   for (const bool across : {true, false}) {
-    const double length_mm = 1000.0 * (across ? metres : screen_height(screen));
+    const double length_mm = 1000.0 * (across ? meters : screen_height(screen));
     for (int i = 1; i * step < length_mm; ++i) {
       draw_tick(canvas, across, std::round(i * step * (across ? pixels_per_mm : size.y / length_mm)), i, unit, step);
     }
@@ -127,9 +128,9 @@ void draw_neighbours(Canvas& canvas, const Wall& wall, std::size_t index) {
   const double arrow = 0.035 * std::min(size.x, size.y);
   const double height = 0.9 * arrow;
   if (height < 4.0) return;
-  const auto neighbours = adjacent_screens(wall, index);
+  const auto neighbors = adjacent_screens(wall, index);
   const auto label = [&](Side side) -> std::string {
-    const auto found = neighbours.at(static_cast<std::size_t>(side));
+    const auto found = neighbors.at(static_cast<std::size_t>(side));
     return found ? wall.screens[*found].id : "";
   };
   const auto draw = [&](Side side, glm::dvec2 tip, glm::dvec2 back, bool upright) {
@@ -179,6 +180,25 @@ void draw_checkers(Image<Rgba8>& image) {
   }
 }
 
+constexpr Rgba8 kBetween{96, 96, 96, 255};
+
+/// Where bars and number are, of a pattern's height and width.
+constexpr double kLeft = 0.1;
+constexpr double kWidth = 0.8;
+constexpr double kTop = 0.65;
+constexpr double kBars = 0.05;
+constexpr double kNumber = 0.05;
+
+Rect all_bars(Size size) {
+  const int top = static_cast<int>(kTop * size.height);
+  const int left = static_cast<int>(kLeft * size.width);
+  return {left, top, left + static_cast<int>(kWidth * size.width), top + static_cast<int>(kBars * size.height)};
+}
+
+void fill(Image<Rgba8>& image, const Rect& rect, Rgba8 color) {
+  paste(Image<Rgba8>({rect.width(), rect.height()}, color), rect.x0, rect.y0, image);
+}
+
 }  // namespace
 
 Image<Rgba8> wall_pattern(const Wall& wall, std::size_t index) {
@@ -214,6 +234,31 @@ Image<Rgba8> wall_pattern(const Wall& wall, std::size_t index) {
   Image<Rgba8> image = canvas.image();
   draw_checkers(image);
   return image;
+}
+
+Rect frame_counter_bar(Size pattern, int bit) {
+  const Rect all = all_bars(pattern);
+  const int step = all.width() / kFrameCounterBits;
+  const int inset = std::max(1, step / 8);
+  const int x = all.x0 + (kFrameCounterBits - 1 - bit) * step;
+  const Rect bar{x + inset, all.y0 + 1, x + step, all.y1 - 1};
+  return bar.empty() ? Rect{} : bar;
+}
+
+void draw_frame_counter(Image<Rgba8>& pattern, std::uint64_t frame) {
+  const Rect all = all_bars(pattern.size());
+  if (frame_counter_bar(pattern.size(), 0).empty()) return;
+  fill(pattern, all, kBetween);
+  for (int bit = 0; bit < kFrameCounterBits; ++bit) {
+    fill(pattern, frame_counter_bar(pattern.size(), bit),
+         (frame >> static_cast<unsigned>(bit) & 1U) != 0 ? kWhite : kBlack);
+  }
+  const Size size{all.width(), static_cast<int>(kNumber * pattern.height())};
+  if (size.height < 6) return;
+  PixelCanvas canvas(size);
+  canvas.fill({0.0, 0.0}, {size.width, size.height}, kBlack);
+  canvas.text({0.5 * size.width, 0.5 * size.height}, fmt::format("frame {}", frame), 0.8 * size.height, kWhite);
+  paste(canvas.image(), all.x0, all.y1, pattern);
 }
 
 }  // namespace hpr

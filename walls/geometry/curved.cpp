@@ -5,10 +5,12 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numbers>
 
 #include "core/error.h"
 #include "core/parallel.h"
 #include "walls/geometry/geometry.h"
+#include "walls/geometry/warping.h"
 
 namespace hpr {
 namespace {
@@ -16,25 +18,25 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A rectangle on the plane pictures are on.
-struct Seen {
+struct ViewBounds {
   glm::dvec2 low{kInfinity};
   glm::dvec2 high{-kInfinity};
 
-  void add(const glm::dvec2& place) {
-    low = glm::min(low, place);
-    high = glm::max(high, place);
+  void add(const glm::dvec2& position) {
+    low = glm::min(low, position);
+    high = glm::max(high, position);
   }
 };
 
 /// Widens `seen` to a block's box; false, having changed nothing, where not all of it is seen.
-bool add_box(const PixelPoints& points, const Bounds& box, Seen& seen) {
-  Seen wider = seen;
+bool add_box(const PixelPoints& points, const Bounds& box, ViewBounds& seen) {
+  ViewBounds wider = seen;
   for (unsigned int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at((corner & 1U) != 0 ? box.high.x : box.low.x, (corner & 2U) != 0 ? box.high.y : box.low.y,
                         (corner & 4U) != 0 ? box.high.z : box.low.z);
-    const auto place = points.seen(at);
-    if (!place) return false;
-    wider.add(*place);
+    const auto position = points.seen(at);
+    if (!position) return false;
+    wider.add(*position);
   }
   seen = wider;
   return true;
@@ -53,11 +55,22 @@ View flattened(const View& view, const View& flat) {
   return result;
 }
 
-void darken(Image<Rgba8>& picture, const Image<SourcePlace>& places) {
+void darken(Image<Rgba8>& picture, const Image<SourcePosition>& positions) {
   const auto pixels = picture.pixels();
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (places.pixels()[i] == kNoSource) pixels[i] = {0, 0, 0, 255};
+    if (positions.pixels()[i] == kNoSource) pixels[i] = {0, 0, 0, 255};
   }
+}
+
+CurveFigures curve_of(const Wall& wall, const WallScreen& screen) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const WallViewer& viewer = wall.viewers.at(screen.viewer);
+  View view;
+  view.screen = screen.pixels;
+  view.points = pixel_points(screen, eye_position(viewer, {viewer.position}, screen.eye));
+  const View flat = flat_view(view, view.screen);
+  return {(std::atan(flat.right) - std::atan(flat.left)) / kDegree,
+          (std::atan(flat.top) - std::atan(flat.bottom)) / kDegree, flat_pixels(view)};
 }
 
 }  // namespace
@@ -73,11 +86,11 @@ PixelPoints pixel_points(const WallScreen& screen, const glm::dvec3& eye) {
 View flat_view(const View& view, Size pixels) {
   HPR_CHECK(view.points && pixels.area() > 0);
   const PixelPoints& points = *view.points;
-  Seen seen;
+  ViewBounds seen;
   for (const PositionMap::Block& block : points.map->blocks()) {
     if (add_box(points, block.box, seen)) continue;
     points.map->visit(block, [&](const glm::dvec3& point) {
-      if (const auto place = points.seen(point)) seen.add(*place);
+      if (const auto position = points.seen(point)) seen.add(*position);
     });
   }
   View flat = flattened(view, view);
@@ -107,7 +120,7 @@ Size flat_pixels(const View& view) {
       least = glm::min(least, glm::max(glm::abs(*beside - *here), glm::abs(*below - *here)));
     }
   }
-  const int most = std::min(2 * std::max(view.screen.width, view.screen.height), kLargestSource);
+  const int most = std::min(2 * std::max(view.screen.width, view.screen.height), kMaxSourceSide);
   const auto pixels = [&](double extent, double step, int own) {
     const double wanted = extent / step;
     return std::isfinite(step) && std::isfinite(wanted)
@@ -118,35 +131,37 @@ Size flat_pixels(const View& view) {
           pixels(flat.top - flat.bottom, least.y, view.screen.height)};
 }
 
-Image<SourcePlace> curved_sources(const View& view, const View& flat, int threads) {
+Image<SourcePosition> curved_sources(const View& view, const View& flat, int threads) {
   const PixelPoints& points = *view.points;
-  Image<SourcePlace> sources(view.screen, kNoSource);
+  Image<SourcePosition> sources(view.screen, kNoSource);
   const glm::dvec2 scale(flat.screen.width / (flat.right - flat.left), flat.screen.height / (flat.top - flat.bottom));
   parallel_for(threads, static_cast<std::size_t>(view.screen.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < view.screen.width; ++x) {
-      const auto place = points.seen_at((x + 0.5) / view.screen.width, (y + 0.5) / view.screen.height);
-      if (!place) continue;
-      sources.at(x, y) = source_place((place->x - flat.left) * scale.x, (flat.top - place->y) * scale.y, flat.screen);
+      const auto position = points.seen_at((x + 0.5) / view.screen.width, (y + 0.5) / view.screen.height);
+      if (!position) continue;
+      sources.at(x, y) =
+          source_position((position->x - flat.left) * scale.x, (flat.top - position->y) * scale.y, flat.screen);
     }
   });
   return sources;
 }
 
-CurvedScreens::CurvedScreens(std::span<const View> views, bool by_rays) : by_rays_(by_rays), seen_(views.size()) {
+CurvedScreens::CurvedScreens(std::span<const View> views, bool by_rays)
+    : by_rays_(by_rays), cached_views_(views.size()) {
   for (const View& view : views) {
     sizes_.push_back(view.points && !by_rays ? flat_pixels(view) : view.screen);
   }
 }
 
-CurvedScreens::Seen& CurvedScreens::seen(std::size_t picture, const View& view) {
-  std::optional<Seen>& seen = seen_[picture];
+CurvedScreens::CachedView& CurvedScreens::cached_view(std::size_t picture, const View& view) {
+  std::optional<CachedView>& seen = cached_views_[picture];
   const PixelPoints& points = *view.points;
   const auto as_before = [&](const PixelPoints& from) {
     return from.eye == points.eye && from.scale == points.scale && from.orthographic == points.orthographic;
   };
   if (!seen || !as_before(seen->from)) {
-    seen = Seen{points, by_rays_ ? view : flat_view(view, sizes_[picture]), {}};
+    seen = CachedView{points, by_rays_ ? view : flat_view(view, sizes_[picture]), {}};
   }
   return *seen;
 }
@@ -154,7 +169,7 @@ CurvedScreens::Seen& CurvedScreens::seen(std::size_t picture, const View& view) 
 std::vector<View> CurvedScreens::drawn(std::vector<View> views) {
   HPR_CHECK(views.size() == sizes_.size());
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (views[i].points && !by_rays_) views[i] = flattened(views[i], seen(i, views[i]).flat);
+    if (views[i].points && !by_rays_) views[i] = flattened(views[i], cached_view(i, views[i]).flat);
   }
   return views;
 }
@@ -164,14 +179,42 @@ void CurvedScreens::finish(std::span<const View> views, std::vector<Image<Rgba8>
   for (std::size_t i = 0; i < views.size(); ++i) {
     const View& view = views[i];
     if (!view.points || pictures[i].size().area() == 0) continue;
-    Seen& shown = seen(i, view);
-    if (shown.places.size() != view.screen) shown.places = curved_sources(view, shown.flat, threads);
+    CachedView& shown = cached_view(i, view);
+    if (shown.positions.size() != view.screen) shown.positions = curved_sources(view, shown.flat, threads);
     if (by_rays_) {
-      darken(pictures[i], shown.places);
+      darken(pictures[i], shown.positions);
     } else {
-      pictures[i] = warped(pictures[i], shown.places, threads);
+      pictures[i] = warped(pictures[i], shown.positions, threads);
     }
   }
+}
+
+std::vector<WarpFigures> warp_figures(const Wall& wall) {
+  std::vector<WarpFigures> all;
+  for (std::size_t i = 0; i < wall.screens.size(); ++i) {
+    const WallScreen& screen = wall.screens[i];
+    if (!screen.warp.any()) continue;
+    WarpFigures& figures = all.emplace_back();
+    figures.screen = i;
+    std::size_t lit = screen.pixels.area();
+    if (screen.warp.grid) {
+      const Image<SourcePosition> sources = mesh_sources(*screen.warp.grid, screen.pixels);
+      lit -= static_cast<std::size_t>(std::ranges::count(sources.pixels(), kNoSource));
+      figures.mesh_size = screen.warp.grid->triangles.size();
+    }
+    if (screen.warp.points) {
+      figures.curve = curve_of(wall, screen);
+      figures.mesh_size = screen.warp.points->size().area();
+      for (int y = 0; y < screen.pixels.height; ++y) {
+        for (int x = 0; x < screen.pixels.width; ++x) {
+          const double s = (x + 0.5) / screen.pixels.width;
+          if (!screen.warp.points->at(s, (y + 0.5) / screen.pixels.height)) --lit;
+        }
+      }
+    }
+    figures.lit = static_cast<double>(lit) / static_cast<double>(screen.pixels.area());
+  }
+  return all;
 }
 
 }  // namespace hpr

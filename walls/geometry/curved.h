@@ -9,7 +9,7 @@
 #include "image/image.h"
 #include "scene/view.h"
 #include "walls/config/wall.h"
-#include "walls/geometry/warped_picture.h"
+#include "walls/geometry/warping.h"
 
 namespace hpr {
 
@@ -40,21 +40,39 @@ class CurvedScreens {
 
  private:
   /// Stays the same as long as the eye does.
-  struct Seen {
+  struct CachedView {
     PixelPoints from;
     View flat;
-    Image<SourcePlace> places;  ///< empty: not asked for yet
+    Image<SourcePosition> positions;  ///< empty: not asked for yet
   };
 
-  /// Of one picture, as `view` has its eye.
-  Seen& seen(std::size_t picture, const View& view);
+  /// What is kept of one picture, made anew where the eye of `view` is another one than before.
+  CachedView& cached_view(std::size_t picture, const View& view);
 
   bool by_rays_;
   std::vector<Size> sizes_;
-  std::vector<std::optional<Seen>> seen_;
+  std::vector<std::optional<CachedView>> cached_views_;
 };
 
 /// Per pixel of the screen of `view` where its point is seen in the picture of `flat`; kNoSource where it has none.
-[[nodiscard]] Image<SourcePlace> curved_sources(const View& view, const View& flat, int threads);
+[[nodiscard]] Image<SourcePosition> curved_sources(const View& view, const View& flat, int threads);
+
+/// What a warped screen's position map looks like to its viewer at rest.
+struct CurveFigures {
+  double width_degrees = 0.0;  ///< covered, along the axes of the screen's corners
+  double height_degrees = 0.0;
+  Size flat_pixels;  ///< of the picture OpenGL draws
+};
+
+/// What one wants to know about a screen with a warp.
+struct WarpFigures {
+  std::size_t screen = 0;             ///< index into Wall::screens
+  double lit = 1.0;                   ///< fraction of its pixels
+  std::size_t mesh_size = 0;          ///< points or triangles of its mesh; 0: it has none
+  std::optional<CurveFigures> curve;  ///< of a position map
+};
+
+/// The figures of each screen with a warp.
+[[nodiscard]] std::vector<WarpFigures> warp_figures(const Wall& wall);
 
 }  // namespace hpr

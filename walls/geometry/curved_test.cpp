@@ -33,7 +33,7 @@ WallScreen arc_screen(const Arc& arc, Size pixels, Size texels) {
 Wall arc_wall(const std::vector<Arc>& arcs, Size pixels, Size texels, const glm::dvec3& eye) {
   Wall wall;
   for (const Arc& arc : arcs) wall.screens.push_back(arc_screen(arc, pixels, texels));
-  wall.viewers.front().given = true;
+  wall.viewers.front().has_position = true;
   wall.viewers.front().position = eye;
   return wall;
 }
@@ -178,7 +178,7 @@ TEST(CurvedScreens, FlatPicturesHoldAllThatIsSeenAndAreFineEnough) {
       }
     }
     EXPECT_LT(across, 1.05 * least);
-    const Image<SourcePlace> sources = curved_sources(view, flat, 3);
+    const Image<SourcePosition> sources = curved_sources(view, flat, 3);
     EXPECT_EQ(std::ranges::count(sources.pixels(), kNoSource), 0);
     EXPECT_EQ(sources, curved_sources(view, flat, 1));
   }

@@ -5,21 +5,49 @@
 #include <span>
 #include <vector>
 
+#include "image/color.h"
+#include "image/image.h"
 #include "scene/view.h"
 #include "walls/config/wall.h"
-#include "walls/geometry/stereo.h"
-#include "walls/tracking/head.h"
+#include "walls/tracking/head_path.h"
 
 namespace hpr {
 
+/// A picture to draw: of a screen, for an eye.
+struct ScreenEye {
+  std::size_t screen = 0;  ///< index into Wall::screens
+  Eye eye = Eye::Both;
+  Size pixels;
+
+  bool operator==(const ScreenEye&) const = default;
+};
+
+/// Whether each of the two screens is for an eye of its own.
+[[nodiscard]] bool for_other_eyes(const WallScreen& a, const WallScreen& b);
+
+/// The pictures a wall needs, screen after screen: one each, but the left and then the right eye's of screens for both
+/// where the stereo mode puts two pictures on one panel. Side by side and above each other each has half of the
+/// screen's pixels, the left (upper) one the smaller half.
+[[nodiscard]] std::vector<ScreenEye> screen_eyes(const Wall& wall);
+
+/// Which parts of a screen's pixels its pictures take, in the order of screen_eyes(); one part where they share it.
+[[nodiscard]] std::vector<Rect> eye_rects(const Wall& wall, std::size_t screen);
+
+/// What the screen shows of two eyes' pictures of the sizes of screen_eyes(). Anaglyph: red of the left eye, green and
+/// blue of the right one.
+[[nodiscard]] Image<Rgba8> compose_eyes(StereoMode mode, const Image<Rgba8>& left, const Image<Rgba8>& right);
+
+/// Per screen what it shows, of the pictures of screen_eyes(); empty where one of them is.
+[[nodiscard]] std::vector<Image<Rgba8>> compose_screens(const Wall& wall, std::vector<Image<Rgba8>> pictures);
+
 /// The rectangle all screens lie in, seen along their mean normal.
 struct WallExtent {
-  glm::dmat3 axes{1.0};    ///< columns: right, up, towards the viewer; wall space, orthonormal
-  glm::dvec3 center{0.0};  ///< of the rectangle, wall space
-  double width = 0.0;      ///< metres
-  double height = 0.0;     ///< metres
-  bool flat = true;        ///< all screens face the same way in one plane (to 1e-6 of the extent)
-  glm::dvec3 middle{0.0};  ///< mean of the screens' centres, wall space
+  glm::dmat3 axes{1.0};      ///< columns: right, up, towards the viewer; wall space, orthonormal
+  glm::dvec3 center{0.0};    ///< of the rectangle, wall space
+  double width = 0.0;        ///< metres
+  double height = 0.0;       ///< metres
+  bool flat = true;          ///< all screens face the same way in one plane (to 1e-6 of the extent)
+  glm::dvec3 centroid{0.0};  ///< mean of the screens' centres, wall space
 };
 
 [[nodiscard]] WallExtent wall_extent(std::span<const WallScreen> screens);
@@ -49,7 +77,7 @@ struct WallExtent {
 /// position map is looked at through its points, by an eye that stays where it is.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, std::span<const HeadPose> heads, const Camera& camera,
                                            const Bounds& bounds);
-/// With heads at rest.
+/// The views of heads at rest.
 [[nodiscard]] std::vector<View> wall_views(const Wall& wall, const Camera& camera, const Bounds& bounds);
 
 /// Screens (by index) that lie in one plane and face the same way; plane after plane from left to right as the viewer
@@ -67,14 +95,14 @@ struct WallPicture {
 };
 
 /// Pixels a side of an assembled wall that is looked at, or encoded: most programs take no larger picture well.
-inline constexpr int kLargestPicture = 8192;
+inline constexpr int kMaxPictureSide = 8192;
 
 /// A flat wall as it stands, at its finest screen's pixels; any other wall plane by plane: upright ones side by side
 /// from left to right, ceilings above, floors below. Scaled down when a side would exceed `max_side` pixels. Edges are
 /// rounded to whole pixels; where all screens have one pitch, and nothing is scaled, each keeps its size.
 [[nodiscard]] WallPicture wall_picture(const Wall& wall, int max_side);
 
-/// What lies between neighbours of one pitch in the rows and columns of a flat wall, and how far that is from whole
+/// What lies between neighbors of one pitch in the rows and columns of a flat wall, and how far that is from whole
 /// pixels: the error a wall description with bezels in whole pixels would make.
 struct WallSeams {
   int count = 0;
@@ -88,7 +116,7 @@ struct WallSeams {
 /// Metres per pixel along the screen's width.
 [[nodiscard]] double pixel_pitch(const WallScreen& screen);
 
-/// Of the screen with the smallest pixels.
+/// Meters per pixel of the screen with the smallest pixels.
 [[nodiscard]] double finest_pitch(const Wall& wall);
 
 }  // namespace hpr

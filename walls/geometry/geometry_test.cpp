@@ -32,7 +32,7 @@ Wall wall_of(const std::vector<WallScreen>& screens, const glm::dvec3& viewer) {
   Wall wall;
   wall.screens = screens;
   wall.viewers.front().position = viewer;
-  wall.viewers.front().given = true;
+  wall.viewers.front().has_position = true;
   return wall;
 }
 
@@ -182,7 +182,7 @@ TEST(WallGeometry, AWallWithoutViewerShowsWhatTheCameraSees) {
 TEST(WallGeometry, AWallThatFacesElsewhereIsTurnedTowardsTheCamera) {
   // Faces +x, 40 m away.
   Wall wall = wall_of({screen_at({40.0, 1.0, 3.0}, {40.0, 1.0, 1.0}, {40.0, 2.0, 3.0}, {200, 100})}, glm::dvec3(0.0));
-  wall.viewers.front().given = false;
+  wall.viewers.front().has_position = false;
   const Camera camera = perspective(0.9);
   const View view = wall_views(wall, camera, kBounds).at(0);
   const View plain = make_view(camera, {200, 100}, kBounds);
@@ -198,12 +198,12 @@ TEST(WallGeometry, AnOrthographicCameraCoversItsHalfHeightWithHalfTheWall) {
   camera.lens = OrthographicLens{4.0, 3.0, 0.5, 50.0};
   const std::vector<View> views = wall_views(wall, camera, kBounds);
   const WallExtent extent = wall_extent(wall);
-  const double per_metre = 6.0 / extent.height;
+  const double per_meter = 6.0 / extent.height;
   EXPECT_TRUE(views[0].orthographic);
   EXPECT_NEAR(views[0].top, 3.0, 1e-14);
   EXPECT_NEAR(views[0].bottom, -3.0, 1e-14);
-  EXPECT_NEAR(views[0].left, -0.5 * extent.width * per_metre, 1e-13);
-  EXPECT_NEAR(views[1].left - views[0].right, 0.006 * per_metre, 1e-13);
+  EXPECT_NEAR(views[0].left, -0.5 * extent.width * per_meter, 1e-13);
+  EXPECT_NEAR(views[1].left - views[0].right, 0.006 * per_meter, 1e-13);
   EXPECT_GE(views[0].near_distance, 0.5);
   EXPECT_LE(views[0].far_distance, 50.0);
   camera.lens = OrthographicLens{30.0, 3.0, 0.5, 50.0};

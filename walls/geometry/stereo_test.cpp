@@ -1,5 +1,3 @@
-#include "walls/geometry/stereo.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -50,7 +48,7 @@ Wall stereo_wall(StereoMode mode) {
   Wall wall = load_wall("3x2@640x361");
   wall.stereo = mode;
   WallViewer& viewer = wall.viewers.front();
-  viewer.given = true;
+  viewer.has_position = true;
   viewer.position = {0.2, 0.1, 1.3};
   viewer.ipd_m = 0.063;
   viewer.eye_offset = {0.0, 0.02, -0.08};

@@ -14,11 +14,9 @@
 #include "core/file.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
-#include "walls/drawing/level_table.h"
-#include "walls/drawing/scan_out.h"
-#include "walls/geometry/position_map.h"
-#include "walls/geometry/warp_mesh.h"
+#include "walls/drawing/panel_transform.h"
 #include "walls/geometry/warp_test_tools.h"
+#include "walls/geometry/warping.h"
 
 namespace hpr {
 namespace {
@@ -56,17 +54,17 @@ std::string what_of(const std::function<void()>& work) {
 TEST(WarpMesh, TheIdentityIsSentTheSameBits) {
   for (const Size size : {Size{1, 1}, Size{7, 5}, Size{640, 361}}) {
     const Image<Rgba8> picture = noise(size);
-    const ScanOut csv(wall_of(parse_warp_csv(kIdentity, "m.csv"), size), 0);
-    EXPECT_FALSE(csv.trivial());
+    const PanelTransform csv(wall_of(parse_warp_csv(kIdentity, "m.csv"), size), 0);
+    EXPECT_FALSE(csv.is_identity());
     EXPECT_EQ(csv.apply(picture), picture);
     const WarpMesh quad =
         parse_warp_obj("v 0 0\nv 1 0\nv 1 1\nv 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n", "m");
-    EXPECT_EQ(ScanOut(wall_of(quad, size), 0).apply(picture), picture);
+    EXPECT_EQ(PanelTransform(wall_of(quad, size), 0).apply(picture), picture);
     const WarpMesh marked = parse_warp_csv(
         "\xEF\xBB\xBF"
         "0;1;0;1\r\n1;1;1;1\r\n0;0;0;0\r\n1;0;1;0\r\n",
         "m.csv");
-    EXPECT_EQ(ScanOut(wall_of(marked, size), 0).apply(picture), picture);
+    EXPECT_EQ(PanelTransform(wall_of(marked, size), 0).apply(picture), picture);
   }
 }
 
@@ -76,14 +74,14 @@ TEST(WarpMesh, ManyRowsOfTheIdentityAreTheIdentity) {
     for (int x = 0; x <= 17; ++x) text += fmt::format("{0},{1},{0},{1}\n", x / 17.0, y / 13.0);
   }
   const Image<Rgba8> picture = noise({333, 217});
-  EXPECT_EQ(ScanOut(wall_of(parse_warp_csv(text, "m.csv"), picture.size()), 0).apply(picture), picture);
+  EXPECT_EQ(PanelTransform(wall_of(parse_warp_csv(text, "m.csv"), picture.size()), 0).apply(picture), picture);
 }
 
 TEST(WarpMesh, AShiftedMeshShowsWhatItSaysAndNothingBeside) {
   // The screen's left three quarters show the picture from a quarter on, up by an eighth.
   const WarpMesh mesh = parse_warp_csv("0,1,0.25,0.875\n0.75,1,1,0.875\n0,0.125,0.25,0\n0.75,0.125,1,0\n", "m.csv");
   const Image<Rgba8> picture = noise({64, 32});
-  const Image<Rgba8> sent = ScanOut(wall_of(mesh, picture.size()), 0).apply(picture);
+  const Image<Rgba8> sent = PanelTransform(wall_of(mesh, picture.size()), 0).apply(picture);
   for (int y = 0; y < 32; ++y) {
     for (int x = 0; x < 64; ++x) {
       const bool inside = x < 48 && y < 28;
@@ -96,12 +94,12 @@ TEST(WarpMesh, BetweenPixelsLightIsMixedLinearly) {
   Image<Rgba8> picture({2, 1}, {0, 0, 0, 255});
   picture.at(1, 0) = {255, 255, 255, 255};
   for (const double part : {0.25, 0.5, 0.9}) {
-    const Image<SourcePlace> sources({1, 1}, source_place(0.5 + part, 0.5, picture.size()));
+    const Image<SourcePosition> sources({1, 1}, source_position(0.5 + part, 0.5, picture.size()));
     const auto light = static_cast<float>(std::llround(part * 65536.0)) / 65536.0F;
     EXPECT_EQ(warped(picture, sources, 1).at(0, 0), to_srgb({light, light, light}));
   }
-  EXPECT_EQ(source_place(-3.0, 9.0, {4, 5}), (SourcePlace{0, 4U << 16U}));
-  EXPECT_EQ(source_place(65536.0, 0.5, {65536, 1}), (SourcePlace{65535U << 16U, 0}));
+  EXPECT_EQ(source_position(-3.0, 9.0, {4, 5}), (SourcePosition{0, 4U << 16U}));
+  EXPECT_EQ(source_position(65536.0, 0.5, {65536, 1}), (SourcePosition{65535U << 16U, 0}));
 }
 
 TEST(WarpMesh, SideBySideEachEyesPictureGoesThroughTheMesh) {
@@ -109,7 +107,7 @@ TEST(WarpMesh, SideBySideEachEyesPictureGoesThroughTheMesh) {
   Wall wall = wall_of(parse_warp_csv("0,1,1,1\n1,1,0,1\n0,0,1,0\n1,0,0,0\n", "m.csv"), {16, 4});
   wall.stereo = StereoMode::SideBySide;
   const Image<Rgba8> picture = noise({16, 4});
-  const Image<Rgba8> sent = ScanOut(wall, 0).apply(picture);
+  const Image<Rgba8> sent = PanelTransform(wall, 0).apply(picture);
   for (int x = 0; x < 8; ++x) {
     EXPECT_EQ(sent.at(x, 2), picture.at(7 - x, 2));
     EXPECT_EQ(sent.at(8 + x, 2), picture.at(15 - x, 2));
@@ -204,7 +202,7 @@ class WarpFiles : public ::testing::Test {
   }
 
   /// Findings about a screen of 2 m x 1.25 m before the viewer, on a line each, and what the wall is then.
-  [[nodiscard]] std::string told(const std::string& warp, bool viewer = true) {
+  [[nodiscard]] std::string findings_of(const std::string& warp, bool viewer = true) {
     const std::string text = fmt::format(
         "hpr_wall = 1\n{}[[surfaces]]\nscreens = [{{ id = \"a\", pixels = [160, 100], corners_m = {{ ll = [-1, 0, -2], "
         "lr "
@@ -228,7 +226,7 @@ TEST_F(WarpFiles, AreFoundBesideTheWallFileAndHeld) {
   write_map("m.pfm", {});
   write_file_atomically(folder_ / "m.csv", kIdentity);
   write_png(folder_ / "alpha.png", Image<Rgba8>({8, 5}, {51, 102, 255, 255}));
-  EXPECT_EQ(told("{ mesh = \"m.pfm\", blend = \"alpha.png\", black = \"alpha.png\" }"), "");
+  EXPECT_EQ(findings_of("{ mesh = \"m.pfm\", blend = \"alpha.png\", black = \"alpha.png\" }"), "");
   const ScreenWarp warp = wall_.screens.front().warp;
   ASSERT_TRUE(warp.points && warp.light && warp.floor && !warp.grid);
   EXPECT_EQ(warp.points->points(), test::Arc{}.points({12, 8}));
@@ -236,7 +234,7 @@ TEST_F(WarpFiles, AreFoundBesideTheWallFileAndHeld) {
   EXPECT_FLOAT_EQ(warp.floor->at(3, 3).g, 0.4F);
   EXPECT_EQ(warp.light->at(3, 3).b, 1.0F);
   const std::uint64_t hash = wall_.hash;
-  EXPECT_EQ(told("{ mesh = \"m.csv\" }"), "");
+  EXPECT_EQ(findings_of("{ mesh = \"m.csv\" }"), "");
   EXPECT_TRUE(wall_.screens.front().warp.grid && !wall_.screens.front().warp.points);
   EXPECT_NE(wall_.hash, hash);
   EXPECT_NE(wall_.screens.front().warp, warp);
@@ -244,43 +242,43 @@ TEST_F(WarpFiles, AreFoundBesideTheWallFileAndHeld) {
 
 TEST_F(WarpFiles, WhatLooksWrongIsAWarning) {
   write_map("mirrored.pfm", {.left = 40.0, .right = -40.0});
-  EXPECT_EQ(told("{ mesh = \"mirrored.pfm\" }"),
+  EXPECT_EQ(findings_of("{ mesh = \"mirrored.pfm\" }"),
             "warning 4:124: the points of screen \"a\" are in mirror image as the viewer sees them\n");
   write_map("upside-down.pfm", {.bottom = 3.0, .top = 0.0});
-  EXPECT_NE(told("{ mesh = \"upside-down.pfm\" }").find("in mirror image"), std::string::npos);
+  EXPECT_NE(findings_of("{ mesh = \"upside-down.pfm\" }").find("in mirror image"), std::string::npos);
   write_map("round.pfm", {.left = -100.0, .right = 100.0});
   EXPECT_EQ(
-      told("{ mesh = \"round.pfm\" }"),
+      findings_of("{ mesh = \"round.pfm\" }"),
       "warning 4:124: 16 of 96 points of screen \"a\" lie behind the viewer's eye, or 85 degrees and more off its "
       "normal\n");
   Image<glm::vec3> folded = test::Arc{}.points({12, 8});
   std::swap(folded.at(5, 4), folded.at(6, 4));
   write_file_atomically(folder_ / "folded.pfm", test::pfm(folded));
-  EXPECT_NE(told("{ mesh = \"folded.pfm\" }").find("warning 4:124: the points of screen \"a\" fold over, in "),
+  EXPECT_NE(findings_of("{ mesh = \"folded.pfm\" }").find("warning 4:124: the points of screen \"a\" fold over, in "),
             std::string::npos);
   write_map("tall.pfm", {}, {64, 80});
-  EXPECT_EQ(told("{ mesh = \"tall.pfm\" }"),
+  EXPECT_EQ(findings_of("{ mesh = \"tall.pfm\" }"),
             "warning 4:133: 'mesh' of warp has 64 x 80 pixels, another shape than the screen's 160 x 100\n");
 }
 
 TEST_F(WarpFiles, WhatCannotBeUsedIsAnError) {
   write_map("m.pfm", {});
   write_map("behind.pfm", {.left = 140.0, .right = 220.0});
-  EXPECT_EQ(told("{ mesh = \"m.pfm\" }", false),
+  EXPECT_EQ(findings_of("{ mesh = \"m.pfm\" }", false),
             "error 3:124: screen \"a\" has a position map, and no viewer a place\n");
-  EXPECT_NE(told("{ mesh = \"behind.pfm\" }").find("error 4:124: all points of screen \"a\" lie behind"),
+  EXPECT_NE(findings_of("{ mesh = \"behind.pfm\" }").find("error 4:124: all points of screen \"a\" lie behind"),
             std::string::npos);
-  EXPECT_EQ(told("{ }"), "error 4:124: warp names no file\n");
-  EXPECT_EQ(told("{ mesh = \"m.ply\" }").substr(0, 47), "error 4:133: 'mesh' of warp cannot be used: can");
+  EXPECT_EQ(findings_of("{ }"), "error 4:124: warp names no file\n");
+  EXPECT_EQ(findings_of("{ mesh = \"m.ply\" }").substr(0, 47), "error 4:133: 'mesh' of warp cannot be used: can");
   write_file_atomically(folder_ / "m.ply", "ply\n");
-  EXPECT_EQ(told("{ mesh = \"m.ply\" }"), "error 4:133: 'mesh' of warp is \"m.ply\", of no known kind\n");
-  EXPECT_EQ(told("{ mesh = \"\" }"), "error 4:133: 'mesh' of warp is \"\"\n");
+  EXPECT_EQ(findings_of("{ mesh = \"m.ply\" }"), "error 4:133: 'mesh' of warp is \"m.ply\", of no known kind\n");
+  EXPECT_EQ(findings_of("{ mesh = \"\" }"), "error 4:133: 'mesh' of warp is \"\"\n");
   Image<Rgb> bright({2, 2}, {1.0F, 1.0F, 1.5F});
   write_file_atomically(folder_ / "bright.exr", encode_exr(bright, {}));
-  EXPECT_EQ(told("{ blend = \"bright.exr\" }"), "error 4:134: 'blend' of warp holds 1.5\n");
+  EXPECT_EQ(findings_of("{ blend = \"bright.exr\" }"), "error 4:134: 'blend' of warp holds 1.5\n");
 }
 
-TEST(ScanOut, AWarpsBlendAndBlackChangeLinearLight) {
+TEST(PanelTransform, AWarpsBlendAndBlackChangeLinearLight) {
   Wall wall = load_wall("1x1@4x2");
   ScreenWarp& warp = wall.screens.front().warp;
   Image<Rgb> light({4, 2}, {1.0F, 1.0F, 1.0F});
@@ -290,7 +288,7 @@ TEST(ScanOut, AWarpsBlendAndBlackChangeLinearLight) {
   floor.at(2, 1) = {0.1F, 0.1F, 0.1F};
   warp.floor = std::make_shared<const Image<Rgb>>(floor);
   const Image<Rgba8> picture = noise({4, 2});
-  const Image<Rgba8> sent = ScanOut(wall, 0).apply(picture);
+  const Image<Rgba8> sent = PanelTransform(wall, 0).apply(picture);
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 4; ++x) {
       const Rgba8 before = picture.at(x, y);
@@ -305,7 +303,7 @@ TEST(ScanOut, AWarpsBlendAndBlackChangeLinearLight) {
   EXPECT_NEAR(panel_level(color, 0, 0.5, 1.0, 0.2), encode_srgb(0.6F + 0.4F * 0.5F), 1e-6);
 }
 
-TEST(ScanOut, WhereNoLightFallsNothingIsSentWhateverTheFloor) {
+TEST(PanelTransform, WhereNoLightFallsNothingIsSentWhateverTheFloor) {
   Wall mesh = wall_of(parse_warp_csv("0,1,0,1\n0.5,1,1,1\n0,0,0,0\n0.5,0,1,0\n", "m.csv"), {4, 2});
   Image<glm::vec3> points = test::Arc{}.points({4, 2});
   for (int y = 0; y < 2; ++y) points.at(2, y) = points.at(3, y) = glm::vec3(std::numeric_limits<float>::infinity());
@@ -315,18 +313,18 @@ TEST(ScanOut, WhereNoLightFallsNothingIsSentWhateverTheFloor) {
     WallScreen& screen = wall->screens.front();
     screen.color.black = glm::dvec3(0.2);
     screen.warp.floor = std::make_shared<const Image<Rgb>>(Size{1, 1}, Rgb{0.5F, 0.5F, 0.5F});
-    const Image<Rgba8> sent = ScanOut(*wall, 0).apply(Image<Rgba8>({4, 2}, {0, 0, 0, 255}));
+    const Image<Rgba8> sent = PanelTransform(*wall, 0).apply(Image<Rgba8>({4, 2}, {0, 0, 0, 255}));
     EXPECT_EQ(sent.at(1, 0), to_srgb({0.6F, 0.6F, 0.6F}));
     EXPECT_EQ(sent.at(2, 1), (Rgba8{0, 0, 0, 255}));
   }
 }
 
-TEST(ScanOut, AMapOfFewerPixelsIsBroughtToTheScreens) {
+TEST(PanelTransform, AMapOfFewerPixelsIsBroughtToTheScreens) {
   Wall wall = load_wall("1x1@64x2");
   Image<Rgb> light({2, 1});
   light.at(1, 0) = {1.0F, 1.0F, 1.0F};
   wall.screens.front().warp.light = std::make_shared<const Image<Rgb>>(light);
-  const Image<Rgba8> sent = ScanOut(wall, 0).apply(Image<Rgba8>({64, 2}, {255, 255, 255, 255}));
+  const Image<Rgba8> sent = PanelTransform(wall, 0).apply(Image<Rgba8>({64, 2}, {255, 255, 255, 255}));
   EXPECT_EQ(sent.at(0, 0).r, 0);
   EXPECT_EQ(sent.at(63, 1).r, 255);
   for (int x = 16; x < 48; ++x) {

@@ -5,14 +5,14 @@
 #include <limits>
 
 #include "core/text.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {
 
 constexpr double kRetry = 0.25;
 constexpr double kHandshakeLimit = 2.0;
-constexpr std::size_t kLongestAnswer = 64;  ///< payload of what displays send, bytes
+constexpr std::size_t kMaxAnswerBytes = 64;  ///< payload of what displays send, bytes
 
 }  // namespace
 
@@ -72,7 +72,7 @@ ClientLink::Change ClientLink::advance(double now, const std::function<void(cons
     }
   }
   if (state_ == State::Up) {
-    const auto limit = [](const PacketHeader&) { return kLongestAnswer; };
+    const auto limit = [](const PacketHeader&) { return kMaxAnswerBytes; };
     while (const auto packet = connection_->take_packet(limit)) {
       if (!packet->intact) throw LinkError("an answer arrived damaged");
       arrived(*packet);

@@ -2,8 +2,11 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <span>
 #include <string>
 #include <system_error>
 
@@ -13,8 +16,8 @@ namespace hpr {
 namespace {
 
 constexpr std::size_t kChunk = std::size_t{256} << 10U;
-/// Of one call, so that one link cannot keep the others waiting.
-constexpr std::size_t kMostReceived = 16 * kChunk;
+/// Bytes received in one call at most, so that one link cannot keep the others waiting.
+constexpr std::size_t kMaxReceivedBytes = 16 * kChunk;
 
 [[noreturn]] void gone(int code) {
   throw LinkError(std::generic_category().message(code));
@@ -25,6 +28,21 @@ bool later(int code) {
 }
 
 }  // namespace
+
+double link_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void ClockOffset::add(double sent, double arrived, double answered, double received) {
+  const double round_trip = std::max(0.0, (received - sent) - (answered - arrived));
+  samples_.at(count_ % samples_.size()) = {((arrived - sent) + (answered - received)) / 2.0, round_trip};
+  ++count_;
+}
+
+ClockOffset::Sample ClockOffset::best() const {
+  if (count_ == 0) return {};
+  return std::ranges::min(std::span(samples_).first(std::min(count_, samples_.size())), {}, &Sample::round_trip);
+}
 
 void Connection::send() {
   while (!unsent_.empty()) {
@@ -43,8 +61,8 @@ void Connection::send() {
 }
 
 void Connection::receive() {
-  drop_taken();
-  for (std::size_t total = 0; total < kMostReceived;) {
+  drop_consumed();
+  for (std::size_t total = 0; total < kMaxReceivedBytes;) {
     const std::size_t before = in_.size();
     const ssize_t got = ::recv(socket_.descriptor(), in_.extend(kChunk).data(), kChunk, MSG_DONTWAIT);
     in_.shrink(before + (got > 0 ? static_cast<std::size_t>(got) : 0));
@@ -65,7 +83,7 @@ std::optional<std::vector<std::byte>> Connection::take_block() {
   const auto begin = arrived();
   const auto size = block_bytes(begin);
   if (!size || begin.size() < *size) return std::nullopt;
-  taken_ += *size;
+  consumed_ += *size;
   return std::vector<std::byte>(begin.begin(), begin.begin() + static_cast<std::ptrdiff_t>(*size));
 }
 
@@ -76,20 +94,20 @@ std::optional<Packet> Connection::take_packet(const std::function<std::size_t(co
   if (header.length > limit_of(header)) throw LinkError("a packet is longer than it may be");
   if (begin.size() - kPacketHeaderBytes < header.length) return std::nullopt;
   const auto payload = begin.subspan(kPacketHeaderBytes, header.length);
-  taken_ += kPacketHeaderBytes + header.length;
+  consumed_ += kPacketHeaderBytes + header.length;
   return Packet{header, payload, xxh64(payload) == header.payload_hash};
 }
 
 std::span<const std::byte> Connection::arrived() const {
-  return in_.bytes().subspan(taken_);
+  return in_.bytes().subspan(consumed_);
 }
 
-void Connection::drop_taken() {
-  if (taken_ == 0) return;
+void Connection::drop_consumed() {
+  if (consumed_ == 0) return;
   const auto rest = arrived();
   if (!rest.empty()) std::memmove(in_.bytes().data(), rest.data(), rest.size());
   in_.shrink(rest.size());
-  taken_ = 0;
+  consumed_ = 0;
 }
 
 }  // namespace hpr

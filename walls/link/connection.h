@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -14,6 +15,33 @@
 #include "walls/link/socket.h"
 
 namespace hpr {
+
+/// Seconds of this machine's monotonic clock.
+[[nodiscard]] double link_seconds();
+
+/// How far another machine's clock is ahead of this one's, from round trips: NTP's formula (RFC 5905), of the last few
+/// the one that was quickest, as what a round trip lost in waiting it may have lost one way.
+class ClockOffset {
+ public:
+  /// A question left at `sent` and its answer was here at `received`, by this clock; by the other one the question came
+  /// at `arrived` and the answer left at `answered`.
+  void add(double sent, double arrived, double answered, double received);
+
+  [[nodiscard]] bool known() const { return count_ > 0; }
+  /// Seconds: the other clock less this one. The error is at most half the round trip.
+  [[nodiscard]] double seconds() const { return best().offset; }
+  [[nodiscard]] double round_trip() const { return best().round_trip; }
+
+ private:
+  struct Sample {
+    double offset = 0.0;
+    double round_trip = 0.0;
+  };
+  [[nodiscard]] Sample best() const;
+
+  std::array<Sample, 8> samples_{};
+  std::size_t count_ = 0;  ///< ever
+};
 
 /// Bytes on their way; shared, as a frame may have to be sent again.
 using LinkMessage = std::shared_ptr<const std::vector<std::byte>>;
@@ -51,13 +79,13 @@ class Connection {
 
  private:
   [[nodiscard]] std::span<const std::byte> arrived() const;
-  void drop_taken();
+  void drop_consumed();
 
   Socket socket_;
   std::deque<LinkMessage> unsent_;
   std::size_t sent_of_first_ = 0;
   ByteBuffer in_;
-  std::size_t taken_ = 0;  ///< of in_
+  std::size_t consumed_ = 0;  ///< of in_
 };
 
 }  // namespace hpr

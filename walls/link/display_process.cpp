@@ -40,14 +40,14 @@ std::string_view to_string(ShownState state) {
   return "ended";
 }
 
-Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& words) {
+Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& label) {
   const int height = std::min(kBadgeHeight, std::max(1, picture.height() / 4));
   const double text = height * 0.6;
   const int width =
-      std::min(picture.width(), static_cast<int>(text * 0.7 * static_cast<double>(words.size())) + height);
+      std::min(picture.width(), static_cast<int>(text * 0.7 * static_cast<double>(label.size())) + height);
   PixelCanvas canvas({width, height});
   canvas.fill({0.0, 0.0}, {width, height}, kBadgeColor);
-  canvas.text({width / 2.0, height / 2.0}, words, text, kBadgeText);
+  canvas.text({width / 2.0, height / 2.0}, label, text, kBadgeText);
   Image<Rgba8> result = picture;
   paste(canvas.image(), 0, 0, result);
   return result;

@@ -25,8 +25,8 @@ enum class ShownState : std::uint8_t {
 
 [[nodiscard]] std::string_view to_string(ShownState state);
 
-/// `picture` with a badge in its upper left corner that says `words`.
-[[nodiscard]] Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& words);
+/// `picture` with a badge in its upper left corner that says `label`.
+[[nodiscard]] Image<Rgba8> with_badge(const Image<Rgba8>& picture, const std::string& label);
 
 struct ProcessSettings {
   std::filesystem::path folder;  ///< display.json goes here; empty: nowhere

@@ -13,7 +13,7 @@
 namespace hpr {
 namespace {
 
-constexpr std::size_t kLongestHostInName = 40;
+constexpr std::size_t kMaxHostNameBytes = 40;
 
 std::string plain_host(const std::string& host) {
   return host.empty() || host == "*" ? "localhost" : host;
@@ -77,7 +77,7 @@ std::filesystem::path socket_folder() {
 }
 
 std::filesystem::path display_socket(const Wall& wall, const std::string& host) {
-  const bool plain = !host.empty() && host.size() <= kLongestHostInName && std::ranges::all_of(host, [](char c) {
+  const bool plain = !host.empty() && host.size() <= kMaxHostNameBytes && std::ranges::all_of(host, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.';
   });
   return socket_folder() /

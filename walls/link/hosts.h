@@ -25,14 +25,13 @@ struct WallHost {
 /// The wall with that host's screens only; the hash stays.
 [[nodiscard]] Wall wall_of_host(const Wall& wall, const WallHost& host);
 
-/// As the ends of a link compare them.
+/// A host's screens as the ends of a link compare them.
 [[nodiscard]] std::vector<LinkScreen> link_screens(const Wall& wall, const WallHost& host);
 
 /// Where this user's runs and displays are reached: hpr/ in $XDG_RUNTIME_DIR, or /tmp/hpr-UID. Only names it.
 [[nodiscard]] std::filesystem::path socket_folder();
 
-/// Where the display process of that wall and host listens unless told otherwise: in
-/// socket_folder(). Only names it.
+/// Where the display process of that wall and host listens by default: in socket_folder(). Only names it.
 [[nodiscard]] std::filesystem::path display_socket(const Wall& wall, const std::string& host);
 
 }  // namespace hpr

@@ -336,19 +336,19 @@ TEST_F(LinkTest, AScreenWithoutFramesIsMarkedAndUnmarkedByTheNext) {
 }
 
 TEST_F(LinkTest, ASocketSomebodyListensOnIsNotTakenAndADeadOneIs) {
-  const LinkAddress place = address("taken");
+  const LinkAddress where = address("taken");
   {
-    const Listener first(place);
+    const Listener first(where);
     struct stat found {};
-    ASSERT_EQ(::stat(place.text.c_str(), &found), 0);
+    ASSERT_EQ(::stat(where.text.c_str(), &found), 0);
     EXPECT_EQ(found.st_mode & 0777U, 0600U);
-    EXPECT_THROW({ const Listener second(place); }, Error);
+    EXPECT_THROW({ const Listener second(where); }, Error);
   }
-  EXPECT_FALSE(std::filesystem::exists(place.text));
+  EXPECT_FALSE(std::filesystem::exists(where.text));
   // As a killed process leaves it.
   const Socket dead(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  ASSERT_EQ(::bind(dead.descriptor(), reinterpret_cast<const sockaddr*>(&place.storage), place.length), 0);
-  EXPECT_NO_THROW({ const Listener again(place); });
+  ASSERT_EQ(::bind(dead.descriptor(), reinterpret_cast<const sockaddr*>(&where.storage), where.length), 0);
+  EXPECT_NO_THROW({ const Listener again(where); });
 }
 
 TEST(WallHosts, ScreensGoToTheirNodesHostsAndTheRestToThisOne) {

@@ -1,11 +1,19 @@
 #include "walls/link/protocol.h"
 
+#include <fmt/format.h>
+#include <hpr/version.h>
+#include <openssl/crypto.h>
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <string_view>
 
 #include "core/bytes.h"
+#include "core/error.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
@@ -17,15 +25,15 @@ constexpr std::uint32_t kPacketMagic = 0x4B525048;  // "HPRK"
 constexpr std::uint32_t kByteOrder = 0x01020304;
 constexpr std::size_t kPreambleBytes = 8 + 4 + 4 + 4;
 constexpr std::size_t kHashBytes = 8;
-constexpr std::size_t kLongestText = 1024;
+constexpr std::size_t kMaxTextBytes = 1024;
 
-std::vector<std::byte> make_block(const ByteWriter& body) {
+std::vector<std::byte> make_block(const ByteWriter& payload) {
   ByteWriter block;
   block.raw(std::as_bytes(std::span(kBlockMagic)));
   block.raw(std::as_bytes(std::span(&kByteOrder, 1)));
   block.u32(kLinkProtocol);
-  block.u32(static_cast<std::uint32_t>(body.bytes().size()));
-  block.raw(body.bytes());
+  block.u32(static_cast<std::uint32_t>(payload.bytes().size()));
+  block.raw(payload.bytes());
   block.u64(xxh64(block.bytes()));
   return block.take();
 }
@@ -52,38 +60,38 @@ bool read_bool(ByteReader& reader) {
 }  // namespace
 
 std::vector<std::byte> encode(const Greeting& greeting) {
-  ByteWriter body;
-  body.text(greeting.build);
-  body.raw(greeting.nonce);
-  body.u8(greeting.wants_token ? 1 : 0);
-  return make_block(body);
+  ByteWriter payload;
+  payload.text(greeting.build);
+  payload.raw(greeting.nonce);
+  payload.u8(greeting.wants_token ? 1 : 0);
+  return make_block(payload);
 }
 
 std::vector<std::byte> encode(const Hello& hello) {
-  ByteWriter body;
-  body.text(hello.build);
-  body.u8(static_cast<std::uint8_t>(hello.role));
-  body.text(hello.host);
-  body.u64(hello.wall_hash);
-  body.u64(hello.session);
-  body.u32(hello.rank);
-  body.u32(static_cast<std::uint32_t>(hello.screens.size()));
+  ByteWriter payload;
+  payload.text(hello.build);
+  payload.u8(static_cast<std::uint8_t>(hello.role));
+  payload.text(hello.host);
+  payload.u64(hello.wall_hash);
+  payload.u64(hello.session);
+  payload.u32(hello.rank);
+  payload.u32(static_cast<std::uint32_t>(hello.screens.size()));
   for (const LinkScreen& screen : hello.screens) {
-    body.text(screen.id);
-    body.u32(static_cast<std::uint32_t>(screen.size.width));
-    body.u32(static_cast<std::uint32_t>(screen.size.height));
+    payload.text(screen.id);
+    payload.u32(static_cast<std::uint32_t>(screen.size.width));
+    payload.u32(static_cast<std::uint32_t>(screen.size.height));
   }
-  body.raw(hello.nonce);
-  body.raw(hello.proof);
-  return make_block(body);
+  payload.raw(hello.nonce);
+  payload.raw(hello.proof);
+  return make_block(payload);
 }
 
 std::vector<std::byte> encode(const Reply& reply) {
-  ByteWriter body;
-  body.u8(reply.accepted ? 1 : 0);
-  body.text(reply.reason);
-  body.raw(reply.proof);
-  return make_block(body);
+  ByteWriter payload;
+  payload.u8(reply.accepted ? 1 : 0);
+  payload.text(reply.reason);
+  payload.raw(reply.proof);
+  return make_block(payload);
 }
 
 std::optional<std::size_t> block_bytes(std::span<const std::byte> begin) {
@@ -100,15 +108,15 @@ std::optional<std::size_t> block_bytes(std::span<const std::byte> begin) {
     throw LinkError("the other end speaks protocol " + std::to_string(protocol) + " of displays, this is " +
                     std::to_string(kLinkProtocol) + ": install the same hpr on both");
   }
-  const std::size_t body = reader.u32();
-  if (body > kMostBlockBytes) throw LinkError("a handshake is too long");
-  return kPreambleBytes + body + kHashBytes;
+  const std::size_t payload = reader.u32();
+  if (payload > kMaxBlockBytes) throw LinkError("a handshake is too long");
+  return kPreambleBytes + payload + kHashBytes;
 }
 
 Greeting decode_greeting(std::span<const std::byte> block) {
   ByteReader reader = open_block(block);
   Greeting greeting;
-  greeting.build = reader.text(kLongestText);
+  greeting.build = reader.text(kMaxTextBytes);
   read_array(reader, greeting.nonce);
   greeting.wants_token = read_bool(reader);
   reader.finish();
@@ -118,22 +126,22 @@ Greeting decode_greeting(std::span<const std::byte> block) {
 Hello decode_hello(std::span<const std::byte> block) {
   ByteReader reader = open_block(block);
   Hello hello;
-  hello.build = reader.text(kLongestText);
+  hello.build = reader.text(kMaxTextBytes);
   const std::uint8_t role = reader.u8();
   if (role > static_cast<std::uint8_t>(LinkRole::Swap)) throw LinkError("a handshake names an unknown role");
   hello.role = static_cast<LinkRole>(role);
-  hello.host = reader.text(kLongestText);
+  hello.host = reader.text(kMaxTextBytes);
   hello.wall_hash = reader.u64();
   hello.session = reader.u64();
   hello.rank = reader.u32();
   const std::uint32_t screens = reader.u32();
-  if (screens > static_cast<std::uint32_t>(kMostScreens)) throw LinkError("a handshake names too many screens");
+  if (screens > static_cast<std::uint32_t>(kMaxScreens)) throw LinkError("a handshake names too many screens");
   for (std::uint32_t i = 0; i < screens; ++i) {
     LinkScreen screen;
-    screen.id = reader.text(kLongestText);
+    screen.id = reader.text(kMaxTextBytes);
     const std::uint32_t width = reader.u32();
     const std::uint32_t height = reader.u32();
-    if (std::max(width, height) > static_cast<std::uint32_t>(kMostScreenSide)) {
+    if (std::max(width, height) > static_cast<std::uint32_t>(kMaxScreenSide)) {
       throw LinkError("a handshake names too large a screen");
     }
     screen.size = {static_cast<int>(width), static_cast<int>(height)};
@@ -149,13 +157,13 @@ Reply decode_reply(std::span<const std::byte> block) {
   ByteReader reader = open_block(block);
   Reply reply;
   reply.accepted = read_bool(reader);
-  reply.reason = reader.text(kLongestText);
+  reply.reason = reader.text(kMaxTextBytes);
   read_array(reader, reply.proof);
   reader.finish();
   return reply;
 }
 
-std::size_t longest_picture(Size size) {
+std::size_t max_picture_bytes(Size size) {
   // Bytes nothing can compress, a codec's own frame around them, and room.
   constexpr std::size_t kRoom = 65536;
   const std::size_t raw = size.area() * 4;
@@ -194,6 +202,46 @@ PacketHeader decode_header(std::span<const std::byte> bytes) {
   header.payload_hash = hashed.u64();
   if (!std::isfinite(header.time)) throw LinkError("a packet from no time");
   return header;
+}
+
+std::string link_build() {
+  return fmt::format("hpr {} ({})", kVersion, kCommit);
+}
+
+std::string link_token() {
+  const char* const token = std::getenv("HPR_TOKEN");  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
+  return token == nullptr ? "" : token;
+}
+
+LinkNonce make_nonce() {
+  LinkNonce nonce{};
+  fill_random(std::as_writable_bytes(std::span(nonce)));
+  return nonce;
+}
+
+std::uint64_t make_session() {
+  return ByteReader(make_nonce()).u64();
+}
+
+LinkProof prove_token(const std::string& token, const std::string& who, const LinkNonce& of_display,
+                      const Hello& hello) {
+  Hello without_proof = hello;
+  without_proof.proof = {};
+  ByteWriter message;
+  message.text(who);
+  message.raw(of_display);
+  message.raw(encode(without_proof));
+  LinkProof proof{};
+  unsigned int size = 0;
+  const auto* const bytes = reinterpret_cast<const unsigned char*>(message.bytes().data());
+  const unsigned char* const made = HMAC(EVP_sha256(), token.data(), static_cast<int>(token.size()), bytes,
+                                         message.bytes().size(), reinterpret_cast<unsigned char*>(proof.data()), &size);
+  HPR_CHECK(made != nullptr && size == proof.size());
+  return proof;
+}
+
+bool same_proof(const LinkProof& a, const LinkProof& b) {
+  return CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 }  // namespace hpr

@@ -8,7 +8,6 @@
 #include <string>
 
 #include "walls/link/connection.h"
-#include "walls/link/token.h"
 
 namespace hpr {
 namespace {

@@ -11,20 +11,20 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "walls/link/token.h"
+#include "walls/link/protocol.h"
 
 namespace hpr {
 namespace {
 
-constexpr std::size_t kMostPeers = 4096 + 64;  ///< ranks, and whoever else tries
-constexpr std::size_t kMostUnknownPeers = 64;
+constexpr std::size_t kMaxPeers = 4096 + 64;  ///< ranks, and whoever else tries
+constexpr std::size_t kMaxUnknownPeers = 64;
 constexpr double kHandshakeLimit = 2.0;
 /// Rank 0 pings several times a second.
 constexpr double kSilence = 10.0;
-/// Rank 0 asks for moments a few milliseconds ahead. One further off comes from a round trip that told the clocks
+/// Rank 0 asks for moments a few milliseconds ahead. One further off comes from a round trip that measured the clocks
 /// badly, and is not waited for.
-constexpr double kFurthestMoment = 0.05;
-constexpr std::size_t kMostPending = 10;  ///< pictures of one screen: more than may be in flight
+constexpr double kMaxMoment = 0.05;
+constexpr std::size_t kMaxPending = 10;  ///< pictures of one screen: more than may be in flight
 constexpr int kPollMs = 250;
 
 }  // namespace
@@ -158,7 +158,7 @@ void FrameReceiver::step() {
 void FrameReceiver::accept(const Listener& listener) {
   while (auto socket = listener.accept()) {
     const auto unknown = std::ranges::count_if(peers_, [](const auto& peer) { return !peer->open; });
-    if (peers_.size() >= kMostPeers || static_cast<std::size_t>(unknown) >= kMostUnknownPeers) continue;
+    if (peers_.size() >= kMaxPeers || static_cast<std::size_t>(unknown) >= kMaxUnknownPeers) continue;
     auto peer = std::make_unique<Peer>(Peer{Connection(std::move(*socket)), listener.tcp()});
     peer->nonce = make_nonce();
     peer->since = settings_.clock();
@@ -181,7 +181,7 @@ bool FrameReceiver::step_peer(Peer& peer, double now) {
     const auto limit = [&](const PacketHeader& header) -> std::size_t {
       if (header.type != PacketType::Frame) return 0;
       if (header.screen >= settings_.screens.size()) throw LinkError("a picture for a screen nobody knows");
-      return longest_picture(settings_.screens[header.screen].size);
+      return max_picture_bytes(settings_.screens[header.screen].size);
     };
     while (const auto packet = peer.connection.take_packet(limit)) {
       peer.since = now;
@@ -272,9 +272,9 @@ void FrameReceiver::take(Peer& peer, const Packet& packet) {
     take_picture(peer, packet);
   } else if (header.type == PacketType::Present && swap) {
     const double now = settings_.clock();
-    const bool moment = header.time < now + kFurthestMoment && header.time > now - kSilence;
+    const bool moment = header.time < now + kMaxMoment && header.time > now - kSilence;
     orders_.emplace_back(header.frame, moment ? header.time : now);
-    if (orders_.size() > kMostPending) orders_.pop_front();
+    if (orders_.size() > kMaxPending) orders_.pop_front();
   } else if (header.type == PacketType::Ping && swap) {
     ByteWriter times;
     const double now = settings_.clock();
@@ -316,7 +316,7 @@ void FrameReceiver::take_picture(Peer& peer, const Packet& packet) {
   }
   screen.report.arrived = settings_.clock();
   screen.pending.insert_or_assign(header.frame, Pending{std::move(image), false});
-  if (screen.pending.size() > kMostPending) screen.pending.erase(screen.pending.begin());
+  if (screen.pending.size() > kMaxPending) screen.pending.erase(screen.pending.begin());
   announce();
   if (ended_) show_rest();
 }

@@ -16,7 +16,6 @@
 #include "image/color.h"
 #include "image/image.h"
 #include "walls/codecs/codec.h"
-#include "walls/link/clock.h"
 #include "walls/link/connection.h"
 #include "walls/link/protocol.h"
 

@@ -16,12 +16,12 @@ constexpr double kPingEvery = 0.25;
 constexpr double kFirstPingsEvery = 0.01;
 constexpr std::uint64_t kFirstPings = 4;
 /// No frame follows the last one: it may take a little longer.
-constexpr std::chrono::duration<double> kLeastEnd{2.0};
+constexpr std::chrono::duration<double> kMinEnd{2.0};
 /// A Unix socket moves about as much as memory.
 constexpr double kSocketBytesPerSecond = 3e9;
-constexpr double kLongestPoll = 0.25;
+constexpr double kMaxPoll_s = 0.25;
 /// An order to show a frame reaches everybody before its time comes: round trips differ. Not more than this.
-constexpr double kMostLead = 0.02;
+constexpr double kMaxLead_s = 0.02;
 constexpr double kLead = 0.0005;
 
 std::vector<std::size_t> display_of_screens(const Wall& wall) {
@@ -71,9 +71,9 @@ WallSender::~WallSender() {
 }
 
 ClientLink WallSender::make_link(const WallHost& host, LinkRole role) const {
-  const auto given = settings_.addresses.find(host.host);
+  const auto named = settings_.addresses.find(host.host);
   LinkAddress address =
-      given != settings_.addresses.end() ? given->second : socket_address(display_socket(wall_, host.host));
+      named != settings_.addresses.end() ? named->second : socket_address(display_socket(wall_, host.host));
   Hello hello;
   hello.build = settings_.build;
   hello.role = role;
@@ -106,9 +106,9 @@ std::vector<WallSender::ScreenPacket> WallSender::encode_all(const WallFrame& fr
     const auto link = std::ranges::find_if(
         frames_, [&](const FrameLink& l) { return std::ranges::find(l.screens, picture.screen) != l.screens.end(); });
     HPR_CHECK(link != frames_.end());
-    const auto place =
+    const auto index =
         static_cast<std::size_t>(std::ranges::find(link->screens, picture.screen) - link->screens.begin());
-    PacketHeader header{PacketType::Frame, link->numbers[place], frame.number, now_since_1970(), 0, 0};
+    PacketHeader header{PacketType::Frame, link->numbers[index], frame.number, now_since_1970(), 0, 0};
     const std::vector<std::byte> encoded = encode(picture.screen, picture.image);
     packets.push_back({picture.screen, std::make_shared<const std::vector<std::byte>>(encode_packet(header, encoded))});
     costs_.push_back({picture.screen, watch.ms(), encoded.size()});
@@ -152,7 +152,7 @@ void WallSender::show(const WallFrame& frame) {
 
 std::vector<std::byte> WallSender::encode(std::size_t screen, const Image<Rgba8>& picture) {
   std::vector<std::byte> encoded = codecs_[screen]->encode(picture);
-  if (encoded.size() <= longest_picture(picture.size())) return encoded;
+  if (encoded.size() <= max_picture_bytes(picture.size())) return encoded;
   // What a codec cannot make smaller goes as it is.
   codecs_[screen]->restart();
   return make_codec("raw", {})->encode(picture);
@@ -169,18 +169,18 @@ void WallSender::restart_broken_streams() {
   }
 }
 
-void WallSender::make_whole(FrameLink& link, std::size_t place) const {
-  link.whole[place] = true;
-  if (!settings_.codec_settings.deltas || place >= link.current.size()) return;
-  PacketHeader header = decode_header(std::span(*link.current[place]).first(kPacketHeaderBytes));
-  link.current[place] = std::make_shared<const std::vector<std::byte>>(
-      encode_packet(header, make_codec("raw", {})->encode(link.pictures[place])));
+void WallSender::make_whole(FrameLink& link, std::size_t index) const {
+  link.whole[index] = true;
+  if (!settings_.codec_settings.deltas || index >= link.current.size()) return;
+  PacketHeader header = decode_header(std::span(*link.current[index]).first(kPacketHeaderBytes));
+  link.current[index] = std::make_shared<const std::vector<std::byte>>(
+      encode_packet(header, make_codec("raw", {})->encode(link.pictures[index])));
 }
 
 void WallSender::finish() {
   std::unique_lock lock(mutex_);
   const std::uint64_t newest = barrier_.newest().value_or(0);
-  const auto limit = std::max(settings_.send_budget + settings_.swap_timeout, kLeastEnd);
+  const auto limit = std::max(settings_.send_budget + settings_.swap_timeout, kMinEnd);
   const auto done = [&] { return all_sent() && (swaps_.empty() || barrier_.all_shown(newest)); };
   (void)news_.wait_for(lock, limit, done);
   degraded_s_ = barrier_.degraded_seconds(link_seconds());
@@ -232,7 +232,7 @@ void WallSender::run(const std::stop_token& stop) {
 
 void WallSender::wait_for_news(double now) {
   std::vector<pollfd> watched{{alarm_.descriptor(), POLLIN, 0}};
-  double until = now + kLongestPoll;
+  double until = now + kMaxPoll_s;
   {
     const std::lock_guard lock(mutex_);
     const auto add = [&](const ClientLink& link) {
@@ -246,7 +246,7 @@ void WallSender::wait_for_news(double now) {
     }
     if (const auto due = barrier_.next_due()) until = std::min(until, *due);
   }
-  const double wait_ms = std::ceil(std::clamp(until - now, 0.0, kLongestPoll) * 1000.0);
+  const double wait_ms = std::ceil(std::clamp(until - now, 0.0, kMaxPoll_s) * 1000.0);
   (void)::poll(watched.data(), watched.size(), static_cast<int>(wait_ms));
   clear_alarm(alarm_);
 }
@@ -260,8 +260,8 @@ void WallSender::step(double now) {
 void WallSender::step_frames(FrameLink& link, double now) {
   const auto send_again = [&](const Packet& packet) {
     // A damaged picture that is still the latest is sent once more.
-    const auto place = std::ranges::find(link.numbers, packet.header.screen) - link.numbers.begin();
-    const auto i = static_cast<std::size_t>(place);
+    const auto index = std::ranges::find(link.numbers, packet.header.screen) - link.numbers.begin();
+    const auto i = static_cast<std::size_t>(index);
     if (packet.header.type != PacketType::Damaged || i >= link.current.size()) return;
     make_whole(link, i);
     const std::uint64_t latest = decode_header(std::span(*link.current[i]).first(kPacketHeaderBytes)).frame;
@@ -304,10 +304,10 @@ void WallSender::step_swap(std::size_t display, double now) {
     if (!finishing_) barrier_.gone(display, now);
     log::debug("display of host '{}' on {}: {}", swap.host.host, swap.link.address().text, swap.link.failure());
   }
-  if (swap.ever_up && swap.link.refusal() != swap.told_refusal) {
-    swap.told_refusal = swap.link.refusal();
-    if (!swap.told_refusal.empty())
-      log::warning("the display of host '{}' refuses: {}", swap.host.host, swap.told_refusal);
+  if (swap.ever_up && swap.link.refusal() != swap.reported_refusal) {
+    swap.reported_refusal = swap.link.refusal();
+    if (!swap.reported_refusal.empty())
+      log::warning("the display of host '{}' refuses: {}", swap.host.host, swap.reported_refusal);
   }
   if (!swap.link.up() || now < swap.next_ping) return;
   ++swap.pings;
@@ -348,7 +348,7 @@ void WallSender::present(double now) {
   for (const SwapLink& swap : swaps_) {
     if (swap.link.up()) lead = std::max(lead, swap.clock.round_trip());
   }
-  const double at = now + std::min(lead + kLead, kMostLead);
+  const double at = now + std::min(lead + kLead, kMaxLead_s);
   for (const SwapDecision& decision : barrier_.due(now)) {
     SwapLink& swap = swaps_[decision.display];
     if (!swap.link.up()) continue;
@@ -356,10 +356,10 @@ void WallSender::present(double now) {
     const double when = decision.late || !swap.clock.known() ? 0.0 : at + swap.clock.seconds();
     swap.link.connection().queue(encode_packet({.type = PacketType::Present, .frame = decision.frame, .time = when}));
   }
-  for (const SwapEvent& event : barrier_.take_events()) say(event);
+  for (const SwapEvent& event : barrier_.take_events()) report_event(event);
 }
 
-void WallSender::say(const SwapEvent& event) const {
+void WallSender::report_event(const SwapEvent& event) const {
   if (finishing_) return;
   const WallHost& host = swaps_[event.display].host;
   for (const std::size_t screen : host.screens) {

@@ -15,7 +15,7 @@
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
 #include "walls/link/client_link.h"
-#include "walls/link/clock.h"
+#include "walls/link/connection.h"
 #include "walls/link/hosts.h"
 #include "walls/link/swap_barrier.h"
 
@@ -67,11 +67,11 @@ class WallSender {
   [[nodiscard]] std::string why_unreached() const;
 
  private:
-  /// The way of this rank's pictures to a host.
+  /// The link that takes this rank's pictures to a host.
   struct FrameLink {
     ClientLink link;
     std::vector<std::size_t> screens;        ///< of the wall, of this rank
-    std::vector<std::uint32_t> numbers;      ///< the same among the host's
+    std::vector<std::uint32_t> numbers;      ///< their numbers among the host's screens
     std::vector<LinkMessage> current;        ///< the latest frame's, one per screen
     bool sent = true;                        ///< `current` was handed to the connection
     std::vector<std::uint64_t> sent_anew{};  ///< per screen the frame last sent a second time, plus one
@@ -92,27 +92,28 @@ class WallSender {
     std::array<double, 16> ping_sent{};  ///< of the last few, by number
     double next_ping = 0.0;
     bool ever_up = false;
-    std::string told_refusal{};
+    std::string reported_refusal{};
   };
 
   [[nodiscard]] ClientLink make_link(const WallHost& host, LinkRole role) const;
   void run(const std::stop_token& stop);
   void wait_for_news(double now);
   void step(double now);
-  /// With deltas: streams whose display may not have seen their last picture begin anew.
+  /// Begins streams anew, with deltas, whose display may not have seen their last picture.
   void restart_broken_streams();
   [[nodiscard]] std::vector<std::byte> encode(std::size_t screen, const Image<Rgba8>& picture);
   [[nodiscard]] std::vector<ScreenPacket> encode_all(const WallFrame& frame);
   void post(FrameLink& link, const WallFrame& frame, std::span<const ScreenPacket> packets);
-  /// With deltas: `current` of this screen in place of what builds on an earlier picture.
-  void make_whole(FrameLink& link, std::size_t place) const;
+  /// Replaces, with deltas, `current` of this screen by the whole picture, in place of what builds on an earlier
+  /// picture.
+  void make_whole(FrameLink& link, std::size_t index) const;
   /// Queues the latest frame unless the connection still has its hands full.
   void hand_over(FrameLink& link) const;
   void step_frames(FrameLink& link, double now);
   void step_swap(std::size_t display, double now);
   void take_answer(std::size_t display, const Packet& packet, double now);
   void present(double now);
-  void say(const SwapEvent& event) const;
+  void report_event(const SwapEvent& event) const;
   [[nodiscard]] bool all_sent() const;
 
   const Wall& wall_;

@@ -1,13 +1,38 @@
 #pragma once
 
+#include <sys/socket.h>
+
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "walls/link/address.h"
-
 namespace hpr {
+
+/// Where a process listens: a Unix socket's path, or a TCP address.
+struct LinkAddress {
+  std::string text;  ///< as users write it: "/run/user/1000/hpr/x.sock", "10.0.0.5:5005", "[::1]:5005"
+  bool tcp = false;
+  sockaddr_storage storage{};
+  socklen_t length = 0;
+};
+
+/// A path (what holds a slash) or HOST:PORT. Throws Error: Usage for anything else, Io for a host nobody knows.
+[[nodiscard]] LinkAddress parse_address(const std::string& text);
+
+/// Parses what parse_address takes, and also what only a listener may name: ":PORT" (loopback), port 0 (any that is
+/// free), and a path without a slash.
+[[nodiscard]] LinkAddress parse_listen_address(const std::string& text);
+
+/// Throws Error (Usage) for a path longer than sockets take.
+[[nodiscard]] LinkAddress socket_address(const std::filesystem::path& path);
+
+/// Has, from now on, a SIGINT, SIGTERM or SIGHUP that ends this process remove the file of a Unix socket first: those
+/// that are caught or ignored already keep what they do. Of more than 16 files the others stay.
+void remove_when_ended(const std::string& path);
+
+/// Takes back remove_when_ended(): the file is removed already.
+void forget_removal(const std::string& path);
 
 /// A file descriptor that is closed with its owner.
 class Socket {
@@ -64,8 +89,8 @@ class Listener {
 /// Starts to connect, without waiting. Throws LinkError when it fails at once.
 [[nodiscard]] Socket start_connecting(const LinkAddress& address);
 
-/// Once such a socket can be written: throws LinkError when it did not connect, or when a Unix socket's listener is
-/// another user.
+/// Completes a connection, once the socket of start_connecting() can be written. Throws LinkError when it did not
+/// connect, or when a Unix socket's listener is another user.
 void finish_connecting(const Socket& socket, bool tcp);
 
 /// Whether the other end of a stream has closed it. Takes nothing that arrived, and does not wait.

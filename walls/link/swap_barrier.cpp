@@ -8,8 +8,8 @@
 namespace hpr {
 namespace {
 
-/// Of one screen; a display holds fewer.
-constexpr std::size_t kMostReadyFrames = 64;
+/// Frames that one screen is remembered to be ready for; a display holds fewer.
+constexpr std::size_t kMaxReadyFrames = 64;
 /// A display that is late for so long is worth a line in the log.
 constexpr double kWorthALine = 1.0;
 
@@ -38,15 +38,15 @@ void SwapBarrier::connected(std::size_t display, double now) {
 void SwapBarrier::gone(std::size_t display, double now) {
   Display& gone = displays_[display];
   if (!gone.up) return;
-  gone = {.told_lost = gone.told_lost};
+  gone = {.reported_lost = gone.reported_lost};
   for (auto& [number, frame] : frames_) {
     if (frame.presented) continue;
     for (std::size_t screen = 0; screen < screens_.size(); ++screen) {
       if (screens_[screen].display == display) frame.screens[screen] = ScreenState::Lost;
     }
   }
-  if (posted_ && !gone.told_lost) {
-    gone.told_lost = true;
+  if (posted_ && !gone.reported_lost) {
+    gone.reported_lost = true;
     events_.push_back({SwapEvent::Kind::Lost, display, *posted_});
   }
   count_degraded(now);
@@ -62,8 +62,8 @@ void SwapBarrier::post(std::uint64_t number, double now) {
   }
   frames_.emplace(number, std::move(frame));
   for (std::size_t i = 0; i < displays_.size(); ++i) {
-    if (displays_[i].up || displays_[i].told_lost) continue;
-    displays_[i].told_lost = true;
+    if (displays_[i].up || displays_[i].reported_lost) continue;
+    displays_[i].reported_lost = true;
     events_.push_back({SwapEvent::Kind::Lost, i, number});
   }
   count_degraded(now);
@@ -72,11 +72,12 @@ void SwapBarrier::post(std::uint64_t number, double now) {
 void SwapBarrier::ready(std::size_t screen, std::uint64_t number, double now) {
   if (screen >= screens_.size()) return;
   const auto frame = frames_.find(number);
-  // Rank 0 may hear of another rank's picture before it has posted the frame itself; of other frames, it never posts.
+  // Rank 0 may receive news of another rank's picture before it has posted the frame itself; of other frames, it never
+  // posts.
   if (posted_ && number < *posted_ && frame == frames_.end()) return;
   Screen& of = screens_[screen];
   of.ready.insert(number);
-  if (of.ready.size() > kMostReadyFrames) of.ready.erase(of.ready.begin());
+  if (of.ready.size() > kMaxReadyFrames) of.ready.erase(of.ready.begin());
   if (presented_ && number <= *presented_) {
     late_decisions_.push_back({of.display, number, true});
   } else if (frame != frames_.end() && !frame->second.first_ready) {
@@ -92,7 +93,7 @@ void SwapBarrier::shown(std::size_t display, std::uint64_t number, double at) {
 
 std::uint64_t SwapBarrier::oldest_undecided() const {
   const std::uint64_t newest = posted_.value_or(0);
-  return std::max(presented_ ? *presented_ + 1 : 0, newest - std::min<std::uint64_t>(newest, kMostReadyFrames));
+  return std::max(presented_ ? *presented_ + 1 : 0, newest - std::min<std::uint64_t>(newest, kMaxReadyFrames));
 }
 
 std::vector<SwapDecision> SwapBarrier::due(double now) {
@@ -108,9 +109,9 @@ std::vector<SwapDecision> SwapBarrier::due(double now) {
   }
   for (std::size_t i = 0; i < displays_.size(); ++i) {
     Display& display = displays_[i];
-    if (!display.up || display.told_stale || display.told_lost || !display.late_since) continue;
+    if (!display.up || display.reported_stale || display.reported_lost || !display.late_since) continue;
     if (now - *display.late_since < kWorthALine) continue;
-    display.told_stale = true;
+    display.reported_stale = true;
     events_.push_back({SwapEvent::Kind::Stale, i, *posted_});
   }
   return decisions;
@@ -226,7 +227,7 @@ void SwapBarrier::fall_behind(std::size_t display, double now) {
 
 void SwapBarrier::catch_up(std::size_t display, double now) {
   Display& back = displays_[display];
-  if (back.told_lost || back.told_stale) {
+  if (back.reported_lost || back.reported_stale) {
     events_.push_back({SwapEvent::Kind::Back, display, posted_.value_or(0)});
   }
   back = {.up = true};

@@ -61,7 +61,7 @@ class SwapBarrier {
   /// Nobody waits any longer for those that are not ready for it.
   void give_up(std::uint64_t frame, double now);
 
-  /// Of a frame that was posted and not forgotten.
+  /// The outcome of a frame that was posted and not forgotten.
   [[nodiscard]] SwapOutcome outcome(std::uint64_t frame) const;
   /// Forgets frames before this one, also those that nobody showed.
   void forget_before(std::uint64_t frame);
@@ -74,8 +74,8 @@ class SwapBarrier {
     bool up = false;
     bool late = false;                   ///< missed a frame and has not caught up
     std::optional<double> late_since{};  ///< cleared when caught up
-    bool told_lost = false;
-    bool told_stale = false;
+    bool reported_lost = false;
+    bool reported_stale = false;
   };
   struct Screen {
     std::size_t display = 0;

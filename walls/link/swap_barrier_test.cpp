@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "walls/link/clock.h"
+#include "walls/link/connection.h"
 
 namespace hpr {
 namespace {

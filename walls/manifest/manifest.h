@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -11,7 +12,8 @@
 #include "core/json.h"
 #include "image/color.h"
 #include "image/image.h"
-#include "walls/tracking/head.h"
+#include "walls/config/wall.h"
+#include "walls/tracking/head_path.h"
 
 namespace hpr {
 
@@ -25,7 +27,7 @@ struct ScreenRecord {
   Size size;                ///< pixels
   std::uint64_t xxh64 = 0;  ///< of the RGBA8 pixels, row by row
   ScreenState state = ScreenState::Fresh;
-  int rank = -1;                            ///< that handed it over; -1: not told
+  int rank = -1;                            ///< that handed it over; -1: not known
   std::optional<double> ms = {};            ///< handing it over: encoding, writing
   std::optional<std::uint64_t> bytes = {};  ///< of what was handed over
 };
@@ -110,5 +112,24 @@ struct WallStatusRecord {
 
 /// One JSON document, schema hpr.wall-run/1; hashes are 16 hex digits, a NaN becomes null.
 [[nodiscard]] std::string to_json(const RunManifest& manifest);
+
+/// A manifest as a run left it: what another run, or a drawing, needs of it.
+struct ManifestFile {
+  std::uint64_t scene_hash = 0;
+  std::uint64_t wall_hash = 0;
+  std::uint64_t seed = 0;
+  std::vector<std::string> frames;    ///< records in order, one JSON object each, on one line
+  std::vector<std::string> restarts;  ///< JSON objects
+  std::optional<int> stopped_of;      ///< the frames the run was to have, where it was stopped before
+};
+
+/// Reads what to_json(RunManifest) writes; `name` stands in errors. Throws Error (BadInput) for anything else.
+[[nodiscard]] ManifestFile parse_manifest(std::string_view text, const std::string& name);
+
+/// Throws Error (BadInput) unless the frames are 0, 1, ... of these screens, in their order.
+void check_records(const ManifestFile& file, std::span<const WallScreen> screens, const std::string& name);
+
+/// Reads a manifest's file of at most 1 GiB, as parse_manifest does its text. Throws Error: Io too.
+[[nodiscard]] ManifestFile load_manifest(const std::string& path);
 
 }  // namespace hpr

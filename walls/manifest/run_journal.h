@@ -22,10 +22,10 @@ class RunJournal {
 
   /// A frame is drawn and shown.
   void add_frame(const std::string& record);
-  /// The run was told this, and it changed something.
+  /// Adds a command line that changed something about the run.
   void add_command(const std::string& line);
   void add_restart(const std::string& why);
-  /// As Entries has them.
+  /// Adds a record of an earlier restart, as Entries::restarts has them.
   void keep_restart(const std::string& record);
   /// The run came to its end, whatever its exit code.
   void add_end();

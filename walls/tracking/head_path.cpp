@@ -17,8 +17,8 @@
 namespace hpr {
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t{64} << 20U;
-constexpr double kFarthest = 1e6;  ///< metres, and seconds by as much again
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{64} << 20U;
+constexpr double kMaxCoordinate = 1e6;  ///< metres, and seconds by as much again
 
 [[noreturn]] void fail(const std::string& name, int line, std::string_view what, std::string_view text) {
   throw Error(ExitCode::BadInput, fmt::format("{}:{}: {}", name, line, what),
@@ -67,7 +67,7 @@ std::optional<std::vector<double>> json_row(std::string_view line) {
   return numbers;
 }
 
-/// Of a table of the array `poses`.
+/// The row of a table of the array `poses`.
 std::optional<std::vector<double>> toml_row(const TomlValue& table) {
   using Type = TomlValue::Type;
   const auto value = [&](std::string_view key) -> const TomlValue* {
@@ -101,7 +101,7 @@ class Collector {
   void add(const std::optional<std::vector<double>>& row, int line, std::string_view text) {
     HeadSample sample;
     if (!row || row->size() < 4 || !pose_from(std::span(*row).subspan(1), sample.pose) ||
-        !(std::abs(row->front()) <= kFarthest)) {
+        !(std::abs(row->front()) <= kMaxCoordinate)) {
       fail(name_, line, "no pose of a head", text);
     }
     sample.time = row->front();
@@ -127,17 +127,17 @@ class Collector {
 HeadPath parse_toml_path(std::string_view text, const std::string& name) {
   const auto parsed = parse_toml(text);
   if (const auto* const failure = std::get_if<TomlFailure>(&parsed)) {
-    throw Error(ExitCode::BadInput, fmt::format("{}:{}: {}", name, failure->place.line, failure->what),
+    throw Error(ExitCode::BadInput, fmt::format("{}:{}: {}", name, failure->position.line, failure->what),
                 "write poses = [{ time = 0.0, position = [x, y, z] }, ...]");
   }
   Collector collector(name);
   for (const TomlEntry& entry : std::get<TomlValue>(parsed).entries) {
     if (entry.key != "poses" || entry.value.type != TomlValue::Type::Array) {
       throw Error(ExitCode::BadInput,
-                  fmt::format("{}:{}: '{}' is no array of poses", name, entry.place.line, printable(entry.key)),
+                  fmt::format("{}:{}: '{}' is no array of poses", name, entry.position.line, printable(entry.key)),
                   "write poses = [{ time = 0.0, position = [x, y, z] }, ...]");
     }
-    for (const TomlValue& item : entry.value.items) collector.add(toml_row(item), item.place.line, "");
+    for (const TomlValue& item : entry.value.items) collector.add(toml_row(item), item.position.line, "");
   }
   return collector.path();
 }
@@ -145,17 +145,17 @@ HeadPath parse_toml_path(std::string_view text, const std::string& name) {
 }  // namespace
 
 bool pose_from(std::span<const double> numbers, HeadPose& pose) {
-  constexpr double kShortest = 1e-3;
-  constexpr double kLongest = 1e3;
+  constexpr double kMinLength = 1e-3;
+  constexpr double kMaxLength = 1e3;
   if (numbers.size() != 3 && numbers.size() != 6 && numbers.size() != 7) return false;
-  if (!std::ranges::all_of(numbers, [](double n) { return std::abs(n) <= kFarthest; })) return false;
+  if (!std::ranges::all_of(numbers, [](double n) { return std::abs(n) <= kMaxCoordinate; })) return false;
   pose.position = {numbers[0], numbers[1], numbers[2]};
   pose.orientation = {1.0, 0.0, 0.0, 0.0};
   if (numbers.size() == 6) pose.orientation = orientation_of(numbers[3], numbers[4], numbers[5]);
   if (numbers.size() == 7) {
     const glm::dquat turn(numbers[6], numbers[3], numbers[4], numbers[5]);
     const double length = glm::length(turn);
-    if (!(length > kShortest && length < kLongest)) return false;
+    if (!(length > kMinLength && length < kMaxLength)) return false;
     pose.orientation = turn / length;
   }
   return true;
@@ -176,9 +176,9 @@ HeadPose HeadPath::at(double seconds) const {
   if (after == samples_.begin()) return samples_.front().pose;
   if (after == samples_.end()) return samples_.back().pose;
   const HeadSample& from = *(after - 1);
-  const double way = (time - from.time) / (after->time - from.time);
-  return {glm::mix(from.pose.position, after->pose.position, way),
-          glm::normalize(glm::slerp(from.pose.orientation, after->pose.orientation, way))};
+  const double fraction = (time - from.time) / (after->time - from.time);
+  return {glm::mix(from.pose.position, after->pose.position, fraction),
+          glm::normalize(glm::slerp(from.pose.orientation, after->pose.orientation, fraction))};
 }
 
 HeadPath parse_head_path(std::string_view text, HeadPathFormat format, const std::string& name) {
@@ -211,7 +211,7 @@ HeadPath load_head_path(const std::filesystem::path& file) {
     throw Error(ExitCode::BadInput, fmt::format("'{}' is no head's path", name),
                 "it is a .csv, .json, .jsonl (an object a line) or .toml file");
   }
-  const auto bytes = read_file(file, kLargestFile);
+  const auto bytes = read_file(file, kMaxFileBytes);
   return parse_head_path({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, format, name);
 }
 

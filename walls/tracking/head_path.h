@@ -1,14 +1,22 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "walls/tracking/head.h"
-
 namespace hpr {
+
+/// A head in wall space.
+struct HeadPose {
+  glm::dvec3 position{0.0};                    ///< metres
+  glm::dquat orientation{1.0, 0.0, 0.0, 0.0};  ///< unit; turns the head's right, up, back into wall space
+
+  bool operator==(const HeadPose&) const = default;
+};
 
 /// A head at a time, in seconds.
 struct HeadSample {
@@ -16,7 +24,7 @@ struct HeadSample {
   HeadPose pose;
 };
 
-/// A recorded way of a head: straight between samples, turning along the shortest arc (Shoemake, "Animating Rotation
+/// A recorded path of a head: straight between samples, turning along the shortest arc (Shoemake, "Animating Rotation
 /// with Quaternion Curves", 1985).
 class HeadPath {
  public:

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "walls/config/wall.h"
-#include "walls/tracking/head.h"
+#include "walls/tracking/head_path.h"
 
 namespace hpr {
 
@@ -19,8 +19,8 @@ class Tracker {
   [[nodiscard]] virtual double ends_at() const { return 0.0; }
 };
 
-/// Of a viewer with a tracker; `rest` is the head's pose before anything is known. Throws Error: Io and BadInput for a
-/// recording that cannot be read, Io for a port that cannot be listened at.
+/// Makes the tracker of a viewer; `rest` is the head's pose before anything is known. Throws Error: Io and BadInput for
+/// a recording that cannot be read, Io for a port that cannot be listened at.
 [[nodiscard]] std::unique_ptr<Tracker> make_tracker(const WallTracker& tracker, const HeadPose& rest);
 
 /// The trackers there are, one per file; make_tracker chooses.

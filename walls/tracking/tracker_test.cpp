@@ -175,10 +175,10 @@ TEST(UdpTracker, ALostHeadStaysOrGoesToRestAndComesBack) {
   for (const auto then : {WallTracker::Lost::Freeze, WallTracker::Lost::Rest}) {
     const Sender sender;
     const HeadPose rest{{0.0, 1.7, 0.0}};
-    WallTracker told = listening_at(sender.port());
-    told.lost_after_ms = 200;
-    told.lost_then = then;
-    const auto tracker = make_tracker(told, rest);
+    WallTracker settings = listening_at(sender.port());
+    settings.lost_after_ms = 200;
+    settings.lost_then = then;
+    const auto tracker = make_tracker(settings, rest);
     sender.send("50.0 1 2 3");
     const HeadPose seen = tracker->sample(1.0);
     EXPECT_EQ(seen.position, glm::dvec3(1.0, 2.0, 3.0));

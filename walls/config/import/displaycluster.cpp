@@ -3,10 +3,10 @@
 #include <map>
 
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/xml_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
+namespace {
 
 /// DisplayCluster (Johnson, Abram, Westing, Navratil, Gaither: "DisplayCluster: An Interactive Visualization
 /// Environment for Tiled Displays", 2012): equal tiles, mullions in pixels, one process per group of tiles.
@@ -15,16 +15,16 @@ ImportedWall import_displaycluster(std::string_view text, const std::string& nam
   const tinyxml2::XMLElement& root = file.root("configuration");
   const tinyxml2::XMLElement& dimensions = file.child(root, "dimensions");
   ForeignGrid grid;
-  grid.columns = file.integer(dimensions, "numTilesWidth", 1, kMostScreens);
-  grid.rows = file.integer(dimensions, "numTilesHeight", 1, kMostScreens);
-  grid.panel = {file.integer(dimensions, "screenWidth", 1, kMostScreenSide),
-                file.integer(dimensions, "screenHeight", 1, kMostScreenSide)};
-  grid.gap_x_pixels = file.integer(dimensions, "mullionWidth", 1 - grid.panel.width, kMostScreenSide, 0);
-  grid.gap_y_pixels = file.integer(dimensions, "mullionHeight", 1 - grid.panel.height, kMostScreenSide, 0);
+  grid.columns = file.integer(dimensions, "numTilesWidth", 1, kMaxScreens);
+  grid.rows = file.integer(dimensions, "numTilesHeight", 1, kMaxScreens);
+  grid.panel = {file.integer(dimensions, "screenWidth", 1, kMaxScreenSide),
+                file.integer(dimensions, "screenHeight", 1, kMaxScreenSide)};
+  grid.gap_x_pixels = file.integer(dimensions, "mullionWidth", 1 - grid.panel.width, kMaxScreenSide, 0);
+  grid.gap_y_pixels = file.integer(dimensions, "mullionHeight", 1 - grid.panel.height, kMaxScreenSide, 0);
   grid.pitch_m = settings.pitch_m;
-  if (grid.columns * grid.rows > kMostScreens) {
+  if (grid.columns * grid.rows > kMaxScreens) {
     file.fail(dimensions, fmt::format("the wall has {}x{} tiles", grid.columns, grid.rows),
-              fmt::format("it may have {}", kMostScreens));
+              fmt::format("it may have {}", kMaxScreens));
   }
   const bool fullscreen = file.integer(dimensions, "fullscreen", 0, 1, 0) == 1;
 
@@ -41,8 +41,8 @@ ImportedWall import_displaycluster(std::string_view text, const std::string& nam
       if (const std::string own = XmlFile::text(*screen, "display"); !own.empty()) tile.display = own;
       tile.column = file.integer(*screen, "i", 0, grid.columns - 1);
       tile.row = file.integer(*screen, "j", 0, grid.rows - 1);
-      tile.x = file.integer(*screen, "x", -kMostScreenSide, kMostScreenSide, 0);
-      tile.y = file.integer(*screen, "y", -kMostScreenSide, kMostScreenSide, 0);
+      tile.x = file.integer(*screen, "x", -kMaxScreenSide, kMaxScreenSide, 0);
+      tile.y = file.integer(*screen, "y", -kMaxScreenSide, kMaxScreenSide, 0);
       const auto [other, fresh] = lines.emplace(std::pair(tile.column, tile.row), screen->GetLineNum());
       if (!fresh) {
         file.fail(*screen, fmt::format("tile i {}, j {} is driven twice", tile.column, tile.row),
@@ -53,6 +53,12 @@ ImportedWall import_displaycluster(std::string_view text, const std::string& nam
   }
   add_grid(grid, tiles, imported);
   return imported;
+}
+
+}  // namespace
+
+WallImporter displaycluster_importer() {
+  return {"displaycluster", "displaycluster", "DisplayCluster's configuration.xml", import_displaycluster};
 }
 
 }  // namespace hpr

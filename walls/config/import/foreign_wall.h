@@ -1,9 +1,14 @@
 #pragma once
 
+#include <tinyxml2.h>
+
+#include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/json.h"
 #include "walls/config/import/importer.h"
 
 /// What importers share.
@@ -25,7 +30,7 @@ struct ForeignTile {
   int x = 0;            ///< on it, pixels
   int y = 0;
   bool fullscreen = false;
-  bool placed = true;  ///< x and y are told
+  bool placed = true;  ///< x and y are known
 };
 
 /// A grid measured in pixels.
@@ -53,5 +58,60 @@ void add_grid(const ForeignGrid& grid, const std::vector<ForeignTile>& tiles, Im
 
 /// Moves the upper left corner by up to a thousandth of the height, so that corners written with few digits are square.
 void square_corners(WallScreen& screen);
+
+/// Another system's JSON, read key by key; everything wrong is an Error (BadInput) that names the value's path, and the
+/// line of what is no JSON.
+class JsonFile {
+ public:
+  JsonFile(std::string_view text, std::string name);
+
+  [[nodiscard]] const Json& root() const { return root_; }
+  /// The elements of the array under `key` of `object`, which is at `path`; none when it is absent.
+  [[nodiscard]] const std::vector<Json>& array(const Json& object, const std::string& path, const char* key) const;
+  [[nodiscard]] std::string text(const Json& object, const std::string& path, const char* key,
+                                 const std::string& otherwise) const;
+  [[nodiscard]] bool boolean(const Json& object, const std::string& path, const char* key) const;
+  /// Within [low, high]; absent: `otherwise`, or an error without one.
+  [[nodiscard]] int integer(const Json& object, const std::string& path, const char* key, int low, int high,
+                            std::optional<int> otherwise = std::nullopt) const;
+  [[nodiscard]] double real(const Json& object, const std::string& path, const char* key, double low, double high,
+                            std::optional<double> otherwise = std::nullopt) const;
+  /// `value`, or an error where it is no object.
+  [[nodiscard]] const Json& object(const Json& value, const std::string& path) const;
+
+  [[noreturn]] void fail(const std::string& path, std::string_view what, std::string hint) const;
+
+ private:
+  std::string name_;
+  Json root_;
+};
+
+/// Another system's XML, read attribute by attribute; everything wrong is an Error (BadInput) with its line.
+class XmlFile {
+ public:
+  /// `text` must outlive this.
+  XmlFile(std::string_view text, std::string name);
+
+  /// The outermost element, which must be called so.
+  [[nodiscard]] const tinyxml2::XMLElement& root(const char* called) const;
+  [[nodiscard]] const tinyxml2::XMLElement& child(const tinyxml2::XMLElement& parent, const char* called) const;
+  [[nodiscard]] static std::vector<const tinyxml2::XMLElement*> children(const tinyxml2::XMLElement& parent,
+                                                                         const char* called);
+
+  /// Empty when absent.
+  [[nodiscard]] static std::string text(const tinyxml2::XMLElement& element, const char* attribute);
+  /// Within [low, high]; absent: `otherwise`, or an error without one.
+  [[nodiscard]] int integer(const tinyxml2::XMLElement& element, const char* attribute, int low, int high,
+                            std::optional<int> otherwise = std::nullopt) const;
+  /// Three finite numbers; none when absent.
+  [[nodiscard]] std::optional<glm::dvec3> point(const tinyxml2::XMLElement& element, const char* attribute) const;
+
+  [[noreturn]] void fail(const tinyxml2::XMLElement& element, std::string_view what, std::string hint) const;
+
+ private:
+  std::string_view text_;
+  std::string name_;
+  tinyxml2::XMLDocument document_;
+};
 
 }  // namespace hpr

@@ -12,7 +12,7 @@ namespace hpr {
 
 /// What other systems' files leave open.
 struct ImportSettings {
-  Size pixels{1920, 1080};   ///< of a screen where the file does not tell
+  Size pixels{1920, 1080};   ///< of a screen where the file has none
   double pitch_m = 0.00025;  ///< metres from pixel to pixel where the file counts in pixels only
 };
 
@@ -21,7 +21,7 @@ struct ImportedWall {
   std::vector<std::string> remarks;  ///< what was assumed, or could not be carried over
 };
 
-/// One other system's wall files.
+/// Reads one other system's wall files; defined in the file of its name.
 struct WallImporter {
   std::string_view name;
   std::string_view alias;
@@ -38,12 +38,15 @@ struct WallImporter {
 [[nodiscard]] std::string import_wall(std::string_view text, const std::string& name, std::string_view kind,
                                       const ImportSettings& settings);
 
-[[nodiscard]] ImportedWall import_paraview(std::string_view text, const std::string& name,
-                                           const ImportSettings& settings);
-[[nodiscard]] ImportedWall import_displaycluster(std::string_view text, const std::string& name,
-                                                 const ImportSettings& settings);
-[[nodiscard]] ImportedWall import_tide(std::string_view text, const std::string& name, const ImportSettings& settings);
-[[nodiscard]] ImportedWall import_ospray(std::string_view text, const std::string& name,
-                                         const ImportSettings& settings);
+/// Every importer, in the order in which help lists them: X(tide) stands for tide.cpp, which defines tide_importer().
+#define HPR_IMPORTERS(X) \
+  X(paraview)            \
+  X(tide)                \
+  X(ospray)              \
+  X(displaycluster)
+
+#define HPR_DECLARE_IMPORTER(name) [[nodiscard]] WallImporter name##_importer();
+HPR_IMPORTERS(HPR_DECLARE_IMPORTER)
+#undef HPR_DECLARE_IMPORTER
 
 }  // namespace hpr

@@ -4,7 +4,6 @@
 #include <glm/geometric.hpp>
 
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/json_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
@@ -41,22 +40,20 @@ WallScreen read_screen(const JsonFile& file, const Json& entry, const std::strin
   screen.lower_right = bottom_right - mullion("mullionRight", width) * right + from_bottom * up;
   screen.upper_left = top_left + from_left * right - mullion("mullionTop", height) * up;
   square_corners(screen);
-  screen.pixels = {file.integer(entry, path, "screenWidth", 1, kMostScreenSide),
-                   file.integer(entry, path, "screenHeight", 1, kMostScreenSide)};
+  screen.pixels = {file.integer(entry, path, "screenWidth", 1, kMaxScreenSide),
+                   file.integer(entry, path, "screenHeight", 1, kMaxScreenSide)};
   screen.viewport = {0, 0, screen.pixels.width, screen.pixels.height};
   return screen;
 }
 
 WallWindow read_window(const JsonFile& file, const Json& entry, const std::string& path, Size pixels) {
   WallWindow window;
-  const int x = file.integer(entry, path, "screenX", -kMostScreenSide, kMostScreenSide, 0);
-  const int y = file.integer(entry, path, "screenY", -kMostScreenSide, kMostScreenSide, 0);
+  const int x = file.integer(entry, path, "screenX", -kMaxScreenSide, kMaxScreenSide, 0);
+  const int y = file.integer(entry, path, "screenY", -kMaxScreenSide, kMaxScreenSide, 0);
   window.rect = {x, y, x + pixels.width, y + pixels.height};
-  window.display = fmt::format(":0.{}", file.integer(entry, path, "display", 0, kMostScreens, 0));
+  window.display = fmt::format(":0.{}", file.integer(entry, path, "display", 0, kMaxScreens, 0));
   return window;
 }
-
-}  // namespace
 
 /// OSPRay Studio's branch for immersive walls (Nam, TACC): one entry per MPI rank, metres.
 ImportedWall import_ospray(std::string_view text, const std::string& name, const ImportSettings& /*settings*/) {
@@ -85,10 +82,10 @@ ImportedWall import_ospray(std::string_view text, const std::string& name, const
     window.node = node_of_host(wall, file.text(entry, path, "hostName", "localhost"));
     if (entry.contains("eye")) {
       const glm::dvec3 eye = read_point(file, entry, path, "eye");
-      several_eyes =
-          several_eyes || (wall.viewers.front().given && glm::distance(eye, wall.viewers.front().position) > 1e-9);
-      if (!wall.viewers.front().given) wall.viewers.front().position = eye;
-      wall.viewers.front().given = true;
+      several_eyes = several_eyes ||
+                     (wall.viewers.front().has_position && glm::distance(eye, wall.viewers.front().position) > 1e-9);
+      if (!wall.viewers.front().has_position) wall.viewers.front().position = eye;
+      wall.viewers.front().has_position = true;
     }
     wall.windows.push_back(std::move(window));
     wall.screens.push_back(std::move(screen));
@@ -97,6 +94,12 @@ ImportedWall import_ospray(std::string_view text, const std::string& name, const
   if (several_eyes) imported.remarks.emplace_back("Screens have different eyes: the first one's is the viewer.");
   imported.remarks.emplace_back("\"display\" is a monitor's number there: it became the screen of X display :0.");
   return imported;
+}
+
+}  // namespace
+
+WallImporter ospray_importer() {
+  return {"ospray", "osprstudio", "OSPRay Studio's display_settings.json", import_ospray};
 }
 
 }  // namespace hpr

@@ -5,7 +5,6 @@
 
 #include "core/text.h"
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/xml_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
@@ -16,7 +15,7 @@ using Element = tinyxml2::XMLElement;
 /// A server process of ParaView with the window it opens.
 struct Machine {
   const Element* element = nullptr;
-  std::string host;     ///< may be empty: processes are told apart by their rank alone
+  std::string host;     ///< may be empty: then only their ranks distinguish processes
   std::string display;  ///< may be empty
   Rect window;          ///< may be empty
 };
@@ -42,14 +41,14 @@ Machine read_machine(const XmlFile& file, const Element& element) {
   int used = 0;
   const int read = std::sscanf(geometry.c_str(), "%6dx%6d%7d%7d%n", &width, &height, &x, &y, &used);
   const bool whole = read == 4 && static_cast<std::size_t>(used) == geometry.size();
-  if (!whole || width < 1 || height < 1 || width > kMostScreenSide || height > kMostScreenSide) {
+  if (!whole || width < 1 || height < 1 || width > kMaxScreenSide || height > kMaxScreenSide) {
     file.fail(element, fmt::format("Geometry is '{}'", printable(geometry)), "write e.g. Geometry=\"1920x1080+0+0\"");
   }
   machine.window = {x, y, x + width, y + height};
   return machine;
 }
 
-/// The one that says where servers draw; the file's root where there is none.
+/// The element of the process that draws; the file's root where there is none.
 const Element& server_process(const Element& root) {
   const Element* chosen = &root;
   for (const Element* const process : XmlFile::children(root, "Process")) {
@@ -83,43 +82,43 @@ void import_tiles(const XmlFile& file, const Element& process, const std::vector
                   const ImportSettings& settings, ImportedWall& into) {
   ForeignGrid grid;
   // As pvserver takes them: of two, the one that is not given is 1.
-  grid.columns = std::max(1, option_value(file, process, "tile-dimensions-x", 0, kMostScreens));
-  grid.rows = std::max(1, option_value(file, process, "tile-dimensions-y", 0, kMostScreens));
-  if (grid.columns * grid.rows > kMostScreens) {
+  grid.columns = std::max(1, option_value(file, process, "tile-dimensions-x", 0, kMaxScreens));
+  grid.rows = std::max(1, option_value(file, process, "tile-dimensions-y", 0, kMaxScreens));
+  if (grid.columns * grid.rows > kMaxScreens) {
     file.fail(process, fmt::format("the wall has {}x{} tiles", grid.columns, grid.rows),
-              fmt::format("it may have {}", kMostScreens));
+              fmt::format("it may have {}", kMaxScreens));
   }
   grid.panel = settings.pixels;
-  const bool told = !machines.empty() && !machines.front().window.empty();
-  if (told) grid.panel = {machines.front().window.width(), machines.front().window.height()};
-  if (!told) {
+  const bool has_size = !machines.empty() && !machines.front().window.empty();
+  if (has_size) grid.panel = {machines.front().window.width(), machines.front().window.height()};
+  if (!has_size) {
     into.remarks.push_back(
         fmt::format("The file does not tell the tiles' pixels: they are {}x{} here, or as --pixels says.",
                     grid.panel.width, grid.panel.height));
   }
-  grid.gap_x_pixels = option_value(file, process, "tile-mullion-x", 1 - grid.panel.width, kMostScreenSide);
-  grid.gap_y_pixels = option_value(file, process, "tile-mullion-y", 1 - grid.panel.height, kMostScreenSide);
+  grid.gap_x_pixels = option_value(file, process, "tile-mullion-x", 1 - grid.panel.width, kMaxScreenSide);
+  grid.gap_y_pixels = option_value(file, process, "tile-mullion-y", 1 - grid.panel.height, kMaxScreenSide);
   grid.pitch_m = settings.pitch_m;
   into.remarks.push_back(pitch_remark(settings));
   std::vector<ForeignTile> tiles;
   for (std::size_t i = 0; i < machines.size(); ++i) {
-    const int place = static_cast<int>(i);
-    if (place >= grid.columns * grid.rows) {
+    const int index = static_cast<int>(i);
+    if (index >= grid.columns * grid.rows) {
       into.remarks.push_back(fmt::format("The last {} machines drive no tile and were left out.", machines.size() - i));
       break;
     }
     const Machine& machine = machines[i];
     const Size size{machine.window.width(), machine.window.height()};
-    if (told && size != grid.panel) {
+    if (has_size && size != grid.panel) {
       file.fail(*machine.element, "its Geometry has another size than the first machine's", "tiles are of one size");
     }
-    tiles.push_back({.column = place % grid.columns,
-                     .row = place / grid.columns,
+    tiles.push_back({.column = index % grid.columns,
+                     .row = index / grid.columns,
                      .node = node_of(into.wall, machine),
                      .display = machine.display,
                      .x = machine.window.x0,
                      .y = machine.window.y0,
-                     .placed = told});
+                     .placed = has_size});
   }
   add_grid(grid, tiles, into);
 }
@@ -152,7 +151,7 @@ void import_corners(const XmlFile& file, const std::vector<Machine>& machines, c
     if (machine.window.empty()) {
       assumed = true;
       const double width = settings.pixels.height * screen_width(screen) / screen_height(screen);
-      const bool sound = std::isfinite(width) && width >= 1.0 && width <= kMostScreenSide;
+      const bool sound = std::isfinite(width) && width >= 1.0 && width <= kMaxScreenSide;
       screen.pixels = {sound ? static_cast<int>(std::lround(width)) : settings.pixels.width, settings.pixels.height};
     } else {
       screen.pixels = {machine.window.width(), machine.window.height()};
@@ -167,15 +166,13 @@ void import_corners(const XmlFile& file, const std::vector<Machine>& machines, c
     into.wall.windows.push_back(std::move(window));
     into.wall.screens.push_back(std::move(screen));
   }
-  into.wall.viewers.front().given = true;  // ParaView's stands where its corners are measured from
+  into.wall.viewers.front().has_position = true;  // ParaView's stands where its corners are measured from
   if (assumed) {
     into.remarks.push_back(
         fmt::format("The file does not tell all screens' pixels: those have square ones, {} high, or as --pixels says.",
                     settings.pixels.height));
   }
 }
-
-}  // namespace
 
 ImportedWall import_paraview(std::string_view text, const std::string& name, const ImportSettings& settings) {
   const XmlFile file(text, name);
@@ -198,6 +195,12 @@ ImportedWall import_paraview(std::string_view text, const std::string& name, con
               R"(add what pvserver was told: <Option Name="tile-dimensions-x" Value="3"/>)");
   }
   return imported;
+}
+
+}  // namespace
+
+WallImporter paraview_importer() {
+  return {"paraview", "pvx", "ParaView's .pvx: CAVE corners, or tiles and mullions", import_paraview};
 }
 
 }  // namespace hpr

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "walls/config/import/foreign_wall.h"
-#include "walls/config/import/json_file.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
@@ -33,7 +32,7 @@ class TideReader {
 
  private:
   int count(const Json& surface, const std::string& path, const char* key, const char* newer_key) const {
-    return file_.integer(surface, path, surface.contains(newer_key) ? newer_key : key, 1, kMostScreens);
+    return file_.integer(surface, path, surface.contains(newer_key) ? newer_key : key, 1, kMaxScreens);
   }
 
   void read_surface(const Json& surface) {
@@ -43,23 +42,23 @@ class TideReader {
     if (!grids_.empty()) grid.surface = fmt::format("surface{}", grids_.size());
     grid.columns = count(surface, path, "numScreensX", "screenCountX");
     grid.rows = count(surface, path, "numScreensY", "screenCountY");
-    grid.panel = {file_.integer(surface, path, "displayWidth", 1, kMostScreenSide),
-                  file_.integer(surface, path, "displayHeight", 1, kMostScreenSide)};
-    grid.panels = {file_.integer(surface, path, "displaysPerScreenX", 1, kMostScreens, 1),
-                   file_.integer(surface, path, "displaysPerScreenY", 1, kMostScreens, 1)};
+    grid.panel = {file_.integer(surface, path, "displayWidth", 1, kMaxScreenSide),
+                  file_.integer(surface, path, "displayHeight", 1, kMaxScreenSide)};
+    grid.panels = {file_.integer(surface, path, "displaysPerScreenX", 1, kMaxScreens, 1),
+                   file_.integer(surface, path, "displaysPerScreenY", 1, kMaxScreens, 1)};
     const double panels = 1.0 * grid.columns * grid.rows * grid.panels.width * grid.panels.height;
     panels_ += panels;
-    if (panels_ > kMostScreens) {
+    if (panels_ > kMaxScreens) {
       file_.fail(path, fmt::format("up to here the wall has {:g} displays", panels_),
-                 fmt::format("it may have {}", kMostScreens));
+                 fmt::format("it may have {}", kMaxScreens));
     }
-    grid.gap_x_pixels = file_.integer(surface, path, "bezelWidth", 1 - grid.panel.width, kMostScreenSide, 0);
-    grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMostScreenSide, 0);
+    grid.gap_x_pixels = file_.integer(surface, path, "bezelWidth", 1 - grid.panel.width, kMaxScreenSide, 0);
+    grid.gap_y_pixels = file_.integer(surface, path, "bezelHeight", 1 - grid.panel.height, kMaxScreenSide, 0);
     grid.pitch_m = 1.0;
     const double width_pixels = grid_width(grid);
-    const std::vector<Json>& metres = file_.array(surface, path, "dimensions");
-    if (metres.size() == 2 && metres[0].is_number() && metres[0].get<double>() > 0.0) {
-      grid.pitch_m = metres[0].get<double>() / width_pixels;
+    const std::vector<Json>& size_m = file_.array(surface, path, "dimensions");
+    if (size_m.size() == 2 && size_m[0].is_number() && size_m[0].get<double>() > 0.0) {
+      grid.pitch_m = size_m[0].get<double>() / width_pixels;
     } else {
       grid.pitch_m = settings_.pitch_m;
       by_pitch_ = true;
@@ -90,9 +89,9 @@ class TideReader {
     tile.fullscreen = file_.boolean(screen, path, "fullscreen");
     tile.column = file_.integer(screen, path, "i", 0, grid.columns - 1, 0);
     tile.row = file_.integer(screen, path, "j", 0, grid.rows - 1, 0);
-    tile.x = file_.integer(screen, path, "x", -kMostScreenSide, kMostScreenSide, 0);
-    tile.y = file_.integer(screen, path, "y", -kMostScreenSide, kMostScreenSide, 0);
-    const auto [other, fresh] = places_.emplace(std::array{surface, tile.column, tile.row}, path);
+    tile.x = file_.integer(screen, path, "x", -kMaxScreenSide, kMaxScreenSide, 0);
+    tile.y = file_.integer(screen, path, "y", -kMaxScreenSide, kMaxScreenSide, 0);
+    const auto [other, fresh] = positions_.emplace(std::array{surface, tile.column, tile.row}, path);
     if (!fresh) {
       file_.fail(path, fmt::format("screen i {}, j {} is driven twice", tile.column, tile.row),
                  fmt::format("the other one is {}", other->second));
@@ -123,16 +122,20 @@ class TideReader {
   std::vector<ForeignGrid> grids_;
   double panels_ = 0.0;                          ///< of all surfaces
   std::vector<std::vector<ForeignTile>> tiles_;  ///< of grids_
-  std::map<std::array<int, 3>, std::string> places_;
+  std::map<std::array<int, 3>, std::string> positions_;
   double right_m_ = 0.0;  ///< where the next surface begins
   bool by_pitch_ = false;
   int right_eyes_ = 0;
 };
 
-}  // namespace
-
 ImportedWall import_tide(std::string_view text, const std::string& name, const ImportSettings& settings) {
   return TideReader(text, name, settings).read();
+}
+
+}  // namespace
+
+WallImporter tide_importer() {
+  return {"tide", "tide", "Tide's configuration.json", import_tide};
 }
 
 }  // namespace hpr
