@@ -324,7 +324,7 @@ void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scr
   if (denoises) scratch.denoiser.start(jobs.size(), sums.wants_components);
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
   if (shared != 0) scratch.shared.start(shared, context, jobs.front());
-  const int height = jobs.front().place.height();
+  const int height = jobs.front().rect.height();
   for (RowRange rows; rows.first < height; rows.first = rows.end) {
     rows.end = end_of_wavefront(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
@@ -416,13 +416,13 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     const std::size_t tile = order[i];
-    const TilePlace place = layout.place(tile);
+    const TilePlace position = layout.place(tile);
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
     if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
     std::vector<TileJob> jobs;
     for (const ShadedSample& sample : samples) {
       set_active(sample.output, tile);
-      jobs.push_back({place.pixels, sample.number, sample.keys->tile(tile), &sample.views[place.screen],
+      jobs.push_back({position.pixels, sample.number, sample.keys->tile(tile), &sample.views[position.screen],
                       static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
     }
     std::unique_ptr<Scratch> scratch = state.take_scratch();
@@ -434,8 +434,8 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
                                .followed_lobes = state.followed_lobes,
                                .gathers = state.gathers,
                                .photons = photons,
-                               .view = &first.views[place.screen],
-                               .eye_media = eyes[place.screen]};
+                               .view = &first.views[position.screen],
+                               .eye_media = eyes[position.screen]};
     state.shade_tile(context, *scratch, jobs, tile, samples);
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));

@@ -16,7 +16,7 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 Light point_light(const glm::dvec3& position, float intensity) {
@@ -28,8 +28,8 @@ Light point_light(const glm::dvec3& position, float intensity) {
 
 Scene white_floor() {
   Scene scene;
-  add_material(scene, test::matte());
-  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  add_material(scene, test::diffuse());
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
   finish_scene(scene);
   return scene;
 }
@@ -44,9 +44,9 @@ TEST(DeferredShader, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
     for (int x = 0; x < 65; ++x) {
       const Ray ray = view_ray(view, x + 0.5, y + 0.5);
       const glm::dvec3 p = ray.origin - ray.direction * (ray.origin.y / ray.direction.y);
-      const glm::dvec3 way = scene.lights[0].position - p;
-      const double d2 = glm::dot(way, way);
-      const double expected = 7.0 * (way.y / std::sqrt(d2)) / (std::numbers::pi * d2);
+      const glm::dvec3 direction = scene.lights[0].position - p;
+      const double d2 = glm::dot(direction, direction);
+      const double expected = 7.0 * (direction.y / std::sqrt(d2)) / (std::numbers::pi * d2);
       ASSERT_NEAR(lit.image.at(x, y).g / expected, 1.0, 1e-6) << x << ',' << y;
     }
   }
@@ -57,7 +57,7 @@ TEST(DeferredShader, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
 TEST(DeferredShader, ABlockersShadowEndsWhereGeometrySays) {
   Scene scene = white_floor();
   // A square of half side 0.5 at half the light's height: its shadow has half side 1.
-  place(scene, add_mesh(scene, quad({-0.5, 1, 0.5}, {1, 0, 0}, {0, 0, -1}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-0.5, 1, 0.5}, {1, 0, 0}, {0, 0, -1}, 0)));
   finish_scene(scene);
   scene.lights = {point_light({0, 2, 0}, 1.0F)};
   const View view = test::view_from({0.0, 0.9, 3.9}, {0, 0, 0}, {80, 60}, scene);
@@ -85,7 +85,7 @@ TEST(DeferredShader, ABlockersShadowEndsWhereGeometrySays) {
 TEST(DeferredShader, ALightThatLiesOnASurfaceIsNotHiddenByIt) {
   Scene scene = white_floor();
   add_mesh(scene, quad({-4, 3, -4}, {8, 0, 0}, {0, 0, 8}, 0));
-  place(scene, 1);
+  place_mesh(scene, 1);
   finish_scene(scene);
   scene.lights = {point_light({0.1, 3.0, 0.2}, 1.0F)};
   const View view = test::view_from({0, 1, 0.1}, {0, 0, 0}, {32, 32}, scene);
@@ -107,10 +107,10 @@ TEST(DeferredShader, NoSphereShadowsItselfAtAnyScale) {
   for (const double scale : {1e-9, 1e-3, 1.0, 1e3, 1e9}) {
     for (const double offset : {0.0, 100.0}) {
       Scene scene;
-      add_material(scene, test::matte());
+      add_material(scene, test::diffuse());
       const std::uint32_t ball = add_mesh(scene, test::sphere(1.0, 16, 0));
       const glm::dvec3 center = scale * offset * glm::dvec3(1.0, 0.5, -0.3);
-      place(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), center), glm::dvec3(scale)));
+      place_mesh(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), center), glm::dvec3(scale)));
       finish_scene(scene);
       Light sun;
       sun.type = LightType::Directional;
@@ -133,12 +133,12 @@ TEST(DeferredShader, NoSphereShadowsItselfAtAnyScale) {
 
 Scene busy_scene(bool flattened) {
   Scene scene;
-  add_material(scene, test::matte({0.8F, 0.7F, 0.6F}));
+  add_material(scene, test::diffuse({0.8F, 0.7F, 0.6F}));
   Material shiny;
   shiny.base_color = {0.9F, 0.8F, 0.5F, 1.0F};
   shiny.roughness = 0.15F;
   add_material(scene, shiny);
-  place(scene, add_mesh(scene, quad({-3, -1, 3}, {6, 0, 0}, {0, 0, -6}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-3, -1, 3}, {6, 0, 0}, {0, 0, -6}, 0)));
   const Mesh ball = test::sphere(0.6, 10, 1);
   const std::uint32_t shared = flattened ? 0 : add_mesh(scene, ball);
   for (int i = 0; i < 4; ++i) {
@@ -146,14 +146,14 @@ Scene busy_scene(bool flattened) {
     to_world = glm::rotate(to_world, 0.7 * i, glm::normalize(glm::dvec3(1, 2, 3)));
     to_world = glm::scale(to_world, {1.0, i == 2 ? -0.7 : 1.0, 1.0 + 0.2 * i});
     if (!flattened) {
-      place(scene, shared, to_world);
+      place_mesh(scene, shared, to_world);
       continue;
     }
     Mesh moved = ball;
     const glm::dmat3 normal_matrix = glm::transpose(glm::inverse(glm::dmat3(to_world)));
     for (glm::vec3& p : moved.positions) p = glm::vec3(to_world * glm::dvec4(p, 1.0));
     for (glm::vec3& n : moved.normals) n = glm::vec3(glm::normalize(normal_matrix * glm::dvec3(n)));
-    place(scene, add_mesh(scene, moved));
+    place_mesh(scene, add_mesh(scene, moved));
   }
   finish_scene(scene);
   scene.lights = {point_light({2, 4, 3}, 40.0F), point_light({-3, 3, 1}, 20.0F)};
@@ -278,7 +278,7 @@ TEST(DeferredShader, InfiniteRadianceIsBlackAndCounted) {
 
 TEST(DeferredShader, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
   Material bright = test::glowing(glm::vec3(3e38F));
   bright.base_color = glm::vec4(1.0F);
   test::add_material(scene, bright);
@@ -344,13 +344,13 @@ TEST(DeferredShader, LocalShadingPutsTheDisplayColourIntoTheKeys) {
 // A flat floor whose normals pretend a hill, higher than the wall that stands on it: lifted rays look over the wall.
 TEST(DeferredShader, TheReferenceLiftsShadowRaysAsSettingsSay) {
   Scene scene;
-  const std::uint32_t white = add_material(scene, test::matte());
+  const std::uint32_t white = add_material(scene, test::diffuse());
   Mesh hill = quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, white);
   for (const glm::vec3& corner : hill.positions) {
     hill.normals.push_back(glm::normalize(glm::vec3(0.5F * corner.x, 1.0F, 0.5F * corner.z)));
   }
-  place(scene, add_mesh(scene, hill));
-  place(scene, add_mesh(scene, quad({0, 0, 1}, {0, 0.1F, 0}, {0, 0, -2}, white)));
+  place_mesh(scene, add_mesh(scene, hill));
+  place_mesh(scene, add_mesh(scene, quad({0, 0, 1}, {0, 0.1F, 0}, {0, 0, -2}, white)));
   Light& sun = scene.lights.emplace_back();
   sun.type = LightType::Directional;
   sun.direction = glm::normalize(glm::vec3(-1.0F, -0.2F, 0.0F));

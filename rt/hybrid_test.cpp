@@ -13,7 +13,7 @@ namespace {
 using test::add_material;
 using test::add_mesh;
 using test::mean_of;
-using test::place;
+using test::place_mesh;
 using test::quad;
 using test::room;
 
@@ -43,12 +43,12 @@ TEST(Hybrid, AHeadlightShowsWhatIsLookedAtAndIsScatteredNoFurther) {
 }
 
 TEST(Hybrid, AMatteBall) {
-  expect_the_same_light(room(test::matte({0.3F, 0.4F, 0.6F}), false));
+  expect_the_same_light(room(test::diffuse({0.3F, 0.4F, 0.6F}), false));
 }
 
 /// All light comes from a spot of the floor that is not seen.
 TEST(Hybrid, AFloorWhoseNormalsLeanFromIt) {
-  Scene scene = room(test::matte(glm::vec3(0.5F)), false);
+  Scene scene = room(test::diffuse(glm::vec3(0.5F)), false);
   constexpr std::size_t kFloor = 4;
   scene.meshes[kFloor].normals.assign(4, glm::normalize(glm::vec3(1.5F, 1.0F, 0.0F)));
   for (Material& material : scene.materials) material.emissive = glm::vec3(0.0F);
@@ -104,7 +104,7 @@ TEST(Hybrid, ABallOfHalfGlass) {
 TEST(Hybrid, ABallOfHalfGlassInAFurnaceGivesBackNoMoreThanArrives) {
   for (const float roughness : {0.0F, 0.4F}) {
     Scene scene;
-    place(scene, add_mesh(scene, test::sphere(1.0, 32, add_material(scene, half_glass(roughness)))));
+    place_mesh(scene, add_mesh(scene, test::sphere(1.0, 32, add_material(scene, half_glass(roughness)))));
     scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
     finish_scene(scene);
     const View view = test::view_from({0, 0, 4}, {0, 0, 0}, {16, 16}, scene, 0.45);
@@ -146,8 +146,8 @@ TEST(Hybrid, ACoarseShellOfFrostedGlassAboutALampWhoseShadowRaysAreLifted) {
   Scene scene;
   Material frosted = test::clear_glass(1.5F, 0.0F);
   frosted.roughness = 0.6F;
-  place(scene, add_mesh(scene, test::sphere(0.6, 6, add_material(scene, frosted))),
-        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.3, -0.5, 1));
+  place_mesh(scene, add_mesh(scene, test::sphere(0.6, 6, add_material(scene, frosted))),
+             glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.3, -0.5, 1));
   scene.lights.emplace_back().position = {0.1, -0.3, -0.5};
   finish_scene(scene);
   expect_the_same_light(scene, 0.3, true);
@@ -156,10 +156,10 @@ TEST(Hybrid, ACoarseShellOfFrostedGlassAboutALampWhoseShadowRaysAreLifted) {
 /// A ball on a floor under a sky of clouds, one far brighter than the others.
 Scene under_the_sky(const Material& thing) {
   Scene scene;
-  const std::uint32_t ground = add_material(scene, test::matte({0.6F, 0.5F, 0.4F}));
-  place(scene, add_mesh(scene, quad({-2, -1, -2}, {0, 0, 4}, {4, 0, 0}, ground)));
-  place(scene, add_mesh(scene, test::sphere(0.45, 64, add_material(scene, thing))),
-        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
+  const std::uint32_t ground = add_material(scene, test::diffuse({0.6F, 0.5F, 0.4F}));
+  place_mesh(scene, add_mesh(scene, quad({-2, -1, -2}, {0, 0, 4}, {4, 0, 0}, ground)));
+  place_mesh(scene, add_mesh(scene, test::sphere(0.45, 64, add_material(scene, thing))),
+             glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
   scene.environment = Environment{Image<Rgb>({8, 4}, {0.5F, 0.6F, 0.9F})};
   scene.environment->image.at(2, 1) = {6.0F, 5.0F, 4.0F};
   for (int x = 0; x < 8; x += 3) scene.environment->image.at(x, 0) = {1.0F, 0.8F, 0.7F};
@@ -168,7 +168,7 @@ Scene under_the_sky(const Material& thing) {
 }
 
 TEST(Hybrid, AMatteBallUnderTheSky) {
-  expect_the_same_light(under_the_sky(test::matte({0.3F, 0.4F, 0.6F})));
+  expect_the_same_light(under_the_sky(test::diffuse({0.3F, 0.4F, 0.6F})));
 }
 
 TEST(Hybrid, APolishedMetalBallUnderTheSky) {
@@ -184,7 +184,7 @@ TEST(Hybrid, AFrostedGlassBallUnderTheSky) {
 }
 
 TEST(Hybrid, ABallBeforeASphereOfLightASpotAndASun) {
-  Scene scene = under_the_sky(test::matte({0.3F, 0.4F, 0.6F}));
+  Scene scene = under_the_sky(test::diffuse({0.3F, 0.4F, 0.6F}));
   scene.environment.reset();
   for (const LightType type : {LightType::Point, LightType::Spot, LightType::Directional}) {
     Light& light = scene.lights.emplace_back();
@@ -202,10 +202,10 @@ TEST(Hybrid, ABallBeforeASphereOfLightASpotAndASun) {
 /// A wall of light that is none, behind a floor of some material. The lamp is far weaker.
 Scene beside_an_unlit_wall(const Material& floor) {
   Scene scene;
-  place(scene, add_mesh(scene, quad({-2, -1, 0}, {4, 0, 0}, {0, 0, -2}, add_material(scene, floor))));
-  Material poster = test::matte({2.0F, 1.0F, 0.5F});
+  place_mesh(scene, add_mesh(scene, quad({-2, -1, 0}, {4, 0, 0}, {0, 0, -2}, add_material(scene, floor))));
+  Material poster = test::diffuse({2.0F, 1.0F, 0.5F});
   poster.unlit = true;
-  place(scene, add_mesh(scene, quad({-2, -1, -2}, {4, 0, 0}, {0, 3, 0}, add_material(scene, poster))));
+  place_mesh(scene, add_mesh(scene, quad({-2, -1, -2}, {4, 0, 0}, {0, 3, 0}, add_material(scene, poster))));
   Light& light = scene.lights.emplace_back();
   light.position = {0.3, 0.8, -0.5};
   light.intensity = glm::vec3(0.2F);
@@ -214,11 +214,11 @@ Scene beside_an_unlit_wall(const Material& floor) {
 }
 
 TEST(Hybrid, AMatteFloorBesideAnUnlitWall) {
-  expect_the_same_light(beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F})));
+  expect_the_same_light(beside_an_unlit_wall(test::diffuse({0.8F, 0.8F, 0.8F})));
 }
 
 TEST(Hybrid, WhatAnUnlitWallIsSaidToEmitIsNoLight) {
-  Scene scene = beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F}));
+  Scene scene = beside_an_unlit_wall(test::diffuse({0.8F, 0.8F, 0.8F}));
   const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
   for (const bool reference : {false, true}) {
     const RaySettings settings{.photons = 1000, .global_photons = true, .reference = reference};
@@ -245,17 +245,18 @@ TEST(Hybrid, AMetalFloorBesideAnUnlitWall) {
 }
 
 TEST(Hybrid, APolishedFloorBesideAnUnlitWall) {
-  Material plastic = test::matte({0.8F, 0.8F, 0.8F});
+  Material plastic = test::diffuse({0.8F, 0.8F, 0.8F});
   plastic.ior = 1.5F;
   plastic.roughness = 0.2F;
   expect_the_same_light(beside_an_unlit_wall(plastic));
 }
 
 TEST(Hybrid, AFrostedSheetBeforeAnUnlitWall) {
-  Scene scene = beside_an_unlit_wall(test::matte({0.8F, 0.8F, 0.8F}));
+  Scene scene = beside_an_unlit_wall(test::diffuse({0.8F, 0.8F, 0.8F}));
   Material sheet = test::clear_glass(1.5F, 0.0F);
   sheet.roughness = 0.4F;
-  place(scene, add_mesh(scene, quad({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, add_material(scene, sheet))));
+  place_mesh(scene,
+             add_mesh(scene, quad({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, add_material(scene, sheet))));
   finish_scene(scene);
   expect_the_same_light(scene);
 }
@@ -272,14 +273,14 @@ void expect_the_same_light_behind(Scene scene, double alpha) {
 
 TEST(Hybrid, ASheetThatCoversInPart) {
   for (const double alpha : {0.5, 0.1})
-    expect_the_same_light_behind(room(test::matte({0.8F, 0.8F, 0.2F}), true), alpha);
+    expect_the_same_light_behind(room(test::diffuse({0.8F, 0.8F, 0.2F}), true), alpha);
 }
 
 TEST(Hybrid, ADecalCloseToTheFloor) {
-  Scene scene = room(test::matte({0.8F, 0.8F, 0.2F}), true);
+  Scene scene = room(test::diffuse({0.8F, 0.8F, 0.2F}), true);
   scene.instances.pop_back();
-  place(scene, add_mesh(scene, quad({-0.9F, -0.999F, 0.9F}, {1.8F, 0, 0}, {0, 0, -1.8F},
-                                    static_cast<std::uint32_t>(scene.materials.size() - 1))));
+  place_mesh(scene, add_mesh(scene, quad({-0.9F, -0.999F, 0.9F}, {1.8F, 0, 0}, {0, 0, -1.8F},
+                                         static_cast<std::uint32_t>(scene.materials.size() - 1))));
   finish_scene(scene);
   expect_the_same_light_behind(std::move(scene), 0.5);
 }
@@ -288,13 +289,13 @@ TEST(Hybrid, ADecalCloseToTheFloor) {
 /// two the sheet has the lower ids.
 Scene veiled_glow(double gap, bool sheet_first) {
   Scene scene;
-  Material sheet = test::matte(glm::vec3(0.0F));
+  Material sheet = test::diffuse(glm::vec3(0.0F));
   sheet.alpha_mode = AlphaMode::Blend;
   sheet.base_color.a = 0.5F;
   const std::uint32_t veil = add_material(scene, sheet);
   const std::uint32_t glow = add_material(scene, test::glowing(glm::vec3(1.0F)));
   const auto wall = [&](double z, std::uint32_t material) {
-    place(scene, add_mesh(scene, quad({-2, -2, static_cast<float>(z)}, {4, 0, 0}, {0, 4, 0}, material)));
+    place_mesh(scene, add_mesh(scene, quad({-2, -2, static_cast<float>(z)}, {4, 0, 0}, {0, 4, 0}, material)));
   };
   if (sheet_first) wall(gap, veil);
   wall(0.0, glow);
@@ -316,7 +317,7 @@ TEST(Hybrid, NothingIsSkippedBehindASheetThatLiesOnIt) {
 }
 
 TEST(Hybrid, APaneOfOneMeshWhoseFacesLieCloseTogether) {
-  Scene scene = room(test::matte({0.8F, 0.8F, 0.2F}), true);
+  Scene scene = room(test::diffuse({0.8F, 0.8F, 0.2F}), true);
   scene.instances.pop_back();
   const auto material = static_cast<std::uint32_t>(scene.materials.size() - 1);
   Mesh pane = quad({-0.9F, -0.8F, 0.9F}, {1.8F, 0, 0}, {0, 0, -1.8F}, material);
@@ -324,13 +325,13 @@ TEST(Hybrid, APaneOfOneMeshWhoseFacesLieCloseTogether) {
   pane.positions.insert(pane.positions.end(), below.positions.begin(), below.positions.end());
   pane.uvs[0].insert(pane.uvs[0].end(), below.uvs[0].begin(), below.uvs[0].end());
   for (const glm::uvec3& corners : below.triangles) pane.triangles.push_back(corners + glm::uvec3(4));
-  place(scene, add_mesh(scene, pane));
+  place_mesh(scene, add_mesh(scene, pane));
   finish_scene(scene);
   expect_the_same_light_behind(std::move(scene), 0.5);
 }
 
 TEST(Hybrid, AVeil) {
-  Material veil = test::matte({0.8F, 0.8F, 0.2F});
+  Material veil = test::diffuse({0.8F, 0.8F, 0.2F});
   veil.alpha_mode = AlphaMode::Mask;  // cast_keys has no coverage: a mask that covers all, but by way of coverage
   expect_the_same_light(room(veil, true));
 }

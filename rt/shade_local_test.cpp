@@ -10,17 +10,17 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 // Before a sky: a board, and a pane over its rim that lets half of the light through.
 TEST(ShadeLocal, WhatItLeavesEmptyIsLitLikeAllElse) {
   Scene scene;
-  place(scene, add_mesh(scene, quad({-2, -2, 0}, {2, 0, 0}, {0, 4, 0}, add_material(scene, test::matte()))));
-  Material pane = test::matte();
+  place_mesh(scene, add_mesh(scene, quad({-2, -2, 0}, {2, 0, 0}, {0, 4, 0}, add_material(scene, test::diffuse()))));
+  Material pane = test::diffuse();
   pane.alpha_mode = AlphaMode::Blend;
   pane.base_color.a = 0.5F;
-  place(scene, add_mesh(scene, quad({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}, add_material(scene, pane))));
+  place_mesh(scene, add_mesh(scene, quad({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}, add_material(scene, pane))));
   scene.environment = test::even_light({0.2F, 0.5F, 0.8F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 6}, {0, 0, 0}, {64, 64}, scene, 0.7);

@@ -11,15 +11,15 @@ namespace hpr::test {
 /// A closed room of coloured walls under a lamp, with something in the middle.
 inline Scene room(const Material& thing, bool is_sheet) {
   Scene scene;
-  const std::uint32_t white = add_material(scene, matte(glm::vec3(0.7F)));
-  const std::uint32_t red = add_material(scene, matte({0.6F, 0.1F, 0.1F}));
-  const std::uint32_t green = add_material(scene, matte({0.1F, 0.5F, 0.1F}));
-  Material glow = matte(glm::vec3(0.7F));
+  const std::uint32_t white = add_material(scene, diffuse(glm::vec3(0.7F)));
+  const std::uint32_t red = add_material(scene, diffuse({0.6F, 0.1F, 0.1F}));
+  const std::uint32_t green = add_material(scene, diffuse({0.1F, 0.5F, 0.1F}));
+  Material glow = diffuse(glm::vec3(0.7F));
   glow.emissive = glm::vec3(12.0F, 10.0F, 8.0F);
   const std::uint32_t lamp = add_material(scene, glow);
   const std::uint32_t special = add_material(scene, thing);
   const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b, std::uint32_t material) {
-    place(scene, add_mesh(scene, quad(corner, a, b, material)));
+    place_mesh(scene, add_mesh(scene, quad(corner, a, b, material)));
   };
   side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white);
   side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0}, white);
@@ -31,8 +31,8 @@ inline Scene room(const Material& thing, bool is_sheet) {
   if (is_sheet) {
     side({-0.6F, -0.9F, 0.1F}, {1.2F, 0, 0}, {0, 1.2F, 0.2F}, special);
   } else {
-    place(scene, add_mesh(scene, sphere(0.45, 64, special)),
-          glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
+    place_mesh(scene, add_mesh(scene, sphere(0.45, 64, special)),
+               glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
   }
   finish_scene(scene);
   return scene;
@@ -42,12 +42,12 @@ inline Scene room(const Material& thing, bool is_sheet) {
 inline Scene corner(const Material& ball, glm::vec3 floor = glm::vec3(0.8F),
                     glm::vec3 back = glm::vec3(0.2F, 0.4F, 0.6F), int rings = 24) {
   Scene scene;
-  add_material(scene, matte(floor));
-  add_material(scene, matte(back));
+  add_material(scene, diffuse(floor));
+  add_material(scene, diffuse(back));
   add_material(scene, ball);
-  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
-  place(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 6, 0}, 1)));
-  place(scene, add_mesh(scene, sphere(1.0, rings, 2)), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 1));
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 6, 0}, 1)));
+  place_mesh(scene, add_mesh(scene, sphere(1.0, rings, 2)), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 1));
   scene.environment = even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   return scene;

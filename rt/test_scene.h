@@ -21,7 +21,7 @@ inline std::uint32_t add_material(Scene& scene, const Material& material) {
 }
 
 /// White Lambert: no specular layer (an ior of 1 reflects nothing).
-inline Material matte(glm::vec3 color = glm::vec3(1.0F)) {
+inline Material diffuse(glm::vec3 color = glm::vec3(1.0F)) {
   Material material;
   material.base_color = glm::vec4(color, 1.0F);
   material.metallic = 0.0F;
@@ -38,7 +38,7 @@ inline Material mirror(float reflectance) {
 }
 
 inline Material glowing(glm::vec3 radiance) {
-  Material material = matte(glm::vec3(0.0F));
+  Material material = diffuse(glm::vec3(0.0F));
   material.emissive = radiance;
   return material;
 }
@@ -67,7 +67,7 @@ inline std::uint32_t add_mesh(Scene& scene, Mesh mesh) {
   return static_cast<std::uint32_t>(scene.meshes.size() - 1);
 }
 
-inline void place(Scene& scene, std::uint32_t mesh, const glm::dmat4& to_world = glm::dmat4(1.0)) {
+inline void place_mesh(Scene& scene, std::uint32_t mesh, const glm::dmat4& to_world = glm::dmat4(1.0)) {
   scene.instances.push_back({mesh, to_world, 0});
 }
 

@@ -44,8 +44,8 @@ Patch FragmentFinder::patch_of(const TileJob& job, std::uint32_t pixel, std::spa
 
 void FragmentFinder::add_sides(const TileJob& job, const SilhouetteEdges::Pixel& pixel, TileFragments& found) {
   std::uint32_t left_samples = 0;
-  for (std::uint32_t i = 0; i < found.places->size(); ++i) {
-    left_samples |= static_cast<std::uint32_t>(pixel.is_left(found.places->at(i))) << i;
+  for (std::uint32_t i = 0; i < found.positions->size(); ++i) {
+    left_samples |= static_cast<std::uint32_t>(pixel.is_left(found.positions->at(i))) << i;
   }
   for (const bool is_left : {true, false}) {
     const std::size_t side = is_left ? 0 : 1;
@@ -67,14 +67,14 @@ void FragmentFinder::add_sides(const TileJob& job, const SilhouetteEdges::Pixel&
 
 void FragmentFinder::trace_pending(const LightContext& context, RayBuffers& buffers, const TileJob& job,
                                    TileFragments& found) {
-  const SubpixelOffsets& places = *found.places;
+  const SubpixelOffsets& positions = *found.positions;
   buffers.requests.clear();
   for (const std::uint32_t pixel : pending_) {
-    for (const glm::vec2& place : places) buffers.requests.push_back(ray_through(view_, job, pixel, place));
+    for (const glm::vec2& position : positions) buffers.requests.push_back(ray_through(view_, job, pixel, position));
   }
   trace_features(context, buffers, view_.eye, traced_features_, Coherence::High);
   for (std::size_t i = 0; i < pending_.size(); ++i) {
-    group(job, pending_[i], std::span(traced_features_).subspan(i * places.size(), places.size()), found);
+    group(job, pending_[i], std::span(traced_features_).subspan(i * positions.size(), positions.size()), found);
   }
   pending_.clear();
 }
@@ -101,7 +101,7 @@ void FragmentFinder::group(const TileJob& job, std::uint32_t pixel, std::span<co
     if (!seen[kind.first].is_surface) continue;
     known_.clear();
     for (std::uint32_t i = 0; i < seen.size(); ++i) {
-      if ((kind.samples >> i & 1U) != 0) known_.push_back({found.places->at(i), i});
+      if ((kind.samples >> i & 1U) != 0) known_.push_back({found.positions->at(i), i});
     }
     fragment.shows = CoverageFragment::Shows::Surface;
     fragment.patch = patch_of(job, pixel, known_, seen);
@@ -138,8 +138,8 @@ Patch::Patch(std::span<const KnownFeature> known, std::span<const SurfaceFeature
   const float weight = 1.0F / static_cast<float>(known.size());
   glm::vec2 centroid(0.0F);
   for (const KnownFeature& each : known) {
-    centroid += weight * each.place;
-    place_[0] += weight * features[each.feature].position;
+    centroid += weight * each.position;
+    position_[0] += weight * features[each.feature].position;
     across_[0] += weight * across(features[each.feature]);
   }
   float xx = kRidge;
@@ -148,14 +148,15 @@ Patch::Patch(std::span<const KnownFeature> known, std::span<const SurfaceFeature
   Plane place_by{};
   Plane across_by{};
   for (const KnownFeature& each : known) {
-    const glm::vec2 way = each.place - centroid;
-    xx += weight * way.x * way.x;
-    xy += weight * way.x * way.y;
-    yy += weight * way.y * way.y;
+    const glm::vec2 direction = each.position - centroid;
+    xx += weight * direction.x * direction.x;
+    xy += weight * direction.x * direction.y;
+    yy += weight * direction.y * direction.y;
     for (const int axis : {0, 1}) {
-      place_by.at(static_cast<std::size_t>(axis)) += weight * way[axis] * (features[each.feature].position - place_[0]);
+      place_by.at(static_cast<std::size_t>(axis)) +=
+          weight * direction[axis] * (features[each.feature].position - position_[0]);
       across_by.at(static_cast<std::size_t>(axis)) +=
-          weight * way[axis] * (across(features[each.feature]) - across_[0]);
+          weight * direction[axis] * (across(features[each.feature]) - across_[0]);
     }
   }
   const float determinant = xx * yy - xy * xy;
@@ -164,34 +165,34 @@ Patch::Patch(std::span<const KnownFeature> known, std::span<const SurfaceFeature
     plane[2] = (xx * by[1] - xy * by[0]) / determinant;
     plane[0] -= centroid.x * plane[1] + centroid.y * plane[2];
   };
-  tilt(place_, place_by);
+  tilt(position_, place_by);
   tilt(across_, across_by);
 }
 
-SurfaceFeature Patch::at(const glm::vec2& place) const {
+SurfaceFeature Patch::at(const glm::vec2& position) const {
   SurfaceFeature feature;
   feature.is_surface = true;
   feature.material = material_;
-  feature.position = place_[0] + place.x * place_[1] + place.y * place_[2];
-  const glm::vec3 across = across_[0] + place.x * across_[1] + place.y * across_[2];
+  feature.position = position_[0] + position.x * position_[1] + position.y * position_[2];
+  const glm::vec3 across = across_[0] + position.x * across_[1] + position.y * across_[2];
   const float across2 = glm::dot(across, across);
   feature.normal = across2 < 1.0F ? across + std::sqrt(1.0F - across2) * to_eye_ : across / std::sqrt(across2);
   return feature;
 }
 
-glm::vec2 CoverageFragment::place(const SubpixelOffsets& places, std::uint32_t number) const {
+glm::vec2 CoverageFragment::position_at(const SubpixelOffsets& positions, std::uint32_t number) const {
   if (samples == 0) return centroid;
   std::uint32_t left = samples;
   for (std::uint32_t skipped = number % count(); skipped > 0; --skipped) left &= left - 1;
-  return places.at(static_cast<std::size_t>(std::countr_zero(left)));
+  return positions.at(static_cast<std::size_t>(std::countr_zero(left)));
 }
 
-bool CoverageFragment::matches(const View& view, const SurfaceFeature& feature, const glm::vec2& place) const {
+bool CoverageFragment::matches(const View& view, const SurfaceFeature& feature, const glm::vec2& position) const {
   switch (shows) {
     case Shows::Background:
       return !feature.is_surface;
     case Shows::Surface:  // the two lie one behind the other at most: neighbors on the screen do not matter
-      return feature.is_surface && is_within_depth(view, patch.at(place), feature);
+      return feature.is_surface && is_within_depth(view, patch.at(position), feature);
     case Shows::Many:
       return true;
   }
@@ -203,16 +204,16 @@ void CoverageFragments::prepare(const FrameLayout& layout, std::span<const View>
   layout_ = layout;
   views_.assign(views.begin(), views.end());
   tiles_.assign(layout.tiles(), {});
-  for (std::uint32_t i = 0; i < places_.size(); ++i) {
+  for (std::uint32_t i = 0; i < positions_.size(); ++i) {
     Sampler sampler(pixel_stream({settings.seed, 0}, kSubpixelScreen, 0, 0), i);
-    places_.at(i) = sample_filter(settings.filter, sampler.two()).offset;
+    positions_.at(i) = sample_filter(settings.filter, sampler.two()).offset;
   }
 }
 
 const TileFragments& CoverageFragments::of_tile(const LightContext& context, RayBuffers& buffers, const TileJob& job,
                                                 std::size_t tile, FragmentFinder& finder) {
   TileFragments& found = tiles_[tile];
-  found.places = &places_;
+  found.positions = &positions_;
   if (found.crossed.empty()) found.crossed = finder.find(context, buffers, job, found);
   return found;
 }

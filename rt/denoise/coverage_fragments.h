@@ -24,7 +24,7 @@ class Patch {
   Patch(std::span<const KnownFeature> known, std::span<const SurfaceFeature> features, const glm::vec3& to_eye);
 
   /// At a place of the pixel, from its centre.
-  [[nodiscard]] SurfaceFeature at(const glm::vec2& place) const;
+  [[nodiscard]] SurfaceFeature at(const glm::vec2& position) const;
 
  private:
   /// In the pixel's centre, and by how much it changes with x and with y.
@@ -32,7 +32,7 @@ class Patch {
 
   std::uint32_t material_ = 0;
   glm::vec3 to_eye_{0.0F};
-  Plane place_{};
+  Plane position_{};
   Plane across_{};
 };
 
@@ -54,15 +54,15 @@ struct CoverageFragment {
   /// The number of offsets that show it.
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(std::popcount(samples)); }
   /// Where it is seen, from the pixel's centre: a place for each number, all in turn.
-  [[nodiscard]] glm::vec2 place(const SubpixelOffsets& places, std::uint32_t number) const;
+  [[nodiscard]] glm::vec2 position_at(const SubpixelOffsets& positions, std::uint32_t number) const;
   /// Whether that may be what is seen of it at a place.
-  [[nodiscard]] bool matches(const View& view, const SurfaceFeature& feature, const glm::vec2& place) const;
+  [[nodiscard]] bool matches(const View& view, const SurfaceFeature& feature, const glm::vec2& position) const;
 };
 
 struct TileFragments {
   std::vector<std::uint8_t> crossed;        ///< 1 for each pixel that an edge crosses; empty: not yet known
   std::vector<CoverageFragment> fragments;  ///< of the crossed pixels, pixel after pixel
-  const SubpixelOffsets* places = nullptr;
+  const SubpixelOffsets* positions = nullptr;
 };
 
 /// Finds the parts of pixels of one tile after the other. Keeps its memory.
@@ -108,7 +108,7 @@ class CoverageFragments {
  private:
   FrameLayout layout_;
   std::vector<View> views_;
-  SubpixelOffsets places_{};
+  SubpixelOffsets positions_{};
   std::vector<TileFragments> tiles_;
 };
 

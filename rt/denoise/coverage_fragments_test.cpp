@@ -19,7 +19,7 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 const RaySettings kDenoised{.passes = {PassId::Gather}, .max_depth = 2, .denoise = true};
@@ -27,7 +27,7 @@ const RaySettings kDenoised{.passes = {PassId::Gather}, .max_depth = 2, .denoise
 /// Black things before a white sky: so a pixel is the share of the sky in it.
 Scene before_the_sky() {
   Scene scene;
-  add_material(scene, test::matte(glm::vec3(0.0F)));
+  add_material(scene, test::diffuse(glm::vec3(0.0F)));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   return scene;
 }
@@ -74,7 +74,7 @@ TEST(CoverageFragments, SharesOfStraightOutlinesAreMeasured) {
     Scene scene = before_the_sky();
     const glm::vec3 along(std::cos(angle), std::sin(angle), 0.0F);
     const glm::vec3 across(-along.y, along.x, 0.0F);
-    place(scene, add_mesh(scene, quad(0.03F * across - 8.0F * along, 16.0F * along, 8.0F * across, 0)));
+    place_mesh(scene, add_mesh(scene, quad(0.03F * across - 8.0F * along, 16.0F * along, 8.0F * across, 0)));
     finish_scene(scene);
     const Error error = error_of(scene, straight_on(scene), [&](const Ray& ray) {
       const glm::dvec3 at = ray.origin - ray.origin.z / ray.direction.z * ray.direction;
@@ -91,7 +91,7 @@ TEST(CoverageFragments, SharesOfRoundOutlinesAreMeasured) {
   for (const double radius : {0.2, 0.4, 0.8}) {
     Scene scene = before_the_sky();
     const glm::dvec3 centre(0.013, 0.037, 0.0);  // else the same few pixels stand all about
-    place(scene, add_mesh(scene, test::sphere(radius, 64, 0)), glm::translate(glm::dmat4(1.0), centre));
+    place_mesh(scene, add_mesh(scene, test::sphere(radius, 64, 0)), glm::translate(glm::dmat4(1.0), centre));
     finish_scene(scene);
     const Error error = error_of(scene, straight_on(scene, {64, 48}), [&](const Ray& ray) {
       const glm::dvec3 start = ray.origin - centre;
@@ -114,7 +114,7 @@ TEST(CoverageFragments, CornersAreCounted) {
     for (const double x : {0.017, 0.03, 0.043}) {
       Scene scene = before_the_sky();
       const glm::dvec3 tip(x, 0.52, 0.0);
-      place(scene, add_mesh(scene, quad(tip, wedge.a, wedge.b, 0)));
+      place_mesh(scene, add_mesh(scene, quad(tip, wedge.a, wedge.b, 0)));
       finish_scene(scene);
       const glm::dmat2 to_sides = glm::inverse(glm::dmat2(glm::dvec2(wedge.a), glm::dvec2(wedge.b)));
       const Error error = error_of(scene, straight_on(scene), [&](const Ray& ray) {
@@ -131,10 +131,11 @@ TEST(CoverageFragments, CornersAreCounted) {
 /// Strips thinner than a pixel before an outline, which corners between two of them know nothing of.
 TEST(CoverageFragments, WhatNoCornerSeesKeepsItsLight) {
   Scene scene = before_the_sky();
-  add_material(scene, test::matte(glm::vec3(0.0F)));
-  place(scene, add_mesh(scene, quad({-4, -4, 0}, {8, 0, 0}, {0, 4.01F, 0}, 0)));
+  add_material(scene, test::diffuse(glm::vec3(0.0F)));
+  place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {8, 0, 0}, {0, 4.01F, 0}, 0)));
   for (int i = -40; i <= 40; ++i) {
-    place(scene, add_mesh(scene, quad({0.0412F * static_cast<float>(i), -0.5F, 0.1F}, {0.01F, 0, 0}, {0, 1, 0}, 1)));
+    place_mesh(scene,
+               add_mesh(scene, quad({0.0412F * static_cast<float>(i), -0.5F, 0.1F}, {0.01F, 0, 0}, {0, 1, 0}, 1)));
   }
   finish_scene(scene);
   const View view = straight_on(scene);
@@ -157,7 +158,7 @@ TEST(CoverageFragments, WhatNoCornerSeesKeepsItsLight) {
 /// Where a screen of points has none, looks see what the pixel's centre does; the plane's corners say nothing.
 TEST(CoverageFragments, LooksGoThroughThePointsOfTheScreen) {
   Scene scene = before_the_sky();
-  place(scene, add_mesh(scene, quad({-9, -9, 0}, {9.5F, 0, 0}, {0, 18, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-9, -9, 0}, {9.5F, 0, 0}, {0, 18, 0}, 0)));
   finish_scene(scene);
   View view = straight_on(scene);
   view.eye.x = 3.0;  // the plane shows sky alone
@@ -180,8 +181,8 @@ TEST(CoverageFragments, LooksGoThroughThePointsOfTheScreen) {
 /// Three surfaces meet, and a gap thinner than a pixel runs from there: rays ask.
 TEST(CoverageFragments, SharesAreCountedWhereMoreThanOneOutlineRuns) {
   Scene scene = before_the_sky();
-  place(scene, add_mesh(scene, quad({-3.02F, -3, 0}, {3, 0, 0}, {0, 6, 0}, 0)));
-  place(scene, add_mesh(scene, quad({0.02F, -3, 0}, {3, 0, 0}, {0.4F, 3.2F, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-3.02F, -3, 0}, {3, 0, 0}, {0, 6, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({0.02F, -3, 0}, {3, 0, 0}, {0.4F, 3.2F, 0}, 0)));
   finish_scene(scene);
   const Error error = error_of(scene, straight_on(scene), [&](const Ray& ray) {
     const glm::dvec3 at = ray.origin - ray.origin.z / ray.direction.z * ray.direction;
@@ -194,7 +195,7 @@ TEST(CoverageFragments, SharesAreCountedWhereMoreThanOneOutlineRuns) {
 /// A wider filter reaches beyond the pixel: its half of a straight outline through the middle is one half too.
 TEST(CoverageFragments, WiderFiltersAreCounted) {
   Scene scene = before_the_sky();
-  place(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
   finish_scene(scene);
   RaySettings settings = kDenoised;
   settings.filter = PixelFilter::Gaussian;
@@ -204,7 +205,7 @@ TEST(CoverageFragments, WiderFiltersAreCounted) {
 
 TEST(CoverageFragments, AreFoundOnceWhileTheViewStays) {
   Scene scene = before_the_sky();
-  place(scene, add_mesh(scene, test::sphere(0.8, 32, 0)));
+  place_mesh(scene, add_mesh(scene, test::sphere(0.8, 32, 0)));
   finish_scene(scene);
   View view = straight_on(scene);
   DeferredShader shader(scene, kDenoised);

@@ -182,7 +182,7 @@ bool Denoiser::add_filtered(const LightContext& context, const TileJob& job, con
   FilterCenter<float> center = center_of(*job.view, seen, sample.pixel);
   center.normal = seen.normal;
   center.sharpness = sharpness_of(narrowed_);
-  center.offset = sample.place - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
+  center.offset = sample.position - glm::vec2(job.view->jitter);  // from what the pixel's own sample sees
   center.window = window_about(center.pixel, center.offset, radius);
   center.reach = static_cast<float>(radius) + 1.0F;
   center.is_pixel = false;
@@ -212,7 +212,7 @@ void Denoiser::add_sample(const LightContext& context, const TileJob& job, RayBu
 /// The brightest of the pixels about one that are lit.
 double Denoiser::brightest_about(const PixelSums& sums, const TileJob& job, int column, int row) {
   const Rect about{column - 1, row - 1, column + 2, row + 2};
-  const Rect pixels = intersection(about, {0, 0, job.place.width(), job.place.height()});
+  const Rect pixels = intersection(about, {0, 0, job.rect.width(), job.rect.height()});
   double found = 0.0;
   for (int y = pixels.y0; y < pixels.y1; ++y) {
     for (int x = pixels.x0; x < pixels.x1; ++x) {
@@ -226,8 +226,8 @@ double Denoiser::brightest_about(const PixelSums& sums, const TileJob& job, int 
 
 void Denoiser::set_apart(const PixelSums& sums, const TileJob& job) {
   std::vector<std::size_t> apart;
-  for (int y = 0; y < job.place.height(); ++y) {
-    for (int x = 0; x < job.place.width(); ++x) {
+  for (int y = 0; y < job.rect.height(); ++y) {
+    for (int x = 0; x < job.rect.width(); ++x) {
       const std::size_t own = job.first_pixel + index_of(x, y);
       if (states_[own] == State::Unlit) continue;
       const glm::dvec3& light = sums.radiance[own];
@@ -240,15 +240,15 @@ void Denoiser::set_apart(const PixelSums& sums, const TileJob& job) {
 }
 
 void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const CoverageFragment> fragments) {
-  const glm::vec2 place(job.view->jitter);
+  const glm::vec2 position(job.view->jitter);
   for (auto fragment = fragments.begin(); fragment != fragments.end();) {
     const std::uint32_t pixel = fragment->pixel;
     const auto next =
         std::find_if(fragment, fragments.end(), [&](const CoverageFragment& each) { return each.pixel != pixel; });
     const std::uint32_t own = job.first_pixel + pixel;
     const SurfaceFeature seen = states_[own] == State::Unlit ? SurfaceFeature{} : pixel_features_[own].feature;
-    const bool is_expected =
-        std::any_of(fragment, next, [&](const CoverageFragment& each) { return each.matches(*job.view, seen, place); });
+    const bool is_expected = std::any_of(
+        fragment, next, [&](const CoverageFragment& each) { return each.matches(*job.view, seen, position); });
     if (job.wants(pixel) && !is_expected) states_[own] = State::Apart;
     fragment = next;
   }
@@ -270,7 +270,7 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, c
   samples_.clear();
   for (const CoverageFragment& fragment : fragments.fragments) {
     if (!job.wants(fragment.pixel) || states_[job.first_pixel + fragment.pixel] == State::Apart) continue;
-    sample_fragment(context, job, buffers, sums, view, fragment, *fragments.places);
+    sample_fragment(context, job, buffers, sums, view, fragment, *fragments.positions);
   }
   trace_primary_rays(context, buffers);
   for (std::size_t i = 0; i < samples_.size(); ++i) add_sample(context, job, buffers, samples_[i], i, unfiltered);
@@ -279,21 +279,22 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, c
 
 /// Requests a ray where no tap has a weight.
 void Denoiser::sample_fragment(const LightContext& context, const TileJob& job, RayBuffers& buffers, PixelSums& sums,
-                               View& view, const CoverageFragment& fragment, const SubpixelOffsets& places) {
+                               View& view, const CoverageFragment& fragment, const SubpixelOffsets& positions) {
   if (fragment.shows == CoverageFragment::Shows::Background) {
-    const SubpixelSample sample{fragment.pixel, 0, fragment.place(places, job.number.sample), fragment.fraction};
-    return add_background(context, sample, ray_through(view, job, sample.pixel, sample.place).direction);
+    const SubpixelSample sample{fragment.pixel, 0, fragment.position_at(positions, job.number.sample),
+                                fragment.fraction};
+    return add_background(context, sample, ray_through(view, job, sample.pixel, sample.position).direction);
   }
   const bool is_surface = fragment.shows == CoverageFragment::Shows::Surface;
   const std::uint32_t count = is_surface ? std::clamp(fragment.count(), 1U, kSurfaceSamples) : kMixedSamples;
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t number =
         samples_.empty() || samples_.back().pixel != fragment.pixel ? 0 : samples_.back().number + 1;
-    const glm::vec2 place = fragment.place(places, job.number.sample * count + i);
-    const SubpixelSample sample{fragment.pixel, number, place, fragment.fraction / static_cast<float>(count)};
-    if (is_surface && add_filtered(context, job, sample, fragment.patch.at(place))) continue;
+    const glm::vec2 position = fragment.position_at(positions, job.number.sample * count + i);
+    const SubpixelSample sample{fragment.pixel, number, position, fragment.fraction / static_cast<float>(count)};
+    if (is_surface && add_filtered(context, job, sample, fragment.patch.at(position))) continue;
     samples_.push_back(sample);
-    buffers.requests.push_back(ray_through(view, job, sample.pixel, place));
+    buffers.requests.push_back(ray_through(view, job, sample.pixel, position));
     sums.count_ray(job.first_pixel + sample.pixel);
   }
 }
@@ -336,8 +337,8 @@ void Denoiser::filter(const LightContext& context, const TileJob& job, std::uint
 
 void Denoiser::resolve(const LightContext& context, const TileJob& job, const TileFragments& fragments,
                        PixelSums& sums) {
-  for (int y = 0; y < job.place.height(); ++y) {
-    for (int x = 0; x < job.place.width(); ++x) {
+  for (int y = 0; y < job.rect.height(); ++y) {
+    for (int x = 0; x < job.rect.width(); ++x) {
       const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
       if (!job.wants(pixel)) continue;
       const std::uint32_t own = job.first_pixel + pixel;

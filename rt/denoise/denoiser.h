@@ -72,7 +72,7 @@ class Denoiser {
   struct SubpixelSample {
     std::uint32_t pixel = 0;   ///< of the tile
     std::uint32_t number = 0;  ///< of the pixel's samples
-    glm::vec2 place{0.0F};     ///< from the pixel's centre
+    glm::vec2 position{0.0F};  ///< from the pixel's centre
     double fraction = 0.0;     ///< of the pixel
   };
 
@@ -98,7 +98,7 @@ class Denoiser {
   /// Pixels whose sample sees what none of their parts is stay apart: so what was missed keeps its light.
   void set_unexpected_apart(const TileJob& job, std::span<const CoverageFragment> fragments);
   void sample_fragment(const LightContext& context, const TileJob& job, RayBuffers& buffers, PixelSums& sums,
-                       View& view, const CoverageFragment& fragment, const SubpixelOffsets& places);
+                       View& view, const CoverageFragment& fragment, const SubpixelOffsets& positions);
   void add_sample(const LightContext& context, const TileJob& job, RayBuffers& buffers, const SubpixelSample& sample,
                   std::size_t ray, std::vector<PathVertex>& unfiltered);
   void filter(const LightContext& context, const TileJob& job, std::uint32_t pixel);

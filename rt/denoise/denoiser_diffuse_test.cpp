@@ -9,7 +9,7 @@ namespace {
 /// Light that a lacquered surface scatters below its lacquer is filtered as if the surface were diffuse, what it
 /// mirrors is not; where there are lamps, whose light is not shared, that of the sky still is.
 TEST(Denoiser, DiffuseLightOfSmoothSurfacesIsSharedAsWidely) {
-  Scene scene = corner(matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
+  Scene scene = corner(diffuse(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
   for (Material& material : scene.materials) {
     material.roughness = 0.0F;
     material.ior = 1.5F;
@@ -34,10 +34,10 @@ TEST(Denoiser, GatheredMirrorImagesAreNotSharedWidely) {
   Material half = mirror(0.5F);
   half.metallic = 0.5F;
   add_material(scene, half);
-  add_material(scene, matte(glm::vec3(0.0F)));
-  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  add_material(scene, diffuse(glm::vec3(0.0F)));
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
   for (int i = -4; i < 4; ++i) {
-    place(scene, add_mesh(scene, quad({static_cast<float>(i), 0.2F, -4}, {0.5F, 0, 0}, {0, 6, 0}, 1)));
+    place_mesh(scene, add_mesh(scene, quad({static_cast<float>(i), 0.2F, -4}, {0.5F, 0, 0}, {0, 6, 0}, 1)));
   }
   scene.environment = even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);

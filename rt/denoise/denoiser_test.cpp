@@ -21,12 +21,12 @@ using test::look;
 using test::mean;
 using test::mean_picture;
 using test::painted_floor;
-using test::place;
+using test::place_mesh;
 using test::quad;
 using test::squared_error;
 
 TEST(Denoiser, TakesMostOfTheErrorOfOneSampleAndKeepsTheMean) {
-  const Scene scene = corner(test::matte(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
+  const Scene scene = corner(test::diffuse(glm::vec3(0.5F)), glm::vec3(0.8F), {0.2F, 0.4F, 0.6F}, 12);
   const View view = look(scene, {70, 52});
   const Image<Rgb> truth = mean_picture(scene, view, kGathered, 256);
   const Image<Rgb> plain = mean_picture(scene, view, kGathered, 1);
@@ -36,7 +36,7 @@ TEST(Denoiser, TakesMostOfTheErrorOfOneSampleAndKeepsTheMean) {
 }
 
 TEST(Denoiser, LeavesSamplesPastTheFirstAlone) {
-  const Scene scene = corner(test::matte(glm::vec3(0.5F)));
+  const Scene scene = corner(test::diffuse(glm::vec3(0.5F)));
   const View view = look(scene);
   for (const std::uint32_t sample : {kDenoisedSamples - 1, kDenoisedSamples}) {
     const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
@@ -53,8 +53,8 @@ TEST(Denoiser, LeavesSamplesPastTheFirstAlone) {
 /// Half of each pixel on the edge of a black sheet before a white sky is seen, whatever the pixel's one sample sees.
 TEST(Denoiser, LooksAgainAtOutlines) {
   Scene scene;
-  add_material(scene, test::matte(glm::vec3(0.0F)));
-  place(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
+  add_material(scene, test::diffuse(glm::vec3(0.0F)));
+  place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {65, 65}, scene);  // the edge goes through column 32
@@ -71,9 +71,9 @@ TEST(Denoiser, LooksAgainAtOutlines) {
 /// What is thinner than a pixel is met by some samples only: looking more closely when it is must not weigh it less.
 TEST(Denoiser, ThinThingsKeepTheirLight) {
   Scene scene;
-  add_material(scene, test::matte(glm::vec3(0.0F)));
+  add_material(scene, test::diffuse(glm::vec3(0.0F)));
   for (int i = -6; i <= 6; ++i) {
-    place(scene, add_mesh(scene, quad({0.2F * static_cast<float>(i), -4, 0}, {0.007F, 0, 0}, {0.9F, 8, 0}, 0)));
+    place_mesh(scene, add_mesh(scene, quad({0.2F * static_cast<float>(i), -4, 0}, {0.007F, 0, 0}, {0.9F, 8, 0}, 0)));
   }
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
@@ -99,12 +99,12 @@ TEST(Denoiser, TexturesStay) {
 /// A mirror that shows something black, and beside it in the same plane what is matte and sees the sky about that.
 TEST(Denoiser, NoLightCrossesToAnotherMaterial) {
   Scene scene;
-  add_material(scene, test::matte(glm::vec3(0.5F)));
+  add_material(scene, test::diffuse(glm::vec3(0.5F)));
   add_material(scene, test::mirror(0.5F));
-  add_material(scene, test::matte(glm::vec3(0.0F)));
-  place(scene, add_mesh(scene, quad({-1, -1, 0}, {1, 0, 0}, {0, 2, 0}, 0)));
-  place(scene, add_mesh(scene, quad({0, -1, 0}, {1, 0, 0}, {0, 2, 0}, 1)));
-  place(scene, add_mesh(scene, quad({4, -4, 4}, {-8, 0, 0}, {0, 8, 0}, 2)));
+  add_material(scene, test::diffuse(glm::vec3(0.0F)));
+  place_mesh(scene, add_mesh(scene, quad({-1, -1, 0}, {1, 0, 0}, {0, 2, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({0, -1, 0}, {1, 0, 0}, {0, 2, 0}, 1)));
+  place_mesh(scene, add_mesh(scene, quad({4, -4, 4}, {-8, 0, 0}, {0, 8, 0}, 2)));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene, 0.5);
@@ -195,9 +195,9 @@ TEST(Denoiser, EmissionIsNotLent) {
 /// Shadows of small lights have edges and no noise.
 TEST(Denoiser, ShadowsOfSmallLightsKeepTheirEdges) {
   Scene scene;
-  add_material(scene, test::matte());
-  place(scene, add_mesh(scene, quad({-9, 0, 9}, {18, 0, 0}, {0, 0, -18}, 0)));
-  place(scene, add_mesh(scene, quad({0.8F, 2, 0.2F}, {0.4F, 0, 0}, {0, 0, -0.4F}, 0)));
+  add_material(scene, test::diffuse());
+  place_mesh(scene, add_mesh(scene, quad({-9, 0, 9}, {18, 0, 0}, {0, 0, -18}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({0.8F, 2, 0.2F}, {0.4F, 0, 0}, {0, 0, -0.4F}, 0)));
   Light& light = scene.lights.emplace_back();
   light.position = {0.0, 4.0, 0.0};
   light.intensity = glm::vec3(20.0F);
@@ -214,12 +214,12 @@ TEST(Denoiser, ShadowsOfSmallLightsKeepTheirEdges) {
 /// Light that one ray in many finds, that of a lamp by a mirror, is not spread about the pixel that has it, nor lost.
 TEST(Denoiser, WhatIsFarBrighterThanAllAboutStaysApart) {
   Scene scene;
-  add_material(scene, test::matte(glm::vec3(0.5F)));
+  add_material(scene, test::diffuse(glm::vec3(0.5F)));
   add_material(scene, test::mirror(0.9F));
   add_material(scene, test::glowing(glm::vec3(1e4F)));
-  place(scene, add_mesh(scene, quad({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}, 0)));
-  place(scene, add_mesh(scene, quad({3, 0, 3}, {0, 0, -6}, {0, 6, 0}, 1)));
-  place(scene, add_mesh(scene, quad({-0.4F, 3, -0.4F}, {0.8F, 0, 0}, {0, 0, 0.8F}, 2)));
+  place_mesh(scene, add_mesh(scene, quad({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({3, 0, 3}, {0, 0, -6}, {0, 6, 0}, 1)));
+  place_mesh(scene, add_mesh(scene, quad({-0.4F, 3, -0.4F}, {0.8F, 0, 0}, {0, 0, 0.8F}, 2)));
   finish_scene(scene);
   const View view = test::view_from({0, 2.5, 0.01}, {0, 0, 0}, {64, 64}, scene);
   const Image<Rgb> plain = test::shade(scene, view, kGathered).image;
@@ -245,7 +245,7 @@ TEST(Denoiser, LooksSeeWhatGlowsInPart) {
   for (int x = 0; x < 64; ++x) stripes.image.at(x, 0) = x % 2 == 0 ? Rgba8{255, 255, 255, 255} : Rgba8{0, 0, 0, 255};
   scene.textures.push_back(stripes);
   for (int i = -6; i <= 6; ++i) {
-    place(scene, add_mesh(scene, quad({0.2F * static_cast<float>(i), -4, 0}, {0.1F, 0, 0}, {0.4F, 8, 0}, 0)));
+    place_mesh(scene, add_mesh(scene, quad({0.2F * static_cast<float>(i), -4, 0}, {0.1F, 0, 0}, {0.4F, 8, 0}, 0)));
   }
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
@@ -257,9 +257,9 @@ TEST(Denoiser, LooksSeeWhatGlowsInPart) {
 /// What lies past the far plane of parallel rays is not there, between its corners either.
 TEST(Denoiser, LooksEndAtTheFarPlane) {
   Scene scene;
-  add_material(scene, test::matte());
-  place(scene, add_mesh(scene, quad({-0.5F, -0.5F, 0}, {1, 0, 0}, {0, 1, 0}, 0)));
-  place(scene, add_mesh(scene, quad({-0.8F, -0.8F, -4}, {1.1F, 0, 0}, {0, 1.1F, 0}, 0)));
+  add_material(scene, test::diffuse());
+  place_mesh(scene, add_mesh(scene, quad({-0.5F, -0.5F, 0}, {1, 0, 0}, {0, 1, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-0.8F, -0.8F, -4}, {1.1F, 0, 0}, {0, 1.1F, 0}, 0)));
   scene.background = {0.25F, 0.25F, 0.25F};
   Scene near = scene;
   near.instances.pop_back();

@@ -69,9 +69,9 @@ HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& ce
     for (std::size_t lane = 0; lane < weights.columns; lane += hn::Lanes(d)) {
       const std::size_t i = weights.first + row * TapPlanes::kStride + lane;
       const V column = hn::Iota(d, static_cast<T>(columns_off + static_cast<int>(lane)));
-      const VectorOf<V> way = Lanes::less(Lanes::load(taps.position, i), center.position);
-      const V way2 = length2(way);
-      const V bend = dot(way, Lanes::load(taps.normal, i));
+      const VectorOf<V> direction = Lanes::less(Lanes::load(taps.position, i), center.position);
+      const V way2 = length2(direction);
+      const V bend = dot(direction, Lanes::load(taps.normal, i));
       const VectorOf<V> turned = Lanes::less(Lanes::load(normals, i), center.normal);
       V sharpness = all(center.sharpness);
       if (!center.is_pixel) sharpness = hn::Mul(sharpness, hn::LoadU(d, &taps.sharpness[i]));
@@ -165,9 +165,9 @@ HWY_EXPORT(mean);
 
 FilterWindow window_about(const glm::ivec2& pixel, const glm::vec2& offset, int radius) {
   // Taps farther outside the tile have no weight either.
-  const auto inside = [&](int middle) {
+  const auto inside = [&](int center) {
     const int most = TapPlanes::kMargin - radius;
-    return std::clamp(middle, -most, kTileSide - 1 + most) - radius;
+    return std::clamp(center, -most, kTileSide - 1 + most) - radius;
   };
   const glm::ivec2 shift(std::lround(offset.x), std::lround(offset.y));
   const int side = 2 * radius + 1;

@@ -24,9 +24,9 @@ struct Tile {
   std::unique_ptr<TapVectors<double>> light = std::make_unique<TapVectors<double>>();
 };
 
-glm::vec3 about(std::mt19937& random, const glm::vec3& middle, float spread) {
+glm::vec3 about(std::mt19937& random, const glm::vec3& center, float spread) {
   std::uniform_real_distribution<float> off(-spread, spread);
-  return middle + glm::vec3(off(random), off(random), off(random));
+  return center + glm::vec3(off(random), off(random), off(random));
 }
 
 /// A pixel of a slab of two materials a metre off, a centimetre a pixel; every ninth is no tap and shows garbage.
@@ -66,8 +66,8 @@ struct Expected {
 
 /// What pixel (x, y) gives by itself, as the members of FilterCenter say: its weight, and the ratio of each term.
 template <typename T>
-std::pair<T, std::array<glm::vec<3, T>, kPlanes>> given(const NeighborFeatures<T>& taps, const FilterCenter<T>& center,
-                                                        const glm::ivec2& pixel) {
+std::pair<T, std::array<glm::vec<3, T>, kPlanes>> sent(const NeighborFeatures<T>& taps, const FilterCenter<T>& center,
+                                                       const glm::ivec2& pixel) {
   using Vector = glm::vec<3, T>;
   const std::pair<T, std::array<Vector, kPlanes>> nothing{T{0}, {}};
   const std::size_t i = TapPlanes::index(pixel.x, pixel.y);
@@ -76,9 +76,11 @@ std::pair<T, std::array<glm::vec<3, T>, kPlanes>> given(const NeighborFeatures<T
   if (!is_same) return nothing;
   const glm::vec2 off = glm::vec2(pixel - center.pixel) - center.offset;
   const T spatial = T{1} - static_cast<T>(glm::dot(off, off)) / (center.reach * center.reach);
-  const Vector way = taps.position.at(i) - center.position;
-  const T bend = glm::dot(way, taps.normal.at(i));
-  if (glm::dot(way, way) > center.max_distance2 || bend * bend > center.max_bend2 * glm::dot(way, way)) return nothing;
+  const Vector direction = taps.position.at(i) - center.position;
+  const T bend = glm::dot(direction, taps.normal.at(i));
+  if (glm::dot(direction, direction) > center.max_distance2 ||
+      bend * bend > center.max_bend2 * glm::dot(direction, direction))
+    return nothing;
   const Vector turned = (center.is_pixel ? taps.shading_normal : taps.normal).at(i) - center.normal;
   const T sharpness = center.sharpness * (center.is_pixel ? T{1} : taps.sharpness[i]);
   const T alike = T{1} - glm::dot(turned, turned) * sharpness;
@@ -101,7 +103,7 @@ Expected expected(const Tile<T>& tile, const FilterCenter<T>& center) {
   for (int y = center.window.first.y; y < center.window.first.y + center.window.rows; ++y) {
     for (int x = center.window.first.x; x < center.window.first.x + center.window.columns; ++x) {
       if (x < 0 || y < 0 || x >= kTileSide || y >= kTileSide) continue;
-      const auto [weight, ratios] = given(*tile.taps, center, {x, y});
+      const auto [weight, ratios] = sent(*tile.taps, center, {x, y});
       found.sum += static_cast<double>(weight);
       for (std::size_t term = 0; term < kPlanes; ++term) {
         found.mean[term] += glm::dvec3(weight * ratios[term]) * tile.light->at(TapPlanes::index(x, y));

@@ -59,15 +59,15 @@ float square(float value) {
 }
 
 float max_bend(const SilhouetteEdges::Pixel& pixel) {
-  return std::min(kMaxLineBend, kMaxLineBendOfWay * glm::length(pixel.way));
+  return std::min(kMaxLineBend, kMaxLineBendOfWay * glm::length(pixel.direction));
 }
 
 /// What the bend takes from the left side, a segment of a parabola.
 void take_bend(SilhouetteEdges::Pixel& pixel) {
-  const float taken = 2.0F / 3.0F * pixel.bend * glm::length(pixel.way);
-  const glm::vec2 from = pixel.start + 0.5F * pixel.way + 0.4F * pixel.bend * pixel.to_left;
-  const float left = std::clamp(pixel.fraction - taken, 0.0F, 1.0F);
-  if (left > 0.0F) pixel.centroid = glm::clamp((pixel.fraction * pixel.centroid - taken * from) / left, -0.5F, 0.5F);
+  const float received = 2.0F / 3.0F * pixel.bend * glm::length(pixel.direction);
+  const glm::vec2 from = pixel.start + 0.5F * pixel.direction + 0.4F * pixel.bend * pixel.to_left;
+  const float left = std::clamp(pixel.fraction - received, 0.0F, 1.0F);
+  if (left > 0.0F) pixel.centroid = glm::clamp((pixel.fraction * pixel.centroid - received * from) / left, -0.5F, 0.5F);
   pixel.fraction = left;
 }
 
@@ -77,21 +77,22 @@ SurfaceFeature feature_at(const SurfacePoint& point, const glm::dvec3& eye) {
   return {true, point.material, point.position - eye, point.facing_normal()};
 }
 
-float max_distance2(const View& view, const glm::vec3& place) {
+float max_distance2(const View& view, const glm::vec3& position) {
   // Parallel rays have no eye to be far from.
-  return view.orthographic ? std::numeric_limits<float>::infinity() : square(kMaxDistance) * glm::dot(place, place);
+  return view.orthographic ? std::numeric_limits<float>::infinity()
+                           : square(kMaxDistance) * glm::dot(position, position);
 }
 
 bool is_within_depth(const View& view, const SurfaceFeature& first, const SurfaceFeature& second) {
   if (first.material != second.material) return false;
-  const glm::vec3 way = second.position - first.position;
-  return glm::dot(way, way) <= max_distance2(view, second.position);
+  const glm::vec3 direction = second.position - first.position;
+  return glm::dot(direction, direction) <= max_distance2(view, second.position);
 }
 
 bool is_coplanar(const View& view, const SurfaceFeature& first, const SurfaceFeature& second) {
-  const glm::vec3 way = second.position - first.position;
-  const float off = glm::dot(way, first.normal);
-  return off * off <= kMaxBend * kMaxBend * glm::dot(way, way) && is_within_depth(view, first, second);
+  const glm::vec3 direction = second.position - first.position;
+  const float off = glm::dot(direction, first.normal);
+  return off * off <= kMaxBend * kMaxBend * glm::dot(direction, direction) && is_within_depth(view, first, second);
 }
 
 bool is_silhouette(const View& view, const SurfaceFeature& a, const SurfaceFeature& b) {
@@ -106,8 +107,8 @@ View unjittered(const TileJob& job) {
 }
 
 /// By the jitter: where a screen of points has none, that is the ray of the pixel's centre.
-RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, const glm::vec2& place) {
-  view.jitter = place;
+RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, const glm::vec2& position) {
+  view.jitter = position;
   const RayRequest ray =
       eye_ray(view, job, static_cast<int>(pixel % kTileSide) + 0.5, static_cast<int>(pixel / kTileSide) + 0.5);
   view.jitter = glm::dvec2(0.0);
@@ -150,7 +151,7 @@ void SilhouetteEdges::find_edge(int x, int y, int axis) {
   const std::uint32_t to = corner(end.x, end.y);
   if (!is_silhouette(view_, features_[from], features_[to])) return;
   edge_at_.at(static_cast<std::size_t>(axis))[from] = static_cast<std::int32_t>(edges_.size());
-  edges_.push_back({.start = {x, y}, .way = {1 - axis, axis}, .before = from, .after = to});
+  edges_.push_back({.start = {x, y}, .direction = {1 - axis, axis}, .before = from, .after = to});
 }
 
 void SilhouetteEdges::find_edges() {
@@ -166,7 +167,7 @@ void SilhouetteEdges::bisect_edges(const LightContext& context, RayBuffers& buff
   for (int halving = 0; halving < kHalvings; ++halving) {
     buffers.requests.clear();
     for (const Edge& edge : edges_) {
-      if (edge.is_clear) buffers.requests.push_back(eye_ray(view_, job, edge.middle().x, edge.middle().y));
+      if (edge.is_clear) buffers.requests.push_back(eye_ray(view_, job, edge.center().x, edge.center().y));
     }
     trace_features(context, buffers, view_.eye, traced_features_);
     auto seen = traced_features_.begin();
@@ -175,9 +176,9 @@ void SilhouetteEdges::bisect_edges(const LightContext& context, RayBuffers& buff
       const bool is_before = !is_silhouette(view_, features_[edge.before], *seen);
       const bool is_after = !is_silhouette(view_, *seen, features_[edge.after]);
       edge.is_clear = is_before != is_after;
-      const double middle = 0.5 * (edge.low + edge.high);
+      const double center = 0.5 * (edge.low + edge.high);
       (is_before ? edge.before : edge.after) = static_cast<std::uint32_t>(features_.size());
-      (is_before ? edge.low : edge.high) = middle;
+      (is_before ? edge.low : edge.high) = center;
       features_.push_back(*seen++);
     }
   }
@@ -196,8 +197,8 @@ void SilhouetteEdges::find_sides(Pixel& pixel, int x, int y, const std::array<st
   pixel.has_sides = true;
   for (std::size_t i = 0; i < ends.size(); ++i) pixel.edges.at(i) = static_cast<std::uint32_t>(around.at(ends.at(i)));
   const glm::dvec2 centre(x + 0.5, y + 0.5);
-  const auto put = [&](std::size_t side, const glm::vec2& place, std::uint32_t feature) {
-    pixel.known.at(side).at(pixel.counts.at(side)++) = {place, feature};
+  const auto put = [&](std::size_t side, const glm::vec2& position, std::uint32_t feature) {
+    pixel.known.at(side).at(pixel.counts.at(side)++) = {position, feature};
   };
   // Corner i starts edge i in the order of the clock: those past the first crossing up to the second lie to the left.
   const std::array<std::uint32_t, 4> corners{corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)};
@@ -209,7 +210,7 @@ void SilhouetteEdges::find_sides(Pixel& pixel, int x, int y, const std::array<st
   std::array<glm::vec2, 2> crossed_at;
   for (std::size_t i = 0; i < ends.size(); ++i) {
     const Edge& edge = edges_[static_cast<std::size_t>(around.at(ends.at(i)))];
-    crossed_at.at(i) = edge.middle() - centre;
+    crossed_at.at(i) = edge.center() - centre;
     // The lower edge and the left one run against the clock.
     const bool starts_first = (ends.at(i) < 2) == (i == 0);
     put(starts_first ? 1 : 0, edge.at(edge.low) - centre, edge.before);
@@ -221,12 +222,12 @@ void SilhouetteEdges::find_sides(Pixel& pixel, int x, int y, const std::array<st
   left_side.at(vertices++) = crossed_at[1];
   measure(std::span(left_side).first(vertices), pixel);
   pixel.start = crossed_at[0];
-  pixel.way = crossed_at[1] - crossed_at[0];
-  pixel.to_left = glm::normalize(glm::vec2(pixel.way.y, -pixel.way.x));
+  pixel.direction = crossed_at[1] - crossed_at[0];
+  pixel.to_left = glm::normalize(glm::vec2(pixel.direction.y, -pixel.direction.x));
 }
 
-bool SilhouetteEdges::differ(int x, int y, const glm::ivec2& way) const {
-  return is_silhouette(view_, features_[corner(x, y)], features_[corner(x + way.x, y + way.y)]);
+bool SilhouetteEdges::differ(int x, int y, const glm::ivec2& direction) const {
+  return is_silhouette(view_, features_[corner(x, y)], features_[corner(x + direction.x, y + direction.y)]);
 }
 
 /// Whether what a corner shows ends on both sides of it, and is not the tip of something wider: it may then leave the
@@ -235,8 +236,8 @@ bool SilhouetteEdges::is_thin_along(int x, int y, const glm::ivec2& axis) const 
   const auto ends_at_both = [&](int cx, int cy) { return differ(cx, cy, axis) && differ(cx, cy, -axis); };
   if (!ends_at_both(x, y)) return false;
   const glm::ivec2 across(axis.y, axis.x);
-  return std::ranges::all_of(std::array{across, -across}, [&](const glm::ivec2& way) {
-    return differ(x, y, way) || ends_at_both(x + way.x, y + way.y);
+  return std::ranges::all_of(std::array{across, -across}, [&](const glm::ivec2& direction) {
+    return differ(x, y, direction) || ends_at_both(x + direction.x, y + direction.y);
   });
 }
 
@@ -268,8 +269,8 @@ std::optional<glm::vec2> SilhouetteEdges::end_of_next(const Pixel& pixel, std::s
   for (const std::int32_t i : edges_[edge].pixels) {
     if (i < 0 || crossed_[static_cast<std::size_t>(i)].pixel == pixel.pixel) continue;
     const Pixel& next = crossed_[static_cast<std::size_t>(i)];
-    const auto place = [](const Pixel& of) { return glm::vec2(of.pixel % kTileSide, of.pixel / kTileSide); };
-    return place(next) - place(pixel) + next.end(next.edges[0] == edge ? 1 : 0);
+    const auto position = [](const Pixel& of) { return glm::vec2(of.pixel % kTileSide, of.pixel / kTileSide); };
+    return position(next) - position(pixel) + next.end(next.edges[0] == edge ? 1 : 0);
   }
   return std::nullopt;
 }
@@ -277,8 +278,8 @@ std::optional<glm::vec2> SilhouetteEdges::end_of_next(const Pixel& pixel, std::s
 /// The bend of a parabola through both ends and those of the pixels before and after; nothing where it would not do.
 std::optional<float> SilhouetteEdges::even_bend(const Pixel& pixel) const {
   if (view_.points) return std::nullopt;  // corners and pixels may see otherwise
-  const float length = glm::length(pixel.way);
-  const glm::vec2 along = pixel.way / length;
+  const float length = glm::length(pixel.direction);
+  const glm::vec2 along = pixel.direction / length;
   float sum = 0.0F;
   float weights = 0.0F;
   float low = std::numeric_limits<float>::infinity();
@@ -287,11 +288,11 @@ std::optional<float> SilhouetteEdges::even_bend(const Pixel& pixel) const {
     const std::optional<glm::vec2> next = end_of_next(pixel, end);
     if (!next) continue;
     // From the nearer end, away from the pixel; the second divided difference and the inverse of its variance.
-    const glm::vec2 way = *next - pixel.end(end);
-    const float away = end == 0 ? -glm::dot(way, along) : glm::dot(way, along);
+    const glm::vec2 direction = *next - pixel.end(end);
+    const float away = end == 0 ? -glm::dot(direction, along) : glm::dot(direction, along);
     if (!(away > 0.0F)) return std::nullopt;
     const float product = away * (away + length);
-    const float curve = glm::dot(way, pixel.to_left) / product;
+    const float curve = glm::dot(direction, pixel.to_left) / product;
     const float weight =
         1.0F / (1.0F / square(product) + 1.0F / square(away * length) + 1.0F / square(length * (away + length)));
     const float bend = -0.25F * curve * square(length);
@@ -355,8 +356,8 @@ void SilhouetteEdges::bisect_bends(const LightContext& context, RayBuffers& buff
 
 void SilhouetteEdges::find(const LightContext& context, RayBuffers& buffers, const TileJob& job) {
   view_ = unjittered(job);
-  width_ = job.place.width();
-  height_ = job.place.height();
+  width_ = job.rect.width();
+  height_ = job.rect.height();
   trace_corners(context, buffers, job);
   find_edges();
   bisect_edges(context, buffers, job);

@@ -29,7 +29,7 @@ struct SurfaceFeature {
 inline constexpr float kMaxBend = 0.5F;
 
 /// The squared distance from a place within which another counts as near in the view, metres squared.
-[[nodiscard]] float max_distance2(const View& view, const glm::vec3& place);
+[[nodiscard]] float max_distance2(const View& view, const glm::vec3& position);
 
 /// Whether both show one material, at places within max_distance2.
 [[nodiscard]] bool is_within_depth(const View& view, const SurfaceFeature& first, const SurfaceFeature& second);
@@ -44,7 +44,7 @@ inline constexpr float kMaxBend = 0.5F;
 [[nodiscard]] View unjittered(const TileJob& job);
 
 /// The ray from the eye through a place of a pixel of the tile, from its centre. `view`: not jittered.
-[[nodiscard]] RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, const glm::vec2& place);
+[[nodiscard]] RayRequest ray_through(View& view, const TileJob& job, std::uint32_t pixel, const glm::vec2& position);
 
 /// Traces buffers.requests, which start at the eye: sets buffers.hits.
 void trace_primary_rays(const LightContext& context, RayBuffers& buffers, Coherence coherence = Coherence::Low);
@@ -55,7 +55,7 @@ void trace_features(const LightContext& context, RayBuffers& buffers, const glm:
 
 /// A feature that is known at a place of a pixel.
 struct KnownFeature {
-  glm::vec2 place{0.0F};      ///< from the pixel's centre
+  glm::vec2 position{0.0F};   ///< from the pixel's centre
   std::uint32_t feature = 0;  ///< its number
 };
 
@@ -70,7 +70,7 @@ class SilhouetteEdges {
     /// Whether one edge goes through that is about a parabola: then there are two sides.
     bool has_sides = false;
     glm::vec2 start{0.0F};                 ///< of the edge in the pixel, from the pixel's centre, pixels
-    glm::vec2 way{0.0F};                   ///< from there to its end
+    glm::vec2 direction{0.0F};             ///< from there to its end
     glm::vec2 to_left{0.0F};               ///< unit length: across the way; y is down
     float bend = 0.0F;                     ///< by how much the edge's middle lies to the left of the straight line
     float fraction = 0.0F;                 ///< of the left side
@@ -80,10 +80,10 @@ class SilhouetteEdges {
     std::array<std::array<KnownFeature, 8>, 2> known{};
     std::array<std::uint8_t, 2> counts{};
 
-    [[nodiscard]] glm::vec2 end(std::size_t i) const { return i == 0 ? start : start + way; }
-    [[nodiscard]] glm::vec2 middle_of_edge() const { return start + 0.5F * way + bend * to_left; }
+    [[nodiscard]] glm::vec2 end(std::size_t i) const { return i == 0 ? start : start + direction; }
+    [[nodiscard]] glm::vec2 middle_of_edge() const { return start + 0.5F * direction + bend * to_left; }
     /// Whether a place of the pixel, from its centre, lies on the left side, but for the bend.
-    [[nodiscard]] bool is_left(const glm::vec2& place) const { return glm::dot(place - start, to_left) > 0.0F; }
+    [[nodiscard]] bool is_left(const glm::vec2& position) const { return glm::dot(position - start, to_left) > 0.0F; }
   };
 
   /// `job`: any sample of the tile.
@@ -96,7 +96,7 @@ class SilhouetteEdges {
   /// Between two corners, in direction of x or of y.
   struct Edge {
     glm::dvec2 start{0.0};
-    glm::dvec2 way{0.0};
+    glm::dvec2 direction{0.0};
     /// The silhouette lies between these fractions of the way, where features `before` and `after` were seen.
     double low = 0.0;
     double high = 1.0;
@@ -106,8 +106,8 @@ class SilhouetteEdges {
     std::array<std::int32_t, 2> pixels{
         -1, -1};  ///< indices into crossed(): pixels with sides that have this edge; -1: none
 
-    [[nodiscard]] glm::dvec2 at(double part) const { return start + part * way; }
-    [[nodiscard]] glm::dvec2 middle() const { return at(0.5 * (low + high)); }
+    [[nodiscard]] glm::dvec2 at(double part) const { return start + part * direction; }
+    [[nodiscard]] glm::dvec2 center() const { return at(0.5 * (low + high)); }
   };
 
   /// From -1, which lies outside, to one past the last of the tile.
@@ -119,7 +119,7 @@ class SilhouetteEdges {
   void find_edge(int x, int y, int axis);
   void bisect_edges(const LightContext& context, RayBuffers& buffers, const TileJob& job);
   void find_pixels();
-  [[nodiscard]] bool differ(int x, int y, const glm::ivec2& way) const;
+  [[nodiscard]] bool differ(int x, int y, const glm::ivec2& direction) const;
   [[nodiscard]] bool is_thin(int x, int y) const;
   [[nodiscard]] bool is_thin_along(int x, int y, const glm::ivec2& axis) const;
   void find_sides(Pixel& pixel, int x, int y, const std::array<std::int32_t, 4>& around) const;

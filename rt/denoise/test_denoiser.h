@@ -33,8 +33,8 @@ inline Image<Rgb> mean_picture(const Scene& scene, View view, const RaySettings&
       for (int x = 0; x < sum.width(); ++x) {
         const Rgb& color = radiance.at(0, x, y);
         Rgb& to = sum.at(x, y);
-        const auto share = 1.0F / static_cast<float>(samples);
-        to = {to.r + share * color.r, to.g + share * color.g, to.b + share * color.b};
+        const auto fraction = 1.0F / static_cast<float>(samples);
+        to = {to.r + fraction * color.r, to.g + fraction * color.g, to.b + fraction * color.b};
       }
     }
   }
@@ -60,11 +60,11 @@ inline const RaySettings kGathered{.passes = {PassId::Gather}, .max_depth = 4};
 /// A sheet alone under an even sky, which sends back its base colour.
 inline Scene painted_floor() {
   Scene scene;
-  add_material(scene, matte());
+  add_material(scene, diffuse());
   Mesh floor = quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0);
   floor.colors = {
       {0.2F, 0.9F, 0.5F, 1.0F}, {0.9F, 0.8F, 0.5F, 1.0F}, {0.5F, 0.5F, 0.5F, 1.0F}, {0.7F, 0.3F, 0.5F, 1.0F}};
-  place(scene, add_mesh(scene, floor));
+  place_mesh(scene, add_mesh(scene, floor));
   scene.environment = even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   return scene;

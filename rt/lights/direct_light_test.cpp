@@ -13,8 +13,8 @@ namespace {
 
 Scene white_floor() {
   Scene scene;
-  test::add_material(scene, test::matte());
-  test::place(scene, test::add_mesh(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  test::add_material(scene, test::diffuse());
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
   finish_scene(scene);
   return scene;
 }

@@ -52,10 +52,10 @@ EnvironmentMap::EnvironmentMap(const Environment& environment) : environment_(&e
       row_squares += brightness(radiance) * brightness(radiance);
     }
     const auto at = static_cast<std::size_t>(y);
-    const double share = 0.5 * (row_cosines_[at] - row_cosines_[at + 1]) / size.width;  // of the sphere, per texel
-    mean_ += share * row;
-    row_sums_.push_back(sum += share * row_sum);
-    squares += share * row_squares;
+    const double fraction = 0.5 * (row_cosines_[at] - row_cosines_[at + 1]) / size.width;  // of the sphere, per texel
+    mean_ += fraction * row;
+    row_sums_.push_back(sum += fraction * row_sum);
+    squares += fraction * row_squares;
   }
   // Relative variances of one sample of a matte surface under open sky: by the cosine, that of the brightness; by
   // brightness, for a constant one, 5/3. Each has its share by how little the other is good for.

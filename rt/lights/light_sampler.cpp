@@ -133,9 +133,9 @@ std::size_t LightSampler::enumerated() const {
   return enumerated_;
 }
 
-LightSample LightSampler::sample_enumerated(std::size_t light, const glm::dvec3& place, const View& view,
+LightSample LightSampler::sample_enumerated(std::size_t light, const glm::dvec3& position, const View& view,
                                             const glm::dvec2& u) const {
-  return sample_punctual(punctual_[light], place, view, u);
+  return sample_punctual(punctual_[light], position, view, u);
 }
 
 bool LightSampler::enumerated_is_fixed(std::size_t light) const {
@@ -148,36 +148,36 @@ bool LightSampler::has_tree() const {
 
 /// How often a light outside the tree is chosen: in proportion to its irradiance and to what the tree promises, which
 /// is a rough estimate, and therefore never trusted to rule out either.
-double LightSampler::outside_share(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal) const {
+double LightSampler::outside_share(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal) const {
   if (choices.outside.empty()) return 0.0;
-  const double from_tree = choices.tree.empty() ? 0.0 : choices.tree.importance(place, normal);
+  const double from_tree = choices.tree.empty() ? 0.0 : choices.tree.importance(position, normal);
   if (!(from_tree > 0.0)) return 1.0;
   return std::clamp(choices.outside_sums.back() / (choices.outside_sums.back() + from_tree), 0.1, 0.9);
 }
 
-std::optional<LightSampler::Chosen> LightSampler::choose(const Choices& choices, const glm::dvec3& place,
+std::optional<LightSampler::Chosen> LightSampler::choose(const Choices& choices, const glm::dvec3& position,
                                                          const glm::dvec3& normal, double u) const {
-  const double share = outside_share(choices, place, normal);
-  if (u < share) {
-    const DiscreteSample picked = sample_discrete(choices.outside_sums, u / share);
-    return Chosen{choices.outside[picked.index], share * picked.probability, picked.rest};
+  const double fraction = outside_share(choices, position, normal);
+  if (u < fraction) {
+    const DiscreteSample picked = sample_discrete(choices.outside_sums, u / fraction);
+    return Chosen{choices.outside[picked.index], fraction * picked.probability, picked.rest};
   }
-  if (!(share < 1.0)) return std::nullopt;
-  const auto choice = choices.tree.choose(place, normal, (u - share) / (1.0 - share));
+  if (!(fraction < 1.0)) return std::nullopt;
+  const auto choice = choices.tree.choose(position, normal, (u - fraction) / (1.0 - fraction));
   if (!choice) return std::nullopt;
-  return Chosen{choices.in_tree[choice->light], (1.0 - share) * choice->probability};
+  return Chosen{choices.in_tree[choice->light], (1.0 - fraction) * choice->probability};
 }
 
-std::optional<LightSample> LightSampler::sample(const Choices& choices, const glm::dvec3& place,
+std::optional<LightSample> LightSampler::sample(const Choices& choices, const glm::dvec3& position,
                                                 const glm::dvec3& normal, const View& view, double u_choice,
                                                 const glm::dvec2& u) const {
-  const auto chosen = choose(choices, place, normal, u_choice);
+  const auto chosen = choose(choices, position, normal, u_choice);
   if (!chosen) return std::nullopt;
   LightSample sample;
   if (chosen->light < punctual_.size()) {
-    sample = sample_punctual(punctual_[chosen->light], place, view, u);
+    sample = sample_punctual(punctual_[chosen->light], position, view, u);
   } else if (chosen->light < environment_number()) {
-    sample = triangles_.sample(chosen->light - punctual_.size(), place, u);
+    sample = triangles_.sample(chosen->light - punctual_.size(), position, u);
   } else {
     sample_environment(normal, chosen->rest, u, sample);
   }
@@ -202,47 +202,47 @@ void LightSampler::sample_environment(const glm::dvec3& normal, double rest, con
 double LightSampler::environment_density(double by_brightness, const glm::dvec3& normal,
                                          const glm::dvec3& direction) const {
   if (normal == glm::dvec3(0.0)) return by_brightness;
-  const double share = environment_->cosine_fraction();
-  return (1.0 - share) * by_brightness + share * std::max(0.0, glm::dot(normal, direction)) / kPi;
+  const double fraction = environment_->cosine_fraction();
+  return (1.0 - fraction) * by_brightness + fraction * std::max(0.0, glm::dot(normal, direction)) / kPi;
 }
 
-double LightSampler::surface_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
+double LightSampler::surface_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,
                                  std::uint32_t surface, const SurfacePoint& hit) const {
   const auto triangle = triangles_.find(surface);
   if (!triangle) return 0.0;
-  const double in_tree = 1.0 - outside_share(choices, place, normal);
-  const double probability = in_tree * choices.tree.probability(place, normal, choices.first_triangle + *triangle);
-  return probability > 0.0 ? triangles_.pdf(*triangle, place, hit.position) * probability : 0.0;
+  const double in_tree = 1.0 - outside_share(choices, position, normal);
+  const double probability = in_tree * choices.tree.probability(position, normal, choices.first_triangle + *triangle);
+  return probability > 0.0 ? triangles_.pdf(*triangle, position, hit.position) * probability : 0.0;
 }
 
-double LightSampler::environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
+double LightSampler::environment_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,
                                      const glm::dvec3& direction) const {
   if (choices.outside.empty() || choices.outside.back() != environment_number()) return 0.0;
   // Equals sample_discrete(), bit for bit.
   const double before = choices.outside.size() > 1 ? choices.outside_sums[choices.outside.size() - 2] : 0.0;
   const double sum = choices.outside_sums.back();
-  const double probability = outside_share(choices, place, normal) * ((sum - before) / sum);
+  const double probability = outside_share(choices, position, normal) * ((sum - before) / sum);
   return environment_density(environment_->evaluate(direction).pdf, normal, direction) * probability;
 }
 
-std::optional<LightSample> LightSampler::sample(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
+std::optional<LightSample> LightSampler::sample(const glm::dvec3& position, const glm::dvec3& normal, const View& view,
                                                 double u_choice, const glm::dvec2& u) const {
-  return sample(one(), place, normal, view, u_choice, u);
+  return sample(one(), position, normal, view, u_choice, u);
 }
 
-std::optional<LightSample> LightSampler::sample_any(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
-                                                    double u_choice, const glm::dvec2& u) const {
-  return sample(all_, place, normal, view, u_choice, u);
+std::optional<LightSample> LightSampler::sample_any(const glm::dvec3& position, const glm::dvec3& normal,
+                                                    const View& view, double u_choice, const glm::dvec2& u) const {
+  return sample(all_, position, normal, view, u_choice, u);
 }
 
-double LightSampler::surface_pdf(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+double LightSampler::surface_pdf(const glm::dvec3& position, const glm::dvec3& normal, std::uint32_t surface,
                                  const SurfacePoint& hit) const {
-  return surface_pdf(one(), place, normal, surface, hit);
+  return surface_pdf(one(), position, normal, surface, hit);
 }
 
-double LightSampler::surface_pdf_any(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+double LightSampler::surface_pdf_any(const glm::dvec3& position, const glm::dvec3& normal, std::uint32_t surface,
                                      const SurfacePoint& hit) const {
-  return surface_pdf(all_, place, normal, surface, hit);
+  return surface_pdf(all_, position, normal, surface, hit);
 }
 
 glm::dvec3 LightSampler::environment(const glm::dvec3& direction) const {
@@ -254,14 +254,14 @@ std::optional<glm::dvec3> LightSampler::constant_environment() const {
   return environment_->is_constant() ? std::optional(environment_->mean()) : std::nullopt;
 }
 
-double LightSampler::environment_pdf(const glm::dvec3& place, const glm::dvec3& normal,
+double LightSampler::environment_pdf(const glm::dvec3& position, const glm::dvec3& normal,
                                      const glm::dvec3& direction) const {
-  return environment_pdf(one(), place, normal, direction);
+  return environment_pdf(one(), position, normal, direction);
 }
 
-double LightSampler::environment_pdf_any(const glm::dvec3& place, const glm::dvec3& normal,
+double LightSampler::environment_pdf_any(const glm::dvec3& position, const glm::dvec3& normal,
                                          const glm::dvec3& direction) const {
-  return environment_pdf(all_, place, normal, direction);
+  return environment_pdf(all_, position, normal, direction);
 }
 
 double LightSampler::power() const {

@@ -35,7 +35,7 @@ class LightSampler {
   /// kMaxEnumerated; then 0, and all are in the tree.
   [[nodiscard]] std::size_t enumerated() const;
   /// A sample of enumerated light i. `u` is used by lights with an extent. weight is zero where it does not reach.
-  [[nodiscard]] LightSample sample_enumerated(std::size_t light, const glm::dvec3& place, const View& view,
+  [[nodiscard]] LightSample sample_enumerated(std::size_t light, const glm::dvec3& position, const View& view,
                                               const glm::dvec2& u) const;
   /// Whether every sample of enumerated light i is equal (it has no extent): then more samples of it are of no
   /// use.
@@ -47,27 +47,27 @@ class LightSampler {
   /// A sample of one of the lights that are not enumerated, chosen by what it may give to a surface at `place` with
   /// `normal` (a light tree: Conty and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018).
   /// None when no light reaches it.
-  [[nodiscard]] std::optional<LightSample> sample(const glm::dvec3& place, const glm::dvec3& normal, const View& view,
-                                                  double u_choice, const glm::dvec2& u) const;
+  [[nodiscard]] std::optional<LightSample> sample(const glm::dvec3& position, const glm::dvec3& normal,
+                                                  const View& view, double u_choice, const glm::dvec2& u) const;
 
   /// A sample of one of all lights, enumerated or not, for path tracing; the headlight is one of them.
-  [[nodiscard]] std::optional<LightSample> sample_any(const glm::dvec3& place, const glm::dvec3& normal,
+  [[nodiscard]] std::optional<LightSample> sample_any(const glm::dvec3& position, const glm::dvec3& normal,
                                                       const View& view, double u_choice, const glm::dvec2& u) const;
 
   /// Per solid angle: the density with which sample (or sample_any) at `place` picks the direction to the point
   /// `hit` of an emitting surface; of a sample, the very pdf it says. 0 for surfaces that do not emit.
-  [[nodiscard]] double surface_pdf(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+  [[nodiscard]] double surface_pdf(const glm::dvec3& position, const glm::dvec3& normal, std::uint32_t surface,
                                    const SurfacePoint& hit) const;
-  [[nodiscard]] double surface_pdf_any(const glm::dvec3& place, const glm::dvec3& normal, std::uint32_t surface,
+  [[nodiscard]] double surface_pdf_any(const glm::dvec3& position, const glm::dvec3& normal, std::uint32_t surface,
                                        const SurfacePoint& hit) const;
 
   /// Radiance from outside the scene along `direction`: the environment, or the background where there is none.
   [[nodiscard]] glm::dvec3 environment(const glm::dvec3& direction) const;
   /// The radiance from outside the scene where no direction changes it.
   [[nodiscard]] std::optional<glm::dvec3> constant_environment() const;
-  [[nodiscard]] double environment_pdf(const glm::dvec3& place, const glm::dvec3& normal,
+  [[nodiscard]] double environment_pdf(const glm::dvec3& position, const glm::dvec3& normal,
                                        const glm::dvec3& direction) const;
-  [[nodiscard]] double environment_pdf_any(const glm::dvec3& place, const glm::dvec3& normal,
+  [[nodiscard]] double environment_pdf_any(const glm::dvec3& position, const glm::dvec3& normal,
                                            const glm::dvec3& direction) const;
 
   /// Watts of all lights together, mean of the three channels (directional lights and the environment: through the
@@ -101,18 +101,19 @@ class LightSampler {
   [[nodiscard]] Choices make_choices(bool punctual) const;
   void sum_powers();
   void find_media(const Scene& scene);
-  [[nodiscard]] double outside_share(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal) const;
-  [[nodiscard]] std::optional<Chosen> choose(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
-                                             double u) const;
-  [[nodiscard]] std::optional<LightSample> sample(const Choices& choices, const glm::dvec3& place,
+  [[nodiscard]] double outside_share(const Choices& choices, const glm::dvec3& position,
+                                     const glm::dvec3& normal) const;
+  [[nodiscard]] std::optional<Chosen> choose(const Choices& choices, const glm::dvec3& position,
+                                             const glm::dvec3& normal, double u) const;
+  [[nodiscard]] std::optional<LightSample> sample(const Choices& choices, const glm::dvec3& position,
                                                   const glm::dvec3& normal, const View& view, double u_choice,
                                                   const glm::dvec2& u) const;
   void sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u, LightSample& sample) const;
   [[nodiscard]] double environment_density(double by_brightness, const glm::dvec3& normal,
                                            const glm::dvec3& direction) const;
-  [[nodiscard]] double surface_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
+  [[nodiscard]] double surface_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,
                                    std::uint32_t surface, const SurfacePoint& hit) const;
-  [[nodiscard]] double environment_pdf(const Choices& choices, const glm::dvec3& place, const glm::dvec3& normal,
+  [[nodiscard]] double environment_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,
                                        const glm::dvec3& direction) const;
 
   ConstantEnvironment constant_environment_;

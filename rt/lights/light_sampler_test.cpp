@@ -30,13 +30,13 @@ Light lamp(const glm::dvec3& position, float intensity, double radius = 0.0) {
 /// A floor, some emitting triangles over it, and whatever is added.
 Scene hall(int lamps = 20) {
   Scene scene;
-  const std::uint32_t floor = test::add_material(scene, test::matte());
+  const std::uint32_t floor = test::add_material(scene, test::diffuse());
   const std::uint32_t glow = test::add_material(scene, test::glowing({2.0F, 4.0F, 6.0F}));
-  test::place(scene, test::add_mesh(scene, test::quad({-10, -10, 0}, {20, 0, 0}, {0, 20, 0}, floor)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-10, -10, 0}, {20, 0, 0}, {0, 20, 0}, floor)));
   const std::uint32_t panel = test::add_mesh(scene, test::quad({0, 0, 0}, {0.5, 0, 0}, {0, 0.5, 0.2}, glow));
   for (int i = 0; i < lamps; ++i) {
     const glm::dvec3 at(-9.0 + i % 5 * 4.0, -9.0 + i / 5 * 3.0, 2.0 + 0.1 * i);
-    test::place(scene, panel, glm::rotate(glm::translate(glm::dmat4(1.0), at), 0.3 * i, glm::dvec3(1, 0, 0)));
+    test::place_mesh(scene, panel, glm::rotate(glm::translate(glm::dmat4(1.0), at), 0.3 * i, glm::dvec3(1, 0, 0)));
   }
   finish_scene(scene);
   return scene;
@@ -49,17 +49,17 @@ Environment sky() {
 }
 
 /// The irradiance on the floor at `place` with nothing in the way.
-glm::dvec3 estimate(const LightSampler& lights, const glm::dvec3& place, std::uint32_t samples, bool any) {
+glm::dvec3 estimate(const LightSampler& lights, const glm::dvec3& position, std::uint32_t samples, bool any) {
   glm::dvec3 sum(0.0);
   for (std::uint32_t i = 0; i < samples; ++i) {
     Sampler sampler(11, i);
     const double u = sampler.one();
-    const auto sample = any ? lights.sample_any(place, kUp, View{}, u, sampler.two())
-                            : lights.sample(place, kUp, View{}, u, sampler.two());
+    const auto sample = any ? lights.sample_any(position, kUp, View{}, u, sampler.two())
+                            : lights.sample(position, kUp, View{}, u, sampler.two());
     if (sample) sum += sample->weight * std::max(0.0, sample->to_light.z);
     if (any) continue;
     for (std::size_t light = 0; light < lights.enumerated(); ++light) {
-      const LightSample of_light = lights.sample_enumerated(light, place, View{}, sampler.two());
+      const LightSample of_light = lights.sample_enumerated(light, position, View{}, sampler.two());
       sum += of_light.weight * std::max(0.0, of_light.to_light.z);
     }
   }
@@ -106,15 +106,15 @@ TEST(LightSampler, AllWaysToAskGiveTheSameLight) {
   scene.lights[2].type = LightType::Directional;
   scene.lights[2].direction = {0, 0, -1};
   constexpr std::uint32_t kSamples = 65536;
-  for (const glm::dvec3 place : {glm::dvec3(0, 0, 0.01), glm::dvec3(8, -7, 0.5)}) {
+  for (const glm::dvec3 position : {glm::dvec3(0, 0, 0.01), glm::dvec3(8, -7, 0.5)}) {
     const LightSampler lights(scene);
-    const glm::dvec3 one = estimate(lights, place, kSamples, false);
-    const glm::dvec3 any = estimate(lights, place, kSamples, true);
+    const glm::dvec3 one = estimate(lights, position, kSamples, false);
+    const glm::dvec3 any = estimate(lights, position, kSamples, true);
     Scene many = scene;
     for (int i = 0; i < 100; ++i) many.lights.push_back(lamp({0, 0, 9}, 1e-9F));
     const LightSampler unlisted(many);
     ASSERT_EQ(unlisted.enumerated(), 0U);
-    const glm::dvec3 sampled = estimate(unlisted, place, kSamples, false);
+    const glm::dvec3 sampled = estimate(unlisted, position, kSamples, false);
     for (int c = 0; c < 3; ++c) {
       EXPECT_NEAR(any[c] / one[c], 1.0, 0.01) << c;
       EXPECT_NEAR(sampled[c] / one[c], 1.0, 0.01) << c;
@@ -135,17 +135,17 @@ TEST(LightSampler, DensitiesFoundBackwardsAreThoseOfTheSamples) {
   int outside = 0;
   for (std::uint32_t i = 0; i < 30'000; ++i) {
     Sampler sampler(13, i);
-    const glm::dvec3 place(8.0 * sampler.one() - 4.0, 8.0 * sampler.one() - 4.0, 4.0 * sampler.one());
+    const glm::dvec3 position(8.0 * sampler.one() - 4.0, 8.0 * sampler.one() - 4.0, 4.0 * sampler.one());
     const glm::dvec3 normal = i % 4 == 0 ? glm::dvec3(0.0) : glm::normalize(glm::dvec3(sampler.one(), 0.2, 0.5));
     const bool any = i % 2 == 0;
     const double u = sampler.one();
-    const auto sample = any ? lights.sample_any(place, normal, View{}, u, sampler.two())
-                            : lights.sample(place, normal, View{}, u, sampler.two());
+    const auto sample = any ? lights.sample_any(position, normal, View{}, u, sampler.two())
+                            : lights.sample(position, normal, View{}, u, sampler.two());
     if (!sample || sample->pdf == 0.0) continue;
     if (std::isinf(sample->distance)) {
       ++outside;
-      EXPECT_EQ(any ? lights.environment_pdf_any(place, normal, sample->to_light)
-                    : lights.environment_pdf(place, normal, sample->to_light),
+      EXPECT_EQ(any ? lights.environment_pdf_any(position, normal, sample->to_light)
+                    : lights.environment_pdf(position, normal, sample->to_light),
                 sample->pdf);
       continue;
     }
@@ -158,15 +158,15 @@ TEST(LightSampler, DensitiesFoundBackwardsAreThoseOfTheSamples) {
     double nearest = std::numeric_limits<double>::infinity();
     for (std::uint32_t id = 2; id < scene.triangles; ++id) {
       surfaces.load(id, triangle);
-      const SurfacePoint met = surfaces.meet(triangle, place, sample->to_light);
+      const SurfacePoint met = surfaces.meet(triangle, position, sample->to_light);
       const double off = glm::distance(met.position, sample->goal);
       if (off >= nearest) continue;
       nearest = off;
-      best = any ? lights.surface_pdf_any(place, normal, id, hit) : lights.surface_pdf(place, normal, id, hit);
+      best = any ? lights.surface_pdf_any(position, normal, id, hit) : lights.surface_pdf(position, normal, id, hit);
     }
     if (nearest > 1e-9) continue;
     EXPECT_NEAR(best / sample->pdf, 1.0, 1e-9) << nearest;
-    EXPECT_EQ(lights.surface_pdf_any(place, normal, 0, hit), 0.0) << "the floor does not emit";
+    EXPECT_EQ(lights.surface_pdf_any(position, normal, 0, hit), 0.0) << "the floor does not emit";
   }
   EXPECT_GT(triangles, 10'000);
   EXPECT_GT(outside, 2000);
@@ -178,11 +178,11 @@ TEST(LightSampler, TheEnvironmentsDensitiesSumToOneOverItsTexels) {
   const LightSampler lights(scene);
   double sum = 0.0;
   for (int y = 0; y < 8; ++y) {
-    const double middle = kPi * (y + 0.5) / 8.0;
+    const double center = kPi * (y + 0.5) / 8.0;
     const double solid_angle = 2.0 * kPi / 16.0 * (std::cos(kPi * y / 8.0) - std::cos(kPi * (y + 1) / 8.0));
     for (int x = 0; x < 16; ++x) {
       const double angle = 2.0 * kPi * ((x + 0.5) / 16.0 - 0.5);
-      const glm::dvec3 w(std::sin(middle) * std::sin(angle), std::cos(middle), -std::sin(middle) * std::cos(angle));
+      const glm::dvec3 w(std::sin(center) * std::sin(angle), std::cos(center), -std::sin(center) * std::cos(angle));
       sum += lights.environment_pdf(glm::dvec3(0.0), glm::dvec3(0.0), w) * solid_angle;
     }
   }
@@ -238,7 +238,7 @@ TEST(LightSampler, NothingIsNanWhateverTheLights) {
                   lamp({1e6, 0, 0}, 1.0F, 1e6), lamp({0, 0, 1}, std::numeric_limits<float>::infinity())};
   scene.lights.push_back(lamp({0, 0, 0}, 1.0F));
   scene.lights.back().type = LightType::Spot;
-  test::place(scene, 1, glm::dmat4(0.0));
+  test::place_mesh(scene, 1, glm::dmat4(0.0));
   scene.instances.back().to_world[3] = glm::dvec4(0, 0, 0, 1);
   finish_scene(scene);
   const LightSampler lights(scene);
@@ -249,17 +249,17 @@ TEST(LightSampler, NothingIsNanWhateverTheLights) {
   };
   for (std::uint32_t i = 0; i < 3000; ++i) {
     Sampler sampler(17, i);
-    const glm::dvec3 place = i % 3 == 0 ? glm::dvec3(0.0) : i % 3 == 1 ? scene.bounds.high : glm::dvec3(1e200);
+    const glm::dvec3 position = i % 3 == 0 ? glm::dvec3(0.0) : i % 3 == 1 ? scene.bounds.high : glm::dvec3(1e200);
     const glm::dvec3 normal = i % 2 == 0 ? kUp : glm::dvec3(0.0);
     const double u = sampler.one();
-    if (const auto sample = lights.sample_any(place, normal, View{}, u, sampler.two())) {
+    if (const auto sample = lights.sample_any(position, normal, View{}, u, sampler.two())) {
       EXPECT_TRUE(finite(*sample));
     }
-    if (const auto sample = lights.sample(place, normal, View{}, u, sampler.two())) {
+    if (const auto sample = lights.sample(position, normal, View{}, u, sampler.two())) {
       EXPECT_TRUE(finite(*sample));
     }
     for (std::size_t light = 0; light < lights.enumerated(); ++light) {
-      EXPECT_TRUE(finite(lights.sample_enumerated(light, place, View{}, sampler.two())));
+      EXPECT_TRUE(finite(lights.sample_enumerated(light, position, View{}, sampler.two())));
     }
     const glm::dvec2 u_place = sampler.two();
     const auto photon = lights.emit(u, u_place, sampler.two());

@@ -106,25 +106,26 @@ LightCluster::LightCluster(const LightBounds& bounds)
       cos_emission(std::cos(bounds.emission_radians)),
       two_sided(bounds.two_sided) {}
 
-double LightCluster::importance(const glm::dvec3& place, const glm::dvec3& normal) const {
-  const glm::dvec3 way = center - place;
-  const double distance = glm::length(way);
+double LightCluster::importance(const glm::dvec3& position, const glm::dvec3& normal) const {
+  const glm::dvec3 direction = center - position;
+  const double distance = glm::length(direction);
   if (!(distance + radius > 0.0) || !std::isfinite(distance + radius)) return 0.0;
-  if (reach > 0.0 && glm::length(glm::max(glm::abs(way) - half, glm::dvec3(0.0))) > reach * (1.0 + 1e-9)) return 0.0;
+  if (reach > 0.0 && glm::length(glm::max(glm::abs(direction) - half, glm::dvec3(0.0))) > reach * (1.0 + 1e-9))
+    return 0.0;
   double cosine = 1.0;
   if (distance > radius) {
     // Every angle may be less by that under which the lights are seen.
     const double near = 1.0 / distance;
     const double sine = radius * near;
     const Angle seen{std::sqrt((distance - radius) * near * (1.0 + sine)), sine};
-    const double off_axis = -glm::dot(axis, way) * near;
+    const double off_axis = -glm::dot(axis, direction) * near;
     const Angle from_axis = angle_of_cosine(two_sided ? std::abs(off_axis) : off_axis);
     const Angle leaving = difference(difference(from_axis, {cos_spread, sin_spread}), seen);
     if (leaving.cosine <= cos_emission) return 0.0;
     // Rounding at grazing angles must not shut out a light.
     cosine = std::max(leaving.cosine, 1e-3);
     if (normal != glm::dvec3(0.0)) {
-      const Angle arriving = difference(angle_of_cosine(glm::dot(normal, way) * near), seen);
+      const Angle arriving = difference(angle_of_cosine(glm::dot(normal, direction) * near), seen);
       if (!(arriving.cosine > 0.0)) return 0.0;
       cosine *= arriving.cosine;
     }
@@ -182,9 +183,9 @@ struct LightTree::Builder {
     glm::dvec3 low(std::numeric_limits<double>::infinity());
     glm::dvec3 high(-std::numeric_limits<double>::infinity());
     for (const std::uint32_t light : part) {
-      const glm::dvec3 middle(center(light, 0), center(light, 1), center(light, 2));
-      low = glm::min(low, middle);
-      high = glm::max(high, middle);
+      const glm::dvec3 at(center(light, 0), center(light, 1), center(light, 2));
+      low = glm::min(low, at);
+      high = glm::max(high, at);
     }
     const glm::dvec3 extent = high - low;
     const int longest = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
@@ -237,27 +238,28 @@ LightTree::LightTree(std::span<const LightBounds> lights) {
   builder.build(builder.order, 0, 0);
 }
 
-double LightTree::share_of_first(std::uint32_t node, const glm::dvec3& place, const glm::dvec3& normal) const {
-  const double first = nodes_[node + 1].lights.importance(place, normal);
-  const double second = nodes_[nodes_[node].second].lights.importance(place, normal);
+double LightTree::share_of_first(std::uint32_t node, const glm::dvec3& position, const glm::dvec3& normal) const {
+  const double first = nodes_[node + 1].lights.importance(position, normal);
+  const double second = nodes_[nodes_[node].second].lights.importance(position, normal);
   const double sum = first + second;
   return sum > 0.0 ? first / sum : -1.0;
 }
 
-std::optional<LightTree::Choice> LightTree::choose(const glm::dvec3& place, const glm::dvec3& normal, double u) const {
-  if (nodes_.empty() || !(importance(place, normal) > 0.0)) return std::nullopt;
+std::optional<LightTree::Choice> LightTree::choose(const glm::dvec3& position, const glm::dvec3& normal,
+                                                   double u) const {
+  if (nodes_.empty() || !(importance(position, normal) > 0.0)) return std::nullopt;
   std::uint32_t node = 0;
   Choice choice{0, 1.0};
   while (nodes_[node].second != 0) {
-    const double share = share_of_first(node, place, normal);
-    if (share < 0.0) return std::nullopt;
-    if (u < share) {
-      u /= share;
-      choice.probability *= share;
+    const double fraction = share_of_first(node, position, normal);
+    if (fraction < 0.0) return std::nullopt;
+    if (u < fraction) {
+      u /= fraction;
+      choice.probability *= fraction;
       ++node;
     } else {
-      u = std::min((u - share) / (1.0 - share), 1.0 - 1e-16);
-      choice.probability *= 1.0 - share;
+      u = std::min((u - fraction) / (1.0 - fraction), 1.0 - 1e-16);
+      choice.probability *= 1.0 - fraction;
       node = nodes_[node].second;
     }
   }
@@ -265,18 +267,18 @@ std::optional<LightTree::Choice> LightTree::choose(const glm::dvec3& place, cons
   return choice;
 }
 
-double LightTree::probability(const glm::dvec3& place, const glm::dvec3& normal, std::size_t light) const {
+double LightTree::probability(const glm::dvec3& position, const glm::dvec3& normal, std::size_t light) const {
   // Multiplied from the root down, as choose() does.
-  if (!(importance(place, normal) > 0.0)) return 0.0;
+  if (!(importance(position, normal) > 0.0)) return 0.0;
   std::array<std::uint32_t, 128> path{};
   std::size_t length = 0;
   for (std::uint32_t node = leaf_of_[light]; node != 0; node = nodes_[node].parent) path[length++] = node;
   double probability = 1.0;
   for (std::size_t i = length; i > 0; --i) {
     const std::uint32_t parent = nodes_[path[i - 1]].parent;
-    const double share = share_of_first(parent, place, normal);
-    if (share < 0.0) return 0.0;
-    probability *= path[i - 1] == parent + 1 ? share : 1.0 - share;
+    const double fraction = share_of_first(parent, position, normal);
+    if (fraction < 0.0) return 0.0;
+    probability *= path[i - 1] == parent + 1 ? fraction : 1.0 - fraction;
   }
   return probability;
 }

@@ -43,7 +43,7 @@ struct LightCluster {
 
   /// An estimate of the irradiance the lights give to a surface, zero only where they surely give none: Conty and Kulla
   /// (see LightTree), section 4. A zero `normal` takes light from all sides.
-  [[nodiscard]] double importance(const glm::dvec3& place, const glm::dvec3& normal) const;
+  [[nodiscard]] double importance(const glm::dvec3& position, const glm::dvec3& normal) const;
 };
 
 /// Chooses among many lights by what they may give to a place: a binary tree over them in which either branch is
@@ -58,8 +58,8 @@ class LightTree {
 
   [[nodiscard]] bool empty() const { return nodes_.empty(); }
   /// Of all lights together; the tree must not be empty.
-  [[nodiscard]] double importance(const glm::dvec3& place, const glm::dvec3& normal) const {
-    return nodes_.front().lights.importance(place, normal);
+  [[nodiscard]] double importance(const glm::dvec3& position, const glm::dvec3& normal) const {
+    return nodes_.front().lights.importance(position, normal);
   }
 
   struct Choice {
@@ -68,9 +68,9 @@ class LightTree {
   };
   /// None when no light reaches the place; the branch taken may find out late, so the probabilities of all lights may
   /// add up to less than 1. O(log n).
-  [[nodiscard]] std::optional<Choice> choose(const glm::dvec3& place, const glm::dvec3& normal, double u) const;
+  [[nodiscard]] std::optional<Choice> choose(const glm::dvec3& position, const glm::dvec3& normal, double u) const;
   /// With which choose() returns `light`: the same bits. O(log n).
-  [[nodiscard]] double probability(const glm::dvec3& place, const glm::dvec3& normal, std::size_t light) const;
+  [[nodiscard]] double probability(const glm::dvec3& position, const glm::dvec3& normal, std::size_t light) const;
 
  private:
   struct Node {
@@ -81,7 +81,7 @@ class LightTree {
   };
   struct Builder;
 
-  [[nodiscard]] double share_of_first(std::uint32_t node, const glm::dvec3& place, const glm::dvec3& normal) const;
+  [[nodiscard]] double share_of_first(std::uint32_t node, const glm::dvec3& position, const glm::dvec3& normal) const;
 
   std::vector<Node> nodes_;  ///< in depth-first order
   std::vector<std::uint32_t> leaf_of_;

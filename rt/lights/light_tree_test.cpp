@@ -44,10 +44,10 @@ std::vector<LightBounds> random_lights(std::uint32_t count, std::uint64_t stream
 }
 
 /// What a light without extent gives, which importance must not take for none.
-double irradiance(const LightBounds& light, const glm::dvec3& place, const glm::dvec3& normal) {
-  const glm::dvec3 way = light.low - place;
-  const double distance = glm::length(way);
-  const glm::dvec3 to_light = way / distance;
+double irradiance(const LightBounds& light, const glm::dvec3& position, const glm::dvec3& normal) {
+  const glm::dvec3 direction = light.low - position;
+  const double distance = glm::length(direction);
+  const glm::dvec3 to_light = direction / distance;
   double cosine = normal == kNoNormal ? 1.0 : std::max(0.0, glm::dot(normal, to_light));
   if (light.spread_radians < kPi) {
     const double off = -glm::dot(light.axis, to_light);
@@ -57,10 +57,10 @@ double irradiance(const LightBounds& light, const glm::dvec3& place, const glm::
   return light.strength * cosine / (distance * distance);
 }
 
-std::vector<double> probabilities(const LightTree& tree, std::size_t lights, const glm::dvec3& place,
+std::vector<double> probabilities(const LightTree& tree, std::size_t lights, const glm::dvec3& position,
                                   const glm::dvec3& normal) {
   std::vector<double> found(lights);
-  for (std::size_t i = 0; i < lights; ++i) found[i] = tree.probability(place, normal, i);
+  for (std::size_t i = 0; i < lights; ++i) found[i] = tree.probability(position, normal, i);
   return found;
 }
 
@@ -75,8 +75,8 @@ TEST(LightTree, ProbabilitiesOfLightsThatShineEverywhereSumToOne) {
     std::vector<LightBounds> lights = random_lights(count, 1);
     for (LightBounds& light : lights) light.spread_radians = kPi;
     const LightTree tree(lights);
-    for (const glm::dvec3 place : {glm::dvec3(0.0), glm::dvec3(3, 0, 0), glm::dvec3(-50, 20, 9)}) {
-      EXPECT_NEAR(sum_of(probabilities(tree, count, place, kNoNormal)), 1.0, 1e-9) << count;
+    for (const glm::dvec3 position : {glm::dvec3(0.0), glm::dvec3(3, 0, 0), glm::dvec3(-50, 20, 9)}) {
+      EXPECT_NEAR(sum_of(probabilities(tree, count, position, kNoNormal)), 1.0, 1e-9) << count;
     }
   }
 }
@@ -85,13 +85,13 @@ TEST(LightTree, ChoosesAsOftenAsItsProbabilitiesSayAndTellsThemTheSame) {
   constexpr std::uint32_t kSamples = 40'000;
   const std::vector<LightBounds> lights = random_lights(50, 2);
   const LightTree tree(lights);
-  const glm::dvec3 place(0.9, 1.4, -0.3);
+  const glm::dvec3 position(0.9, 1.4, -0.3);
   const glm::dvec3 normal = glm::normalize(glm::dvec3(-1, -1, 0.2));
-  const std::vector<double> expected = probabilities(tree, lights.size(), place, normal);
+  const std::vector<double> expected = probabilities(tree, lights.size(), position, normal);
   std::vector<double> found(lights.size(), 0.0);
   double none = 0.0;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
-    const auto choice = tree.choose(place, normal, Sampler(3, i).one());
+    const auto choice = tree.choose(position, normal, Sampler(3, i).one());
     if (!choice) {
       ++none;
       continue;
@@ -113,12 +113,12 @@ TEST(LightTree, NeverRulesOutALightThatReachesThePlace) {
   int reached = 0;
   for (std::uint32_t i = 0; i < 200; ++i) {
     Sampler sampler(5, i);
-    const glm::dvec3 place = 2.5 * sampler.one() * random_direction(sampler);
+    const glm::dvec3 position = 2.5 * sampler.one() * random_direction(sampler);
     const glm::dvec3 normal = random_direction(sampler);
     for (std::size_t light = 0; light < kLights; ++light) {
-      if (!(irradiance(lights[light], place, normal) > 0.0)) continue;
+      if (!(irradiance(lights[light], position, normal) > 0.0)) continue;
       ++reached;
-      EXPECT_GT(tree.probability(place, normal, light), 0.0);
+      EXPECT_GT(tree.probability(position, normal, light), 0.0);
     }
   }
   EXPECT_GT(reached, 10'000);
@@ -130,15 +130,15 @@ TEST(LightTree, TheEstimateOverFiveThousandLightsIsTheirSum) {
   std::vector<LightBounds> lights = random_lights(kLights, 6);
   for (LightBounds& light : lights) light.high = light.low;
   const LightTree tree(lights);
-  for (const glm::dvec3 place : {glm::dvec3(1.5, 0.2, 0.1), glm::dvec3(-1.2, -1.2, 1.2)}) {
-    const glm::dvec3 normal = -glm::normalize(place);
+  for (const glm::dvec3 position : {glm::dvec3(1.5, 0.2, 0.1), glm::dvec3(-1.2, -1.2, 1.2)}) {
+    const glm::dvec3 normal = -glm::normalize(position);
     double exact = 0.0;
-    for (const LightBounds& light : lights) exact += irradiance(light, place, normal);
+    for (const LightBounds& light : lights) exact += irradiance(light, position, normal);
     double sum = 0.0;
     double squares = 0.0;
     for (std::uint32_t i = 0; i < kSamples; ++i) {
-      const auto choice = tree.choose(place, normal, Sampler(7, i).one());
-      const double value = choice ? irradiance(lights[choice->light], place, normal) / choice->probability : 0.0;
+      const auto choice = tree.choose(position, normal, Sampler(7, i).one());
+      const double value = choice ? irradiance(lights[choice->light], position, normal) / choice->probability : 0.0;
       sum += value;
       squares += value * value;
     }
@@ -158,15 +158,15 @@ TEST(LightTree, InALongCorridorItVariesFarLessThanUniformChoice) {
     lights[i].spread_radians = kPi;
   }
   const LightTree tree(lights);
-  const glm::dvec3 place(777.0, 0.0, 0.3);
+  const glm::dvec3 position(777.0, 0.0, 0.3);
   const glm::dvec3 normal(0, 1, 0);
   double exact = 0.0;
   double of_tree = 0.0;
   double uniform = 0.0;
   for (std::size_t i = 0; i < kLights; ++i) {
-    const double value = irradiance(lights[i], place, normal);
+    const double value = irradiance(lights[i], position, normal);
     exact += value;
-    of_tree += value * value / tree.probability(place, normal, i);
+    of_tree += value * value / tree.probability(position, normal, i);
     uniform += value * value * kLights;
   }
   EXPECT_LT(of_tree - exact * exact, 2.5 * exact * exact);
@@ -212,13 +212,13 @@ TEST(LightBounds, OfManyNormalsHoldEveryOneOfThem) {
     Sampler sampler(9, i);
     std::vector<glm::dvec3> normals;
     LightBounds all;
-    const glm::dvec3 middle = random_direction(sampler);
+    const glm::dvec3 center = random_direction(sampler);
     const double width = 2.0 * sampler.one();
     for (int k = 0; k < 8; ++k) {
       LightBounds one;
       one.strength = 1.0;
       one.two_sided = i % 2 == 0;
-      one.axis = glm::normalize(middle + width * random_direction(sampler));
+      one.axis = glm::normalize(center + width * random_direction(sampler));
       normals.push_back(one.axis);
       all = united(all, one);
     }

@@ -70,7 +70,7 @@ LightSample sample_directional(const Light& light, const glm::dvec2& u) {
   return sample;
 }
 
-LightSample sample_headlight(const Light& light, const glm::dvec3& place, const View& view) {
+LightSample sample_headlight(const Light& light, const glm::dvec3& position, const View& view) {
   LightSample sample;
   sample.casts_shadows = false;
   if (view.orthographic) {
@@ -79,11 +79,11 @@ LightSample sample_headlight(const Light& light, const glm::dvec3& place, const 
     sample.weight = glm::dvec3(light.intensity);
     return sample;
   }
-  const glm::dvec3 way = view.eye - place;
-  sample.distance = glm::length(way);
+  const glm::dvec3 direction = view.eye - position;
+  sample.distance = glm::length(direction);
   sample.goal = view.eye;
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return sample;
-  sample.to_light = glm::normalize(way / sample.distance + kHeadlightLift);
+  sample.to_light = glm::normalize(direction / sample.distance + kHeadlightLift);
   sample.weight = glm::dvec3(light.intensity);
   return sample;
 }
@@ -96,16 +96,16 @@ double range_window(double distance, double range) {
   return std::clamp(1.0 - ratio * ratio * ratio * ratio, 0.0, 1.0);
 }
 
-LightSample sample_punctual(const Light& light, const glm::dvec3& place, const View& view, const glm::dvec2& u) {
+LightSample sample_punctual(const Light& light, const glm::dvec3& position, const View& view, const glm::dvec2& u) {
   if (light.type == LightType::Directional) return sample_directional(light, u);
-  if (light.type == LightType::Headlight) return sample_headlight(light, place, view);
+  if (light.type == LightType::Headlight) return sample_headlight(light, position, view);
   LightSample sample;
-  const glm::dvec3 way = light.position - place;
-  const double distance = glm::length(way);
+  const glm::dvec3 direction = light.position - position;
+  const double distance = glm::length(direction);
   sample.distance = distance;
   sample.goal = light.position;
   if (!(distance > light.radius) || !std::isfinite(distance)) return sample;
-  sample.to_light = way / distance;
+  sample.to_light = direction / distance;
   double cosine = 1.0;  // of half the angle the sphere is seen under
   if (light.radius > 0.0) {
     const double sine = light.radius / distance;
@@ -117,7 +117,7 @@ LightSample sample_punctual(const Light& light, const glm::dvec3& place, const V
     const double off_axis = distance * std::sqrt(below * (2.0 - below));
     const double half_chord = std::sqrt(std::max(0.0, (light.radius - off_axis) * (light.radius + off_axis)));
     sample.distance = std::max(0.0, distance * (1.0 - below) - half_chord);
-    sample.goal = place + sample.distance * sample.to_light;
+    sample.goal = position + sample.distance * sample.to_light;
   }
   // Radiance, I / (pi r^2), times the solid angle of the cone, 2 pi sin^2 / (1 + cos): the radius cancels.
   double strength = range_window(distance, light.range) * 2.0 / (distance * distance * (1.0 + cosine));

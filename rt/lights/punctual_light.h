@@ -51,7 +51,7 @@ struct LitSphere {
 /// angular radius are discs of uniform radiance in the sky that give their W/m^2 to a plane that faces the middle.
 /// `u` = 0 samples the middle. The weight is zero where a light does not reach, on the very place of a light without
 /// radius, and inside of one with a radius: it shines outwards only.
-[[nodiscard]] LightSample sample_punctual(const Light& light, const glm::dvec3& place, const View& view,
+[[nodiscard]] LightSample sample_punctual(const Light& light, const glm::dvec3& position, const View& view,
                                           const glm::dvec2& u);
 
 /// Whether every sample of it is the same.

@@ -184,17 +184,17 @@ TEST(Photons, OfASpotFollowItsRamp) {
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(6, i);
     const PhotonStart photon = emit_punctual(light, {}, {}, sampler.two());
-    const double place = (1.0 + photon.direction.z) / (1.0 - edge);  // the light shines along -z
-    ASSERT_LT(place, 1.0 + 1e-9);
-    found[std::min(static_cast<std::size_t>(place * kRings), found.size() - 1)] += photon.flux.r / kSamples;
+    const double position = (1.0 + photon.direction.z) / (1.0 - edge);  // the light shines along -z
+    ASSERT_LT(position, 1.0 + 1e-9);
+    found[std::min(static_cast<std::size_t>(position * kRings), found.size() - 1)] += photon.flux.r / kSamples;
   }
   for (int ring = 0; ring < kRings; ++ring) {
     // W/sr as the direct light has it, over a ring of equal solid angle.
     double expected = 0.0;
     for (int part = 0; part < 64; ++part) {
       const double cosine = 1.0 - (1.0 - edge) * (ring + (part + 0.5) / 64.0) / kRings;
-      const glm::dvec3 place(std::sqrt(1.0 - cosine * cosine), 0.0, -cosine);
-      expected += sample_punctual(light, place, View{}, {}).weight.r * 2.0 * kPi * (1.0 - edge) / kRings / 64.0;
+      const glm::dvec3 position(std::sqrt(1.0 - cosine * cosine), 0.0, -cosine);
+      expected += sample_punctual(light, position, View{}, {}).weight.r * 2.0 * kPi * (1.0 - edge) / kRings / 64.0;
     }
     EXPECT_NEAR(found[static_cast<std::size_t>(ring)], expected, 0.005) << ring;
   }
@@ -211,9 +211,9 @@ TEST(Photons, OfTheSunCrossTheSceneEvenly) {
     Sampler sampler(8, i);
     const glm::dvec2 u = sampler.two();
     const PhotonStart photon = emit_punctual(light, lit, u, sampler.two());
-    const glm::dvec3 way = photon.origin - lit.center;
-    EXPECT_NEAR(glm::dot(way, photon.direction), -2.0, 1e-6);
-    const double off = glm::length(way - glm::dot(way, photon.direction) * photon.direction);
+    const glm::dvec3 direction = photon.origin - lit.center;
+    EXPECT_NEAR(glm::dot(direction, photon.direction), -2.0, 1e-6);
+    const double off = glm::length(direction - glm::dot(direction, photon.direction) * photon.direction);
     EXPECT_LE(off, 2.0 + 1e-6);
     if (off < 1.0) inside += photon.flux.r / kSamples;
   }

@@ -26,9 +26,9 @@ glm::dvec3 perpendicular(const glm::dvec3& v, const glm::dvec3& axis) {
 
 }  // namespace
 
-SphericalTriangle::SphericalTriangle(const glm::dvec3& place, const glm::dvec3& v0, const glm::dvec3& e1,
+SphericalTriangle::SphericalTriangle(const glm::dvec3& position, const glm::dvec3& v0, const glm::dvec3& e1,
                                      const glm::dvec3& e2) {
-  const glm::dvec3 to_a = v0 - place;
+  const glm::dvec3 to_a = v0 - position;
   const glm::dvec3 to_b = to_a + e1;
   const glm::dvec3 to_c = to_a + e2;
   const double la = glm::length(to_a);
@@ -142,8 +142,8 @@ TexelBox texels_of(const Texture& texture, const TextureRef& reference, const Me
 }
 
 /// Möller and Trumbore 1997: where the direction meets the triangle's plane, moved onto the triangle.
-glm::dvec2 met_at(const TriangleLight& triangle, const glm::dvec3& place, const glm::dvec3& direction) {
-  const glm::dvec3 from_v0 = place - triangle.v0;
+glm::dvec2 met_at(const TriangleLight& triangle, const glm::dvec3& position, const glm::dvec3& direction) {
+  const glm::dvec3 from_v0 = position - triangle.v0;
   const glm::dvec3 p = glm::cross(direction, triangle.e2);
   const double determinant = glm::dot(triangle.e1, p);
   glm::dvec2 at(glm::dot(from_v0, p) / determinant,
@@ -160,10 +160,10 @@ glm::dvec2 uniform_in_triangle(const glm::dvec2& u) {
 }
 
 /// Per solid angle, of a point uniform over the area; 0 when it is seen edge-on.
-double area_pdf(const TriangleLight& triangle, const glm::dvec3& way) {
-  const double distance = glm::length(way);
+double area_pdf(const TriangleLight& triangle, const glm::dvec3& direction) {
+  const double distance = glm::length(direction);
   if (!(distance > 0.0)) return 0.0;
-  const double cosine = std::abs(glm::dot(triangle.normal, way / distance));
+  const double cosine = std::abs(glm::dot(triangle.normal, direction / distance));
   const double pdf = distance * distance / (triangle.area * cosine);
   return cosine > 0.0 && std::isfinite(pdf) ? pdf : 0.0;
 }
@@ -249,26 +249,26 @@ std::optional<std::size_t> TriangleLights::find(std::uint32_t surface) const {
   return static_cast<std::size_t>(found - triangles_.begin());
 }
 
-LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& place, const glm::dvec2& u) const {
+LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& position, const glm::dvec2& u) const {
   const TriangleLight& triangle = triangles_[index];
-  const SphericalTriangle seen(place, triangle.v0, triangle.e1, triangle.e2);
+  const SphericalTriangle seen(position, triangle.v0, triangle.e1, triangle.e2);
   const bool by_angle = seen.can_sample();
-  const glm::dvec2 at = by_angle ? met_at(triangle, place, seen.sample(u)) : uniform_in_triangle(u);
+  const glm::dvec2 at = by_angle ? met_at(triangle, position, seen.sample(u)) : uniform_in_triangle(u);
   LightSample sample;
   sample.goal = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
-  const glm::dvec3 way = sample.goal - place;
-  sample.distance = glm::length(way);
+  const glm::dvec3 direction = sample.goal - position;
+  sample.distance = glm::length(direction);
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return LightSample{};
-  sample.to_light = way / sample.distance;
-  sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, way);
+  sample.to_light = direction / sample.distance;
+  sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, direction);
   if (sample.pdf > 0.0) sample.weight = radiance(triangle, at) / sample.pdf;
   return sample;
 }
 
-double TriangleLights::pdf(std::size_t index, const glm::dvec3& place, const glm::dvec3& point) const {
+double TriangleLights::pdf(std::size_t index, const glm::dvec3& position, const glm::dvec3& point) const {
   const TriangleLight& triangle = triangles_[index];
-  const SphericalTriangle seen(place, triangle.v0, triangle.e1, triangle.e2);
-  return seen.can_sample() ? 1.0 / seen.solid_angle() : area_pdf(triangle, point - place);
+  const SphericalTriangle seen(position, triangle.v0, triangle.e1, triangle.e2);
+  return seen.can_sample() ? 1.0 / seen.solid_angle() : area_pdf(triangle, point - position);
 }
 
 PhotonStart TriangleLights::emit(std::size_t index, double u_side, const glm::dvec2& u_place,

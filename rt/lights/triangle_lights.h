@@ -19,7 +19,7 @@ namespace hpr {
 class SphericalTriangle {
  public:
   /// The triangle v0, v0 + e1, v0 + e2.
-  SphericalTriangle(const glm::dvec3& place, const glm::dvec3& v0, const glm::dvec3& e1, const glm::dvec3& e2);
+  SphericalTriangle(const glm::dvec3& position, const glm::dvec3& v0, const glm::dvec3& e1, const glm::dvec3& e2);
 
   [[nodiscard]] double solid_angle() const { return solid_angle_; }
   /// Whether sample() is accurate: not below 1e-6 sr, nor for a triangle that is all but an arc or half the sphere.
@@ -63,9 +63,9 @@ class TriangleLights {
   /// The triangle with this surface id, if it emits. O(log n).
   [[nodiscard]] std::optional<std::size_t> find(std::uint32_t surface) const;
 
-  [[nodiscard]] LightSample sample(std::size_t triangle, const glm::dvec3& place, const glm::dvec2& u) const;
+  [[nodiscard]] LightSample sample(std::size_t triangle, const glm::dvec3& position, const glm::dvec2& u) const;
   /// Per solid angle: the density with which sample() picks the direction to `point` of the triangle.
-  [[nodiscard]] double pdf(std::size_t triangle, const glm::dvec3& place, const glm::dvec3& point) const;
+  [[nodiscard]] double pdf(std::size_t triangle, const glm::dvec3& position, const glm::dvec3& point) const;
 
   /// A photon, uniform over area and with a cosine lobe, from the front for `u_side` below a half. The mean of its flux
   /// is the triangle's power.

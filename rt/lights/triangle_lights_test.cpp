@@ -27,24 +27,24 @@ Scene lamp(double size, double height) {
   mesh.triangles = {{0, 1, 2}};
   mesh.material = material;
   const std::uint32_t index = test::add_mesh(scene, mesh);
-  test::place(scene, index,
-              glm::scale(glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, height)), glm::dvec3(size, size, 1.0)));
+  test::place_mesh(scene, index,
+                   glm::scale(glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, height)), glm::dvec3(size, size, 1.0)));
   finish_scene(scene);
   return scene;
 }
 
 /// On the floor below its middle.
-double estimated_irradiance(const TriangleLights& lights, const glm::dvec3& place) {
+double estimated_irradiance(const TriangleLights& lights, const glm::dvec3& position) {
   double sum = 0.0;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
-    const LightSample sample = lights.sample(0, place, Sampler(1, i).two());
+    const LightSample sample = lights.sample(0, position, Sampler(1, i).two());
     sum += sample.weight.r * std::abs(sample.to_light.z);
   }
   return sum / kSamples;
 }
 
-double exact_irradiance(const TriangleLight& light, const glm::dvec3& place) {
-  const glm::dvec3 corners[3] = {light.v0 - place, light.v0 + light.e1 - place, light.v0 + light.e2 - place};
+double exact_irradiance(const TriangleLight& light, const glm::dvec3& position) {
+  const glm::dvec3 corners[3] = {light.v0 - position, light.v0 + light.e1 - position, light.v0 + light.e2 - position};
   double sum = 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
     const glm::dvec3 cross = glm::cross(corners[i], corners[(i + 1) % 3]);
@@ -58,8 +58,8 @@ TEST(TriangleLights, GiveLambertsIrradianceNearAndFarAndFromBothSides) {
     const Scene scene = lamp(size, 1.0);
     const TriangleLights lights(scene);
     ASSERT_EQ(lights.size(), 1U);
-    for (const glm::dvec3 place : {glm::dvec3(0.0), glm::dvec3(0.1, 0.2, 0.9), glm::dvec3(0.1, 0.1, 2.0)}) {
-      EXPECT_NEAR(estimated_irradiance(lights, place) / exact_irradiance(lights[0], place), 1.0, 2e-3) << size;
+    for (const glm::dvec3 position : {glm::dvec3(0.0), glm::dvec3(0.1, 0.2, 0.9), glm::dvec3(0.1, 0.1, 2.0)}) {
+      EXPECT_NEAR(estimated_irradiance(lights, position) / exact_irradiance(lights[0], position), 1.0, 2e-3) << size;
     }
   }
 }
@@ -69,10 +69,10 @@ TEST(TriangleLights, TheDensityOfASampleIsFoundAgainFromItsPlace) {
     const Scene scene = lamp(size, 1.0);
     const TriangleLights lights(scene);
     for (std::uint32_t i = 0; i < 1000; ++i) {
-      const glm::dvec3 place(0.3, -0.2, 0.1);
-      const LightSample sample = lights.sample(0, place, Sampler(2, i).two());
+      const glm::dvec3 position(0.3, -0.2, 0.1);
+      const LightSample sample = lights.sample(0, position, Sampler(2, i).two());
       ASSERT_GT(sample.pdf, 0.0);
-      EXPECT_EQ(lights.pdf(0, place, sample.goal), sample.pdf);
+      EXPECT_EQ(lights.pdf(0, position, sample.goal), sample.pdf);
     }
   }
 }
@@ -117,8 +117,8 @@ TEST(TriangleLights, TexturesAreReadWhereTheSampleFalls) {
     EXPECT_EQ(sample.weight.r > 0.0, sample.goal.x > 0.5);
     Sampler sampler(4, i);
     const double side = sampler.one();
-    const glm::dvec2 place = sampler.two();
-    flux += lights.emit(0, side, place, sampler.two()).flux.r / kSamples;
+    const glm::dvec2 position = sampler.two();
+    flux += lights.emit(0, side, position, sampler.two()).flux.r / kSamples;
   }
   EXPECT_NEAR(flux, 2.0 * std::numbers::pi * 4.5 * 0.75, 0.05);
 }
@@ -151,10 +151,10 @@ TEST(TriangleLights, WhatIsCutOutEmitsNothing) {
 
 TEST(TriangleLights, AreFoundByTheirSurfaceInEveryInstance) {
   Scene scene = lamp(1.0, 1.0);
-  const std::uint32_t dark = test::add_material(scene, test::matte());
-  test::place(scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, dark)));
-  test::place(scene, 0, glm::translate(glm::dmat4(1.0), glm::dvec3(9, 0, 0)));
-  test::place(scene, 0, glm::dmat4(0.0));  // singular: all in one point
+  const std::uint32_t dark = test::add_material(scene, test::diffuse());
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, dark)));
+  test::place_mesh(scene, 0, glm::translate(glm::dmat4(1.0), glm::dvec3(9, 0, 0)));
+  test::place_mesh(scene, 0, glm::dmat4(0.0));  // singular: all in one point
   scene.instances.back().to_world[3] = glm::dvec4(0, 0, 0, 1);
   finish_scene(scene);
   const TriangleLights lights(scene);
@@ -169,12 +169,12 @@ TEST(TriangleLights, AreFoundByTheirSurfaceInEveryInstance) {
 TEST(TriangleLights, NoPlaceGivesNan) {
   const Scene scene = lamp(1.0, 0.0);
   const TriangleLights lights(scene);
-  for (const glm::dvec3 place : {glm::dvec3(0.0), glm::dvec3(-1, -1, 0), glm::dvec3(0.5, 0, 0), glm::dvec3(7, 0, 0),
-                                 glm::dvec3(0, 0, 1e-200), glm::dvec3(0, 0, 1e200), glm::dvec3(1e300)}) {
+  for (const glm::dvec3 position : {glm::dvec3(0.0), glm::dvec3(-1, -1, 0), glm::dvec3(0.5, 0, 0), glm::dvec3(7, 0, 0),
+                                    glm::dvec3(0, 0, 1e-200), glm::dvec3(0, 0, 1e200), glm::dvec3(1e300)}) {
     for (std::uint32_t i = 0; i < 64; ++i) {
-      const LightSample sample = lights.sample(0, place, Sampler(5, i).two());
+      const LightSample sample = lights.sample(0, position, Sampler(5, i).two());
       EXPECT_TRUE(std::isfinite(sample.weight.r) && std::isfinite(sample.pdf) && std::isfinite(sample.to_light.x));
-      EXPECT_TRUE(std::isfinite(lights.pdf(0, place, sample.goal)));
+      EXPECT_TRUE(std::isfinite(lights.pdf(0, position, sample.goal)));
     }
   }
 }

@@ -171,8 +171,8 @@ std::optional<Bsdf::Facet> Bsdf::facet(Lobe lobe, const glm::dvec3& to_light) co
     facet.light_half = -glm::dot(to_light, half);
   } else {
     // What goes through a rough sheet is its mirror image carried to the other side.
-    const glm::dvec3 mirrored = through ? to_light + 2.0 * facet.normal_light * normal_ : to_light;
-    half = view_ + mirrored;
+    const glm::dvec3 reflected = through ? to_light + 2.0 * facet.normal_light * normal_ : to_light;
+    half = view_ + reflected;
     const double length = glm::length(half);
     half /= length;
     facet.view_half = facet.light_half = 0.5 * length;
@@ -336,18 +336,18 @@ std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) con
   const double bound = lobe == Lobe::Reflection ? bounded_view_ / normal_view_ : 1.0;
   const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), bound, u);
   const double view_half = glm::dot(view_, half);
-  const glm::dvec3 mirrored = 2.0 * view_half * half - view_;
+  const glm::dvec3 reflected = 2.0 * view_half * half - view_;
   BsdfSample sample;
   if (lobe == Lobe::Reflection) {
-    sample.direction = glm::normalize(mirrored);
+    sample.direction = glm::normalize(reflected);
   } else if (refracts()) {
     const auto direction = refracted(half);
     if (!direction) return std::nullopt;
     sample.direction = *direction;
   } else {
-    const double height = glm::dot(mirrored, normal_);
+    const double height = glm::dot(reflected, normal_);
     if (!(height > 0.0)) return std::nullopt;
-    sample.direction = glm::normalize(mirrored - 2.0 * height * normal_);
+    sample.direction = glm::normalize(reflected - 2.0 * height * normal_);
   }
   const auto at = facet(lobe, sample.direction);
   if (!at) return std::nullopt;

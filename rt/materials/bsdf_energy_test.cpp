@@ -237,8 +237,8 @@ TEST(BsdfEnergy, WeightsAreNearTheLobesShares) {
       material.base_color = glm::dvec3(0.7);
       const Bsdf bsdf = bsdf_of(material, direction(polar, 0.0), false, Carried::Flux);
       for (const Lobe lobe : kLobes) {
-        const double share = albedo(bsdf, lobe);
-        EXPECT_NEAR(bsdf.weight(lobe).g, share, 0.15 * share + 0.02) << static_cast<int>(lobe);
+        const double fraction = albedo(bsdf, lobe);
+        EXPECT_NEAR(bsdf.weight(lobe).g, fraction, 0.15 * fraction + 0.02) << static_cast<int>(lobe);
       }
     }
   }

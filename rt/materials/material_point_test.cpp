@@ -131,7 +131,7 @@ Scene mapped_quad(std::uint8_t x, std::uint8_t y, const glm::dmat4& to_world = g
   scene.textures.emplace_back().image = Image<Rgba8>({1, 1}, {x, y, 255, 255});
   Mesh mesh = test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
   mesh.uvs[0] = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
-  test::place(scene, test::add_mesh(scene, mesh), to_world);
+  test::place_mesh(scene, test::add_mesh(scene, mesh), to_world);
   finish_scene(scene);
   return scene;
 }

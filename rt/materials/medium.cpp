@@ -25,12 +25,12 @@ bool is_absorber(const Material& material) {
          material.attenuation_color != glm::vec3(1.0F);
 }
 
-bool meets_line(const Bounds& box, const glm::dvec3& place) {
+bool meets_line(const Bounds& box, const glm::dvec3& position) {
   double first = -std::numeric_limits<double>::infinity();
   double last = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
-    first = std::max(first, (box.low[axis] - place[axis]) / kLine[axis]);
-    last = std::min(last, (box.high[axis] - place[axis]) / kLine[axis]);
+    first = std::max(first, (box.low[axis] - position[axis]) / kLine[axis]);
+    last = std::min(last, (box.high[axis] - position[axis]) / kLine[axis]);
   }
   return first <= last;
 }
@@ -83,9 +83,9 @@ MediumFinder::MediumFinder(const Scene& scene) : scene_(scene) {
 }
 
 /// Moeller and Trumbore 1997, in the mesh's own coordinates: a line keeps its parameter there.
-void MediumFinder::cross(const Solid& solid, const glm::dvec3& place, std::vector<Crossing>& crossings) const {
+void MediumFinder::cross(const Solid& solid, const glm::dvec3& position, std::vector<Crossing>& crossings) const {
   const Mesh& mesh = scene_.mesh_of(scene_.instances[solid.instance]);
-  const glm::dvec3 origin(solid.from_world * glm::dvec4(place, 1.0));
+  const glm::dvec3 origin(solid.from_world * glm::dvec4(position, 1.0));
   const glm::dvec3 direction(solid.from_world * glm::dvec4(kLine, 0.0));
   for (const glm::uvec3& corners : mesh.triangles) {
     const glm::dvec3 v0(mesh.positions[corners.x]);
@@ -104,14 +104,14 @@ void MediumFinder::cross(const Solid& solid, const glm::dvec3& place, std::vecto
   }
 }
 
-Media MediumFinder::at(const glm::dvec3& place) const {
+Media MediumFinder::at(const glm::dvec3& position) const {
   const auto holds = [&](const Bounds& box) {
-    return glm::all(glm::lessThanEqual(box.low, place)) && glm::all(glm::lessThanEqual(place, box.high));
+    return glm::all(glm::lessThanEqual(box.low, position)) && glm::all(glm::lessThanEqual(position, box.high));
   };
   if (std::ranges::none_of(boxes_, holds)) return {};
   std::vector<Crossing> crossings;
   for (const Solid& solid : solids_) {
-    if (meets_line(solid.box, place)) cross(solid, place, crossings);
+    if (meets_line(solid.box, position)) cross(solid, position, crossings);
   }
   std::ranges::stable_sort(crossings, {}, &Crossing::along);
   const auto here = std::ranges::lower_bound(crossings, 0.0, {}, &Crossing::along);

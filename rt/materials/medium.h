@@ -67,7 +67,7 @@ class MediumFinder {
 
   /// A place lies in a solid that a line through it leaves both ways without having entered it: so open meshes hold
   /// nothing. Exact up to double rounding, but for places on a wall.
-  [[nodiscard]] Media at(const glm::dvec3& place) const;
+  [[nodiscard]] Media at(const glm::dvec3& position) const;
 
   /// What the eye of each view lies in, looked for once where they share it. An orthographic view has no such place:
   /// its rays start in what absorbs nothing.
@@ -85,7 +85,7 @@ class MediumFinder {
     bool leaves = false;  ///< as seen by who goes up the line
   };
 
-  void cross(const Solid& solid, const glm::dvec3& place, std::vector<Crossing>& crossings) const;
+  void cross(const Solid& solid, const glm::dvec3& position, std::vector<Crossing>& crossings) const;
 
   const Scene& scene_;
   std::vector<Solid> solids_;

@@ -16,7 +16,7 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 /// A closed body of six quads that look outwards, each an instance of its own.
@@ -29,8 +29,8 @@ void add_box(Scene& scene, const glm::vec3& low, const glm::vec3& high, std::uin
     a[(axis + 1) % 3] = size[(axis + 1) % 3];
     b[(axis + 2) % 3] = size[(axis + 2) % 3];
     across[axis] = size[axis];
-    place(scene, add_mesh(scene, quad(low, b, a, material)));
-    place(scene, add_mesh(scene, quad(low + across, a, b, material)));
+    place_mesh(scene, add_mesh(scene, quad(low, b, a, material)));
+    place_mesh(scene, add_mesh(scene, quad(low + across, a, b, material)));
   }
 }
 
@@ -53,12 +53,12 @@ glm::dvec3 seen_from(double z, const Scene& scene, RaySettings settings, bool re
   return test::mean_pixel(scene, view, 0, 0, samples, settings);
 }
 
-void expect_seen(const glm::dvec3& expected, double z, Scene scene, double share = 1e-4) {
+void expect_seen(const glm::dvec3& expected, double z, Scene scene, double fraction = 1e-4) {
   finish_scene(scene);
   for (const bool reference : {false, true}) {
     // An index of 1.33 mirrors a little, by chance.
     const glm::dvec3 seen = seen_from(z, scene, {.max_depth = 32}, reference);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c] / expected[c], 1.0, share) << reference << ' ' << c;
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c] / expected[c], 1.0, fraction) << reference << ' ' << c;
   }
 }
 
@@ -86,7 +86,7 @@ TEST(Medium, AnEyeInASolidSeesWhatGlowsThereThroughIt) {
 TEST(Medium, LightOfALampInASolidIsAbsorbedOnItsWay) {
   Scene scene;
   add_box(scene, 1.5F, add_absorber(scene, glm::vec3(0.5F)));
-  add_box(scene, 0.5F, add_material(scene, test::matte()));
+  add_box(scene, 0.5F, add_material(scene, test::diffuse()));
   // Half a metre before the wall: an irradiance of pi.
   Light lamp;
   lamp.position = {0.1, 0.07, 1.0};
@@ -98,7 +98,7 @@ TEST(Medium, LightOfALampInASolidIsAbsorbedOnItsWay) {
 TEST(Medium, PhotonsOfTheSunAreAbsorbedOnTheirWay) {
   Scene scene;
   add_box(scene, 1.5F, add_absorber(scene, glm::vec3(0.5F)));
-  add_box(scene, 0.5F, add_material(scene, test::matte()));
+  add_box(scene, 0.5F, add_material(scene, test::diffuse()));
   Light sun;
   sun.type = LightType::Directional;
   sun.intensity = glm::vec3(std::numbers::pi_v<float>);
@@ -110,7 +110,8 @@ TEST(Medium, PhotonsOfTheSunAreAbsorbedOnTheirWay) {
 
 /// A white floor at z = -1 under what stands between it and the sun, looked at from below that.
 double sunlit_floor(Scene scene) {
-  place(scene, add_mesh(scene, quad({-1.5F, -1.5F, -1}, {3, 0, 0}, {0, 3, 0}, add_material(scene, test::matte()))));
+  place_mesh(scene,
+             add_mesh(scene, quad({-1.5F, -1.5F, -1}, {3, 0, 0}, {0, 3, 0}, add_material(scene, test::diffuse()))));
   Light sun;
   sun.type = LightType::Directional;
   sun.intensity = glm::vec3(std::numbers::pi_v<float>);
@@ -124,9 +125,10 @@ TEST(Medium, FromWithoutTheSceneToTheInsideOfAWallNothingIsAbsorbed) {
   const auto below_a_pane = [](bool with_far_thing) {
     Scene scene;
     const std::uint32_t absorber = add_absorber(scene, glm::vec3(0.25F));
-    place(scene, add_mesh(scene, quad({-1.5F, -1.5F, 0}, {0, 3, 0}, {3, 0, 0}, absorber)));  // it faces the floor
+    place_mesh(scene, add_mesh(scene, quad({-1.5F, -1.5F, 0}, {0, 3, 0}, {3, 0, 0}, absorber)));  // it faces the floor
     if (with_far_thing) {
-      place(scene, add_mesh(scene, quad({0, 0, 9}, {0.01F, 0, 0}, {0, 0.01F, 0}, add_material(scene, test::matte()))));
+      place_mesh(scene,
+                 add_mesh(scene, quad({0, 0, 9}, {0.01F, 0, 0}, {0, 0.01F, 0}, add_material(scene, test::diffuse()))));
     }
     return sunlit_floor(std::move(scene));
   };
@@ -144,7 +146,7 @@ TEST(Medium, FromWithoutTheSceneToTheInsideOfAWallNothingIsAbsorbed) {
 
 TEST(Medium, AnEyeOutsideSeesTheBackOfAWallUndimmed) {
   Scene scene;
-  place(scene, add_mesh(scene, quad({-5, -5, 0}, {0, 10, 0}, {10, 0, 0}, add_absorber(scene, glm::vec3(0.5F)))));
+  place_mesh(scene, add_mesh(scene, quad({-5, -5, 0}, {0, 10, 0}, {10, 0, 0}, add_absorber(scene, glm::vec3(0.5F)))));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   expect_seen(glm::dvec3(1.0), 3.0, std::move(scene));
 }
@@ -175,7 +177,7 @@ TEST(Medium, BehindASolidTheOneAroundItGoesOn) {
 TEST(Medium, DimsNoNormals) {
   Scene scene;
   add_box(scene, 1.5F, add_absorber(scene, glm::vec3(0.5F)));
-  add_box(scene, 0.5F, add_material(scene, test::matte()));
+  add_box(scene, 0.5F, add_material(scene, test::diffuse()));
   finish_scene(scene);
   const View view = test::view_from({0.1, 0.07, 1.25}, {0.1, 0.07, 0.0}, {1, 1}, scene, 1e-4);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
@@ -191,17 +193,18 @@ TEST(Medium, DimsNoNormals) {
 TEST(Medium, PassesAndReferenceShowTheSameRoomUnderWater) {
   for (const bool point_light : {false, true}) {
     Scene scene;
-    const std::uint32_t white = add_material(scene, test::matte(glm::vec3(0.7F)));
+    const std::uint32_t white = add_material(scene, test::diffuse(glm::vec3(0.7F)));
     add_box(scene, 1.0F, white);
     add_box(scene, point_light ? 1.2F : 0.9F, add_absorber(scene, {0.9F, 0.6F, 0.3F}));
-    place(scene, add_mesh(scene, test::sphere(0.3, 24, white)), glm::translate(glm::dmat4(1.0), {0.1, -0.3, -0.2}));
+    place_mesh(scene, add_mesh(scene, test::sphere(0.3, 24, white)),
+               glm::translate(glm::dmat4(1.0), {0.1, -0.3, -0.2}));
     if (point_light) {
       Light lamp;
       lamp.position = {0.1, 0.6, 0.2};
       scene.lights.push_back(lamp);
     } else {
       const std::uint32_t glow = add_material(scene, test::glowing({8.0F, 8.0F, 8.0F}));
-      place(scene, add_mesh(scene, quad({-0.6F, 0.7F, -0.6F}, {1.2F, 0, 0}, {0, 0, 1.2F}, glow)));
+      place_mesh(scene, add_mesh(scene, quad({-0.6F, 0.7F, -0.6F}, {1.2F, 0, 0}, {0, 0, 1.2F}, glow)));
     }
     finish_scene(scene);
     const View view = test::view_from({0, 0, 0.8}, {0, -0.3, -1}, {8, 8}, scene, 1.2);
@@ -233,12 +236,12 @@ TEST(Medium, FindsTheSolidsAPlaceLiesIn) {
   const std::uint32_t water = add_absorber(scene, half);
   const std::uint32_t clear = add_material(scene, test::clear_glass(1.5F, 1.0F));
   const std::uint32_t ball = add_mesh(scene, test::sphere(1.0, 16, water));
-  place(scene, ball);
-  place(scene, ball, glm::translate(glm::dmat4(1.0), {1.0, 2.9, 0.8}));  // about on the line through the first
-  place(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), {10, 0, 0}), {-2, 1, 1}));  // mirrored
-  place(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), {20, 0, 0}), {1, 1, 0}));   // of no volume
-  place(scene, add_mesh(scene, quad({-50, 30, -50}, {0, 0, 100}, {100, 0, 0}, water)));     // open, looks up
-  place(scene, add_mesh(scene, test::sphere(0.2, 16, clear)), glm::translate(glm::dmat4(1.0), {-0.5, 0, 0}));
+  place_mesh(scene, ball);
+  place_mesh(scene, ball, glm::translate(glm::dmat4(1.0), {1.0, 2.9, 0.8}));  // about on the line through the first
+  place_mesh(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), {10, 0, 0}), {-2, 1, 1}));  // mirrored
+  place_mesh(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), {20, 0, 0}), {1, 1, 0}));   // of no volume
+  place_mesh(scene, add_mesh(scene, quad({-50, 30, -50}, {0, 0, 100}, {100, 0, 0}, water)));     // open, looks up
+  place_mesh(scene, add_mesh(scene, test::sphere(0.2, 16, clear)), glm::translate(glm::dmat4(1.0), {-0.5, 0, 0}));
   finish_scene(scene);
   const MediumFinder finder(scene);
   EXPECT_TRUE(finder.absorbs());
@@ -265,7 +268,7 @@ TEST(Medium, FindsTheSolidsAPlaceLiesIn) {
 
 TEST(Medium, IsNotLookedForWhereNothingAbsorbs) {
   Scene scene;
-  place(scene, add_mesh(scene, test::sphere(1.0, 16, add_material(scene, test::clear_glass(1.5F, 1.0F)))));
+  place_mesh(scene, add_mesh(scene, test::sphere(1.0, 16, add_material(scene, test::clear_glass(1.5F, 1.0F)))));
   finish_scene(scene);
   EXPECT_FALSE(MediumFinder(scene).absorbs());
 }

@@ -59,9 +59,9 @@ TEST(Texture, DecodesColourBeforeMixingAndNeverAlpha) {
   texture.image = Image<Rgba8>({2, 1});
   texture.image.at(0, 0) = {0, 0, 0, 0};
   texture.image.at(1, 0) = {255, 255, 255, 255};
-  const glm::dvec4 middle = sample_texture(texture, Encoding::Srgb, {0.5, 0.5});
-  EXPECT_NEAR(middle.r, 0.5, 1e-7);
-  EXPECT_NEAR(middle.a, 0.5, 1e-12);
+  const glm::dvec4 center = sample_texture(texture, Encoding::Srgb, {0.5, 0.5});
+  EXPECT_NEAR(center.r, 0.5, 1e-7);
+  EXPECT_NEAR(center.a, 0.5, 1e-12);
   texture.image.at(0, 0) = {128, 0, 0, 128};
   const glm::dvec4 left = sample_texture(texture, Encoding::Srgb, {0.25, 0.5});
   EXPECT_NEAR(left.r, 0.2158605, 1e-6);

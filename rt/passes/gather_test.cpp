@@ -14,20 +14,20 @@ namespace {
 using test::add_material;
 using test::add_mesh;
 using test::mean_of;
-using test::place;
+using test::place_mesh;
 using test::quad;
 using test::room;
 
 /// A floor, a wall and a ball in the open, under a sky that is all the light there is.
 Scene terrace(const Material& thing) {
   Scene scene;
-  const std::uint32_t white = add_material(scene, test::matte(glm::vec3(0.8F)));
-  const std::uint32_t red = add_material(scene, test::matte({0.7F, 0.2F, 0.1F}));
+  const std::uint32_t white = add_material(scene, test::diffuse(glm::vec3(0.8F)));
+  const std::uint32_t red = add_material(scene, test::diffuse({0.7F, 0.2F, 0.1F}));
   const std::uint32_t special = add_material(scene, thing);
-  place(scene, add_mesh(scene, quad({-1, -1, 1}, {2, 0, 0}, {0, 0, -2}, white)));
-  place(scene, add_mesh(scene, quad({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, red)));
-  place(scene, add_mesh(scene, test::sphere(0.45, 64, special)),
-        glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
+  place_mesh(scene, add_mesh(scene, quad({-1, -1, 1}, {2, 0, 0}, {0, 0, -2}, white)));
+  place_mesh(scene, add_mesh(scene, quad({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, red)));
+  place_mesh(scene, add_mesh(scene, test::sphere(0.45, 64, special)),
+             glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.5, 0, 1));
   scene.environment = test::even_light({1.0F, 0.9F, 0.7F});
   finish_scene(scene);
   return scene;
@@ -40,9 +40,9 @@ TEST(Gather, RaysBringTheLightOfAnEvenSky) {
   polished.roughness = 0.2F;
   Material frosted = test::clear_glass(1.5F, 0.0F);
   frosted.roughness = 0.4F;
-  Material sign = test::matte({0.9F, 0.8F, 0.1F});
+  Material sign = test::diffuse({0.9F, 0.8F, 0.1F});
   sign.unlit = true;  // lights nothing
-  for (const Material& thing : {test::matte({0.3F, 0.6F, 0.9F}), rough, polished, frosted, sign}) {
+  for (const Material& thing : {test::diffuse({0.3F, 0.6F, 0.9F}), rough, polished, frosted, sign}) {
     const Scene scene = terrace(thing);
     const RaySettings best{
         .max_depth = 24, .photons = 1000, .global_photons = true, .gather = true, .terminator_fix = false};
@@ -80,7 +80,7 @@ TEST(Gather, RaysBringWhatNoOtherPassFollows) {
 
 /// Neither a backdrop nor the headlight are light to anything: as the passes have it.
 TEST(Gather, RaysBringNothingFromABackdrop) {
-  Scene scene = terrace(test::matte({0.3F, 0.6F, 0.9F}));
+  Scene scene = terrace(test::diffuse({0.3F, 0.6F, 0.9F}));
   scene.environment.reset();
   scene.background = {5.0F, 5.0F, 5.0F};
   const View view = test::view_from({0.3, 0.1, 0.95}, {-0.2, -0.4, -1}, {16, 16}, scene, 1.0);
@@ -92,7 +92,7 @@ TEST(Gather, RaysBringNothingFromABackdrop) {
 
 /// Where nothing decides for rays, they may be asked for: they meet a lamp too, and ask it.
 TEST(Gather, RaysBringTheLightOfALamp) {
-  const Scene scene = room(test::matte({0.3F, 0.4F, 0.6F}), false);
+  const Scene scene = room(test::diffuse({0.3F, 0.4F, 0.6F}), false);
   const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
   const glm::dvec3 reference =
       mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 1500);

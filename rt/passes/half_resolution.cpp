@@ -124,9 +124,10 @@ void HalfResShading::choose(std::vector<PathVertex>& points, int first_row) {
 
 /// Taps stand on a lattice two pixels wide: a pixel lies on one of its lines, or half way between two.
 FilterWindow HalfResShading::taps_about(std::uint32_t pixel) const {
-  const glm::ivec2 place(static_cast<int>(pixel % kTileSide) - tap_x_, static_cast<int>(pixel / kTileSide) - tap_y_);
-  const glm::ivec2 first(place.x >= 0 ? place.x / kBlockSide : -1, place.y >= 0 ? place.y / kBlockSide : -1);
-  return {first, 1 + place.x - first.x * kBlockSide, 1 + place.y - first.y * kBlockSide};
+  const glm::ivec2 position(static_cast<int>(pixel % kTileSide) - tap_x_, static_cast<int>(pixel / kTileSide) - tap_y_);
+  const glm::ivec2 first(position.x >= 0 ? position.x / kBlockSide : -1,
+                         position.y >= 0 ? position.y / kBlockSide : -1);
+  return {first, 1 + position.x - first.x * kBlockSide, 1 + position.y - first.y * kBlockSide};
 }
 
 void HalfResShading::upsample(PixelSums& sums) {

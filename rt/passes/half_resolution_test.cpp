@@ -14,7 +14,7 @@ namespace {
 using test::add_material;
 using test::add_mesh;
 using test::corner;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 const std::vector<PassId> kAll{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion,
@@ -42,13 +42,13 @@ TEST(HalfResolution, OneRayInFourFollowsWhatIsShared) {
   const View view = look(shiny);
   const test::Shaded full = test::shade(shiny, view, settings);
   const test::Shaded half = test::shade(shiny, view, halved(settings, kAll));
-  const auto share = [](std::uint64_t few, std::uint64_t all) {
+  const auto fraction = [](std::uint64_t few, std::uint64_t all) {
     return static_cast<double>(few) / static_cast<double>(all);
   };
-  EXPECT_GE(share(half.counts[PassId::Shadow], full.counts[PassId::Shadow]), 0.25);
-  EXPECT_LT(share(half.counts[PassId::Shadow], full.counts[PassId::Shadow]), 0.4);
-  EXPECT_LT(share(half.counts[PassId::AmbientOcclusion], full.counts[PassId::AmbientOcclusion]), 0.35);
-  EXPECT_LT(share(half.counts[PassId::Reflection], full.counts[PassId::Reflection]),
+  EXPECT_GE(fraction(half.counts[PassId::Shadow], full.counts[PassId::Shadow]), 0.25);
+  EXPECT_LT(fraction(half.counts[PassId::Shadow], full.counts[PassId::Shadow]), 0.4);
+  EXPECT_LT(fraction(half.counts[PassId::AmbientOcclusion], full.counts[PassId::AmbientOcclusion]), 0.35);
+  EXPECT_LT(fraction(half.counts[PassId::Reflection], full.counts[PassId::Reflection]),
             0.7);  // the ball is small and round
   EXPECT_NEAR(mean(half.image) / mean(full.image), 1.0, 0.02);
   EXPECT_NE(half.image, full.image);
@@ -57,9 +57,9 @@ TEST(HalfResolution, OneRayInFourFollowsWhatIsShared) {
 TEST(HalfResolution, RefractionIsShared) {
   Scene scene;
   add_material(scene, test::clear_glass(1.5F, 0.0F));
-  add_material(scene, test::matte());
-  place(scene, add_mesh(scene, quad({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 0)));
-  place(scene, add_mesh(scene, quad({-9, -9, -3}, {18, 0, 0}, {0, 18, 0}, 1)));
+  add_material(scene, test::diffuse());
+  place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-9, -9, -3}, {18, 0, 0}, {0, 18, 0}, 1)));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
@@ -71,12 +71,12 @@ TEST(HalfResolution, RefractionIsShared) {
 TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
   // Under a sky with nothing in its way occlusion is the same all over: shared, it is made up for the base colour.
   Scene scene;
-  Material painted = test::matte();
+  Material painted = test::diffuse();
   add_material(scene, painted);
   Mesh floor = quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0);
   floor.colors = {
       {0.2F, 0.9F, 0.5F, 1.0F}, {0.9F, 0.8F, 0.5F, 1.0F}, {0.5F, 0.5F, 0.5F, 1.0F}, {0.7F, 0.3F, 0.5F, 1.0F}};
-  place(scene, add_mesh(scene, floor));
+  place_mesh(scene, add_mesh(scene, floor));
   finish_scene(scene);
   const View view = test::view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
   const RaySettings settings{.passes = {PassId::AmbientOcclusion}};
@@ -92,11 +92,11 @@ TEST(HalfResolution, WhatIsEvenStaysAsItIs) {
 TEST(HalfResolution, AnotherMaterialIsNotTheLike) {
   // Two materials of one look meet in a plane, on a line between the pixels of one column of blocks.
   Scene scene;
-  add_material(scene, test::matte());
-  add_material(scene, test::matte());
+  add_material(scene, test::diffuse());
+  add_material(scene, test::diffuse());
   const float border = static_cast<float>(-2.0 * 3.0 * std::tan(0.4) / 64.0);
-  place(scene, add_mesh(scene, quad({-4, -4, 0}, {4 + border, 0, 0}, {0, 8, 0}, 0)));
-  place(scene, add_mesh(scene, quad({border, -4, 0}, {4 - border, 0, 0}, {0, 8, 0}, 1)));
+  place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {4 + border, 0, 0}, {0, 8, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({border, -4, 0}, {4 - border, 0, 0}, {0, 8, 0}, 1)));
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene);
   const RaySettings settings{.passes = {PassId::AmbientOcclusion}, .occlusion_rays = 1};
@@ -106,7 +106,7 @@ TEST(HalfResolution, AnotherMaterialIsNotTheLike) {
 
 TEST(HalfResolution, NoLightCrossesAnEdge) {
   // White before black: a pixel that borrowed from the other side would be far off.
-  const Scene scene = corner(test::matte(glm::vec3(0.0F)), glm::vec3(1.0F), glm::vec3(0.0F));
+  const Scene scene = corner(test::diffuse(glm::vec3(0.0F)), glm::vec3(1.0F), glm::vec3(0.0F));
   const View view = look(scene);
   const RaySettings settings{.passes = {PassId::AmbientOcclusion}};
   const Image<Rgb> full = test::shade(scene, view, settings).image;

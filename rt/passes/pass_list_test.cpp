@@ -14,7 +14,7 @@ namespace {
 Scene scene_with(const Material& material, std::size_t lights) {
   Scene scene;
   test::add_material(scene, material);
-  test::place(scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0)));
   scene.lights.resize(lights);
   finish_scene(scene);
   return scene;
@@ -25,9 +25,9 @@ bool runs(const Scene& scene, const RaySettings& settings, PassId pass) {
 }
 
 TEST(Passes, RunOnlyWhereTheSceneCanShowThem) {
-  EXPECT_FALSE(runs(scene_with(test::matte(), 0), {}, PassId::Shadow));
-  EXPECT_TRUE(runs(scene_with(test::matte(), 1), {}, PassId::Shadow));
-  EXPECT_FALSE(runs(scene_with(test::matte(), 1), {}, PassId::Reflection));
+  EXPECT_FALSE(runs(scene_with(test::diffuse(), 0), {}, PassId::Shadow));
+  EXPECT_TRUE(runs(scene_with(test::diffuse(), 1), {}, PassId::Shadow));
+  EXPECT_FALSE(runs(scene_with(test::diffuse(), 1), {}, PassId::Reflection));
   EXPECT_TRUE(runs(scene_with(test::mirror(0.5F), 0), {}, PassId::Reflection));
   EXPECT_FALSE(runs(Scene{}, {}, PassId::Reflection));
 }
@@ -38,7 +38,7 @@ TEST(Passes, RunWhenNamedAndNotWhenOthersAre) {
   EXPECT_TRUE(runs(scene, shadow_only, PassId::Shadow));
   EXPECT_FALSE(runs(scene, shadow_only, PassId::Reflection));
   EXPECT_FALSE(runs(scene, {.auto_passes = false}, PassId::Shadow));
-  EXPECT_FALSE(runs(scene_with(test::matte(), 1), {.passes = {PassId::Reflection}}, PassId::Reflection));
+  EXPECT_FALSE(runs(scene_with(test::diffuse(), 1), {.passes = {PassId::Reflection}}, PassId::Reflection));
 }
 
 TEST(Passes, FollowWhatTheGlossyCutoffSays) {
@@ -46,8 +46,8 @@ TEST(Passes, FollowWhatTheGlossyCutoffSays) {
   for (const float roughness : {0.2F, 0.5F}) {
     metal.roughness = roughness;
     Scene scene = scene_with(metal, 1);
-    test::add_material(scene, test::matte());  // to show caustics
-    test::place(scene, test::add_mesh(scene, test::quad({0, 0, -1}, {1, 0, 0}, {0, 1, 0}, 1)));
+    test::add_material(scene, test::diffuse());  // to show caustics
+    test::place_mesh(scene, test::add_mesh(scene, test::quad({0, 0, -1}, {1, 0, 0}, {0, 1, 0}, 1)));
     finish_scene(scene);
     for (const double cutoff : {0.0, 0.1, 0.3, 1.0}) {
       const RaySettings settings{.glossy_cutoff = cutoff, .photons = 1000};
@@ -61,7 +61,7 @@ TEST(Passes, FollowWhatTheGlossyCutoffSays) {
 }
 
 TEST(Passes, RaysGatherIndirectLightWhereAnEvenSkyIsAllThereIs) {
-  Scene scene = scene_with(test::matte(), 0);
+  Scene scene = scene_with(test::diffuse(), 0);
   scene.lights.clear();
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   const RaySettings best{.photons = 1000, .global_photons = true, .gather = true};
@@ -94,9 +94,9 @@ TEST(Passes, RaysGatherIndirectLightWhereAnEvenSkyIsAllThereIs) {
 }
 
 TEST(Passes, SayWhy) {
-  for (const PassPlan& plan : plan_passes(requirements_of(scene_with(test::matte(), 2)), {}))
+  for (const PassPlan& plan : plan_passes(requirements_of(scene_with(test::diffuse(), 2)), {}))
     EXPECT_FALSE(plan.why.empty());
-  EXPECT_EQ(plan_passes(requirements_of(scene_with(test::matte(), 2)), {})[0].why, "2 lights cast shadows");
+  EXPECT_EQ(plan_passes(requirements_of(scene_with(test::diffuse(), 2)), {})[0].why, "2 lights cast shadows");
 }
 
 TEST(Passes, AreFoundByTheirNames) {

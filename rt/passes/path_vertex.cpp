@@ -19,8 +19,8 @@ namespace {
 
 Sampler sampler_of(const LightContext& context, const TileJob& job, int x, int y) {
   const View& view = *job.view;
-  return {pixel_stream({context.settings.seed, job.number.frame}, view.screen_number, view.block.x0 + job.place.x0 + x,
-                       view.block.y0 + job.place.y0 + y),
+  return {pixel_stream({context.settings.seed, job.number.frame}, view.screen_number, view.block.x0 + job.rect.x0 + x,
+                       view.block.y0 + job.rect.y0 + y),
           job.number.sample};
 }
 
@@ -44,26 +44,26 @@ class PrimaryVertices {
     prefetch(rows_.first);
     for (int y = rows_.first; y < rows_.end; ++y) {
       if (y + 1 < rows_.end) prefetch(y + 1);
-      for (int x = 0; x < job_.place.width(); ++x) {
+      for (int x = 0; x < job_.rect.width(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
-        const double share = left_.empty() ? 1.0 : left_[pixel];
-        if (!(share > 0.0) || !job_.wants(pixel)) continue;
+        const double fraction = left_.empty() ? 1.0 : left_[pixel];
+        if (!(fraction > 0.0) || !job_.wants(pixel)) continue;
         if (job_.keys[pixel] != kNoKey) {
-          find_surface(x, y, job_.keys[pixel], share);
+          find_surface(x, y, job_.keys[pixel], fraction);
           continue;
         }
         const glm::dvec3 light = even ? *even : context_.lights.environment(glm::normalize(ray_of(x, y).direction));
-        sums_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, share * light);
+        sums_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, fraction * light);
       }
     }
   }
 
-  void find_surface(int x, int y, Key key, double share) {
+  void find_surface(int x, int y, Key key, double fraction) {
     const Ray ray = ray_of(x, y);
     const WorldTriangle& triangle = buffers_.triangles.load(context_.surfaces, key_surface(key));
     PathVertex& point = points_.emplace_back();
     point.surface = context_.surfaces.meet(triangle, ray.origin, ray.direction);
-    start_vertex(context_, job_, x, y, share, point);
+    start_vertex(context_, job_, x, y, fraction, point);
   }
 
   void prefetch(int y) const {
@@ -74,7 +74,7 @@ class PrimaryVertices {
   }
 
   [[nodiscard]] Ray ray_of(int x, int y) const {
-    return view_ray(*job_.view, job_.place.x0 + x + 0.5, job_.place.y0 + y + 0.5);
+    return view_ray(*job_.view, job_.rect.x0 + x + 0.5, job_.rect.y0 + y + 0.5);
   }
 
   /// Rays go from the near plane to the surface the key names: what they meet covers a share of what lies behind.
@@ -83,7 +83,7 @@ class PrimaryVertices {
     buffers_.requests.clear();
     WorldTriangle triangle;
     for (int y = rows_.first; y < rows_.end; ++y) {
-      for (int x = 0; x < job_.place.width(); ++x) {
+      for (int x = 0; x < job_.rect.width(); ++x) {
         const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
         if (!job_.wants(pixel)) continue;
         const Ray ray = ray_of(x, y);
@@ -107,11 +107,11 @@ class PrimaryVertices {
                                         const int y = static_cast<int>(pixel) / kTileSide;
                                         Sampler sampler = sampler_of(context_, job_, x, y).branch(surface.surface);
                                         const double covered = left_[pixel] * coverage;
-                                        const double share = covered * russian_roulette_weight(covered, sampler);
-                                        if (share > 0.0) {
+                                        const double fraction = covered * russian_roulette_weight(covered, sampler);
+                                        if (fraction > 0.0) {
                                           PathVertex& point = points_.emplace_back();
                                           point.surface = surface;
-                                          start_vertex(context_, job_, x, y, share, point);
+                                          start_vertex(context_, job_, x, y, fraction, point);
                                         }
                                         left_[pixel] *= 1.0 - coverage;
                                         left_[pixel] *= russian_roulette_weight(left_[pixel], sampler);
@@ -131,17 +131,17 @@ class PrimaryVertices {
 
 }  // namespace
 
-void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double share, PathVertex& point) {
-  point.coverage = share;
+void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double fraction, PathVertex& point) {
+  point.coverage = fraction;
   point.media = context.eye_media;
-  point.throughput = share * transmittance(point.media.here, glm::distance(job.view->eye, point.surface.position));
+  point.throughput = fraction * transmittance(point.media.here, glm::distance(job.view->eye, point.surface.position));
   point.sampler = sampler_of(context, job, x, y);
   point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
   prefetch_material(context.scene, point.surface);
 }
 
 RayRequest eye_ray(const View& view, const TileJob& job, double x, double y) {
-  const Ray ray = view_ray(view, job.place.x0 + x, job.place.y0 + y);
+  const Ray ray = view_ray(view, job.rect.x0 + x, job.rect.y0 + y);
   RayRequest request;
   request.origin = ray.origin + ray.direction * view.near_distance;
   request.direction = glm::normalize(ray.direction);
@@ -167,13 +167,13 @@ std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const
 }
 
 int end_of_wavefront(const TileJob& job, int first) {
-  if (job.wanted.empty()) return std::min(first + static_cast<int>(kWavefrontVertices) / kTileSide, job.place.height());
+  if (job.wanted.empty()) return std::min(first + static_cast<int>(kWavefrontVertices) / kTileSide, job.rect.height());
   std::size_t points = 0;
   int row = first;
   do {
     const auto pixels = job.wanted.subspan(static_cast<std::size_t>(row) * kTileSide, kTileSide);
     points += static_cast<std::size_t>(std::ranges::count(pixels, std::uint8_t{1}));
-  } while (++row < job.place.height() && points + kTileSide <= kWavefrontVertices);
+  } while (++row < job.rect.height() && points + kTileSide <= kWavefrontVertices);
   return row;
 }
 
@@ -318,10 +318,10 @@ void finish_vertex(const LightContext& context, PathVertex& point, double metres
   const auto reflection = static_cast<std::size_t>(Lobe::Reflection);
   const auto transmission = static_cast<std::size_t>(Lobe::Transmission);
   if (point.depth < kChoosingDepth || !point.may_follow[reflection] || !point.may_follow[transmission]) return;
-  const double share = std::clamp(bright[reflection] / (bright[reflection] + bright[transmission]), 0.1, 0.9);
-  const bool reflects = point.sampler.one() < share;
-  point.lobe_weights[reflection] *= reflects ? static_cast<float>(1.0 / share) : 0.0F;
-  point.lobe_weights[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - share));
+  const double fraction = std::clamp(bright[reflection] / (bright[reflection] + bright[transmission]), 0.1, 0.9);
+  const bool reflects = point.sampler.one() < fraction;
+  point.lobe_weights[reflection] *= reflects ? static_cast<float>(1.0 / fraction) : 0.0F;
+  point.lobe_weights[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - fraction));
 }
 
 void follow_lobe(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,

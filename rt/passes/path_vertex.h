@@ -14,7 +14,7 @@ namespace hpr {
 
 /// One sample of a tile: its pixels, its view and its keys.
 struct TileJob {
-  Rect place;
+  Rect rect;
   SampleNumber number;
   std::span<const Key> keys;
   const View* view = nullptr;
@@ -46,7 +46,7 @@ inline constexpr std::size_t kWavefrontVertices = 512;
 [[nodiscard]] int end_of_wavefront(const TileJob& job, int first);
 
 /// Initializes a vertex whose surface is set, shown at pixel (x, y) of the tile, of which it covers `share`.
-void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double share, PathVertex& point);
+void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double fraction, PathVertex& point);
 
 /// Finds the primary vertices in some rows of a tile: the surfaces its keys name, and those of partial coverage before
 /// them, each with the share of the pixel it covers. Adds the background where neither is.

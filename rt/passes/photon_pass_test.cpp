@@ -15,17 +15,17 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 /// A closed box of one grey that emits, two of `size` a side: light is the same everywhere inside.
 Scene furnace(float albedo, float emission, float size = 1.0F) {
   Scene scene;
-  Material wall = test::matte(glm::vec3(albedo));
+  Material wall = test::diffuse(glm::vec3(albedo));
   wall.emissive = glm::vec3(emission);
   add_material(scene, wall);
   const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b) {
-    place(scene, add_mesh(scene, quad(size * corner, size * a, size * b, 0)));
+    place_mesh(scene, add_mesh(scene, quad(size * corner, size * a, size * b, 0)));
   };
   side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0});
   side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0});

@@ -21,8 +21,8 @@ bool is_finite(const Rgb& color) {
 /// Calls `body` with each pixel of the tile that is lit.
 template <typename Body>
 void each_lit(const TileJob& job, const Body& body) {
-  for (int y = 0; y < job.place.height(); ++y) {
-    for (int x = 0; x < job.place.width(); ++x) {
+  for (int y = 0; y < job.rect.height(); ++y) {
+    for (int x = 0; x < job.rect.width(); ++x) {
       const auto pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
       if (job.wants(pixel)) body(pixel);
     }
@@ -37,7 +37,7 @@ void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) 
   const auto y = static_cast<int>(pixel / kTileSide);
   counts.first_not_finite =
       std::min(counts.first_not_finite,
-               ScreenPixel{job.view->screen_number, block.y0 + job.place.y0 + y, block.x0 + job.place.x0 + x});
+               ScreenPixel{job.view->screen_number, block.y0 + job.rect.y0 + y, block.x0 + job.rect.x0 + x});
 }
 
 /// Sets the sums of so many pixels, tile after tile, to 0 where they are wanted: everywhere when the mask is empty.

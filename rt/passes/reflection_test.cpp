@@ -13,15 +13,15 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 TEST(Reflection, AMirrorShowsTheColourOfWhatItReflectsTimesItsReflectance) {
   Scene scene;
   add_material(scene, test::mirror(0.25F));
   add_material(scene, test::glowing({3.0F, 0.5F, 0.125F}));
-  place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
-  place(scene, add_mesh(scene, quad({-50, 10, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
+  place_mesh(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-50, 10, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
   finish_scene(scene);
   const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {5, 5}, scene, 1e-4, {0, 0, -1});
   const test::Shaded lit = test::shade(scene, view);
@@ -40,8 +40,8 @@ test::Shaded leaning_mirror(const glm::dvec3& to_viewer) {
   add_material(scene, test::glowing(glm::vec3(2.0F)));
   Mesh mirror = quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0);
   mirror.normals.assign(4, glm::vec3(std::sin(0.7F), std::cos(0.7F), 0.0F));
-  place(scene, add_mesh(scene, mirror));
-  place(scene, add_mesh(scene, quad({10, -50, -50}, {0, 100, 0}, {0, 0, 100}, 1)));
+  place_mesh(scene, add_mesh(scene, mirror));
+  place_mesh(scene, add_mesh(scene, quad({10, -50, -50}, {0, 100, 0}, {0, 0, 100}, 1)));
   finish_scene(scene);
   return test::shade(scene, test::view_from(3.0 * to_viewer, {0, 0, 0}, {3, 3}, scene, 1e-4));
 }
@@ -76,7 +76,7 @@ Furnace furnace(float roughness, const RaySettings& settings) {
   Material material = test::mirror(1.0F);
   material.roughness = roughness;
   add_material(scene, material);
-  place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({2, 2, 0}, {0, 0, 0}, {1, 1}, scene, 1e-4);
@@ -112,7 +112,7 @@ TEST(Reflection, ABlurredMirrorImageIsTheMeanOverItsLobe) {
 TEST(Reflection, AMirrorThatFacesNothingShowsTheBackground) {
   Scene scene;
   add_material(scene, test::mirror(0.5F));
-  place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
   scene.background = {0.5F, 1.0F, 2.0F};
   finish_scene(scene);
   const View view = test::view_from({0, 3, 0}, {0, 0, 0}, {65, 65}, scene, 1.2, {0, 0, -1});
@@ -127,8 +127,8 @@ TEST(Reflection, TwoFacingMirrorsSumTheirGeometricSeriesUpToTheDepth) {
   Material glowing_mirror = test::mirror(static_cast<float>(kRho));
   glowing_mirror.emissive = glm::vec3(1.0F);
   add_material(scene, glowing_mirror);
-  place(scene, add_mesh(scene, quad({-50, 0, 50}, {100, 0, 0}, {0, 0, -100}, 0)));
-  place(scene, add_mesh(scene, quad({-50, 4, -50}, {100, 0, 0}, {0, 0, 100}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-50, 0, 50}, {100, 0, 0}, {0, 0, -100}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-50, 4, -50}, {100, 0, 0}, {0, 0, 100}, 0)));
   finish_scene(scene);
   const View view = test::view_from({0, 2, 0}, {0, 0, 0}, {3, 3}, scene, 1e-6, {0, 0, -1});
   for (const int depth : {0, 1, 2, 7, 40}) {
@@ -145,8 +145,8 @@ TEST(Reflection, ADimMirrorShowsWhatIsBrightEnough) {
   Scene scene;
   add_material(scene, test::mirror(1e-7F));
   add_material(scene, test::glowing(glm::vec3(1e6F)));
-  place(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
-  place(scene, add_mesh(scene, quad({-50, 4, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
+  place_mesh(scene, add_mesh(scene, quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-50, 4, -50}, {100, 0, 0}, {0, 0, 100}, 1)));
   finish_scene(scene);
   const View view = test::view_from({0, 2, 0}, {0, 0, 0}, {64, 64}, scene, 0.1, {0, 0, -1});
   double sum = 0.0;
@@ -164,11 +164,11 @@ TEST(Reflection, ADimMirrorShowsWhatIsBrightEnough) {
 TEST(Reflection, WhatAMirrorShowsIsLitAndShadowed) {
   // The eye sees, by a mirror, a floor whose light is blocked on one half.
   Scene scene;
-  add_material(scene, test::matte());
+  add_material(scene, test::diffuse());
   add_material(scene, test::mirror(1.0F));
-  place(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
-  place(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 8, 0}, 1)));
-  place(scene, add_mesh(scene, quad({0, 1, 4}, {4, 0, 0}, {0, 0, -8}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, -4}, {8, 0, 0}, {0, 8, 0}, 1)));
+  place_mesh(scene, add_mesh(scene, quad({0, 1, 4}, {4, 0, 0}, {0, 0, -8}, 0)));
   finish_scene(scene);
   Light sun;
   sun.type = LightType::Directional;

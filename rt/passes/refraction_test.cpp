@@ -10,7 +10,7 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 constexpr double kWall = 2.0;
@@ -20,7 +20,7 @@ template <typename Add>
 double seen_through(const Add& add, const RaySettings& settings = {.max_depth = 60}) {
   Scene scene;
   add_material(scene, test::glowing(glm::vec3(kWall)));
-  place(scene, add_mesh(scene, quad({-500, -500, -5}, {1000, 0, 0}, {0, 1000, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-500, -500, -5}, {1000, 0, 0}, {0, 1000, 0}, 0)));
   add(scene);
   finish_scene(scene);
   const View view = test::view_from({0, 0, 5}, {0, 0, 0}, {1, 1}, scene, 1e-4);
@@ -31,9 +31,9 @@ double seen_through(const Add& add, const RaySettings& settings = {.max_depth = 
 auto pane(const Material& material, float thickness) {
   return [material, thickness](Scene& scene) {
     const std::uint32_t glass = add_material(scene, material);
-    place(scene, add_mesh(scene, quad({-50, -50, 0}, {100, 0, 0}, {0, 100, 0}, glass)));
+    place_mesh(scene, add_mesh(scene, quad({-50, -50, 0}, {100, 0, 0}, {0, 100, 0}, glass)));
     if (thickness == 0.0F) return;
-    place(scene, add_mesh(scene, quad({-50, -50, -thickness}, {0, 100, 0}, {100, 0, 0}, glass)));
+    place_mesh(scene, add_mesh(scene, quad({-50, -50, -thickness}, {0, 100, 0}, {100, 0, 0}, glass)));
   };
 }
 
@@ -76,7 +76,7 @@ TEST(Refraction, AGlassBallUnderAnEvenSkyIsAsBrightAsTheSky) {
   Scene scene;
   const std::uint32_t glass = add_material(scene, test::clear_glass(1.5F, 1.0F));
   Mesh ball = test::sphere(1.0, 64, glass);
-  place(scene, add_mesh(scene, ball));
+  place_mesh(scene, add_mesh(scene, ball));
   scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
   finish_scene(scene);
   const View view = test::view_from({0, 0, 4}, {0, 0, 0}, {16, 16}, scene, 0.6);
@@ -90,7 +90,7 @@ TEST(Refraction, AGlassBallUnderAnEvenSkyIsAsBrightAsTheSky) {
 TEST(Refraction, CountsItsRaysAndItsShareOfTheColour) {
   Scene scene;
   add_material(scene, test::glowing(glm::vec3(1.0F)));
-  place(scene, add_mesh(scene, quad({-50, -50, -5}, {100, 0, 0}, {0, 100, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-50, -50, -5}, {100, 0, 0}, {0, 100, 0}, 0)));
   pane(test::clear_glass(1.5F, 1.0F), 1.0F)(scene);
   finish_scene(scene);
   const View view = test::view_from({0, 0, 5}, {0, 0, 0}, {8, 8}, scene, 0.1);

@@ -21,8 +21,8 @@ double chance_of_plain(const SurfacePoint& surface, const glm::dvec3& shading_no
   if (lobe == Lobe::Diffuse) return 1.0;
   if (lobe == Lobe::Transmission) return 0.25;
   const glm::dvec3& geometric = surface.geometric_normal;
-  const glm::dvec3 mirrored = 2.0 * glm::dot(surface.to_viewer, geometric) * geometric - surface.to_viewer;
-  if (!(glm::dot(mirrored, shading_normal) > 0.0)) return 0.5;
+  const glm::dvec3 reflected = 2.0 * glm::dot(surface.to_viewer, geometric) * geometric - surface.to_viewer;
+  if (!(glm::dot(reflected, shading_normal) > 0.0)) return 0.5;
   return std::clamp(1.0 - glm::dot(shading_normal, geometric), 0.0, 0.5);
 }
 
@@ -140,10 +140,10 @@ AdjointBsdf::Directions AdjointBsdf::find_directions(Lobe lobe) const {
     const auto same = [&](const glm::dvec3& other) { return glm::distance(other, *normal) < 4.0 * kSame; };
     if (std::any_of(normals.begin(), normal, same)) continue;
     for (const glm::dvec3& before : arrived) {
-      const FluxDirection way = direction_by(before, *normal, eta);
-      if (!(sum_of(way.weight) > 0.0) || !std::isfinite(sum_of(way.weight))) continue;
-      directions.sum += way.weight;
-      directions.all.at(directions.count++) = way;
+      const FluxDirection direction = direction_by(before, *normal, eta);
+      if (!(sum_of(direction.weight) > 0.0) || !std::isfinite(sum_of(direction.weight))) continue;
+      directions.sum += direction.weight;
+      directions.all.at(directions.count++) = direction;
     }
   }
   return directions;
@@ -157,8 +157,8 @@ std::optional<BsdfSample> AdjointBsdf::sample_direction(const Directions& direct
   while (chosen + 1 < directions.count && left >= sum_of(directions.all.at(chosen).weight)) {
     left -= sum_of(directions.all.at(chosen++).weight);
   }
-  const FluxDirection& way = directions.all.at(chosen);
-  return BsdfSample{way.direction, way.weight * (sum / sum_of(way.weight)), 0.0};
+  const FluxDirection& direction = directions.all.at(chosen);
+  return BsdfSample{direction.direction, direction.weight * (sum / sum_of(direction.weight)), 0.0};
 }
 
 }  // namespace hpr

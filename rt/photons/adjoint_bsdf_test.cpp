@@ -43,15 +43,15 @@ struct Place {
       scene.textures.push_back(std::move(map));
       scene.materials[used].normal_texture.texture = 0;
     }
-    test::place(scene, test::add_mesh(scene, std::move(mesh)));
+    test::place_mesh(scene, test::add_mesh(scene, std::move(mesh)));
     finish_scene(scene);
     surfaces.emplace(scene, RaySpace(scene.bounds));
     surfaces->load(0, triangle);
   }
 
   [[nodiscard]] SurfacePoint from(const glm::dvec3& direction) const {
-    const glm::dvec3 place(0.2, -0.3, 0.0);
-    return surfaces->meet(triangle, place + direction, -direction);
+    const glm::dvec3 position(0.2, -0.3, 0.0);
+    return surfaces->meet(triangle, position + direction, -direction);
   }
 };
 
@@ -85,13 +85,13 @@ void add(Sums& sums, double amount, const glm::dvec3& lamp, const glm::dvec3& ey
 constexpr std::uint32_t kSamples = 1U << 19U;
 
 /// Eyes that look for light by the lobe.
-Sums by_eyes(const Place& place, Lobe lobe) {
+Sums by_eyes(const Place& position, Lobe lobe) {
   Sums sums{};
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(7, i);
     const glm::dvec3 eye = warp::on_sphere(sampler.two());
-    const SurfacePoint surface = place.from(eye);
-    const Bsdf bsdf(evaluate_material(place.scene, surface), surface);
+    const SurfacePoint surface = position.from(eye);
+    const Bsdf bsdf(evaluate_material(position.scene, surface), surface);
     const auto sample = bsdf.sample(lobe, sampler.two());
     if (sample) add(sums, sample->weight.r * std::abs(eye.z) / kSamples, sample->direction, eye);
   }
@@ -99,16 +99,16 @@ Sums by_eyes(const Place& place, Lobe lobe) {
 }
 
 /// Light that looks for eyes.
-Sums by_light(const Place& place, Lobe lobe) {
+Sums by_light(const Place& position, Lobe lobe) {
   Sums sums{};
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(8, i);
     const glm::dvec3 light = warp::on_sphere(sampler.two());
-    const SurfacePoint surface = place.from(light);
-    const MaterialPoint material = evaluate_material(place.scene, surface);
+    const SurfacePoint surface = position.from(light);
+    const MaterialPoint material = evaluate_material(position.scene, surface);
     const Bsdf bsdf(material, surface, Carried::Flux);
-    const FluxArrival arrival{surface, material, bsdf, place.triangle};
-    const AdjointBsdf scatters(place.scene, *place.surfaces, arrival);
+    const FluxArrival arrival{surface, material, bsdf, position.triangle};
+    const AdjointBsdf scatters(position.scene, *position.surfaces, arrival);
     const auto sample = scatters.sample(lobe, sampler);
     EXPECT_TRUE(!sample || sample->weight.r == 0.0 || scatters.weight(lobe).r > 0.0);
     if (!sample) continue;
@@ -138,9 +138,9 @@ TEST_P(AdjointBsdf, SendsOnWhatEyesSee) {
                          std::tuple("frosted solid", Lobe::Transmission, glass(0.4F, 1.0F)),
                          std::tuple("clear solid", Lobe::Transmission, glass(0.0F, 1.0F))};
   for (const auto& [name, lobe, material] : cases) {
-    const Place place(material, GetParam());
-    const Sums seen = by_eyes(place, lobe);
-    const Sums sent = by_light(place, lobe);
+    const Place position(material, GetParam());
+    const Sums seen = by_eyes(position, lobe);
+    const Sums sent = by_light(position, lobe);
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t j = 0; j < 3; ++j) {
         EXPECT_NEAR(sent.at(i).at(j), seen.at(i).at(j), 0.002 + 0.015 * seen.at(i).at(j))

@@ -17,9 +17,9 @@ constexpr double kBeamHalf = 0.3;
 /// A glass sphere about the middle of a matte room.
 PhotonRoom room_with_sphere() {
   Scene scene;
-  test::add_room(scene, test::add_material(scene, test::matte(glm::vec3(0.5F))));
+  test::add_room(scene, test::add_material(scene, test::diffuse(glm::vec3(0.5F))));
   const std::uint32_t glass = test::add_material(scene, test::clear_glass());
-  test::place(scene, test::add_mesh(scene, test::sphere(kRadius, 100, glass)));
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(kRadius, 100, glass)));
   return PhotonRoom(std::move(scene));
 }
 
@@ -84,8 +84,8 @@ TEST(PhotonCausticTest, TheMapHoldsTheEnergyOfItsPhotons) {
   double sum = 0.0;
   for (int i = 0; i < kSide; ++i) {
     for (int j = 0; j < kSide; ++j) {
-      const glm::dvec3 place(1.2 * (i + 0.5) / kSide - 0.6, -1.0, 1.2 * (j + 0.5) / kSide - 0.6);
-      sum += map.gather(place, {0.0, 1.0, 0.0}, [](const glm::dvec3&) { return glm::dvec3(1.0); }).g;
+      const glm::dvec3 position(1.2 * (i + 0.5) / kSide - 0.6, -1.0, 1.2 * (j + 0.5) / kSide - 0.6);
+      sum += map.gather(position, {0.0, 1.0, 0.0}, [](const glm::dvec3&) { return glm::dvec3(1.0); }).g;
     }
   }
   EXPECT_NEAR(sum * std::pow(1.2 / kSide, 2.0), on_floor, 0.005 * on_floor);
@@ -109,9 +109,9 @@ TEST(PhotonGatherTest, OnlySurfacesWithALobeThatIsNotFollowedTakePhotons) {
   EXPECT_FALSE(takes(metal, 0.6));
   EXPECT_TRUE(takes(metal, 0.5));
   EXPECT_FALSE(takes(test::clear_glass(), 0.0));
-  EXPECT_TRUE(takes(test::matte(), 1.0));
-  EXPECT_FALSE(takes(test::matte(glm::vec3(0.0F)), 0.0));
-  Material plastic = test::matte();
+  EXPECT_TRUE(takes(test::diffuse(), 1.0));
+  EXPECT_FALSE(takes(test::diffuse(glm::vec3(0.0F)), 0.0));
+  Material plastic = test::diffuse();
   plastic.ior = 1.5F;
   EXPECT_TRUE(takes(plastic, 1.0)) << "the base below the followed layer";
 }

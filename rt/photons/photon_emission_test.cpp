@@ -20,11 +20,11 @@ constexpr std::uint32_t kPhotons = 65536;
 
 Scene room(const glm::vec3& emission) {
   Scene scene;
-  const std::uint32_t floor = test::add_material(scene, test::matte());
-  test::place(scene, test::add_mesh(scene, test::quad({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, floor)));
+  const std::uint32_t floor = test::add_material(scene, test::diffuse());
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, floor)));
   const std::uint32_t glow = test::add_material(scene, test::glowing(emission));
   const std::uint32_t panel = test::add_mesh(scene, test::quad({-1, -1, 3}, {0, 2, 0}, {2, 0, 0}, glow));
-  test::place(scene, panel);
+  test::place_mesh(scene, panel);
   finish_scene(scene);
   return scene;
 }

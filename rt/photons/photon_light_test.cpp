@@ -149,9 +149,9 @@ PhotonSource lamp() {
 /// A room of twelve triangles, red and green left and right, with a lamp and one object.
 PhotonRoom cornell(const Material& object_material, bool cube) {
   Scene scene;
-  const std::uint32_t white = test::add_material(scene, test::matte(glm::vec3(0.75F)));
-  const std::uint32_t red = test::add_material(scene, test::matte({0.6F, 0.1F, 0.1F}));
-  const std::uint32_t green = test::add_material(scene, test::matte({0.1F, 0.5F, 0.1F}));
+  const std::uint32_t white = test::add_material(scene, test::diffuse(glm::vec3(0.75F)));
+  const std::uint32_t red = test::add_material(scene, test::diffuse({0.6F, 0.1F, 0.1F}));
+  const std::uint32_t green = test::add_material(scene, test::diffuse({0.1F, 0.5F, 0.1F}));
   const std::uint32_t light = test::add_material(scene, test::glowing(glm::vec3(1.0F)));
   const std::uint32_t object = test::add_material(scene, object_material);
   test::add_room(scene, white);
@@ -159,11 +159,11 @@ PhotonRoom cornell(const Material& object_material, bool cube) {
   scene.meshes[1].material = green;
   const auto height = static_cast<float>(kLampHeight);
   const auto half = static_cast<float>(kLampHalf);
-  test::place(scene,
-              test::add_mesh(scene, test::quad({-half, height, -half}, {2 * half, 0, 0}, {0, 0, 2 * half}, light)));
+  test::place_mesh(
+      scene, test::add_mesh(scene, test::quad({-half, height, -half}, {2 * half, 0, 0}, {0, 0, 2 * half}, light)));
   if (!cube) {
-    test::place(scene,
-                test::add_mesh(scene, test::quad({-0.7F, -0.95F, -0.4F}, {1.2F, 0, -0.3F}, {0, 1.3F, -0.2F}, object)));
+    test::place_mesh(
+        scene, test::add_mesh(scene, test::quad({-0.7F, -0.95F, -0.4F}, {1.2F, 0, -0.3F}, {0, 1.3F, -0.2F}, object)));
     return PhotonRoom(std::move(scene));
   }
   Scene walls;
@@ -174,7 +174,7 @@ PhotonRoom cornell(const Material& object_material, bool cube) {
     for (glm::vec3& normal : wall.normals) normal = -normal;
     glm::dmat4 to_world(axes);
     to_world[3] = {0.1, -0.4, 0.0, 1.0};
-    test::place(scene, test::add_mesh(scene, wall), to_world);
+    test::place_mesh(scene, test::add_mesh(scene, wall), to_world);
   }
   return PhotonRoom(std::move(scene));
 }

@@ -97,17 +97,17 @@ void PhotonMap::sort(std::span<const Photon> photons) {
   const std::uint32_t again = starts_[0] + starts_[1];
   std::uint32_t before = 0;
   for (std::uint32_t slot = 0; slot < slots_; ++slot) before += std::exchange(starts_[slot], before);
-  places_ = std::make_unique_for_overwrite<PhotonPlace[]>(size_ + again + kReadBeyond);
+  positions_ = std::make_unique_for_overwrite<PhotonPlace[]>(size_ + again + kReadBeyond);
   lights_ = std::make_unique_for_overwrite<PhotonLight[]>(size_ + again);
   constexpr std::size_t kAhead = 16;  // every photon goes to other cache lines, whose way is long
   for (std::size_t i = 0; i < photons.size(); ++i) {
     if (i + kAhead < photons.size()) {
-      __builtin_prefetch(places_.get() + starts_[slots[i + kAhead]], 1);
+      __builtin_prefetch(positions_.get() + starts_[slots[i + kAhead]], 1);
       __builtin_prefetch(lights_.get() + starts_[slots[i + kAhead]], 1);
     }
     if (slots[i] == slots_) continue;
     const std::uint32_t to = starts_[slots[i]]++;
-    places_[to] = {photons[i].position, photons[i].facing};
+    positions_[to] = {photons[i].position, photons[i].facing};
     lights_[to] = {photons[i].direction, photons[i].flux};
   }
   // Each start now stands where the next slot begins.
@@ -115,17 +115,18 @@ void PhotonMap::sort(std::span<const Photon> photons) {
   starts_[0] = 0;
   starts_[slots_ + 1] = starts_[slots_] + starts_[1];
   starts_[slots_ + 2] = starts_[slots_] + starts_[2];
-  std::copy_n(places_.get(), again, places_.get() + size_);
+  std::copy_n(positions_.get(), again, positions_.get() + size_);
   std::copy_n(lights_.get(), again, lights_.get() + size_);
-  std::fill_n(places_.get() + size_ + again, kReadBeyond, PhotonPlace{});
+  std::fill_n(positions_.get() + size_ + again, kReadBeyond, PhotonPlace{});
 }
 
-void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const {
+void PhotonMap::find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer,
+                     FoundPhotons& found) const {
   found.count = 0;
   if (size_ == 0) return;
   PhotonSearch search;
-  search.place = space_.from_world(place);
-  const glm::dvec3 cell = in_cells(search.place);
+  search.position = space_.from_world(position);
+  const glm::dvec3 cell = in_cells(search.position);
   if (!inside(cell)) return;
   const auto x = static_cast<std::uint32_t>(cell.x);
   const auto y = static_cast<std::uint32_t>(cell.y);
@@ -142,7 +143,7 @@ void PhotonMap::find(const glm::dvec3& place, const glm::dvec3& normal, std::uin
   search.cells_per_unit = cells_per_unit_;
   search.flatness = flatness_;
   search.min_cosine2 = kMinCosine2;
-  find_photons(search, starts_.get(), places_.get(), found);
+  find_photons(search, starts_.get(), positions_.get(), found);
 }
 
 double progressive_radius(double first, std::uint64_t pass) {
@@ -157,30 +158,30 @@ double first_radius(std::span<const Photon> photons, const RaySpace& space, doub
   constexpr std::size_t kMaxThinned = 32768;
   constexpr std::size_t kProbes = 127;
   const std::size_t stride = photons.size() / kMaxThinned + 1;
-  std::vector<glm::vec3> places;
+  std::vector<glm::vec3> positions;
   for (std::size_t i = 0; i < photons.size(); i += stride) {
     const auto& p = photons[i].position;
-    if (finite(p)) places.emplace_back(p[0], p[1], p[2]);
+    if (finite(p)) positions.emplace_back(p[0], p[1], p[2]);
   }
-  const auto share = static_cast<double>(stride);
-  const auto k = static_cast<std::size_t>(std::clamp(wanted / share, 1.0, static_cast<double>(places.size())));
-  if (places.size() < 2 || k >= places.size()) return most / space.scale;
-  const std::size_t step = std::max<std::size_t>(places.size() / kProbes, 1);
+  const auto fraction = static_cast<double>(stride);
+  const auto k = static_cast<std::size_t>(std::clamp(wanted / fraction, 1.0, static_cast<double>(positions.size())));
+  if (positions.size() < 2 || k >= positions.size()) return most / space.scale;
+  const std::size_t step = std::max<std::size_t>(positions.size() / kProbes, 1);
   std::vector<double> areas;  // of the circles about some of them that take in k others, over pi
-  std::vector<float> distances2(places.size());
-  for (std::size_t probe = 0; probe < places.size(); probe += step) {
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const glm::vec3 way = places[i] - places[probe];
-      distances2[i] = glm::dot(way, way);
+  std::vector<float> distances2(positions.size());
+  for (std::size_t probe = 0; probe < positions.size(); probe += step) {
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const glm::vec3 direction = positions[i] - positions[probe];
+      distances2[i] = glm::dot(direction, direction);
     }
     const auto kth = distances2.begin() + static_cast<std::ptrdiff_t>(k);  // the nearest is the probe itself
     std::ranges::nth_element(distances2, kth);
     areas.push_back(*kth);
   }
-  const auto middle = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
-  std::ranges::nth_element(areas, middle);
+  const auto center = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
+  std::ranges::nth_element(areas, center);
   // The circle that takes in k of evenly scattered points follows a gamma distribution, whose median is k - 1/3.
-  const double area_of_one = *middle / (static_cast<double>(k) - 1.0 / 3.0) / share;
+  const double area_of_one = *center / (static_cast<double>(k) - 1.0 / 3.0) / fraction;
   const double radius = std::sqrt(wanted * area_of_one);
   return (radius > 0.0 ? std::min(radius, most) : most) / space.scale;
 }

@@ -94,7 +94,7 @@ class PhotonMap {
   /// They are weighted by Epanechnikov's kernel 2 / (pi r^2) (1 - d^2 / r^2), of which density() is the factor: of all
   /// kernels the one with the least mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at
   /// the rim, so that what lies there matters little and pictures are continuous.
-  void find(const glm::dvec3& place, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const;
+  void find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const;
 
   /// W/m^2 per flux unit: times this, the sum of weights and fluxes is an irradiance.
   [[nodiscard]] double density() const { return density_; }
@@ -106,9 +106,9 @@ class PhotonMap {
   /// direction it came from: irradiance in W/m^2 for a value of 1, reflected radiance for that of a BRDF (flux density
   /// holds the cosine).
   template <typename Value>
-  [[nodiscard]] glm::dvec3 gather(const glm::dvec3& place, const glm::dvec3& normal, Value&& value) const {
+  [[nodiscard]] glm::dvec3 gather(const glm::dvec3& position, const glm::dvec3& normal, Value&& value) const {
     FoundPhotons found;
-    find(place, normal, 0, found);
+    find(position, normal, 0, found);
     glm::dvec3 sum(0.0);
     for (std::size_t i = 0; i < found.count; ++i) {
       const PhotonLight& light = lights_[found.index[i]];
@@ -119,9 +119,9 @@ class PhotonMap {
   }
 
   /// How many photons such a gather counts.
-  [[nodiscard]] std::size_t count(const glm::dvec3& place, const glm::dvec3& normal) const {
+  [[nodiscard]] std::size_t count(const glm::dvec3& position, const glm::dvec3& normal) const {
     FoundPhotons found;
-    find(place, normal, 0, found);
+    find(position, normal, 0, found);
     return found.count;
   }
 
@@ -163,7 +163,7 @@ class PhotonMap {
   std::uint32_t row_step_ = 0;
   std::uint32_t layer_step_ = 0;
   // By slot; those of the first two slots stand once more behind the last, so that runs need not wrap around.
-  std::unique_ptr<PhotonPlace[]> places_;  ///< and kReadBeyond more
+  std::unique_ptr<PhotonPlace[]> positions_;  ///< and kReadBeyond more
   std::unique_ptr<PhotonLight[]> lights_;
   std::unique_ptr<std::uint32_t[]> starts_;  ///< [slots_ + 3]: where each slot's photons begin
 };

@@ -65,13 +65,14 @@ glm::dvec3 facing_of(const Photon& photon) {
 }
 
 /// What the map promises, photon by photon.
-Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& place, const glm::dvec3& normal, double radius) {
+Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& position, const glm::dvec3& normal,
+                    double radius) {
   Gathered result;
   for (const Photon& photon : photons) {
-    const glm::dvec3 way = glm::dvec3(photon.position[0], photon.position[1], photon.position[2]) - place;
-    const double distance = glm::length(way);
+    const glm::dvec3 direction = glm::dvec3(photon.position[0], photon.position[1], photon.position[2]) - position;
+    const double distance = glm::length(direction);
     if (!(distance < radius)) continue;
-    if (std::abs(glm::dot(way, normal)) > PhotonMap::kFlatness * radius + 2.0 * kFloatStep) continue;
+    if (std::abs(glm::dot(direction, normal)) > PhotonMap::kFlatness * radius + 2.0 * kFloatStep) continue;
     const double cosine = glm::dot(facing_of(photon), normal);
     if (cosine < 0.5) continue;
     ++result.count;
@@ -92,18 +93,18 @@ TEST(PhotonMapTest, AGatherEqualsTheSumOverAllPhotons) {
       const PhotonMap map(all, kRoom, radius);
       ASSERT_EQ(map.size(), photons);
       for (int i = 0; i < 60; ++i) {
-        glm::dvec3 place(side(random), side(random), side(random));
+        glm::dvec3 position(side(random), side(random), side(random));
         glm::dvec3 normal = glm::normalize(glm::dvec3(side(random), side(random), side(random)));
         if (i % 3 != 0) {
           const int axis = i % 3;
-          place[axis] = std::copysign(1.0, place[axis]);
+          position[axis] = std::copysign(1.0, position[axis]);
           normal = glm::dvec3(0.0);
-          normal[axis] = -place[axis];
+          normal[axis] = -position[axis];
         }
-        const Gathered expected = gather_all(all, place, normal, radius);
-        ASSERT_EQ(map.count(place, normal), expected.count) << photons << " photons, radius " << radius;
+        const Gathered expected = gather_all(all, position, normal, radius);
+        ASSERT_EQ(map.count(position, normal), expected.count) << photons << " photons, radius " << radius;
         const glm::dvec3 sum =
-            map.gather(place, normal, [&](const glm::dvec3& d) { return glm::dvec3(glm::dot(d, kUp + normal)); });
+            map.gather(position, normal, [&](const glm::dvec3& d) { return glm::dvec3(glm::dot(d, kUp + normal)); });
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c], expected.sum[c], 1e-5 * glm::length(expected.sum));
         found += expected.count;
       }
@@ -121,8 +122,8 @@ TEST(PhotonMapTest, AnEvenlyLitPlaneHasItsFluxOverItsArea) {
   }
   const PhotonMap map(photons, kRoom, 0.08);
   const double expected = static_cast<double>(photons.size()) / 4.0;
-  for (const glm::dvec3& place : {glm::dvec3(0.0, 0.25, 0.0), glm::dvec3(0.513, 0.25, -0.377)})
-    EXPECT_NEAR(map.gather(place, kUp, one).g, expected, 2e-3 * expected);
+  for (const glm::dvec3& position : {glm::dvec3(0.0, 0.25, 0.0), glm::dvec3(0.513, 0.25, -0.377)})
+    EXPECT_NEAR(map.gather(position, kUp, one).g, expected, 2e-3 * expected);
 }
 
 TEST(PhotonMapTest, ACornersOtherWallAndAThinWallsOtherSideDoNotCount) {
@@ -147,9 +148,9 @@ TEST(PhotonMapTest, ScalingBySomePowerOfTwoChangesNoBit) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> side(-1.0, 1.0);
   for (int i = 0; i < 100; ++i) {
-    const glm::dvec3 place(side(random), -1.0, side(random));
-    const glm::dvec3 sum = map.gather(place, kUp, one);
-    EXPECT_EQ(scaled.gather(place * 0x1p20, kUp, one), sum * 0x1p-40);
+    const glm::dvec3 position(side(random), -1.0, side(random));
+    const glm::dvec3 sum = map.gather(position, kUp, one);
+    EXPECT_EQ(scaled.gather(position * 0x1p20, kUp, one), sum * 0x1p-40);
   }
 }
 
@@ -168,10 +169,10 @@ TEST(PhotonMapTest, SumsKeepThePhotonsOrderWithinACell) {
   const PhotonMap other(shuffled, kRoom, 0.1);
   int differing = 0;
   for (int i = 0; i < 50; ++i) {
-    const glm::dvec3 place(-0.5 + 0.02 * i, -1.0, 0.5);
-    const glm::dvec3 sum = map.gather(place, kUp, one);
-    EXPECT_EQ(same.gather(place, kUp, one), sum);
-    differing += other.gather(place, kUp, one) == sum ? 0 : 1;
+    const glm::dvec3 position(-0.5 + 0.02 * i, -1.0, 0.5);
+    const glm::dvec3 sum = map.gather(position, kUp, one);
+    EXPECT_EQ(same.gather(position, kUp, one), sum);
+    differing += other.gather(position, kUp, one) == sum ? 0 : 1;
   }
   EXPECT_GT(differing, 0) << "the order given would not matter at all";
 }
@@ -186,9 +187,9 @@ TEST(PhotonMapTest, EmptyMapsFarPlacesAndWhatIsNotANumberGiveNothing) {
   const PhotonMap map(photons, kRoom, 0.5);
   for (const double far : {1e3, 1e9, -1e9, 1e300, nan, infinity}) {
     for (int axis = 0; axis < 3; ++axis) {
-      glm::dvec3 place(0.0);
-      place[axis] = far;
-      EXPECT_EQ(map.gather(place, kUp, one), glm::dvec3(0.0));
+      glm::dvec3 position(0.0);
+      position[axis] = far;
+      EXPECT_EQ(map.gather(position, kUp, one), glm::dvec3(0.0));
     }
   }
   EXPECT_EQ(map.gather(glm::dvec3(0.0), glm::dvec3(nan), one), glm::dvec3(0.0));

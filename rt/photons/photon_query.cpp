@@ -53,10 +53,10 @@ HWY_INLINE void find_rows(const PhotonSearch& search, const std::uint32_t* start
     const Vector width2 = hn::Sub(hn::Sub(all(1.0F), square(gap(y, in_cell.y))), square(gap(z, in_cell.z)));
     const Vector width = hn::Sqrt(hn::Max(width2, hn::Zero(floats)));
     // How far along x the row's box may touch the slab about the plane.
-    const Vector middle = hn::Add(hn::Mul(all(normal.y), hn::Add(y, all(0.5F - in_cell.y))),
+    const Vector center = hn::Add(hn::Mul(all(normal.y), hn::Add(y, all(0.5F - in_cell.y))),
                                   hn::Mul(all(normal.z), hn::Add(z, all(0.5F - in_cell.z))));
-    const Vector one = hn::Mul(hn::Sub(all(-flat), middle), all(1.0F / slope));
-    const Vector other = hn::Mul(hn::Sub(all(flat), middle), all(1.0F / slope));
+    const Vector one = hn::Mul(hn::Sub(all(-flat), center), all(1.0F / slope));
+    const Vector other = hn::Mul(hn::Sub(all(flat), center), all(1.0F / slope));
     const Vector low = hn::Max(hn::Neg(width), hn::Min(one, other));
     const Vector high = hn::Min(width, hn::Max(one, other));
     const Mask touches = hn::And(hn::Gt(width2, hn::Zero(floats)), hn::Le(low, high));
@@ -79,7 +79,7 @@ HWY_INLINE void find_rows(const PhotonSearch& search, const std::uint32_t* start
 /// What is the same for every photon, in all lanes.
 struct Wanted {
   explicit Wanted(const PhotonSearch& search)
-      : high(search.place), low(search.place - glm::dvec3(high)), normal(search.normal) {
+      : high(search.position), low(search.position - glm::dvec3(high)), normal(search.normal) {
     radius2 = all(static_cast<float>(search.radius2));
     inverse_radius2 = all(static_cast<float>(search.inverse_radius2));
     flatness = all(static_cast<float>(search.flatness));
@@ -94,13 +94,13 @@ struct Wanted {
 };
 
 /// Whether each of the photons at `places` counts, and its weight.
-HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* places, Vector& weight) {
+HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* positions, Vector& weight) {
   Vector x, y, z, packed;
-  hn::LoadInterleaved4(Floats(), places->position.data(), x, y, z, packed);
-  const Vector3 way{hn::Sub(hn::Sub(x, all(wanted.high.x)), all(wanted.low.x)),
-                    hn::Sub(hn::Sub(y, all(wanted.high.y)), all(wanted.low.y)),
-                    hn::Sub(hn::Sub(z, all(wanted.high.z)), all(wanted.low.z))};
-  const Vector distance2 = length2(way);
+  hn::LoadInterleaved4(Floats(), positions->position.data(), x, y, z, packed);
+  const Vector3 direction{hn::Sub(hn::Sub(x, all(wanted.high.x)), all(wanted.low.x)),
+                          hn::Sub(hn::Sub(y, all(wanted.high.y)), all(wanted.low.y)),
+                          hn::Sub(hn::Sub(z, all(wanted.high.z)), all(wanted.low.z))};
+  const Vector distance2 = length2(direction);
   weight = hn::Sub(all(1.0F), hn::Mul(distance2, wanted.inverse_radius2));
   const auto words = hn::BitCast(Words(), packed);
   const Vector3 facing = unpack_facing(words);
@@ -108,21 +108,21 @@ HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* places, Vector& w
   const Mask same_layer = hn::RebindMask(Floats(), hn::Eq(layer, wanted.layer));
   const Vector cosine = dot(facing, wanted.normal);
   const Mask near =
-      hn::And(hn::Lt(distance2, wanted.radius2), hn::Le(hn::Abs(dot(way, wanted.normal)), wanted.flatness));
+      hn::And(hn::Lt(distance2, wanted.radius2), hn::Le(hn::Abs(dot(direction, wanted.normal)), wanted.flatness));
   const Mask turned =
       hn::And(hn::Gt(cosine, hn::Zero(Floats())), hn::Ge(square(cosine), hn::Mul(wanted.min_cosine2, length2(facing))));
   return hn::And(same_layer, hn::And(near, turned));
 }
 
 /// Implements find_photons.
-void find(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* places, FoundPhotons& found) {
+void find(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* positions, FoundPhotons& found) {
   Rows rows;
   find_rows(search, starts, rows);
   std::size_t most = kReadBeyond;
   for (std::size_t row = 0; row < kRows; ++row) {
     most += static_cast<std::size_t>(rows.last[row] - rows.first[row]);
-    __builtin_prefetch(places + rows.first[row]);
-    __builtin_prefetch(places + rows.first[row] + 4);
+    __builtin_prefetch(positions + rows.first[row]);
+    __builtin_prefetch(positions + rows.first[row] + 4);
   }
   if (found.index.size() < most) {
     found.index.resize(2 * most);
@@ -135,7 +135,7 @@ void find(const PhotonSearch& search, const std::uint32_t* starts, const PhotonP
     const auto last = static_cast<std::size_t>(rows.last[row]);
     for (auto i = static_cast<std::size_t>(rows.first[row]); i < last; i += hn::Lanes(Floats())) {
       Vector weights;
-      const Mask counts = hn::And(judge(wanted, places + i, weights), hn::FirstN(Floats(), last - i));
+      const Mask counts = hn::And(judge(wanted, positions + i, weights), hn::FirstN(Floats(), last - i));
       const auto numbers = hn::Iota(unsigneds, static_cast<std::uint32_t>(i));
       hn::StoreU(hn::Compress(numbers, hn::RebindMask(unsigneds, counts)), unsigneds, found.index.data() + count);
       hn::StoreU(hn::Compress(weights, counts), Floats(), found.weight.data() + count);
@@ -267,9 +267,9 @@ namespace hpr {
 HWY_EXPORT(find);
 HWY_EXPORT(add_reflected);
 
-void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* places,
+void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* positions,
                   FoundPhotons& found) {
-  HWY_DYNAMIC_DISPATCH(find)(search, starts, places, found);
+  HWY_DYNAMIC_DISPATCH(find)(search, starts, positions, found);
 }
 
 glm::dvec3 reflect_photons(const ReflectionTerms& terms, bool leans, const PhotonLight* lights, FoundPhotons& found) {

@@ -32,7 +32,7 @@ namespace hpr {
 
 /// Photons about a place on a surface, in ray space.
 struct PhotonSearch {
-  glm::dvec3 place{0.0};
+  glm::dvec3 position{0.0};
   glm::dvec3 in_cell{0.0};  ///< where in its cell it lies, each in [0, 1)
   std::uint32_t cell = 0;   ///< where that would be in the order of cells, not yet wrapped around
   std::uint32_t row_step = 0;
@@ -52,7 +52,7 @@ struct PhotonSearch {
 /// layer z stands at slot (x + y row_step + z layer_step) & last_slot; starts[slot] is where its photons begin in
 /// `places`, also for the first two slots behind the last. In single precision, in steps that no processor rounds
 /// otherwise.
-void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* places,
+void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* positions,
                   FoundPhotons& found);
 
 /// The sum of weight * flux * f over the photons found, f being what `terms` say, in single precision; sums run in an

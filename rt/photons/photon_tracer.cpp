@@ -74,8 +74,8 @@ PhotonRange share_of_rank(const PhotonRange& all, int rank, int ranks) {
 
 struct PhotonTracer::Flight {
   Sampler sampler;
-  glm::dvec3 place{0.0};   ///< world: where it was scattered last
-  glm::dvec3 origin{0.0};  ///< ray space: off that surface
+  glm::dvec3 position{0.0};  ///< world: where it was scattered last
+  glm::dvec3 origin{0.0};    ///< ray space: off that surface
   glm::dvec3 direction{0.0};
   glm::dvec3 flux{0.0};
   Media media;             ///< that it flies through
@@ -160,7 +160,7 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
   return all;
 }
 
-void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const {
+void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const {
   for (std::uint64_t i = 0; i < range.count; ++i) {
     const std::uint64_t index = range.first + i;
     Flight flight;
@@ -171,9 +171,9 @@ void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double 
     const std::optional<PhotonStart> begin = source_(u_choice, u_place, flight.sampler.two());
     if (!begin) continue;
     ++block.traced.counts.sent;
-    flight.flux = begin->flux * share;
+    flight.flux = begin->flux * fraction;
     if (!carries_light(flight.flux)) continue;
-    flight.place = begin->origin;
+    flight.position = begin->origin;
     flight.direction = begin->direction;
     flight.media = begin->media;
     flight.center = begin->center;
@@ -209,7 +209,7 @@ void PhotonTracer::move(Block& block) const {
     if (block.hits[i] == kNoSurface) continue;
     Flight& flight = block.flights[i];
     surfaces_.load(block.hits[i], block.triangle);
-    const SurfacePoint surface = surfaces_.meet(block.triangle, flight.place, flight.direction);
+    const SurfacePoint surface = surfaces_.meet(block.triangle, flight.position, flight.direction);
     if (arrive(flight, surface, block.met[i], block)) block.next.push_back(flight);
   }
   std::swap(block.flights, block.next);
@@ -230,7 +230,7 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
 /// Keeps the photon if it is wanted here and sends it on; false when it ends.
 bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const {
   const MaterialPoint material = evaluate_material(scene_, surface);
-  const double metres = glm::distance(surface.position, flight.place);
+  const double metres = glm::distance(surface.position, flight.position);
   // As to lights: nothing is taken from endless ways.
   glm::dvec3 flux =
       flight.endless ? flight.flux : flight.flux * transmittance_to(flight.media, surface, material, metres);
@@ -282,7 +282,7 @@ bool PhotonTracer::scatter(Flight& flight, const FluxArrival& at) const {
   flight.followed = flight.followed && follows;
   flight.media = media_towards(flight.media, surface, at.material, sample->direction);
   flight.direction = sample->direction;
-  flight.place = surface.position;
+  flight.position = surface.position;
   flight.passed = 0;
   flight.last = {};
   flight.endless = false;
@@ -330,8 +330,8 @@ PhotonMapBuilder::PhotonMapBuilder(const Scene& scene, const Surfaces& surfaces,
       settings_(settings),
       tracer_(
           scene, surfaces, space, rays,
-          [&lights](double choice, const glm::dvec2& place, const glm::dvec2& direction) {
-            return lights.emit(choice, place, direction);
+          [&lights](double choice, const glm::dvec2& position, const glm::dvec2& direction) {
+            return lights.emit(choice, position, direction);
           },
           tracer_settings(settings, lights)) {}
 

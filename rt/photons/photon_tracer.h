@@ -97,7 +97,7 @@ class PhotonTracer {
   struct Flight;
   struct Block;
 
-  void start(std::uint64_t stream, const PhotonRange& range, double share, Block& block) const;
+  void start(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const;
   void move(Block& block) const;
   [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const;
   void keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const;

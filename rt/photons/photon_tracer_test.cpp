@@ -24,19 +24,20 @@ PhotonSource downwards(double half) {
 
 PhotonRoom matte_room(float albedo) {
   Scene scene;
-  test::add_room(scene, test::add_material(scene, test::matte(glm::vec3(albedo))));
+  test::add_room(scene, test::add_material(scene, test::diffuse(glm::vec3(albedo))));
   return PhotonRoom(std::move(scene));
 }
 
 /// A room with a glass cube turned askew and a mirror on one side.
 PhotonRoom furnished_room() {
   Scene scene;
-  const std::uint32_t white = test::add_material(scene, test::matte(glm::vec3(0.7F, 0.5F, 0.3F)));
+  const std::uint32_t white = test::add_material(scene, test::diffuse(glm::vec3(0.7F, 0.5F, 0.3F)));
   const std::uint32_t glass = test::add_material(scene, test::clear_glass());
   const std::uint32_t mirror = test::add_material(scene, test::mirror(0.9F));
   test::add_room(scene, white);
-  test::place(scene, test::add_mesh(scene, test::sphere(0.4, 12, glass)));
-  test::place(scene, test::add_mesh(scene, test::quad({-0.9F, -0.9F, -0.9F}, {1.8F, 0, 0}, {0, 1.8F, 0.3F}, mirror)));
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(0.4, 12, glass)));
+  test::place_mesh(scene,
+                   test::add_mesh(scene, test::quad({-0.9F, -0.9F, -0.9F}, {1.8F, 0, 0}, {0, 1.8F, 0.3F}, mirror)));
   return PhotonRoom(std::move(scene));
 }
 
@@ -78,10 +79,10 @@ TEST(PhotonTracerTest, SharesOfRanksPartitionTheRange) {
     for (const int ranks : {1, 3, 7, 300}) {
       std::uint64_t next = 17;
       for (int rank = 0; rank < ranks; ++rank) {
-        const PhotonRange share = share_of_rank({17, count}, rank, ranks);
-        ASSERT_EQ(share.first, next);
-        ASSERT_LE(share.count, count / static_cast<std::uint64_t>(ranks) + 1);
-        next += share.count;
+        const PhotonRange fraction = share_of_rank({17, count}, rank, ranks);
+        ASSERT_EQ(fraction.first, next);
+        ASSERT_LE(fraction.count, count / static_cast<std::uint64_t>(ranks) + 1);
+        next += fraction.count;
       }
       EXPECT_EQ(next, 17 + count);
     }
@@ -133,12 +134,13 @@ TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {
   // What the floor sends back to the walls of all that falls on it, in watts.
   const auto sent_back = [](std::optional<float> gap) {
     Scene scene;
-    const std::uint32_t white = test::add_material(scene, test::matte(glm::vec3(1.0F)));
-    Material black = test::matte(glm::vec3(0.0F));
+    const std::uint32_t white = test::add_material(scene, test::diffuse(glm::vec3(1.0F)));
+    Material black = test::diffuse(glm::vec3(0.0F));
     black.alpha_mode = AlphaMode::Blend;
     black.base_color.a = 0.5F;
     const std::uint32_t veil = test::add_material(scene, black);
-    if (gap) test::place(scene, test::add_mesh(scene, test::quad({-1, -1 + *gap, -1}, {0, 0, 2}, {2, 0, 0}, veil)));
+    if (gap)
+      test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1 + *gap, -1}, {0, 0, 2}, {2, 0, 0}, veil)));
     test::add_room(scene, white);
     return flux_of(PhotonRoom(std::move(scene)).trace(downwards(0.5), 4000, {.max_bounces = 1}).global).g;
   };
@@ -187,22 +189,22 @@ TEST_P(FurnaceTest, PhotonsBringTheIndirectLightOfAClosedRoom) {
 
   const PhotonMap map(traced.global, room.space, 0.2);
   double sum = 0.0;
-  int places = 0;
+  int positions = 0;
   for (int wall = 0; wall < 6; ++wall) {
     for (int i = 0; i < 36; ++i) {
       const int axis = wall / 2;
-      glm::dvec3 place(0.0);
-      place[(axis + 1) % 3] = (i % 6 - 2.5) * 0.3;
-      place[(axis + 2) % 3] = (i / 6 - 2.5) * 0.3;
-      place[axis] = wall % 2 == 0 ? -1.0 : 1.0;
+      glm::dvec3 position(0.0);
+      position[(axis + 1) % 3] = (i % 6 - 2.5) * 0.3;
+      position[(axis + 2) % 3] = (i / 6 - 2.5) * 0.3;
+      position[axis] = wall % 2 == 0 ? -1.0 : 1.0;
       glm::dvec3 normal(0.0);
-      normal[axis] = -place[axis];
-      sum += map.gather(place, normal, [](const glm::dvec3&) { return glm::dvec3(1.0); }).g;
-      ++places;
+      normal[axis] = -position[axis];
+      sum += map.gather(position, normal, [](const glm::dvec3&) { return glm::dvec3(1.0); }).g;
+      ++positions;
     }
   }
   // The places take in most of the walls; so what they see varies little more than the whole.
-  EXPECT_NEAR(sum / places / std::numbers::pi, expected, 4.0 * 1.5 * error + 0.005 * expected);
+  EXPECT_NEAR(sum / positions / std::numbers::pi, expected, 4.0 * 1.5 * error + 0.005 * expected);
 }
 INSTANTIATE_TEST_SUITE_P(Albedos, FurnaceTest, ::testing::Values(0.5, 0.9, 0.99));
 
@@ -216,7 +218,7 @@ TEST(PhotonTracerTest, PathsCutShortAreCountedAsLost) {
 
 TEST(PhotonTracerTest, ClearGlassLosesNoLight) {
   Scene scene;
-  const std::uint32_t white = test::add_material(scene, test::matte(glm::vec3(0.5F)));
+  const std::uint32_t white = test::add_material(scene, test::diffuse(glm::vec3(0.5F)));
   const std::uint32_t glass = test::add_material(scene, test::clear_glass());
   test::add_room(scene, white);
   Scene cube;
@@ -227,7 +229,7 @@ TEST(PhotonTracerTest, ClearGlassLosesNoLight) {
     for (glm::vec3& normal : wall.normals) normal = -normal;
     glm::dmat4 to_world(0.3 * look_at({0.3, 0.2, 0.5}, {0.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 1.0).axes);
     to_world[3] = {0.05, 0.1, 0.0, 1.0};
-    test::place(scene, test::add_mesh(scene, wall), to_world);
+    test::place_mesh(scene, test::add_mesh(scene, wall), to_world);
   }
   const PhotonRoom room(std::move(scene));
   const TracedPhotons traced = room.trace(downwards(0.1), 20000);
@@ -241,13 +243,13 @@ TEST(PhotonTracerTest, ClearGlassLosesNoLight) {
 /// mirror, so that the floor's is indirect.
 TracedPhotons through_pane(const Material& upper, const Material& lower, std::uint64_t photons) {
   Scene scene;
-  test::add_room(scene, test::add_material(scene, test::matte(glm::vec3(0.5F))));
-  test::place(scene, test::add_mesh(
-                         scene, test::quad({-1, 0.25F, -1}, {0, 0, 2}, {2, 0, 0}, test::add_material(scene, upper))));
-  test::place(scene, test::add_mesh(
-                         scene, test::quad({-1, -0.25F, -1}, {2, 0, 0}, {0, 0, 2}, test::add_material(scene, lower))));
-  test::place(scene, test::add_mesh(scene, test::quad({-0.5F, 0.5F, -0.5F}, {1, 0, 0}, {0, 0.5F, 0.5F},
-                                                      test::add_material(scene, test::mirror(1.0F)))));
+  test::add_room(scene, test::add_material(scene, test::diffuse(glm::vec3(0.5F))));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, 0.25F, -1}, {0, 0, 2}, {2, 0, 0},
+                                                           test::add_material(scene, upper))));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -0.25F, -1}, {2, 0, 0}, {0, 0, 2},
+                                                           test::add_material(scene, lower))));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-0.5F, 0.5F, -0.5F}, {1, 0, 0}, {0, 0.5F, 0.5F},
+                                                           test::add_material(scene, test::mirror(1.0F)))));
   const PhotonRoom room(std::move(scene));
   // Against z, until the mirror turns it down.
   return room.trace(test::beam({0.0, 0.75, 0.9}, -kX, {0.0, 1.0, 0.0}, 0.1), photons);
@@ -260,7 +262,7 @@ double caustic_on_floor(const TracedPhotons& traced) {
 }
 
 TEST(PhotonTracerTest, SurfacesOfPartialCoverageLetTheRestPass) {
-  Material half = test::matte(glm::vec3(0.0F));
+  Material half = test::diffuse(glm::vec3(0.0F));
   half.alpha_mode = AlphaMode::Blend;
   half.base_color.a = 0.25F;
   constexpr std::uint64_t kPhotons = 40000;
@@ -269,13 +271,13 @@ TEST(PhotonTracerTest, SurfacesOfPartialCoverageLetTheRestPass) {
 }
 
 TEST(PhotonTracerTest, LightStaysDirectWhenItPassesASurface) {
-  Material half = test::matte(glm::vec3(0.0F));
+  Material half = test::diffuse(glm::vec3(0.0F));
   half.alpha_mode = AlphaMode::Blend;
   half.base_color.a = 0.25F;
   Scene scene;
-  test::add_room(scene, test::add_material(scene, test::matte(glm::vec3(0.5F))));
-  test::place(scene,
-              test::add_mesh(scene, test::quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, test::add_material(scene, half))));
+  test::add_room(scene, test::add_material(scene, test::diffuse(glm::vec3(0.5F))));
+  test::place_mesh(
+      scene, test::add_mesh(scene, test::quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, test::add_material(scene, half))));
   const PhotonRoom room(std::move(scene));
   const TracedPhotons traced = room.trace(downwards(0.5), 10000);
   EXPECT_TRUE(traced.caustic.empty());

@@ -24,7 +24,7 @@ inline void add_room(Scene& scene, std::uint32_t material) {
       corner[axis] = 1.0F;
       std::swap(a, b);
     }
-    place(scene, add_mesh(scene, quad(corner, a, b, material)));
+    place_mesh(scene, add_mesh(scene, quad(corner, a, b, material)));
   }
 }
 

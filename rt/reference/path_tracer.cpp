@@ -170,9 +170,9 @@ glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
     if (chances[i] > 0.0 && is_followed(bsdf, kLobes[i], glossy_cutoff)) followed += scattered.lobes.value[i];
   }
-  glm::dvec3 share(0.0);
-  for (int c = 0; c < 3; ++c) share[c] = scattered.value[c] > 0.0 ? followed[c] / scattered.value[c] : 0.0;
-  return share;
+  glm::dvec3 fraction(0.0);
+  for (int c = 0; c < 3; ++c) fraction[c] = scattered.value[c] > 0.0 ? followed[c] / scattered.value[c] : 0.0;
+  return fraction;
 }
 
 std::size_t choose_lobe(const std::array<double, kLobes.size()>& chances, double u) {
@@ -375,9 +375,9 @@ void PathWavefront::sample_light(Path& path, const SurfacePoint& point, const Ma
   // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies on
   // a surface is not hidden by it.
   const glm::dvec3 goal = shared_.space.from_world(light->goal);
-  const glm::dvec3 way = light->goal - ray.origin;
-  const double distance = glm::length(way);
-  if (distance > 0.0) ray.direction = way / distance;
+  const glm::dvec3 direction = light->goal - ray.origin;
+  const double distance = glm::length(direction);
+  if (distance > 0.0) ray.direction = direction / distance;
   const double size = std::max(largest(glm::abs(goal)), 1.0) / shared_.space.scale;
   ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
 }
@@ -450,8 +450,8 @@ Path path_from_eye(const View& view, const Media& media, const PathSettings& set
   path.sampler =
       Sampler(pixel_stream({settings.seed, number.frame}, view.screen_number, view.block.x0 + x, view.block.y0 + y),
               number.sample);
-  const glm::dvec2 place = settings.spread_in_pixel ? path.sampler.two_of_pixel() : glm::dvec2(0.5);
-  const Ray ray = view_ray(view, x + place.x, y + place.y);
+  const glm::dvec2 position = settings.spread_in_pixel ? path.sampler.two_of_pixel() : glm::dvec2(0.5);
+  const Ray ray = view_ray(view, x + position.x, y + position.y);
   path.origin = ray.origin + view.near_distance * ray.direction;
   path.direction = glm::normalize(ray.direction);
   path.media = media;
@@ -495,7 +495,7 @@ struct PathTracer::State {
   PathCounts counts;
 
   std::unique_ptr<PathWavefront> take_wave();
-  void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& place,
+  void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& position,
                   const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels) const;
 };
 
@@ -511,12 +511,12 @@ std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
   return std::make_unique<PathWavefront>(shared);
 }
 
-void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& place,
+void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& position,
                                    const SampleNumber& number, std::span<const std::uint8_t> wanted,
                                    std::span<Rgb> pixels) const {
   const DenormalsAsZero mode;
   std::ranges::fill(pixels, Rgb{});
-  const Rect& rect = place.pixels;
+  const Rect& rect = position.pixels;
   for (int top = rect.y0; top < rect.y1; top += kRowsAtOnce) {
     const int bottom = std::min(top + kRowsAtOnce, rect.y1);
     wave.start(view, static_cast<std::size_t>(bottom - top) * kTileSide);
@@ -568,10 +568,10 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
   state.shared.rays.for_each(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const trace::Span span("path trace tile", "tile", tile);
-    const TilePlace place = layout.place(tile);
+    const TilePlace position = layout.place(tile);
     radiance.set_active(tile);
     std::unique_ptr<PathWavefront> wave = state.take_wave();
-    state.trace_tile(*wave, views[place.screen], eyes[place.screen], place, number, mask_of(wanted, tile),
+    state.trace_tile(*wave, views[position.screen], eyes[position.screen], position, number, mask_of(wanted, tile),
                      radiance.tile(tile));
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(wave));

@@ -16,7 +16,7 @@ using test::add_mesh;
 using test::estimate;
 using test::Estimate;
 using test::PathBench;
-using test::place;
+using test::place_mesh;
 
 constexpr Size kSmall{8, 8};
 constexpr int kNoLimit = 1'000'000;
@@ -41,14 +41,14 @@ glm::dvec3 on_floor(const View& view, int x, int y) {
 /// A grey floor at y = 0, 20 m a side.
 Scene floor_scene(float albedo) {
   Scene scene;
-  const std::uint32_t look = add_material(scene, test::matte(glm::vec3(albedo)));
-  place(scene, add_mesh(scene, test::quad({-10, 0, 10}, {20, 0, 0}, {0, 0, -20}, look)));
+  const std::uint32_t look = add_material(scene, test::diffuse(glm::vec3(albedo)));
+  place_mesh(scene, add_mesh(scene, test::quad({-10, 0, 10}, {20, 0, 0}, {0, 0, -20}, look)));
   return scene;
 }
 
-void add_point_light(Scene& scene, const glm::dvec3& place) {
+void add_point_light(Scene& scene, const glm::dvec3& position) {
   Light light;
-  light.position = place;
+  light.position = position;
   light.intensity = glm::vec3(10.0F);
   scene.lights.push_back(light);
 }
@@ -56,7 +56,7 @@ void add_point_light(Scene& scene, const glm::dvec3& place) {
 /// A square light of side 2 at y = 2 that shines down on the floor.
 void add_square_light(Scene& scene, float radiance) {
   const std::uint32_t look = add_material(scene, test::glowing(glm::vec3(radiance)));
-  place(scene, add_mesh(scene, test::quad({-1, 2, -1}, {2, 0, 0}, {0, 0, 2}, look)));
+  place_mesh(scene, add_mesh(scene, test::quad({-1, 2, -1}, {2, 0, 0}, {0, 0, 2}, look)));
 }
 
 /// Every pixel sees the floor.
@@ -68,7 +68,7 @@ View down_at_floor(const Scene& scene, Size size = kSmall) {
 
 TEST(PathTracer, AClosedFurnaceShinesByTheGeometricSeries) {
   for (const double albedo : {0.5, 0.9, 0.99}) {
-    const Scene scene = test::closed_box(test::matte(glm::vec3(static_cast<float>(albedo))), 1.0);
+    const Scene scene = test::closed_box(test::diffuse(glm::vec3(static_cast<float>(albedo))), 1.0);
     const PathBench bench(scene);
     const View view = test::view_from({0.2, -0.3, 0.4}, {0.9, 0.1, -0.6}, kSmall, scene);
     const double exact = 1.0 / (1.0 - static_cast<double>(static_cast<float>(albedo)));
@@ -86,9 +86,9 @@ TEST(PathTracer, APointLightGivesTheFloorItsIrradiance) {
   const Image<Rgb> image = test::trace(bench, view, {.spread_in_pixel = false});
   for (int y = 0; y < kSmall.height; ++y) {
     for (int x = 0; x < kSmall.width; ++x) {
-      const glm::dvec3 way = scene.lights[0].position - on_floor(view, x, y);
-      const double distance = glm::length(way);
-      const double irradiance = 10.0 * (way.y / distance) / (distance * distance);
+      const glm::dvec3 direction = scene.lights[0].position - on_floor(view, x, y);
+      const double distance = glm::length(direction);
+      const double irradiance = 10.0 * (direction.y / distance) / (distance * distance);
       EXPECT_NEAR(image.at(x, y).g, 0.5 / std::numbers::pi * irradiance, 1e-5) << x << ' ' << y;
     }
   }
@@ -96,16 +96,16 @@ TEST(PathTracer, APointLightGivesTheFloorItsIrradiance) {
 
 /// The part of a differential floor's hemisphere, by cosine, that an axis-parallel rectangle above covers (Howell, "A
 /// Catalog of Radiation Heat Transfer Configuration Factors", B-4), summed over signed quarters.
-double floor_to_rectangle(const glm::dvec3& place, double height, double x0, double x1, double z0, double z1) {
+double floor_to_rectangle(const glm::dvec3& position, double height, double x0, double x1, double z0, double z1) {
   const auto corner = [&](double a, double b) {
     const double ra = std::sqrt(height * height + a * a);
     const double rb = std::sqrt(height * height + b * b);
     return (a / ra * std::atan(b / ra) + b / rb * std::atan(a / rb)) / (2.0 * std::numbers::pi);
   };
-  const double a0 = x0 - place.x;
-  const double a1 = x1 - place.x;
-  const double b0 = z0 - place.z;
-  const double b1 = z1 - place.z;
+  const double a0 = x0 - position.x;
+  const double a1 = x1 - position.x;
+  const double b0 = z0 - position.z;
+  const double b1 = z1 - position.z;
   return corner(a1, b1) - corner(a0, b1) - corner(a1, b0) + corner(a0, b0);
 }
 
@@ -133,12 +133,12 @@ Scene mixed_scene() {
   Material glossy = test::mirror(0.8F);
   glossy.roughness = 0.35F;
   const std::uint32_t metal = add_material(scene, glossy);
-  place(scene, add_mesh(scene, test::quad({-3, 0, -2}, {6, 0, 0}, {0, 4, 0}, metal)));
-  Material plastic = test::matte(glm::vec3(0.7F));
+  place_mesh(scene, add_mesh(scene, test::quad({-3, 0, -2}, {6, 0, 0}, {0, 4, 0}, metal)));
+  Material plastic = test::diffuse(glm::vec3(0.7F));
   plastic.ior = 1.5F;
   plastic.roughness = 0.2F;
-  place(scene, add_mesh(scene, test::sphere(0.6, 12, add_material(scene, plastic))),
-        glm::dmat4({1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0.5, 0.6, 0.5, 1}));
+  place_mesh(scene, add_mesh(scene, test::sphere(0.6, 12, add_material(scene, plastic))),
+             glm::dmat4({1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0.5, 0.6, 0.5, 1}));
   scene.environment = test::white_sky();
   scene.environment->scale = 0.1;
   finish_scene(scene);
@@ -178,7 +178,7 @@ TEST(PathTracer, GlassInAWhiteSkyIsNotSeen) {
     for (int corner = 0; corner < 3; ++corner) faceted.positions.push_back(smooth.positions[t[corner]]);
     faceted.triangles.emplace_back(first, first + 1, first + 2);
   }
-  place(scene, add_mesh(scene, std::move(faceted)));
+  place_mesh(scene, add_mesh(scene, std::move(faceted)));
   scene.environment = test::white_sky();
   finish_scene(scene);
   const PathBench bench(scene);
@@ -225,7 +225,7 @@ TEST(PathTracer, CoverageThinsSightAndShadow) {
     const View view = down_at_floor(scene);
     const Estimate uncovered = estimate(open, view, {.spread_in_pixel = false}, 2, 1);
 
-    Material veil = test::matte(glm::vec3(0.0F));
+    Material veil = test::diffuse(glm::vec3(0.0F));
     veil.alpha_mode = AlphaMode::Blend;
     veil.base_color.a = 0.25F;
     Scene covered = scene;
@@ -235,11 +235,11 @@ TEST(PathTracer, CoverageThinsSightAndShadow) {
       const glm::vec3 back(glm::normalize(eye));
       const glm::vec3 right(1, 0, 0);
       const glm::vec3 up = glm::cross(back, right);
-      place(covered, add_mesh(covered, test::quad(glm::vec3(eye) - 0.1F * back - 0.2F * right - 0.2F * up, 0.4F * right,
-                                                  0.4F * up, look)));
+      place_mesh(covered, add_mesh(covered, test::quad(glm::vec3(eye) - 0.1F * back - 0.2F * right - 0.2F * up,
+                                                       0.4F * right, 0.4F * up, look)));
     } else {  // two, between light and floor, above the eye's rays
       for (const float height : {2.6F, 2.8F})
-        place(covered, add_mesh(covered, test::quad({-9, height, 9}, {18, 0, 0}, {0, 0, -18}, look)));
+        place_mesh(covered, add_mesh(covered, test::quad({-9, height, 9}, {18, 0, 0}, {0, 0, -18}, look)));
     }
     finish_scene(covered);
     const PathBench bench(covered);
@@ -255,7 +255,7 @@ double two_sheets(double t, double r) {
 
 TEST(PathTracer, SheetsThatCoverAQuarterReflectAQuarterAsMuch) {
   Scene scene;
-  Material sheet = test::matte(glm::vec3(0.0F));
+  Material sheet = test::diffuse(glm::vec3(0.0F));
   sheet.ior = 1.5F;
   sheet.roughness = 0.0F;
   sheet.transmission = 0.75F;
@@ -263,7 +263,7 @@ TEST(PathTracer, SheetsThatCoverAQuarterReflectAQuarterAsMuch) {
   sheet.base_color.a = 0.25F;
   const std::uint32_t look = add_material(scene, sheet);
   for (const float height : {0.0F, 0.03F})
-    place(scene, add_mesh(scene, test::quad({-50, height, 50}, {100, 0, 0}, {0, 0, -100}, look)));
+    place_mesh(scene, add_mesh(scene, test::quad({-50, height, 50}, {100, 0, 0}, {0, 0, -100}, look)));
   scene.environment = test::white_sky();
   finish_scene(scene);
   const PathBench bench(scene);
@@ -284,8 +284,8 @@ TEST(PathTracer, AbsorbingGlassDimsByBeersLaw) {
   glass.attenuation_color = glm::vec3(0.5F);
   glass.attenuation_distance = 0.25F;
   const std::uint32_t look = add_material(scene, glass);
-  place(scene, add_mesh(scene, test::quad({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, look)));
-  place(scene, add_mesh(scene, test::quad({-5, -5, -0.5}, {0, 10, 0}, {10, 0, 0}, look)));
+  place_mesh(scene, add_mesh(scene, test::quad({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, look)));
+  place_mesh(scene, add_mesh(scene, test::quad({-5, -5, -0.5}, {0, 10, 0}, {10, 0, 0}, look)));
   scene.environment = test::white_sky();
   finish_scene(scene);
   const PathBench bench(scene);
@@ -315,7 +315,7 @@ TEST(PathTracer, UnlitSurfacesShowTheirColourAndEndPaths) {
 }
 
 TEST(PathTracer, SamplesTooBrightForANumberAreBlackAndCounted) {
-  const Scene scene = test::closed_box(test::matte(glm::vec3(0.9F)), 3e38);
+  const Scene scene = test::closed_box(test::diffuse(glm::vec3(0.9F)), 3e38);
   const PathBench bench(scene);
   const View view = test::view_from({0.2, -0.3, 0.4}, {0.9, 0.1, -0.6}, kSmall, scene);
   PathCounts counts;

@@ -83,7 +83,7 @@ inline Scene closed_box(Material material, double emission) {
       glm::vec3 b(0.0F);
       a[(axis + 1) % 3] = 2.0F;
       b[(axis + 2) % 3] = 2.0F;
-      place(scene, add_mesh(scene, side < 0.0F ? quad(corner, a, b, look) : quad(corner, b, a, look)));
+      place_mesh(scene, add_mesh(scene, side < 0.0F ? quad(corner, a, b, look) : quad(corner, b, a, look)));
     }
   }
   finish_scene(scene);

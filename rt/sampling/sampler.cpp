@@ -116,15 +116,15 @@ double Sampler::one() {
 
 glm::dvec2 Sampler::two() {
   const std::uint64_t key = next_key();
-  const std::uint32_t place = shuffled(index_, key);
-  return scrambled(place, sobol_second_reversed(place), key);
+  const std::uint32_t position = shuffled(index_, key);
+  return scrambled(position, sobol_second_reversed(position), key);
 }
 
 // One order for both pairs, so that they belong together; none in which every other sample lies in the same half of the
 // pixel, as whoever compares even samples with odd ones would take that for noise.
 glm::dvec2 Sampler::two_of_pixel() {
-  const std::uint32_t place = shuffled(index_, kPixelOrder);
-  return scrambled(place, sobol_second_reversed(place), next_key());
+  const std::uint32_t position = shuffled(index_, kPixelOrder);
+  return scrambled(position, sobol_second_reversed(position), next_key());
 }
 
 glm::dvec2 Sampler::two_with_pixel() {
@@ -144,9 +144,9 @@ Sampler Sampler::branch(std::uint32_t which) const {
 
 std::uint64_t pixel_stream(const RandomKey& key, std::uint32_t screen, int x, int y) {
   const std::uint64_t frame = mixed(mixed(key.seed) ^ key.frame);
-  const std::uint64_t place =
+  const std::uint64_t position =
       (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32U) | static_cast<std::uint32_t>(x);
-  return mixed(mixed(frame ^ (std::uint64_t{screen} + 1)) ^ place);
+  return mixed(mixed(frame ^ (std::uint64_t{screen} + 1)) ^ position);
 }
 
 std::uint64_t photon_stream(const RandomKey& key) {

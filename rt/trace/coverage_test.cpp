@@ -14,7 +14,7 @@ namespace {
 
 using test::add_material;
 using test::add_mesh;
-using test::place;
+using test::place_mesh;
 using test::quad;
 
 Material veil(float alpha, float radiance) {
@@ -26,7 +26,7 @@ Material veil(float alpha, float radiance) {
 
 void add_wall(Scene& scene, float z, const Material& material) {
   const std::uint32_t index = add_material(scene, material);
-  place(scene, add_mesh(scene, quad({-500, -500, z}, {1000, 0, 0}, {0, 1000, 0}, index)));
+  place_mesh(scene, add_mesh(scene, quad({-500, -500, z}, {1000, 0, 0}, {0, 1000, 0}, index)));
 }
 
 /// Keys of the opaque surfaces alone, as the raster makes them.
@@ -99,10 +99,10 @@ TEST(Coverage, AMaskCoversAllOrNothingAtItsCutoff) {
 
 TEST(Coverage, AVeilCastsAShadowOfItsAlpha) {
   Scene scene;
-  add_wall(scene, -5, test::matte());
+  add_wall(scene, -5, test::diffuse());
   Material dark = veil(0.75F, 0.0F);
   const std::uint32_t index = add_material(scene, dark);
-  place(scene, add_mesh(scene, quad({1, -50, -50}, {0, 0, 100}, {0, 100, 0}, index)));
+  place_mesh(scene, add_mesh(scene, quad({1, -50, -50}, {0, 0, 100}, {0, 100, 0}, index)));
   Light sun;
   sun.type = LightType::Directional;
   sun.direction = glm::normalize(glm::vec3(-1.0F, 0.0F, -1.0F));
@@ -131,7 +131,7 @@ void add_layers(Scene& scene, int layers, const Material& material) {
   for (int i = 0; i < layers; ++i) {
     glm::dmat4 to_world(1.0);
     to_world[3] = {0.0, 0.0, 1.0 + 0.002 * i, 1.0};
-    place(scene, mesh, to_world);
+    place_mesh(scene, mesh, to_world);
   }
 }
 
@@ -163,12 +163,12 @@ TEST(Coverage, TwoHundredThinVeilsAddUp) {
 
 TEST(Coverage, TwoHundredThinVeilsCastAShadow) {
   Scene scene;
-  add_wall(scene, 0, test::matte());
+  add_wall(scene, 0, test::diffuse());
   Material dark = veil(0.02F, 0.0F);
   const std::uint32_t index = add_material(scene, dark);
   for (int i = 0; i < 200; ++i) {
-    place(scene,
-          add_mesh(scene, quad({1.0F + 0.005F * static_cast<float>(i), -50, -50}, {0, 0, 100}, {0, 100, 0}, index)));
+    place_mesh(scene, add_mesh(scene, quad({1.0F + 0.005F * static_cast<float>(i), -50, -50}, {0, 0, 100}, {0, 100, 0},
+                                           index)));
   }
   Light sun;
   sun.type = LightType::Directional;
@@ -186,8 +186,8 @@ TEST(Coverage, AMirrorShowsWhatTwoHundredVeilsLeave) {
   add_wall(scene, 20, test::glowing(glm::vec3(8.0F)));
   const std::uint32_t index = add_material(scene, veil(0.02F, 1.0F));
   for (int i = 0; i < 200; ++i) {
-    place(scene,
-          add_mesh(scene, quad({-50, -50, 10.0F + 0.005F * static_cast<float>(i)}, {100, 0, 0}, {0, 100, 0}, index)));
+    place_mesh(scene, add_mesh(scene, quad({-50, -50, 10.0F + 0.005F * static_cast<float>(i)}, {100, 0, 0}, {0, 100, 0},
+                                           index)));
   }
   finish_scene(scene);
   const double left = std::pow(0.98, 200);
@@ -212,10 +212,10 @@ TEST(Coverage, WhereLayersAreTooManyItIsCountedAndSaidOnce) {
 
 TEST(Coverage, SurfacesAreSortedByWhetherTheyCover) {
   Scene scene;
-  add_wall(scene, 0, test::matte());
-  add_wall(scene, 1, test::matte());
+  add_wall(scene, 0, test::diffuse());
+  add_wall(scene, 1, test::diffuse());
   add_wall(scene, 2, veil(0.5F, 1.0F));
-  add_wall(scene, 3, test::matte());
+  add_wall(scene, 3, test::diffuse());
   finish_scene(scene);
   EXPECT_EQ(covering_surfaces(scene, false), (std::vector<SurfaceRange>{{0, 4}, {6, 8}}));
   EXPECT_EQ(covering_surfaces(scene, true), (std::vector<SurfaceRange>{{4, 6}}));

@@ -15,8 +15,8 @@ void CoverageTraversal::push(const RayRequest& ray, RayBatch& batch) const {
   batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale);
 }
 
-double CoverageTraversal::size_of(const glm::dvec3& place) const {
-  const glm::dvec3 seen = space_.from_world(place);
+double CoverageTraversal::size_of(const glm::dvec3& position) const {
+  const glm::dvec3 seen = space_.from_world(position);
   return std::max({std::abs(seen.x), std::abs(seen.y), std::abs(seen.z), 1.0}) / space_.scale;
 }
 

@@ -75,13 +75,13 @@ std::optional<Rect> pixels_of(const View& view, const Shifts& shifts, const Pixe
   unsigned int behind = 0;
   bool reaches_behind = false;
   for (unsigned int corner = 0; corner < 8; ++corner) {
-    const glm::dvec4 place((corner & 1U) != 0 ? box.high.x : box.low.x, (corner & 2U) != 0 ? box.high.y : box.low.y,
-                           (corner & 4U) != 0 ? box.high.z : box.low.z, 1.0);
-    const double w = glm::dot(map.w, place);
+    const glm::dvec4 position((corner & 1U) != 0 ? box.high.x : box.low.x, (corner & 2U) != 0 ? box.high.y : box.low.y,
+                              (corner & 4U) != 0 ? box.high.z : box.low.z, 1.0);
+    const double w = glm::dot(map.w, position);
     if (w + slack.w < nearest) ++behind;
     reaches_behind = reaches_behind || !(w - slack.w >= nearest);
     if (reaches_behind) continue;
-    const glm::dvec2 pixel(glm::dot(map.x, place) / w, glm::dot(map.y, place) / w);
+    const glm::dvec2 pixel(glm::dot(map.x, position) / w, glm::dot(map.y, position) / w);
     const glm::dvec2 moved = (glm::dvec2(slack.x, slack.y) + glm::abs(pixel) * slack.w) / (w - slack.w);
     low = glm::min(low, pixel - moved);
     high = glm::max(high, pixel + moved);
@@ -116,8 +116,8 @@ class Cells {
   }
 
   [[nodiscard]] std::size_t count() const { return std::size_t{count_.x} * count_.y * count_.z; }
-  [[nodiscard]] std::size_t of(const glm::dvec3& place) const {
-    const glm::dvec3 at = (place - low_) * per_metre_;
+  [[nodiscard]] std::size_t of(const glm::dvec3& position) const {
+    const glm::dvec3 at = (position - low_) * per_metre_;
     std::size_t cell = 0;
     for (int axis = 2; axis >= 0; --axis) {
       const auto along = static_cast<std::uint32_t>(std::max(0.0, at[axis]));
@@ -192,14 +192,14 @@ void OccupiedPixels::add(const Rect& pixels, const FrameLayout& layout, std::siz
   }
 }
 
-bool OccupiedPixels::mark(std::size_t tile, const Rect& place, std::span<std::uint8_t> mask) const {
+bool OccupiedPixels::mark(std::size_t tile, const Rect& position, std::span<std::uint8_t> mask) const {
   std::ranges::fill(mask, static_cast<std::uint8_t>(everywhere_ ? 1 : 0));
   if (everywhere_) return true;
   const std::vector<Rect>& seen = seen_[tile - first_tile_];
   for (const Rect& part : seen) {
     for (int y = part.y0; y < part.y1; ++y) {
-      const auto row = mask.begin() + static_cast<std::ptrdiff_t>(y - place.y0) * kTileSide;
-      std::fill(row + (part.x0 - place.x0), row + (part.x1 - place.x0), std::uint8_t{1});
+      const auto row = mask.begin() + static_cast<std::ptrdiff_t>(y - position.y0) * kTileSide;
+      std::fill(row + (part.x0 - position.x0), row + (part.x1 - position.x0), std::uint8_t{1});
     }
   }
   return !seen.empty();

@@ -34,7 +34,7 @@ class OccupiedPixels {
 
   /// Sets `mask`, [kTileSide][kTileSide], to 1 at those pixels of a tile of that screen, which lies at `place`, and to
   /// 0 elsewhere. Returns whether there are any.
-  [[nodiscard]] bool mark(std::size_t tile, const Rect& place, std::span<std::uint8_t> mask) const;
+  [[nodiscard]] bool mark(std::size_t tile, const Rect& position, std::span<std::uint8_t> mask) const;
 
  private:
   void add(const Rect& pixels, const FrameLayout& layout, std::size_t screen);

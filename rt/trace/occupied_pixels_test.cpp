@@ -21,7 +21,7 @@ Scene two_balls() {
   for (const glm::uvec3& triangle : other.triangles) mesh.triangles.push_back(triangle + offset);
   mesh.normals.clear();
   std::ranges::shuffle(mesh.triangles, std::mt19937(7));
-  test::place(scene, test::add_mesh(scene, std::move(mesh)));
+  test::place_mesh(scene, test::add_mesh(scene, std::move(mesh)));
   finish_scene(scene);
   return scene;
 }

@@ -379,16 +379,16 @@ void draw_tile(TileTracer& tracer, std::size_t tile, std::span<const Rect> parts
                std::span<TileLayer<Key>* const> layers) {
   const trace::Span span("trace tile", "tile", tile);
   const DenormalsAsZero mode;
-  const Rect place = layers.front()->layout().place(tile).pixels;
-  if (std::ranges::none_of(parts, [&](const Rect& part) { return !intersection(part, place).empty(); })) return;
+  const Rect rect = layers.front()->layout().place(tile).pixels;
+  if (std::ranges::none_of(parts, [&](const Rect& part) { return !intersection(part, rect).empty(); })) return;
   std::array<std::span<Key>, PrimaryRays::kMaxViews> keys;
   for (std::size_t view = 0; view < layers.size(); ++view) {
     layers[view]->touch(tile);
     keys.at(view) = layers[view]->tile(tile);
   }
   for (const Rect& part : parts) {
-    const Rect pixels = intersection(part, place);
-    if (!pixels.empty()) tracer.trace(pixels, place.x0, place.y0, mask, std::span(keys).first(layers.size()));
+    const Rect pixels = intersection(part, rect);
+    if (!pixels.empty()) tracer.trace(pixels, rect.x0, rect.y0, mask, std::span(keys).first(layers.size()));
   }
   for (std::size_t view = 0; view < layers.size(); ++view) {
     if ((tracer.seen() >> view & 1U) != 0) layers[view]->set_active(tile);

@@ -15,7 +15,7 @@ namespace {
 
 TEST(PrimaryRaysReach, PixelsOutOfReachShowNothingOfOthers) {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
   finish_scene(scene);
   View view = test::view_from({0.1, 0.2, 4}, {0.1, 0.2, 0}, {9, 9}, scene);
   view.orthographic = true;
@@ -39,7 +39,7 @@ TEST(PrimaryRaysReach, PixelsOutOfReachShowNothingOfOthers) {
 TEST(PrimaryRaysReach, WhatIsMetNowhereNearItsPlaceHidesNothingBehindIt) {
   const auto wall = test::quad({-6, -6, -1.5}, {12, 0, 0}, {0, 12, 0}, 0);
   Scene scene;
-  test::place(scene, test::add_mesh(scene, wall));
+  test::place_mesh(scene, test::add_mesh(scene, wall));
   finish_scene(scene);
   const View view = test::view_from({0.3, 0.7, 3}, {0, 0, 0}, {64, 64}, scene);
   // Sheets in which the rays of single pixels almost lie: single precision may place hits on them far off.
@@ -48,9 +48,9 @@ TEST(PrimaryRaysReach, WhatIsMetNowhereNearItsPlaceHidesNothingBehindIt) {
     const glm::dvec3 along = glm::normalize(ray.direction);
     const glm::dvec3 side = 0.01 * glm::normalize(glm::cross(along, glm::dvec3(0.2, 1.0, 0.1)));
     const glm::dvec3 tilt = std::exp2(-10.0 - 16.0 * i / 256.0) * glm::cross(along, side / 0.01);
-    const glm::dvec3 middle = ray.origin + 2.5 * along;
-    test::place(scene,
-                test::add_mesh(scene, test::quad(middle - along - tilt - side, 2.0 * side, 2.0 * (along + tilt), 0)));
+    const glm::dvec3 center = ray.origin + 2.5 * along;
+    test::place_mesh(
+        scene, test::add_mesh(scene, test::quad(center - along - tilt - side, 2.0 * side, 2.0 * (along + tilt), 0)));
   }
   finish_scene(scene);
   const RayScene rays(scene, RaySpace(scene.bounds), 1);

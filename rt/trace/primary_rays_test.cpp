@@ -37,16 +37,16 @@ Mesh soup(std::uint32_t count) {
 /// A soup, spheres placed once and several times, turned and mirrored, and layers in one plane.
 Scene mixed_scene() {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, soup(700)));
-  test::place(scene, test::add_mesh(scene, test::sphere(0.8, 24, 0)),
-              glm::translate(glm::dmat4(1.0), {0.9, -0.3, 0.2}));
+  test::place_mesh(scene, test::add_mesh(scene, soup(700)));
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(0.8, 24, 0)),
+                   glm::translate(glm::dmat4(1.0), {0.9, -0.3, 0.2}));
   const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.5, 16, 0));
   const glm::dmat4 one(1.0);
-  test::place(scene, shared, glm::translate(one, {-1.0, 0.4, 0.3}));
-  test::place(scene, shared, glm::rotate(glm::translate(one, {0.0, -0.9, 0.5}), 0.7, glm::dvec3(0.6, 0.8, 0.0)));
-  test::place(scene, shared, glm::scale(glm::translate(one, {0.2, 0.9, -0.5}), {-1.5, 0.7, 1.0}));
+  test::place_mesh(scene, shared, glm::translate(one, {-1.0, 0.4, 0.3}));
+  test::place_mesh(scene, shared, glm::rotate(glm::translate(one, {0.0, -0.9, 0.5}), 0.7, glm::dvec3(0.6, 0.8, 0.0)));
+  test::place_mesh(scene, shared, glm::scale(glm::translate(one, {0.2, 0.9, -0.5}), {-1.5, 0.7, 1.0}));
   const std::uint32_t wall = test::add_mesh(scene, test::quad({-3, -3, -1}, {6, 0, 0}, {0, 6, 0}, 0));
-  for (int copy = 0; copy < 3; ++copy) test::place(scene, wall);
+  for (int copy = 0; copy < 3; ++copy) test::place_mesh(scene, wall);
   finish_scene(scene);
   return scene;
 }
@@ -105,11 +105,11 @@ TEST(PrimaryRays, SeeWhatASearchThroughAllTrianglesSees) {
 
 /// Keys from so many ranks' shares of the scene, `run` surfaces at a time, cut without regard for meshes and
 /// instances.
-Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t shares, std::uint32_t run) {
+Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t fractions, std::uint32_t run) {
   TileLayer<Key> layer(FrameLayout({view.size()}));
-  for (std::uint32_t share = 0; share < shares; ++share) {
+  for (std::uint32_t fraction = 0; fraction < fractions; ++fraction) {
     std::vector<SurfaceRange> ranges;
-    for (std::uint32_t first = run * share; first < scene.triangles; first += run * shares) {
+    for (std::uint32_t first = run * fraction; first < scene.triangles; first += run * fractions) {
       ranges.push_back({first, std::min(first + run, scene.triangles)});
     }
     std::ranges::reverse(ranges);
@@ -123,8 +123,8 @@ TEST(PrimaryRays, SharesOfTheSceneMergeIntoTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = front_view(scene);
   const Image<Key> expected = draw(scene, view).keys;
-  for (const std::uint32_t shares : {2U, 3U, 5U, 12U}) {
-    EXPECT_TRUE(expected == draw_shares(scene, view, shares, 93)) << shares << " shares";
+  for (const std::uint32_t fractions : {2U, 3U, 5U, 12U}) {
+    EXPECT_TRUE(expected == draw_shares(scene, view, fractions, 93)) << fractions << " shares";
   }
 }
 
@@ -152,11 +152,11 @@ Scene floating_scene() {
   Scene scene;
   Mesh splinters = soup(40);
   for (glm::vec3& position : splinters.positions) position = 0.3F * position + glm::vec3(0.5F, -1.0F, 0.3F);
-  test::place(scene, test::add_mesh(scene, splinters));
+  test::place_mesh(scene, test::add_mesh(scene, splinters));
   const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.3, 24, 0));
   for (const double x : {-1.2, -0.4, 0.6, 1.2}) {
     const glm::dmat4 there = glm::translate(glm::dmat4(1.0), {x, 0.3 * x, 0.5});
-    test::place(scene, shared, glm::scale(glm::rotate(there, x, glm::dvec3(0.6, 0.8, 0.0)), {x, 1.0, 0.4}));
+    test::place_mesh(scene, shared, glm::scale(glm::rotate(there, x, glm::dvec3(0.6, 0.8, 0.0)), {x, 1.0, 0.4}));
   }
   finish_scene(scene);
   return scene;
@@ -229,8 +229,8 @@ TEST(PrimaryRays, OfSurfacesInOnePlaneTheLowestIdIsSeen) {
   Scene scene;
   const std::uint32_t wall = test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0));
   const std::uint32_t once = test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0));
-  test::place(scene, once);
-  for (int copy = 0; copy < 4; ++copy) test::place(scene, wall);
+  test::place_mesh(scene, once);
+  for (int copy = 0; copy < 4; ++copy) test::place_mesh(scene, wall);
   finish_scene(scene);
   const Image<Key> keys = draw(scene, test::view_from({0.7, 0.4, 2.0}, {0, 0, 0}, {90, 70}, scene)).keys;
   EXPECT_GT(covered(keys), 500U);
@@ -244,8 +244,8 @@ TEST(PrimaryRays, OfSurfacesInOnePlaneTheLowestIdIsSeen) {
 TEST(PrimaryRays, SurfacesApartByLessThanAFloatStepAreToldApart) {
   // A millionth of the scene behind the other, and with the lower id.
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, -1e-6F}, {2, 0, 0}, {0, 2, 0}, 0)));
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, -1e-6F}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
   finish_scene(scene);
   View view = test::view_from({0.2, 0.1, 1.5}, {0, 0, 0}, {64, 64}, scene);
   const Drawn drawn = draw(scene, view);
@@ -259,8 +259,8 @@ TEST(PrimaryRays, SurfacesApartByLessThanAFloatStepAreToldApart) {
 TEST(PrimaryRays, SurfacesWithinAStepOfTheKeysDepthAreToldApartByTheirNumbers) {
   // From afar, and where an orthographic view's planes lie far apart, steps of depth are coarser than distances.
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0.005}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, 0.005}, {2, 0, 0}, {0, 2, 0}, 0)));
   finish_scene(scene);
   View far = test::view_from({0, 0, 1e5}, {0, 0, 0}, {40, 30}, scene, 1e-5);
   far.near_distance = 0.1;
@@ -275,15 +275,16 @@ TEST(PrimaryRays, SurfacesWithinAStepOfTheKeysDepthAreToldApartByTheirNumbers) {
     const Image<Key> whole = draw(scene, view).keys;
     EXPECT_EQ(covered(whole), view.size().area());
     for (const Key key : whole.pixels()) EXPECT_LT(key_surface(key), 2U) << "of equals the first is seen";
-    for (const std::uint32_t shares : {2U, 4U}) EXPECT_TRUE(whole == draw_shares(scene, view, shares, 1)) << shares;
+    for (const std::uint32_t fractions : {2U, 4U})
+      EXPECT_TRUE(whole == draw_shares(scene, view, fractions, 1)) << fractions;
   }
 }
 
 TEST(PrimaryRays, WhatLiesBeforeTheNearPlaneIsLookedThrough) {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::quad({-9, -9, 2.95F}, {18, 0, 0}, {0, 18, 0}, 0)));
-  test::place(scene, test::add_mesh(scene, test::quad({-9, -9, 3.0F}, {18, 0, 0}, {0, 18, 0}, 0)));
-  test::place(scene, test::add_mesh(scene, test::quad({-9, -9, 0}, {18, 0, 0}, {0, 18, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-9, -9, 2.95F}, {18, 0, 0}, {0, 18, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-9, -9, 3.0F}, {18, 0, 0}, {0, 18, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-9, -9, 0}, {18, 0, 0}, {0, 18, 0}, 0)));
   finish_scene(scene);
   View view = test::view_from({0, 0, 3.5}, {0, 0, 0}, {40, 30}, scene);
   for (const auto& [near, surface] : {std::pair{0.3, 2U}, {0.4999, 2U}, {0.5001, 0U}, {0.5499, 0U}, {0.5501, 4U}}) {

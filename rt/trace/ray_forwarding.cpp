@@ -41,9 +41,9 @@ RayBox box_of(const Scene& scene, const RaySpace& space, const InstanceRange& pa
   RayBox box = empty_box();
   for (std::uint32_t i = part.range.first; i < part.range.last; ++i) {
     for (int corner = 0; corner < 3; ++corner) {
-      const glm::dvec3 place = space.from_world(world_position(instance, mesh.positions[mesh.triangles[i][corner]]));
-      const std::array<float, 3> at{static_cast<float>(place.x), static_cast<float>(place.y),
-                                    static_cast<float>(place.z)};
+      const glm::dvec3 position = space.from_world(world_position(instance, mesh.positions[mesh.triangles[i][corner]]));
+      const std::array<float, 3> at{static_cast<float>(position.x), static_cast<float>(position.y),
+                                    static_cast<float>(position.z)};
       widen(box, {at, at});
     }
   }
@@ -66,10 +66,10 @@ void merge_near(std::span<RayBox> boxes, int halvings, std::vector<RayBox>& merg
   for (std::size_t axis = 1; axis < 3; ++axis) {
     if (all.high[axis] - all.low[axis] > all.high[longest] - all.low[longest]) longest = axis;
   }
-  const auto middle = boxes.begin() + static_cast<std::ptrdiff_t>(boxes.size() / 2);
-  std::ranges::nth_element(boxes, middle, {}, [&](const RayBox& box) { return box.low[longest] + box.high[longest]; });
-  merge_near({boxes.begin(), middle}, halvings - 1, merged);
-  merge_near({middle, boxes.end()}, halvings - 1, merged);
+  const auto center = boxes.begin() + static_cast<std::ptrdiff_t>(boxes.size() / 2);
+  std::ranges::nth_element(boxes, center, {}, [&](const RayBox& box) { return box.low[longest] + box.high[longest]; });
+  merge_near({boxes.begin(), center}, halvings - 1, merged);
+  merge_near({center, boxes.end()}, halvings - 1, merged);
 }
 
 }  // namespace

@@ -25,15 +25,15 @@ namespace {
 /// A ball, ten times in a mesh that is shared and once in one that is not, over a floor, with veils between.
 Scene crowd(bool veils = true) {
   Scene scene;
-  const std::uint32_t white = test::add_material(scene, test::matte(glm::vec3(0.7F)));
+  const std::uint32_t white = test::add_material(scene, test::diffuse(glm::vec3(0.7F)));
   const std::uint32_t polished = test::add_material(scene, test::mirror(0.8F));
-  Material veil = test::matte({0.9F, 0.3F, 0.2F});
+  Material veil = test::diffuse({0.9F, 0.3F, 0.2F});
   veil.base_color.a = 0.4F;
   veil.alpha_mode = AlphaMode::Blend;
   const std::uint32_t thin = test::add_material(scene, veil);
   const std::uint32_t lamp = test::add_material(scene, test::glowing(glm::vec3(6.0F)));
   const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b, std::uint32_t material) {
-    test::place(scene, test::add_mesh(scene, test::quad(corner, a, b, material)));
+    test::place_mesh(scene, test::add_mesh(scene, test::quad(corner, a, b, material)));
   };
   side({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}, white);
   side({-3, 0, -3}, {6, 0, 0}, {0, 3, 0}, white);
@@ -42,9 +42,9 @@ Scene crowd(bool veils = true) {
   for (int i = 0; i < 10; ++i) {
     glm::dmat4 there(1.0);
     there[3] = {-2.0 + 0.45 * i, 0.3 + 0.1 * (i % 3), -1.0 + 0.3 * (i % 4), 1.0};
-    test::place(scene, ball, there);
+    test::place_mesh(scene, ball, there);
   }
-  test::place(scene, test::add_mesh(scene, test::sphere(0.5, 32, white)), glm::dmat4(1.3));
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(0.5, 32, white)), glm::dmat4(1.3));
   if (veils) {
     side({-2, 0.2F, 0.8F}, {4, 0, 0}, {0, 0.6F, 0}, thin);
     side({-2, 0.1F, 0.9F}, {4, 0, 0}, {0, 0.5F, 0.1F}, thin);
@@ -59,12 +59,12 @@ std::vector<SurfaceRange> part_of(const Scene& scene, const Communicator& comm) 
 
 RayBatch random_rays(int count, unsigned int seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<double> place(-2.0, 2.0);
-  std::normal_distribution<double> way;
+  std::uniform_real_distribution<double> coordinate(-2.0, 2.0);
+  std::normal_distribution<double> normal;
   RayBatch rays;
   for (int i = 0; i < count; ++i) {
-    const glm::dvec3 origin(place(random), place(random), place(random));
-    glm::dvec3 direction = glm::normalize(glm::dvec3(way(random), way(random), way(random)));
+    const glm::dvec3 origin(coordinate(random), coordinate(random), coordinate(random));
+    glm::dvec3 direction = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
     if (i % 7 == 0) direction = {0.0, i % 2 == 0 ? 1.0 : -1.0, 0.0};
     if (i % 50 == 49) direction = glm::dvec3(std::nan(""));
     rays.push(origin, direction, i % 3 == 0 ? 0.7 : std::numeric_limits<double>::infinity());

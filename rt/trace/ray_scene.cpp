@@ -82,16 +82,16 @@ bool tracable(const float* p) {
 struct MeshPart {
   const Mesh& mesh;
   SurfaceRange range;
-  std::vector<std::uint32_t> vertices;  ///< of the mesh; empty: all, in their order
-  std::vector<std::uint32_t> place;     ///< of a mesh's vertex among those
+  std::vector<std::uint32_t> vertices;    ///< of the mesh; empty: all, in their order
+  std::vector<std::uint32_t> part_index;  ///< of a mesh's vertex among those
 
   MeshPart(const Mesh& of, SurfaceRange triangles) : mesh(of), range(triangles) {
     if (range.count() == mesh.triangles.size()) return;
     constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
-    place.assign(mesh.positions.size(), kNowhere);
+    part_index.assign(mesh.positions.size(), kNowhere);
     for (std::uint32_t i = range.first; i < range.last; ++i) {
       for (int corner = 0; corner < 3; ++corner) {
-        std::uint32_t& vertex = place[mesh.triangles[i][corner]];
+        std::uint32_t& vertex = part_index[mesh.triangles[i][corner]];
         if (vertex != kNowhere) continue;
         vertex = static_cast<std::uint32_t>(vertices.size());
         vertices.push_back(mesh.triangles[i][corner]);
@@ -105,7 +105,7 @@ struct MeshPart {
   }
   [[nodiscard]] glm::uvec3 triangle(std::uint32_t i) const {
     const glm::uvec3& t = mesh.triangles[range.first + i];
-    return vertices.empty() ? t : glm::uvec3(place[t.x], place[t.y], place[t.z]);
+    return vertices.empty() ? t : glm::uvec3(part_index[t.x], part_index[t.y], part_index[t.z]);
   }
 };
 
@@ -205,9 +205,9 @@ RTCScene RayScene::Embree::shared_part(const Scene& scene, const InstanceRange& 
 void RayScene::Embree::add_instance(const Instance& instance, unsigned int id, RTCScene shared_mesh,
                                     const RaySpace& space) {
   std::array<float, 12> matrix{};  // column by column
-  const glm::dvec3 place = space.from_world(glm::dvec3(instance.to_world[3]));
+  const glm::dvec3 position = space.from_world(glm::dvec3(instance.to_world[3]));
   for (int column = 0; column < 4; ++column) {
-    const glm::dvec3 values = column < 3 ? glm::dvec3(instance.to_world[column]) * space.scale : place;
+    const glm::dvec3 values = column < 3 ? glm::dvec3(instance.to_world[column]) * space.scale : position;
     for (int row = 0; row < 3; ++row) {
       matrix[3 * static_cast<std::size_t>(column) + static_cast<std::size_t>(row)] = static_cast<float>(values[row]);
     }

@@ -17,17 +17,18 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Scene facing_quad() {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0)));
   finish_scene(scene);
   return scene;
 }
 
 TEST(RayScene, FindsWhatABruteForceSearchFinds) {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::sphere(1.0, 12, 0)), glm::translate(glm::dmat4(1.0), {0.3, 0.1, 0.0}));
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(1.0, 12, 0)),
+                   glm::translate(glm::dmat4(1.0), {0.3, 0.1, 0.0}));
   const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.5, 6, 0));
-  test::place(scene, shared, glm::translate(glm::dmat4(1.0), {-1.5, 0.0, 0.0}));
-  test::place(scene, shared, glm::scale(glm::translate(glm::dmat4(1.0), {0.0, 1.4, 0.2}), {0.5, 1.0, -0.7}));
+  test::place_mesh(scene, shared, glm::translate(glm::dmat4(1.0), {-1.5, 0.0, 0.0}));
+  test::place_mesh(scene, shared, glm::scale(glm::translate(glm::dmat4(1.0), {0.0, 1.4, 0.2}), {0.5, 1.0, -0.7}));
   finish_scene(scene);
   ASSERT_EQ(shared_instances(scene), (std::vector<std::uint8_t>{0, 1, 1}));
   const RaySpace space(scene.bounds);
@@ -60,13 +61,14 @@ TEST(RayScene, FindsWhatABruteForceSearchFinds) {
 /// Surfaces met by rays from random places, many of them into the edges of triangles.
 std::vector<std::uint32_t> met_with(const RayBuild& build) {
   Scene scene;
-  test::place(scene, test::add_mesh(scene, test::sphere(1.0, 40, 0)), glm::translate(glm::dmat4(1.0), {0.3, 0.1, 0.0}));
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(1.0, 40, 0)),
+                   glm::translate(glm::dmat4(1.0), {0.3, 0.1, 0.0}));
   const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.5, 12, 0));
   for (int i = 0; i < 20; ++i) {
-    test::place(scene, shared, glm::translate(glm::dmat4(1.0), {std::cos(i), 0.1 * i - 1.0, std::sin(i)}));
+    test::place_mesh(scene, shared, glm::translate(glm::dmat4(1.0), {std::cos(i), 0.1 * i - 1.0, std::sin(i)}));
   }
   const Mesh quad = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
-  for (int copy = 0; copy < 3; ++copy) test::place(scene, test::add_mesh(scene, quad));
+  for (int copy = 0; copy < 3; ++copy) test::place_mesh(scene, test::add_mesh(scene, quad));
   finish_scene(scene);
   const RaySpace space(scene.bounds);
   const RayScene rays(scene, space, 1, std::array{SurfaceRange{0, scene.triangles}}, build);
@@ -106,7 +108,7 @@ TEST(RayScene, TheWidestInstructionsMayDisagreeAtEdgesAlone) {
 TEST(RayScene, GivesTheLowestIdAmongSurfacesInOnePlane) {
   Scene scene;
   const Mesh quad = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
-  for (int copy = 0; copy < 5; ++copy) test::place(scene, test::add_mesh(scene, quad));
+  for (int copy = 0; copy < 5; ++copy) test::place_mesh(scene, test::add_mesh(scene, quad));
   finish_scene(scene);
   const RaySpace space(scene.bounds);
   const RayScene rays(scene, space, 1);
@@ -167,11 +169,11 @@ TEST(RayScene, TakesSingularHugeAndEmptyPlacements) {
   Scene scene;
   const std::uint32_t ball = test::add_mesh(scene, test::sphere(1.0, 4, 0));
   const std::uint32_t empty = test::add_mesh(scene, Mesh{});
-  test::place(scene, ball);
-  test::place(scene, ball, glm::scale(glm::dmat4(1.0), {1.0, 0.0, 1.0}));
-  test::place(scene, ball, glm::dmat4(0.0));
-  test::place(scene, ball, glm::scale(glm::dmat4(1.0), {1e-7, 1.0, 1.0}));
-  test::place(scene, empty);
+  test::place_mesh(scene, ball);
+  test::place_mesh(scene, ball, glm::scale(glm::dmat4(1.0), {1.0, 0.0, 1.0}));
+  test::place_mesh(scene, ball, glm::dmat4(0.0));
+  test::place_mesh(scene, ball, glm::scale(glm::dmat4(1.0), {1e-7, 1.0, 1.0}));
+  test::place_mesh(scene, empty);
   finish_scene(scene);
   const RaySpace space(scene.bounds);
   const RayScene rays(scene, space, 1);
@@ -189,7 +191,7 @@ TEST(RayScene, LeavesOutTrianglesBeyondFloatAndKeepsTheNumbersOfTheOthers) {
   mesh.positions.push_back({1e38F, 1e38F, 1e38F});
   mesh.normals.clear();
   mesh.triangles = {{0, 1, 4}, {0, 1, 2}, {0, 2, 3}};
-  test::place(scene, test::add_mesh(scene, mesh));
+  test::place_mesh(scene, test::add_mesh(scene, mesh));
   finish_scene(scene);
   const RayScene rays(scene, RaySpace(), 1);
   EXPECT_EQ(rays.skipped_triangles(), 1U);

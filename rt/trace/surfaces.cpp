@@ -18,15 +18,16 @@ namespace {
 std::vector<std::uint32_t> welded(const Mesh& mesh) {
   std::vector<std::uint32_t> order(mesh.positions.size());
   std::iota(order.begin(), order.end(), 0U);
-  const auto place = [&](std::uint32_t vertex) {
+  const auto position = [&](std::uint32_t vertex) {
     const glm::vec3& p = mesh.positions[vertex];
     return std::tuple(p.x, p.y, p.z);
   };
-  std::ranges::sort(
-      order, [&](std::uint32_t a, std::uint32_t b) { return place(a) != place(b) ? place(a) < place(b) : a < b; });
+  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
+    return position(a) != position(b) ? position(a) < position(b) : a < b;
+  });
   std::vector<std::uint32_t> first(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool again = i > 0 && place(order[i]) == place(order[i - 1]);
+    const bool again = i > 0 && position(order[i]) == position(order[i - 1]);
     first[order[i]] = again ? first[order[i - 1]] : order[i];
   }
   return first;
@@ -143,7 +144,7 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
     const glm::dmat3 linear(to_world);
     const glm::dmat3 scaled = linear / std::max(row_sum_norm(linear), 1e-300);
     placed_[i].normal_matrix = cofactors(scaled);
-    placed_[i].mirrored = glm::determinant(scaled) < 0.0;
+    placed_[i].reflected = glm::determinant(scaled) < 0.0;
     if (shared[i] == 0) continue;
     placed_[i].distortion = distortion(linear);
     placed_[i].reach = row_sum_norm(linear) * mesh_reach[scene.instances[i].mesh] +
@@ -158,10 +159,10 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
   if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangles.size()) {
     triangle.index = id - instance->first_surface;
   } else {
-    const SurfaceLocation place = locate_surface(scene_, id);
-    triangle.instance = place.instance;
-    triangle.index = place.triangle;
-    instance = &scene_.instances[place.instance];
+    const SurfaceLocation position = locate_surface(scene_, id);
+    triangle.instance = position.instance;
+    triangle.index = position.triangle;
+    instance = &scene_.instances[position.instance];
   }
   triangle.surface = id;
   const Mesh& mesh = scene_.mesh_of(*instance);
@@ -178,9 +179,9 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
     triangle.normals[static_cast<std::size_t>(corner)] =
         unit(placed.normal_matrix * glm::dvec3(mesh.normals[corners[corner]]), triangle.normal);
   }
-  const double place = largest(triangle.v0 - space_.origin);
+  const double position = largest(triangle.v0 - space_.origin);
   const double extent = std::max(largest(triangle.e1), largest(triangle.e2));
-  const double world = place + extent;
+  const double world = position + extent;
   triangle.offset = kOriginSteps * kFloatStep * std::max(world, placed.distortion * world + placed.reach);
 }
 
@@ -231,7 +232,7 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   point.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
   const bool against_winding = glm::dot(triangle.normal, point.to_viewer) < 0.0;
   point.geometric_normal = against_winding ? -triangle.normal : triangle.normal;
-  point.inside = against_winding != placed_[triangle.instance].mirrored;
+  point.inside = against_winding != placed_[triangle.instance].reflected;
   const auto& corner = triangle.normals;
   const glm::dvec3 smooth = unit(b0 * corner[0] + at.x * corner[1] + at.y * corner[2], triangle.normal);
   const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;

@@ -18,7 +18,7 @@ Scene one_triangle(const glm::dmat4& to_world = glm::dmat4(1.0)) {
   mesh.positions = {{0, 0, 0}, {2, 0, 0}, {0, 4, 0}};
   mesh.uvs[0] = {{0, 0}, {1, 0}, {0, 1}};
   mesh.triangles = {{0, 1, 2}};
-  test::place(scene, test::add_mesh(scene, mesh), to_world);
+  test::place_mesh(scene, test::add_mesh(scene, mesh), to_world);
   finish_scene(scene);
   return scene;
 }
@@ -61,7 +61,7 @@ TEST(Surfaces, LeaveMoreRoomWhereARayIsCarriedIntoADistortedMesh) {
   const double plain = meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -1.0}).offset;
   EXPECT_GT(plain, 0.0);
   // Two instances share the mesh; rays of the second are divided by 8 along one axis and come back.
-  test::place(scene, 0, glm::scale(glm::dmat4(1.0), {8.0, 1.0, 1.0}));
+  test::place_mesh(scene, 0, glm::scale(glm::dmat4(1.0), {8.0, 1.0, 1.0}));
   finish_scene(scene);
   const SurfacePoint point = meet(scene, 1, {0.5, 1.0, 3.0}, {0.0, 0.0, -1.0});
   const double world = 8.0 + 16.0;  // from the scene's middle to the corner, and the longest edge
@@ -96,14 +96,14 @@ TEST(Surfaces, TransformNormalsByTheInverseTransposeAndUnderMirroring) {
   mesh.positions = {{0, 0, 0}, {1, 1, 0}, {0, 0, -1}};
   mesh.triangles = {{0, 1, 2}};
   const std::uint32_t id = test::add_mesh(scene, mesh);
-  test::place(scene, id, glm::scale(glm::dmat4(1.0), {1.0, 0.5, 1.0}));
-  test::place(scene, id, glm::scale(glm::dmat4(1.0), {1.0, -0.5, 1.0}));
-  test::place(scene, id, glm::scale(glm::dmat4(1.0), {1.0, 0.0, 1.0}));
+  test::place_mesh(scene, id, glm::scale(glm::dmat4(1.0), {1.0, 0.5, 1.0}));
+  test::place_mesh(scene, id, glm::scale(glm::dmat4(1.0), {1.0, -0.5, 1.0}));
+  test::place_mesh(scene, id, glm::scale(glm::dmat4(1.0), {1.0, 0.0, 1.0}));
   finish_scene(scene);
   const glm::dvec3 up = glm::normalize(glm::dvec3(-0.5, 1.0, 0.0));
   EXPECT_LT(glm::length(meet(scene, 0, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - up), 1e-7);
-  const glm::dvec3 mirrored = glm::normalize(glm::dvec3(0.5, 1.0, 0.0));
-  EXPECT_LT(glm::length(meet(scene, 1, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - mirrored), 1e-7);
+  const glm::dvec3 reflected = glm::normalize(glm::dvec3(0.5, 1.0, 0.0));
+  EXPECT_LT(glm::length(meet(scene, 1, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - reflected), 1e-7);
   EXPECT_LT(glm::length(meet(scene, 2, {0.4, 5, -0.2}, {0, -1, 0}).shading_normal - glm::dvec3(0, 1, 0)), 1e-7);
 }
 
@@ -128,7 +128,7 @@ TEST(Surfaces, InterpolateVertexColorsAndTellTheirNumber) {
   EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).surface, 0U);
   scene.meshes[0].colors = {{1, 0, 0, 1}, {0, 1, 0, 0}, {0, 0, 1, 0.5F}};
   EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).color, glm::dvec4(0.5, 0.25, 0.25, 0.625));
-  test::place(scene, 0);
+  test::place_mesh(scene, 0);
   finish_scene(scene);
   EXPECT_EQ(meet(scene, 1, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).surface, 1U);
 }
@@ -138,8 +138,8 @@ TEST(Surfaces, FindTheInstanceOfAnyIdInAnyOrder) {
   const std::uint32_t square = test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0));
   const std::uint32_t empty = test::add_mesh(scene, Mesh{});
   for (int i = 0; i < 4; ++i) {
-    test::place(scene, square, glm::translate(glm::dmat4(1.0), {10.0 * i, 0.0, 0.0}));
-    test::place(scene, empty);
+    test::place_mesh(scene, square, glm::translate(glm::dmat4(1.0), {10.0 * i, 0.0, 0.0}));
+    test::place_mesh(scene, empty);
   }
   finish_scene(scene);
   const Surfaces surfaces(scene, RaySpace(scene.bounds));

@@ -10,7 +10,7 @@
 namespace hpr {
 namespace {
 
-constexpr int kMostRanks = 4096;
+constexpr int kMaxRanks = 4096;
 
 }  // namespace
 
@@ -32,9 +32,9 @@ std::vector<int> parse_counts(const std::string& list, const std::string& option
   for (const std::string& item : split_commas(list)) {
     int value = 0;
     const auto [end, failure] = std::from_chars(item.data(), item.data() + item.size(), value);
-    if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMostRanks) {
+    if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMaxRanks) {
       throw Error(ExitCode::Usage,
-                  fmt::format("{}: '{}' is not a number from 1 to {}", option, printable(item), kMostRanks),
+                  fmt::format("{}: '{}' is not a number from 1 to {}", option, printable(item), kMaxRanks),
                   fmt::format("write it like {} 1,2,4,8", option));
     }
     counts.push_back(value);
