@@ -21,8 +21,8 @@ import tempfile
 HPR = os.path.abspath(sys.argv[1])
 FULL = sys.argv[2:] == ["--full"]
 SCENE = "gen:gallery"
-SIZE = (1280, 1024) if FULL else (192, 144)
-FEW = ["--photons", "5000"]
+SIZE = (1280, 1024) if FULL else (136, 88)
+FEW = ["--photons", "2000"]
 WAYS = {
     "raster": FEW,
     "rays": ["--primary", "rays", *FEW],

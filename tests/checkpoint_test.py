@@ -19,7 +19,7 @@ import tempfile
 import processes
 from program import HPR, expect, failures
 
-SAMPLES = 100
+SAMPLES = 64
 COMMON = ["--progress", "line", "--threads", "1", "--photons", "1000"]
 ARGUMENTS = ["render", "gen:gallery", "--size", "96x64", *COMMON]
 
@@ -92,8 +92,8 @@ def write_and_go_on(folder, whole):
 
 def as_soon_as_mpi_starts(folder):
     """mpiexec has no ear for signals yet, and ranks would die of them: they wait until all have started."""
-    for wanted, code, name in ((signal.SIGUSR1, 75, "USR1"), (signal.SIGUSR2, 0, "USR2")):
-        process = subprocess.Popen([HPR, *ARGUMENTS, "-o", "j.exr", "--spp", str(SAMPLES), "--ranks", "2"], cwd=folder,
+    for wanted, code, name, samples in ((signal.SIGUSR1, 75, "USR1", "1000"), (signal.SIGUSR2, 0, "USR2", str(SAMPLES))):
+        process = subprocess.Popen([HPR, *ARGUMENTS, "-o", "j.exr", "--spp", samples, "--ranks", "2"], cwd=folder,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         while process.poll() is None and not processes.children_of(process.pid):
             pass
@@ -188,10 +188,10 @@ def main():
         expect(result.returncode == 0, f"--adaptive left with {result.returncode}: {result.stderr}")
         adaptive = (folder / "adaptive.exr").read_bytes()
         expect(adaptive != whole, "--adaptive makes no difference")
-        for at in (12, 60):  # where all pixels get the same samples, and where they do not
+        for at in (12, 40):  # where all pixels get the same samples, and where they do not
             stop_and_resume(folder, adaptive, f"adaptive, at {at}, one rank, then three", itself, ["--adaptive"],
                             ["--adaptive", *sort_last], at)
-        stop_and_resume(folder, adaptive, "adaptive, three ranks, then one", itself, ["--adaptive", *sort_last], ["--adaptive"], 60)
+        stop_and_resume(folder, adaptive, "adaptive, three ranks, then one", itself, ["--adaptive", *sort_last], ["--adaptive"], 40)
         result = run(folder, "-o", "denoised.exr", "--spp", str(SAMPLES), "--denoise")
         denoised = (folder / "denoised.exr").read_bytes()
         expect(denoised != whole, "--denoise makes no difference")

@@ -22,13 +22,13 @@ MATTE = "gen:cornell"
 
 
 def hpr(folder, *arguments):
-    result = subprocess.run([HPR, *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=100, check=False)
+    result = subprocess.run([HPR, *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=200, check=False)
     expect(result.returncode == 0, f"hpr {' '.join(map(str, arguments))} left with {result.returncode}: {result.stderr[-1000:]}")
     return result
 
 
 def render(folder, *arguments, scene="gen:gallery"):
-    hpr(folder, "render", scene, "--size", "168x104", "-o", "a.exr", "--stats", "a.json", "--force", *arguments)
+    hpr(folder, "render", scene, "--size", "136x60", "-o", "a.exr", "--stats", "a.json", "--force", *arguments)
     return (folder / "a.exr").read_bytes()
 
 
@@ -88,7 +88,7 @@ def rounds(folder):
     look = ("--at", "0,0.2,0", "--environment", "0.5,0.6,0.7", "--quality", "best", "--primary", "rays")
     sky = (*look, "--eye", "0.3,1.2,1.9", "--spp", "13")
     scene = folder / "open.gltf"
-    hpr(folder, "render", scene, "--size", "168x104", "-o", "b.exr", "--force", "--aov", "direct,shadow,reflection,photon", *sky)
+    hpr(folder, "render", scene, "--size", "136x60", "-o", "b.exr", "--force", "--aov", "direct,shadow,reflection,photon", *sky)
     layers = exr.read(folder / "b.exr")[2]
     ways = [(), ("--threads", "1"), ("--ranks", "3"), ("--ranks", "2", "--data", "partitioned")]
     pictures = {render(folder, *sky, *way, scene=scene) for way in ways}

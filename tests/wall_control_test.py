@@ -110,44 +110,44 @@ def told_and_stopped(folder):
 
 def stops_and_goes_on(folder):
     """SIGUSR1 ends a run after its frame with 75; --resume goes on, and both are one run: of the same run only."""
-    whole = Wall(folder, "uncut", 1, 200)
+    whole = Wall(folder, "uncut", 1, 120)
     whole.leave()
     expected = [hashes(frame) for frame in whole.manifest()["frames"]]
     for ranks in (1, 2):
         name = f"stopped-{ranks}"
-        wall = Wall(folder, name, ranks, 200)
+        wall = Wall(folder, name, ranks, 120)
         wall.wait_for_frame(2)
         wall.job.send_signal(signal.SIGUSR1)
         wall.leave(75)
         done = len(wall.manifest()["frames"])
-        expect(wall.manifest().get("stopped") == {"frames": done, "of": 200}, f"stopped: {wall.manifest().get('stopped')}")
+        expect(wall.manifest().get("stopped") == {"frames": done, "of": 120}, f"stopped: {wall.manifest().get('stopped')}")
         expect("--resume goes on" in wall.told(), f"the log does not tell how to go on: {wall.told()}")
         command = [HPR, "wall", "run", "2x1@64x48", "gen:gallery", "-o", str(wall.out), "--quality", "draft", "--resume"]
-        for options, words in ((["--frames", "201"], "200 frames"), (["--frames", "200", "--seed", "2"], "seed 1"),
-                               (["--frames", "200", "--scale", "0.5"], "record 0"),
-                               (["--frames", "200", "--set", "test.gap_rgba=[1,2,3,255]"], "another wall")):
+        for options, words in ((["--frames", "121"], "120 frames"), (["--frames", "120", "--seed", "2"], "seed 1"),
+                               (["--frames", "120", "--scale", "0.5"], "record 0"),
+                               (["--frames", "120", "--set", "test.gap_rgba=[1,2,3,255]"], "another wall")):
             refused = subprocess.run([*command, *options], capture_output=True, text=True, timeout=60, check=False)
             expect(refused.returncode == 3 and words in refused.stderr, f"{options}: {refused.returncode}, {refused.stderr}")
-        for options in (["--display", "none", "--frames", "200"], ["--until-stopped"]):
+        for options in (["--display", "none", "--frames", "120"], ["--until-stopped"]):
             expect(subprocess.run([*command, *options], capture_output=True, timeout=60, check=False).returncode == 2, f"takes {options}")
-        rest = subprocess.run([*command, "--frames", "200", "--ranks", str(3 - ranks)], capture_output=True, text=True, timeout=120,
+        rest = subprocess.run([*command, "--frames", "120", "--ranks", str(3 - ranks)], capture_output=True, text=True, timeout=120,
                               check=False)
-        expect(rest.returncode == 0 and f"going on after {done} of 200" in rest.stderr, f"{rest.returncode}, {rest.stderr}")
+        expect(rest.returncode == 0 and f"going on after {done} of 120" in rest.stderr, f"{rest.returncode}, {rest.stderr}")
         expect([hashes(frame) for frame in wall.manifest()["frames"]] == expected, f"{ranks} ranks: two parts differ from the whole")
         expect("stopped" not in wall.manifest(), "it is called stopped still")
         shorter = subprocess.run([*command, "--frames", "100"], capture_output=True, text=True, timeout=60, check=False)
-        expect(shorter.returncode == 3 and "200 frames" in shorter.stderr, f"of a whole run: {shorter.returncode}, {shorter.stderr}")
+        expect(shorter.returncode == 3 and "120 frames" in shorter.stderr, f"of a whole run: {shorter.returncode}, {shorter.stderr}")
     nothing = Wall(folder, "from-nothing", 1, 3, "--resume")
     nothing.leave()
     expect(len(nothing.manifest()["frames"]) == 3, "--resume without a manifest begins with the first frame")
 
 
 def survives_a_lost_rank(folder):
-    whole = Wall(folder, "whole", 2, 150)
+    whole = Wall(folder, "whole", 2, 90)
     whole.leave()
     expected = [hashes(frame) for frame in whole.manifest()["frames"]]
     for how in (signal.SIGKILL, signal.SIGSTOP):
-        wall = Wall(folder, f"lost-{how.name}", 2, 150, "--hang-timeout", "2")
+        wall = Wall(folder, f"lost-{how.name}", 2, 90, "--hang-timeout", "2")
         wall.wait_for_frame(3)
         ranks = wall.ranks()
         expect(len(ranks) == 2, f"the job has ranks {ranks}")
@@ -156,19 +156,19 @@ def survives_a_lost_rank(folder):
         wall.leave()
         manifest = wall.manifest()
         numbers = [frame["frame"] for frame in manifest["frames"]]
-        expect(numbers == list(range(150)), f"{how.name}: frames {numbers[:5]} ... {numbers[-5:]}, {len(numbers)} of 150")
+        expect(numbers == list(range(90)), f"{how.name}: frames {numbers[:5]} ... {numbers[-5:]}, {len(numbers)} of 90")
         restarts = manifest.get("restarts", [])
-        expect(len(restarts) == 1 and 3 <= restarts[0]["frame"] < 150, f"{how.name}: restarts {restarts}")
+        expect(len(restarts) == 1 and 3 <= restarts[0]["frame"] < 90, f"{how.name}: restarts {restarts}")
         expect([hashes(frame) for frame in manifest["frames"]] == expected, f"{how.name}: other frames than those of a whole run")
         expect("starting it again from frame" in wall.told(), "the log does not tell of the restart")
-    first = Wall(folder, "halves", 2, 150)
+    first = Wall(folder, "halves", 2, 90)
     first.wait_for_frame(3)
     os.kill(first.ranks()[-1], signal.SIGKILL)
     first.wait_for_frame(6)
     first.job.send_signal(signal.SIGUSR1)
     first.leave(75)
     begun = len(first.manifest()["frames"])
-    second = Wall(folder, "halves", 2, 150, "--resume")
+    second = Wall(folder, "halves", 2, 90, "--resume")
     second.wait_for_frame(begun + 1)
     os.kill(second.ranks()[-1], signal.SIGKILL)
     second.leave()

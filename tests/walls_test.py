@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The example walls at an eighth of their size: whatever strategy and ranks, each screen shows what one rank draws of it.
+"""The example walls at a sixteenth of their size (an eighth with --full): whatever strategy and ranks, each screen shows what one rank draws of it.
 
 usage: walls_test.py HPR SOURCE [--full]
 
@@ -21,7 +21,7 @@ SCENE = "gen:gallery"
 
 
 def screens_of(wall, folder, *options):
-    command = [HPR, "-q", "wall", "run", str(wall), SCENE, "--scale", "0.125", "--quality", "draft", "-o", str(folder), *options]
+    command = [HPR, "-q", "wall", "run", str(wall), SCENE, "--scale", "0.125" if FULL else "0.0625", "--quality", "draft", "-o", str(folder), *options]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     if result.returncode != 0:
         print(f"{' '.join(command)} left with {result.returncode}:\n{result.stderr[-1500:]}")
