@@ -20,10 +20,10 @@ namespace HWY_NAMESPACE {
 
 static_assert(TapWeights<float>::kPlaces == kPlaces);
 
-/// The lanes of one element type, and what the filter loads into them.
-template <typename T>
+/// Lanes of one element type, at most kMaxLanes, and what the filter loads into them.
+template <typename T, std::size_t kMaxLanes>
 struct FilterLanes {
-  using D = hn::CappedTag<T, kPlaces>;
+  using D = hn::CappedTag<T, kMaxLanes>;
   using Words = hn::RebindToSigned<D>;
   using V = hn::Vec<D>;
   using M = hn::Mask<D>;
@@ -46,9 +46,9 @@ struct FilterLanes {
 };
 
 /// Implements joint_bilateral_weights.
-template <typename T>
+template <std::size_t kMaxLanes, typename T>
 HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& center, TapWeights<T>& weights) {
-  using Lanes = FilterLanes<T>;
+  using Lanes = FilterLanes<T, kMaxLanes>;
   using V = typename Lanes::V;
   const typename Lanes::D d;
   const typename Lanes::Words words;
@@ -119,11 +119,17 @@ HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& ce
 }
 
 void weigh_floats(const NeighborFeatures<float>& taps, const FilterCenter<float>& center, TapWeights<float>& weights) {
-  weigh(taps, center, weights);
+  weigh<kPlaces>(taps, center, weights);
 }
 void weigh_doubles(const NeighborFeatures<double>& taps, const FilterCenter<double>& center,
                    TapWeights<double>& weights) {
-  weigh(taps, center, weights);
+  // The windows of half resolution are two taps wide: wider vectors would divide for nothing.
+  constexpr std::size_t kNarrow = 2;
+  if (center.window.columns <= static_cast<int>(kNarrow)) {
+    weigh<kNarrow>(taps, center, weights);
+  } else {
+    weigh<kPlaces>(taps, center, weights);
+  }
 }
 
 HWY_INLINE double sum_of(const TapWeights<float>& weights, const TapWeights<float>::Rows& of, const double* light) {
