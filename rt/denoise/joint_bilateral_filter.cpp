@@ -45,6 +45,38 @@ struct FilterLanes {
   }
 };
 
+/// The weight of taps in the columns `column`, of a row `down` from the center, by their distance from it and how alike
+/// they are; clears the mask where they are out of reach. Of the center's own row the center weighs 1.
+template <typename Lanes, typename T>
+HWY_INLINE typename Lanes::V spatial_weight(const FilterCenter<T>& center, typename Lanes::V column,
+                                            typename Lanes::V down, typename Lanes::V alike, bool is_own_row,
+                                            typename Lanes::M& accepted) {
+  const typename Lanes::D d;
+  const auto right = hn::Sub(column, Lanes::all(static_cast<T>(center.offset.x)));
+  const auto off2 = hn::Add(square(right), square(down));
+  const auto spatial = hn::Sub(Lanes::all(T{1}), hn::Mul(off2, Lanes::all(T{1} / (center.reach * center.reach))));
+  accepted = hn::And(accepted, hn::Gt(spatial, hn::Zero(d)));
+  const auto weight = hn::Mul(hn::Mul(Lanes::all(center.neighbor_weight), spatial), square(alike));
+  if (!center.is_pixel || !is_own_row) return weight;
+  return hn::IfThenElse(hn::Eq(column, hn::Zero(d)), Lanes::all(T{1}), weight);
+}
+
+/// What the light of the taps from `i` on is multiplied by, for each term of the center; 1 where it has none.
+template <typename Lanes, typename T>
+HWY_INLINE auto scattering_ratios(const NeighborFeatures<T>& taps, const FilterCenter<T>& center, std::size_t i,
+                                  typename Lanes::M& accepted) {
+  std::array<VectorOf<typename Lanes::V>, FilterCenter<T>::kMaxTerms> ratios;
+  ratios[0] = {Lanes::all(T{1}), Lanes::all(T{1}), Lanes::all(T{1})};
+  for (std::size_t term = 0; term < center.term_count; ++term) {
+    const ScatteringTerm<T>& scattering = center.terms[term];
+    const auto theirs = Lanes::load(taps.scattering[scattering.plane], i);
+    ratios[term].x = Lanes::ratio(center, scattering.own.x, theirs.x, accepted);
+    ratios[term].y = Lanes::ratio(center, scattering.own.y, theirs.y, accepted);
+    ratios[term].z = Lanes::ratio(center, scattering.own.z, theirs.z, accepted);
+  }
+  return ratios;
+}
+
 /// Implements joint_bilateral_weights.
 template <std::size_t kMaxLanes, typename T>
 HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& center, TapWeights<T>& weights) {
@@ -54,7 +86,6 @@ HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& ce
   const typename Lanes::Words words;
   const auto all = [](T value) { return Lanes::all(value); };
   const FilterWindow& window = center.window;
-  const V inverse_reach2 = all(T{1} / (center.reach * center.reach));
   using Kind = typename NeighborFeatures<T>::Kind;
   const auto center_kind = hn::Set(words, Kind{tap_kind(center.material, !center.is_pixel || center.separate_diffuse)});
   const TapVectors<T>& normals = center.is_pixel ? taps.shading_normal : taps.normal;
@@ -84,25 +115,8 @@ HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& ce
       accepted = hn::And(accepted, hn::And(hn::Le(way2, all(center.max_distance2)),
                                            hn::Le(square(bend), hn::Mul(all(center.max_bend2), way2))));
       V weight = all(T{1});
-      if (!center.is_box) {
-        const V right = hn::Sub(column, all(static_cast<T>(center.offset.x)));
-        const V off2 = hn::Add(square(right), square(down));
-        const V spatial = hn::Sub(all(T{1}), hn::Mul(off2, inverse_reach2));
-        accepted = hn::And(accepted, hn::Gt(spatial, hn::Zero(d)));
-        weight = hn::Mul(hn::Mul(all(center.neighbor_weight), spatial), square(alike));
-        if (center.is_pixel && rows_off == 0) {
-          weight = hn::IfThenElse(hn::Eq(column, hn::Zero(d)), all(T{1}), weight);
-        }
-      }
-      std::array<VectorOf<V>, FilterCenter<T>::kMaxTerms> ratios;
-      ratios[0] = {all(T{1}), all(T{1}), all(T{1})};
-      for (std::size_t term = 0; term < center.term_count; ++term) {
-        const ScatteringTerm<T>& scattering = center.terms[term];
-        const VectorOf<V> theirs = Lanes::load(taps.scattering[scattering.plane], i);
-        ratios[term].x = Lanes::ratio(center, scattering.own.x, theirs.x, accepted);
-        ratios[term].y = Lanes::ratio(center, scattering.own.y, theirs.y, accepted);
-        ratios[term].z = Lanes::ratio(center, scattering.own.z, theirs.z, accepted);
-      }
+      if (!center.is_box) weight = spatial_weight<Lanes>(center, column, down, alike, rows_off == 0, accepted);
+      const auto ratios = scattering_ratios<Lanes>(taps, center, i, accepted);
       weight = hn::IfThenElseZero(accepted, weight);
       const std::size_t at = row * kPlaces + lane;
       for (std::size_t term = 0; term < std::max<std::size_t>(center.term_count, 1); ++term) {

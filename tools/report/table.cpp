@@ -85,6 +85,15 @@ void set_at(Json& object, std::string_view path, const Json& value) {
   }
 }
 
+/// A cell of a row: a heading where it is the row's first.
+std::string table_cell(const Json& value, const ColumnStyle& of, bool is_heading) {
+  std::string cell = html_cell(value, of);
+  if (of.code) cell = fmt::format("<code>{}</code>", cell);
+  if (is_heading) return fmt::format("<th scope=\"row\">{}</th>", cell);
+  const bool is_wrong = of.wrong != nullptr && of.wrong(value);
+  return fmt::format("<td{}>{}</td>", is_wrong ? " class=\"wrong\"" : "", cell);
+}
+
 }  // namespace
 
 std::vector<std::size_t> Table::indices_of(const std::vector<std::string>& keys) const {
@@ -186,15 +195,7 @@ std::string Table::html(const std::vector<std::string>& keys, const HtmlTableSty
     if (style.starts_group && style.starts_group(row)) text += "</tbody>\n<tbody>\n";
     text += style.highlighted && style.highlighted(row) ? "<tr class=\"fastest\">" : "<tr>";
     for (const std::size_t column : shown) {
-      const ColumnStyle& of = columns_[column].style;
-      const Json& value = rows_[row][column];
-      std::string cell = html_cell(value, of);
-      if (of.code) cell = "<code>" + cell + "</code>";
-      if (column == shown.front()) {
-        text += "<th scope=\"row\">" + cell + "</th>";
-      } else {
-        text += (of.wrong != nullptr && of.wrong(value) ? "<td class=\"wrong\">" : "<td>") + cell + "</td>";
-      }
+      text += table_cell(rows_[row][column], columns_[column].style, column == shown.front());
     }
     text += "</tr>\n";
   }
