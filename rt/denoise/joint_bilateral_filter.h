@@ -88,7 +88,7 @@ struct FilterWindow {
 /// A place that light is filtered for.
 template <typename T>
 struct FilterCenter {
-  static constexpr std::size_t kMaxTerms = 6;
+  static constexpr std::size_t kMaxTerms = 8;
 
   std::uint32_t material = 0;
   bool separate_diffuse = false;  ///< taps must be so too; subpixel samples take either
