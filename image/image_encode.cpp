@@ -100,8 +100,6 @@ std::vector<std::byte> encode_exr(const Image<Rgb>& image, const std::map<std::s
       file.writePixels(image.height());
     }
     return bytes.take();
-  } catch (const Error&) {
-    throw;
   } catch (const std::exception& error) {
     throw Error(ExitCode::Io, fmt::format("cannot encode exr: {}", error.what()), "check the picture's size");
   }

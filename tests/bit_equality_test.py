@@ -21,7 +21,7 @@ import tempfile
 HPR = os.path.abspath(sys.argv[1])
 FULL = sys.argv[2:] == ["--full"]
 SCENE = "gen:gallery"
-SIZE = (1280, 1024) if FULL else (136, 88)
+SIZE = (1280, 1024) if FULL else (200, 88)
 FEW = ["--photons", "2000"]
 WAYS = {
     "raster": FEW,

@@ -1,19 +1,17 @@
 #!/usr/bin/env python3
 """Holds the language of the sources: no identifier of a private dialect, no doc comment that leans on the one before.
 
-usage: check_names.py [--self-test] [--all] ROOT
+usage: check_names.py [--self-test] ROOT
 
-Every identifier in the code (not in comments or strings) of the folders in ROOMS_DONE is compared with DENIED, every
-doc comment with LEANING. Prints one line per breach, `file:line: NAME: say TERM`, and leaves with 1. --all checks every
-folder: what is still to be done.
+Every identifier in the code (not in comments or strings) of the folders in ROOMS is compared with DENIED, every doc
+comment with LEANING. Prints one line per breach, `file:line: NAME: say TERM`, and leaves with 1.
 """
 
 import pathlib
 import re
 import sys
 
-ROOMS_DONE = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "engine", "app", "tools", "bench"]
-ALL_ROOMS = ROOMS_DONE + ["gpu", "tests"]
+ROOMS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "engine", "app", "tools", "bench", "tests"]
 
 # A pattern of whole identifiers (without a trailing _) -> the term of the field's literature that stands instead.
 DENIED = [
@@ -129,10 +127,10 @@ def breaches_of(path, text):
     return found
 
 
-def check(root, rooms):
+def check(root):
     breaches = []
     files = 0
-    for room in rooms:
+    for room in ROOMS:
         for file in sorted((root / room).rglob("*")):
             if file.suffix in SOURCES:
                 files += 1
@@ -171,4 +169,4 @@ def self_test():
 if __name__ == "__main__":
     if "--self-test" in sys.argv:
         sys.exit(self_test())
-    sys.exit(check(pathlib.Path(sys.argv[-1]), ALL_ROOMS if "--all" in sys.argv else ROOMS_DONE))
+    sys.exit(check(pathlib.Path(sys.argv[-1])))

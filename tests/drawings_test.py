@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The drawings of docs/compositing.md are what the strategies do now. A strategy may have none.
+"""The drawings of docs/compositing.md are what the strategies do now.
 
 usage: drawings_test.py DRAW_STRATEGIES ROOT
 """
@@ -18,7 +18,7 @@ def main():
         subprocess.run([tool, folder], check=True, timeout=60)
         made = {file.name: file.read_bytes() for file in pathlib.Path(folder).iterdir()}
     have = {file.name: file.read_bytes() for file in kept.iterdir()}
-    wrong = sorted(name for name in have if made.get(name) != have[name])
+    wrong = sorted(name for name in made.keys() | have.keys() if made.get(name) != have.get(name))
     for name in wrong:
         print(f"{kept / name}: not what is drawn now")
     if wrong:

@@ -22,7 +22,7 @@ MATTE = "gen:cornell"
 
 
 def hpr(folder, *arguments):
-    result = subprocess.run([HPR, *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=200, check=False)
+    result = subprocess.run([HPR, *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=100, check=False)
     expect(result.returncode == 0, f"hpr {' '.join(map(str, arguments))} left with {result.returncode}: {result.stderr[-1000:]}")
     return result
 

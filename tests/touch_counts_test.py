@@ -4,8 +4,8 @@
 usage: touch_counts_test.py [--build DIR CMAKE] ROOT
 
 Every patch applies to the tree as it stands and touches at most as many files as TOUCHES allows for its kind; every
-kind has a patch. With --build, a copy of the tree in DIR gets all patches, is built, and
-each patch's own check is run: the head of a patch has the lines
+kind has a patch. With --build, a copy of the tree in DIR gets all patches, is built, and each patch's own check is run:
+the head of a patch has the lines
 
     Check: hpr scene list | grep NAME
     Build: TARGET                         what the check needs beside hpr; may be left out

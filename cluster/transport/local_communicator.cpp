@@ -287,12 +287,11 @@ class LocalCommunicator final : public Communicator {
 
 }  // namespace
 
-void run_local_ranks(int size, const std::function<void(Communicator&)>& segment,
-                     std::chrono::nanoseconds hang_timeout) {
-  run_local_ranks({.size = size, .hang_timeout = hang_timeout}, segment);
+void run_local_ranks(int size, const std::function<void(Communicator&)>& body, std::chrono::nanoseconds hang_timeout) {
+  run_local_ranks({.size = size, .hang_timeout = hang_timeout}, body);
 }
 
-void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& segment) {
+void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& body) {
   const int size = ranks.size;
   HPR_CHECK(size > 0);
   PostOffice office(ranks);
@@ -304,7 +303,7 @@ void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communica
     LocalCommunicator comm(office, {}, worlds, rank);
     const trace::InRow row({rank, 0});
     try {
-      segment(comm);
+      body(comm);
     } catch (...) {
       {
         const std::lock_guard lock(mutex);

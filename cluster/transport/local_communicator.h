@@ -8,9 +8,9 @@
 
 namespace hpr {
 
-/// Runs `segment` once per rank, each on a thread of this process, and returns when all are done. When a rank fails its
+/// Runs `body` once per rank, each on a thread of this process, and returns when all are done. When a rank fails its
 /// peers' waits end; rethrows the first failure. Lets everything above be tested, and run, without MPI.
-void run_local_ranks(int size, const std::function<void(Communicator&)>& segment,
+void run_local_ranks(int size, const std::function<void(Communicator&)>& body,
                      std::chrono::nanoseconds hang_timeout = kHangTimeout);
 
 /// How ranks of one process are to behave.
@@ -20,6 +20,6 @@ struct LocalRanks {
   int ranks_per_host = 0;      ///< makes ranks [n k, n (k + 1)) a host that shares memory; 0: all of them
   std::uint64_t disorder = 0;  ///< seed of random delays and orders of arrival; 0: none
 };
-void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& segment);
+void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& body);
 
 }  // namespace hpr

@@ -12,11 +12,11 @@ namespace {
 
 constexpr std::array<std::byte, 100> kBytes{};
 
-Schedule record(const LocalRanks& ranks, const std::function<void(RecordingCommunicator&)>& segment) {
+Schedule record(const LocalRanks& ranks, const std::function<void(RecordingCommunicator&)>& body) {
   std::vector<std::vector<TraceEvent>> events(static_cast<std::size_t>(ranks.size));
   run_local_ranks(ranks, [&](Communicator& inner) {
     RecordingCommunicator comm(inner);
-    segment(comm);
+    body(comm);
     events[static_cast<std::size_t>(comm.rank())] = comm.take_events();
   });
   return schedule_of(events);

@@ -23,14 +23,14 @@ const SimulatedCluster kCluster{.hosts = 2,
                                 .local_bandwidth = 50.0,
                                 .merge = 25.0};
 
-/// Each rank's clock after `segment`.
-std::vector<double> clocks(const SimulatedCluster& cluster, const std::function<void(Communicator&)>& segment,
+/// Each rank's clock after `body`.
+std::vector<double> clocks(const SimulatedCluster& cluster, const std::function<void(Communicator&)>& body,
                            std::uint64_t disorder = 0) {
   std::vector<double> times(static_cast<std::size_t>(cluster.ranks));
   run_local_ranks({.size = cluster.ranks, .ranks_per_host = cluster.ranks_per_host(), .disorder = disorder},
                   [&](Communicator& local) {
                     SimulatedCommunicator comm(local, cluster);
-                    segment(comm);
+                    body(comm);
                     times[static_cast<std::size_t>(comm.rank())] = comm.seconds();
                   });
   return times;
@@ -91,7 +91,7 @@ TEST(SimulatedCommunicator, AMeetingBringsTheClocksOfAHostTogether) {
 }
 
 TEST(SimulatedCommunicator, TheOrderMessagesReallyComeInChangesNothing) {
-  const auto segment = [](Communicator& comm) {
+  const auto body = [](Communicator& comm) {
     std::vector<std::vector<std::byte>> messages;
     std::vector<int> others;
     for (int peer = 0; peer < comm.size(); ++peer) {
@@ -108,8 +108,8 @@ TEST(SimulatedCommunicator, TheOrderMessagesReallyComeInChangesNothing) {
     barrier(*part);
     barrier(comm);
   };
-  const auto expected = clocks(kCluster, segment);
-  for (std::uint64_t disorder = 1; disorder < 20; ++disorder) EXPECT_EQ(clocks(kCluster, segment, disorder), expected);
+  const auto expected = clocks(kCluster, body);
+  for (std::uint64_t disorder = 1; disorder < 20; ++disorder) EXPECT_EQ(clocks(kCluster, body, disorder), expected);
 }
 
 }  // namespace

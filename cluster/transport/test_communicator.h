@@ -30,13 +30,13 @@ inline std::vector<std::byte> exchange_with(Communicator& comm, std::span<const 
   return in;
 }
 
-/// Runs `segment` on `size` ranks and expects every one of them to throw just this.
+/// Runs `body` on `size` ranks and expects every one of them to throw just this.
 inline void expect_error_on_all(int size, ExitCode code, const std::string& what,
-                                const std::function<void(Communicator&)>& segment) {
+                                const std::function<void(Communicator&)>& body) {
   std::atomic<int> thrown = 0;
   run_local_ranks(size, [&](Communicator& comm) {
     try {
-      segment(comm);
+      body(comm);
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), code);
       EXPECT_EQ(error.what(), what);
