@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -13,11 +14,14 @@
 #include "cluster/transport/collectives.h"
 #include "core/file.h"
 #include "core/progress.h"
+#include "core/text.h"
 #include "core/timing.h"
 #include "engine/output.h"
 
 namespace hpr {
 namespace {
+
+constexpr int kMaxRanks = 4096;
 
 /// ", about 12 s left"; empty before a case was measured.
 std::string time_left(std::size_t cases, std::size_t measured, double ms) {
@@ -107,6 +111,42 @@ void check_job_ranks(const std::vector<int>& wanted, std::string_view text, int 
   if (wanted.empty() || wanted == std::vector{job_ranks}) return;
   throw Error(ExitCode::Usage, fmt::format("--ranks {} inside an MPI job of {} ranks", text, job_ranks),
               "leave --ranks away, or mpirun");
+}
+
+Size parse_size(const std::string& text, const std::string& option, int max) {
+  const auto extent = parse_extent(text);
+  if (!extent) {
+    throw Error(ExitCode::Usage, fmt::format("{}: '{}' is not two positive integers", option, printable(text)),
+                fmt::format("write it like {} 3x2", option));
+  }
+  if (extent->first > max || extent->second > max) {
+    throw Error(ExitCode::Limit, fmt::format("{}: {} is more than {} a side", option, printable(text), max),
+                fmt::format("the most is {} {}x{}", option, max, max));
+  }
+  return {extent->first, extent->second};
+}
+
+std::vector<int> parse_counts(const std::string& list, const std::string& option) {
+  std::vector<int> counts;
+  for (const std::string& item : split_commas(list)) {
+    int value = 0;
+    const auto [end, failure] = std::from_chars(item.data(), item.data() + item.size(), value);
+    if (failure != std::errc{} || end != item.data() + item.size() || value < 1 || value > kMaxRanks) {
+      throw Error(ExitCode::Usage,
+                  fmt::format("{}: '{}' is not a number from 1 to {}", option, printable(item), kMaxRanks),
+                  fmt::format("write it like {} 1,2,4,8", option));
+    }
+    counts.push_back(value);
+  }
+  return counts;
+}
+
+std::string grid_name(Size grid) {
+  return fmt::format("{}x{}", grid.width, grid.height);
+}
+
+std::string wall_of(Size grid, Size screen) {
+  return fmt::format("{}@{}", grid_name(grid), grid_name(screen));
 }
 
 void check_result_files(const Globals& globals, const std::string& scene, const std::vector<std::string>& inputs,

@@ -14,10 +14,11 @@
 #include "cluster/transport/communicator.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "image/image.h"
 #include "tools/report/table.h"
 
 /// What all measurements share: repetitions in turns, medians and spreads, progress over cases, jobs that measure for
-/// the process that started them, and the files of a report.
+/// the process that started them, the files of a report, and how sizes and lists of counts are written.
 namespace hpr {
 
 /// Order statistics of repeated measurements.
@@ -111,6 +112,17 @@ template <typename Row>
 /// Throws Error (Usage) unless `wanted`, as the list `text` of --ranks names it, is empty or this job's number of
 /// ranks.
 void check_job_ranks(const std::vector<int>& wanted, std::string_view text, int job_ranks);
+
+inline constexpr int kMaxScreensASide = 256;
+
+/// "3x2", the value of `option`. Throws Error: Usage for what is no size, Limit past `max` a side.
+[[nodiscard]] Size parse_size(const std::string& text, const std::string& option, int max);
+/// "1,2,4,8", the value of `option`: numbers from 1 to the most ranks there may be. Throws Error (Usage).
+[[nodiscard]] std::vector<int> parse_counts(const std::string& list, const std::string& option);
+/// "3x2".
+[[nodiscard]] std::string grid_name(Size grid);
+/// "3x2@640x360": the wall shorthand of so many screens of that size.
+[[nodiscard]] std::string wall_of(Size grid, Size screen);
 
 /// Refuses names of result files before anything is measured: two alike, the scene or another input, files that cannot
 /// be written. Empty names are skipped. Throws Error.

@@ -20,7 +20,6 @@
 #include "tools/bench/bench.h"
 #include "tools/bench/bench_raster.h"
 #include "tools/bench/bench_rays.h"
-#include "tools/report/lists.h"
 #include "tools/sweep.h"
 
 namespace hpr {

@@ -21,7 +21,6 @@
 #include "engine/wall/wall_displays.h"
 #include "rt/deferred_shader.h"
 #include "tools/report/canvas.h"
-#include "tools/report/lists.h"
 #include "tools/report/plot.h"
 #include "tools/sweep.h"
 #include "walls/config/wall_file.h"
@@ -231,7 +230,7 @@ struct Scales {
   LogScale speed_up;
 
   [[nodiscard]] Point at(const ScaleReport& report, const ScaleRun& run) const {
-    return {cores.at(run.ranks * run.threads), speed_up.at(figures_of(report, run).speed_up)};
+    return {cores.at(cores_of(run)), speed_up.at(figures_of(report, run).speed_up)};
   }
 };
 
@@ -288,9 +287,9 @@ ScaleFigures figures_of(const ScaleReport& report, const ScaleRun& run) {
   HPR_CHECK(!run.ms.empty());
   const ScaleRun& base = base_of(report, run);
   ScaleFigures figures;
-  figures.median_ms = spread_of(run.ms).median;
+  figures.median_ms = median(run.ms);
   std::tie(figures.low_ms, figures.high_ms) = median_interval(run.ms);
-  if (figures.median_ms > 0.0) figures.speed_up = spread_of(base.ms).median / figures.median_ms;
+  if (figures.median_ms > 0.0) figures.speed_up = median(base.ms) / figures.median_ms;
   figures.efficiency = figures.speed_up * cores_of(base) / cores_of(run);
   const double mean = mean_of(run.rank_ms);
   if (mean > 0.0) figures.imbalance = std::ranges::max(run.rank_ms) / mean;
@@ -301,7 +300,7 @@ std::vector<std::string> slow_ranks(const ScaleReport& report) {
   constexpr double kSlow = 1.5;
   std::vector<std::string> sentences;
   for (const ScaleRun& run : report.runs) {
-    const double usual = spread_of(run.rank_ms).median;
+    const double usual = median(run.rank_ms);
     for (std::size_t rank = 0; rank < run.rank_ms.size() && run.ranks > 2; ++rank) {
       if (run.rank_ms[rank] <= kSlow * usual) continue;
       sentences.push_back(
@@ -364,7 +363,7 @@ std::string plot_speed_up(const ScaleReport& report) {
   std::set<int> cores;
   std::vector<double> speed_ups;
   for (const ScaleRun& run : report.runs) {
-    cores.insert(run.ranks * run.threads);
+    cores.insert(cores_of(run));
     speed_ups.push_back(figures_of(report, run).speed_up);
   }
   const double linear = static_cast<double>(*cores.rbegin()) / *cores.begin();

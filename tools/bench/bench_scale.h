@@ -58,7 +58,7 @@ struct ScaleReport {
   std::uint64_t seed = 1;
   std::vector<ScaleRun> runs;
 
-  /// Whether some run has more threads, on each of its hosts, than that has cores.
+  /// Whether a run has more threads, on each of its hosts, than that has cores.
   [[nodiscard]] bool oversubscribed(const ScaleRun& run) const;
 };
 

@@ -18,7 +18,6 @@
 #include "core/text.h"
 #include "scene/view.h"
 #include "tools/bench/bench_scale.h"
-#include "tools/report/lists.h"
 #include "tools/sweep.h"
 #include "walls/config/wall_file.h"
 

@@ -129,9 +129,9 @@ void summarize(const std::vector<std::vector<Sample>>& ranks, CompareRun& run) {
     imbalance[frame] = mean > 0.0 ? composite[frame] / mean : 1.0;
   }
   run.ms = spread_of(total);
-  run.ms_composite = spread_of(composite).median;
-  run.ms_collect = spread_of(collect).median;
-  run.imbalance = spread_of(imbalance).median;
+  run.ms_composite = median(composite);
+  run.ms_collect = median(collect);
+  run.imbalance = median(imbalance);
   // Every frame sends the same.
   for (const auto& samples : ranks) {
     run.bytes_total += samples.back().bytes;

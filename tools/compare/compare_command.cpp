@@ -29,7 +29,6 @@
 #include "tools/compare/compare.h"
 #include "tools/compare/compare_options.h"
 #include "tools/compare/compare_report.h"
-#include "tools/report/lists.h"
 #include "tools/sweep.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/geometry.h"

@@ -9,7 +9,6 @@
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/text.h"
-#include "tools/report/lists.h"
 #include "tools/sweep.h"
 
 namespace hpr {
@@ -90,14 +89,10 @@ void apply(SimulatedCluster& cluster, std::string_view key, std::string_view val
 
 SimulatedCluster parse_simulation(std::string_view text) {
   SimulatedCluster cluster;
-  for (std::string_view rest = text;;) {
-    const auto comma = rest.find(',');
-    const std::string_view item = rest.substr(0, comma);
+  for (const std::string& item : split_commas(text)) {
     const auto equals = item.find('=');
-    if (equals == std::string_view::npos) refuse(item, "", "key with a value");
+    if (equals == std::string::npos) refuse(item, "", "key with a value");
     apply(cluster, item.substr(0, equals), item.substr(equals + 1));
-    if (comma == std::string_view::npos) break;
-    rest.remove_prefix(comma + 1);
   }
   if (cluster.ranks < cluster.hosts) {
     throw Error(ExitCode::Usage,

@@ -11,7 +11,6 @@
 #include <set>
 
 #include "tools/report/canvas.h"
-#include "tools/report/lists.h"
 #include "tools/report/plot.h"
 
 namespace hpr {

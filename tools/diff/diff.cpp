@@ -245,9 +245,7 @@ std::string picture_value(const DiffReport& report, const std::string& metric) {
 }  // namespace
 
 std::optional<std::array<std::size_t, 3>> color_channels(const FloatImage& picture) {
-  const auto index = [&](const char* channel) {
-    return static_cast<std::size_t>(std::ranges::find(picture.channels, channel) - picture.channels.begin());
-  };
+  const auto index = [&](const char* channel) { return channel_index(picture, channel); };
   const std::size_t none = picture.channels.size();
   std::array<std::size_t, 3> indices{index("R"), index("G"), index("B")};
   if (std::ranges::count(indices, none) != 0) indices.fill(index("Y"));

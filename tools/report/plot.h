@@ -71,7 +71,6 @@ class Plot {
       : layout_(layout), canvas_(layout.width, layout.height, title, description) {}
 
   [[nodiscard]] SvgCanvas& canvas() { return canvas_; }
-  [[nodiscard]] const PlotLayout& layout() const { return layout_; }
 
   void draw_x_ticks(std::span<const Tick> ticks);
   void draw_y_ticks(std::span<const Tick> ticks);

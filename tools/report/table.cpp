@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "tools/report/canvas.h"
-#include "tools/report/lists.h"
 
 namespace hpr {
 namespace {
@@ -50,6 +49,14 @@ std::string number_text(const Json& value, const std::string& format, double sca
   }
   const auto negative = value.get<std::int64_t>();
   return fmt::vformat(format, fmt::make_format_args(negative));
+}
+
+/// A field as RFC 4180 has it: in quotes where it holds what separates fields.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
 }
 
 bool is_missing(const Json& value) {

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -105,27 +104,26 @@ class LongExposure {
 };
 
 std::vector<StabilityFinding> measure_accumulator(const Globals& globals) {
-  StabilityFinding sums = finding("accumulator/sums", "1e3 .. 1e6 samples over 12 decades, 6 % of them negative",
-                                  0.5 * kSamples * kDoubleRounding, "relative to the sum of sizes",
-                                  "n / 2 additions to each of two sums, 2^-53 each");
+  StabilityFinding sums = make_finding("accumulator/sums", "1e3 .. 1e6 samples over 12 decades, 6 % of them negative",
+                                       0.5 * kSamples * kDoubleRounding, "relative to the sum of sizes",
+                                       "n / 2 additions to each of two sums, 2^-53 each");
   sums.curve.x = "samples";
-  StabilityFinding mean = finding("accumulator/mean", "the picture after 1e6 such samples",
-                                  kFloatRounding + (0.5 * kSamples + 3.0) * kDoubleRounding,
-                                  "relative to the mean size", "one rounding to float beside the sums' own error");
+  StabilityFinding mean = make_finding("accumulator/mean", "the picture after 1e6 such samples",
+                                       kFloatRounding + (0.5 * kSamples + 3.0) * kDoubleRounding,
+                                       "relative to the mean size", "one rounding to float beside the sums' own error");
   LongExposure wide(12.0, globals.seed);
   std::uint32_t before = 0;
   for (const std::uint32_t samples : {1'000U, 10'000U, 100'000U, kSamples}) {
     wide.expose(samples - std::exchange(before, samples));
     const LongExposure::Errors errors = wide.errors();
-    sums.measured = worse(sums.measured, errors.sum);
+    add_point(sums, samples, errors.sum);
     mean.measured = worse(mean.measured, errors.mean);
-    sums.curve.points.emplace_back(samples, errors.sum);
     sums.curve.expected.emplace_back(samples, 0.5 * samples * kDoubleRounding);
   }
 
   StabilityFinding alike =
-      finding("accumulator/like-sizes", "1e5 samples within a factor of 8", 0.0, "relative to the sum of sizes",
-              "24 bits each, 3 of spread and 17 of count: 44 of 53");
+      make_finding("accumulator/like-sizes", "1e5 samples within a factor of 8", 0.0, "relative to the sum of sizes",
+                   "24 bits each, 3 of spread and 17 of count: 44 of 53");
   LongExposure narrow(std::log10(8.0), globals.seed);
   narrow.expose(100'000);
   alike.measured = narrow.errors().sum;

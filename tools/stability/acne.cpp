@@ -144,34 +144,33 @@ class SunnyFloor {
 std::vector<StabilityFinding> measure_acne(const Globals& globals) {
   const int threads = threads_of(globals);
   StabilityFinding terminator =
-      finding("acne/terminator", "wall and smooth sphere lit at 89.9 degrees, scales 1e-3 .. 1e3", 0.0,
-              "shadowed pixels", "nothing stands in the light's way");
-  StabilityFinding scales = finding("acne/offset-rule", "the same at scales 1e-9 .. 1e9", 0.0, "shadowed pixels",
-                                    "origins move by 4 steps of the coordinates' own size, which scale along");
+      make_finding("acne/terminator", "wall and smooth sphere lit at 89.9 degrees, scales 1e-3 .. 1e3", 0.0,
+                   "shadowed pixels", "nothing stands in the light's way");
+  StabilityFinding scales = make_finding("acne/offset-rule", "the same at scales 1e-9 .. 1e9", 0.0, "shadowed pixels",
+                                         "origins move by 4 steps of the coordinates' own size, which scale along");
   scales.curve.x = "scale";
   for (const double scale : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
     const auto count = static_cast<double>(shadowed_pixels(grazed({scale, {}}), {scale, {}}, threads));
     if (scale >= 1e-3 && scale <= 1e3) terminator.measured = worse(terminator.measured, count);
-    scales.measured = worse(scales.measured, count);
-    scales.curve.points.emplace_back(scale, count);
+    add_point(scales, scale, count);
   }
 
-  StabilityFinding small = finding("acne/small-in-large", "the same, 1 .. 1e-4 scene radii large, away from the middle",
-                                   0.0, "shadowed pixels", "origins move by more than Embree's test errs");
+  StabilityFinding small =
+      make_finding("acne/small-in-large", "the same, 1 .. 1e-4 scene radii large, away from the middle", 0.0,
+                   "shadowed pixels", "origins move by more than Embree's test errs");
   small.curve.x = "size, in radii of the scene";
   for (const double size : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
     const auto count = static_cast<double>(shadowed_in_a_wide_scene(size, threads));
-    if (size >= 1e-4) small.measured = worse(small.measured, count);
-    small.curve.points.emplace_back(size, count);
+    add_point(small, size, count, size >= 1e-4);
   }
   const auto holds_small = [&](double size) { return shadowed_in_a_wide_scene(size, threads) == 0; };
   small.breaks_at = breaking_point_if_any(1e-4, 1e-8, 0.2, holds_small);
 
   // The floor's corners lie 1 radius off the middle, its edges are 2 long.
   constexpr double kOffset = kOriginSteps * kFloatStep * 3.0;
-  StabilityFinding thin =
-      finding("acne/thin-wall", "floor under a cover 2.9e-6 (two offsets) .. 1e-2 radii above it, scales 1e-3 .. 1e3",
-              0.0, "lit pixels", "an origin is moved by 4 steps, and Embree errs by 3");
+  StabilityFinding thin = make_finding(
+      "acne/thin-wall", "floor under a cover 2.9e-6 (two offsets) .. 1e-2 radii above it, scales 1e-3 .. 1e3", 0.0,
+      "lit pixels", "an origin is moved by 4 steps, and Embree errs by 3");
   thin.curve.x = "gap, in radii of the scene";
   const std::array floors{SunnyFloor(1e-3, threads), SunnyFloor(1.0, threads), SunnyFloor(1e3, threads)};
   const auto worst_lit = [&](double gap) {
@@ -181,8 +180,7 @@ std::vector<StabilityFinding> measure_acne(const Globals& globals) {
   };
   for (const double gap : {0.5 * kOffset, kOffset, 2.0 * kOffset, 1e-4, 1e-2}) {
     const double lit = worst_lit(gap);
-    if (gap >= 2.0 * kOffset) thin.measured = worse(thin.measured, lit);
-    thin.curve.points.emplace_back(gap, lit);
+    add_point(thin, gap, lit, gap >= 2.0 * kOffset);
   }
   thin.breaks_at = breaking_point_if_any(2.0 * kOffset, 1e-9, 0.05, [&](double gap) { return worst_lit(gap) == 0.0; });
   return {terminator, scales, small, thin};

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <glm/gtc/matrix_transform.hpp>
 #include <mutex>
@@ -192,25 +191,22 @@ std::vector<StabilityFinding> measure_coplanar(const Globals& globals) {
     const Quads quads = make_quads(kind);
     const TileLayer<Key> expected = drawer.draw(quads.scene, view, std::array{SurfaceRange{0, quads.scene.triangles}});
     const Compared compared = compare(drawer, quads, view, expected);
-    StabilityFinding finding;
-    finding.name = fmt::format("coplanar/{}", kind == Kind::OneMesh          ? "one-mesh"
-                                              : kind == Kind::MeshEach       ? "mesh-each"
-                                              : kind == Kind::CutDifferently ? "cut-differently"
-                                                                             : "ulps-apart");
-    finding.parameter = fmt::format(
-        "{} overlapping quads in one plane, {}: {} composites on 2, 3, 4 and 7 ranks, all "
-        "strategies, and the screen in parts",
-        kQuads, name, compared.composites);
-    finding.unit = "pixels that differ from one rank's";
+    StabilityFinding finding =
+        make_finding(fmt::format("coplanar/{}", kind == Kind::OneMesh          ? "one-mesh"
+                                                : kind == Kind::MeshEach       ? "mesh-each"
+                                                : kind == Kind::CutDifferently ? "cut-differently"
+                                                                               : "ulps-apart"),
+                     fmt::format("{} overlapping quads in one plane, {}: {} composites on 2, 3, 4 and 7 ranks, all "
+                                 "strategies, and the screen in parts",
+                                 kQuads, name, compared.composites),
+                     0.0, "pixels that differ from one rank's",
+                     "A triangle's keys do not depend on what else is drawn, and the maximum of keys is exact.");
     finding.measured = static_cast<double>(compared.differing);
-    finding.why = "A triangle's keys do not depend on what else is drawn, and the maximum of keys is exact.";
     findings.push_back(finding);
     if (kind == Kind::MeshEach) {
-      ties.name = "coplanar/lowest-id-wins";
-      ties.parameter = fmt::format("{} overlapping quads at one depth", kQuads);
-      ties.unit = "pixels that show another surface";
+      ties = make_finding("coplanar/lowest-id-wins", fmt::format("{} overlapping quads at one depth", kQuads), 0.0,
+                          "pixels that show another surface", "Of equal depths the largest key has the lowest id.");
       ties.measured = static_cast<double>(broken_ties(to_image(expected, 0)));
-      ties.why = "Of equal depths the largest key has the lowest id.";
     }
   }
   findings.push_back(ties);

@@ -121,15 +121,14 @@ double reach_of(const std::function<bool(int pair)>& keeps_order) {
 
 /// How much farther the order of what was drawn holds than that of a standard mapping would.
 StabilityFinding reach(const Gaps& breaks) {
-  StabilityFinding finding;
-  finding.name = "depth-order/reach";
-  finding.parameter =
-      fmt::format("a relative gap of 1e-6, near {:g} m; standard mapping, far {:g} m, computed", kDepthNear, kFar);
-  finding.unit = "times as far as a standard mapping in float or 24 bits";
-  finding.bound = Bound::AtLeast;
   // Order holds to the farthest pair; depth n / z in steps of 2^-24 resolves gaps of z 2^-24 / n.
-  finding.limit = distance_of(kPairs - 1) / (2.0 * kPromisedGap * kDepthNear / kFloatRounding);
-  finding.why = "A standard mapping has steps of 2^-24 in n / z, twice as fine nearer than 2 n in float.";
+  const double limit = distance_of(kPairs - 1) / (2.0 * kPromisedGap * kDepthNear / kFloatRounding);
+  StabilityFinding finding = make_finding(
+      "depth-order/reach",
+      fmt::format("a relative gap of 1e-6, near {:g} m; standard mapping, far {:g} m, computed", kDepthNear, kFar),
+      limit, "times as far as a standard mapping in float or 24 bits",
+      "A standard mapping has steps of 2^-24 in n / z, twice as fine nearer than 2 n in float.");
+  finding.bound = Bound::AtLeast;
   finding.curve.x = "distance, m";
   for (int pair = 0; pair < kPairs; ++pair) {
     const double z = distance_of(pair);
@@ -147,25 +146,20 @@ StabilityFinding reach(const Gaps& breaks) {
 
 std::vector<StabilityFinding> measure_depth_order(const Globals& globals) {
   Drawer drawer(globals);
-  StabilityFinding order;
-  order.name = "depth-order/reversed-z";
-  order.parameter =
-      fmt::format("relative gap 1e-2 .. 1e-6 at 1e-3 .. 1e7 m, {} distances, near {:g} m", kPairs, kDepthNear);
-  order.unit = "share of pixels";
-  order.why = "Depth n / w takes three roundings: two surfaces keep their order from 6 x 2^-24 = 3.6e-7 on.";
+  StabilityFinding order = make_finding(
+      "depth-order/reversed-z",
+      fmt::format("relative gap 1e-2 .. 1e-6 at 1e-3 .. 1e7 m, {} distances, near {:g} m", kPairs, kDepthNear), 0.0,
+      "share of pixels",
+      "Depth n / w takes three roundings: two surfaces keep their order from 6 x 2^-24 = 3.6e-7 on.");
   order.curve.x = "relative gap";
   for (const double gap : {1e-8, 3e-8, 6e-8, 1e-7, 1.3e-7, 1.6e-7, 2e-7, 4e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2}) {
     const double fraction = score(drawer, equal_gaps(gap)).fraction();
-    order.curve.points.emplace_back(gap, fraction);
-    if (gap >= kPromisedGap) order.measured = std::max(order.measured, fraction);
+    add_point(order, gap, fraction, gap >= kPromisedGap);
   }
 
-  StabilityFinding gap;
-  gap.name = "depth-order/smallest-gap";
-  gap.parameter = "distance 1e-3 .. 1e7 m, the gap at which any pixel is wrong, by bisection";
-  gap.limit = 6.0 * kFloatRounding;
-  gap.unit = "relative";
-  gap.why = "Three roundings of 2^-24 in the depth of each of the two surfaces.";
+  StabilityFinding gap = make_finding(
+      "depth-order/smallest-gap", "distance 1e-3 .. 1e7 m, the gap at which any pixel is wrong, by bisection",
+      6.0 * kFloatRounding, "relative", "Three roundings of 2^-24 in the depth of each of the two surfaces.");
   gap.curve.x = "distance, m";
   const Gaps breaks = break_gaps(drawer);
   for (int pair = 0; pair < kPairs; ++pair) {
@@ -215,21 +209,19 @@ double roundings(double angle) {
 
 std::vector<StabilityFinding> measure_crossing_planes(const Globals& globals) {
   Drawer drawer(globals);
-  StabilityFinding finding;
-  finding.name = "crossing/line";
-  finding.parameter = "angle 1e-1 .. 1e-5 rad at 1, 100 and 10 000 m: distance from the true line x sin(angle) / depth";
-  finding.unit = "relative";
-  finding.limit = roundings(0.1) * kFloatRounding;
-  finding.why = "The planes lie x sin(angle) apart beside their line; depth takes 13 + 60 sin(angle) roundings.";
+  StabilityFinding finding =
+      make_finding("crossing/line",
+                   "angle 1e-1 .. 1e-5 rad at 1, 100 and 10 000 m: distance from the true line x sin(angle) / depth",
+                   roundings(0.1) * kFloatRounding, "relative",
+                   "The planes lie x sin(angle) apart beside their line; depth takes 13 + 60 sin(angle) roundings.");
   finding.curve.x = "angle, rad";
   for (const double angle : {1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1}) {
     double worst = 0.0;
     for (const double distance : {1.0, 100.0, 1e4}) {
       worst = std::max(worst, line_error(drawer, distance, angle) * std::sin(angle) / distance);
     }
-    finding.curve.points.emplace_back(angle, worst);
+    add_point(finding, angle, worst);
     finding.curve.expected.emplace_back(angle, roundings(angle) * kFloatRounding);
-    finding.measured = std::max(finding.measured, worst);
   }
   return {finding};
 }
@@ -282,17 +274,14 @@ std::vector<StabilityFinding> measure_slanted_planes(const Globals& globals) {
   // Of each triangle's depth, at most: 42 roundings of its plane and 10 of its corners and of the sum;
   // docs/numerics.md.
   constexpr double kRoundings = 2.0 * 52.0;
-  StabilityFinding finding;
-  finding.name = "slanted/ground";
-  finding.parameter = "ground from 0.5 to 1e7 m, seen from 1 m up: the gap that is lost x nearest depth / distance";
-  finding.unit = "relative to the nearest corner's depth";
-  finding.limit = kRoundings * kFloatRounding;
-  finding.why = "Depth is interpolated in floats from corner to corner, so it rounds as the largest depth does.";
+  StabilityFinding finding = make_finding(
+      "slanted/ground", "ground from 0.5 to 1e7 m, seen from 1 m up: the gap that is lost x nearest depth / distance",
+      kRoundings * kFloatRounding, "relative to the nearest corner's depth",
+      "Depth is interpolated in floats from corner to corner, so it rounds as the largest depth does.");
   finding.curve.x = "distance, m";
   for (std::size_t row = lost.size(); row-- > 0;) {
     const double z = 0.5 * kRows / (static_cast<double>(row) + 0.5);
-    finding.measured = std::max(finding.measured, lost[row] * kNearEdge / z);
-    finding.curve.points.emplace_back(z, lost[row] * kNearEdge / z);
+    add_point(finding, z, lost[row] * kNearEdge / z);
   }
   return {finding};
 }

@@ -65,11 +65,9 @@ std::size_t wrong_tiles(std::size_t screens) {
 }
 
 StabilityFinding layout_arithmetic() {
-  StabilityFinding finding;
-  finding.name = "frames/layout";
-  finding.parameter = "frames of 2^31 .. 2^36 pixels: tiles by place, places by tile, bytes of a layer";
-  finding.unit = "wrong answers";
-  finding.why = "All of it counts in 64 bits.";
+  StabilityFinding finding =
+      make_finding("frames/layout", "frames of 2^31 .. 2^36 pixels: tiles by place, places by tile, bytes of a layer",
+                   0.0, "wrong answers", "All of it counts in 64 bits.");
   finding.curve.x = "pixels of the frame";
   for (std::size_t screens = 1; screens <= 32; screens *= 2) {
     const auto wrong = static_cast<double>(wrong_tiles(screens));
@@ -115,13 +113,11 @@ StabilityFinding composited_far_out() {
   std::vector<std::size_t> tiles;
   for (const std::size_t index_of_64 : {0U, 1U, 31U, 32U, 33U, 63U}) tiles.push_back(layout.tiles() / 64 * index_of_64);
   tiles.push_back(layout.tiles() - 1);
-  StabilityFinding finding;
-  finding.name = "frames/composited";
-  finding.parameter =
+  StabilityFinding finding = make_finding(
+      "frames/composited",
       fmt::format("tiles from the first to the last of a layer of {} bytes, 2 ranks, all strategies that send messages",
-                  TileLayer<Key>::bytes_for(layout));
-  finding.unit = "wrong keys";
-  finding.why = "Tiles are found by 64-bit offsets.";
+                  TileLayer<Key>::bytes_for(layout)),
+      0.0, "wrong keys", "Tiles are found by 64-bit offsets.");
   for (const auto& each : all_compositors()) {
     // Those that merge in shared memory would touch as much of it as the layers are large.
     if (each->fits(2) && !each->merges_in_place()) {
@@ -169,13 +165,12 @@ StabilityFinding long_message() {
       }
     }
   });
-  StabilityFinding finding;
-  finding.name = "frames/message";
-  finding.parameter = fmt::format("a message of {} bytes between two ranks, threads of one process{}", bytes,
-                                  bytes < wanted ? "; memory is too short for more than 2^31" : "");
-  finding.unit = "wrong words of 8 bytes";
+  StabilityFinding finding =
+      make_finding("frames/message",
+                   fmt::format("a message of {} bytes between two ranks, threads of one process{}", bytes,
+                               bytes < wanted ? "; memory is too short for more than 2^31" : ""),
+                   0.0, "wrong words of 8 bytes", "Sizes of messages are 64-bit throughout.");
   finding.measured = static_cast<double>(wrong);
-  finding.why = "Sizes of messages are 64-bit throughout.";
   return finding;
 }
 

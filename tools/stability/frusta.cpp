@@ -91,27 +91,22 @@ std::size_t wrong_pixels(Drawer& drawer, const Beside& beside, double distance) 
 std::vector<StabilityFinding> measure_frusta(const Globals& globals) {
   Drawer drawer(globals);
   std::vector<StabilityFinding> findings;
-  StabilityFinding drawn;
-  drawn.name = "frusta/pixels";
-  drawn.parameter = "a screen a metre wide and an eighth of it, as surfaces, the eye 1 .. 1e-6 m from it";
-  drawn.unit = "pixels wrongly open or covered";
-  drawn.why = "The borders lie half a pixel from any pixel's centre, more than corners err.";
+  StabilityFinding drawn = make_finding(
+      "frusta/pixels", "a screen a metre wide and an eighth of it, as surfaces, the eye 1 .. 1e-6 m from it", 0.0,
+      "pixels wrongly open or covered", "The borders lie half a pixel from any pixel's centre, more than corners err.");
   drawn.curve.x = "distance of the eye, m";
   for (double distance = 1.0; distance > 0.9e-6; distance *= 0.1) drawn.curve.points.emplace_back(distance, 0.0);
   for (const Beside& beside : kBeside) {
     // 2 x / w and the off-axis term, up to 1 + 2 a and 2 a of half the width, take five roundings together.
     const double aside = std::max(std::abs(2.0 * beside.x / kWidth - 1.0), std::abs(2.0 * beside.y / kHeight - 1.0));
-    StabilityFinding finding;
-    finding.name = fmt::format("frusta/corner-{}", beside.name);
-    finding.parameter = "the eye 1 .. 1e-6 m from a screen a metre and 1920 pixels wide";
-    finding.unit = "pixels";
-    finding.limit = 0.5 * kPixels.width * 5.0 * kFloatRounding * (1.0 + 2.0 * aside);
-    finding.why = "Frusta are derived in double; GL's floats round five times, whatever the distance.";
+    StabilityFinding finding = make_finding(
+        fmt::format("frusta/corner-{}", beside.name), "the eye 1 .. 1e-6 m from a screen a metre and 1920 pixels wide",
+        0.5 * kPixels.width * 5.0 * kFloatRounding * (1.0 + 2.0 * aside), "pixels",
+        "Frusta are derived in double; GL's floats round five times, whatever the distance.");
     finding.curve.x = drawn.curve.x;
     for (auto& [distance, wrong] : drawn.curve.points) {
       const double error = corner_error(beside, distance);
-      finding.curve.points.emplace_back(distance, error);
-      finding.measured = std::max(finding.measured, error);
+      add_point(finding, distance, error);
       wrong += static_cast<double>(wrong_pixels(drawer, beside, distance));
     }
     std::ranges::reverse(finding.curve.points);

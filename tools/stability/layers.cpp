@@ -66,12 +66,10 @@ StabilityFinding veils(const Globals& globals) {
   scene.background = {background.r, background.g, background.b};
   finish_scene(scene);
   const Picture picture = make_picture(globals, scene, head_on({64, 64}, 1.0, 0.01));
-  StabilityFinding finding;
-  finding.name = "layers/veils";
-  finding.parameter = "64 BLEND quads 1 mm apart, shuffled, seen through rays";
-  finding.unit = "largest error of a channel";
-  finding.limit = over_error_bound<RgbaPremultiplied>(kLayers + 1);
-  finding.why = "The bound of 64 merges by `over` in floats, and colours divided by their alpha once.";
+  StabilityFinding finding =
+      make_finding("layers/veils", "64 BLEND quads 1 mm apart, shuffled, seen through rays",
+                   over_error_bound<RgbaPremultiplied>(kLayers + 1), "largest error of a channel",
+                   "The bound of 64 merges by `over` in floats, and colours divided by their alpha once.");
   for (const Rgb& color : picture.radiance.pixels()) {
     const glm::dvec3 error = glm::dvec3(color.r, color.g, color.b) - exact_color(background);
     finding.measured =
@@ -108,12 +106,10 @@ double blended_error(const std::string& strategy, const FrameLayout& layout) {
 }
 
 StabilityFinding blended() {
-  StabilityFinding finding;
-  finding.name = "layers/blended";
-  finding.parameter = "64 translucent layers on 64 ranks in shuffled order, every strategy that keeps an order";
-  finding.unit = "largest error of a channel";
-  finding.limit = over_error_bound<RgbaPremultiplied>(kLayers);
-  finding.why = "63 merges of three roundings, in colour and in alpha.";
+  StabilityFinding finding = make_finding(
+      "layers/blended", "64 translucent layers on 64 ranks in shuffled order, every strategy that keeps an order",
+      over_error_bound<RgbaPremultiplied>(kLayers), "largest error of a channel",
+      "63 merges of three roundings, in colour and in alpha.");
   const FrameLayout layout({{128, 64}});
   for (const auto& blender : all_blenders<RgbaPremultiplied>()) {
     if (!blender->fits(kLayers)) continue;

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -32,8 +31,8 @@ double relative(double measured, double expected) {
 
 StabilityFinding near_surface() {
   StabilityFinding near =
-      finding("lights/near-surface", "a point light 1 .. 1e-6 m above a floor of 2 m, with shadows", 0.0, "relative",
-              "the distance is a difference of numbers about 1, off by 2^-52 each");
+      make_finding("lights/near-surface", "a point light 1 .. 1e-6 m above a floor of 2 m, with shadows", 0.0,
+                   "relative", "the distance is a difference of numbers about 1, off by 2^-52 each");
   constexpr double kNearest = 1e-6;
   const auto limit = [](double height) { return kFloatRounding + 16.0 * kDoubleRounding * (1.0 + 1.0 / height); };
   near.limit = limit(kNearest);
@@ -47,8 +46,7 @@ StabilityFinding near_surface() {
   };
   for (const double height : {1e-9, 1e-8, 1e-7, kNearest, 1e-5, 1e-4, 1e-2, 1.0}) {
     const double off = error(height);
-    if (height >= kNearest) near.measured = worse(near.measured, off);
-    near.curve.points.emplace_back(height, off);
+    add_point(near, height, off, height >= kNearest);
     near.curve.expected.emplace_back(height, limit(height));
   }
   const auto holds = [&](double height) { return error(height) <= near.limit; };
@@ -57,9 +55,10 @@ StabilityFinding near_surface() {
 }
 
 StabilityFinding on_surface(int threads) {
-  StabilityFinding on = finding("lights/on-surface", "lights of radius 0 and 1e-3 m at distance 0 and in the eye", 0.0,
-                                "pixels without finite radiance",
-                                "a light has no weight on its own place, and 1e-18 m off its light still fits a float");
+  StabilityFinding on =
+      make_finding("lights/on-surface", "lights of radius 0 and 1e-3 m at distance 0 and in the eye", 0.0,
+                   "pixels without finite radiance",
+                   "a light has no weight on its own place, and 1e-18 m off its light still fits a float");
   for (const double radius : {0.0, 1e-3}) {
     for (const double height : {0.0, 1e-300, 1e-18, -1e-18, 0.5}) {
       Light light;
@@ -103,10 +102,10 @@ double off_the_point(bool sphere, double size) {
 }
 
 StabilityFinding far_away(bool sphere) {
-  StabilityFinding far = finding(sphere ? "lights/far-sphere" : "lights/far-triangle",
-                                 "size 1e-1 .. 1e-6 of the distance, at 45 degrees, one sample, against a point light",
-                                 1.0, "of what a light of that size may be off",
-                                 "one sample of a light of size q sees cosine and distance off by q");
+  StabilityFinding far = make_finding(
+      sphere ? "lights/far-sphere" : "lights/far-triangle",
+      "size 1e-1 .. 1e-6 of the distance, at 45 degrees, one sample, against a point light", 1.0,
+      "of what a light of that size may be off", "one sample of a light of size q sees cosine and distance off by q");
   // d(cos / r^2) <= (tan 45 + 2) q to first order, corners reaching up to sqrt(2) q about the middle; then floats.
   const auto limit = [](double q) { return 3.0 * std::sqrt(2.0) * q * (1.0 + 2.0 * q) + 8.0 * kFloatRounding; };
   constexpr double kMinSize = 1e-6;
@@ -132,14 +131,13 @@ double at_elevation(double radians) {
 
 StabilityFinding horizon() {
   StabilityFinding low =
-      finding("lights/horizon", "a directional light 1 .. 1e-6 radians above the horizon", 4.0 * kFloatRounding,
-              "relative", "its direction is stored in floats, which keep their digits near 0");
+      make_finding("lights/horizon", "a directional light 1 .. 1e-6 radians above the horizon", 4.0 * kFloatRounding,
+                   "relative", "its direction is stored in floats, which keep their digits near 0");
   low.curve.x = "elevation, radians";
   const auto error = [](double radians) { return relative(at_elevation(radians), std::sin(radians) / kPi); };
   for (const double radians : {1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0}) {
     const double off = error(radians);
-    if (radians >= 1e-6) low.measured = worse(low.measured, off);
-    low.curve.points.emplace_back(radians, off);
+    add_point(low, radians, off, radians >= 1e-6);
   }
   for (const double radians : {0.0, -1e-30, -1e-3}) low.measured = worse(low.measured, at_elevation(radians));
   low.breaks_at = breaking_point_if_any(1e-6, 1e-12, 0.1, [&](double radians) { return error(radians) <= low.limit; });

@@ -43,9 +43,9 @@ double furnace(const MaterialPoint& material, double polar) {
 
 StabilityFinding energy() {
   StabilityFinding most =
-      finding("materials/furnace", "white metal of roughness 0 .. 1, looked at from 0 to 89.4 degrees",
-              1.0 + (3.0 * kSamples + 64.0) * kDoubleRounding, "of what arrives",
-              "a sample's weight is Fresnel's share times a masking of 1 at the most");
+      make_finding("materials/furnace", "white metal of roughness 0 .. 1, looked at from 0 to 89.4 degrees",
+                   1.0 + (3.0 * kSamples + 64.0) * kDoubleRounding, "of what arrives",
+                   "a sample's weight is Fresnel's share times a masking of 1 at the most");
   most.curve.x = "roughness";
   for (const double roughness : {0.0, 1e-4, 9e-4, 1.1e-3, 0.01, 0.1, 0.3, 0.6, 1.0}) {
     double worst = 0.0;
@@ -55,8 +55,7 @@ StabilityFinding energy() {
       metal.roughness = roughness;
       worst = std::max(worst, furnace(metal, polar));
     }
-    most.measured = worse(most.measured, worst);
-    most.curve.points.emplace_back(roughness, worst);
+    add_point(most, roughness, worst);
   }
   return most;
 }
@@ -65,10 +64,10 @@ StabilityFinding kept_energy() {
   constexpr double kRoughest = 0.01;
   constexpr double kSteepest = 1.56;
   const double masked = std::tan(kSteepest) * kRoughest * kRoughest;  // alpha tan
-  StabilityFinding least =
-      finding("materials/furnace-smooth", "white metal of roughness 0 .. 0.01, looked at from 0 to 89.4 degrees",
-              1.0 - masked * masked - 1.0 / kSamples, "of what arrives",
-              "Smith's masking takes (alpha tan)^2 / 4 on either way, the horizon as much; and one sample in 4096");
+  StabilityFinding least = make_finding(
+      "materials/furnace-smooth", "white metal of roughness 0 .. 0.01, looked at from 0 to 89.4 degrees",
+      1.0 - masked * masked - 1.0 / kSamples, "of what arrives",
+      "Smith's masking takes (alpha tan)^2 / 4 on either way, the horizon as much; and one sample in 4096");
   least.bound = Bound::AtLeast;
   least.measured = 1.0;
   least.curve.x = "roughness";
@@ -112,9 +111,9 @@ StabilityFinding smooth() {
     return 0.5 * std::numbers::pi * alpha * (1.0 + std::tan(polar)) + 1024.0 * kDoubleRounding;
   };
   constexpr double kMinRoughness = 1.0001 * Bsdf::kDeltaRoughness;
-  StabilityFinding jump =
-      finding("materials/mirror-limit", "white metal just above the roughness of a mirror, from 0 to 80 degrees",
-              limit(kMinRoughness, kSteepest), "radiance", "GGX of alpha turns directions by pi alpha in the mean");
+  StabilityFinding jump = make_finding(
+      "materials/mirror-limit", "white metal just above the roughness of a mirror, from 0 to 80 degrees",
+      limit(kMinRoughness, kSteepest), "radiance", "GGX of alpha turns directions by pi alpha in the mean");
   jump.curve.x = "roughness";
   for (const double roughness : {kMinRoughness, 2e-3, 5e-3, 0.01, 0.03, 0.1}) {
     double worst = 0.0;
@@ -176,11 +175,12 @@ std::vector<StabilityFinding> indices(int threads) {
     const double shift = 2.0 * over * std::tan(50.0 * std::numbers::pi / 180.0) * 4.0 / 0.96 + 4.0 * 32.0 * 0x1p-23;
     return 0.5 * shift + over * over + 4.0 * kFloatRounding;
   };
-  StabilityFinding none = finding("materials/no-interface", "a ball of glass of index 1 against no ball at all",
-                                  limit(1.0), "relative", "nothing is refracted; rays start again, off the surface");
+  StabilityFinding none =
+      make_finding("materials/no-interface", "a ball of glass of index 1 against no ball at all", limit(1.0),
+                   "relative", "nothing is refracted; rays start again, off the surface");
   none.measured = difference(1.0, threads);
-  StabilityFinding weak = finding("materials/weak-interface", "a ball of glass of index 1.0001", limit(1.0001),
-                                  "relative", "rays turn by twice the index's excess over 1, times the tangent");
+  StabilityFinding weak = make_finding("materials/weak-interface", "a ball of glass of index 1.0001", limit(1.0001),
+                                       "relative", "rays turn by twice the index's excess over 1, times the tangent");
   weak.measured = difference(1.0001, threads);
   weak.curve.x = "index less 1";
   for (const double over : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2}) {
@@ -233,23 +233,22 @@ Reflected reflect_times(const Scene& scene, int reflections, int max_depth) {
 
 std::vector<StabilityFinding> measure_mirrors(const Globals& /*globals*/) {
   const Scene scene = facing_mirrors();
-  StabilityFinding falls = finding("mirrors/decay", "1 .. 64 reflections between facing mirrors of 0.9", 0.0,
-                                   "relative", "each reflection rounds in double, the picture once to float");
+  StabilityFinding falls = make_finding("mirrors/decay", "1 .. 64 reflections between facing mirrors of 0.9", 0.0,
+                                        "relative", "each reflection rounds in double, the picture once to float");
   falls.limit = kFloatRounding + 32.0 * kMaxDepth * kDoubleRounding;
   falls.curve.x = "reflections";
   for (int depth = 1; depth <= kMaxDepth; ++depth) {
     const Reflected reflected = reflect_times(scene, depth, kMaxDepth);
     const double error = std::abs(reflected.radiance / reflected.expected - 1.0);
-    falls.measured = worse(falls.measured, error);
-    falls.curve.points.emplace_back(depth, error);
+    add_point(falls, depth, error);
   }
   // Deeper than any option asks for; paths end where hardly any light is left.
   int depth = kMaxDepth + 1;
   while (depth < 256 && reflect_times(scene, depth, 256).radiance > 0.0) ++depth;
   falls.breaks_at = depth;
 
-  StabilityFinding cap = finding("mirrors/cap", "max depth 1, 2, 16, 63 and one reflection more", 0.0, "radiance",
-                                 "past the cap nothing is followed");
+  StabilityFinding cap = make_finding("mirrors/cap", "max depth 1, 2, 16, 63 and one reflection more", 0.0, "radiance",
+                                      "past the cap nothing is followed");
   for (const int most : {1, 2, 16, 63}) {
     cap.measured = worse(cap.measured, reflect_times(scene, most + 1, most).radiance);
     const Reflected last = reflect_times(scene, most, most);

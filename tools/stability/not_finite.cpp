@@ -57,8 +57,8 @@ std::string write_triangle(const TemporaryFile& file, const std::string& attribu
 }
 
 StabilityFinding geometry(const TemporaryFile& file) {
-  StabilityFinding let_in = finding("not-finite/geometry", "NaN and infinities in a glTF file's positions", 0.0,
-                                    "files drawn", "nothing can stand in for a place");
+  StabilityFinding let_in = make_finding("not-finite/geometry", "NaN and infinities in a glTF file's positions", 0.0,
+                                         "files drawn", "nothing can stand in for a place");
   for (const float bad : kBad) {
     try {
       (void)load_scene(write_triangle(file, "POSITION", bad), {});
@@ -71,9 +71,9 @@ StabilityFinding geometry(const TemporaryFile& file) {
 }
 
 StabilityFinding attributes(const TemporaryFile& file, int threads) {
-  StabilityFinding odd =
-      finding("not-finite/attributes", "the same in normals, texture coordinates and vertex colours", 0.0,
-              "files miscounted, pixels without finite radiance", "each is counted, its vertex named, and replaced");
+  StabilityFinding odd = make_finding(
+      "not-finite/attributes", "the same in normals, texture coordinates and vertex colours", 0.0,
+      "files miscounted, pixels without finite radiance", "each is counted, its vertex named, and replaced");
   for (const char* const attribute : {"NORMAL", "TEXCOORD_0", "COLOR_0"}) {
     for (const float bad : kBad) {
       const Scene scene = load_scene(write_triangle(file, attribute, bad), {});
@@ -91,9 +91,9 @@ StabilityFinding attributes(const TemporaryFile& file, int threads) {
 }
 
 StabilityFinding environment(const TemporaryFile& file, int threads) {
-  StabilityFinding odd =
-      finding("not-finite/environment", "every seventh value of an EXR environment, 48 of 336", 0.0,
-              "values miscounted, pixels without finite radiance", "NaN becomes 0, infinity the largest half float");
+  StabilityFinding odd = make_finding("not-finite/environment", "every seventh value of an EXR environment, 48 of 336",
+                                      0.0, "values miscounted, pixels without finite radiance",
+                                      "NaN becomes 0, infinity the largest half float");
   Image<Rgb> image({16, 7}, {0.5F, 0.5F, 0.5F});
   std::uint64_t planted = 0;
   std::size_t number = 0;
@@ -140,20 +140,19 @@ RayCounts glare(double radiance, int threads) {
 
 std::vector<StabilityFinding> overflow() {
   StabilityFinding bright =
-      finding("not-finite/overflow", "a floor of radiance 1 .. 9e37 under eight suns of the same", 0.0,
-              "pixels without finite radiance", "sums run in double: 1 + 8 / pi of it fits a float");
+      make_finding("not-finite/overflow", "a floor of radiance 1 .. 9e37 under eight suns of the same", 0.0,
+                   "pixels without finite radiance", "sums run in double: 1 + 8 / pi of it fits a float");
   bright.curve.x = "radiance";
   for (const double radiance : {1.0, 1e20, 1e30, 9e37}) {
     const auto count = static_cast<double>(glare(radiance, 1).not_finite);
-    bright.measured = worse(bright.measured, count);
-    bright.curve.points.emplace_back(radiance, count);
+    add_point(bright, radiance, count);
   }
   bright.breaks_at =
       breaking_point_if_any(9e37, 3.4e38, 0.01, [](double radiance) { return glare(radiance, 1).not_finite == 0; });
 
   StabilityFinding named =
-      finding("not-finite/first-pixel", "past that, the first pixel named by 1, 2 and 3 threads", 0.0,
-              "answers that differ or are wrong", "the smallest in order of rows, whoever meets it");
+      make_finding("not-finite/first-pixel", "past that, the first pixel named by 1, 2 and 3 threads", 0.0,
+                   "answers that differ or are wrong", "the smallest in order of rows, whoever meets it");
   const RayCounts one = glare(3.4e38, 1);
   if (one.not_finite != std::uint64_t{130} * 70 || one.first_not_finite != ScreenPixel{0, 200, 300}) ++named.measured;
   for (const int threads : {2, 3}) named.measured += glare(3.4e38, threads) == one ? 0.0 : 1.0;

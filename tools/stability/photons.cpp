@@ -102,30 +102,28 @@ double power_lost(double power, std::uint64_t first, std::uint64_t all, int thre
 
 StabilityFinding power(int threads) {
   StabilityFinding kept =
-      finding("photons/power", "32768 photons out of 32768 .. 1e8 .. 2^40, each kept once",
-              kFloatRounding + 16.0 * kDoubleRounding, "relative",
-              "a photon's flux is rounded to float once; white walls in a closed room lose nothing");
+      make_finding("photons/power", "32768 photons out of 32768 .. 1e8 .. 2^40, each kept once",
+                   kFloatRounding + 16.0 * kDoubleRounding, "relative",
+                   "a photon's flux is rounded to float once; white walls in a closed room lose nothing");
   kept.curve.x = "photons of a pass";
   for (const std::uint64_t all :
        {kSlice, std::uint64_t{1'000'000}, std::uint64_t{100'000'000}, std::uint64_t{1} << 40U}) {
     double lost = 0.0;
     for (const std::uint64_t first : {std::uint64_t{0}, all / 2, all - kSlice})
       lost = worse(lost, power_lost(1.0, first, all, threads));
-    kept.measured = worse(kept.measured, lost);
-    kept.curve.points.emplace_back(static_cast<double>(all), lost);
+    add_point(kept, static_cast<double>(all), lost);
   }
   return kept;
 }
 
 StabilityFinding faint(int threads) {
-  StabilityFinding kept = finding("photons/faint", "a photon's flux from 1 down to 1e-37 of its unit",
-                                  kFloatRounding + 16.0 * kDoubleRounding, "relative",
-                                  "above 2^-126 of its unit a float rounds by 2^-24 of itself");
+  StabilityFinding kept = make_finding("photons/faint", "a photon's flux from 1 down to 1e-37 of its unit",
+                                       kFloatRounding + 16.0 * kDoubleRounding, "relative",
+                                       "above 2^-126 of its unit a float rounds by 2^-24 of itself");
   kept.curve.x = "flux of a photon, in its unit";
   const auto lost = [&](double flux) { return power_lost(flux * static_cast<double>(kSlice), 0, kSlice, threads); };
   for (const double flux : {1e-37, 1e-30, 1e-20, 1e-10, 1.0}) {
-    kept.curve.points.emplace_back(flux, lost(flux));
-    kept.measured = worse(kept.measured, kept.curve.points.back().second);
+    add_point(kept, flux, lost(flux));
   }
   kept.breaks_at = breaking_point_if_any(1e-37, 1e-46, 0.05, [&](double flux) { return lost(flux) <= kept.limit; });
   return kept;
@@ -143,8 +141,8 @@ std::size_t differing(const std::vector<Photon>& a, const std::vector<Photon>& b
 /// Photons of a room with glass, sent by many and by one.
 StabilityFinding who_sends() {
   StabilityFinding same =
-      finding("photons/who-sends", "ranks 1 .. 17, threads 1 .. 3, photons from 0 and across 2^32", 0.0,
-              "differing photons", "a photon depends on its index alone, and order is by index");
+      make_finding("photons/who-sends", "ranks 1 .. 17, threads 1 .. 3, photons from 0 and across 2^32", 0.0,
+                   "differing photons", "a photon depends on its index alone, and order is by index");
   const PhotonRoom room(generate_scene("cornell?variant=glass"));
   constexpr std::uint64_t kPhotons = 10'007;
   for (const std::uint64_t first : {std::uint64_t{0}, (std::uint64_t{1} << 32U) - kPhotons / 2}) {
@@ -168,8 +166,8 @@ StabilityFinding who_sends() {
 }
 
 StabilityFinding split_among_ranks() {
-  StabilityFinding whole = finding("photons/shares", "0, 1, 1e8, 2^32 + 5, 2^62 photons among 1 .. 1000 ranks", 0.0,
-                                   "photons sent twice or by nobody", "shares follow one another");
+  StabilityFinding whole = make_finding("photons/shares", "0, 1, 1e8, 2^32 + 5, 2^62 photons among 1 .. 1000 ranks",
+                                        0.0, "photons sent twice or by nobody", "shares follow one another");
   for (const std::uint64_t count : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{100'000'000},
                                     (std::uint64_t{1} << 32U) + 5, std::uint64_t{1} << 62U}) {
     for (const int ranks : {1, 2, 3, 7, 64, 1000}) {
@@ -190,9 +188,9 @@ StabilityFinding split_among_ranks() {
 /// All photons at one position: gathering them is the longest sum there can be.
 StabilityFinding max_sum(std::uint64_t seed) {
   constexpr std::size_t kMaxPhotons = 1'000'000;
-  StabilityFinding sum = finding("photons/longest-sum", "1e3 .. 1e6 photons in one place, fluxes over 12 decades",
-                                 (kMaxPhotons + 4.0) * kDoubleRounding, "relative",
-                                 "one addition each, 2^-53 each: 1e8 photons would lose 1.1e-8");
+  StabilityFinding sum = make_finding("photons/longest-sum", "1e3 .. 1e6 photons in one place, fluxes over 12 decades",
+                                      (kMaxPhotons + 4.0) * kDoubleRounding, "relative",
+                                      "one addition each, 2^-53 each: 1e8 photons would lose 1.1e-8");
   sum.curve.x = "photons";
   RandomStream random(seed);
   std::vector<Photon> photons(kMaxPhotons);
@@ -209,8 +207,7 @@ StabilityFinding max_sum(std::uint64_t seed) {
     for (std::size_t i = 0; i < count; ++i) exact.add(photons[i].flux[0]);
     const long double density = 2.0L / (std::numbers::pi_v<long double> * 0.25L);
     const auto error = static_cast<double>(std::abs(found.r / (density * exact.sum) - 1.0L));
-    sum.measured = worse(sum.measured, error);
-    sum.curve.points.emplace_back(static_cast<double>(count), error);
+    add_point(sum, static_cast<double>(count), error);
     sum.curve.expected.emplace_back(static_cast<double>(count), (static_cast<double>(count) + 4.0) * kDoubleRounding);
   }
   return sum;
@@ -218,8 +215,9 @@ StabilityFinding max_sum(std::uint64_t seed) {
 
 /// Pictures with hardly a photon.
 StabilityFinding few(const Globals& globals) {
-  StabilityFinding odd = finding("photons/none-and-one", "a pass of 1, 2 and 3 photons, and a scene that can send none",
-                                 0.0, "pixels", "pixels without a photon about them stay as they are");
+  StabilityFinding odd =
+      make_finding("photons/none-and-one", "a pass of 1, 2 and 3 photons, and a scene that can send none", 0.0,
+                   "pixels", "pixels without a photon about them stay as they are");
   Scene scene = generate_scene("cornell?variant=glass");
   const View view = make_view(scene.cameras.front(), {64, 64}, scene.bounds);
   RaySettings settings;

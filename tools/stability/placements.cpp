@@ -57,17 +57,15 @@ StabilityFinding exact_positions(Drawer& drawer) {
     move_placements(other, offset_by(metres));
     return static_cast<double>(differing_keys(expected, drawer.draw(other, moved(exhibits_view(kSteps), metres))));
   };
-  StabilityFinding finding;
-  finding.name = "offset/exact-places";
-  finding.parameter = "places at multiples of 2^-10 m, scene and eye moved by (D, 0, -D), D up to 1e7 m";
-  finding.unit = "pixels whose keys differ";
-  finding.why = "Sums of such places are exact in double below 2^43 m, and GL sees their differences only.";
+  StabilityFinding finding = make_finding(
+      "offset/exact-places", "places at multiples of 2^-10 m, scene and eye moved by (D, 0, -D), D up to 1e7 m", 0.0,
+      "pixels whose keys differ",
+      "Sums of such places are exact in double below 2^43 m, and GL sees their differences only.");
   finding.curve.x = "D, m";
   for (int power = 0; power <= 16; ++power) {
     const double metres = std::pow(10.0, power);
     const double fraction = differing(metres);
-    finding.curve.points.emplace_back(metres, fraction);
-    if (metres <= kPromised) finding.measured = std::max(finding.measured, fraction);
+    add_point(finding, metres, fraction, metres <= kPromised);
   }
   if (finding.holds()) {
     finding.breaks_at =
@@ -87,20 +85,17 @@ StabilityFinding any_positions(Drawer& drawer) {
   };
   // Scene and eye round to 2^-53 of the offset each.
   const auto bound = [&](double metres) {
-    return fraction_moved(edge_fraction, 2.0 * 0x1p-53 * metres * kPixelsPerMetre);
+    return fraction_moved(edge_fraction, 2.0 * kDoubleRounding * metres * kPixelsPerMetre);
   };
-  StabilityFinding finding;
-  finding.name = "offset/any-places";
-  finding.parameter = "any places, scene and eye moved by (D, 0, -D), D up to 1e7 m";
-  finding.unit = "share of pixels with another surface";
-  finding.limit = bound(kPromised);
-  finding.why = "Places round to 2^-53 D; only where that moves a corner to the next 1/256 pixel can an edge change.";
+  StabilityFinding finding = make_finding(
+      "offset/any-places", "any places, scene and eye moved by (D, 0, -D), D up to 1e7 m", bound(kPromised),
+      "share of pixels with another surface",
+      "Places round to 2^-53 D; only where that moves a corner to the next 1/256 pixel can an edge change.");
   finding.curve.x = "D, m";
   for (int power = 0; power <= 16; ++power) {
     const double metres = std::pow(10.0, power);
-    finding.curve.points.emplace_back(metres, fraction(metres));
+    add_point(finding, metres, fraction(metres), metres <= kPromised);
     finding.curve.expected.emplace_back(metres, bound(metres));
-    if (metres <= kPromised) finding.measured = std::max(finding.measured, finding.curve.points.back().second);
   }
   if (finding.holds()) {
     finding.breaks_at =
@@ -112,20 +107,18 @@ StabilityFinding any_positions(Drawer& drawer) {
 StabilityFinding lit(const Globals& globals) {
   const Scene scene = exhibits();
   const Picture expected = make_picture(globals, scene, exhibits_view(), exhibits_light());
-  StabilityFinding finding;
-  finding.name = "offset/light";
-  finding.parameter = "the same with all light, D up to 1e7 m";
-  finding.unit = "share of pixels off by more than 1 level of 255";
-  finding.limit = fraction_moved(std::max(edges(expected.keys), color_edges(expected.radiance)), 0.0);
-  finding.why = "Rays start from places relative to the scene's middle: as for surfaces, only edges can change.";
+  StabilityFinding finding =
+      make_finding("offset/light", "the same with all light, D up to 1e7 m",
+                   fraction_moved(std::max(edges(expected.keys), color_edges(expected.radiance)), 0.0),
+                   "share of pixels off by more than 1 level of 255",
+                   "Rays start from places relative to the scene's middle: as for surfaces, only edges can change.");
   finding.curve.x = "D, m";
   for (const double metres : {1e2, 1e4, 1e5, 1e6, 1e7, 1e9}) {
     Scene other = scene;
     move_placements(other, offset_by(metres));
     const Picture found = make_picture(globals, other, moved(exhibits_view(), metres), exhibits_light());
     const double fraction = other_colors(expected.radiance, found.radiance);
-    finding.curve.points.emplace_back(metres, fraction);
-    if (metres <= kPromised) finding.measured = std::max(finding.measured, fraction);
+    add_point(finding, metres, fraction, metres <= kPromised);
   }
   return finding;
 }
@@ -143,19 +136,14 @@ StabilityFinding baked(Drawer& drawer) {
     // Two rounded coordinates, and as much again where the matrix multiplies them and takes the offset off.
     return fraction_moved(edge_fraction, 2.0 * std::sqrt(2.0) * 2.0 * kFloatRounding * metres * kPixelsPerMetre);
   };
-  StabilityFinding finding;
-  finding.name = "offset/baked-vertices";
-  finding.parameter = "offset in the vertices, which are floats: D up to 1e3 m";
-  finding.unit = "share of pixels with another surface";
-  finding.limit = bound(kPromisedBaked);
-  finding.why = "Vertices round to 2^-24 D, before HPR sees them, and again when the eye is taken off.";
+  StabilityFinding finding =
+      make_finding("offset/baked-vertices", "offset in the vertices, which are floats: D up to 1e3 m",
+                   bound(kPromisedBaked), "share of pixels with another surface",
+                   "Vertices round to 2^-24 D, before HPR sees them, and again when the eye is taken off.");
   finding.curve.x = "D, m";
   for (double metres = 1.0; metres < 2e8; metres *= std::sqrt(10.0)) {
-    finding.curve.points.emplace_back(metres, fraction(metres));
+    add_point(finding, metres, fraction(metres), metres <= kPromisedBaked * 1.001);
     finding.curve.expected.emplace_back(metres, bound(metres));
-    if (metres <= kPromisedBaked * 1.001) {
-      finding.measured = std::max(finding.measured, finding.curve.points.back().second);
-    }
   }
   if (finding.holds()) {
     finding.breaks_at =
@@ -193,17 +181,14 @@ std::size_t differing_bits(const Picture& a, const Picture& b) {
 
 StabilityFinding powers_of_two(const Globals& globals, const Picture& expected, ScaleScene scale, const char* name,
                                const char* what) {
-  StabilityFinding finding;
-  finding.name = name;
-  finding.parameter = std::string(what) + " scaled by 2^-20 .. 2^20";
-  finding.unit = "pixels of which a bit of key or colour differs";
-  finding.why = "Scaling by a power of two rounds nothing, so only an absolute length somewhere could show.";
+  StabilityFinding finding = make_finding(
+      name, std::string(what) + " scaled by 2^-20 .. 2^20", 0.0, "pixels of which a bit of key or colour differs",
+      "Scaling by a power of two rounds nothing, so only an absolute length somewhere could show.");
   finding.curve.x = "scale";
   for (const int power : {-20, -14, -7, -1, 1, 7, 14, 20}) {
     const double factor = std::ldexp(1.0, power);
     const auto differing = static_cast<double>(differing_bits(expected, scaled_picture(globals, scale, factor)));
-    finding.curve.points.emplace_back(factor, differing);
-    finding.measured = std::max(finding.measured, differing);
+    add_point(finding, factor, differing);
   }
   return finding;
 }
@@ -211,12 +196,10 @@ StabilityFinding powers_of_two(const Globals& globals, const Picture& expected, 
 std::vector<StabilityFinding> powers_of_ten(const Globals& globals, const Picture& expected) {
   // An edge moves to the next 1/256 pixel at the most.
   constexpr double kMoved = 2.0 / 256.0;
-  StabilityFinding surfaces;
-  surfaces.name = "scale/surfaces";
-  surfaces.parameter = "scene, eye and lights scaled by 1e-6 .. 1e6";
-  surfaces.unit = "share of pixels with another surface";
-  surfaces.limit = kMoved * edges(expected.keys);
-  surfaces.why = "Matrices round otherwise at another scale: corners may move to the next 1/256 pixel.";
+  StabilityFinding surfaces =
+      make_finding("scale/surfaces", "scene, eye and lights scaled by 1e-6 .. 1e6", kMoved * edges(expected.keys),
+                   "share of pixels with another surface",
+                   "Matrices round otherwise at another scale: corners may move to the next 1/256 pixel.");
   surfaces.curve.x = "scale";
   StabilityFinding colors = surfaces;
   colors.name = "scale/light";
@@ -226,10 +209,8 @@ std::vector<StabilityFinding> powers_of_ten(const Globals& globals, const Pictur
   for (int power = -6; power <= 6; ++power) {
     const double factor = std::pow(10.0, power);
     const Picture found = scaled_picture(globals, scale_placements, factor);
-    surfaces.curve.points.emplace_back(factor, other_surfaces(expected.keys, found.keys));
-    colors.curve.points.emplace_back(factor, other_colors(expected.radiance, found.radiance));
-    surfaces.measured = std::max(surfaces.measured, surfaces.curve.points.back().second);
-    colors.measured = std::max(colors.measured, colors.curve.points.back().second);
+    add_point(surfaces, factor, other_surfaces(expected.keys, found.keys));
+    add_point(colors, factor, other_colors(expected.radiance, found.radiance));
   }
   return {surfaces, colors};
 }
@@ -275,12 +256,9 @@ double farthest_from_identity(const glm::dmat4& matrix) {
 }
 
 StabilityFinding scales_that_cancel() {
-  StabilityFinding finding;
-  finding.name = "nodes/scale-and-back";
-  finding.parameter = "a node scaled by 10^-k below one scaled by 10^k, k = 1 .. 6";
-  finding.unit = "largest error of the composed matrix";
-  finding.limit = 3.0 * 0x1p-53;
-  finding.why = "The two factors round to double, and so does their product.";
+  StabilityFinding finding = make_finding(
+      "nodes/scale-and-back", "a node scaled by 10^-k below one scaled by 10^k, k = 1 .. 6", 3.0 * kDoubleRounding,
+      "largest error of the composed matrix", "The two factors round to double, and so does their product.");
   finding.curve.x = "outer scale";
   for (int power = 1; power <= 6; ++power) {
     const double factor = std::pow(10.0, power);
@@ -289,21 +267,17 @@ StabilityFinding scales_that_cancel() {
     const Json turned = Json::array({scaled(1.0 / factor), scaled(factor)});
     const double error =
         std::max(farthest_from_identity(placed_below(nodes)), farthest_from_identity(placed_below(turned)));
-    finding.curve.points.emplace_back(factor, error);
-    finding.measured = std::max(finding.measured, error);
+    add_point(finding, factor, error);
   }
   return finding;
 }
 
 StabilityFinding rotations_that_cancel() {
-  StabilityFinding finding;
-  finding.name = "nodes/rotations";
-  finding.parameter = "10 .. 1000 nested rotations that multiply to none";
-  finding.unit = "largest error of the composed matrix";
   // Per node: 10 roundings of a quaternion's matrix and 6 of the product, each of entries up to 1.
-  const auto bound = [](int count) { return 16.0 * count * 0x1p-53; };
-  finding.limit = bound(1000);
-  finding.why = "16 roundings of 2^-53 a node.";
+  const auto bound = [](int count) { return 16.0 * count * kDoubleRounding; };
+  StabilityFinding finding =
+      make_finding("nodes/rotations", "10 .. 1000 nested rotations that multiply to none", bound(1000),
+                   "largest error of the composed matrix", "16 roundings of 2^-53 a node.");
   finding.curve.x = "nodes";
   std::mt19937_64 random(1);
   for (const int count : {10, 30, 100, 300, 1000}) {
@@ -318,9 +292,8 @@ StabilityFinding rotations_that_cancel() {
     }
     there.insert(there.end(), back.rbegin(), back.rend());
     const double drift = farthest_from_identity(placed_below(Json(there)));
-    finding.curve.points.emplace_back(count, drift);
+    add_point(finding, count, drift);
     finding.curve.expected.emplace_back(count, bound(count));
-    finding.measured = std::max(finding.measured, drift);
   }
   return finding;
 }

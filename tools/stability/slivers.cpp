@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
@@ -67,12 +66,12 @@ Mesh t_junctions() {
 }
 
 StabilityFinding finding_of(const char* name, std::string parameter, const Coverage& found) {
-  StabilityFinding finding;
-  finding.name = fmt::format("slivers/{}", name);
-  finding.parameter = fmt::format("{}: {} pixels missed, {} covered twice", parameter, found.missed, found.twice);
-  finding.unit = "pixels not covered exactly once";
+  StabilityFinding finding =
+      make_finding(fmt::format("slivers/{}", name),
+                   fmt::format("{}: {} pixels missed, {} covered twice", parameter, found.missed, found.twice), 0.0,
+                   "pixels not covered exactly once",
+                   "Shared corners snap to one place, and an edge gives each pixel centre to one side only.");
   finding.measured = static_cast<double>(found.missed + found.twice);
-  finding.why = "Shared corners snap to one place, and an edge gives each pixel centre to one side only.";
   return finding;
 }
 
@@ -210,11 +209,12 @@ std::vector<StabilityFinding> measure_degenerate(const Globals& globals) {
   const auto measure = [&](Extra extra, const char* name, const char* what) {
     const Mixed other = mixed(clean, extra);
     const Image<Key> keys = drawer.draw(scene_of(other.mesh), view);
-    StabilityFinding finding;
-    finding.name = fmt::format("degenerate/{}", name);
-    finding.parameter = fmt::format("a sphere of {} triangles and {} that are {}", clean.triangles.size(),
-                                    other.mesh.triangles.size() - clean.triangles.size(), what);
-    finding.unit = "share of pixels that show another triangle than without";
+    StabilityFinding finding =
+        make_finding(fmt::format("degenerate/{}", name),
+                     fmt::format("a sphere of {} triangles and {} that are {}", clean.triangles.size(),
+                                 other.mesh.triangles.size() - clean.triangles.size(), what),
+                     0.0, "share of pixels that show another triangle than without",
+                     "They cover no pixel's centre, or cover it at the very depth of the triangle they stand for.");
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < keys.pixels().size(); ++i) {
       const Key a = keys.pixels()[i];
@@ -223,7 +223,6 @@ std::vector<StabilityFinding> measure_degenerate(const Globals& globals) {
       wrong += same ? 0U : 1U;
     }
     finding.measured = static_cast<double>(wrong) / static_cast<double>(keys.pixels().size());
-    finding.why = "They cover no pixel's centre, or cover it at the very depth of the triangle they stand for.";
     return finding;
   };
   std::vector<StabilityFinding> findings{

@@ -94,6 +94,27 @@ void scale_lights(Scene& scene, double factor) {
 
 }  // namespace
 
+double worse(double a, double b) {
+  constexpr double kWorst = std::numeric_limits<double>::infinity();
+  return std::isnan(a) || std::isnan(b) ? kWorst : std::max(a, b);
+}
+
+StabilityFinding make_finding(std::string name, std::string parameter, double limit, std::string unit,
+                              std::string why) {
+  StabilityFinding finding;
+  finding.name = std::move(name);
+  finding.parameter = std::move(parameter);
+  finding.limit = limit;
+  finding.unit = std::move(unit);
+  finding.why = std::move(why);
+  return finding;
+}
+
+void add_point(StabilityFinding& finding, double parameter, double measured, bool promised) {
+  finding.curve.points.emplace_back(parameter, measured);
+  if (promised) finding.measured = worse(finding.measured, measured);
+}
+
 void add(Scene& scene, Mesh mesh, const glm::dmat4& to_world) {
   if (mesh.normals.empty()) mesh.normals = smooth_normals(mesh.positions, mesh.triangles);
   scene.meshes.push_back(std::move(mesh));
@@ -212,16 +233,6 @@ glm::dvec3 RandomStream::in_ball() {
   return std::cbrt(one()) * direction;
 }
 
-StabilityFinding finding(std::string name, std::string parameter, double limit, std::string unit, std::string why) {
-  StabilityFinding made;
-  made.name = std::move(name);
-  made.parameter = std::move(parameter);
-  made.limit = limit;
-  made.unit = std::move(unit);
-  made.why = std::move(why);
-  return made;
-}
-
 int threads_of(const Globals& globals) {
   return globals.threads > 0 ? globals.threads : usable_cores();
 }
@@ -258,11 +269,9 @@ Mesh parallelogram(const glm::dvec3& corner, const glm::dvec3& a, const glm::dve
 }
 
 LitPicture lit_picture(const Scene& scene, const View& view, const RaySettings& settings) {
-  const Size size = view.size();
-  LitPicture picture{TileLayer<Key>(FrameLayout({size})), {}, {}};
+  LitPicture picture{TileLayer<Key>(FrameLayout({view.size()})), {}, {}};
   const RayScene rays(scene, RaySpace(scene.bounds), settings.threads);
-  const Rect whole{0, 0, size.width, size.height};
-  PrimaryRays(scene, rays, settings.threads).draw(view, 0, std::span(&whole, 1), picture.keys);
+  PrimaryRays(scene, rays, settings.threads).draw(view, 0, std::array{whole(view)}, picture.keys);
   TileLayer<Rgb> radiance(picture.keys.layout());
   DeferredShader shader(scene, settings);
   shader.shade(std::span(&view, 1), picture.keys, all_tiles(picture.keys.layout()), {.radiance = &radiance});
@@ -289,11 +298,6 @@ RaySettings only(std::vector<PassId> passes, int threads) {
   settings.passes = std::move(passes);
   settings.threads = threads;
   return settings;
-}
-
-double worse(double a, double b) {
-  constexpr double kWorst = std::numeric_limits<double>::infinity();
-  return std::isnan(a) || std::isnan(b) ? kWorst : std::max(a, b);
 }
 
 Scene exhibits(double steps_per_metre) {

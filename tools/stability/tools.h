@@ -29,6 +29,8 @@ namespace hpr::stability {
 
 /// The unit roundoff of a float, 2^-24.
 inline constexpr double kFloatRounding = 0x1p-24;
+/// The unit roundoff of a double, 2^-53.
+inline constexpr double kDoubleRounding = 0x1p-53;
 
 /// Random numbers that are equal on every machine.
 class RandomStream {
@@ -45,9 +47,6 @@ class RandomStream {
   std::mt19937_64 bits_;
 };
 
-/// The unit roundoff of a double, 2^-53.
-inline constexpr double kDoubleRounding = 0x1p-53;
-
 /// A sum that loses nothing to speak of: Kahan's compensation on top of 64 bits.
 struct ExactSum {
   long double sum = 0.0L;
@@ -63,6 +62,15 @@ struct ExactSum {
 
 /// The worse of two measured numbers, of which larger is worse: a NaN is the worst there is.
 [[nodiscard]] double worse(double a, double b);
+
+// Findings.
+
+/// A finding whose measured value is still 0.
+[[nodiscard]] StabilityFinding make_finding(std::string name, std::string parameter, double limit, std::string unit,
+                                            std::string why);
+/// Appends (parameter, measured) to the finding's curve; where it is promised, `measured` also counts for the finding's
+/// worst number, of which larger is worse.
+void add_point(StabilityFinding& finding, double parameter, double measured, bool promised = true);
 
 // Keys and pictures of scenes, drawn with OpenGL.
 
@@ -124,10 +132,6 @@ struct Picture {
 [[nodiscard]] double color_edges(const Image<Rgb>& colors);
 
 // Light without OpenGL.
-
-/// A finding whose measured value is still 0.
-[[nodiscard]] StabilityFinding finding(std::string name, std::string parameter, double limit, std::string unit,
-                                       std::string why);
 
 /// Threads a case may use.
 [[nodiscard]] int threads_of(const Globals& globals);

@@ -2,8 +2,22 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 namespace hpr::stability {
 namespace {
+
+TEST(AddPoint, ExtendsTheCurveAndCountsForTheWorstNumberWhereItIsPromised) {
+  StabilityFinding finding = make_finding("case/number", "gap", 1.0, "relative", "because");
+  add_point(finding, 1.0, 0.5);
+  add_point(finding, 2.0, 0.25);
+  add_point(finding, 3.0, 0.75, false);
+  EXPECT_EQ(finding.measured, 0.5);
+  EXPECT_EQ(finding.curve.points, (std::vector<std::pair<double, double>>{{1.0, 0.5}, {2.0, 0.25}, {3.0, 0.75}}));
+  add_point(finding, 4.0, std::nan(""));
+  EXPECT_EQ(finding.measured, std::numeric_limits<double>::infinity());
+}
 
 TEST(Shares, AreOfSurfacesNotOfDepths) {
   Image<Key> a({4, 1});

@@ -43,14 +43,12 @@ double slope_at(int pixel) {
 }
 
 StabilityFinding triangle(Drawer& drawer) {
-  StabilityFinding finding;
-  finding.name = "giant/triangle";
-  finding.parameter = "a triangle 10 m away with corners up to +-1e7 m, around a screen of +-10 m: error of its depth";
-  finding.unit = "relative; infinite where a pixel is open";
-  finding.limit = 8.0 * kFloatRounding;
-  finding.why =
+  StabilityFinding finding = make_finding(
+      "giant/triangle",
+      "a triangle 10 m away with corners up to +-1e7 m, around a screen of +-10 m: error of its depth",
+      8.0 * kFloatRounding, "relative; infinite where a pixel is open",
       "Corners that clipping makes take five roundings, the division three; GL clips in floats, a screen's half "
-      "beside the screen, and errs by up to 16 x 2^-24 of the corners' distance.";
+      "beside the screen, and errs by up to 16 x 2^-24 of the corners' distance.");
   finding.curve.x = "corners at +- m";
   const auto error = [&](double reach) {
     const Image<Key> keys = drawer.draw(one_triangle(reach), head_on(kGiantSize, 1.0, kNear));
@@ -61,8 +59,7 @@ StabilityFinding triangle(Drawer& drawer) {
     return worst;
   };
   for (double reach = 1e2; reach < 2e9; reach *= 10.0) {
-    finding.curve.points.emplace_back(reach, error(reach));
-    if (reach < 2e7) finding.measured = std::max(finding.measured, finding.curve.points.back().second);
+    add_point(finding, reach, error(reach), reach < 2e7);
   }
   // It depends on luck from where on: the first decade that breaks is searched.
   const auto broken =
@@ -103,18 +100,16 @@ VisibleGround visible_ground(Drawer& drawer, double reach, double turned) {
 std::vector<StabilityFinding> horizon(Drawer& drawer) {
   constexpr double kPromised = 1e9;
   constexpr std::array<double, 4> kTurns{0.0, 0.3, 1.1, 2.5};
-  StabilityFinding rows;
-  rows.name = "giant/horizon";
-  rows.parameter = "ground to +-1e9 m on all sides of an eye a metre above it, turned four ways, near plane at 1e-3 m";
-  rows.unit = "pixels wrongly open or covered";
-  rows.why = "Ground covers all rows below the horizon that see no farther than it reaches.";
+  StabilityFinding rows =
+      make_finding("giant/horizon",
+                   "ground to +-1e9 m on all sides of an eye a metre above it, turned four ways, near plane at 1e-3 m",
+                   0.0, "pixels wrongly open or covered",
+                   "Ground covers all rows below the horizon that see no farther than it reaches.");
   rows.curve.x = "ground to +- m";
-  StabilityFinding depths;
-  depths.name = "giant/ground-depth";
-  depths.parameter = "the same: error of depth";
-  depths.unit = "relative to the depth at the picture's lower edge";
-  depths.limit = 52.0 * kFloatRounding;
-  depths.why = "Depth is interpolated in floats between corners, where the triangle is clipped: 52 roundings.";
+  StabilityFinding depths =
+      make_finding("giant/ground-depth", "the same: error of depth", 52.0 * kFloatRounding,
+                   "relative to the depth at the picture's lower edge",
+                   "Depth is interpolated in floats between corners, where the triangle is clipped: 52 roundings.");
   depths.curve.x = "distance, m";
   const auto wrong = [&](double reach) {
     double sum = 0.0;
@@ -122,8 +117,7 @@ std::vector<StabilityFinding> horizon(Drawer& drawer) {
     return sum;
   };
   for (double reach = 1e2; reach < 2e9; reach *= 10.0) {
-    rows.curve.points.emplace_back(reach, wrong(reach));
-    if (reach < 2.0 * kPromised) rows.measured = std::max(rows.measured, rows.curve.points.back().second);
+    add_point(rows, reach, wrong(reach), reach < 2.0 * kPromised);
   }
   if (rows.holds()) {
     rows.breaks_at = breaking_point_if_any(kPromised, 1e30, 0.2, [&](double reach) { return wrong(reach) <= 0.0; });
@@ -177,16 +171,14 @@ double wrong_squares(const Globals& globals, double reach, std::uint64_t& not_fi
 }
 
 StabilityFinding checker(const Globals& globals, std::uint64_t& not_finite) {
-  StabilityFinding finding;
-  finding.name = "giant/checker";
-  finding.parameter = "a checker of 1 m on ground up to +-1e4 m, of pixels 1 cm or more from its lines";
-  finding.unit = "share of pixels with the wrong square";
-  finding.why = "Texture coordinates round to 2^-24 of the largest: 16 roundings of 1e4 m are 1 cm.";
+  StabilityFinding finding =
+      make_finding("giant/checker", "a checker of 1 m on ground up to +-1e4 m, of pixels 1 cm or more from its lines",
+                   0.0, "share of pixels with the wrong square",
+                   "Texture coordinates round to 2^-24 of the largest: 16 roundings of 1e4 m are 1 cm.");
   finding.curve.x = "ground to +- m";
   for (double reach = 1e2; reach < 2e9; reach *= 10.0) {
     const double wrong = wrong_squares(globals, reach, not_finite);
-    finding.curve.points.emplace_back(reach, wrong);
-    if (reach <= 1e4) finding.measured = std::max(finding.measured, wrong);
+    add_point(finding, reach, wrong, reach <= 1e4);
   }
   if (finding.holds()) {
     finding.breaks_at = breaking_point_if_any(
@@ -214,19 +206,17 @@ std::size_t wrong_close_pixels(const Globals& globals, double distance, std::uin
 }
 
 StabilityFinding close_wall(const Globals& globals, std::uint64_t& not_finite) {
-  StabilityFinding finding;
-  finding.name = "giant/close-wall";
-  finding.parameter = "the eye 1e-1 .. 1e-4 m before a wall of 20 m that lies 5 m from the origin";
-  finding.unit = "pixels that do not show it";
-  finding.why = "Clipping errs by up to 16 x 2^-24 of the wall's 10 m, which must be less than the distance.";
+  StabilityFinding finding =
+      make_finding("giant/close-wall", "the eye 1e-1 .. 1e-4 m before a wall of 20 m that lies 5 m from the origin",
+                   0.0, "pixels that do not show it",
+                   "Clipping errs by up to 16 x 2^-24 of the wall's 10 m, which must be less than the distance.");
   finding.curve.x = "distance, m";
   const auto wrong = [&](double distance) {
     return static_cast<double>(wrong_close_pixels(globals, distance, not_finite));
   };
   for (int power = -9; power <= -1; ++power) {
     const double distance = std::pow(10.0, power);
-    finding.curve.points.emplace_back(distance, wrong(distance));
-    if (power >= -4) finding.measured = std::max(finding.measured, finding.curve.points.back().second);
+    add_point(finding, distance, wrong(distance), power >= -4);
   }
   if (finding.holds()) {
     finding.breaks_at = breaking_point_if_any(1e-4, 1e-12, 0.1, [&](double d) { return wrong(d) <= 0.0; });
@@ -241,12 +231,9 @@ std::vector<StabilityFinding> measure_giant(const Globals& globals) {
   std::uint64_t not_finite = 0;
   findings.push_back(checker(globals, not_finite));
   findings.push_back(close_wall(globals, not_finite));
-  StabilityFinding finite;
-  finite.name = "giant/not-finite";
-  finite.parameter = "all pictures of this case";
-  finite.unit = "pixels whose light was no finite number";
+  StabilityFinding finite = make_finding("giant/not-finite", "all pictures of this case", 0.0,
+                                         "pixels whose light was no finite number", "None of them has a reason to be.");
   finite.measured = static_cast<double>(not_finite);
-  finite.why = "None of them has a reason to be.";
   findings.push_back(finite);
   return findings;
 }
@@ -323,28 +310,22 @@ std::vector<StabilityFinding> measure_tiny(const Globals& globals) {
   Scene scene;
   add(scene, fine_grid(), over_pixels(kFirst, kPixels));
   finish_scene(scene);
-  StabilityFinding pixels;
-  pixels.name = "tiny/pixels";
-  pixels.parameter = fmt::format("{} triangles, each 1/130 of a pixel, in one tile", scene.triangles);
-  pixels.unit = "pixels open, covered or shown wrongly";
+  StabilityFinding pixels = make_finding(
+      "tiny/pixels", fmt::format("{} triangles, each 1/130 of a pixel, in one tile", scene.triangles), 0.0,
+      "pixels open, covered or shown wrongly", "Every centre lies in a cell but for 1/256 pixel of snapping.");
   pixels.measured = static_cast<double>(wrong_pixels(drawer.draw(scene, head_on(kTinySize, 1.0, 0.01))));
-  pixels.why = "Every centre lies in a cell but for 1/256 pixel of snapping.";
 
-  StabilityFinding balance;
-  balance.name = "tiny/balance";
-  balance.parameter = "the same, and the same over all the screen, shared out to 2 .. 512 ranks";
-  balance.unit = "chunks of 512 triangles above the mean, largest share";
-  balance.limit = 1.5;
-  balance.why =
-      "Halving whole chunks is off by half a chunk a level, halved by each level below: 1 chunk, and the last.";
+  StabilityFinding balance = make_finding(
+      "tiny/balance", "the same, and the same over all the screen, shared out to 2 .. 512 ranks", 1.5,
+      "chunks of 512 triangles above the mean, largest share",
+      "Halving whole chunks is off by half a chunk a level, halved by each level below: 1 chunk, and the last.");
   balance.curve.x = "ranks";
   Scene spread = scene;
   spread.instances[0].to_world = over_pixels(0, kTinySize.width);
   finish_scene(spread);
   for (int ranks = 2; ranks <= 512; ranks = ranks * 3 / 2 + 1) {
     const double worst = std::max(max_over_mean(scene, ranks, 512), max_over_mean(spread, ranks, 512));
-    balance.curve.points.emplace_back(ranks, worst);
-    balance.measured = std::max(balance.measured, worst);
+    add_point(balance, ranks, worst);
   }
   return {pixels, balance};
 }

@@ -222,8 +222,9 @@ std::vector<StabilityFinding> measure_watertight(const Globals& globals) {
   const Crossings vertices = both_sides(scene, Aim::Vertex, kClearOfVertices, kRays / 2, globals);
 
   const std::string both = "5e6 rays from inside and outside, closed icosphere of 81 920 triangles";
-  StabilityFinding at_edges = finding("watertight/edges", both + ", aimed at shared edges", 0.0, "1",
-                                      "both triangles of an edge find the same number for it: one of them takes a ray");
+  StabilityFinding at_edges =
+      make_finding("watertight/edges", both + ", aimed at shared edges", 0.0, "1",
+                   "both triangles of an edge find the same number for it: one of them takes a ray");
   at_edges.measured = static_cast<double>(edges.missed());
   at_edges.curve.x = "radius of the ball, in radii of the scene";
   const auto missed_by_size = [&](double radius) {
@@ -238,8 +239,8 @@ std::vector<StabilityFinding> measure_watertight(const Globals& globals) {
   at_edges.breaks_at =
       breaking_point_if_any(kMinBallRadius, 1e-7, 0.2, [&](double r) { return missed_by_size(r) == 0.0; });
 
-  StabilityFinding at_vertices = finding("watertight/vertices", both + ", past vertices at 4e-5 radii", 0.0, "1",
-                                         "only next to a vertex may rounding let every triangle refuse a ray");
+  StabilityFinding at_vertices = make_finding("watertight/vertices", both + ", past vertices at 4e-5 radii", 0.0, "1",
+                                              "only next to a vertex may rounding let every triangle refuse a ray");
   at_vertices.measured = static_cast<double>(vertices.missed());
   at_vertices.curve.x = "distance of the rays from vertices, in radii";
   const auto missed_beside = [&](double beside) {
@@ -252,8 +253,8 @@ std::vector<StabilityFinding> measure_watertight(const Globals& globals) {
   at_vertices.breaks_at =
       breaking_point_if_any(kClearOfVertices, 1e-9, 0.2, [&](double d) { return missed_beside(d) == 0.0; });
 
-  StabilityFinding doubles = finding("watertight/double-hits", "the same 1e7 rays", 0.0, "1",
-                                     "a ray that leaves a surface by the origin rule does not meet it again");
+  StabilityFinding doubles = make_finding("watertight/double-hits", "the same 1e7 rays", 0.0, "1",
+                                          "a ray that leaves a surface by the origin rule does not meet it again");
   doubles.measured = static_cast<double>(edges.doubles + vertices.doubles);
   return {at_edges, at_vertices, doubles};
 }

@@ -55,9 +55,7 @@ KnobSweep parse_knob_sweep(const std::string& text) {
     throw Error(ExitCode::Usage, fmt::format("--vary {}: no values", printable(text)), "write e.g. --vary spp=1,4,16");
   }
   KnobSweep sweep{std::string(find_tradeoff_setting(text.substr(0, equals)).name), {}};
-  for (std::size_t start = equals + 1; start <= text.size();) {
-    const std::size_t end = std::min(text.find(',', start), text.size());
-    std::string value = text.substr(start, end - start);
+  for (std::string& value : split_commas(std::string_view(text).substr(equals + 1))) {
     if (value.empty()) {
       throw Error(ExitCode::Usage, fmt::format("--vary {}: an empty value", printable(text)),
                   "write e.g. --vary spp=1,4,16; lists within a value take + between their words");
@@ -67,7 +65,6 @@ KnobSweep parse_knob_sweep(const std::string& text) {
                   "name each value once");
     }
     sweep.values.push_back(std::move(value));
-    start = end + 1;
   }
   return sweep;
 }

@@ -22,7 +22,6 @@
 #include "engine/session.h"
 #include "scene/view.h"
 #include "tools/diff/diff.h"
-#include "tools/report/lists.h"
 #include "tools/sweep.h"
 #include "tools/tradeoff/tradeoff_measure.h"
 #include "tools/tradeoff/tradeoff_report.h"

@@ -19,7 +19,6 @@ struct TradeoffMeasurement {
   std::uint32_t reference_spp = 1024;
   int frames = 3;  ///< measured of each point; fewer where they take long
   std::vector<std::string> metrics;
-  std::optional<Rect> crop;  ///< none: where the reference has most detail
 };
 
 /// The truth a sweep is held against.
