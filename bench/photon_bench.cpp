@@ -1,8 +1,12 @@
 #include <benchmark/benchmark.h>
 
-#include <cstring>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
 #include <numeric>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "rt/photons/photon_map.h"
@@ -10,9 +14,8 @@
 #include "rt/ray_settings.h"
 
 // A million photons on the walls of a room: sorting them into a map, and the light of about 50 gathered at a place. The
-// floor of a
-// build is to move each photon once to where it belongs, a scattered copy; that of a gather is to read and sum fifty
-// photons that lie side by side somewhere.
+// floor of a build is to move each photon once to where it belongs, a scattered copy; that of a gather is to read and
+// sum fifty photons that lie side by side somewhere.
 namespace {
 
 constexpr std::size_t kPhotons = 1'000'000;
@@ -25,7 +28,7 @@ struct SurfaceSample {
 };
 
 /// On the faces of the cube [-1, 1]^3, from inside.
-SurfaceSample random_position(std::mt19937_64& random) {
+SurfaceSample random_sample(std::mt19937_64& random) {
   std::uniform_real_distribution<double> side(-1.0, 1.0);
   const auto axis = static_cast<int>(random() % 3);
   SurfaceSample sample{{side(random), side(random), side(random)}, glm::dvec3(0.0)};
@@ -38,7 +41,7 @@ std::vector<hpr::Photon> photons_of_a_room() {
   std::mt19937_64 random(1);
   std::vector<hpr::Photon> photons(kPhotons);
   for (hpr::Photon& photon : photons) {
-    const SurfaceSample sample = random_position(random);
+    const SurfaceSample sample = random_sample(random);
     for (int axis = 0; axis < 3; ++axis)
       photon.position[static_cast<std::size_t>(axis)] = static_cast<float>(sample.position[axis]);
     photon.facing = hpr::pack_facing(sample.normal);
@@ -96,26 +99,26 @@ BENCHMARK(photon_scattered_copy)->Unit(benchmark::kMillisecond);
 void photon_gather(benchmark::State& state) {
   const hpr::PhotonMap map(photons_of_a_room(), room_space(), room_radius());
   std::mt19937_64 random(3);
-  std::vector<SurfaceSample> positions(1 << 16);
-  for (SurfaceSample& sample : positions) sample = random_position(random);
+  std::vector<SurfaceSample> samples(1 << 16);
+  for (SurfaceSample& sample : samples) sample = random_sample(random);
   if (state.range(0) != 0) {
     // As neighbouring pixels come: a walk over one wall.
-    for (std::size_t i = 0; i < positions.size(); ++i) {
+    for (std::size_t i = 0; i < samples.size(); ++i) {
       const std::size_t row = i / 256;
       const double across = static_cast<double>(i % 256) / 128.0 - 1.0;
-      positions[i] = {{across, -1.0, static_cast<double>(row) / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
+      samples[i] = {{across, -1.0, static_cast<double>(row) / 128.0 - 1.0}, {0.0, 1.0, 0.0}};
     }
   }
   std::size_t gathered = 0;
-  for (const SurfaceSample& sample : positions) gathered += map.count(sample.position, sample.normal);
+  for (const SurfaceSample& sample : samples) gathered += map.count(sample.position, sample.normal);
   hpr::FoundPhotons found;
   std::size_t i = 0;
   for (auto _ : state) {
-    const ShadedPoint point(positions[i++ % positions.size()]);
+    const ShadedPoint point(samples[i++ % samples.size()]);
     benchmark::DoNotOptimize(
         hpr::gather_photons(map, point.surface, point.bsdf, point.material.normal, kGlossyCutoff, found));
   }
-  state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(positions.size());
+  state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(samples.size());
 }
 BENCHMARK(photon_gather)->ArgName("neighbours")->Arg(0)->Arg(1);
 

@@ -1,8 +1,6 @@
 #include "rt/deferred_shader.h"
 
 #include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <mutex>
 #include <numeric>
 #include <optional>
@@ -355,12 +353,12 @@ void DeferredShader::State::gather_counts(double spent_ms) {
   }
   if (forwarding != nullptr) share_out(spent_ms, ms);
   if (photons) {
-    const PhotonCounts sent = photons->take_counts();
+    const PhotonCounts traced = photons->take_counts();
     for (const RunningPass& running : passes) {
-      if (running.info.needs_photons) counts[running.info.id] = sent.rays;
+      if (running.info.needs_photons) counts[running.info.id] = traced.rays;
     }
-    counts.invalid += sent.invalid;
-    counts.cut += sent.cut;
+    counts.invalid += traced.invalid;
+    counts.cut += traced.cut;
   }
   warn_of_cut_rays();
   times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
@@ -416,13 +414,13 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     const std::size_t tile = order[i];
-    const TilePlace position = layout.place(tile);
+    const TilePlace location = layout.place(tile);
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
     if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
     std::vector<TileJob> jobs;
     for (const ShadedSample& sample : samples) {
       set_active(sample.output, tile);
-      jobs.push_back({position.pixels, sample.number, sample.keys->tile(tile), &sample.views[position.screen],
+      jobs.push_back({location.pixels, sample.number, sample.keys->tile(tile), &sample.views[location.screen],
                       static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
     }
     std::unique_ptr<Scratch> scratch = state.take_scratch();
@@ -434,8 +432,8 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
                                .followed_lobes = state.followed_lobes,
                                .gathers = state.gathers,
                                .photons = photons,
-                               .view = &first.views[position.screen],
-                               .eye_media = eyes[position.screen]};
+                               .view = &first.views[location.screen],
+                               .eye_media = eyes[location.screen]};
     state.shade_tile(context, *scratch, jobs, tile, samples);
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));

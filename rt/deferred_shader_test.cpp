@@ -18,20 +18,13 @@ using test::add_material;
 using test::add_mesh;
 using test::place_mesh;
 using test::quad;
+using test::white_floor;
 
 Light point_light(const glm::dvec3& position, float intensity) {
   Light light;
   light.position = position;
   light.intensity = glm::vec3(intensity);
   return light;
-}
-
-Scene white_floor() {
-  Scene scene;
-  add_material(scene, test::diffuse());
-  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
-  finish_scene(scene);
-  return scene;
 }
 
 TEST(DeferredShader, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
@@ -44,9 +37,9 @@ TEST(DeferredShader, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
     for (int x = 0; x < 65; ++x) {
       const Ray ray = view_ray(view, x + 0.5, y + 0.5);
       const glm::dvec3 p = ray.origin - ray.direction * (ray.origin.y / ray.direction.y);
-      const glm::dvec3 direction = scene.lights[0].position - p;
-      const double d2 = glm::dot(direction, direction);
-      const double expected = 7.0 * (direction.y / std::sqrt(d2)) / (std::numbers::pi * d2);
+      const glm::dvec3 offset = scene.lights[0].position - p;
+      const double d2 = glm::dot(offset, offset);
+      const double expected = 7.0 * (offset.y / std::sqrt(d2)) / (std::numbers::pi * d2);
       ASSERT_NEAR(lit.image.at(x, y).g / expected, 1.0, 1e-6) << x << ',' << y;
     }
   }

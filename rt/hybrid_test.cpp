@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <array>
-
 #include "rt/deferred_shader.h"
 #include "rt/test_rooms.h"
 #include "rt/test_scene.h"

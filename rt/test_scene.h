@@ -104,6 +104,15 @@ inline Mesh sphere(double radius, int rings, std::uint32_t material) {
   return mesh;
 }
 
+/// A diffuse white square in the plane y = 0, metres 8 x 8.
+inline Scene white_floor() {
+  Scene scene;
+  add_material(scene, diffuse());
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  finish_scene(scene);
+  return scene;
+}
+
 struct Met {
   double distance = std::numeric_limits<double>::infinity();
   std::uint32_t surface = 0;
@@ -177,6 +186,13 @@ inline Shaded shade(const Scene& scene, const View& view, const RaySettings& set
   DeferredShader shader(scene, settings);
   shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
   return {to_image(radiance, 0), shader.counts()};
+}
+
+/// The mean of a picture's green.
+inline double mean(const Image<Rgb>& image) {
+  double sum = 0.0;
+  for (const Rgb& color : image.pixels()) sum += static_cast<double>(color.g);
+  return sum / static_cast<double>(image.pixels().size());
 }
 
 /// The mean of a pixel over many samples.

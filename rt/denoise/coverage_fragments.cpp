@@ -148,15 +148,15 @@ Patch::Patch(std::span<const KnownFeature> known, std::span<const SurfaceFeature
   Plane place_by{};
   Plane across_by{};
   for (const KnownFeature& each : known) {
-    const glm::vec2 direction = each.position - centroid;
-    xx += weight * direction.x * direction.x;
-    xy += weight * direction.x * direction.y;
-    yy += weight * direction.y * direction.y;
+    const glm::vec2 offset = each.position - centroid;
+    xx += weight * offset.x * offset.x;
+    xy += weight * offset.x * offset.y;
+    yy += weight * offset.y * offset.y;
     for (const int axis : {0, 1}) {
       place_by.at(static_cast<std::size_t>(axis)) +=
-          weight * direction[axis] * (features[each.feature].position - position_[0]);
+          weight * offset[axis] * (features[each.feature].position - position_[0]);
       across_by.at(static_cast<std::size_t>(axis)) +=
-          weight * direction[axis] * (across(features[each.feature]) - across_[0]);
+          weight * offset[axis] * (across(features[each.feature]) - across_[0]);
     }
   }
   const float determinant = xx * yy - xy * xy;

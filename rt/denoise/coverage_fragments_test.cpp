@@ -69,7 +69,7 @@ View straight_on(const Scene& scene, const Size& size = {64, 64}) {
   return test::view_from({0, 0, 3}, {0, 0, 0}, size, scene);
 }
 
-TEST(CoverageFragments, SharesOfStraightOutlinesAreMeasured) {
+TEST(CoverageFragments, FractionsAtStraightEdgesAreMeasured) {
   for (const float angle : {0.1F, 0.5F, 0.785F, 1.2F, 2.0F, 3.0F}) {
     Scene scene = before_the_sky();
     const glm::vec3 along(std::cos(angle), std::sin(angle), 0.0F);
@@ -87,7 +87,7 @@ TEST(CoverageFragments, SharesOfStraightOutlinesAreMeasured) {
 }
 
 /// Radii of about 4 to 15 pixels.
-TEST(CoverageFragments, SharesOfRoundOutlinesAreMeasured) {
+TEST(CoverageFragments, FractionsAtRoundEdgesAreMeasured) {
   for (const double radius : {0.2, 0.4, 0.8}) {
     Scene scene = before_the_sky();
     const glm::dvec3 centre(0.013, 0.037, 0.0);  // else the same few pixels stand all about
@@ -155,8 +155,9 @@ TEST(CoverageFragments, WhatNoCornerSeesKeepsItsLight) {
   EXPECT_NEAR(mean_of(true) / truth, 1.0, 0.05);
 }
 
-/// Where a screen of points has none, looks see what the pixel's centre does; the plane's corners say nothing.
-TEST(CoverageFragments, LooksGoThroughThePointsOfTheScreen) {
+/// Where a screen of points has none, subpixel samples see what the pixel's centre does; the plane's corners say
+/// nothing.
+TEST(CoverageFragments, SubpixelSamplesGoThroughThePointsOfTheScreen) {
   Scene scene = before_the_sky();
   place_mesh(scene, add_mesh(scene, quad({-9, -9, 0}, {9.5F, 0, 0}, {0, 18, 0}, 0)));
   finish_scene(scene);
@@ -179,7 +180,7 @@ TEST(CoverageFragments, LooksGoThroughThePointsOfTheScreen) {
 }
 
 /// Three surfaces meet, and a gap thinner than a pixel runs from there: rays ask.
-TEST(CoverageFragments, SharesAreCountedWhereMoreThanOneOutlineRuns) {
+TEST(CoverageFragments, FractionsAreMeasuredWhereMoreThanOneEdgeRuns) {
   Scene scene = before_the_sky();
   place_mesh(scene, add_mesh(scene, quad({-3.02F, -3, 0}, {3, 0, 0}, {0, 6, 0}, 0)));
   place_mesh(scene, add_mesh(scene, quad({0.02F, -3, 0}, {3, 0, 0}, {0.4F, 3.2F, 0}, 0)));

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "rt/denoise/test_denoiser.h"
@@ -51,7 +50,7 @@ TEST(Denoiser, LeavesSamplesPastTheFirstAlone) {
 }
 
 /// Half of each pixel on the edge of a black sheet before a white sky is seen, whatever the pixel's one sample sees.
-TEST(Denoiser, LooksAgainAtOutlines) {
+TEST(Denoiser, ResamplesEdges) {
   Scene scene;
   add_material(scene, test::diffuse(glm::vec3(0.0F)));
   place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
@@ -233,8 +232,8 @@ TEST(Denoiser, WhatIsFarBrighterThanAllAboutStaysApart) {
   EXPECT_NEAR(mean(smooth) / mean(plain), 1.0, 0.01);
 }
 
-/// Stripes of light and of black on one surface, thinner than pixels: looks at its outlines see both.
-TEST(Denoiser, LooksSeeWhatGlowsInPart) {
+/// Stripes of light and of black on one surface, thinner than pixels: subpixel samples at its edges see both.
+TEST(Denoiser, SubpixelSamplesSeeWhatGlowsInPart) {
   Scene scene;
   Material striped = test::glowing(glm::vec3(1.0F));
   striped.emissive_texture.texture = 0;
@@ -255,7 +254,7 @@ TEST(Denoiser, LooksSeeWhatGlowsInPart) {
 }
 
 /// What lies past the far plane of parallel rays is not there, between its corners either.
-TEST(Denoiser, LooksEndAtTheFarPlane) {
+TEST(Denoiser, SubpixelSamplesEndAtTheFarPlane) {
   Scene scene;
   add_material(scene, test::diffuse());
   place_mesh(scene, add_mesh(scene, quad({-0.5F, -0.5F, 0}, {1, 0, 0}, {0, 1, 0}, 0)));

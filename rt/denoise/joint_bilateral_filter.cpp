@@ -100,9 +100,9 @@ HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& ce
     for (std::size_t lane = 0; lane < weights.columns; lane += hn::Lanes(d)) {
       const std::size_t i = weights.first + row * TapPlanes::kStride + lane;
       const V column = hn::Iota(d, static_cast<T>(columns_off + static_cast<int>(lane)));
-      const VectorOf<V> direction = Lanes::less(Lanes::load(taps.position, i), center.position);
-      const V way2 = length2(direction);
-      const V bend = dot(direction, Lanes::load(taps.normal, i));
+      const VectorOf<V> offset = Lanes::less(Lanes::load(taps.position, i), center.position);
+      const V distance2 = length2(offset);
+      const V bend = dot(offset, Lanes::load(taps.normal, i));
       const VectorOf<V> turned = Lanes::less(Lanes::load(normals, i), center.normal);
       V sharpness = all(center.sharpness);
       if (!center.is_pixel) sharpness = hn::Mul(sharpness, hn::LoadU(d, &taps.sharpness[i]));
@@ -112,8 +112,8 @@ HWY_INLINE void weigh(const NeighborFeatures<T>& taps, const FilterCenter<T>& ce
       auto accepted = hn::RebindMask(d, hn::Eq(kind, center_kind));
       accepted = hn::And(accepted, hn::Lt(column, all(static_cast<T>(columns_off + window.columns))));
       accepted = hn::And(accepted, hn::Gt(alike, hn::Zero(d)));
-      accepted = hn::And(accepted, hn::And(hn::Le(way2, all(center.max_distance2)),
-                                           hn::Le(square(bend), hn::Mul(all(center.max_bend2), way2))));
+      accepted = hn::And(accepted, hn::And(hn::Le(distance2, all(center.max_distance2)),
+                                           hn::Le(square(bend), hn::Mul(all(center.max_bend2), distance2))));
       V weight = all(T{1});
       if (!center.is_box) weight = spatial_weight<Lanes>(center, column, down, alike, rows_off == 0, accepted);
       const auto ratios = scattering_ratios<Lanes>(taps, center, i, accepted);

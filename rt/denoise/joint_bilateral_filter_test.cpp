@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
@@ -64,10 +62,11 @@ struct Expected {
   double sum = 0.0;
 };
 
-/// What pixel (x, y) gives by itself, as the members of FilterCenter say: its weight, and the ratio of each term.
+/// The weight of a pixel and the ratio of each term, as the members of FilterCenter define them.
 template <typename T>
-std::pair<T, std::array<glm::vec<3, T>, kPlanes>> sent(const NeighborFeatures<T>& taps, const FilterCenter<T>& center,
-                                                       const glm::ivec2& pixel) {
+std::pair<T, std::array<glm::vec<3, T>, kPlanes>> weight_and_ratios(const NeighborFeatures<T>& taps,
+                                                                    const FilterCenter<T>& center,
+                                                                    const glm::ivec2& pixel) {
   using Vector = glm::vec<3, T>;
   const std::pair<T, std::array<Vector, kPlanes>> nothing{T{0}, {}};
   const std::size_t i = TapPlanes::index(pixel.x, pixel.y);
@@ -76,10 +75,9 @@ std::pair<T, std::array<glm::vec<3, T>, kPlanes>> sent(const NeighborFeatures<T>
   if (!is_same) return nothing;
   const glm::vec2 off = glm::vec2(pixel - center.pixel) - center.offset;
   const T spatial = T{1} - static_cast<T>(glm::dot(off, off)) / (center.reach * center.reach);
-  const Vector direction = taps.position.at(i) - center.position;
-  const T bend = glm::dot(direction, taps.normal.at(i));
-  if (glm::dot(direction, direction) > center.max_distance2 ||
-      bend * bend > center.max_bend2 * glm::dot(direction, direction))
+  const Vector offset = taps.position.at(i) - center.position;
+  const T bend = glm::dot(offset, taps.normal.at(i));
+  if (glm::dot(offset, offset) > center.max_distance2 || bend * bend > center.max_bend2 * glm::dot(offset, offset))
     return nothing;
   const Vector turned = (center.is_pixel ? taps.shading_normal : taps.normal).at(i) - center.normal;
   const T sharpness = center.sharpness * (center.is_pixel ? T{1} : taps.sharpness[i]);
@@ -103,7 +101,7 @@ Expected expected(const Tile<T>& tile, const FilterCenter<T>& center) {
   for (int y = center.window.first.y; y < center.window.first.y + center.window.rows; ++y) {
     for (int x = center.window.first.x; x < center.window.first.x + center.window.columns; ++x) {
       if (x < 0 || y < 0 || x >= kTileSide || y >= kTileSide) continue;
-      const auto [weight, ratios] = sent(*tile.taps, center, {x, y});
+      const auto [weight, ratios] = weight_and_ratios(*tile.taps, center, {x, y});
       found.sum += static_cast<double>(weight);
       for (std::size_t term = 0; term < kPlanes; ++term) {
         found.mean[term] += glm::dvec3(weight * ratios[term]) * tile.light->at(TapPlanes::index(x, y));

@@ -18,7 +18,7 @@ constexpr int kHalvings = 5;
 /// Halvings of how far an edge may bend; its bounds in pixels and in lengths of the straight line.
 constexpr int kBendHalvings = 3;
 constexpr float kMaxLineBend = 0.125F;
-constexpr float kMaxLineBendOfWay = 0.25F;
+constexpr float kMaxLineBendOfChord = 0.25F;
 /// Bounds for edges whose bend is interpolated from the pixels before and after: of the bend, in lengths of the line,
 /// and of the difference of the two estimates, in pixels.
 constexpr float kMaxEvenBend = 0.025F;
@@ -59,15 +59,15 @@ float square(float value) {
 }
 
 float max_bend(const SilhouetteEdges::Pixel& pixel) {
-  return std::min(kMaxLineBend, kMaxLineBendOfWay * glm::length(pixel.direction));
+  return std::min(kMaxLineBend, kMaxLineBendOfChord * glm::length(pixel.chord));
 }
 
 /// What the bend takes from the left side, a segment of a parabola.
 void take_bend(SilhouetteEdges::Pixel& pixel) {
-  const float received = 2.0F / 3.0F * pixel.bend * glm::length(pixel.direction);
-  const glm::vec2 from = pixel.start + 0.5F * pixel.direction + 0.4F * pixel.bend * pixel.to_left;
-  const float left = std::clamp(pixel.fraction - received, 0.0F, 1.0F);
-  if (left > 0.0F) pixel.centroid = glm::clamp((pixel.fraction * pixel.centroid - received * from) / left, -0.5F, 0.5F);
+  const float removed = 2.0F / 3.0F * pixel.bend * glm::length(pixel.chord);
+  const glm::vec2 from = pixel.start + 0.5F * pixel.chord + 0.4F * pixel.bend * pixel.to_left;
+  const float left = std::clamp(pixel.fraction - removed, 0.0F, 1.0F);
+  if (left > 0.0F) pixel.centroid = glm::clamp((pixel.fraction * pixel.centroid - removed * from) / left, -0.5F, 0.5F);
   pixel.fraction = left;
 }
 
@@ -85,14 +85,14 @@ float max_distance2(const View& view, const glm::vec3& position) {
 
 bool is_within_depth(const View& view, const SurfaceFeature& first, const SurfaceFeature& second) {
   if (first.material != second.material) return false;
-  const glm::vec3 direction = second.position - first.position;
-  return glm::dot(direction, direction) <= max_distance2(view, second.position);
+  const glm::vec3 offset = second.position - first.position;
+  return glm::dot(offset, offset) <= max_distance2(view, second.position);
 }
 
 bool is_coplanar(const View& view, const SurfaceFeature& first, const SurfaceFeature& second) {
-  const glm::vec3 direction = second.position - first.position;
-  const float off = glm::dot(direction, first.normal);
-  return off * off <= kMaxBend * kMaxBend * glm::dot(direction, direction) && is_within_depth(view, first, second);
+  const glm::vec3 offset = second.position - first.position;
+  const float off = glm::dot(offset, first.normal);
+  return off * off <= kMaxBend * kMaxBend * glm::dot(offset, offset) && is_within_depth(view, first, second);
 }
 
 bool is_silhouette(const View& view, const SurfaceFeature& a, const SurfaceFeature& b) {
@@ -222,8 +222,8 @@ void SilhouetteEdges::find_sides(Pixel& pixel, int x, int y, const std::array<st
   left_side.at(vertices++) = crossed_at[1];
   measure(std::span(left_side).first(vertices), pixel);
   pixel.start = crossed_at[0];
-  pixel.direction = crossed_at[1] - crossed_at[0];
-  pixel.to_left = glm::normalize(glm::vec2(pixel.direction.y, -pixel.direction.x));
+  pixel.chord = crossed_at[1] - crossed_at[0];
+  pixel.to_left = glm::normalize(glm::vec2(pixel.chord.y, -pixel.chord.x));
 }
 
 bool SilhouetteEdges::differ(int x, int y, const glm::ivec2& direction) const {
@@ -278,8 +278,8 @@ std::optional<glm::vec2> SilhouetteEdges::end_of_next(const Pixel& pixel, std::s
 /// The bend of a parabola through both ends and those of the pixels before and after; nothing where it would not do.
 std::optional<float> SilhouetteEdges::even_bend(const Pixel& pixel) const {
   if (view_.points) return std::nullopt;  // corners and pixels may see otherwise
-  const float length = glm::length(pixel.direction);
-  const glm::vec2 along = pixel.direction / length;
+  const float length = glm::length(pixel.chord);
+  const glm::vec2 along = pixel.chord / length;
   float sum = 0.0F;
   float weights = 0.0F;
   float low = std::numeric_limits<float>::infinity();
@@ -288,11 +288,11 @@ std::optional<float> SilhouetteEdges::even_bend(const Pixel& pixel) const {
     const std::optional<glm::vec2> next = end_of_next(pixel, end);
     if (!next) continue;
     // From the nearer end, away from the pixel; the second divided difference and the inverse of its variance.
-    const glm::vec2 direction = *next - pixel.end(end);
-    const float away = end == 0 ? -glm::dot(direction, along) : glm::dot(direction, along);
+    const glm::vec2 offset = *next - pixel.end(end);
+    const float away = end == 0 ? -glm::dot(offset, along) : glm::dot(offset, along);
     if (!(away > 0.0F)) return std::nullopt;
     const float product = away * (away + length);
-    const float curve = glm::dot(direction, pixel.to_left) / product;
+    const float curve = glm::dot(offset, pixel.to_left) / product;
     const float weight =
         1.0F / (1.0F / square(product) + 1.0F / square(away * length) + 1.0F / square(length * (away + length)));
     const float bend = -0.25F * curve * square(length);

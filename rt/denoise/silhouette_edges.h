@@ -70,8 +70,8 @@ class SilhouetteEdges {
     /// Whether one edge goes through that is about a parabola: then there are two sides.
     bool has_sides = false;
     glm::vec2 start{0.0F};                 ///< of the edge in the pixel, from the pixel's centre, pixels
-    glm::vec2 direction{0.0F};             ///< from there to its end
-    glm::vec2 to_left{0.0F};               ///< unit length: across the way; y is down
+    glm::vec2 chord{0.0F};                 ///< from there to its end
+    glm::vec2 to_left{0.0F};               ///< unit length: across the chord; y is down
     float bend = 0.0F;                     ///< by how much the edge's middle lies to the left of the straight line
     float fraction = 0.0F;                 ///< of the left side
     glm::vec2 centroid{0.0F};              ///< of the left side
@@ -80,8 +80,8 @@ class SilhouetteEdges {
     std::array<std::array<KnownFeature, 8>, 2> known{};
     std::array<std::uint8_t, 2> counts{};
 
-    [[nodiscard]] glm::vec2 end(std::size_t i) const { return i == 0 ? start : start + direction; }
-    [[nodiscard]] glm::vec2 middle_of_edge() const { return start + 0.5F * direction + bend * to_left; }
+    [[nodiscard]] glm::vec2 end(std::size_t i) const { return i == 0 ? start : start + chord; }
+    [[nodiscard]] glm::vec2 middle_of_edge() const { return start + 0.5F * chord + bend * to_left; }
     /// Whether a place of the pixel, from its centre, lies on the left side, but for the bend.
     [[nodiscard]] bool is_left(const glm::vec2& position) const { return glm::dot(position - start, to_left) > 0.0F; }
   };
@@ -97,7 +97,7 @@ class SilhouetteEdges {
   struct Edge {
     glm::dvec2 start{0.0};
     glm::dvec2 direction{0.0};
-    /// The silhouette lies between these fractions of the way, where features `before` and `after` were seen.
+    /// The silhouette lies between these fractions of the edge, where features `before` and `after` were seen.
     double low = 0.0;
     double high = 1.0;
     std::uint32_t before = 0;

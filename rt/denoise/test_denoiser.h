@@ -49,12 +49,6 @@ inline double squared_error(const Image<Rgb>& image, const Image<Rgb>& truth) {
   return sum / static_cast<double>(image.pixels().size());
 }
 
-inline double mean(const Image<Rgb>& image) {
-  double sum = 0.0;
-  for (const Rgb& color : image.pixels()) sum += static_cast<double>(color.g);
-  return sum / static_cast<double>(image.pixels().size());
-}
-
 inline const RaySettings kGathered{.passes = {PassId::Gather}, .max_depth = 4};
 
 /// A sheet alone under an even sky, which sends back its base colour.

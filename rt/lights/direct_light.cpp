@@ -15,13 +15,13 @@ double balance_heuristic(const LightContext& context, double pdf, double light_p
 void add_emission(const LightContext& context, const Wavefront& wave, PixelSums& sums) {
   for (const PathVertex& point : wave.vertices) {
     if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered)) continue;
-    double fraction = 1.0;
+    double weight = 1.0;
     if (point.previous_pdf > 0.0) {
-      fraction = balance_heuristic(context, point.previous_pdf,
-                                   context.lights.surface_pdf(point.previous_position, point.previous_normal,
-                                                              point.surface.surface, point.surface));
+      weight = balance_heuristic(context, point.previous_pdf,
+                                 context.lights.surface_pdf(point.previous_position, point.previous_normal,
+                                                            point.surface.surface, point.surface));
     }
-    sums.add(point.pixel, point.component, fraction * point.throughput * point.material.emission);
+    sums.add(point.pixel, point.component, weight * point.throughput * point.material.emission);
   }
 }
 
@@ -89,8 +89,8 @@ glm::dvec3 DirectLight::shared_scattering(const PathVertex& point, const LightSa
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
   for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
-    const double fraction = point.may_follow[lobe] ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
-    scattered += fraction * all.value[lobe];
+    const double weight = point.may_follow[lobe] ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
+    scattered += weight * all.value[lobe];
   }
   return scattered;
 }

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "rt/passes/path_vertex.h"
@@ -11,13 +11,7 @@
 namespace hpr {
 namespace {
 
-Scene white_floor() {
-  Scene scene;
-  test::add_material(scene, test::diffuse());
-  test::place_mesh(scene, test::add_mesh(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
-  finish_scene(scene);
-  return scene;
-}
+using test::white_floor;
 
 /// A tile all of whose pixels see a white floor under some point lights.
 class LitFloor {

@@ -44,7 +44,7 @@ class LightSampler {
   /// Whether there are lights beside the enumerated ones: emitting triangles, the environment, and, when they are many,
   /// all.
   [[nodiscard]] bool has_tree() const;
-  /// A sample of one of the lights that are not enumerated, chosen by what it may give to a surface at `place` with
+  /// A sample of one of the lights that are not enumerated, chosen by what it may give to a surface at `position` with
   /// `normal` (a light tree: Conty and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018).
   /// None when no light reaches it.
   [[nodiscard]] std::optional<LightSample> sample(const glm::dvec3& position, const glm::dvec3& normal,
@@ -54,7 +54,7 @@ class LightSampler {
   [[nodiscard]] std::optional<LightSample> sample_any(const glm::dvec3& position, const glm::dvec3& normal,
                                                       const View& view, double u_choice, const glm::dvec2& u) const;
 
-  /// Per solid angle: the density with which sample (or sample_any) at `place` picks the direction to the point
+  /// Per solid angle: the density with which sample (or sample_any) at `position` picks the direction to the point
   /// `hit` of an emitting surface; of a sample, the very pdf it says. 0 for surfaces that do not emit.
   [[nodiscard]] double surface_pdf(const glm::dvec3& position, const glm::dvec3& normal, std::uint32_t surface,
                                    const SurfacePoint& hit) const;

@@ -107,10 +107,10 @@ LightCluster::LightCluster(const LightBounds& bounds)
       two_sided(bounds.two_sided) {}
 
 double LightCluster::importance(const glm::dvec3& position, const glm::dvec3& normal) const {
-  const glm::dvec3 direction = center - position;
-  const double distance = glm::length(direction);
+  const glm::dvec3 to_center = center - position;
+  const double distance = glm::length(to_center);
   if (!(distance + radius > 0.0) || !std::isfinite(distance + radius)) return 0.0;
-  if (reach > 0.0 && glm::length(glm::max(glm::abs(direction) - half, glm::dvec3(0.0))) > reach * (1.0 + 1e-9))
+  if (reach > 0.0 && glm::length(glm::max(glm::abs(to_center) - half, glm::dvec3(0.0))) > reach * (1.0 + 1e-9))
     return 0.0;
   double cosine = 1.0;
   if (distance > radius) {
@@ -118,14 +118,14 @@ double LightCluster::importance(const glm::dvec3& position, const glm::dvec3& no
     const double near = 1.0 / distance;
     const double sine = radius * near;
     const Angle seen{std::sqrt((distance - radius) * near * (1.0 + sine)), sine};
-    const double off_axis = -glm::dot(axis, direction) * near;
+    const double off_axis = -glm::dot(axis, to_center) * near;
     const Angle from_axis = angle_of_cosine(two_sided ? std::abs(off_axis) : off_axis);
     const Angle leaving = difference(difference(from_axis, {cos_spread, sin_spread}), seen);
     if (leaving.cosine <= cos_emission) return 0.0;
     // Rounding at grazing angles must not shut out a light.
     cosine = std::max(leaving.cosine, 1e-3);
     if (normal != glm::dvec3(0.0)) {
-      const Angle arriving = difference(angle_of_cosine(glm::dot(normal, direction) * near), seen);
+      const Angle arriving = difference(angle_of_cosine(glm::dot(normal, to_center) * near), seen);
       if (!(arriving.cosine > 0.0)) return 0.0;
       cosine *= arriving.cosine;
     }

@@ -45,9 +45,9 @@ std::vector<LightBounds> random_lights(std::uint32_t count, std::uint64_t stream
 
 /// What a light without extent gives, which importance must not take for none.
 double irradiance(const LightBounds& light, const glm::dvec3& position, const glm::dvec3& normal) {
-  const glm::dvec3 direction = light.low - position;
-  const double distance = glm::length(direction);
-  const glm::dvec3 to_light = direction / distance;
+  const glm::dvec3 offset = light.low - position;
+  const double distance = glm::length(offset);
+  const glm::dvec3 to_light = offset / distance;
   double cosine = normal == kNoNormal ? 1.0 : std::max(0.0, glm::dot(normal, to_light));
   if (light.spread_radians < kPi) {
     const double off = -glm::dot(light.axis, to_light);

@@ -79,11 +79,11 @@ LightSample sample_headlight(const Light& light, const glm::dvec3& position, con
     sample.weight = glm::dvec3(light.intensity);
     return sample;
   }
-  const glm::dvec3 direction = view.eye - position;
-  sample.distance = glm::length(direction);
+  const glm::dvec3 to_eye = view.eye - position;
+  sample.distance = glm::length(to_eye);
   sample.goal = view.eye;
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return sample;
-  sample.to_light = glm::normalize(direction / sample.distance + kHeadlightLift);
+  sample.to_light = glm::normalize(to_eye / sample.distance + kHeadlightLift);
   sample.weight = glm::dvec3(light.intensity);
   return sample;
 }
@@ -100,12 +100,12 @@ LightSample sample_punctual(const Light& light, const glm::dvec3& position, cons
   if (light.type == LightType::Directional) return sample_directional(light, u);
   if (light.type == LightType::Headlight) return sample_headlight(light, position, view);
   LightSample sample;
-  const glm::dvec3 direction = light.position - position;
-  const double distance = glm::length(direction);
+  const glm::dvec3 to_center = light.position - position;
+  const double distance = glm::length(to_center);
   sample.distance = distance;
   sample.goal = light.position;
   if (!(distance > light.radius) || !std::isfinite(distance)) return sample;
-  sample.to_light = direction / distance;
+  sample.to_light = to_center / distance;
   double cosine = 1.0;  // of half the angle the sphere is seen under
   if (light.radius > 0.0) {
     const double sine = light.radius / distance;

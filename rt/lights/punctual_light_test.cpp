@@ -184,9 +184,9 @@ TEST(Photons, OfASpotFollowItsRamp) {
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(6, i);
     const PhotonStart photon = emit_punctual(light, {}, {}, sampler.two());
-    const double position = (1.0 + photon.direction.z) / (1.0 - edge);  // the light shines along -z
-    ASSERT_LT(position, 1.0 + 1e-9);
-    found[std::min(static_cast<std::size_t>(position * kRings), found.size() - 1)] += photon.flux.r / kSamples;
+    const double fraction = (1.0 + photon.direction.z) / (1.0 - edge);  // the light shines along -z
+    ASSERT_LT(fraction, 1.0 + 1e-9);
+    found[std::min(static_cast<std::size_t>(fraction * kRings), found.size() - 1)] += photon.flux.r / kSamples;
   }
   for (int ring = 0; ring < kRings; ++ring) {
     // W/sr as the direct light has it, over a ring of equal solid angle.
@@ -211,9 +211,9 @@ TEST(Photons, OfTheSunCrossTheSceneEvenly) {
     Sampler sampler(8, i);
     const glm::dvec2 u = sampler.two();
     const PhotonStart photon = emit_punctual(light, lit, u, sampler.two());
-    const glm::dvec3 direction = photon.origin - lit.center;
-    EXPECT_NEAR(glm::dot(direction, photon.direction), -2.0, 1e-6);
-    const double off = glm::length(direction - glm::dot(direction, photon.direction) * photon.direction);
+    const glm::dvec3 offset = photon.origin - lit.center;
+    EXPECT_NEAR(glm::dot(offset, photon.direction), -2.0, 1e-6);
+    const double off = glm::length(offset - glm::dot(offset, photon.direction) * photon.direction);
     EXPECT_LE(off, 2.0 + 1e-6);
     if (off < 1.0) inside += photon.flux.r / kSamples;
   }

@@ -1,7 +1,6 @@
 #include "rt/lights/triangle_lights.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -160,10 +159,10 @@ glm::dvec2 uniform_in_triangle(const glm::dvec2& u) {
 }
 
 /// Per solid angle, of a point uniform over the area; 0 when it is seen edge-on.
-double area_pdf(const TriangleLight& triangle, const glm::dvec3& direction) {
-  const double distance = glm::length(direction);
+double area_pdf(const TriangleLight& triangle, const glm::dvec3& to_point) {
+  const double distance = glm::length(to_point);
   if (!(distance > 0.0)) return 0.0;
-  const double cosine = std::abs(glm::dot(triangle.normal, direction / distance));
+  const double cosine = std::abs(glm::dot(triangle.normal, to_point / distance));
   const double pdf = distance * distance / (triangle.area * cosine);
   return cosine > 0.0 && std::isfinite(pdf) ? pdf : 0.0;
 }
@@ -256,11 +255,11 @@ LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& position
   const glm::dvec2 at = by_angle ? met_at(triangle, position, seen.sample(u)) : uniform_in_triangle(u);
   LightSample sample;
   sample.goal = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
-  const glm::dvec3 direction = sample.goal - position;
-  sample.distance = glm::length(direction);
+  const glm::dvec3 to_goal = sample.goal - position;
+  sample.distance = glm::length(to_goal);
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return LightSample{};
-  sample.to_light = direction / sample.distance;
-  sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, direction);
+  sample.to_light = to_goal / sample.distance;
+  sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, to_goal);
   if (sample.pdf > 0.0) sample.weight = radiance(triangle, at) / sample.pdf;
   return sample;
 }

@@ -1,7 +1,6 @@
 // How much light surfaces give back: furnaces, Fresnel's equations, total reflection.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -237,8 +236,8 @@ TEST(BsdfEnergy, WeightsAreNearTheLobesShares) {
       material.base_color = glm::dvec3(0.7);
       const Bsdf bsdf = bsdf_of(material, direction(polar, 0.0), false, Carried::Flux);
       for (const Lobe lobe : kLobes) {
-        const double fraction = albedo(bsdf, lobe);
-        EXPECT_NEAR(bsdf.weight(lobe).g, fraction, 0.15 * fraction + 0.02) << static_cast<int>(lobe);
+        const double expected = albedo(bsdf, lobe);
+        EXPECT_NEAR(bsdf.weight(lobe).g, expected, 0.15 * expected + 0.02) << static_cast<int>(lobe);
       }
     }
   }

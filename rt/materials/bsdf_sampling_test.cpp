@@ -117,7 +117,7 @@ void expect_drawn_by_its_density(const Bsdf& bsdf, Lobe lobe, double narrowest, 
   const Rings rings(axis, narrowest);
   std::vector<double> expected = rings.integrals([&](const glm::dvec3& d) { return bsdf.pdf(lobe, d); }, first_steps);
   double total = 0.0;
-  for (const double fraction : expected) total += fraction;
+  for (const double integral : expected) total += integral;
   EXPECT_LT(total, 1.004) << "the density integrates to more than 1";
   expected.push_back(std::max(0.0, 1.0 - total));
 
@@ -200,7 +200,7 @@ TEST(BsdfSampling, DensitiesHoldUnderATiltedShadingNormal) {
     const Rings rings(material.normal, 0.05);
     const auto integrals = rings.integrals([&](const glm::dvec3& d) { return bsdf.pdf(lobe, d); }, 16);
     double total = 0.0;
-    for (const double fraction : integrals) total += fraction;
+    for (const double integral : integrals) total += integral;
     int drawn = 0;
     for (std::uint32_t i = 0; i < kSamples; ++i) {
       Sampler random(0x9E3779B97F4A7C15U * (i + 1), 0);

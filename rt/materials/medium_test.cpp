@@ -53,12 +53,12 @@ glm::dvec3 seen_from(double z, const Scene& scene, RaySettings settings, bool re
   return test::mean_pixel(scene, view, 0, 0, samples, settings);
 }
 
-void expect_seen(const glm::dvec3& expected, double z, Scene scene, double fraction = 1e-4) {
+void expect_seen(const glm::dvec3& expected, double z, Scene scene, double tolerance = 1e-4) {
   finish_scene(scene);
   for (const bool reference : {false, true}) {
     // An index of 1.33 mirrors a little, by chance.
     const glm::dvec3 seen = seen_from(z, scene, {.max_depth = 32}, reference);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c] / expected[c], 1.0, fraction) << reference << ' ' << c;
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c] / expected[c], 1.0, tolerance) << reference << ' ' << c;
   }
 }
 

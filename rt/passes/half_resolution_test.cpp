@@ -14,6 +14,7 @@ namespace {
 using test::add_material;
 using test::add_mesh;
 using test::corner;
+using test::mean;
 using test::place_mesh;
 using test::quad;
 
@@ -28,12 +29,6 @@ View look(const Scene& scene, Size size = kOdd) {
 RaySettings halved(RaySettings settings, std::vector<PassId> passes) {
   settings.half_resolution = std::move(passes);
   return settings;
-}
-
-double mean(const Image<Rgb>& image) {
-  double sum = 0.0;
-  for (const Rgb& color : image.pixels()) sum += static_cast<double>(color.g);
-  return sum / static_cast<double>(image.pixels().size());
 }
 
 TEST(HalfResolution, OneRayInFourFollowsWhatIsShared) {

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "core/error.h"
 #include "rt/deferred_shader.h"
 #include "rt/test_scene.h"

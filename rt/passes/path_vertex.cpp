@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
@@ -131,10 +130,10 @@ class PrimaryVertices {
 
 }  // namespace
 
-void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double fraction, PathVertex& point) {
-  point.coverage = fraction;
+void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double coverage, PathVertex& point) {
+  point.coverage = coverage;
   point.media = context.eye_media;
-  point.throughput = fraction * transmittance(point.media.here, glm::distance(job.view->eye, point.surface.position));
+  point.throughput = coverage * transmittance(point.media.here, glm::distance(job.view->eye, point.surface.position));
   point.sampler = sampler_of(context, job, x, y);
   point.pixel = job.first_pixel + static_cast<std::uint32_t>(y * kTileSide + x);
   prefetch_material(context.scene, point.surface);

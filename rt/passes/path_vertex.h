@@ -45,8 +45,8 @@ inline constexpr std::size_t kWavefrontVertices = 512;
 /// Past the last of the rows, `first` and on, whose pixels make a wavefront.
 [[nodiscard]] int end_of_wavefront(const TileJob& job, int first);
 
-/// Initializes a vertex whose surface is set, shown at pixel (x, y) of the tile, of which it covers `share`.
-void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double fraction, PathVertex& point);
+/// Initializes a vertex whose surface is set, shown at pixel (x, y) of the tile, of which it covers `coverage`.
+void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double coverage, PathVertex& point);
 
 /// Finds the primary vertices in some rows of a tile: the surfaces its keys name, and those of partial coverage before
 /// them, each with the share of the pixel it covers. Adds the background where neither is.

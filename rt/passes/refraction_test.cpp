@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
 

@@ -46,11 +46,11 @@ class ShadowPass final : public Pass {
     if (!std::isfinite(light.distance)) return ray;
     // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies
     // on a surface is not hidden by it.
-    const glm::dvec3 direction = light.goal - ray.origin;
-    const double distance = glm::length(direction);
+    const glm::dvec3 to_goal = light.goal - ray.origin;
+    const double distance = glm::length(to_goal);
     const double step = kOriginSteps * kFloatStep;
     ray.reach = std::max(distance * (1.0 - step) - step * context.rays->size_of(light.goal), 0.0);
-    if (distance > 0.0) ray.direction = direction / distance;
+    if (distance > 0.0) ray.direction = to_goal / distance;
     return ray;
   }
 };

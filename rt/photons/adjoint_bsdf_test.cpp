@@ -85,13 +85,13 @@ void add(Sums& sums, double amount, const glm::dvec3& lamp, const glm::dvec3& ey
 constexpr std::uint32_t kSamples = 1U << 19U;
 
 /// Eyes that look for light by the lobe.
-Sums by_eyes(const Place& position, Lobe lobe) {
+Sums by_eyes(const Place& location, Lobe lobe) {
   Sums sums{};
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(7, i);
     const glm::dvec3 eye = warp::on_sphere(sampler.two());
-    const SurfacePoint surface = position.from(eye);
-    const Bsdf bsdf(evaluate_material(position.scene, surface), surface);
+    const SurfacePoint surface = location.from(eye);
+    const Bsdf bsdf(evaluate_material(location.scene, surface), surface);
     const auto sample = bsdf.sample(lobe, sampler.two());
     if (sample) add(sums, sample->weight.r * std::abs(eye.z) / kSamples, sample->direction, eye);
   }
@@ -99,16 +99,16 @@ Sums by_eyes(const Place& position, Lobe lobe) {
 }
 
 /// Light that looks for eyes.
-Sums by_light(const Place& position, Lobe lobe) {
+Sums by_light(const Place& location, Lobe lobe) {
   Sums sums{};
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(8, i);
     const glm::dvec3 light = warp::on_sphere(sampler.two());
-    const SurfacePoint surface = position.from(light);
-    const MaterialPoint material = evaluate_material(position.scene, surface);
+    const SurfacePoint surface = location.from(light);
+    const MaterialPoint material = evaluate_material(location.scene, surface);
     const Bsdf bsdf(material, surface, Carried::Flux);
-    const FluxArrival arrival{surface, material, bsdf, position.triangle};
-    const AdjointBsdf scatters(position.scene, *position.surfaces, arrival);
+    const FluxArrival arrival{surface, material, bsdf, location.triangle};
+    const AdjointBsdf scatters(location.scene, *location.surfaces, arrival);
     const auto sample = scatters.sample(lobe, sampler);
     EXPECT_TRUE(!sample || sample->weight.r == 0.0 || scatters.weight(lobe).r > 0.0);
     if (!sample) continue;
@@ -138,9 +138,9 @@ TEST_P(AdjointBsdf, SendsOnWhatEyesSee) {
                          std::tuple("frosted solid", Lobe::Transmission, glass(0.4F, 1.0F)),
                          std::tuple("clear solid", Lobe::Transmission, glass(0.0F, 1.0F))};
   for (const auto& [name, lobe, material] : cases) {
-    const Place position(material, GetParam());
-    const Sums seen = by_eyes(position, lobe);
-    const Sums sent = by_light(position, lobe);
+    const Place location(material, GetParam());
+    const Sums seen = by_eyes(location, lobe);
+    const Sums sent = by_light(location, lobe);
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t j = 0; j < 3; ++j) {
         EXPECT_NEAR(sent.at(i).at(j), seen.at(i).at(j), 0.002 + 0.015 * seen.at(i).at(j))

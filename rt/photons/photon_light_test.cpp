@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "rt/photons/photon_query.h"
 #include "rt/photons/test_photons.h"

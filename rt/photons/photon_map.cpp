@@ -163,25 +163,25 @@ double first_radius(std::span<const Photon> photons, const RaySpace& space, doub
     const auto& p = photons[i].position;
     if (finite(p)) positions.emplace_back(p[0], p[1], p[2]);
   }
-  const auto fraction = static_cast<double>(stride);
-  const auto k = static_cast<std::size_t>(std::clamp(wanted / fraction, 1.0, static_cast<double>(positions.size())));
+  const auto thinning = static_cast<double>(stride);
+  const auto k = static_cast<std::size_t>(std::clamp(wanted / thinning, 1.0, static_cast<double>(positions.size())));
   if (positions.size() < 2 || k >= positions.size()) return most / space.scale;
   const std::size_t step = std::max<std::size_t>(positions.size() / kProbes, 1);
   std::vector<double> areas;  // of the circles about some of them that take in k others, over pi
   std::vector<float> distances2(positions.size());
   for (std::size_t probe = 0; probe < positions.size(); probe += step) {
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      const glm::vec3 direction = positions[i] - positions[probe];
-      distances2[i] = glm::dot(direction, direction);
+      const glm::vec3 offset = positions[i] - positions[probe];
+      distances2[i] = glm::dot(offset, offset);
     }
     const auto kth = distances2.begin() + static_cast<std::ptrdiff_t>(k);  // the nearest is the probe itself
     std::ranges::nth_element(distances2, kth);
     areas.push_back(*kth);
   }
-  const auto center = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
-  std::ranges::nth_element(areas, center);
+  const auto median = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
+  std::ranges::nth_element(areas, median);
   // The circle that takes in k of evenly scattered points follows a gamma distribution, whose median is k - 1/3.
-  const double area_of_one = *center / (static_cast<double>(k) - 1.0 / 3.0) / fraction;
+  const double area_of_one = *median / (static_cast<double>(k) - 1.0 / 3.0) / thinning;
   const double radius = std::sqrt(wanted * area_of_one);
   return (radius > 0.0 ? std::min(radius, most) : most) / space.scale;
 }

@@ -87,9 +87,9 @@ class PhotonMap {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double radius() const { return radius_; }
 
-  /// The photons whose density about `place` (world) on the surface with `normal` (unit length, geometric) counts: that
-  /// lie within the radius, within kFlatness of it off the tangent plane, and on a surface of the same layer turned by
-  /// less than 60 degrees from this one. None for places without photons, far away, or not finite.
+  /// The photons whose density about `position` (world) on the surface with `normal` (unit length, geometric) counts:
+  /// that lie within the radius, within kFlatness of it off the tangent plane, and on a surface of the same layer
+  /// turned by less than 60 degrees from this one. None for places without photons, far away, or not finite.
   ///
   /// They are weighted by Epanechnikov's kernel 2 / (pi r^2) (1 - d^2 / r^2), of which density() is the factor: of all
   /// kernels the one with the least mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at

@@ -69,10 +69,10 @@ Gathered gather_all(std::span<const Photon> photons, const glm::dvec3& position,
                     double radius) {
   Gathered result;
   for (const Photon& photon : photons) {
-    const glm::dvec3 direction = glm::dvec3(photon.position[0], photon.position[1], photon.position[2]) - position;
-    const double distance = glm::length(direction);
+    const glm::dvec3 offset = glm::dvec3(photon.position[0], photon.position[1], photon.position[2]) - position;
+    const double distance = glm::length(offset);
     if (!(distance < radius)) continue;
-    if (std::abs(glm::dot(direction, normal)) > PhotonMap::kFlatness * radius + 2.0 * kFloatStep) continue;
+    if (std::abs(glm::dot(offset, normal)) > PhotonMap::kFlatness * radius + 2.0 * kFloatStep) continue;
     const double cosine = glm::dot(facing_of(photon), normal);
     if (cosine < 0.5) continue;
     ++result.count;

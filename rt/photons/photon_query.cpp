@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <numbers>
 
 // Highway compiles this file once per instruction set by including it again.
@@ -93,14 +92,14 @@ struct Wanted {
   hn::Vec<Words> layer;
 };
 
-/// Whether each of the photons at `places` counts, and its weight.
+/// Whether each of the photons at `positions` counts, and its weight.
 HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* positions, Vector& weight) {
   Vector x, y, z, packed;
   hn::LoadInterleaved4(Floats(), positions->position.data(), x, y, z, packed);
-  const Vector3 direction{hn::Sub(hn::Sub(x, all(wanted.high.x)), all(wanted.low.x)),
-                          hn::Sub(hn::Sub(y, all(wanted.high.y)), all(wanted.low.y)),
-                          hn::Sub(hn::Sub(z, all(wanted.high.z)), all(wanted.low.z))};
-  const Vector distance2 = length2(direction);
+  const Vector3 offset{hn::Sub(hn::Sub(x, all(wanted.high.x)), all(wanted.low.x)),
+                       hn::Sub(hn::Sub(y, all(wanted.high.y)), all(wanted.low.y)),
+                       hn::Sub(hn::Sub(z, all(wanted.high.z)), all(wanted.low.z))};
+  const Vector distance2 = length2(offset);
   weight = hn::Sub(all(1.0F), hn::Mul(distance2, wanted.inverse_radius2));
   const auto words = hn::BitCast(Words(), packed);
   const Vector3 facing = unpack_facing(words);
@@ -108,7 +107,7 @@ HWY_INLINE Mask judge(const Wanted& wanted, const PhotonPlace* positions, Vector
   const Mask same_layer = hn::RebindMask(Floats(), hn::Eq(layer, wanted.layer));
   const Vector cosine = dot(facing, wanted.normal);
   const Mask near =
-      hn::And(hn::Lt(distance2, wanted.radius2), hn::Le(hn::Abs(dot(direction, wanted.normal)), wanted.flatness));
+      hn::And(hn::Lt(distance2, wanted.radius2), hn::Le(hn::Abs(dot(offset, wanted.normal)), wanted.flatness));
   const Mask turned =
       hn::And(hn::Gt(cosine, hn::Zero(Floats())), hn::Ge(square(cosine), hn::Mul(wanted.min_cosine2, length2(facing))));
   return hn::And(same_layer, hn::And(near, turned));

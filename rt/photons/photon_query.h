@@ -50,7 +50,7 @@ struct PhotonSearch {
 /// Finds the photons that count in the 3 x 3 rows of cells about a place, with Epanechnikov's weight 1 - d^2 / r^2: row
 /// after row, cut to the cells that come within the radius and within the flatness of the plane. Cell x of row y of
 /// layer z stands at slot (x + y row_step + z layer_step) & last_slot; starts[slot] is where its photons begin in
-/// `places`, also for the first two slots behind the last. In single precision, in steps that no processor rounds
+/// `positions`, also for the first two slots behind the last. In single precision, in steps that no processor rounds
 /// otherwise.
 void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const PhotonPlace* positions,
                   FoundPhotons& found);

@@ -6,7 +6,6 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>

@@ -22,7 +22,7 @@ PhotonSource downwards(double half) {
   return test::beam({0.0, 0.9, 0.0}, kX, kZ, half);
 }
 
-PhotonRoom matte_room(float albedo) {
+PhotonRoom diffuse_room(float albedo) {
   Scene scene;
   test::add_room(scene, test::add_material(scene, test::diffuse(glm::vec3(albedo))));
   return PhotonRoom(std::move(scene));
@@ -79,10 +79,10 @@ TEST(PhotonTracerTest, SharesOfRanksPartitionTheRange) {
     for (const int ranks : {1, 3, 7, 300}) {
       std::uint64_t next = 17;
       for (int rank = 0; rank < ranks; ++rank) {
-        const PhotonRange fraction = share_of_rank({17, count}, rank, ranks);
-        ASSERT_EQ(fraction.first, next);
-        ASSERT_LE(fraction.count, count / static_cast<std::uint64_t>(ranks) + 1);
-        next += fraction.count;
+        const PhotonRange range = share_of_rank({17, count}, rank, ranks);
+        ASSERT_EQ(range.first, next);
+        ASSERT_LE(range.count, count / static_cast<std::uint64_t>(ranks) + 1);
+        next += range.count;
       }
       EXPECT_EQ(next, 17 + count);
     }
@@ -90,7 +90,7 @@ TEST(PhotonTracerTest, SharesOfRanksPartitionTheRange) {
 }
 
 TEST(PhotonTracerTest, PassesAndSeedsHavePhotonsOfTheirOwn) {
-  const PhotonRoom room = matte_room(0.5F);
+  const PhotonRoom room = diffuse_room(0.5F);
   const PhotonTracer tracer = room.tracer(test::glowing_room());
   const TracedPhotons first = tracer.trace({}, {0, 100}, 100);
   EXPECT_FALSE(same(tracer.trace({}, {100, 100}, 100), first));
@@ -99,7 +99,7 @@ TEST(PhotonTracerTest, PassesAndSeedsHavePhotonsOfTheirOwn) {
 }
 
 TEST(PhotonTracerTest, ALightsRangeEndsTheFirstLegOfItsPhotons) {
-  const PhotonRoom room = matte_room(0.5F);
+  const PhotonRoom room = diffuse_room(0.5F);
   const auto within = [&](double range) {
     const PhotonSource down = [=](double, const glm::dvec2&, const glm::dvec2&) {
       return std::optional(PhotonStart{.direction = {0.0, -1.0, 0.0}, .flux = glm::dvec3(1.0), .range = range});
@@ -116,7 +116,7 @@ TEST(PhotonTracerTest, ALightsRangeEndsTheFirstLegOfItsPhotons) {
 }
 
 TEST(PhotonTracerTest, MorePhotonsThanMayBeKeptAreAnError) {
-  const PhotonRoom room = matte_room(0.5F);
+  const PhotonRoom room = diffuse_room(0.5F);
   const PhotonTracer all = room.tracer(test::glowing_room());
   const std::uint64_t kept = all.trace({}, {0, 5000}, 5000).global.size();
   const PhotonTracer some = room.tracer(test::glowing_room(), {.threads = 2, .max_kept = kept});
@@ -152,7 +152,7 @@ TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {
 }
 
 TEST(PhotonTracerTest, NoPhotonsOneNoLightAndAnEmptySceneAreFine) {
-  const PhotonRoom room = matte_room(0.5F);
+  const PhotonRoom room = diffuse_room(0.5F);
   EXPECT_TRUE(same(room.trace(test::glowing_room(), 0), {}));
   EXPECT_EQ(room.trace(test::glowing_room(), 1).counts.sent, 1U);
   const PhotonSource dark = [](double, const glm::dvec2&, const glm::dvec2&) { return std::optional<PhotonStart>(); };
@@ -176,7 +176,7 @@ class FurnaceTest : public ::testing::TestWithParam<double> {};
 TEST_P(FurnaceTest, PhotonsBringTheIndirectLightOfAClosedRoom) {
   const double albedo = static_cast<double>(static_cast<float>(GetParam()));
   const std::uint64_t photons = albedo > 0.95 ? 20000 : albedo > 0.8 ? 60000 : 200000;
-  const PhotonRoom room = matte_room(static_cast<float>(albedo));
+  const PhotonRoom room = diffuse_room(static_cast<float>(albedo));
   const TracedPhotons traced = room.trace(test::glowing_room(), photons, {.max_bounces = 10000});
   EXPECT_EQ(traced.counts.lost, 0U);
   EXPECT_TRUE(traced.caustic.empty());
@@ -209,7 +209,7 @@ TEST_P(FurnaceTest, PhotonsBringTheIndirectLightOfAClosedRoom) {
 INSTANTIATE_TEST_SUITE_P(Albedos, FurnaceTest, ::testing::Values(0.5, 0.9, 0.99));
 
 TEST(PhotonTracerTest, PathsCutShortAreCountedAsLost) {
-  const PhotonRoom room = matte_room(1.0F);
+  const PhotonRoom room = diffuse_room(1.0F);
   const TracedPhotons traced = room.trace(test::glowing_room(), 500, {.max_bounces = 20});
   EXPECT_EQ(traced.counts.lost, 500U);
   EXPECT_EQ(traced.global.size(), 500U * 20);

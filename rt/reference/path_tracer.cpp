@@ -375,9 +375,9 @@ void PathWavefront::sample_light(Path& path, const SurfacePoint& point, const Ma
   // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies on
   // a surface is not hidden by it.
   const glm::dvec3 goal = shared_.space.from_world(light->goal);
-  const glm::dvec3 direction = light->goal - ray.origin;
-  const double distance = glm::length(direction);
-  if (distance > 0.0) ray.direction = direction / distance;
+  const glm::dvec3 to_goal = light->goal - ray.origin;
+  const double distance = glm::length(to_goal);
+  if (distance > 0.0) ray.direction = to_goal / distance;
   const double size = std::max(largest(glm::abs(goal)), 1.0) / shared_.space.scale;
   ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
 }
@@ -495,7 +495,7 @@ struct PathTracer::State {
   PathCounts counts;
 
   std::unique_ptr<PathWavefront> take_wave();
-  void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& position,
+  void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& location,
                   const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels) const;
 };
 
@@ -511,12 +511,12 @@ std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
   return std::make_unique<PathWavefront>(shared);
 }
 
-void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& position,
+void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& location,
                                    const SampleNumber& number, std::span<const std::uint8_t> wanted,
                                    std::span<Rgb> pixels) const {
   const DenormalsAsZero mode;
   std::ranges::fill(pixels, Rgb{});
-  const Rect& rect = position.pixels;
+  const Rect& rect = location.pixels;
   for (int top = rect.y0; top < rect.y1; top += kRowsAtOnce) {
     const int bottom = std::min(top + kRowsAtOnce, rect.y1);
     wave.start(view, static_cast<std::size_t>(bottom - top) * kTileSide);
@@ -568,10 +568,10 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
   state.shared.rays.for_each(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const trace::Span span("path trace tile", "tile", tile);
-    const TilePlace position = layout.place(tile);
+    const TilePlace location = layout.place(tile);
     radiance.set_active(tile);
     std::unique_ptr<PathWavefront> wave = state.take_wave();
-    state.trace_tile(*wave, views[position.screen], eyes[position.screen], position, number, mask_of(wanted, tile),
+    state.trace_tile(*wave, views[location.screen], eyes[location.screen], location, number, mask_of(wanted, tile),
                      radiance.tile(tile));
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(wave));

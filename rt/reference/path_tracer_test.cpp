@@ -86,9 +86,9 @@ TEST(PathTracer, APointLightGivesTheFloorItsIrradiance) {
   const Image<Rgb> image = test::trace(bench, view, {.spread_in_pixel = false});
   for (int y = 0; y < kSmall.height; ++y) {
     for (int x = 0; x < kSmall.width; ++x) {
-      const glm::dvec3 direction = scene.lights[0].position - on_floor(view, x, y);
-      const double distance = glm::length(direction);
-      const double irradiance = 10.0 * (direction.y / distance) / (distance * distance);
+      const glm::dvec3 offset = scene.lights[0].position - on_floor(view, x, y);
+      const double distance = glm::length(offset);
+      const double irradiance = 10.0 * (offset.y / distance) / (distance * distance);
       EXPECT_NEAR(image.at(x, y).g, 0.5 / std::numbers::pi * irradiance, 1e-5) << x << ' ' << y;
     }
   }

@@ -116,15 +116,15 @@ double Sampler::one() {
 
 glm::dvec2 Sampler::two() {
   const std::uint64_t key = next_key();
-  const std::uint32_t position = shuffled(index_, key);
-  return scrambled(position, sobol_second_reversed(position), key);
+  const std::uint32_t index = shuffled(index_, key);
+  return scrambled(index, sobol_second_reversed(index), key);
 }
 
 // One order for both pairs, so that they belong together; none in which every other sample lies in the same half of the
 // pixel, as whoever compares even samples with odd ones would take that for noise.
 glm::dvec2 Sampler::two_of_pixel() {
-  const std::uint32_t position = shuffled(index_, kPixelOrder);
-  return scrambled(position, sobol_second_reversed(position), next_key());
+  const std::uint32_t index = shuffled(index_, kPixelOrder);
+  return scrambled(index, sobol_second_reversed(index), next_key());
 }
 
 glm::dvec2 Sampler::two_with_pixel() {

@@ -27,9 +27,9 @@ struct DiscreteSample {
   auto found = std::ranges::upper_bound(sums, target);
   if (found == sums.end()) found = std::ranges::lower_bound(sums, sums.back());
   const double before = found == sums.begin() ? 0.0 : *(found - 1);
-  const double fraction = *found - before;
-  return {static_cast<std::size_t>(found - sums.begin()), fraction / sums.back(),
-          std::clamp((target - before) / fraction, 0.0, kBelowOne)};
+  const double weight = *found - before;
+  return {static_cast<std::size_t>(found - sums.begin()), weight / sums.back(),
+          std::clamp((target - before) / weight, 0.0, kBelowOne)};
 }
 
 }  // namespace hpr

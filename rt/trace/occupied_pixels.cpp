@@ -192,14 +192,14 @@ void OccupiedPixels::add(const Rect& pixels, const FrameLayout& layout, std::siz
   }
 }
 
-bool OccupiedPixels::mark(std::size_t tile, const Rect& position, std::span<std::uint8_t> mask) const {
+bool OccupiedPixels::mark(std::size_t tile, const Rect& rect, std::span<std::uint8_t> mask) const {
   std::ranges::fill(mask, static_cast<std::uint8_t>(everywhere_ ? 1 : 0));
   if (everywhere_) return true;
   const std::vector<Rect>& seen = seen_[tile - first_tile_];
   for (const Rect& part : seen) {
     for (int y = part.y0; y < part.y1; ++y) {
-      const auto row = mask.begin() + static_cast<std::ptrdiff_t>(y - position.y0) * kTileSide;
-      std::fill(row + (part.x0 - position.x0), row + (part.x1 - position.x0), std::uint8_t{1});
+      const auto row = mask.begin() + static_cast<std::ptrdiff_t>(y - rect.y0) * kTileSide;
+      std::fill(row + (part.x0 - rect.x0), row + (part.x1 - rect.x0), std::uint8_t{1});
     }
   }
   return !seen.empty();

@@ -32,9 +32,9 @@ class OccupiedPixels {
   OccupiedPixels(const Scene& scene, const RayScene& rays, const MeshBoxes& boxes, std::span<const View> views,
                  const FrameLayout& layout, std::size_t screen);
 
-  /// Sets `mask`, [kTileSide][kTileSide], to 1 at those pixels of a tile of that screen, which lies at `place`, and to
+  /// Sets `mask`, [kTileSide][kTileSide], to 1 at those pixels of a tile of that screen, which lies at `rect`, and to
   /// 0 elsewhere. Returns whether there are any.
-  [[nodiscard]] bool mark(std::size_t tile, const Rect& position, std::span<std::uint8_t> mask) const;
+  [[nodiscard]] bool mark(std::size_t tile, const Rect& rect, std::span<std::uint8_t> mask) const;
 
  private:
   void add(const Rect& pixels, const FrameLayout& layout, std::size_t screen);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
@@ -105,11 +104,11 @@ TEST(PrimaryRays, SeeWhatASearchThroughAllTrianglesSees) {
 
 /// Keys from so many ranks' shares of the scene, `run` surfaces at a time, cut without regard for meshes and
 /// instances.
-Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t fractions, std::uint32_t run) {
+Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t ranks, std::uint32_t run) {
   TileLayer<Key> layer(FrameLayout({view.size()}));
-  for (std::uint32_t fraction = 0; fraction < fractions; ++fraction) {
+  for (std::uint32_t rank = 0; rank < ranks; ++rank) {
     std::vector<SurfaceRange> ranges;
-    for (std::uint32_t first = run * fraction; first < scene.triangles; first += run * fractions) {
+    for (std::uint32_t first = run * rank; first < scene.triangles; first += run * ranks) {
       ranges.push_back({first, std::min(first + run, scene.triangles)});
     }
     std::ranges::reverse(ranges);
@@ -123,8 +122,8 @@ TEST(PrimaryRays, SharesOfTheSceneMergeIntoTheKeysOfTheWhole) {
   const Scene scene = mixed_scene();
   const View view = front_view(scene);
   const Image<Key> expected = draw(scene, view).keys;
-  for (const std::uint32_t fractions : {2U, 3U, 5U, 12U}) {
-    EXPECT_TRUE(expected == draw_shares(scene, view, fractions, 93)) << fractions << " shares";
+  for (const std::uint32_t ranks : {2U, 3U, 5U, 12U}) {
+    EXPECT_TRUE(expected == draw_shares(scene, view, ranks, 93)) << ranks << " ranks";
   }
 }
 
@@ -275,8 +274,7 @@ TEST(PrimaryRays, SurfacesWithinAStepOfTheKeysDepthAreToldApartByTheirNumbers) {
     const Image<Key> whole = draw(scene, view).keys;
     EXPECT_EQ(covered(whole), view.size().area());
     for (const Key key : whole.pixels()) EXPECT_LT(key_surface(key), 2U) << "of equals the first is seen";
-    for (const std::uint32_t fractions : {2U, 4U})
-      EXPECT_TRUE(whole == draw_shares(scene, view, fractions, 1)) << fractions;
+    for (const std::uint32_t ranks : {2U, 4U}) EXPECT_TRUE(whole == draw_shares(scene, view, ranks, 1)) << ranks;
   }
 }
 

@@ -66,10 +66,10 @@ void merge_near(std::span<RayBox> boxes, int halvings, std::vector<RayBox>& merg
   for (std::size_t axis = 1; axis < 3; ++axis) {
     if (all.high[axis] - all.low[axis] > all.high[longest] - all.low[longest]) longest = axis;
   }
-  const auto center = boxes.begin() + static_cast<std::ptrdiff_t>(boxes.size() / 2);
-  std::ranges::nth_element(boxes, center, {}, [&](const RayBox& box) { return box.low[longest] + box.high[longest]; });
-  merge_near({boxes.begin(), center}, halvings - 1, merged);
-  merge_near({center, boxes.end()}, halvings - 1, merged);
+  const auto median = boxes.begin() + static_cast<std::ptrdiff_t>(boxes.size() / 2);
+  std::ranges::nth_element(boxes, median, {}, [&](const RayBox& box) { return box.low[longest] + box.high[longest]; });
+  merge_near({boxes.begin(), median}, halvings - 1, merged);
+  merge_near({median, boxes.end()}, halvings - 1, merged);
 }
 
 }  // namespace

@@ -144,7 +144,7 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
     const glm::dmat3 linear(to_world);
     const glm::dmat3 scaled = linear / std::max(row_sum_norm(linear), 1e-300);
     placed_[i].normal_matrix = cofactors(scaled);
-    placed_[i].reflected = glm::determinant(scaled) < 0.0;
+    placed_[i].swaps_handedness = glm::determinant(scaled) < 0.0;
     if (shared[i] == 0) continue;
     placed_[i].distortion = distortion(linear);
     placed_[i].reach = row_sum_norm(linear) * mesh_reach[scene.instances[i].mesh] +
@@ -159,10 +159,10 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
   if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangles.size()) {
     triangle.index = id - instance->first_surface;
   } else {
-    const SurfaceLocation position = locate_surface(scene_, id);
-    triangle.instance = position.instance;
-    triangle.index = position.triangle;
-    instance = &scene_.instances[position.instance];
+    const SurfaceLocation location = locate_surface(scene_, id);
+    triangle.instance = location.instance;
+    triangle.index = location.triangle;
+    instance = &scene_.instances[location.instance];
   }
   triangle.surface = id;
   const Mesh& mesh = scene_.mesh_of(*instance);
@@ -179,9 +179,9 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
     triangle.normals[static_cast<std::size_t>(corner)] =
         unit(placed.normal_matrix * glm::dvec3(mesh.normals[corners[corner]]), triangle.normal);
   }
-  const double position = largest(triangle.v0 - space_.origin);
+  const double coordinate = largest(triangle.v0 - space_.origin);
   const double extent = std::max(largest(triangle.e1), largest(triangle.e2));
-  const double world = position + extent;
+  const double world = coordinate + extent;
   triangle.offset = kOriginSteps * kFloatStep * std::max(world, placed.distortion * world + placed.reach);
 }
 
@@ -232,7 +232,7 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   point.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
   const bool against_winding = glm::dot(triangle.normal, point.to_viewer) < 0.0;
   point.geometric_normal = against_winding ? -triangle.normal : triangle.normal;
-  point.inside = against_winding != placed_[triangle.instance].reflected;
+  point.inside = against_winding != placed_[triangle.instance].swaps_handedness;
   const auto& corner = triangle.normals;
   const glm::dvec3 smooth = unit(b0 * corner[0] + at.x * corner[1] + at.y * corner[2], triangle.normal);
   const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;

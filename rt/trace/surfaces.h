@@ -93,10 +93,10 @@ class Surfaces {
 
   struct Placed {
     glm::dmat3 normal_matrix{
-        1.0};                 ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
-    bool reflected = false;   ///< turns windings round
-    double distortion = 0.0;  ///< 0: not instanced in the ray scene
-    double reach = 0.0;       ///< metres: |A| |vertex| + distortion |translation| of the instanced mesh
+        1.0};  ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
+    bool swaps_handedness = false;  ///< turns windings round
+    double distortion = 0.0;        ///< 0: not instanced in the ray scene
+    double reach = 0.0;             ///< metres: |A| |vertex| + distortion |translation| of the instanced mesh
   };
 
   const Scene& scene_;
@@ -110,12 +110,12 @@ class Surfaces {
 class RecentTriangles {
  public:
   [[nodiscard]] const WorldTriangle& load(const Surfaces& surfaces, std::uint32_t id) {
-    WorldTriangle& position = triangles_[id % kPlaces];
-    if (position.surface == id) return position;
-    position.instance = instance_;
-    surfaces.load(id, position);
-    instance_ = position.instance;
-    return position;
+    WorldTriangle& recent = triangles_[id % kPlaces];
+    if (recent.surface == id) return recent;
+    recent.instance = instance_;
+    surfaces.load(id, recent);
+    instance_ = recent.instance;
+    return recent;
   }
 
  private:
