@@ -19,6 +19,9 @@ std::uint64_t checksum_of(std::span<const std::byte> bytes) {
   return hash.value();
 }
 
+/// Squares of 64 pixels a side, row by row; those at the right and lower border may be smaller.
+constexpr int kDeltaSide = 64;
+
 std::size_t across(Size picture) {
   return static_cast<std::size_t>((picture.width + kDeltaSide - 1) / kDeltaSide);
 }
@@ -48,20 +51,12 @@ bool differs(const Image<Rgba8>& before, const Image<Rgba8>& now, const Rect& re
   return false;
 }
 
-}  // namespace
+struct Opened {
+  Envelope envelope;
+  std::span<const std::byte> payload;
+};
 
-void throw_damaged(std::string_view what) {
-  throw Error(ExitCode::BadInput, fmt::format("an encoded picture is damaged: {}", what), "have the sender restart");
-}
-
-void seal(Envelope& envelope, std::vector<std::byte>& bytes) {
-  HPR_CHECK(bytes.size() >= sizeof(Envelope));
-  envelope.payload_bytes = bytes.size() - sizeof(Envelope);
-  std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
-  envelope.checksum = checksum_of(bytes);
-  std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
-}
-
+/// Throws Error (BadInput) unless every bit is as it was sealed and the picture is of `size`.
 Opened open_envelope(std::span<const std::byte> bytes, Size size) {
   if (bytes.size() < sizeof(Envelope)) throw_damaged(fmt::format("it has only {} bytes", bytes.size()));
   Envelope envelope;
@@ -90,6 +85,7 @@ std::size_t delta_tile_count(Size picture) {
   return across(picture) * down(picture);
 }
 
+/// Indices of the tiles of `now` with a pixel outside `error` of `before` (all_within); equal sizes.
 std::vector<std::size_t> changed_tiles(const Image<Rgba8>& before, const Image<Rgba8>& now, int error) {
   HPR_CHECK(before.size() == now.size());
   std::vector<std::size_t> changed;
@@ -99,6 +95,7 @@ std::vector<std::size_t> changed_tiles(const Image<Rgba8>& before, const Image<R
   return changed;
 }
 
+/// The size of a picture that holds so many tiles of a picture side by side.
 Size packed_size(Size picture, std::size_t tiles) {
   // No wider than the picture, so that what a codec takes as a picture it takes as tiles.
   const std::size_t columns = std::min(tiles, across(picture));
@@ -107,6 +104,7 @@ Size packed_size(Size picture, std::size_t tiles) {
   return {static_cast<int>(columns) * kDeltaSide, static_cast<int>(rows) * kDeltaSide};
 }
 
+/// These tiles side by side; what they do not fill is 0.
 Image<Rgba8> pack_tiles(const Image<Rgba8>& picture, std::span<const std::size_t> tiles) {
   Image<Rgba8> packed(packed_size(picture.size(), tiles.size()));
   for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -120,6 +118,7 @@ Image<Rgba8> pack_tiles(const Image<Rgba8>& picture, std::span<const std::size_t
   return packed;
 }
 
+/// Puts the tiles of a packed picture back into their places.
 void unpack_tiles(const Image<Rgba8>& packed, std::span<const std::size_t> tiles, Image<Rgba8>& picture) {
   HPR_CHECK(packed.size() == packed_size(picture.size(), tiles.size()));
   for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -132,16 +131,19 @@ void unpack_tiles(const Image<Rgba8>& packed, std::span<const std::size_t> tiles
   }
 }
 
+/// Bytes of one bit per tile.
 std::size_t tile_bits_size(Size picture) {
   return (delta_tile_count(picture) + 7) / 8;
 }
 
+/// Appends one bit per tile, set for `tiles`.
 void append_bits(std::span<const std::size_t> tiles, Size picture, std::vector<std::byte>& into) {
   const std::size_t start = into.size();
   into.resize(start + tile_bits_size(picture));
   for (const std::size_t tile : tiles) into[start + tile / 8] |= std::byte{1} << (tile % 8);
 }
 
+/// The tiles whose bits are set in what append_bits() appended. Throws Error (BadInput) for bits past the last tile.
 std::vector<std::size_t> read_bits(std::span<const std::byte> bytes, Size picture) {
   HPR_CHECK(bytes.size() == tile_bits_size(picture));
   std::vector<std::size_t> tiles;
@@ -151,6 +153,20 @@ std::vector<std::size_t> read_bits(std::span<const std::byte> bytes, Size pictur
     tiles.push_back(bit);
   }
   return tiles;
+}
+
+}  // namespace
+
+void throw_damaged(std::string_view what) {
+  throw Error(ExitCode::BadInput, fmt::format("an encoded picture is damaged: {}", what), "have the sender restart");
+}
+
+void seal(Envelope& envelope, std::vector<std::byte>& bytes) {
+  HPR_CHECK(bytes.size() >= sizeof(Envelope));
+  envelope.payload_bytes = bytes.size() - sizeof(Envelope);
+  std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
+  envelope.checksum = checksum_of(bytes);
+  std::memcpy(bytes.data(), &envelope, sizeof(Envelope));
 }
 
 StreamCodec::StreamCodec(std::size_t coder, const CodecSettings& settings)
@@ -211,7 +227,7 @@ void StreamCodec::decode(std::span<const std::byte> bytes, Image<Rgba8>& picture
   const Envelope& envelope = opened.envelope;
   if ((envelope.flags & ~(Envelope::kTiles | Envelope::kKeep)) != 0) throw_damaged("its flags are unknown");
   if (envelope.has(Envelope::kTiles)) {
-    decode_tiles(opened, picture);
+    decode_tiles(envelope, opened.payload, picture);
   } else if (!picture.pixels().empty()) {
     coder(envelope.coder).decode(opened.payload, envelope.error, picture);
   } else if (!opened.payload.empty()) {
@@ -223,8 +239,7 @@ void StreamCodec::decode(std::span<const std::byte> bytes, Image<Rgba8>& picture
   received_.number = envelope.number;
 }
 
-void StreamCodec::decode_tiles(const Opened& opened, Image<Rgba8>& picture) {
-  const Envelope& envelope = opened.envelope;
+void StreamCodec::decode_tiles(const Envelope& envelope, std::span<const std::byte> payload, Image<Rgba8>& picture) {
   if (!received_.known || received_.checksum != envelope.base || received_.picture.size() != picture.size()) {
     const std::string last =
         received_.known ? fmt::format("the last one here is {}", received_.number) : "there is none";
@@ -234,9 +249,9 @@ void StreamCodec::decode_tiles(const Opened& opened, Image<Rgba8>& picture) {
         "have the sender restart");
   }
   const std::size_t bits = tile_bits_size(picture.size());
-  if (opened.payload.size() < bits) throw_damaged("its list of tiles is cut short");
-  const std::vector<std::size_t> tiles = read_bits(opened.payload.first(bits), picture.size());
-  const std::span<const std::byte> coded = opened.payload.subspan(bits);
+  if (payload.size() < bits) throw_damaged("its list of tiles is cut short");
+  const std::vector<std::size_t> tiles = read_bits(payload.first(bits), picture.size());
+  const std::span<const std::byte> coded = payload.subspan(bits);
   if (!tiles.empty()) {
     Image<Rgba8> packed(packed_size(picture.size(), tiles.size()));
     coder(envelope.coder).decode(coded, envelope.error, packed);

@@ -286,7 +286,7 @@ KeyKind<T> choice(Choice T::*member, const std::vector<std::string>& names) {
   return kind;
 }
 
-/// [x, y, z] in meters.
+/// [x, y, z] in metres.
 template <typename T>
 KeyKind<T> point(glm::dvec3 T::*member) {
   return value_kind(member, "[x, y, z]", schema::list(schema::number(-kMaxMeters, kMaxMeters), 3),
@@ -347,41 +347,38 @@ KeyKind<T> ignored() {
           .is_ignored = true};
 }
 
+/// Reads the table under the key of `source`, where it is there, into `into`.
+template <typename T>
+void read_table(const KeySource& source, const KeyTable<T>& keys, T& into) {
+  const TomlValue* const value = source.reader.table(source.key);
+  if (value == nullptr) return;
+  TableReader reader(*value, std::string(keys.name), source.reader.findings());
+  read_keys(keys, reader, source.folder, into);
+}
+
 /// A table of keys that fill a member.
 template <typename T, typename Inner>
 KeyKind<T> table(Inner T::*member, const KeyTable<Inner>& keys) {
   return {.takes = "a table",
           .schema = schema_of(keys),
-          .read =
-              [=](const KeySource& source, T& into) {
-                const TomlValue* const value = source.reader.table(source.key);
-                if (value == nullptr) return;
-                TableReader reader(*value, std::string(keys.name), source.reader.findings());
-                read_keys(keys, reader, source.folder, into.*member);
-              },
+          .read = [=](const KeySource& source, T& into) { read_table(source, keys, into.*member); },
           .write = [=](const T& from) { return write_inline(keys, from.*member); },
           .is_initial = [=](const T& from) { return from.*member == Inner{}; },
           .inner = describe(keys, "")};
 }
 
-/// A table of keys that fill members of the same T.
+/// A table of keys that fill members of T itself.
 template <typename T>
 KeyKind<T> section(const KeyTable<T>& keys) {
   return {.takes = "a table",
           .schema = schema_of(keys),
-          .read =
-              [=](const KeySource& source, T& into) {
-                const TomlValue* const value = source.reader.table(source.key);
-                if (value == nullptr) return;
-                TableReader reader(*value, std::string(keys.name), source.reader.findings());
-                read_keys(keys, reader, source.folder, into);
-              },
+          .read = [=](const KeySource& source, T& into) { read_table(source, keys, into); },
           .write = [=](const T& from) { return write_inline(keys, from); },
           .is_initial = [=](const T& from) { return write_keys(keys, from, "", "").empty(); },
           .inner = describe(keys, "")};
 }
 
-/// An array of tables that somebody else reads, of `schema`, written from a member one inline table a line.
+/// An array of tables with these keys that wall_reader.cpp reads, written from a member one inline table a line.
 template <typename T, typename Inner>
 KeyKind<T> lines(std::vector<Inner> T::*member, const KeyTable<Inner>& keys) {
   return {.takes = "tables",

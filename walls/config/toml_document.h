@@ -52,6 +52,9 @@ struct TomlFailure {
 /// `text` as a TOML string with its quotes.
 [[nodiscard]] std::string toml_quote(std::string_view text);
 
+/// Line `line` (from 1) of `text` without its line break; empty where `text` has fewer.
+[[nodiscard]] std::string_view text_line(std::string_view text, int line);
+
 /// The shortest TOML float that reads back as the same bits.
 [[nodiscard]] std::string toml_number(double value);
 

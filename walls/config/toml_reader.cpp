@@ -9,20 +9,8 @@
 #include "core/text.h"
 
 namespace hpr {
-namespace {
 
-std::string_view line_of(std::string_view text, int line) {
-  for (; line > 1; --line) {
-    const std::size_t end = text.find('\n');
-    if (end == std::string_view::npos) return {};
-    text.remove_prefix(end + 1);
-  }
-  text = text.substr(0, text.find('\n'));
-  if (text.ends_with('\r')) text.remove_suffix(1);
-  return text;
-}
-
-bool is_name(std::string_view text) {
+bool is_id(std::string_view text) {
   constexpr std::size_t kMaxLength = 64;
   if (text.empty() || text.size() > kMaxLength || text.front() == '.' || text.front() == '-') return false;
   return std::ranges::all_of(text, [](char c) {
@@ -30,8 +18,6 @@ bool is_name(std::string_view text) {
            c == '_';
   });
 }
-
-}  // namespace
 
 /// What an expansion has wrong comes of the overrides, and all of them may have a part in it.
 std::string Findings::where(TextPosition position) const {
@@ -50,7 +36,7 @@ void Findings::add(bool error, TextPosition position, std::string_view what, std
   constexpr std::size_t kLineLimit = 200;
   const std::string where = this->where(position);
   if (kind_ == WallText::Expansion) position.line = position.column = 0;
-  const std::string line = position.line > 0 ? printable(line_of(text_, position.line), kLineLimit) : std::string();
+  const std::string line = position.line > 0 ? printable(text_line(text_, position.line), kLineLimit) : std::string();
   findings_.push_back({error, position, where + std::string(what), line, std::move(hint)});
 }
 
@@ -120,7 +106,7 @@ std::optional<std::string> TableReader::text(std::string_view key) {
 
 std::optional<std::string> TableReader::id(std::string_view key) {
   auto name = text(key);
-  if (!name || is_name(*name)) return name;
+  if (!name || is_id(*name)) return name;
   error(key, fmt::format("is \"{}\"", printable(*name)),
         "an id has 1 to 64 letters, digits, dots, dashes and underscores, and starts with none of dot and dash");
   return std::nullopt;

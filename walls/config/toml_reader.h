@@ -68,6 +68,10 @@ inline constexpr double kMaxMeters = 1e6;
 /// The largest position on a display, on both sides of its origin, and the largest size there, in pixels.
 inline constexpr int kMaxPixelPosition = 1 << 20;
 
+/// Whether `text` may name something: 1 to 64 letters, digits, dots, dashes and underscores, of which dot and dash do
+/// not come first.
+[[nodiscard]] bool is_id(std::string_view text);
+
 /// Reads one table key by key. What is wrong goes into the findings, and the key counts as absent; asking for a key
 /// makes it a known one, so that finish() can report the keys nobody asked for.
 class TableReader {
@@ -88,7 +92,7 @@ class TableReader {
   const TomlValue* require(std::string_view key, std::string_view example);
 
   [[nodiscard]] std::optional<std::string> text(std::string_view key);
-  /// A text that names something: letters, digits, dot, dash, underscore, at most 64.
+  /// A text of which is_id() holds.
   [[nodiscard]] std::optional<std::string> id(std::string_view key);
   /// One of `names`: its index.
   [[nodiscard]] std::optional<std::size_t> choice(std::string_view key, const std::vector<std::string>& names);

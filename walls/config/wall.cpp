@@ -16,7 +16,7 @@ int scaled(int pixels, double factor) {
   return static_cast<int>(std::lround(std::clamp(pixels * factor, 1.0, kMaxPixels)));
 }
 
-/// Edges are scaled, not sizes, so that neighbors stay neighbors.
+/// Edges are scaled, not sizes, so that neighbours stay neighbours.
 Rect scaled(const Rect& r, double factor, Size at_least) {
   const auto edge = [&](int at) { return static_cast<int>(std::lround(at * factor)); };
   const int x = edge(r.x0);

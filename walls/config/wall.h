@@ -64,7 +64,7 @@ struct EdgeBlend {
   double right = 0.0;
   double bottom = 0.0;
   double top = 0.0;
-  double gamma = 1.0;  ///< power of the ramp, as the blend module has it; 1: straight in linear light
+  double gamma = 1.0;  ///< power of the ramp, as BlendWeights has it; 1: straight in linear light
 
   [[nodiscard]] bool any() const { return automatic || left > 0.0 || right > 0.0 || bottom > 0.0 || top > 0.0; }
   bool operator==(const EdgeBlend&) const = default;

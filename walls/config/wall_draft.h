@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -122,9 +121,6 @@ struct WallGrid {
 /// of something to check more.
 [[nodiscard]] bool link_wall(WallDraft& draft, Findings& findings);
 
-/// `id` is to be a picture's name.
-void check_file_name(const std::string& id, const TextPosition& position, Findings& findings);
-
 /// Checks what viewers, stereo and monitors refer to, and settles which viewer sees which screen.
 void link_viewers(WallDraft& draft, Findings& findings);
 
@@ -136,15 +132,5 @@ void warn_about_viewers(const WallDraft& draft, Findings& findings);
 
 /// Warns about what is sound and looks wrong: pixels of other sizes beside each other, edges faded on one side only.
 void warn_about_neighbors(const WallDraft& draft, Findings& findings);
-
-/// Fills in a wall whose screens are sound: the default viewer and the hash.
-void finish_wall(Wall& wall);
-
-/// Puts values over those of a wall file: each override is PATH=VALUE, a path of keys and places in arrays (from 0)
-/// between dots, e.g. viewers.0.position_m=[0,1.6,0.5]. What is not there is made; the place after an array's last
-/// appends. A value is TOML, or a bare word that stands for a string. Places of such values name the override by its
-/// number, from 1. A path that leads nowhere is a finding.
-/// Throws Error (Usage) for what is no override.
-void apply_overrides(TomlValue& document, std::span<const std::string> overrides, Findings& findings);
 
 }  // namespace hpr

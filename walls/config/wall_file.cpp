@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/bytes.h"
@@ -158,8 +159,8 @@ void refuse_without_effect(const std::string& override, Findings& findings) {
                  "hpr wall run has options for it: --strategy, --quality, --codec, --swap-timeout...");
 }
 
-}  // namespace
-
+/// Puts the values of overrides, as parse_wall() takes them, over those of a document; a path that leads nowhere is a
+/// finding. Throws Error (Usage) for what is no override.
 void apply_overrides(TomlValue& document, std::span<const std::string> overrides, Findings& findings) {
   for (std::size_t i = 0; i < overrides.size(); ++i) {
     const std::string_view text = overrides[i];
@@ -181,10 +182,7 @@ void apply_overrides(TomlValue& document, std::span<const std::string> overrides
   }
 }
 
-bool WallReading::ok() const {
-  return std::ranges::none_of(findings, &WallFinding::error);
-}
-
+/// Fills in a wall whose screens are sound: the default viewer and the hash.
 void finish_wall(Wall& wall) {
   if (!wall.viewers.front().has_position) {
     const WallExtent extent = wall_extent(wall);
@@ -199,6 +197,12 @@ void finish_wall(Wall& wall) {
   }
   const std::string text = expand_wall(nameless);
   wall.hash = xxh64(std::as_bytes(std::span(text)));
+}
+
+}  // namespace
+
+bool WallReading::ok() const {
+  return std::ranges::none_of(findings, &WallFinding::error);
 }
 
 WallReading parse_wall(std::string_view text, const std::string& name, const std::vector<std::string>& overrides,

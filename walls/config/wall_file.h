@@ -23,7 +23,11 @@ struct WallReading {
 };
 
 /// Reads the text of a wall file; `name` stands in findings, and files the wall names are looked for beside it.
-/// `overrides`: see wall_override.h; throws Error (Usage) where one is malformed.
+///
+/// Each override is PATH=VALUE, a path of keys and places in arrays (from 0) between dots, e.g.
+/// viewers.0.position_m=[0,1.6,0.5], and its value stands over that of the file. What is not there is made; the place
+/// after an array's last appends. A value is TOML, or a bare word that stands for a string. Findings name the override
+/// such a value came from; a path that leads nowhere is a finding. Throws Error (Usage) for what is no override.
 [[nodiscard]] WallReading parse_wall(std::string_view text, const std::string& name,
                                      const std::vector<std::string>& overrides = {}, WallText kind = WallText::File);
 

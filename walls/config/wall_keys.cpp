@@ -113,10 +113,10 @@ const KeyTable<EdgeBlend>& blend_keys() {
   static const KeyTable<EdgeBlend> table{
       "edge_blend_m",
       {{"auto", boolean(&EdgeBlend::automatic), "fade what overlaps"},
-       {"left", width(&EdgeBlend::left), "width, in meters"},
-       {"right", width(&EdgeBlend::right), "width, in meters"},
-       {"bottom", width(&EdgeBlend::bottom), "width, in meters"},
-       {"top", width(&EdgeBlend::top), "width, in meters"},
+       {"left", width(&EdgeBlend::left), "width, in metres"},
+       {"right", width(&EdgeBlend::right), "width, in metres"},
+       {"bottom", width(&EdgeBlend::bottom), "width, in metres"},
+       {"top", width(&EdgeBlend::top), "width, in metres"},
        {"gamma", always(positive(&EdgeBlend::gamma, 20.0)), "power of the ramp; 1: straight in linear light"}}};
   return table;
 }
@@ -149,7 +149,7 @@ KeyKind<WallScreen> edge_blend() {
     }
   };
   const Json all_sides = schema::positive(kMaxMeters);
-  return {.takes = "\"auto\", one width in meters, or a table",
+  return {.takes = "\"auto\", one width in metres, or a table",
           .schema = {{"anyOf", Json::array({{{"const", "auto"}}, all_sides, schema_of(blend_keys())})}},
           .read = read,
           .write = [](const WallScreen& from) { return write_inline(blend_keys(), from.blend); },
@@ -171,7 +171,7 @@ std::vector<TableKey<WallScreen>> panel_keys() {
 KeyTable<WallScreen> corner_keys() {
   const std::string_view example = "[x, y, z]";
   return {"corners_m",
-          {{"ll", always(point(&WallScreen::lower_left)), "lower left, in meters", example},
+          {{"ll", always(point(&WallScreen::lower_left)), "lower left, in metres", example},
            {"lr", always(point(&WallScreen::lower_right)), "lower right", example},
            {"ul", always(point(&WallScreen::upper_left)), "upper left", example}}};
 }
@@ -194,7 +194,7 @@ KeyKind<WallScreen> warp() {
           .inner = describe(warp_keys(), "")};
 }
 
-/// `count` lengths in meters.
+/// Two lengths in metres.
 KeyKind<DraftGrid> lengths(std::optional<std::vector<double>> DraftGrid::*member, std::string takes, Json schema) {
   const auto read = [](TableReader& reader, std::string_view key) { return reader.reals(key, 2, kMaxMeters); };
   return value_kind(member, std::move(takes), std::move(schema), read);
@@ -207,7 +207,7 @@ KeyKind<DraftGrid> gaps(std::optional<std::vector<double>> DraftGrid::*member, C
     const bool readable = source.reader.has(source.key) && into.is_countable() && into.is_sized();
     if (readable) into.*member = source.reader.reals(source.key, static_cast<std::size_t>(count(into) - 1), kMaxMeters);
   };
-  return {.takes = "meters", .schema = schema::list(schema::number(-kMaxMeters, kMaxMeters)), .read = read};
+  return {.takes = "metres", .schema = schema::list(schema::number(-kMaxMeters, kMaxMeters)), .read = read};
 }
 
 /// The other name of `rotate`.
@@ -458,11 +458,11 @@ const KeyTable<DraftGrid>& grid_keys() {
         {{"columns", whole(&DraftGrid::columns, 1, kMaxScreens), "of screens", "3"},
          {"rows", whole(&DraftGrid::rows, 1, kMaxScreens), "of screens", "2"},
          {"tile_pixels", size(&DraftGrid::tile_pixels, kMaxScreenSide), "of each upright picture", "[1920, 1080]"},
-         {"tile_size_m", lengths(&DraftGrid::tile_size_m, "[width, height], in meters", schema::list(side, 2)),
+         {"tile_size_m", lengths(&DraftGrid::tile_size_m, "[width, height], in metres", schema::list(side, 2)),
           "lit area of each", "[1.2096, 0.6804]"},
-         {"gap_m", lengths(&DraftGrid::gap_m, "[x, y], in meters", schema::list(gap, 2)),
+         {"gap_m", lengths(&DraftGrid::gap_m, "[x, y], in metres", schema::list(gap, 2)),
           "between lit edges; negative: overlap", "", "[0, 0]"},
-         {"centre_m", point(&DraftGrid::center), "of the grid, in meters"}},
+         {"centre_m", point(&DraftGrid::center), "of the grid, in metres"}},
         "not",
         {"rotate", "panel_rotate"}};
     for (const TableKey<WallScreen>& key : panel_keys()) {
@@ -479,7 +479,7 @@ const KeyTable<DraftGrid>& grid_keys() {
     grid.keys.push_back({"row_gaps_m", gaps(&DraftGrid::row_gaps_m, rows), "one by one, from the top", "", "`gap_m`"});
     grid.keys.push_back(
         {"curve", section(curve_keys()),
-         "columns stand as chords on an arc around a vertical axis before the center, gaps along the arc", "",
+         "columns stand as chords on an arc around a vertical axis before the centre, gaps along the arc", "",
          "a plane"});
     return grid;
   }();

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "walls/config/key_table.h"
 #include "walls/config/wall.h"

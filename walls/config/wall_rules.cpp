@@ -24,6 +24,16 @@ std::string offered(std::string_view name, std::vector<std::string> ids, std::st
   return ids.empty() ? std::string(none) : unknown_name_hint(name, ids);
 }
 
+/// Adds a finding where `id` cannot be a picture's name.
+void check_file_name(const std::string& id, const TextPosition& position, Findings& findings) {
+  if (id == "wall") {
+    findings.error(position, "a picture must not be called \"wall\"", "wall.png is the picture of the whole wall");
+  } else if (id.ends_with(".panel")) {
+    findings.error(position, fmt::format("\"{}\" ends as the pictures of panels do", id),
+                   "what a turned panel is sent is in SCREEN.panel.png: leave out the .panel");
+  }
+}
+
 /// The checks of one draft; each member function is one of them.
 class Linker {
  public:
@@ -444,15 +454,6 @@ void check_overlap(const DraftScreen& draft, bool overlaps, NeighborWarnings& wa
 }
 
 }  // namespace
-
-void check_file_name(const std::string& id, const TextPosition& position, Findings& findings) {
-  if (id == "wall") {
-    findings.error(position, "a picture must not be called \"wall\"", "wall.png is the picture of the whole wall");
-  } else if (id.ends_with(".panel")) {
-    findings.error(position, fmt::format("\"{}\" ends as the pictures of panels do", id),
-                   "what a turned panel is sent is in SCREEN.panel.png: leave out the .panel");
-  }
-}
 
 bool link_wall(WallDraft& draft, Findings& findings) {
   return Linker(draft, findings).run();

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "walls/config/toml_document.h"
+#include "walls/config/toml_reader.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
@@ -219,15 +220,6 @@ std::vector<std::string> expand(std::string_view word, std::string_view list) {
   return names;
 }
 
-bool is_host(std::string_view name) {
-  constexpr std::size_t kMaxNameBytes = 64;  // as the system has it
-  return !name.empty() && name.size() <= kMaxNameBytes && name.front() != '-' && name.front() != '.' &&
-         std::ranges::all_of(name, [](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.' ||
-                  c == '_';
-         });
-}
-
 }  // namespace
 
 std::string write_wall_template(const WallTemplate& wall) {
@@ -273,7 +265,8 @@ std::vector<std::string> parse_host_list(std::string_view text) {
   std::set<std::string> seen;
   for (const std::string_view word : words_of(text)) {
     for (std::string& host : expand(word, text)) {
-      if (!is_host(host)) refuse(text, fmt::format("'{}' cannot be a host's name", printable(host)));
+      // A host's name is its node's id, too.
+      if (!is_id(host)) refuse(text, fmt::format("'{}' cannot be a host's name", printable(host)));
       if (!seen.insert(host).second) refuse(text, fmt::format("it names '{}' twice", host));
       hosts.push_back(std::move(host));
     }

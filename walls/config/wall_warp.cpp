@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <utility>
 
 #include "core/bytes.h"
@@ -111,7 +110,7 @@ class WarpReader {
   std::vector<std::byte> bytes_;  ///< of the file at hand
 };
 
-/// What the viewer's eye makes of a position map: of its points, and of cells of four neighbors.
+/// What the viewer's eye makes of a position map: of its points, and of cells of four neighbours.
 struct MapCheck {
   std::size_t points = 0;
   std::size_t hidden = 0;  ///< of them: behind the eye, or too far aside

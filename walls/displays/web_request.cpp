@@ -8,7 +8,6 @@
 #include <charconv>
 #include <cmath>
 #include <string_view>
-#include <utility>
 
 #include "core/error.h"
 #include "core/json.h"

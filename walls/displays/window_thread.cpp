@@ -1,5 +1,8 @@
 #include "walls/displays/window_thread.h"
 
+#define GLFW_INCLUDE_NONE  // NOLINT(readability-identifier-naming): GLFW's own
+#include <GL/glcorearb.h>
+#include <GLFW/glfw3.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,8 +13,10 @@
 #include <mutex>
 #include <numbers>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -80,7 +85,67 @@ void set_hints(const WindowPlan& plan, GLFWmonitor* monitor) {
   if (mode != nullptr) glfwWindowHint(GLFW_REFRESH_RATE, mode->refreshRate);
 }
 
-}  // namespace
+/// GLFW for as long as it lives; of one thread at a time.
+class Desktop {
+ public:
+  /// Throws Error (NoDevice) where there is none.
+  Desktop();
+  ~Desktop() { glfwTerminate(); }
+  Desktop(const Desktop&) = delete;
+  Desktop& operator=(const Desktop&) = delete;
+};
+
+/// The functions of one window's context that show pictures: its name without "gl", and its type in <GL/glcorearb.h>.
+#define HPR_WINDOW_GL_FUNCTIONS(X)                       \
+  X(BindFramebuffer, PFNGLBINDFRAMEBUFFERPROC)           \
+  X(BindTexture, PFNGLBINDTEXTUREPROC)                   \
+  X(BlitFramebuffer, PFNGLBLITFRAMEBUFFERPROC)           \
+  X(Clear, PFNGLCLEARPROC)                               \
+  X(ClearColor, PFNGLCLEARCOLORPROC)                     \
+  X(Finish, PFNGLFINISHPROC)                             \
+  X(FramebufferTexture2D, PFNGLFRAMEBUFFERTEXTURE2DPROC) \
+  X(GenFramebuffers, PFNGLGENFRAMEBUFFERSPROC)           \
+  X(GenTextures, PFNGLGENTEXTURESPROC)                   \
+  X(GetError, PFNGLGETERRORPROC)                         \
+  X(GetIntegerv, PFNGLGETINTEGERVPROC)                   \
+  X(TexImage2D, PFNGLTEXIMAGE2DPROC)                     \
+  X(TexSubImage2D, PFNGLTEXSUBIMAGE2DPROC)
+
+/// A window with its context, and the pictures of its panes as textures. All calls are of one thread, the one that
+/// called glfwInit.
+class PaneWindow {
+ public:
+  /// Throws Error (NoDevice). `interval`: see glfwSwapInterval.
+  PaneWindow(const WindowPlan& plan, int interval);
+
+  [[nodiscard]] GLFWwindow* handle() const { return window_.get(); }
+  [[nodiscard]] const WindowPlan& plan() const { return plan_; }
+
+  /// The picture of pane `pane`, turned, as large as its place.
+  void upload(std::size_t pane, const Image<Rgba8>& image);
+  /// What was uploaded last, in the back buffer.
+  void draw();
+  void swap();
+
+ private:
+  struct Destroy {
+    void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
+  };
+  struct Functions {
+#define HPR_WINDOW_GL_MEMBER(name, type) type name = nullptr;
+    HPR_WINDOW_GL_FUNCTIONS(HPR_WINDOW_GL_MEMBER)
+#undef HPR_WINDOW_GL_MEMBER
+  };
+
+  void load_functions();
+  void make_textures();
+
+  WindowPlan plan_;
+  std::unique_ptr<GLFWwindow, Destroy> window_;
+  Functions gl_;
+  std::vector<GLuint> textures_;  ///< per pane; they end with the context
+  GLuint framebuffer_ = 0;
+};
 
 Desktop::Desktop() {
   end_with_x_server();
@@ -181,6 +246,15 @@ void PaneWindow::swap() {
   glfwMakeContextCurrent(handle());
   glfwSwapBuffers(handle());
 }
+
+void show(std::vector<std::unique_ptr<PaneWindow>>& windows, const std::vector<PanePicture>& pictures) {
+  for (const PanePicture& picture : pictures) windows.at(picture.window)->upload(picture.pane, picture.image);
+  // All are drawn before the first is swapped: what is left then takes as long for each.
+  for (const auto& window : windows) window->draw();
+  for (const auto& window : windows) window->swap();
+}
+
+}  // namespace
 
 /// What the thread of the windows and the one that shows pictures both see.
 struct WindowThread::State {
@@ -290,17 +364,6 @@ class WindowThread::State::Mouse {
   glm::dvec2 pointer_{0.0};  ///< in the window
   std::size_t pane_ = 0;     ///< the one it was in last
 };
-
-namespace {
-
-void show(std::vector<std::unique_ptr<PaneWindow>>& windows, const std::vector<PanePicture>& pictures) {
-  for (const PanePicture& picture : pictures) windows.at(picture.window)->upload(picture.pane, picture.image);
-  // All are drawn before the first is swapped: what is left then takes as long for each.
-  for (const auto& window : windows) window->draw();
-  for (const auto& window : windows) window->swap();
-}
-
-}  // namespace
 
 // Once the private constructor is through, the destructor ends the thread, also when the wait throws.
 WindowThread::WindowThread(std::vector<WindowPlan> plans, std::chrono::seconds to_open)

@@ -24,7 +24,7 @@ constexpr Rgba8 kBackground{24, 26, 32, 255};
 constexpr Rgba8 kGrid{84, 88, 98, 255};
 constexpr Rgba8 kCircle{255, 210, 0, 255};
 constexpr Rgba8 kDiagonal{0, 200, 255, 255};
-constexpr Rgba8 kNeighbour{150, 255, 150, 255};
+constexpr Rgba8 kNeighbor{150, 255, 150, 255};
 
 /// Wall metres in the plane of a screen -> that screen's pixels.
 class ScreenPixels {
@@ -123,7 +123,7 @@ void draw_rulers(Canvas& canvas, const WallScreen& screen) {
 }
 
 /// Where the picture goes on, and as which screen.
-void draw_neighbours(Canvas& canvas, const Wall& wall, std::size_t index) {
+void draw_neighbors(Canvas& canvas, const Wall& wall, std::size_t index) {
   const glm::dvec2 size(wall.screens[index].pixels.width, wall.screens[index].pixels.height);
   const double arrow = 0.035 * std::min(size.x, size.y);
   const double height = 0.9 * arrow;
@@ -138,12 +138,12 @@ void draw_neighbours(Canvas& canvas, const Wall& wall, std::size_t index) {
     if (id.empty()) return;
     const glm::dvec2 across(back.y, -back.x);
     canvas.polyline(std::array{tip + arrow * (back + 0.6 * across), tip, tip + arrow * (back - 0.6 * across)},
-                    kNeighbour, std::max(1.5, arrow / 6.0));
+                    kNeighbor, std::max(1.5, arrow / 6.0));
     // Beside the arrow in either case: what is above and below has other things to show.
     const double half_text = 0.3 * height * static_cast<double>(id.size());
     canvas.text(upright ? tip + 0.5 * arrow * back + glm::dvec2(arrow + half_text, 0.0)
                         : tip + (1.5 * arrow + half_text) * back,
-                id, height, kNeighbour);
+                id, height, kNeighbor);
   };
   draw(Side::Left, {0.01 * size.x, 0.28 * size.y}, {1.0, 0.0}, false);
   draw(Side::Right, {0.99 * size.x, 0.28 * size.y}, {-1.0, 0.0}, false);
@@ -217,7 +217,7 @@ Image<Rgba8> wall_pattern(const Wall& wall, std::size_t index) {
   canvas.frame({0.0, 0.0}, {w, h}, kWhite, 1.0);
 
   draw_rulers(canvas, screen);
-  draw_neighbours(canvas, wall, index);
+  draw_neighbors(canvas, wall, index);
 
   // An id as large as fits, and what it stands for.
   const double letters = static_cast<double>(std::max<std::size_t>(screen.id.size(), 4));

@@ -11,7 +11,7 @@ namespace hpr {
 
 /// A calibration picture for one screen, upright, in its own pixels: its id and size, the outermost pixels in white, a
 /// grid of one pixel width every 64 pixels, a gray ramp, one-pixel checkers in the corners, an arrow that points up,
-/// arrows to the neighbors with their ids, rulers in millimeters from the left and the top of the lit area, who drives
+/// arrows to the neighbours with their ids, rulers in millimetres from the left and the top of the lit area, who drives
 /// it and at which output; room for draw_frame_counter; and a circle and two diagonals that belong to all screens of
 /// the plane and run on behind the gaps. Throws Error (Limit) for a screen beyond 32767 pixels a side.
 [[nodiscard]] Image<Rgba8> wall_pattern(const Wall& wall, std::size_t screen);

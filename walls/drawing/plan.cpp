@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <limits>
 #include <map>
 #include <set>
 
@@ -26,7 +24,7 @@ struct Sums {
   std::size_t stale = 0;
   std::size_t lost = 0;
   std::vector<double> ms{};  ///< of the frames that have it
-  double bytes = 0.0;        ///< of those
+  double bytes = 0.0;        ///< of the frames in `ms`
   std::set<std::uint64_t> ranks{};
 };
 
@@ -42,7 +40,7 @@ std::optional<double> mean_kib(const Sums& sums) {
   return sums.ms.empty() ? std::nullopt : std::optional(sums.bytes / 1024.0 / static_cast<double>(sums.ms.size()));
 }
 
-std::optional<double> fraction(std::size_t count, const Sums& sums) {
+std::optional<double> percent_of_frames(std::size_t count, const Sums& sums) {
   if (sums.frames == 0) return std::nullopt;
   return 100.0 * static_cast<double>(count) / static_cast<double>(sums.frames);
 }
@@ -58,9 +56,9 @@ constexpr std::array kMeasures{
     Measure{"ms", "median time to hand a picture over", " ms", median_ms},
     Measure{"bytes", "mean size of a picture as it was handed over", " KiB", mean_kib},
     Measure{"stale", "share of frames shown too late", " %",
-            [](const Sums& sums) { return fraction(sums.stale, sums); }},
+            [](const Sums& sums) { return percent_of_frames(sums.stale, sums); }},
     Measure{"lost", "share of frames without a display", " %",
-            [](const Sums& sums) { return fraction(sums.lost, sums); }},
+            [](const Sums& sums) { return percent_of_frames(sums.lost, sums); }},
 };
 
 const Measure& find_measure(std::string_view name) {
@@ -105,8 +103,8 @@ std::vector<std::string> notes_of(const Sums& sums) {
   std::vector<std::string> notes;
   if (!sums.ms.empty()) notes.push_back(fmt::format("{:.1f} ms, {:.1f} KiB", *median_ms(sums), *mean_kib(sums)));
   if (sums.frames > 0) {
-    notes.push_back(
-        fmt::format("stale {:.1f} %, lost {:.1f} %", *fraction(sums.stale, sums), *fraction(sums.lost, sums)));
+    notes.push_back(fmt::format("stale {:.1f} %, lost {:.1f} %", *percent_of_frames(sums.stale, sums),
+                                *percent_of_frames(sums.lost, sums)));
   }
   if (sums.ranks.size() == 1) notes.push_back(fmt::format("by rank {}", *sums.ranks.begin()));
   if (sums.ranks.size() > 1) notes.push_back(fmt::format("by {} ranks in turn", sums.ranks.size()));
@@ -134,12 +132,12 @@ constexpr std::array<Rgba8, 8> kOwners{{{176, 206, 240, 255},
                                         {176, 226, 226, 255},
                                         {222, 208, 190, 255}}};
 
-/// Colors from little to much, light enough for dark text; between them colours are mixed.
+/// Colours from little to much, light enough for dark text; between them colours are mixed.
 constexpr std::array<Rgba8, 4> kHeat{
     {{236, 244, 232, 255}, {253, 230, 138, 255}, {251, 170, 90, 255}, {240, 110, 90, 255}}};
 constexpr Rgba8 kNotMeasured{255, 255, 255, 255};
 
-/// `share` from 0 to 1.
+/// `fraction`: from 0 to 1.
 Rgba8 heat_color(double fraction) {
   const double at = std::clamp(fraction, 0.0, 1.0) * (kHeat.size() - 1);
   const auto below = std::min(static_cast<std::size_t>(at), kHeat.size() - 2);

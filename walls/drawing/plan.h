@@ -32,10 +32,9 @@ struct WallHeat {
                                  std::string_view by);
 
 /// The plan of a wall, for people: its screens as they stand, to scale, with their ids, sizes in pixels and
-/// millimeters and owners (host, rank, window), gaps hatched, and the wall from above with its viewer.
-/// Both forms come from the same drawing code.
-/// With `heat` screens are coloured by what a run measured of them instead of by their owners, and a scale shows the
-/// values.
+/// millimetres and owners (host, rank, window), gaps hatched, and the wall from above with its viewer. With `heat`
+/// screens are coloured by what a run measured of them instead of by their owners, and a scale shows the values. SVG
+/// and pixels come from one drawing code.
 [[nodiscard]] std::string wall_plan_svg(const Wall& wall, const WallHeat* heat = nullptr);
 [[nodiscard]] Image<Rgba8> wall_plan_image(const Wall& wall, const WallHeat* heat = nullptr);
 

@@ -189,7 +189,7 @@ Rect rounded(const Box& box, double per_meter) {
           rounded((box.y + box.height) * per_meter)};
 }
 
-/// A screen in the plane of the wall, in meters.
+/// A screen in the plane of the wall, in metres.
 struct SeamBox {
   glm::dvec3 low{0.0};
   glm::dvec3 high{0.0};

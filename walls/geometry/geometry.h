@@ -102,7 +102,7 @@ inline constexpr int kMaxPictureSide = 8192;
 /// rounded to whole pixels; where all screens have one pitch, and nothing is scaled, each keeps its size.
 [[nodiscard]] WallPicture wall_picture(const Wall& wall, int max_side);
 
-/// What lies between neighbors of one pitch in the rows and columns of a flat wall, and how far that is from whole
+/// What lies between neighbours of one pitch in the rows and columns of a flat wall, and how far that is from whole
 /// pixels: the error a wall description with bezels in whole pixels would make.
 struct WallSeams {
   int count = 0;
@@ -116,7 +116,7 @@ struct WallSeams {
 /// Metres per pixel along the screen's width.
 [[nodiscard]] double pixel_pitch(const WallScreen& screen);
 
-/// Meters per pixel of the screen with the smallest pixels.
+/// Metres per pixel of the screen with the smallest pixels.
 [[nodiscard]] double finest_pitch(const Wall& wall);
 
 }  // namespace hpr

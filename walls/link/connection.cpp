@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstring>
 #include <span>
-#include <string>
 #include <system_error>
 
 #include "core/bytes.h"

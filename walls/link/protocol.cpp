@@ -20,11 +20,13 @@ namespace hpr {
 namespace {
 
 constexpr std::string_view kBlockMagic = "HPRLINK\n";
+constexpr std::uint32_t kLinkProtocol = 1;
 constexpr std::uint32_t kPacketMagic = 0x4B525048;  // "HPRK"
 /// Written as it lies in memory: what comes out as another number comes from a machine of another byte order.
 constexpr std::uint32_t kByteOrder = 0x01020304;
 constexpr std::size_t kPreambleBytes = 8 + 4 + 4 + 4;
 constexpr std::size_t kHashBytes = 8;
+constexpr std::size_t kMaxBlockBytes = 1 << 20;
 constexpr std::size_t kMaxTextBytes = 1024;
 
 std::vector<std::byte> make_block(const ByteWriter& payload) {

@@ -100,8 +100,6 @@ class ByteReader {
   std::span<const std::byte> bytes_;
 };
 
-inline constexpr std::uint32_t kLinkProtocol = 1;
-inline constexpr std::size_t kMaxBlockBytes = 1 << 20;
 inline constexpr std::size_t kPacketHeaderBytes = 52;
 
 using LinkNonce = std::array<std::byte, 16>;

@@ -53,8 +53,8 @@ class WallSender {
   void show(const WallFrame& frame);
   /// What the last frame's screens of this rank took to encode, and their bytes.
   [[nodiscard]] const std::vector<ScreenCost>& costs() const { return costs_; }
-  /// After the last frame: returns when it is sent, on rank 0 shown, or after two seconds, or
-  /// what budget and swap time-out ask for.
+  /// Ends the run after its last frame: returns when that is sent, on rank 0 shown, or after two seconds or the budget
+  /// and the swap time-out together, whichever is longer.
   void finish();
 
   /// Rank 0: what became of a frame that was shown and not forgotten; it is final after finish().

@@ -77,6 +77,35 @@ extern "C" void remove_and_end(int signal) {
   ::raise(signal);  // waits until this returns, and then finds no handler
 }
 
+/// Has, from now on, a SIGINT, SIGTERM or SIGHUP that ends this process remove the file of a Unix socket first: those
+/// that are caught or ignored already keep what they do. Of more than 16 files the others stay.
+void remove_when_ended(const std::string& path) {
+  const std::lock_guard lock(writing);
+  for (SocketFile& file : files) {
+    if (file.set.load() || path.size() >= file.path.size()) continue;
+    file.path.fill('\0');
+    path.copy(file.path.data(), path.size());
+    file.set.store(true);
+    break;
+  }
+  struct sigaction action {};
+  action.sa_handler = remove_and_end;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    ::sigaction(signal, nullptr, &before);
+    if (before.sa_handler == SIG_DFL) ::sigaction(signal, &action, nullptr);
+  }
+}
+
+/// Takes back remove_when_ended(): the file is removed already.
+void forget_removal(const std::string& path) {
+  const std::lock_guard lock(writing);
+  for (SocketFile& file : files) {
+    if (file.set.load() && std::string_view(file.path.data()) == path) file.set.store(false);
+  }
+}
+
 constexpr int kBacklog = 64;
 /// A TCP peer that acknowledges nothing for so long is gone.
 constexpr unsigned kUnacknowledgedMs = 10'000;
@@ -145,32 +174,6 @@ LinkAddress parse_listen_address(const std::string& text) {
   if (text.find('/') != std::string::npos) return socket_address(text);
   if (!text.empty() && text.find(':') == std::string::npos) return socket_address("./" + text);
   return tcp_address(text.starts_with(':') ? "127.0.0.1" + text : text, 0);
-}
-
-void remove_when_ended(const std::string& path) {
-  const std::lock_guard lock(writing);
-  for (SocketFile& file : files) {
-    if (file.set.load() || path.size() >= file.path.size()) continue;
-    file.path.fill('\0');
-    path.copy(file.path.data(), path.size());
-    file.set.store(true);
-    break;
-  }
-  struct sigaction action {};
-  action.sa_handler = remove_and_end;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    struct sigaction before {};
-    ::sigaction(signal, nullptr, &before);
-    if (before.sa_handler == SIG_DFL) ::sigaction(signal, &action, nullptr);
-  }
-}
-
-void forget_removal(const std::string& path) {
-  const std::lock_guard lock(writing);
-  for (SocketFile& file : files) {
-    if (file.set.load() && std::string_view(file.path.data()) == path) file.set.store(false);
-  }
 }
 
 void make_private_folder(const std::filesystem::path& folder) {

@@ -27,13 +27,6 @@ struct LinkAddress {
 /// Throws Error (Usage) for a path longer than sockets take.
 [[nodiscard]] LinkAddress socket_address(const std::filesystem::path& path);
 
-/// Has, from now on, a SIGINT, SIGTERM or SIGHUP that ends this process remove the file of a Unix socket first: those
-/// that are caught or ignored already keep what they do. Of more than 16 files the others stay.
-void remove_when_ended(const std::string& path);
-
-/// Takes back remove_when_ended(): the file is removed already.
-void forget_removal(const std::string& path);
-
 /// A file descriptor that is closed with its owner.
 class Socket {
  public:

@@ -42,7 +42,7 @@ class HeadPath {
 /// Degrees: heading about y (to the left), then pitch about x (upwards), then roll about z.
 [[nodiscard]] glm::dquat orientation_of(double heading, double pitch, double roll);
 
-/// The formats, by extension; docs/commands.md describes them.
+/// The formats, by extension; docs/walls.md describes them.
 enum class HeadPathFormat { Csv, JsonLines, Toml };
 
 /// Throws Error (BadInput) with the line that is wrong. `name` stands in errors.

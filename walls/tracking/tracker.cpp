@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "walls/link/socket.h"
 #include "walls/tracking/head_path.h"
 
 namespace hpr {
@@ -61,52 +62,39 @@ std::optional<Report> report_of(std::string_view text) {
   return report.time == report.time ? std::optional(report) : std::nullopt;
 }
 
-class Socket {
- public:
-  Socket(const std::string& address, int port)
-      : handle_(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
-    sockaddr_in at{};
-    at.sin_family = AF_INET;
-    at.sin_port = htons(static_cast<std::uint16_t>(port));
-    const bool known = ::inet_pton(AF_INET, address.c_str(), &at.sin_addr) == 1;
-    if (handle_ < 0 || !known || ::bind(handle_, reinterpret_cast<const sockaddr*>(&at), sizeof(at)) != 0) {
-      const std::string why = known ? std::generic_category().message(errno) : "no numeric address";
-      close();
-      throw Error(ExitCode::Io, fmt::format("cannot listen to a tracker at {}:{}: {}", printable(address), port, why),
-                  "give an address of this host, 0.0.0.0 for all of them, and a free port");
-    }
+/// A socket that datagrams to this address and port come to; it never blocks. Throws Error (Io).
+Socket open_datagrams(const std::string& address, int port) {
+  Socket socket(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_port = htons(static_cast<std::uint16_t>(port));
+  const bool known = ::inet_pton(AF_INET, address.c_str(), &at.sin_addr) == 1;
+  if (!socket || !known || ::bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&at), sizeof(at)) != 0) {
+    const std::string why = known ? std::generic_category().message(errno) : "no numeric address";
+    throw Error(ExitCode::Io, fmt::format("cannot listen to a tracker at {}:{}: {}", printable(address), port, why),
+                "give an address of this host, 0.0.0.0 for all of them, and a free port");
   }
-  ~Socket() { close(); }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
+  return socket;
+}
 
-  /// The bytes of the next datagram, as far as they fit; none when there is none now.
-  [[nodiscard]] std::optional<std::size_t> receive(std::span<char> bytes) const {
-    const ssize_t count = ::recv(handle_, bytes.data(), bytes.size(), 0);
-    if (count < 0) return std::nullopt;
-    return static_cast<std::size_t>(count);
-  }
-
- private:
-  void close() {
-    if (handle_ >= 0) ::close(handle_);
-    handle_ = -1;
-  }
-
-  int handle_;
-};
+/// The bytes of the next datagram, as far as they fit; none when there is none now.
+std::optional<std::size_t> receive(const Socket& socket, std::span<char> bytes) {
+  const ssize_t count = ::recv(socket.descriptor(), bytes.data(), bytes.size(), 0);
+  if (count < 0) return std::nullopt;
+  return static_cast<std::size_t>(count);
+}
 
 class UdpTracker final : public Tracker {
  public:
   UdpTracker(const WallTracker& tracker, const HeadPose& rest)
-      : tracker_(tracker), rest_(rest), socket_(tracker.address, tracker.port), pose_(rest) {}
+      : tracker_(tracker), rest_(rest), socket_(open_datagrams(tracker.address, tracker.port)), pose_(rest) {}
 
   [[nodiscard]] HeadPose sample(double time) override {
     // More than a tracker sends in any frame, and an end to what a flood of datagrams can take.
     constexpr int kMaxDatagramsAFrame = 10'000;
     std::array<char, 512> bytes{};
     for (int i = 0; i < kMaxDatagramsAFrame; ++i) {
-      const auto count = socket_.receive(bytes);
+      const auto count = receive(socket_, bytes);
       if (!count) break;
       const auto report = report_of({bytes.data(), *count});
       if (report) {
@@ -151,22 +139,14 @@ class RestingHead final : public Tracker {
 
 }  // namespace
 
-std::unique_ptr<Tracker> make_file_tracker(const WallTracker& tracker) {
-  return std::make_unique<FileTracker>(load_head_path(tracker.file));
-}
-
-std::unique_ptr<Tracker> make_udp_tracker(const WallTracker& tracker, const HeadPose& rest) {
-  return std::make_unique<UdpTracker>(tracker, rest);
-}
-
 std::unique_ptr<Tracker> make_tracker(const WallTracker& tracker, const HeadPose& rest) {
   switch (tracker.kind) {
     case WallTracker::Kind::None:
       break;
     case WallTracker::Kind::File:
-      return make_file_tracker(tracker);
+      return std::make_unique<FileTracker>(load_head_path(tracker.file));
     case WallTracker::Kind::Udp:
-      return make_udp_tracker(tracker, rest);
+      return std::make_unique<UdpTracker>(tracker, rest);
   }
   return std::make_unique<RestingHead>(rest);
 }

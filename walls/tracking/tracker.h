@@ -23,8 +23,4 @@ class Tracker {
 /// a recording that cannot be read, Io for a port that cannot be listened at.
 [[nodiscard]] std::unique_ptr<Tracker> make_tracker(const WallTracker& tracker, const HeadPose& rest);
 
-/// The trackers there are, one per file; make_tracker chooses.
-[[nodiscard]] std::unique_ptr<Tracker> make_file_tracker(const WallTracker& tracker);
-[[nodiscard]] std::unique_ptr<Tracker> make_udp_tracker(const WallTracker& tracker, const HeadPose& rest);
-
 }  // namespace hpr

@@ -10,25 +10,15 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "walls/config/toml_document.h"
 #include "walls/config/wall_draft.h"
 
 namespace hpr {
-namespace {
-
-std::string line_of(std::string_view text, int line) {
-  for (int i = 1; i < line; ++i) {
-    const std::size_t end = text.find('\n');
-    if (end == std::string_view::npos) return {};
-    text.remove_prefix(end + 1);
-  }
-  return printable(text.substr(0, text.find_first_of("\r\n")), 200);
-}
-
-}  // namespace
 
 void throw_in_file(std::string_view text, const std::string& name, int line, std::string_view what, std::string hint) {
   if (line < 1) throw Error(ExitCode::BadInput, fmt::format("{}: {}", name, what), std::move(hint));
-  throw Error(ExitCode::BadInput, fmt::format("{}:{}: {}", name, line, what), std::move(hint), line_of(text, line));
+  throw Error(ExitCode::BadInput, fmt::format("{}:{}: {}", name, line, what), std::move(hint),
+              printable(text_line(text, line), 200));
 }
 
 std::string node_of_host(Wall& wall, const std::string& host) {

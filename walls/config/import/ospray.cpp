@@ -4,12 +4,11 @@
 #include <glm/geometric.hpp>
 
 #include "walls/config/import/foreign_wall.h"
+#include "walls/config/toml_reader.h"
 #include "walls/config/wall_file.h"
 
 namespace hpr {
 namespace {
-
-constexpr double kMetresLimit = 1e6;
 
 glm::dvec3 read_point(const JsonFile& file, const Json& entry, const std::string& path, const char* key) {
   const std::vector<Json>& values = file.array(entry, path, key);
@@ -27,7 +26,7 @@ WallScreen read_screen(const JsonFile& file, const Json& entry, const std::strin
   const double width = glm::distance(bottom_left, bottom_right);
   const double height = glm::distance(bottom_left, top_left);
   const auto mullion = [&](const char* key, double most) {
-    return file.real(entry, path, key, -kMetresLimit, 0.5 * most, 0.0);
+    return file.real(entry, path, key, -kMaxMeters, 0.5 * most, 0.0);
   };
   if (!(width > 0.0) || !(height > 0.0)) file.fail(path, "its corners coincide", "give a screen a width and a height");
   const glm::dvec3 right = (bottom_right - bottom_left) / width;
