@@ -1,11 +1,9 @@
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <hpr/version.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <charconv>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -18,7 +16,6 @@
 #include "app/results.h"
 #include "core/job_environment.h"
 #include "core/log.h"
-#include "core/text.h"
 #include "engine/settings_table.h"
 #include "raster/gl_context.h"
 
@@ -46,12 +43,9 @@ std::optional<ExitCode> answer_alone(const CommandLine& line, const std::vector<
 }
 
 void configure_log(Globals& globals) {
-  const bool listens = launched_rank() != 0 && globals.verbosity < 2;  // rank 0 speaks
+  const bool errors_only = globals.verbosity < 0 || (launched_rank() != 0 && globals.verbosity < 2);
   if (globals.verbosity < 0 && globals.progress == "auto") globals.progress = "none";
-  log::configure(globals.verbosity < 0 || listens ? log::Level::Error
-                 : globals.verbosity == 0         ? log::Level::Info
-                                                  : log::Level::Debug,
-                 "");
+  log::configure(errors_only ? log::Level::Error : globals.verbosity == 0 ? log::Level::Info : log::Level::Debug, "");
 }
 
 /// Checks --backend, also for commands that draw nothing. Windows are GLFW's, whatever draws their pictures.

@@ -126,13 +126,14 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
 
 namespace {
 
-/// When the ranks met, by this rank's clock. Ranks of rank 0's host have its clock: times so close are no chance.
-std::int64_t meet(Communicator& comm) {
+/// Collective. The time of a barrier by this rank's clock. Ranks of rank 0's host have its clock: times so close are no
+/// chance.
+std::int64_t barrier_ns(Communicator& comm) {
   constexpr std::int64_t kSameClock = 1'000'000'000;
   barrier(comm);
-  const std::vector<std::int64_t> met = all_gather_value(comm, trace::now_ns());
-  const std::int64_t mine = met[static_cast<std::size_t>(comm.rank())];
-  return std::abs(mine - met[0]) < kSameClock ? met[0] : mine;
+  const std::vector<std::int64_t> times = all_gather_value(comm, trace::now_ns());
+  const std::int64_t mine = times[static_cast<std::size_t>(comm.rank())];
+  return std::abs(mine - times[0]) < kSameClock ? times[0] : mine;
 }
 
 Json named(const char* what, int rank, int lane, const std::string& name) {
@@ -204,13 +205,13 @@ ExitCode traced(Communicator& comm, const Globals& globals, const std::function<
   if (globals.trace.empty()) return body(comm);
   if (inside_mpi_job()) check_on_root(comm, [&] { check_trace(globals); });
   const std::string host = host_name();
-  const std::int64_t zero = meet(comm);
+  const std::int64_t zero = barrier_ns(comm);
   trace::start();
-  TracingCommunicator watched(comm);
+  TracingCommunicator tracing(comm);
   ExitCode code = ExitCode::Internal;
   try {
     const trace::Span whole("run");
-    code = body(watched);
+    code = body(tracing);
   } catch (...) {
     (void)trace::finish();
     throw;

@@ -35,7 +35,7 @@ void check_trace(const Globals& globals);
 
 /// Collective: does `body` and writes what all ranks did meanwhile to globals.trace, if that is set, in Chrome's trace
 /// event format (as chrome://tracing, Perfetto and Speedscope read it): one process per rank, one row per thread,
-/// microseconds since the ranks met. Clocks of other hosts are set by that meeting, to within its messages' time.
+/// microseconds since a barrier. Clocks of other hosts are set by that barrier, to within its messages' time.
 /// Throws Error (Io), (Usage) where `body` wrote that file, and what `body` does; then nothing is written.
 ExitCode traced(Communicator& comm, const Globals& globals, const std::function<ExitCode(Communicator&)>& body);
 

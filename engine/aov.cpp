@@ -17,6 +17,10 @@ namespace {
 
 constexpr std::uint32_t kNothingSeen = 0xFFFFFFFFU;
 
+Aov aov_of(Component component) {
+  return static_cast<Aov>(static_cast<std::size_t>(Aov::Direct) + static_cast<std::size_t>(component));
+}
+
 std::vector<std::string> channels(Aov aov, std::string_view letters) {
   std::vector<std::string> names;
   for (const char letter : letters) names.push_back(fmt::format("{}.{}", name_of(aov), letter));
@@ -45,11 +49,7 @@ std::vector<std::string_view> aov_names() {
 std::vector<Aov> parse_aovs(const std::string& list) {
   const std::vector<std::string_view> names = aov_names();
   std::vector<Aov> aovs;
-  for (std::size_t start = 0; start <= list.size();) {
-    const std::size_t end = std::min(list.find(',', start), list.size());
-    const std::string name = list.substr(start, end - start);
-    start = end + 1;
-    if (name.empty()) continue;
+  for (const std::string& name : split_words(list)) {
     const auto found = std::ranges::find(names, name);
     if (found == names.end()) {
       const std::vector<std::string> choices(names.begin(), names.end());

@@ -34,10 +34,6 @@ enum class Aov : std::uint8_t {
 
 inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Cost) + 1;
 
-[[nodiscard]] constexpr Aov aov_of(Component component) {
-  return static_cast<Aov>(static_cast<std::size_t>(Aov::Direct) + static_cast<std::size_t>(component));
-}
-
 [[nodiscard]] std::string_view name_of(Aov aov);
 /// Every name, in the order of the enumeration.
 [[nodiscard]] std::vector<std::string_view> aov_names();

@@ -57,8 +57,8 @@ class Film {
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
   [[nodiscard]] bool is_adaptive() const { return pilot_ > 0; }
   [[nodiscard]] std::uint32_t pilot() const { return pilot_; }
-  /// Adaptive: goes on with this number.
-  void go_on_with(std::uint32_t number) { samples_ = number; }
+  /// Adaptive: sets the number of the sample that is added next.
+  void set_next_sample(std::uint32_t number) { samples_ = number; }
 
   /// Adds samples of the numbers from samples() on, each with its weight, for `tiles`; in an adaptive film to the
   /// pixels that are due for the first of them, which are due for all.

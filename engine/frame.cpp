@@ -56,7 +56,7 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
   }
 }
 
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
                               std::span<TileLayer<Key>* const> keys) {
   PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
   const trace::Span span("primary rays");
@@ -67,9 +67,9 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
     const std::vector<Rect> parts = parts_of(plan, screen);
     if (parts.empty()) continue;
     std::vector<View> views;
-    views.reserve(looks.size());
-    for (const JitteredViews& look : looks) views.push_back(look.views[screen]);
-    rays.draw(views, screen, parts, keys, draws_own ? looks.front().sample.wanted : nullptr);
+    views.reserve(jittered.size());
+    for (const JitteredViews& each : jittered) views.push_back(each.views[screen]);
+    rays.draw(views, screen, parts, keys, draws_own ? jittered.front().sample.wanted : nullptr);
     stats += rays.stats();
   }
   return stats;
@@ -78,14 +78,14 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
 namespace {
 
 /// raster: the keys of each sample, before any rank exchanges them.
-FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
+FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
                      std::span<TileLayer<Key>* const> keys) {
   FrameTimes spent;
   const Stopwatch watch;
   if (plan.primary == Primary::Rays) {
-    spent.primary = trace_primary(session, plan, looks, keys);
+    spent.primary = trace_primary(session, plan, jittered, keys);
   } else {
-    for (std::size_t i = 0; i < looks.size(); ++i) rasterize(session, plan, looks[i].views, *keys[i]);
+    for (std::size_t i = 0; i < jittered.size(); ++i) rasterize(session, plan, jittered[i].views, *keys[i]);
   }
   spent.primary_ms = watch.ms();
   return spent;
@@ -120,12 +120,12 @@ void add_light(const DeferredShader& shader, FrameTimes& spent) {
   spent += light;
 }
 
-/// Moves keys to where their tiles' sums are.
-void bring_home(Session& session, const FramePlan& plan, std::optional<TileOwnership>& homes, Frame& frame) {
-  if (!homes) homes.emplace(session.comm(), plan.layout, frame.owned);
+/// Moves keys to the ranks that own their tiles; the first sample decides which those are.
+void move_to_owners(Session& session, const FramePlan& plan, std::optional<TileOwnership>& ownership, Frame& frame) {
+  if (!ownership) ownership.emplace(session.comm(), plan.layout, frame.owned);
   if (plan.distribution == Distribution::SortFirst) return;
-  homes->bring(session.comm(), *frame.keys, frame.owned);
-  frame.owned = homes->mine();
+  ownership->move_to_owners(session.comm(), *frame.keys, frame.owned);
+  frame.owned = ownership->mine();
 }
 
 void mark_rank(const Session& session, Frame& frame) {
@@ -174,9 +174,9 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
 
 FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                       const FrameSample& sample) {
-  const JitteredViews look{{views.begin(), views.end()}, sample};
+  const JitteredViews jittered{{views.begin(), views.end()}, sample};
   TileLayer<Key>* const layer = &keys;
-  FrameTimes spent = draw_keys(session, plan, std::span(&look, 1), std::span(&layer, 1));
+  FrameTimes spent = draw_keys(session, plan, std::span(&jittered, 1), std::span(&layer, 1));
 
   if (spends_light(plan)) {
     const trace::Span photons("photons");
@@ -199,8 +199,8 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
-  if (sample.homes != nullptr) bring_home(session, plan, *sample.homes, frame);
-  if (sample.at_home != nullptr) (*sample.at_home)();
+  if (sample.ownership != nullptr) move_to_owners(session, plan, *sample.ownership, frame);
+  if (sample.before_shading != nullptr) (*sample.before_shading)();
   spent.composite_ms = watch.ms();
 
   shade(session, plan, views, sample, frame, spent);
@@ -219,32 +219,33 @@ std::size_t max_round_size(Session& session, const FramePlan& plan) {
   return std::clamp(fit, std::size_t{1}, PrimaryRays::kMaxViews);
 }
 
-std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
+std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
                               FrameTimes& times) {
-  const trace::Span span("round", "samples", looks.size());
-  const std::span<TileLayer<Key>> keys = session.round_keys(plan.layout, looks.size());
+  const trace::Span span("round", "samples", jittered.size());
+  const std::span<TileLayer<Key>> keys = session.round_keys(plan.layout, jittered.size());
   std::vector<TileLayer<Key>*> layers;
   for (TileLayer<Key>& layer : keys) {
     layer.set_depth_format(plan.depth_format);
     layers.push_back(&layer);
   }
-  times = draw_keys(session, plan, looks, layers);
+  times = draw_keys(session, plan, jittered, layers);
   std::vector<Frame> frames;
   std::vector<ShadedSample> samples;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
+  for (std::size_t i = 0; i < jittered.size(); ++i) {
     frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, {}});
-    if (looks[i].sample.homes != nullptr) bring_home(session, plan, *looks[i].sample.homes, frames.back());
+    if (jittered[i].sample.ownership != nullptr)
+      move_to_owners(session, plan, *jittered[i].sample.ownership, frames.back());
   }
-  if (looks.front().sample.at_home != nullptr) (*looks.front().sample.at_home)();
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    const FrameSample& sample = looks[i].sample;
-    samples.push_back({looks[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});
+  if (jittered.front().sample.before_shading != nullptr) (*jittered.front().sample.before_shading)();
+  for (std::size_t i = 0; i < jittered.size(); ++i) {
+    const FrameSample& sample = jittered[i].sample;
+    samples.push_back({jittered[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});
   }
   const trace::Span light("light");
   DeferredShader& shader = session.shader(plan.rays);
   shader.shade(samples, frames.front().owned);
   add_light(shader, times);
-  times.samples = static_cast<int>(looks.size());
+  times.samples = static_cast<int>(jittered.size());
   return frames;
 }
 

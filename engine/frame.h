@@ -45,9 +45,9 @@ void prepare(Session& session, const FramePlan& plan);
 /// Which frame of several that are one picture's samples.
 struct FrameSample {
   SampleNumber number;
-  std::optional<TileOwnership>* homes = nullptr;  ///< tiles are lit where they were in the first sample; null: anywhere
-  const PixelMask* wanted = nullptr;              ///< pixels that are lit; null: all. Others' radiance means nothing
-  const std::function<void()>* at_home = nullptr;  ///< called once tiles are at home, before any is lit
+  std::optional<TileOwnership>* ownership = nullptr;  ///< made by the first sample; null: keys do not move
+  const PixelMask* wanted = nullptr;  ///< pixels that are lit; null: all. Others' radiance means nothing
+  const std::function<void()>* before_shading = nullptr;  ///< called once the owners of tiles have their keys
 };
 
 /// One of several samples that are drawn together.
@@ -60,7 +60,7 @@ struct JitteredViews {
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
 /// Makes the keys of several samples by primary rays, one layer each, in place of rasterize(); all samples want the
 /// same pixels. Returns the ray counts.
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> looks,
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
                               std::span<TileLayer<Key>* const> keys);
 
 /// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
@@ -75,7 +75,7 @@ FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const V
 /// Collective: several samples step by step together, to the bit what make_frame gives one by one. What rays and lights
 /// look up for one sample is at hand for the next. At least one and at most max_round_size(); all want the same pixels.
 [[nodiscard]] std::vector<Frame> make_round(Session& session, const FramePlan& plan,
-                                            std::span<const JitteredViews> looks, FrameTimes& times);
+                                            std::span<const JitteredViews> jittered, FrameTimes& times);
 
 /// Collective: scene -> cluster -> raster -> compositing -> rt. views[i] is screen i of the plan's layout.
 [[nodiscard]] Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views,

@@ -13,7 +13,6 @@
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
-#include "image/filter.h"
 #include "rt/passes/pass_list.h"
 
 namespace hpr {
@@ -118,8 +117,7 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
   Sampling sampling = sampling_;
   if (budget_) {
     sampling.goal = {.samples = samples, .seconds = {}, .relmse = {}};
-    const auto least = static_cast<std::uint32_t>(min_samples(sampling.filter.value_or(PixelFilter::Box)));
-    if (samples < least) sampling.filter.reset();
+    if (samples < min_samples(sampling)) sampling.filter.reset();
   }
   sampler_.reset();  // frees its memory before the next one takes some
   sampler_ = std::make_unique<FrameSampler>(session_, plan_, sampling, number, keeps_keys_);
@@ -134,7 +132,7 @@ void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Pro
     sampler_.reset();
     plan_for({}, screens);
     sampler_ = std::make_unique<FrameSampler>(session_, plan_, resting_, number, false);
-    // A single look with nothing given up: there is nothing to add to it.
+    // A single sample with nothing given up: there is nothing to add to it.
     if (!resting_.sums()) (void)sampler_->draw(blocks_.views, {}, progress);
   }
   refining_ = true;

@@ -90,7 +90,7 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
 void FrameSampler::write(const CheckpointSettings& checkpoint) {
   const std::vector<int> to_root(plan_.layout.screens(), 0);
   film_.each_layer([&](auto& layer) {
-    if (layer.tiles() > 0) session_.assembler().assemble(session_.comm(), layer, homes_->mine(), to_root);
+    if (layer.tiles() > 0) session_.assembler().assemble(session_.comm(), layer, ownership_->mine(), to_root);
   });
   agree_on_failure(session_.comm(), [&] {
     if (session_.rank() != 0) return;
@@ -110,32 +110,33 @@ bool FrameSampler::try_to_write(const CheckpointSettings& checkpoint) {
   return true;
 }
 
-JitteredViews FrameSampler::look(std::span<const View> views, std::uint32_t number, double& weight) {
+JitteredViews FrameSampler::jittered_views(std::span<const View> views, std::uint32_t number, double& weight) {
   const FilterSample through = subpixel_sample(sampling_, {plan_.rays.seed, number_}, number);
-  JitteredViews look{{views.begin(), views.end()}, {{number_, number}, &homes_, adaptive_ ? &due_ : nullptr, nullptr}};
-  for (View& view : look.views) view.jitter = through.offset;
+  JitteredViews jittered{{views.begin(), views.end()},
+                         {{number_, number}, &ownership_, adaptive_ ? &due_ : nullptr, nullptr}};
+  for (View& view : jittered.views) view.jitter = through.offset;
   weight = through.weight;
-  return look;
+  return jittered;
 }
 
 void FrameSampler::scatter() {
   if (std::exchange(scattered_, true)) return;
   film_.each_layer([&](auto& layer) {
-    if (layer.tiles() > 0) homes_->scatter(session_.comm(), layer);
+    if (layer.tiles() > 0) ownership_->scatter(session_.comm(), layer);
   });
-  if (adaptive_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
+  if (adaptive_ && film_.samples() >= film_.pilot()) film_.mark_due(ownership_->mine(), due_);
 }
 
-/// What rank 0 has of a checkpoint is all its own until tiles have their homes.
+/// The tiles of a checkpoint are all rank 0's until the first sample gives them owners.
 std::vector<std::size_t> FrameSampler::tiles() const {
-  if (homes_ && scattered_) return homes_->mine();
+  if (ownership_ && scattered_) return ownership_->mine();
   return session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
 }
 
-/// The pixels of the first sample after a checkpoint was read are not known before its tiles are at home.
+/// The pixels of the first sample after a checkpoint was read are not known before its tiles have owners.
 void FrameSampler::choose_pixels() {
   if (adaptive_->is_stage_done()) adaptive_->start_stage(session_.comm(), film_, tiles(), session_.threads());
-  if (homes_ && scattered_ && film_.samples() >= film_.pilot()) film_.mark_due(homes_->mine(), due_);
+  if (ownership_ && scattered_ && film_.samples() >= film_.pilot()) film_.mark_due(ownership_->mine(), due_);
 }
 
 void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count) {
@@ -144,24 +145,24 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
     if (adaptive_->is_stage_done()) return;  // no pixel wants more
     count = std::min(count, scattered_ ? adaptive_->max_batch() : 1);
   }
-  const std::function<void()> at_home = [this] { scatter(); };
-  std::vector<JitteredViews> looks;
+  const std::function<void()> before_shading = [this] { scatter(); };
+  std::vector<JitteredViews> jittered;
   std::vector<double> weights(count);
   for (std::uint32_t i = 0; i < count; ++i) {
-    looks.push_back(look(views, film_.samples() + i, weights[i]));
-    looks.back().sample.at_home = &at_home;
+    jittered.push_back(jittered_views(views, film_.samples() + i, weights[i]));
+    jittered.back().sample.before_shading = &before_shading;
   }
   FrameTimes round_times;
   std::vector<Frame> frames;
   if (count > 1) {
-    frames = make_round(session_, plan_, looks, round_times);
+    frames = make_round(session_, plan_, jittered, round_times);
   } else {
-    frames.push_back(make_frame(session_, plan_, looks.front().views, &round_times, looks.front().sample));
+    frames.push_back(make_frame(session_, plan_, jittered.front().views, &round_times, jittered.front().sample));
   }
   std::vector<SampleLight> lights;
   lights.reserve(count);
   for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
-  film_.add(lights, weights, homes_->mine(), session_.threads());
+  film_.add(lights, weights, ownership_->mine(), session_.threads());
   if (adaptive_) adaptive_->added(count, film_);
   times_ += round_times;
   frame_.keys = frames.back().keys;
@@ -229,7 +230,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     if (try_to_write(checkpoint) && agreed.request == Request::Stop) return false;
     written.emplace();
   }
-  if (checkpoint.at_end && homes_) write(checkpoint);
+  if (checkpoint.at_end && ownership_) write(checkpoint);
   finish();
   return true;
 }
@@ -245,11 +246,10 @@ void FrameSampler::refine(std::span<const View> views) {
 }
 
 void FrameSampler::finish() {
-  if (!homes_) {  // a checkpoint that had reached the goal: rank 0 has it all
-    const std::vector<std::size_t> all = session_.rank() == 0 ? all_tiles(plan_.layout) : std::vector<std::size_t>{};
-    homes_.emplace(session_.comm(), plan_.layout, all);
+  if (!ownership_) {  // a checkpoint that had reached the goal: rank 0 has it all
+    ownership_.emplace(session_.comm(), plan_.layout, tiles());
   }
-  frame_.owned = homes_->mine();
+  frame_.owned = ownership_->mine();
   frame_.radiance = TileLayer<Rgb>(plan_.layout);
   frame_.aovs = AovLayers(plan_.layout, plan_.aovs);
   film_.resolve(frame_.owned, session_.threads(), frame_.radiance, frame_.aovs);

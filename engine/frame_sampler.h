@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -17,8 +16,8 @@ class Progress;
 class Session;
 struct CheckpointSettings;
 
-/// Makes a frame: draws samples, each a frame seen through its own place of the pixels, until the goal is reached, and
-/// takes their mean. A single look through the pixels' centres is that frame itself, and nothing is summed.
+/// Makes a frame: draws samples, each a frame seen through its own position in the pixels, until the goal is reached,
+/// and takes their mean. A single sample through the pixels' centres is that frame itself, and nothing is summed.
 class FrameSampler {
  public:
   /// `frame`: its number, by which its noise differs from other frames'. `keeps_keys`, and AOVs that need them:
@@ -48,9 +47,9 @@ class FrameSampler {
   void add_samples(std::span<const View> views, std::uint32_t count);
   /// How many samples to draw together.
   [[nodiscard]] std::uint32_t size_of_round();
-  /// When the first sample drawn since a checkpoint was read is at home: sums go to where their tiles are lit.
+  /// Once the first sample after a checkpoint was read has given tiles their owners: sends them the sums.
   void scatter();
-  [[nodiscard]] JitteredViews look(std::span<const View> views, std::uint32_t number, double& weight);
+  [[nodiscard]] JitteredViews jittered_views(std::span<const View> views, std::uint32_t number, double& weight);
   /// This rank's tiles.
   [[nodiscard]] std::vector<std::size_t> tiles() const;
   /// Before samples are drawn: which pixels they are for, in due_.
@@ -69,7 +68,7 @@ class FrameSampler {
   bool keeps_keys_;
   std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
   bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint
-  std::optional<TileOwnership> homes_;
+  std::optional<TileOwnership> ownership_;
   SampleProgress progress_;
   Frame frame_;
   FrameTimes times_;

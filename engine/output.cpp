@@ -50,13 +50,14 @@ Blocks cut_blocks(std::span<const View> screens) {
   return blocks;
 }
 
+namespace {
+
+/// Per block the rank that shows its screen.
 std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_by) {
   std::vector<int> owners;
   for (const std::size_t screen : blocks.screen_of) owners.push_back(shown_by[screen]);
   return owners;
 }
-
-namespace {
 
 void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, double exposure_stops) {
   const auto gain = static_cast<float>(std::exp2(exposure_stops));
@@ -65,8 +66,7 @@ void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, double 
   });
 }
 
-}  // namespace
-
+/// Converts a picture to display colors, `exposure_stops` brighter.
 Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops) {
   Image<Rgba8> display(radiance.size());
   parallel_for(threads, static_cast<std::size_t>(radiance.height()), [&](std::size_t row) {
@@ -76,6 +76,7 @@ Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure
   return display;
 }
 
+/// Converts a frame's tiles to display colors, `exposure_stops` brighter.
 TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops) {
   TileLayer<Rgba8> display(frame.radiance.layout());
   for (const std::size_t tile : frame.owned) display.set_active(tile);
@@ -84,6 +85,8 @@ TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_sto
   });
   return display;
 }
+
+}  // namespace
 
 RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, const FrameCost& cost) {
   CountingCommunicator& comm = session.comm();
@@ -135,10 +138,10 @@ std::vector<View> at_resolution(std::span<const View> screens, double scale) {
 
 namespace {
 
-/// The screen's size as the frame was made.
-Size made_size(const Blocks& blocks, std::size_t screen) {
+/// The first block of a screen; all of them have one lens and the size the screen was made in.
+const View& first_block(const Blocks& blocks, std::size_t screen) {
   const auto block = std::ranges::find(blocks.screen_of, screen) - blocks.screen_of.begin();
-  return blocks.views.at(static_cast<std::size_t>(block)).screen;
+  return blocks.views.at(static_cast<std::size_t>(block));
 }
 
 }  // namespace
@@ -149,7 +152,7 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
   const std::size_t screens = showing.sizes.size();
   bool as_made = true;
   for (std::size_t screen = 0; screen < screens; ++screen) {
-    as_made = as_made && made_size(blocks, screen) == showing.sizes[screen];
+    as_made = as_made && first_block(blocks, screen).screen == showing.sizes[screen];
   }
   const std::vector<int> owners = block_owners(blocks, showing.shown_by);
   TileLayer<Rgba8> display;  // a third of the bytes of the radiance, but no light to filter
@@ -253,9 +256,7 @@ void CollectedPicture::collect_radiance(Session& session, Frame& frame) const {
 
 std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,
                                  std::span<const Aov> aovs) {
-  // All blocks of a screen have one lens.
-  const auto block = std::ranges::find(blocks.screen_of, screen) - blocks.screen_of.begin();
-  const View& view = blocks.views.at(static_cast<std::size_t>(block));
+  const View& view = first_block(blocks, screen);
   std::vector<ExrLayer> layers;
   for (const Aov aov : aovs) {
     if (needs_keys(aov)) {

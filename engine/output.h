@@ -5,7 +5,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -34,9 +33,6 @@ struct Blocks {
 
 [[nodiscard]] Blocks cut_blocks(std::span<const View> screens);
 
-/// Per block the rank that shows its screen.
-[[nodiscard]] std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_by);
-
 /// One screen's pixels, put together from its blocks.
 template <typename Pixel>
 [[nodiscard]] Image<Pixel> join_blocks(const TileLayer<Pixel>& layer, const Blocks& blocks, std::size_t screen) {
@@ -50,11 +46,6 @@ template <typename Pixel>
   }
   return image;
 }
-
-/// Converts a frame's tiles to display colors, `exposure_stops` brighter.
-[[nodiscard]] TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops);
-/// Converts a picture to display colors, `exposure_stops` brighter.
-[[nodiscard]] Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops);
 
 /// Times and counts of a run of frames, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {

@@ -142,7 +142,7 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Rays through a grid of places of every view.
+/// Rays through a grid of points of every view.
 std::vector<Ray> camera_rays(std::span<const View> views) {
   constexpr double kRays = 1024.0;
   const int side = std::max(4, static_cast<int>(std::sqrt(kRays / static_cast<double>(views.size()))));
@@ -172,7 +172,7 @@ std::optional<double> open_sky(Session& session, const RaySettings& settings, st
   const Surfaces surfaces(session.scene(), space);
   const std::vector<Ray> rays_from_eye = camera_rays(views);
   RayBatch rays;
-  for (const Ray& look : rays_from_eye) rays.push(space.from_world(look.origin), look.direction, kInfinity);
+  for (const Ray& ray : rays_from_eye) rays.push(space.from_world(ray.origin), ray.direction, kInfinity);
   std::vector<std::uint32_t> seen(rays_from_eye.size());
   std::vector<std::uint8_t> blocked;
   scene.for_each(1, 1, [&](std::size_t) {
@@ -194,7 +194,7 @@ std::optional<double> open_sky(Session& session, const RaySettings& settings, st
   return static_cast<double>(std::ranges::count(blocked, 0)) / static_cast<double>(blocked.size());
 }
 
-/// A prime, so that the tiles looked at do not stand in columns.
+/// A prime, so that the tiles drawn do not stand in columns.
 constexpr std::size_t kEachTile = 7;
 
 double quickest_ms(TileLayer<Key>& keys, const std::function<void()>& draw) {
@@ -208,7 +208,7 @@ double quickest_ms(TileLayer<Key>& keys, const std::function<void()>& draw) {
   return best;
 }
 
-/// The plan with every seventh tile of its area; `share` is set to how much of the area that is.
+/// The plan with every seventh tile of its area; `fraction` is set to how much of the area that is.
 FramePlan sampled(const FramePlan& plan, double& fraction) {
   FramePlan some = plan;
   some.mine.area.clear();
@@ -247,9 +247,9 @@ std::string choose_primary(Session& session, FramePlan& plan, std::span<const Vi
     TileLayer<Key> keys(plan.layout);
     mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
     (void)session.primary_rays(plan.mine.objects, plan.rays);
-    const JitteredViews look{{views.begin(), views.end()}, {}};
+    const JitteredViews jittered{{views.begin(), views.end()}, {}};
     TileLayer<Key>* const layer = &keys;
-    const auto trace = [&] { (void)trace_primary(session, some, std::span(&look, 1), std::span(&layer, 1)); };
+    const auto trace = [&] { (void)trace_primary(session, some, std::span(&jittered, 1), std::span(&layer, 1)); };
     mine.rays_ms = quickest_ms(keys, trace) / fraction;
   }
   KeyTimes worst;

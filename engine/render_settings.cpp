@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <glm/trigonometric.hpp>
-#include <iterator>
 #include <optional>
 #include <variant>
 

@@ -19,7 +19,7 @@
 namespace hpr {
 namespace {
 
-/// A number of a screen that no wall has: what shakes the whole frame has a stream of its own.
+/// A number of a screen that no wall has: the jitter of the whole frame has a stream of its own.
 constexpr std::uint32_t kNoScreen = 0xFFFFFFFFU;
 
 /// An estimate from fewer samples may be small by chance.
@@ -279,7 +279,7 @@ void AdaptiveSampling::start_stage(Communicator& comm, Film& film, std::span<con
     choose(comm, film, tiles, threads);
     find_steps(comm, film, tiles, 0);
   } while (steps_.empty() && budget_after(budget_) > budget_);
-  if (!steps_.empty()) film.go_on_with(steps_.front().number);
+  if (!steps_.empty()) film.set_next_sample(steps_.front().number);
 }
 
 void AdaptiveSampling::choose(Communicator& comm, Film& film, std::span<const std::size_t> tiles, int threads) const {
@@ -307,7 +307,7 @@ void AdaptiveSampling::added(std::uint32_t count, Film& film) {
   done_ += count * step.pixels;
   if (step.number < step.end) return;
   steps_.erase(steps_.begin());
-  if (!steps_.empty()) film.go_on_with(steps_.front().number);
+  if (!steps_.empty()) film.set_next_sample(steps_.front().number);
 }
 
 std::uint32_t AdaptiveSampling::samples() const {

@@ -71,14 +71,14 @@ Session::HostResources Session::find_host_resources(Communicator& comm, int thre
 
 void Session::load(const std::function<Scene()>& load) {
   Scene scene = load_scene_of_all(comm_, load);
-  forget_scene();
+  release_scene();
   scene_ = std::move(scene);
   requirements_ = requirements_of(scene_);
   warn_of_scene();
 }
 
 void Session::change_scene(const std::function<void(Scene&)>& change) {
-  forget_scene();
+  release_scene();
   change(scene_);
   requirements_ = requirements_of(scene_);
 }
@@ -89,8 +89,8 @@ void Session::warn_of_scene() const {
     log::warning("{}: {}", printable(scene_.name), printable(warning, 400));
 }
 
-void Session::forget_scene() {
-  forget_rays();
+void Session::release_scene() {
+  release_rays();
   part_.reset();
   forwarding_.reset();
   traced_objects_.clear();
@@ -121,7 +121,7 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
   return *rasterizer_;
 }
 
-void Session::forget_rays() {
+void Session::release_rays() {
   shader_.reset();
   ray_settings_.reset();
   primary_rays_.reset();
@@ -131,14 +131,14 @@ void Session::forget_rays() {
 
 void Session::build_rays_by(const RayBuild& build) {
   if (build == ray_build_) return;
-  forget_rays();
+  release_rays();
   ray_build_ = build;
 }
 
 void Session::partition_rays(const RaySettings& settings) {
   build_rays_by(settings.build);
   if (settings.part == part_) return;
-  forget_rays();
+  release_rays();
   forwarding_.reset();
   part_ = settings.part;
   if (part_) forwarding_ = std::make_unique<RayForwarding>(comm_, scene_, RaySpace(scene_.bounds), *part_);

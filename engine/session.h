@@ -83,10 +83,10 @@ class Session {
   void compare_rasterizers();
   void warn_of_scene() const;
   /// Ends what was made of the scene.
-  void forget_scene();
+  void release_scene();
   /// Ends what rays meet where it was built in another way.
   void build_rays_by(const RayBuild& build);
-  void forget_rays();
+  void release_rays();
   [[nodiscard]] std::vector<SurfaceRange> covering_part() const;
   [[nodiscard]] std::unique_ptr<RayScene> build_ray_scene(std::span<const SurfaceRange> objects) const;
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,

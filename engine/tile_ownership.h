@@ -15,7 +15,7 @@ namespace hpr {
 /// is made by one rank in the order of the samples.
 class TileOwnership {
  public:
-  /// Collective. `owned`: this rank's tiles, ascending; the home of each from now on.
+  /// Collective. `owned`: this rank's tiles, ascending; this rank owns them from now on.
   TileOwnership(Communicator& comm, const FrameLayout& layout, std::span<const std::size_t> owned);
 
   /// This rank's, ascending.
@@ -23,10 +23,10 @@ class TileOwnership {
   /// Of any rank, ascending.
   [[nodiscard]] std::vector<std::size_t> of(int rank) const;
 
-  /// Collective over `comm`. The ranks own partitions of the same tiles as when this was made; after it `layer` holds
-  /// this rank's own tiles. One round of messages where any rank owns a remote tile, else only the one that finds that
-  /// out.
-  void bring(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> owned);
+  /// Collective over `comm`. `present`: the tiles whose keys this rank has in `layer`, which together with the other
+  /// ranks' are those of the constructor. Sends each to its owner; then `layer` holds the tiles of mine(). One round of
+  /// messages where any rank has a tile of another one, else only the round that finds that out.
+  void move_to_owners(Communicator& comm, TileLayer<Key>& layer, std::span<const std::size_t> present);
 
   /// Collective over `comm`. `layer` of rank 0 holds all tiles; after it every rank has its own of them.
   template <typename Pixel>
@@ -50,7 +50,7 @@ class TileOwnership {
 
  private:
   std::vector<std::size_t> mine_;
-  std::vector<int> home_;  ///< per tile; -1: nobody's
+  std::vector<int> owner_;  ///< per tile the rank; -1: none
   TileReader reader_;
 };
 

@@ -31,8 +31,8 @@ TEST(TileOwnership, KeysTravelToTheRankThatHadTheTileFirst) {
         }
         return owned;
       };
-      TileOwnership homes(comm, layout, owned_in(0));
-      EXPECT_EQ(homes.of(comm.rank()), homes.mine());
+      TileOwnership ownership(comm, layout, owned_in(0));
+      EXPECT_EQ(ownership.of(comm.rank()), ownership.mine());
       for (const int sample : {0, 1, 2}) {
         TileLayer<Key> layer(layout);
         for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
@@ -42,8 +42,8 @@ TEST(TileOwnership, KeysTravelToTheRankThatHadTheTileFirst) {
           layer.tile(tile)[7] = key_of(tile, own ? sample : 50);
           layer.set_active(tile);
         }
-        homes.bring(comm, layer, owned_in(sample));
-        for (const std::size_t tile : homes.mine()) {
+        ownership.move_to_owners(comm, layer, owned_in(sample));
+        for (const std::size_t tile : ownership.mine()) {
           EXPECT_EQ(layer.active(tile), tile % 5 != 0);
           EXPECT_EQ(layer.tile(tile)[7], tile % 5 == 0 ? kNoKey : key_of(tile, sample)) << tile << ' ' << sample;
         }
@@ -58,7 +58,7 @@ TEST(TileOwnership, ScatteringGivesEachRankItsTiles) {
     std::vector<std::size_t> owned;
     for (std::size_t tile = static_cast<std::size_t>(comm.rank()); tile < layout.tiles(); tile += 3)
       owned.push_back(tile);
-    TileOwnership homes(comm, layout, owned);
+    TileOwnership ownership(comm, layout, owned);
     TileLayer<double> layer(layout);
     if (comm.rank() == 0) {
       for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
@@ -66,7 +66,7 @@ TEST(TileOwnership, ScatteringGivesEachRankItsTiles) {
         layer.tile(tile)[3] = static_cast<double>(tile) + 0.1;
       }
     }
-    homes.scatter(comm, layer);
+    ownership.scatter(comm, layer);
     for (const std::size_t tile : owned) EXPECT_EQ(layer.tile(tile)[3], static_cast<double>(tile) + 0.1);
   });
 }

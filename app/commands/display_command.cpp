@@ -11,7 +11,6 @@
 #include "core/log.h"
 #include "core/signals.h"
 #include "core/text.h"
-#include "engine/output.h"
 #include "image/image_io.h"
 #include "walls/config/wall_file.h"
 #include "walls/link/display_process.h"

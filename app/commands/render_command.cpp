@@ -124,15 +124,15 @@ class RenderCommand final : public Command {
     if (resume_ && chosen.primary == Primary::Auto) chosen.primary = primary_before(session.comm());
     FramePlan plan = plan_frame(session, chosen, blocks.views);
     plan.lit = !files_.picture.empty() || !report_.stats.empty();
-    const bool speaks = session.comm().rank() == 0;
-    if (report_.explain && speaks) print_plan(plan);
+    const bool is_root = session.comm().rank() == 0;
+    if (report_.explain && is_root) print_plan(plan);
     if (files_.picture.empty() && files_.raw.empty() && report_.stats.empty()) return ExitCode::Done;
 
     prepare(session, plan);
     const Stopwatch watch;
     const std::size_t sent_before = session.comm().bytes_sent();
     FrameSampler sampler(session, plan, sampling, 0, !files_.raw.empty());
-    Progress progress(speaks ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
+    Progress progress(is_root ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
     std::optional<RunIdentity> identity;
     const CheckpointSettings checkpoint{checkpoint_, resume_, [&] {
                                           if (!identity)
@@ -148,11 +148,11 @@ class RenderCommand final : public Command {
     stats.relmse = sampler.sample_progress().relmse;
     stats.samples_in_all = static_cast<int>(sampler.sample_progress().samples);
     agree_on_failure(session.comm(), [&] {
-      if (!speaks) return;
+      if (!is_root) return;
       picture.write(session.scene().name);
       if (!report_.stats.empty()) write_stats(report_.stats, stats);
     });
-    if (speaks) {
+    if (is_root) {
       log::info("{} triangles, {}x{} pixels, {} rank{}: {:.1f} ms{}", session.scene().triangles, size.width,
                 size.height, stats.ranks, stats.ranks == 1 ? "" : "s", stats.ms,
                 sampling.sums() ? fmt::format(", {} samples", sampler.sample_progress().samples) : "");

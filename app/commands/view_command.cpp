@@ -1,4 +1,3 @@
-
 #include "app/command.h"
 #include "app/commands/wall_run.h"
 #include "core/job_environment.h"

@@ -76,8 +76,8 @@ struct RankNeed {
 /// Of each picture that is drawn: its keys, its radiance, the display colours that travel, and the screen's picture.
 constexpr std::uint64_t kBytesPerPixel = sizeof(Key) + sizeof(Rgb) + 2 * sizeof(Rgba8);
 
-/// Rays draw curved screens' own pixels; what OpenGL would need for them stands with their figures.
-/// Per rank that is named, and per node or the whole wall for the screens that name none.
+/// The memory of each rank that screens name, and of each node or the whole wall for the screens that name none. Curved
+/// screens count by their own pixels, which rays draw; what OpenGL would need for them stands with their figures.
 std::vector<RankNeed> needs_of(const Wall& wall) {
   std::vector<RankNeed> needs;
   std::size_t last = wall.screens.size();

@@ -2,14 +2,13 @@
 
 #include <charconv>
 #include <cmath>
-#include <filesystem>
+#include <optional>
 
 #include "app/command.h"
 #include "app/results.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "engine/output.h"
 #include "walls/config/import/importer.h"
 #include "walls/config/wall_file.h"
 #include "walls/config/wall_template.h"

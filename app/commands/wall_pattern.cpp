@@ -10,7 +10,6 @@
 #include "cluster/transport/local_communicator.h"
 #include "core/progress.h"
 #include "core/signals.h"
-#include "engine/output.h"
 #include "engine/wall/wall_displays.h"
 #include "walls/config/wall_file.h"
 #include "walls/drawing/pattern.h"

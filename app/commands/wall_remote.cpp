@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <iomanip>
 #include <optional>
 #include <sstream>
 
 #include "app/command.h"
-#include "cluster/transport/communicator.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
@@ -27,7 +25,9 @@ class WallRemoteCommand : public Command {
   }
 
  protected:
-  [[nodiscard]] std::string send_line(const std::string& line) const { return send_command(chosen(), line, timeout()); }
+  [[nodiscard]] std::string send_line(const std::string& line) const {
+    return send_command(chosen(), line, to_milliseconds(parse_time_limit("--wait", wait_, "10s")));
+  }
   [[nodiscard]] RunningWall chosen() const {
     const std::vector<RunningWall> walls = running_walls();
     if (walls.empty()) {
@@ -49,14 +49,6 @@ class WallRemoteCommand : public Command {
   }
 
  private:
-  [[nodiscard]] std::chrono::milliseconds timeout() const {
-    const auto wait = parse_duration(wait_);
-    if (!wait || wait->count() <= 0) {
-      throw Error(ExitCode::Usage, fmt::format("--wait: '{}' is no duration", printable(wait_)), "write e.g. 10s");
-    }
-    return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*wait, kMaxWait));
-  }
-
   std::string run_;
   std::string wait_ = "10s";
 };

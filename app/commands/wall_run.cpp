@@ -93,11 +93,11 @@ void write_results(const WallJob& job, const WallDriver& driver, const RunStats&
 bool wait_for_work(const WallJob& job, WallDriver& driver) {
   constexpr std::chrono::milliseconds kBetweenPolls{10};
   // Displays outside the job take a run that sends nothing for one that is gone. Counted, so that all ranks agree.
-  constexpr int kPollsBeforeSignOfLife = 30;
+  constexpr int kPollsBeforeHeartbeat = 30;
   for (int poll = 0;; ++poll) {
     if (!driver.follow_viewers() || !driver.apply_commands()) return false;
     if (!job.open_ended() || !driver.settled()) return true;
-    if (job.link && poll == kPollsBeforeSignOfLife) return true;
+    if (job.link && poll == kPollsBeforeHeartbeat) return true;
     std::this_thread::sleep_for(kBetweenPolls);
   }
 }

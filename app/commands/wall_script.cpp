@@ -6,7 +6,6 @@
 #include "app/command.h"
 #include "app/results.h"
 #include "core/text.h"
-#include "engine/output.h"
 #include "walls/config/wall_file.h"
 #include "walls/config/wall_template.h"
 #include "walls/displays/display.h"

@@ -218,19 +218,19 @@ class ConsoleCommand final : public Command {
                        Session session(comm, globals.session(),
                                        [&] { return load_scene(source_, settings_, globals); });
                        Console console(session, globals, settings_, {extent->first, extent->second});
-                       return converse(session.comm(), console);
+                       return run_lines(session.comm(), console);
                      },
                      {.input = StandardInput::OfRank0});
   }
 
  private:
-  ExitCode converse(Communicator& comm, Console& console) {
-    const bool speaks = comm.rank() == 0;
+  ExitCode run_lines(Communicator& comm, Console& console) {
+    const bool is_root = comm.rank() == 0;
     std::optional<LineSource> source;
     agree_on_failure(comm, [&] {
-      if (speaks) source.emplace(LineSource::Options{true, listen_});
+      if (is_root) source.emplace(LineSource::Options{true, listen_});
     });
-    if (speaks) report_address(*source);
+    if (is_root) report_address(*source);
     ExitCode worst = ExitCode::Done;
     while (!console.quits()) {
       const std::optional<Line> line = next_line(comm, source ? &*source : nullptr);

@@ -54,8 +54,12 @@ std::string proc_value(const char* path, std::string_view key) {
   return {};
 }
 
+std::string cpu_model() {
+  return proc_value("/proc/cpuinfo", "model name");
+}
+
 Finding check_cpu() {
-  const std::string model = proc_value("/proc/cpuinfo", "model name");
+  const std::string model = cpu_model();
   const int cores = job_cores();
   const bool avx2 = __builtin_cpu_supports("avx2") != 0;
   const char* const isa = __builtin_cpu_supports("avx512f") != 0 ? "AVX-512" : avx2 ? "AVX2" : "SSE";
@@ -218,20 +222,6 @@ std::vector<Check> graphics_checks() {
   return checks;
 }
 
-namespace {
-
-std::string cpu_model() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    if (!line.starts_with("model name")) continue;
-    const auto colon = line.find(": ");
-    if (colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown";
-}
-
-}  // namespace
-
 int job_cores() {
   cpu_set_t cores;
   CPU_ZERO(&cores);
@@ -246,7 +236,8 @@ int job_cores() {
 }
 
 Machine this_machine() {
-  return {cpu_model(), job_cores(), mpi_version()};
+  const std::string model = cpu_model();
+  return {model.empty() ? "unknown" : model, job_cores(), mpi_version()};
 }
 
 }  // namespace hpr

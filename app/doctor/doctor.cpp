@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <exception>
 #include <string_view>
-#include <utility>
 
 #include "app/command.h"
 #include "core/error.h"

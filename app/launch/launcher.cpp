@@ -196,16 +196,12 @@ std::vector<pid_t> with_descendants(pid_t process) {
   return found;
 }
 
-}  // namespace
-
 void kill_with_descendants(pid_t process) {
   ::kill(process, SIGSTOP);  // starts nobody more while they are listed
   const std::vector<pid_t> all = with_descendants(process);
   if (::getpgid(process) == process) ::kill(-process, SIGKILL);
   for (const pid_t one : all) ::kill(one, SIGKILL);
 }
-
-namespace {
 
 /// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.
 constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
@@ -254,6 +250,11 @@ constexpr std::chrono::seconds kMaxEnd{10};
   ::_exit(127);
 }
 
+/// The path of the running program.
+std::string program_path() {
+  return std::filesystem::read_symlink("/proc/self/exe").string();
+}
+
 /// False with errno. A reader that stands still keeps nobody who wants to end this.
 bool write_all(int file, std::string_view text) {
   while (!text.empty()) {
@@ -269,24 +270,24 @@ bool write_all(int file, std::string_view text) {
 /// Removes the mark of the start from the front of a job's output.
 class StartMark {
  public:
-  /// What of `text`, the next piece of that, is not the mark. Meaningful until the next call.
+  /// Returns what of `text`, the next piece of the output, is not the mark; valid until the next call.
   std::string_view take(std::string_view text) {
-    if (looked_) return text;
+    if (has_output_) return text;
     front_.append(text);
     const std::size_t length = std::min(front_.size(), kStartMark.size());
     const bool like = front_.compare(0, length, kStartMark, 0, length) == 0;
     if (like && length < kStartMark.size()) return {};
-    looked_ = true;
+    has_output_ = true;
     PassedSignals::note_start();
     return std::string_view(front_).substr(like ? length : 0);
   }
 
   /// Whether the job has written any output. For ranks on other hosts that may be the only sign of a start.
-  [[nodiscard]] bool has_output() const { return looked_; }
+  [[nodiscard]] bool has_output() const { return has_output_; }
 
  private:
   std::string front_;
-  bool looked_ = false;
+  bool has_output_ = false;
 };
 
 /// A job from its start to its end. Its standard output is collected, or copied to ours as it arrives: mpiexec
@@ -357,13 +358,13 @@ class RunningJob {
 
   void enforce_limits() {
     const Clock::time_point now = Clock::now();
-    if (!notified_ && (PassedSignals::ends() || output_error_ != 0)) notified_ = now;
-    if (!notified_ && !mark_.has_output() && now - begin_ > start_limit_) {
+    if (!end_requested_at_ && (PassedSignals::ends() || output_error_ != 0)) end_requested_at_ = now;
+    if (!end_requested_at_ && !mark_.has_output() && now - begin_ > start_limit_) {
       late_ = true;
-      notified_ = now;
+      end_requested_at_ = now;
       ::kill(child_, SIGTERM);
     }
-    if (!notified_ || killed_ || now - *notified_ <= end_limit_) return;
+    if (!end_requested_at_ || killed_ || now - *end_requested_at_ <= end_limit_) return;
     log::warning("mpiexec has not ended {:g} s after it was told to, and is killed",
                  std::chrono::duration<double>(end_limit_).count());
     kill_with_descendants(child_);
@@ -377,7 +378,7 @@ class RunningJob {
   std::chrono::nanoseconds end_limit_;
   StartMark mark_;
   Clock::time_point begin_ = Clock::now();
-  std::optional<Clock::time_point> notified_;  ///< to end
+  std::optional<Clock::time_point> end_requested_at_;  ///< when it was sent SIGTERM, or another signal that ends it
   int output_error_ = 0;
   bool late_ = false;
   bool killed_ = false;
@@ -402,10 +403,6 @@ void notify_launcher() {
   if (!launched_by_hpr()) return;
   std::fwrite(kStartMark.data(), 1, kStartMark.size(), stdout);
   std::fflush(stdout);
-}
-
-std::string program_path() {
-  return std::filesystem::read_symlink("/proc/self/exe").string();
 }
 
 int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options) {

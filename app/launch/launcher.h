@@ -50,7 +50,4 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
 /// The first executable file of this name on the PATH.
 [[nodiscard]] std::optional<std::filesystem::path> find_on_path(std::string_view program);
 
-/// The path of the running program.
-[[nodiscard]] std::string program_path();
-
 }  // namespace hpr

@@ -25,7 +25,7 @@
 namespace hpr {
 namespace {
 
-/// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 speaks first, so
+/// A rank that fails alone would leave its peers waiting: the whole job ends with its code. Rank 0 prints first, so
 /// that an error all ranks agreed on is printed once.
 [[noreturn]] void abort_job(int rank, const Error& error) {
   if (rank != 0) std::this_thread::sleep_for(std::chrono::milliseconds(300));

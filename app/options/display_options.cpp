@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <vector>
 
 #include "app/options/render_options.h"
-#include "cluster/transport/communicator.h"
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/text.h"
@@ -23,16 +21,8 @@ std::string name_in(const std::string& display) {
   return display.substr(0, display.find('='));
 }
 
-std::chrono::milliseconds time_limit(const std::string& text) {
-  const auto limit = parse_duration(text);
-  if (!limit || *limit <= std::chrono::nanoseconds::zero()) {
-    throw Error(ExitCode::Usage, fmt::format("--pipe-timeout: '{}' is no duration", printable(text)), "write e.g. 30s");
-  }
-  return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(*limit, kMaxWait));
-}
-
 /// At once, also where stdout is a pipe or file: somebody waits for it.
-void say(const std::string& line) {
+void print_line(const std::string& line) {
   fmt::print("{}\n", line);
   std::fflush(stdout);
 }
@@ -88,9 +78,9 @@ DisplayOptions DisplayFlags::options(const Globals& globals) const {
                .format = parse_pipe_format(pipe_format),
                .screen = pipe_screen,
                .frames_per_second = pipe_fps,
-               .time_limit = time_limit(pipe_timeout)};
+               .time_limit = to_milliseconds(parse_time_limit("--pipe-timeout", pipe_timeout, "30s"))};
   if (value != std::string::npos) made.web_address = display.substr(value + 1);
-  made.announce = say;
+  made.announce = print_line;
   return made;
 }
 

@@ -23,6 +23,19 @@ std::string whole_number_problem(const std::string& text) {
 
 }  // namespace
 
+std::chrono::nanoseconds parse_time_limit(std::string_view option, const std::string& text, std::string_view example) {
+  const auto limit = parse_duration(text);
+  if (!limit || *limit <= std::chrono::nanoseconds::zero()) {
+    throw Error(ExitCode::Usage, fmt::format("{}: '{}' is no duration", option, printable(text)),
+                fmt::format("write e.g. {}", example));
+  }
+  return *limit;
+}
+
+std::chrono::milliseconds to_milliseconds(std::chrono::nanoseconds limit) {
+  return std::chrono::ceil<std::chrono::milliseconds>(std::min<std::chrono::nanoseconds>(limit, kMaxWait));
+}
+
 void Globals::declare(const OptionSet& options) {
   const std::string everywhere = "Everywhere";
   options
@@ -76,12 +89,7 @@ ImageLimits Globals::picture_limits() const {
 }
 
 std::chrono::nanoseconds Globals::hang_limit() const {
-  if (hang_timeout.empty()) return kHangTimeout;
-  const auto limit = parse_duration(hang_timeout);
-  if (!limit || *limit <= std::chrono::nanoseconds::zero()) {
-    throw Error(ExitCode::Usage, fmt::format("--hang-timeout: '{}' is no duration", hang_timeout), "write e.g. 30s");
-  }
-  return *limit;
+  return hang_timeout.empty() ? kHangTimeout : parse_time_limit("--hang-timeout", hang_timeout, "30s");
 }
 
 SessionSettings Globals::session() const {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/options/option_set.h"
@@ -12,6 +13,12 @@
 namespace hpr {
 
 struct SessionSettings;
+
+/// A time above 0 as `option` has it: "30s". Throws Error (Usage) that shows `example`.
+[[nodiscard]] std::chrono::nanoseconds parse_time_limit(std::string_view option, const std::string& text,
+                                                        std::string_view example);
+/// A time limit in whole milliseconds, rounded up, at most kMaxWait.
+[[nodiscard]] std::chrono::milliseconds to_milliseconds(std::chrono::nanoseconds limit);
 
 /// The options every command has.
 struct Globals {

@@ -84,11 +84,6 @@ Option Option::check(const std::function<std::string(const std::string&)>& probl
   return *this;
 }
 
-Option Option::parts(int count) const {
-  option_->delimiter(',')->expected(count);
-  return *this;
-}
-
 Option Option::list() const {
   option_->delimiter(',');
   return *this;
@@ -128,10 +123,6 @@ std::string Option::name() const {
 }
 
 Option OptionSet::option(const std::string& names, std::string& value, const std::string& help) const {
-  return Option(app_->add_option(names, value, help));
-}
-
-Option OptionSet::option(const std::string& names, std::optional<std::string>& value, const std::string& help) const {
   return Option(app_->add_option(names, value, help));
 }
 

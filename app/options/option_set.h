@@ -42,8 +42,6 @@ class Option {
   Option choices(const std::vector<std::string>& names) const;
   /// `problem` returns what is wrong with a value; an empty text: nothing.
   Option check(const std::function<std::string(const std::string&)>& problem) const;
-  /// One value of `count` parts, separated by commas.
-  Option parts(int count) const;
   /// A list whose entries are separated by commas.
   Option list() const;
   /// May be given several times; each time with one value.
@@ -80,7 +78,6 @@ class OptionSet {
 
   /// Declares an option, "-o,--output", or a positional, "scene". Its value goes to `value`, which outlives parsing.
   Option option(const std::string& names, std::string& value, const std::string& help) const;
-  Option option(const std::string& names, std::optional<std::string>& value, const std::string& help) const;
   Option option(const std::string& names, int& value, const std::string& help) const;
   Option option(const std::string& names, std::optional<int>& value, const std::string& help) const;
   Option option(const std::string& names, std::uint32_t& value, const std::string& help) const;

@@ -4,7 +4,6 @@
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -45,11 +44,12 @@ class CommandTable {
 /// Throws Error (Usage) that shows how the command is written.
 [[noreturn]] void refuse(const std::string& problem, const std::string& example);
 
-/// A finite number; three of them, "X,Y,Z". Throw Error (Usage).
-[[nodiscard]] double number_of(const std::string& word);
-[[nodiscard]] glm::dvec3 point_of(const std::string& word);
+/// A finite number. Throws Error (Usage).
+[[nodiscard]] double number_of(const std::string& text);
+/// "X,Y,Z": three finite numbers. Throws Error (Usage).
+[[nodiscard]] glm::dvec3 point_of(const std::string& text);
 
-/// Of length 1, however long it was. Throws Error (Usage) for 0,0,0.
+/// The direction to `point`, of length 1. Throws Error (Usage) for 0,0,0.
 [[nodiscard]] glm::dvec3 direction_of(const glm::dvec3& point);
 
 /// Whether an error concerns one command of a session only and leaves the session as it was.

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <glm/vector_relational.hpp>
 
 #include "core/error.h"

@@ -28,6 +28,13 @@ constexpr std::string_view kPrefix = "wall-";
 constexpr std::string_view kSuffix = ".sock";
 constexpr std::string_view kRefused = "error ";  ///< then the exit code's number, and why
 
+/// socket_folder(), made if missing: where running walls of this user are reached, and nobody else may write. Throws
+/// Error (Io) when it cannot be made, or is another's.
+std::filesystem::path control_folder() {
+  make_private_folder(socket_folder());
+  return socket_folder();
+}
+
 /// To the run that listens there. Throws LinkError.
 Socket connect_to(const std::filesystem::path& path) {
   const LinkAddress address = socket_address(path);
@@ -86,19 +93,14 @@ std::string last_line(const std::string& text) {
 
 }  // namespace
 
-std::filesystem::path control_folder() {
-  make_private_folder(socket_folder());
-  return socket_folder();
-}
-
 RunControl::RunControl(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load,
                        std::function<std::string()> status, std::function<void()> apply,
-                       std::function<void(const std::string&)> remember)
+                       std::function<void(const std::string&)> record)
     : session_(session),
       controls_(session, settings, seed, std::move(load), table_),
       settings_(settings),
       apply_(std::move(apply)),
-      remember_(std::move(remember)) {
+      record_(std::move(record)) {
   table_.add({"status", "", "what the wall shows and how long it takes, as JSON",
               [this, status = std::move(status)](Arguments) {
                 return session_.comm().rank() == 0 ? status() : std::string();
@@ -129,7 +131,7 @@ std::string RunControl::apply_command(const std::string& line) {
     apply_();
     throw;
   }
-  remember_(line);
+  record_(line);
   return answer;
 }
 

@@ -12,21 +12,17 @@
 
 namespace hpr {
 
-/// socket_folder(), made if missing: where running walls of this user are reached, and nobody else may write. Throws
-/// Error (Io) when it cannot be made, or is another's.
-[[nodiscard]] std::filesystem::path control_folder();
-
 /// Runs the commands that other processes send to a running wall, between frames: every command of a console but those
 /// about pictures, and `status` and `stop`.
 class RunControl {
  public:
   /// Collective. Session and settings outlive this. `settings`: what the commands change. `status`: one JSON document;
   /// called on rank 0. `apply`: called on all ranks after every line that changed something; where it throws what
-  /// is_recoverable, the settings are put back and it is called again. `remember`: called with every line that could be
+  /// is_recoverable, the settings are put back and it is called again. `record`: called with every line that could be
   /// applied.
   RunControl(Session& session, RenderSettings& settings, std::uint64_t seed, SceneLoader load,
              std::function<std::string()> status, std::function<void()> apply,
-             std::function<void(const std::string& line)> remember);
+             std::function<void(const std::string& line)> record);
 
   /// See Controls::reject_change().
   void reject_change(const std::string& name, const std::string& why) { controls_.reject_change(name, why); }
@@ -45,7 +41,7 @@ class RunControl {
   Controls controls_;
   RenderSettings& settings_;
   std::function<void()> apply_;
-  std::function<void(const std::string&)> remember_;
+  std::function<void(const std::string&)> record_;
   std::optional<LineSource> source_;  ///< on rank 0
   bool stops_ = false;
 };

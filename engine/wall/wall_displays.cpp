@@ -41,7 +41,7 @@ std::vector<int> ranks_near(const Wall& wall, const WallScreen& screen, const st
 }
 
 /// The first screen before this one that shows in the same window.
-std::optional<std::size_t> window_mate(const Wall& wall, std::size_t screen) {
+std::optional<std::size_t> first_of_window(const Wall& wall, std::size_t screen) {
   if (wall.screens[screen].window.empty()) return std::nullopt;
   for (std::size_t before = 0; before < screen; ++before) {
     if (wall.screens[before].window == wall.screens[screen].window) return before;
@@ -52,11 +52,11 @@ std::optional<std::size_t> window_mate(const Wall& wall, std::size_t screen) {
 /// Screens that are shown by another rank than the wall file names.
 struct Misplaced {
   std::vector<std::string> hosts;  ///< without a rank, each once
-  std::size_t homeless = 0;        ///< screens of those hosts
+  std::size_t screens = 0;         ///< screens of those hosts
   std::vector<int> beyond;         ///< ranks the job does not have
 
-  void add_homeless(const std::string& host) {
-    ++homeless;
+  void add_host(const std::string& host) {
+    ++screens;
     if (std::ranges::find(hosts, host) == hosts.end()) hosts.push_back(host);
   }
 
@@ -71,8 +71,8 @@ struct Misplaced {
     const std::size_t named = std::min(hosts.size(), kMaxNames);
     log::warning("no rank runs on {}{}: others show {} screen{}",
                  fmt::join(hosts.begin(), hosts.begin() + static_cast<std::ptrdiff_t>(named), ", "),
-                 hosts.size() > named ? fmt::format(" and {} more hosts", hosts.size() - named) : "", homeless,
-                 homeless == 1 ? "" : "s");
+                 hosts.size() > named ? fmt::format(" and {} more hosts", hosts.size() - named) : "", screens,
+                 screens == 1 ? "" : "s");
   }
 };
 
@@ -89,8 +89,8 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
   Misplaced misplaced;
   for (std::size_t i = 0; i < wall.screens.size(); ++i) {
     const WallScreen& screen = wall.screens[i];
-    if (const auto mate = window_mate(wall, i)) {
-      owners.push_back(owners[*mate]);
+    if (const auto first = first_of_window(wall, i)) {
+      owners.push_back(owners[*first]);
       continue;
     }
     const std::vector<int> near = ranks_near(wall, screen, hosts);
@@ -104,7 +104,7 @@ std::vector<int> owners_of(const Wall& wall, const std::vector<std::string>& hos
     if (screen.rank >= ranks) misplaced.beyond.push_back(screen.rank);
     const auto node = std::ranges::find(wall.nodes, screen.node, &WallNode::id);
     const bool any_host = node == wall.nodes.end() || node->host == "localhost" || node->host == "*";
-    if (screen.rank < 0 && near.empty() && !any_host && !remote) misplaced.add_homeless(node->host);
+    if (screen.rank < 0 && near.empty() && !any_host && !remote) misplaced.add_host(node->host);
   }
   misplaced.warn(ranks);
   return owners;

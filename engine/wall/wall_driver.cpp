@@ -38,13 +38,9 @@ std::vector<int> picture_owners(const Wall& wall, const std::vector<int>& owners
   return shown_by;
 }
 
-bool has_points(const WallScreen& screen) {
-  return screen.warp.points != nullptr;
-}
-
 /// OpenGL needs other pictures than rays where screens are no planes, so the choice cannot be left to a measurement.
 FrameSettings settings_for(const Wall& wall, FrameSettings settings) {
-  const bool curved = std::ranges::any_of(wall.screens, has_points);
+  const bool curved = std::ranges::any_of(wall.screens, has_position_map);
   if (curved && settings.primary == Primary::Auto) settings.primary = Primary::Rays;
   return settings;
 }
@@ -120,10 +116,10 @@ std::vector<std::string> WallDriver::explained() const {
   std::size_t flat = 0;
   const std::vector<ScreenEye> pictures = screen_eyes(wall_);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    if (has_points(wall_.screens[pictures[i].screen])) flat += curved_->sizes()[i].area();
+    if (has_position_map(wall_.screens[pictures[i].screen])) flat += curved_->sizes()[i].area();
   }
   if (flat == 0) return lines;
-  const auto count = std::ranges::count_if(wall_.screens, has_points);
+  const auto count = std::ranges::count_if(wall_.screens, has_position_map);
   const std::string what = fmt::format("warp: position maps of {} screen{}", count, count == 1 ? "" : "s");
   lines.push_back(plan().primary == Primary::Rays
                       ? what + ", rays go through their points"
@@ -229,13 +225,12 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const trace::Span span("frame", "number", number);
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
-  last_heads_ = heads_.at(number);
-  const std::vector<View> views = screens_in(number, last_heads_);
+  const std::vector<View> views = screens_in(number, heads_.at(number));
   Frame& frame = frames_->make(curved_->drawn(views), number, progress);
   std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
   curved_->finish(views, pictures, session_.threads());
   pictures_ = compose_screens(wall_, std::move(pictures));
-  copies_ = monitors_.draw(session_.comm(), pictures_, owners_);
+  monitor_pictures_ = monitors_.draw(session_.comm(), pictures_, owners_);
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   agree_on_failure(session_.comm(), [&] { show(number); });
   record(number);
@@ -309,7 +304,8 @@ void WallDriver::show(std::uint64_t number) {
     return;
   }
   std::vector<MonitorPicture> monitors;
-  for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) monitors.push_back({monitor, copies_[monitor]});
+  for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor)
+    monitors.push_back({monitor, monitor_pictures_[monitor]});
   display_->show({number, mine, monitors});
 }
 
@@ -346,12 +342,12 @@ void WallDriver::record(std::uint64_t number) {
   if (frames_->report()) frame.budget = to_record(*frames_->report());
   frame.slowest = slowest_of(session_, *frames_, hosts_);
   frame.heads = heads_.report();
-  for (std::size_t monitor = 0; monitor < copies_.size(); ++monitor) {
-    frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, copies_[monitor], ScreenState::Fresh));
+  for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor) {
+    frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, monitor_pictures_[monitor], ScreenState::Fresh));
   }
   // Of an open-ended run only now and then: that it gets on is all that counts.
-  constexpr std::uint64_t kSignOfLife = 1000;
-  if (journal_ && (job_.frames || number % kSignOfLife == 0)) journal_->add_frame(to_json(frame));
+  constexpr std::uint64_t kFramesPerEntry = 1000;
+  if (journal_ && (job_.frames || number % kFramesPerEntry == 0)) journal_->add_frame(to_json(frame));
   // An open-ended run keeps its last frames only.
   constexpr std::size_t kMaxRecords = 10'000;
   if (!job_.frames && manifest_.frames.size() == kMaxRecords) {
@@ -365,8 +361,8 @@ std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
   // Displays have not reported the latest frames yet.
   const std::uint64_t awaited = job_.link ? static_cast<std::uint64_t>(job_.link->in_flight) + 1 : 0;
-  const std::vector<ScreenState> unheard(owners_.size(), ScreenState::Fresh);
-  if (!remote_ || last < first_frame_ + awaited) return unheard;
+  const std::vector<ScreenState> unreported(owners_.size(), ScreenState::Fresh);
+  if (!remote_ || last < first_frame_ + awaited) return unreported;
   return remote_->outcome(last - awaited).screens;
 }
 

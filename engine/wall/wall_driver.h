@@ -98,13 +98,12 @@ class WallDriver {
   std::optional<CurvedScreens> curved_;
   std::optional<FrameMaker> frames_;
   std::unique_ptr<Display> display_;
-  std::unique_ptr<WallSender> remote_;  ///< in place of a display, to those outside the job
-  std::vector<Image<Rgba8>> pictures_;  ///< per screen; empty where another rank shows it
-  std::vector<Image<Rgba8>> copies_;    ///< per monitor, on rank 0
+  std::unique_ptr<WallSender> remote_;          ///< in place of a display, to those outside the job
+  std::vector<Image<Rgba8>> pictures_;          ///< per screen; empty where another rank shows it
+  std::vector<Image<Rgba8>> monitor_pictures_;  ///< per monitor, on rank 0
   RunManifest manifest_;
   FrameCost last_cost_;
-  std::vector<HeadPose> last_heads_;
-  std::optional<RunJournal> journal_;  ///< on rank 0, where a supervisor looks on
+  std::optional<RunJournal> journal_;  ///< on rank 0 of a job that is started again when it is lost
   std::uint64_t first_frame_ = 0;
   bool interrupted_ = false;
 };

@@ -26,8 +26,7 @@ void check_frames(const WallJob& job, const FrameSettings& settings) {
     throw Error(ExitCode::Usage, "--aov and --raw are of a last frame with all its pixels",
                 "say how many there are with --frames, and leave --target-ms out");
   }
-  const bool curved =
-      std::ranges::any_of(job.wall.screens, [](const WallScreen& screen) { return screen.warp.points != nullptr; });
+  const bool curved = std::ranges::any_of(job.wall.screens, has_position_map);
   if (curved && settings.primary == Primary::Raster) {
     throw Error(ExitCode::Usage,
                 "OpenGL draws no surfaces for the pixels of curved screens, which --aov and --raw tell of",

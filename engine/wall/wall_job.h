@@ -66,6 +66,11 @@ struct WallJob {
   [[nodiscard]] int frame_count() const { return frames.value_or(1); }
 };
 
+/// Whether the screen is curved: a position map, not a plane, has the points of its pixels.
+[[nodiscard]] inline bool has_position_map(const WallScreen& screen) {
+  return screen.warp.points != nullptr;
+}
+
 /// How the frames of a run are sampled, under settings that may have changed since it began; until its target error
 /// where there is one. `settings` are resolved.
 [[nodiscard]] Sampling sampling_of(const WallJob& job, const RenderSettings& settings);
