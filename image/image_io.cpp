@@ -3,11 +3,16 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <array>
+#include <cstring>
+#include <optional>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "core/error.h"
 #include "core/file.h"
-#include "image/image_codec.h"
+#include "image/stored_picture.h"
 
 namespace hpr {
 namespace {
@@ -24,18 +29,53 @@ void* open_module() {
   return ::dlopen("libhpr_imageio.so", RTLD_LAZY | RTLD_LOCAL);
 }
 
-const ImageCodec& codec() {
-  static const ImageCodec* const loaded = []() -> const ImageCodec* {
+FloatImage decode_radiance(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
+  static const auto decode = [] {
     void* const module = open_module();
     if (module == nullptr) {
-      throw Error(ExitCode::Internal, fmt::format("cannot open the image module: {}", ::dlerror()),
+      throw Error(ExitCode::Internal, fmt::format("cannot open the module for Radiance pictures: {}", ::dlerror()),
                   "install libopenimageio2.4 and keep libhpr_imageio.so where the build or the package put it");
     }
-    void* const symbol = ::dlsym(module, "hpr_image_codec");
-    if (symbol == nullptr) throw Error(ExitCode::Internal, "libhpr_imageio.so has no hpr_image_codec", "reinstall hpr");
-    return reinterpret_cast<decltype(&hpr_image_codec)>(symbol)();
+    void* const symbol = ::dlsym(module, "hpr_decode_radiance");
+    if (symbol == nullptr) throw Error(ExitCode::Internal, "libhpr_imageio.so has no decoder", "reinstall hpr");
+    return reinterpret_cast<decltype(&hpr_decode_radiance)>(symbol);
   }();
-  return *loaded;
+  FloatImage image;
+  decode(bytes, name, limits, image);
+  return image;
+}
+
+enum class Format { Png, Jpeg, Exr, Radiance };
+
+/// The format that the first bytes tell; file names and MIME types may lie.
+std::optional<Format> format_of(std::span<const std::byte> bytes) {
+  using namespace std::string_view_literals;
+  constexpr std::array kStarts{std::pair(Format::Png, "\x89PNG\r\n\x1A\n"sv), std::pair(Format::Jpeg, "\xFF\xD8\xFF"sv),
+                               std::pair(Format::Exr, "\x76\x2F\x31\x01"sv), std::pair(Format::Radiance, "#?"sv)};
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (const auto& [format, start] : kStarts)
+    if (text.starts_with(start)) return format;
+  return std::nullopt;
+}
+
+/// Of a PNG or JPEG file.
+StoredPicture decode_stored(Format format, std::span<const std::byte> bytes, const std::string& name,
+                            const ImageLimits& limits) {
+  return format == Format::Png ? decode_png(bytes, name, limits) : decode_jpeg(bytes, name, limits);
+}
+
+FloatImage to_floats(const StoredPicture& stored) {
+  constexpr std::array<std::array<const char*, 4>, 4> kNames{
+      {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}}};
+  const auto& names = kNames.at(stored.channels - 1);
+  FloatImage image{.size = stored.size,
+                   .channels = {names.begin(), names.begin() + static_cast<std::ptrdiff_t>(stored.channels)},
+                   .values = std::vector<float>(stored.size.area() * stored.channels),
+                   .linear = false,
+                   .levels = stored.levels()};
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    image.values[i] = static_cast<float>(stored.level(i)) / static_cast<float>(image.levels);
+  return image;
 }
 
 Image<Rgba8> to_srgb(const Image<Rgb>& image) {
@@ -54,12 +94,47 @@ void check_size(Size size, const ImageLimits& limits) {
               "draw a smaller one, or raise --limit-image");
 }
 
+std::uint32_t StoredPicture::level(std::size_t index) const {
+  if (!deep) return bytes[index];
+  std::uint16_t value = 0;
+  std::memcpy(&value, bytes.data() + 2 * index, sizeof(value));
+  return value;
+}
+
 Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
-  return codec().decode(bytes, name, limits);
+  const std::optional<Format> format = format_of(bytes);
+  if (format != Format::Png && format != Format::Jpeg) {
+    throw Error(ExitCode::BadInput, fmt::format("{}: not a PNG or JPEG picture", name), "convert the picture");
+  }
+  const StoredPicture stored = decode_stored(*format, bytes, name, limits);
+  const auto level = [&](std::size_t index) {
+    const std::uint32_t value = stored.level(index);
+    return static_cast<std::uint8_t>(stored.deep ? (value * 0xFF + 0x7FFF) / 0xFFFF : value);
+  };
+  const bool grey = stored.channels < 3;
+  const bool alpha = stored.channels % 2 == 0;
+  Image<Rgba8> image(stored.size);
+  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+    const std::size_t first = i * stored.channels;
+    image.pixels()[i] = {level(first), level(grey ? first : first + 1), level(grey ? first : first + 2),
+                         alpha ? level(first + stored.channels - 1) : std::uint8_t{255}};
+  }
+  return image;
+}
+
+FloatImage decode_float_image(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
+  const std::optional<Format> format = format_of(bytes);
+  if (!format) {
+    throw Error(ExitCode::BadInput, fmt::format("{}: not a PNG, EXR, Radiance or JPEG picture", name),
+                "convert the picture");
+  }
+  if (format == Format::Exr) return decode_exr(bytes, name, limits);
+  if (format == Format::Radiance) return decode_radiance(bytes, name, limits);
+  return to_floats(decode_stored(*format, bytes, name, limits));
 }
 
 FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits) {
-  return codec().decode_float(read_file(path, kMaxFileBytes), path.string(), limits);
+  return decode_float_image(read_file(path, kMaxFileBytes), path.string(), limits);
 }
 
 void write_image(const std::filesystem::path& path, const Image<Rgb>& image,

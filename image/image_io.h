@@ -58,7 +58,11 @@ struct ExrLayer {
 [[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name,
                                         const ImageLimits& limits);
 
-/// Reads a PNG, JPEG, EXR or Radiance (.hdr) file. Throws Error (Io, BadInput, Limit).
+/// Decodes PNG, JPEG, EXR or Radiance (.hdr). `name` stands in errors. Throws Error: BadInput, or Limit before any
+/// pixel is allocated.
+[[nodiscard]] FloatImage decode_float_image(std::span<const std::byte> bytes, const std::string& name,
+                                            const ImageLimits& limits);
+/// Reads such a file. Throws Error (Io, BadInput, Limit).
 [[nodiscard]] FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits);
 
 /// Writes `image` atomically as PNG (through to_srgb) or EXR, by the extension of `path`; throws Error (Usage) for

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <string_view>
@@ -39,15 +41,23 @@ void put_chunk(Bytes& out, std::string_view type, const Bytes& data) {
   put32(out, crc32(body));
 }
 
-/// A PNG file by its specification (ISO/IEC 15948), with uncompressed data. `rows`: each with its filter byte.
-Bytes make_png(std::uint32_t width, std::uint32_t height, int bits, int color_type, const std::vector<Bytes>& rows) {
+struct Chunk {
+  std::string_view type;
+  Bytes data;
+};
+
+/// A PNG file by its specification (ISO/IEC 15948), with uncompressed data. `rows`: each with its filter byte, of an
+/// interlaced picture pass by pass. `chunks` stand before the data.
+Bytes make_png(std::uint32_t width, std::uint32_t height, int bits, int color_type, const std::vector<Bytes>& rows,
+               const std::vector<Chunk>& chunks = {}, int interlaced = 0) {
   Bytes file;
   for (const int b : {0x89, 0x50, 0x4E, 0x47, 0x0D, 0x0A, 0x1A, 0x0A}) file.push_back(static_cast<std::byte>(b));
   Bytes header;
   put32(header, width);
   put32(header, height);
-  for (const int b : {bits, color_type, 0, 0, 0}) header.push_back(static_cast<std::byte>(b));
+  for (const int b : {bits, color_type, 0, 0, interlaced}) header.push_back(static_cast<std::byte>(b));
   put_chunk(file, "IHDR", header);
+  for (const Chunk& chunk : chunks) put_chunk(file, chunk.type, chunk.data);
 
   Bytes raw;
   for (const Bytes& row : rows) raw.insert(raw.end(), row.begin(), row.end());
@@ -74,6 +84,52 @@ Bytes bytes_of(std::initializer_list<int> values) {
   Bytes bytes;
   for (const int value : values) bytes.push_back(static_cast<std::byte>(value));
   return bytes;
+}
+
+/// A baseline JPEG file by its specification (ITU-T T.81) of 8 x 8 pixels, each component of one level, with quantizers
+/// of 1: decoders have nothing to round. `segments`: bytes of markers, put before the frame.
+Bytes make_jpeg(const std::vector<int>& levels, const Bytes& segments = {}) {
+  Bytes file = bytes_of({0xFF, 0xD8});
+  file.insert(file.end(), segments.begin(), segments.end());
+  const auto put = [&](std::initializer_list<int> values) {
+    const Bytes bytes = bytes_of(values);
+    file.insert(file.end(), bytes.begin(), bytes.end());
+  };
+  const int count = static_cast<int>(levels.size());
+  put({0xFF, 0xDB, 0, 67, 0});
+  file.insert(file.end(), 64, std::byte{1});
+  put({0xFF, 0xC0, 0, 8 + 3 * count, 8, 0, 8, 0, 8, count});
+  for (int i = 1; i <= count; ++i) put({i, 0x11, 0});
+  // Lengths of first coefficients have codes of 4 bits each, the end of a block has one of 1 bit.
+  put({0xFF, 0xC4, 0, 31, 0, 0, 0, 0, 12, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11});
+  put({0xFF, 0xC4, 0, 20, 0x10, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  put({0xFF, 0xDA, 0, 6 + 2 * count, count});
+  for (int i = 1; i <= count; ++i) put({i, 0});
+  put({0, 63, 0});
+  unsigned bits = 0;
+  int filled = 0;
+  const auto put_bits = [&](unsigned value, int length) {
+    for (int bit = length - 1; bit >= 0; --bit) {
+      bits = bits << 1U | (value >> static_cast<unsigned>(bit) & 1U);
+      if (++filled % 8 != 0) continue;
+      put({static_cast<int>(bits & 0xFFU)});
+      if ((bits & 0xFFU) == 0xFFU) put({0});
+    }
+  };
+  for (const int level : levels) {
+    const int first = 8 * (level - 128);
+    const auto length = static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(first))));
+    put_bits(static_cast<unsigned>(length), 4);
+    put_bits(static_cast<unsigned>(first < 0 ? first + (1 << length) - 1 : first), length);
+    put_bits(0, 1);
+  }
+  while (filled % 8 != 0) put_bits(1, 1);
+  put({0xFF, 0xD9});
+  return file;
+}
+
+Bytes adobe_marker(int transform) {
+  return bytes_of({0xFF, 0xEE, 0, 14, 'A', 'd', 'o', 'b', 'e', 0, 100, 0, 0, 0, 0, transform});
 }
 
 template <typename Call>
@@ -172,6 +228,102 @@ TEST(ImageIo, SixteenBitPngIsRoundedToEight) {
   EXPECT_EQ(image.at(1, 0), (Rgba8{255, 128, 0, 255}));
 }
 
+TEST(ImageIo, SixteenBitPngKeepsItsLevelsAsFloats) {
+  const FloatImage read = through_file(make_png(2, 1, 16, 0, {bytes_of({0, 0x01, 0x02, 0xFF, 0xFF})}), ".png");
+  EXPECT_EQ(read.channels, (std::vector<std::string>{"Y"}));
+  EXPECT_EQ(read.levels, 0xFFFFU);
+  EXPECT_EQ(read.values, (std::vector<float>{258.0F / 65535.0F, 1.0F}));
+}
+
+TEST(ImageIo, PalettesFewBitsAndTransparentColorsAreExpanded) {
+  const Chunk palette{"PLTE", bytes_of({10, 20, 30, 40, 50, 60, 70, 80, 90})};
+  const Chunk alphas{"tRNS", bytes_of({0, 128})};
+  const Image<Rgba8> image =
+      decode_image(make_png(3, 1, 2, 3, {bytes_of({0, 0b00011000})}, {palette, alphas}), "a", {});
+  EXPECT_EQ(image.at(0, 0), (Rgba8{10, 20, 30, 0}));
+  EXPECT_EQ(image.at(1, 0), (Rgba8{40, 50, 60, 128}));
+  EXPECT_EQ(image.at(2, 0), (Rgba8{70, 80, 90, 255}));
+
+  const Image<Rgba8> bits = decode_image(make_png(3, 1, 1, 0, {bytes_of({0, 0b01000000})}), "a", {});
+  EXPECT_EQ(bits.at(0, 0), (Rgba8{0, 0, 0, 255}));
+  EXPECT_EQ(bits.at(1, 0), (Rgba8{255, 255, 255, 255}));
+
+  const Chunk white{"tRNS", bytes_of({0, 255})};
+  const Image<Rgba8> grey = decode_image(make_png(2, 1, 8, 0, {bytes_of({0, 255, 7})}, {white}), "a", {});
+  EXPECT_EQ(grey.at(0, 0), (Rgba8{255, 255, 255, 0}));
+  EXPECT_EQ(grey.at(1, 0), (Rgba8{7, 7, 7, 255}));
+}
+
+TEST(ImageIo, InterlacedPngGivesItsPixelsInOrder) {
+  // Adam7 of 3 x 3 pixels: pass 1 has (0,0), pass 4 (2,0), pass 5 (0,2) and (2,2), pass 6 (1,0) and (1,2), pass 7
+  // row 1.
+  const std::vector<Bytes> passes{bytes_of({0, 1}), bytes_of({0, 3}), bytes_of({0, 7, 9}),
+                                  bytes_of({0, 2}), bytes_of({0, 8}), bytes_of({0, 4, 5, 6})};
+  const Image<Rgba8> image = decode_image(make_png(3, 3, 8, 0, passes, {}, 1), "a", {});
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(image.at(i % 3, i / 3).r, i + 1) << i;
+}
+
+/// Profiles and other notes are not looked at, so what is wrong with them hurts nobody: OpenImageIO 2.4 reads behind
+/// the end of a profile whose header lies about its size.
+TEST(ImageIo, NotesInAPngFileAreSkipped) {
+  const std::vector<Bytes> rows{bytes_of({0, 1, 2, 3})};
+  const Image<Rgba8> plain = decode_image(make_png(1, 1, 8, 2, rows), "a", {});
+  // A name, deflate, and a stored block of 130 bytes, the profile: it says that it has 2 GiB, and 2^32 - 1 tags.
+  Bytes profile = bytes_of({'x', 0, 0, 0x78, 0x01, 1, 130, 0, 125, 255, 0x7F, 0xFF, 0xFF, 0xFF});
+  profile.resize(profile.size() + 124, std::byte{'a'});
+  profile.insert(profile.end(), 4, std::byte{0xFF});
+  for (const std::string_view type : {"iCCP", "eXIf", "zTXt", "iTXt", "tEXt", "gAMA", "cHRM", "sPLT", "hIST", "pCAL",
+                                      "sCAL", "tIME", "bKGD", "sBIT", "pHYs", "oFFs", "sRGB", "acTL", "juNk"}) {
+    for (const Bytes& data : {profile, Bytes(), Bytes(3, std::byte{0xFF}), Bytes(100000, std::byte{'k'})}) {
+      const Bytes file = make_png(1, 1, 8, 2, rows, {{type, data}, {type, data}});
+      EXPECT_EQ(decode_image(file, "a", {}), plain) << type << ' ' << data.size();
+      EXPECT_EQ(through_file(file, ".png").values.size(), 3U) << type << ' ' << data.size();
+    }
+  }
+}
+
+TEST(ImageIo, JpegGivesGreyAndColors) {
+  const Image<Rgba8> grey = decode_image(make_jpeg({77}), "a.jpg", {});
+  EXPECT_EQ(grey, Image<Rgba8>({8, 8}, {77, 77, 77, 255}));
+  EXPECT_EQ(through_file(make_jpeg({77}), ".jpg").channels, (std::vector<std::string>{"Y"}));
+  // Y, Cb, Cr without color is grey; Adobe's transform 0 says that the components are R, G, B.
+  EXPECT_EQ(decode_image(make_jpeg({200, 128, 128}), "a.jpg", {}).at(3, 4), (Rgba8{200, 200, 200, 255}));
+  EXPECT_EQ(decode_image(make_jpeg({200, 100, 7}, adobe_marker(0)), "a.jpg", {}).at(3, 4), (Rgba8{200, 100, 7, 255}));
+  // Cr of 40 above the middle: R = Y + 1.402 * 40, G = Y - 0.714136 * 40.
+  EXPECT_EQ(decode_image(make_jpeg({100, 128, 168}), "a.jpg", {}).at(7, 7), (Rgba8{156, 71, 100, 255}));
+}
+
+TEST(ImageIo, JpegOfInksBecomesLight) {
+  // Adobe stores how much light passes; others store how much ink there is.
+  EXPECT_EQ(decode_image(make_jpeg({255, 128, 51, 255}, adobe_marker(0)), "a.jpg", {}).at(0, 0),
+            (Rgba8{255, 128, 51, 255}));
+  EXPECT_EQ(decode_image(make_jpeg({255, 128, 51, 51}, adobe_marker(0)), "a.jpg", {}).at(0, 0),
+            (Rgba8{51, 26, 10, 255}));
+  EXPECT_EQ(decode_image(make_jpeg({0, 127, 204, 0}), "a.jpg", {}).at(0, 0), (Rgba8{255, 128, 51, 255}));
+}
+
+TEST(ImageIo, NotesInAJpegFileAreSkipped) {
+  const Image<Rgba8> plain = decode_image(make_jpeg({77}), "a.jpg", {});
+  for (int marker = 0xE1; marker <= 0xEF; ++marker) {
+    if (marker == 0xEE) continue;  // Adobe's own, which says what the components are
+    Bytes segment = bytes_of({0xFF, marker, 0x01, 0x02});
+    for (const char c : std::string_view("ICC_PROFILE\0\xFF\0", 14)) segment.push_back(static_cast<std::byte>(c));
+    segment.resize(2 + 0x102, std::byte{0xFF});
+    EXPECT_EQ(decode_image(make_jpeg({77}, segment), "a.jpg", {}), plain) << marker;
+  }
+}
+
+TEST(ImageIo, JpegPastTheLimitOrDamagedIsRefused) {
+  const Bytes good = make_jpeg({50, 100, 150});
+  EXPECT_EQ(decode_code(good, {.side = 8, .pixels = 64}), ExitCode::Done);
+  EXPECT_EQ(decode_code(good, {.side = 7, .pixels = 64}), ExitCode::Limit);
+  EXPECT_EQ(decode_code(good, {.side = 8, .pixels = 63}), ExitCode::Limit);
+  for (std::size_t kept = 3; kept + 2 < good.size(); ++kept) {
+    EXPECT_EQ(decode_code({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(kept)}), ExitCode::BadInput)
+        << kept;
+  }
+}
+
 TEST(ImageIo, SizesPastTheLimitAreRefusedByTheHeaderAlone) {
   // 40 GB of pixels that are not there: decoding them would be another error, allocating them would end the test.
   EXPECT_EQ(decode_code(make_png(100000, 100000, 8, 6, {})), ExitCode::Limit);
@@ -260,6 +412,58 @@ TEST(ImageIo, ExrIntegersKeepTheirBitsBesideFloats) {
   ASSERT_EQ(floats.integers.size(), 1U);
   EXPECT_EQ(floats.integers.at("id.X"), ids);
   EXPECT_EQ(floats.levels, 0U);
+}
+
+TEST(ImageIo, ExrWhoseDataBeginElsewhereGivesItsPixels) {
+  Image<Rgb> image({2, 2});
+  for (int i = 0; i < 4; ++i) {
+    const auto first = static_cast<float>(3 * i + 1);
+    image.at(i % 2, i / 2) = {first, first + 1.0F, first + 2.0F};
+  }
+  Bytes file = encode_exr(image, {});
+  const std::array<std::int32_t, 4> moved{-5, 1000, -4, 1001};
+  const auto window = std::ranges::search(file, std::as_bytes(std::span("dataWindow\0box2i", 17)));
+  ASSERT_FALSE(window.empty());
+  std::memcpy(&*window.end() + 4, moved.data(), sizeof moved);
+  // The one chunk, its row, follows the header's end and the table with its place in the file.
+  std::uint64_t chunk = 0;
+  for (std::size_t i = 0; i + 8 < file.size(); ++i) {
+    std::memcpy(&chunk, file.data() + i, sizeof chunk);
+    if (chunk == i + 8) break;
+  }
+  ASSERT_LT(chunk, file.size());
+  std::memcpy(file.data() + chunk, &moved[1], sizeof moved[1]);
+  const FloatImage read = through_file(file, ".exr");
+  EXPECT_EQ(read.size, (Size{2, 2}));
+  EXPECT_EQ(read.channels, (std::vector<std::string>{"R", "G", "B"}));
+  EXPECT_EQ(read.values, (std::vector<float>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
+}
+
+TEST(ImageIo, AnExrAttributeThatIsLargerThanItsFileIsRefused) {
+  Bytes file = encode_exr(Image<Rgb>({2, 2}), {{"note", "x"}});
+  const auto note = std::ranges::search(file, std::as_bytes(std::span("note\0string", 12)));
+  ASSERT_FALSE(note.empty());
+  for (const std::int32_t size : {-1, 1 << 30, std::numeric_limits<std::int32_t>::max()}) {
+    std::memcpy(&*note.end(), &size, sizeof size);
+    EXPECT_EQ(code_of([&] { (void)through_file(file, ".exr"); }), ExitCode::BadInput) << size;
+  }
+}
+
+TEST(ImageIo, RadianceFilesAreReadByTheirModule) {
+  Bytes file;
+  for (const char c : std::string_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"))
+    file.push_back(std::byte(c));
+  const Bytes pixels = bytes_of({128, 64, 0, 129, 128, 128, 128, 130});
+  file.insert(file.end(), pixels.begin(), pixels.end());
+  const FloatImage read = through_file(file, ".hdr");
+  EXPECT_TRUE(read.linear);
+  ASSERT_EQ(read.values.size(), 6U);
+  EXPECT_NEAR(read.values[0], 1.0F, 0.01F);
+  EXPECT_NEAR(read.values[1], 0.5F, 0.01F);
+  EXPECT_NEAR(read.values[5], 2.0F, 0.02F);
+  file.resize(file.size() - 3);
+  EXPECT_EQ(code_of([&] { (void)through_file(file, ".hdr"); }), ExitCode::BadInput);
+  EXPECT_EQ(code_of([&] { (void)through_file(file, ".hdr", {.side = 1, .pixels = 9}); }), ExitCode::Limit);
 }
 
 TEST(ImageIo, ExrPastTheLimitIsRefused) {

@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/json.h"
-#include "image/image_codec.h"
 #include "image/image_io.h"
 #include "scene/load_scene.h"
 #include "tools/stability/stability.h"
