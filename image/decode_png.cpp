@@ -31,7 +31,7 @@ class PngReader {
 
   [[nodiscard]] const char* problem() const { return problem_.data(); }
 
-  /// Up to the first pixel. False with problem().
+  /// Up to the first pixel; makes room for none. False with problem().
   bool read_header() {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     png_set_read_fn(png_, this, read_bytes);
@@ -39,6 +39,13 @@ class PngReader {
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_user_limits(png_, 0x7FFFFFFF, 0x7FFFFFFF);  // check_header() has ours
     png_read_info(png_, info_);
+    return true;
+  }
+
+  /// Afterwards channels() and is_deep() are those of pixels as they are read. Makes room for a row. False with
+  /// problem().
+  bool start() {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;
     png_set_expand(png_);
     if (std::endian::native == std::endian::little) png_set_swap(png_);
     (void)png_set_interlace_handling(png_);
@@ -88,6 +95,7 @@ StoredPicture decode_png(std::span<const std::byte> bytes, const std::string& na
   PngReader reader(bytes);
   if (!reader.read_header()) throw_undecodable(name, reader.problem());
   check_header(reader.width(), reader.height(), reader.channels(), name, limits);
+  if (!reader.start()) throw_undecodable(name, reader.problem());
   StoredPicture picture{.size = {static_cast<int>(reader.width()), static_cast<int>(reader.height())},
                         .channels = reader.channels(),
                         .bytes = std::vector<std::uint8_t>(reader.row_bytes() * reader.height()),

@@ -1,6 +1,7 @@
 #include "image/image_io.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
@@ -144,6 +145,13 @@ ExitCode code_of(Call call) {
 
 ExitCode decode_code(const Bytes& bytes, const ImageLimits& limits = {}) {
   return code_of([&] { (void)decode_image(bytes, "a.png", limits); });
+}
+
+/// The most that this process ever used.
+long max_memory_kib() {
+  rusage usage{};
+  EXPECT_EQ(::getrusage(RUSAGE_SELF, &usage), 0);
+  return usage.ru_maxrss;
 }
 
 Image<Rgba8> pattern(Size size) {
@@ -327,6 +335,9 @@ TEST(ImageIo, JpegPastTheLimitOrDamagedIsRefused) {
 TEST(ImageIo, SizesPastTheLimitAreRefusedByTheHeaderAlone) {
   // 40 GB of pixels that are not there: decoding them would be another error, allocating them would end the test.
   EXPECT_EQ(decode_code(make_png(100000, 100000, 8, 6, {})), ExitCode::Limit);
+  const long before = max_memory_kib();
+  EXPECT_EQ(decode_code(make_png(0x7FFFFFFF, 1, 8, 6, {})), ExitCode::Limit);
+  EXPECT_LT(max_memory_kib() - before, 1L << 20) << "a row has 8 GiB";
   const auto small = make_png(4, 4, 8, 0, std::vector<Bytes>(4, bytes_of({0, 1, 2, 3, 4})));
   EXPECT_EQ(decode_code(small, {.side = 4, .pixels = 16}), ExitCode::Done);
   EXPECT_EQ(decode_code(small, {.side = 3, .pixels = 16}), ExitCode::Limit);
