@@ -54,7 +54,9 @@ bool has_whole_header(std::span<const std::byte> bytes) {
   };
   while (!left.empty() && left.front() != '\0') {
     std::int32_t size = 0;
-    if (!skip_text() || !skip_text() || left.size() < sizeof(size)) return false;
+    const bool named = skip_text();
+    const bool typed = skip_text();
+    if (!named || !typed || left.size() < sizeof(size)) return false;
     std::memcpy(&size, left.data(), sizeof(size));
     left.remove_prefix(sizeof(size));
     if (size < 0 || static_cast<std::size_t>(size) > left.size()) return false;
@@ -139,7 +141,7 @@ FloatImage decode_exr(std::span<const std::byte> bytes, const std::string& name,
   try {
     ExrInput input(bytes, name);
     const Imf::Header header = read_header(input);
-    const IMATH_NAMESPACE::Box2i window = header.dataWindow();
+    const IMATH_NAMESPACE::Box2i& window = header.dataWindow();
     const std::vector<ExrChannel> channels = ordered_channels(header);
     const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;

@@ -25,6 +25,7 @@ class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
 
+  // NOLINTBEGIN(modernize-use-nodiscard): calls are chained, and what the last one returns may be left
   /// What help calls the value: "FILE.json".
   Option type(const std::string& name) const;
   /// Help shows the value the variable has now.
@@ -54,6 +55,7 @@ class Option {
   Option group(const std::string& heading) const;
   /// Help does not list it.
   Option hidden() const { return group(""); }
+  // NOLINTEND(modernize-use-nodiscard)
 
   /// Whether the command line has it. Known once the command line was parsed.
   [[nodiscard]] bool specified() const;
