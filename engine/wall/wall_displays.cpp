@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cluster/transport/collectives.h"
+#include "core/bytes.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "walls/drawing/assemble.h"
@@ -125,11 +126,17 @@ std::unique_ptr<WallSender> connect_displays(Communicator& comm, const Wall& wal
     ByteWriter writer;
     writer.u64(make_session());
     writer.text(link_token());
+    RunJournal::Entries run;
+    if (const auto journal = RunJournal::of_supervisor()) run = journal->read();
+    writer.text(run.secret.empty() ? hex16(make_session()) + hex16(make_session()) : run.secret);
+    writer.u32(static_cast<std::uint32_t>(run.restarts.size()));
     return writer.take();
   });
   ByteReader reader(secret);
   settings.session = reader.u64();
   settings.token = reader.text(secret.size());
+  settings.run = reader.text(secret.size());
+  settings.start = reader.u32();
   std::unique_ptr<WallSender> sender;
   agree_on_failure(comm, [&] {
     sender = std::make_unique<WallSender>(wall, owners, settings);

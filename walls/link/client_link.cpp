@@ -97,6 +97,7 @@ void ClientLink::answer(const Greeting& greeting) {
 }
 
 void ClientLink::judge(const Reply& reply) {
+  busy_ = !reply.accepted && reply.busy;
   if (!reply.accepted) refuse(printable(reply.reason, 400));
   if (address_.tcp && !same_proof(reply.proof, prove_token(token_, "display", greeted_, hello_))) {
     refuse("the display does not know the token in HPR_TOKEN");

@@ -26,6 +26,8 @@ class ClientLink {
   [[nodiscard]] bool up() const { return state_ == State::Up; }
   /// Why the display will not have us; empty as long as it has not said so.
   [[nodiscard]] const std::string& refusal() const { return refusal_; }
+  /// Whether it will not have us because another run shows: it may later.
+  [[nodiscard]] bool busy() const { return busy_; }
   /// Why the last attempt failed.
   [[nodiscard]] const std::string& failure() const { return failure_; }
 
@@ -60,6 +62,7 @@ class ClientLink {
   LinkNonce greeted_{};
   double due_ = 0.0;  ///< down: the next attempt; else: the end of the handshake's time
   std::string refusal_;
+  bool busy_ = false;
   std::string failure_ = "not tried yet";
 };
 

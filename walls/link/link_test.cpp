@@ -94,6 +94,8 @@ class LinkTest : public testing::Test {
     SenderSettings settings;
     settings.build = "build";
     settings.session = ++session_;
+    settings.run = "run " + std::to_string(session_);
+    settings.busy_limit = Seconds(0.2);
     for (const WallHost& host : wall_hosts(wall_)) settings.addresses.emplace(host.host, address(host.host));
     return settings;
   }
@@ -214,6 +216,76 @@ TEST_F(LinkTest, WhatDoesNotFitIsRefusedInWords) {
   WallSender first(wall_, owners(), sender());
   first.wait_for_displays(Seconds(2.0));
   EXPECT_NE(refusal(sender()).find("another run"), std::string::npos);
+}
+
+/// A link of a run whose network was cut: it stands open, and nothing comes through it any more.
+class SilentRun {
+ public:
+  SilentRun(const Wall& wall, const LinkAddress& address, const SenderSettings& settings)
+      : link_(address, hello_of(wall, settings), "") {
+    EXPECT_TRUE(within(5.0, [&] {
+      (void)link_.step(link_seconds(), [](const Packet&) {});
+      return link_.up();
+    })) << link_.failure();
+  }
+
+ private:
+  static Hello hello_of(const Wall& wall, const SenderSettings& settings) {
+    Hello hello;
+    hello.build = settings.build;
+    hello.role = LinkRole::Swap;
+    hello.host = "localhost";
+    hello.wall_hash = wall.hash;
+    hello.session = settings.session;
+    hello.run = settings.run;
+    hello.start = settings.start;
+    hello.screens = link_screens(wall, find_host(wall, "localhost"));
+    return hello;
+  }
+
+  ClientLink link_;
+};
+
+TEST_F(LinkTest, ARunThatIsStartedAgainTakesThePlaceOfWhatWasLost) {
+  const RunningDisplay display(wall_, "localhost", receiver());
+  SenderSettings lost = sender();
+  lost.run = "a secret of the run";
+  const SilentRun silent(wall_, address("localhost"), lost);
+  SenderSettings again = sender();
+  again.run = lost.run;
+  again.start = 1;
+  {
+    WallSender sender(wall_, owners(), again);
+    const double begin = link_seconds();
+    sender.wait_for_displays(Seconds(5.0));
+    EXPECT_TRUE(sender.reached_any());
+    EXPECT_LT(link_seconds() - begin, 2.0) << "long before the lost one counts as silent";
+    // Whoever was only cut off and comes back finds its successor, which it must not put out.
+    SenderSettings back = lost;
+    back.session = this->sender().session;
+    EXPECT_NE(refusal(back).find("later start"), std::string::npos);
+    show(sender, 0);
+    EXPECT_TRUE(within(2.0, [&] { return display.display().shown().size() == 2; }));
+  }
+  EXPECT_NE(refusal(lost).find("later start"), std::string::npos) << "also when nothing shows";
+}
+
+TEST_F(LinkTest, ARunWaitsForTheEndOfAnotherOneThatMayBeDead) {
+  ReceiverSettings settings = receiver();
+  settings.silence = 1.5;
+  const RunningDisplay display(wall_, "localhost", settings);
+  SenderSettings dead = sender();
+  dead.run = "one run";
+  const SilentRun silent(wall_, address("localhost"), dead);
+  SenderSettings other = sender();
+  other.run = "another run";
+  other.start = 3;
+  const double begin = link_seconds();
+  EXPECT_NE(refusal(other).find("shows another run"), std::string::npos);
+  EXPECT_LT(link_seconds() - begin, 1.4) << "no longer than it is told to";
+  other.busy_limit = Seconds(10.0);
+  EXPECT_EQ(refusal(other), "accepted");
+  EXPECT_LT(link_seconds() - begin, 5.0);
 }
 
 TEST_F(LinkTest, TcpTakesTheSameTokenOnBothEnds) {

@@ -20,7 +20,7 @@ namespace hpr {
 namespace {
 
 constexpr std::string_view kBlockMagic = "HPRLINK\n";
-constexpr std::uint32_t kLinkProtocol = 1;
+constexpr std::uint32_t kLinkProtocol = 2;
 constexpr std::uint32_t kPacketMagic = 0x4B525048;  // "HPRK"
 /// Written as it lies in memory: what comes out as another number comes from a machine of another byte order.
 constexpr std::uint32_t kByteOrder = 0x01020304;
@@ -76,6 +76,8 @@ std::vector<std::byte> encode(const Hello& hello) {
   payload.text(hello.host);
   payload.u64(hello.wall_hash);
   payload.u64(hello.session);
+  payload.text(hello.run);
+  payload.u32(hello.start);
   payload.u32(hello.rank);
   payload.u32(static_cast<std::uint32_t>(hello.screens.size()));
   for (const LinkScreen& screen : hello.screens) {
@@ -91,6 +93,7 @@ std::vector<std::byte> encode(const Hello& hello) {
 std::vector<std::byte> encode(const Reply& reply) {
   ByteWriter payload;
   payload.u8(reply.accepted ? 1 : 0);
+  payload.u8(reply.busy ? 1 : 0);
   payload.text(reply.reason);
   payload.raw(reply.proof);
   return make_block(payload);
@@ -135,6 +138,8 @@ Hello decode_hello(std::span<const std::byte> block) {
   hello.host = reader.text(kMaxTextBytes);
   hello.wall_hash = reader.u64();
   hello.session = reader.u64();
+  hello.run = reader.text(kMaxTextBytes);
+  hello.start = reader.u32();
   hello.rank = reader.u32();
   const std::uint32_t screens = reader.u32();
   if (screens > static_cast<std::uint32_t>(kMaxScreens)) throw LinkError("a handshake names too many screens");
@@ -159,6 +164,7 @@ Reply decode_reply(std::span<const std::byte> block) {
   ByteReader reader = open_block(block);
   Reply reply;
   reply.accepted = read_bool(reader);
+  reply.busy = read_bool(reader);
   reply.reason = reader.text(kMaxTextBytes);
   read_array(reader, reply.proof);
   reader.finish();

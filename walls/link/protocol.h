@@ -101,6 +101,8 @@ class ByteReader {
 };
 
 inline constexpr std::size_t kPacketHeaderBytes = 52;
+/// Rank 0 pings several times a second: silent for so many seconds, it is dead, or cut off.
+inline constexpr double kSilence = 10.0;
 
 using LinkNonce = std::array<std::byte, 16>;
 using LinkProof = std::array<std::byte, 32>;
@@ -126,7 +128,9 @@ struct Hello {
   LinkRole role = LinkRole::Frames;
   std::string host;  ///< whose screens
   std::uint64_t wall_hash = 0;
-  std::uint64_t session = 0;  ///< one run of the job
+  std::uint64_t session = 0;  ///< one start of the job
+  std::string run;            ///< a secret of the run, the same for each of its starts
+  std::uint32_t start = 0;    ///< how many times the run was started before
   std::uint32_t rank = 0;
   std::vector<LinkScreen> screens;  ///< of the host, in the wall's order
   LinkNonce nonce{};
@@ -135,7 +139,8 @@ struct Hello {
 
 struct Reply {
   bool accepted = false;
-  std::string reason;  ///< of a refusal, in words for the user
+  bool busy = false;        ///< refused because another run shows: may be accepted later
+  std::string reason = {};  ///< of a refusal, in words for the user
   LinkProof proof{};
 };
 

@@ -19,6 +19,8 @@ Hello example_hello() {
   hello.host = "wall01";
   hello.wall_hash = 0x0123456789ABCDEF;
   hello.session = 42;
+  hello.run = "secret";
+  hello.start = 2;
   hello.rank = 7;
   hello.screens = {{"a", {64, 48}}, {"b", {1, 65536}}};
   hello.nonce.fill(std::byte{3});
@@ -52,6 +54,8 @@ TEST(LinkHandshake, BlocksReadBackAsTheyWereWritten) {
   EXPECT_EQ(read.host, hello.host);
   EXPECT_EQ(read.wall_hash, hello.wall_hash);
   EXPECT_EQ(read.session, hello.session);
+  EXPECT_EQ(read.run, hello.run);
+  EXPECT_EQ(read.start, hello.start);
   EXPECT_EQ(read.rank, hello.rank);
   EXPECT_EQ(read.screens, hello.screens);
   EXPECT_EQ(read.nonce, hello.nonce);
@@ -60,8 +64,9 @@ TEST(LinkHandshake, BlocksReadBackAsTheyWereWritten) {
   EXPECT_EQ(greeting.build, "b");
   EXPECT_EQ(greeting.nonce, hello.nonce);
   EXPECT_TRUE(greeting.wants_token);
-  const Reply reply = decode_reply(encode(Reply{false, "no", hello.proof}));
+  const Reply reply = decode_reply(encode(Reply{false, true, "no", hello.proof}));
   EXPECT_FALSE(reply.accepted);
+  EXPECT_TRUE(reply.busy);
   EXPECT_EQ(reply.reason, "no");
   EXPECT_EQ(reply.proof, hello.proof);
 }

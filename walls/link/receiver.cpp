@@ -18,8 +18,6 @@ namespace {
 constexpr std::size_t kMaxPeers = 4096 + 64;  ///< ranks, and whoever else tries
 constexpr std::size_t kMaxUnknownPeers = 64;
 constexpr double kHandshakeLimit = 2.0;
-/// Rank 0 pings several times a second.
-constexpr double kSilence = 10.0;
 /// Rank 0 asks for moments a few milliseconds ahead. One further off comes from a round trip that measured the clocks
 /// badly, and is not waited for.
 constexpr double kMaxMoment = 0.05;
@@ -186,7 +184,7 @@ bool FrameReceiver::step_peer(Peer& peer, double now) {
       peer.since = now;
       take(peer, *packet);
     }
-    if (peer.hello.role == LinkRole::Swap && now - peer.since > kSilence) throw LinkError("rank 0 is silent");
+    if (peer.hello.role == LinkRole::Swap && now - peer.since > settings_.silence) throw LinkError("rank 0 is silent");
   }
   peer.connection.send();
   return true;
@@ -196,10 +194,10 @@ void FrameReceiver::answer(Peer& peer) {
   const auto block = peer.connection.take_block();
   if (!block) return;
   const Hello hello = decode_hello(*block);
-  const std::string reason = objection(peer, hello);
-  Reply reply{reason.empty(), reason, {}};
-  if (!reason.empty()) {
-    log::warning("refused rank {} of a run: {}", hello.rank, printable(reason, 400));
+  std::string reason = objection(peer, hello);
+  Reply reply = reason.empty() ? judge_run(hello) : Reply{.reason = std::move(reason)};
+  if (!reply.accepted) {
+    log::warning("refused rank {} of a run: {}", hello.rank, printable(reply.reason, 400));
     peer.closing = true;
   } else {
     if (session_ != hello.session) begin_session(hello);
@@ -223,7 +221,7 @@ void FrameReceiver::answer(Peer& peer) {
   }
 }
 
-std::string FrameReceiver::objection(const Peer& peer, const Hello& hello) {
+std::string FrameReceiver::objection(const Peer& peer, const Hello& hello) const {
   // The token first: strangers learn nothing of the wall.
   if (peer.tcp && !same_proof(hello.proof, prove_token(settings_.token, "run", peer.nonce, hello))) {
     return "the token differs: set HPR_TOKEN to the same secret on both";
@@ -242,14 +240,27 @@ std::string FrameReceiver::objection(const Peer& peer, const Hello& hello) {
   if (hello.screens != settings_.screens) {
     return "the screens have other sizes here: give display and run the same --scale";
   }
+  return "";
+}
+
+/// A run that was lost and started again takes over at once: its links may stand open for long where the network was
+/// cut. Who was lost and comes back finds its successor.
+Reply FrameReceiver::judge_run(const Hello& hello) const {
+  if (!session_ || hello.session == *session_) return {.accepted = true};
+  if (hello.run == run_) {
+    if (hello.start > start_) return {.accepted = true};
+    return {.reason = "the display shows a later start of this run"};
+  }
   const bool busy =
       std::ranges::any_of(peers_, [](const auto& other) { return other->open && other->hello.role == LinkRole::Swap; });
-  if (session_ && hello.session != *session_ && busy) return "the display shows another run: wait until that has ended";
-  return "";
+  if (!busy) return {.accepted = true};
+  return {.busy = true, .reason = "the display shows another run: wait until that has ended"};
 }
 
 void FrameReceiver::begin_session(const Hello& hello) {
   session_ = hello.session;
+  run_ = hello.run;
+  start_ = hello.start;
   ended_ = false;
   for (const auto& other : peers_) {
     if (other->open) other->closing = true;  // left over from the run before
@@ -271,7 +282,7 @@ void FrameReceiver::take(Peer& peer, const Packet& packet) {
     take_picture(peer, packet);
   } else if (header.type == PacketType::Present && swap) {
     const double now = settings_.clock();
-    const bool moment = header.time < now + kMaxMoment && header.time > now - kSilence;
+    const bool moment = header.time < now + kMaxMoment && header.time > now - settings_.silence;
     orders_.emplace_back(header.frame, moment ? header.time : now);
     if (orders_.size() > kMaxPending) orders_.pop_front();
   } else if (header.type == PacketType::Ping && swap) {

@@ -29,6 +29,7 @@ struct ReceiverSettings {
   std::string token;  ///< of TCP links
   std::vector<LinkAddress> listen;
   std::function<double()> clock = link_seconds;
+  double silence = kSilence;  ///< seconds after which rank 0 is no longer waited for
 };
 
 /// A frame that is to be shown now: the pictures of it that arrived whole, by screen.
@@ -104,7 +105,9 @@ class FrameReceiver {
   /// False: the peer is done with.
   [[nodiscard]] bool step_peer(Peer& peer, double now);
   void answer(Peer& peer);
-  [[nodiscard]] std::string objection(const Peer& peer, const Hello& hello);
+  [[nodiscard]] std::string objection(const Peer& peer, const Hello& hello) const;
+  /// Why this run cannot take the place of the one that shows, if one does.
+  [[nodiscard]] Reply judge_run(const Hello& hello) const;
   void begin_session(const Hello& hello);
   void take(Peer& peer, const Packet& packet);
   void show_rest();
@@ -118,6 +121,8 @@ class FrameReceiver {
   std::condition_variable news_;
   std::vector<std::unique_ptr<Peer>> peers_;
   std::optional<std::uint64_t> session_;
+  std::string run_;  ///< of the session, as its Hello has them
+  std::uint32_t start_ = 0;
   std::vector<Screen> screens_;
   std::deque<std::pair<std::uint64_t, double>> orders_;  ///< frame, when
   bool showing_ = false;

@@ -80,6 +80,8 @@ ClientLink WallSender::make_link(const WallHost& host, LinkRole role) const {
   hello.host = host.host;
   hello.wall_hash = wall_.hash;
   hello.session = settings_.session;
+  hello.run = settings_.run;
+  hello.start = settings_.start;
   hello.rank = static_cast<std::uint32_t>(settings_.rank);
   hello.screens = link_screens(wall_, host);
   return {std::move(address), std::move(hello), settings_.token};
@@ -89,6 +91,14 @@ void WallSender::wait_for_displays(std::chrono::duration<double> limit) {
   std::unique_lock lock(mutex_);
   (void)news_.wait_for(
       lock, limit, [&] { return std::ranges::all_of(swaps_, [](const SwapLink& swap) { return swap.link.up(); }); });
+  const auto busy = std::ranges::find_if(swaps_, [](const SwapLink& swap) { return swap.link.busy(); });
+  if (busy != swaps_.end()) {
+    log::info("the display of host '{}' shows another run; waiting {:.0f} s for its end", busy->host.host,
+              settings_.busy_limit.count());
+    (void)news_.wait_for(lock, settings_.busy_limit, [&] {
+      return std::ranges::none_of(swaps_, [](const SwapLink& swap) { return swap.link.busy(); });
+    });
+  }
   for (const SwapLink& swap : swaps_) {
     if (swap.link.up() || swap.link.refusal().empty()) continue;
     throw Error(ExitCode::Lost, fmt::format("the display of host '{}' on {} refuses: {}", swap.host.host,

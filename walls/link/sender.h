@@ -17,6 +17,7 @@
 #include "walls/link/client_link.h"
 #include "walls/link/connection.h"
 #include "walls/link/hosts.h"
+#include "walls/link/protocol.h"
 #include "walls/link/swap_barrier.h"
 
 namespace hpr {
@@ -24,12 +25,15 @@ namespace hpr {
 struct SenderSettings {
   std::string build;  ///< of this program; displays of another one refuse
   std::uint64_t session = 0;
-  std::string token;                                ///< of TCP links
-  std::map<std::string, LinkAddress> addresses;     ///< per host where it is not the socket wall and host name
-  int rank = 0;                                     ///< 0 also has the displays agree on when to show
-  std::chrono::duration<double> send_budget{0.1};   ///< the longest a frame waits for displays
-  std::chrono::duration<double> swap_timeout{0.1};  ///< the longest displays that are ready wait for others
-  int in_flight = 1;                                ///< frames the job may be ahead of what displays are ready for
+  std::string run;                                           ///< see Hello
+  std::uint32_t start = 0;                                   ///< see Hello
+  std::string token;                                         ///< of TCP links
+  std::map<std::string, LinkAddress> addresses;              ///< per host where it is not the socket wall and host name
+  int rank = 0;                                              ///< 0 also has the displays agree on when to show
+  std::chrono::duration<double> send_budget{0.1};            ///< the longest a frame waits for displays
+  std::chrono::duration<double> busy_limit{kSilence + 2.0};  ///< the longest to wait for displays of another run
+  std::chrono::duration<double> swap_timeout{0.1};           ///< the longest displays that are ready wait for others
+  int in_flight = 1;  ///< frames the job may be ahead of what displays are ready for
   std::string codec = "raw";
   CodecSettings codec_settings;
 };
@@ -45,8 +49,9 @@ class WallSender {
   WallSender(const WallSender&) = delete;
   WallSender& operator=(const WallSender&) = delete;
 
-  /// Rank 0: returns when all displays have answered, or after `limit`. Throws Error (Lost) with the words of a display
-  /// that refuses: waiting would not help.
+  /// Rank 0: returns when all displays have answered, or after `limit`; later where one shows another run, which may be
+  /// dead without its knowing. Throws Error (Lost) with the words of a display that refuses for good, or that still
+  /// shows another run after SenderSettings::busy_limit.
   void wait_for_displays(std::chrono::duration<double> limit);
   /// Hands over a frame: on this rank's screens; numbers ascend. Rank 0 then waits, within the budget, until the
   /// displays are ready for the frame `in_flight` before this one.

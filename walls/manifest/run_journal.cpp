@@ -4,16 +4,21 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <span>
 #include <utility>
 
+#include "core/bytes.h"
 #include "core/json.h"
 #include "core/log.h"
 
 namespace hpr {
 namespace {
 
+constexpr std::string_view kSecret = "secret ";
 constexpr std::string_view kFrame = "frame ";
 constexpr std::string_view kRestart = "restart ";
 constexpr std::string_view kCommand = "command ";
@@ -21,7 +26,11 @@ constexpr std::string_view kEnd = "end {}";
 
 }  // namespace
 
-RunJournal::RunJournal() : file_(std::in_place), path_(file_->path()) {}
+RunJournal::RunJournal() : file_(std::in_place), path_(file_->path()) {
+  std::array<std::uint64_t, 2> secret{};
+  fill_random(std::as_writable_bytes(std::span(secret)));
+  append(fmt::format("{}{}\n", kSecret, Json(hex16(secret[0]) + hex16(secret[1])).dump()));
+}
 
 std::optional<RunJournal> RunJournal::of_supervisor() {
   const char* const path = std::getenv(kVariable);  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
@@ -69,6 +78,7 @@ RunJournal::Entries RunJournal::read() const {
     const std::string record = line.substr(space + 1);
     const std::optional<Json> json = Json::try_parse(record);
     if (!json) continue;
+    if (line.starts_with(kSecret)) entries.secret = json->string();
     if (line.starts_with(kFrame)) entries.frames.push_back(record);
     if (line.starts_with(kRestart)) entries.restarts.push_back(record);
     if (line.starts_with(kCommand)) entries.commands.push_back(json->string());

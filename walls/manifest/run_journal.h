@@ -29,6 +29,7 @@ class RunJournal {
   void add_end();
 
   struct Entries {
+    std::string secret;                 ///< of the run: who knows it is one of its jobs
     std::vector<std::string> frames;    ///< records, in order
     std::vector<std::string> restarts;  ///< JSON objects: the frame that was to come, and why
     std::vector<std::string> commands;  ///< lines, in order

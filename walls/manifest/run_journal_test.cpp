@@ -17,6 +17,9 @@ TEST(RunJournal, KeepsFramesAndRestartsInOrder) {
   const auto entries = journal.read();
   EXPECT_EQ(entries.frames, (std::vector<std::string>{R"({"frame":0})", R"({"frame":1})", R"({"frame":2})"}));
   EXPECT_FALSE(entries.ended);
+  EXPECT_EQ(entries.secret.size(), 32U);
+  EXPECT_EQ(journal.read().secret, entries.secret);
+  EXPECT_NE(RunJournal().read().secret, entries.secret);
   journal.add_end();
   EXPECT_TRUE(journal.read().ended);
   EXPECT_EQ(journal.read().frames.size(), 3U);
