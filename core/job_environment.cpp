@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 
@@ -21,6 +22,25 @@ bool inside_mpi_job() {
     if (std::getenv(name) != nullptr) return true;
   }
   return false;
+}
+
+int srun_tasks() {
+  // A batch script has the allocation's number of tasks, too, but is no step of it.
+  const char* tasks = std::getenv("SLURM_STEP_NUM_TASKS");
+  if (tasks == nullptr && std::getenv("SLURM_STEP_ID") != nullptr) tasks = std::getenv("SLURM_NTASKS");
+  return tasks == nullptr ? 1 : std::max(std::atoi(tasks), 1);
+}
+
+bool is_one_host() {
+  constexpr std::array<const char*, 8> kHosts{"SLURM_JOB_ID",
+                                              "SLURM_JOBID",
+                                              "PBS_JOBID",
+                                              "LSB_JOBID",
+                                              "PE_HOSTFILE",
+                                              "COBALT_JOBID",
+                                              "OMPI_MCA_orte_default_hostfile",
+                                              "OMPI_MCA_orte_rankfile"};
+  return std::ranges::none_of(kHosts, [](const char* name) { return std::getenv(name) != nullptr; });
 }
 
 bool launched_by_hpr() {

@@ -20,6 +20,12 @@ inline constexpr const char* kReportStartVariable = "OMPI_HPR_SAY_START";
 /// True when this program launched the job, in a process that waits for this one.
 [[nodiscard]] bool launched_by_hpr();
 
+/// How many tasks srun started of which this process is one; 1 where it was not srun.
+[[nodiscard]] int srun_tasks();
+
+/// Whether the environment names no other hosts: no batch system's allocation, no file of hosts.
+[[nodiscard]] bool is_one_host();
+
 /// This process's rank as its launcher wrote it into the environment. 0 outside a job.
 [[nodiscard]] int launched_rank();
 

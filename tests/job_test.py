@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import pty
+import shutil
 import signal
 import subprocess
 import sys
@@ -192,6 +193,72 @@ def limits_of_a_stubborn_mpiexec(folder):
         expect_gone(case, pids)
 
 
+def plain_environment(**more):
+    """Without what this test's own job says about Open MPI and Slurm."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "SLURM_", "PMI"))}
+    return {**kept, **more}
+
+
+def without_ssh(folder):
+    """A job of one host needs no ssh: Open MPI's launcher of other hosts ends by a signal where there is none."""
+    programs = folder / "programs"
+    programs.mkdir()
+    for name in ("mpiexec", "orted"):
+        (programs / name).symlink_to(shutil.which(name))
+    left = subprocess.run([HPR, "render", "gen:cornell", "-o", "alone.png", "--size", "32x24", "--ranks", "2"], cwd=folder,
+                          env=plain_environment(PATH=str(programs)), capture_output=True, text=True, timeout=60, check=False)
+    expect(left.returncode == 0, f"two ranks without ssh left with {left.returncode}: {left.stderr}")
+
+
+def open_to_the_network(pids):
+    """The TCP ports of these processes that are not only this host's."""
+    sockets = set()
+    for pid in pids:
+        for file in pathlib.Path(f"/proc/{pid}/fd").iterdir():
+            try:
+                sockets.add(os.readlink(file))
+            except OSError:
+                continue
+    found = []
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        for line in pathlib.Path(table).read_text().splitlines()[1:]:
+            fields = line.split()
+            listens = fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets
+            if listens and not fields[1].startswith(("0100007F:", "00000000000000000000000001000000:")):
+                found.append(fields[1])
+    return found
+
+
+def ranks_that_listen(folder):
+    """The ranks of a job of one host take no connections of other hosts."""
+    run = subprocess.Popen([HPR, *WALL, "-o", "quiet", "--keep-frames", "--ranks", "2"], cwd=folder, env=plain_environment(),
+                           stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 60
+    while not (folder / "quiet" / "frame-000002").exists() and run.poll() is None and time.monotonic() < until:
+        time.sleep(0.02)
+    ranks = ranks_of(run.pid)
+    expect(len(ranks) == 2, f"ranks of a wall: {ranks}")
+    listening = open_to_the_network(ranks)
+    expect(not listening, f"ranks listen to the network at {listening}")
+    run.terminate()
+    run.wait(timeout=30)
+
+
+def lone_tasks(folder):
+    """srun without MPI's help starts whole runs, which would write over each other's files."""
+    for task, ranks in (("0", []), ("1", ["--ranks", "2"])):
+        left = subprocess.run([HPR, "render", "gen:cornell", "-o", "lone.png", "--size", "32x24", *ranks], cwd=folder,
+                              env=plain_environment(SLURM_NTASKS="2", SLURM_PROCID=task, SLURM_STEP_ID="0"),
+                              capture_output=True, text=True, timeout=60, check=False)
+        expect(left.returncode == 2, f"task {task} of 2 without MPI left with {left.returncode}: {left.stderr}")
+        expect("srun --mpi=pmix -n 2" in left.stderr, f"task {task} of 2 says {left.stderr}")
+        expect(not (folder / "lone.png").exists(), f"task {task} of 2 wrote its picture")
+    script = subprocess.run([HPR, "render", "gen:cornell", "-o", "lone.png", "--size", "32x24"], cwd=folder,
+                            env=plain_environment(SLURM_NTASKS="2", SLURM_PROCID="0", SLURM_JOB_ID="1"),
+                            capture_output=True, text=True, timeout=60, check=False)
+    expect(script.returncode == 0, f"a batch script of two tasks left with {script.returncode}: {script.stderr}")
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-job-") as scratch:
         folder = pathlib.Path(scratch)
@@ -199,6 +266,9 @@ def main():
             output_nobody_takes(folder, ranks)
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
+        without_ssh(folder)
+        ranks_that_listen(folder)
+        lone_tasks(folder)
         asked_in_vain(folder)
         colors(folder)
         ignored(folder)

@@ -204,17 +204,22 @@ void kill_with_descendants(pid_t process) {
 }
 
 /// What Open MPI needs to run as root, with more ranks than cores and without its own banners. Values the user set win.
-constexpr std::array<std::pair<const char*, const char*>, 10> kEnvironment{{
+constexpr std::array<std::pair<const char*, const char*>, 9> kEnvironment{{
     {"OMPI_ALLOW_RUN_AS_ROOT", "1"},
     {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
     {"OMPI_MCA_rmaps_base_oversubscribe", "1"},
     {"OMPI_MCA_hwloc_base_binding_policy", "none"},
     {"OMPI_MCA_mpi_yield_when_idle", "1"},
     {"OMPI_MCA_pml", "ob1"},
-    {"OMPI_MCA_btl", "self,vader,tcp"},
     {"OMPI_MCA_orte_execute_quiet", "1"},
     {"OMPI_MCA_opal_signal", ""},  // no stack dumps
     {"HWLOC_COMPONENTS", "-gl"},   // asks X servers, also one that hangs, for nothing that is needed
+}};
+
+/// What it needs besides for jobs of one host: no ssh, which may not be there, and no ranks that listen to the network.
+constexpr std::array<std::pair<const char*, const char*>, 2> kOneHost{{
+    {"OMPI_MCA_plm", "isolated"},
+    {"OMPI_MCA_btl", "self,vader"},
 }};
 
 constexpr std::string_view kStartMark = "\x06hpr ranks have started\n";
@@ -241,6 +246,9 @@ constexpr std::chrono::seconds kMaxEnd{10};
   ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
   for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
+  if (is_one_host()) {
+    for (const auto& [name, value] : kOneHost) ::setenv(name, value, 0);
+  }
   if (typed) ::setenv(kTypedInputVariable, "1", 1);
   ::setenv(kReportStartVariable, "1", 1);
   ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);

@@ -57,6 +57,16 @@ class CallLimit {
   std::jthread thread_;
 };
 
+/// srun without MPI's help starts the program as often as it has tasks, and each would write the same files.
+void refuse_lone_tasks() {
+  if (srun_tasks() == 1) return;
+  throw Error(ExitCode::Usage,
+              fmt::format("srun started {0} tasks, but they are not ranks of one MPI job: each of them would do all of "
+                          "the work, and write the same files",
+                          srun_tasks()),
+              fmt::format("run srun --mpi=pmix -n {} hpr ...; srun --mpi=list shows what it has", srun_tasks()));
+}
+
 /// MPI_Init and, on success only, MPI_Finalize: a rank that left early would hang in it.
 ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
   std::optional<CallLimit> limit;
@@ -69,6 +79,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
   try {
     MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
     limit.reset();
+    if (comm.size() == 1) refuse_lone_tasks();
     if (rank == 0) notify_launcher();
     if (globals.ranks > 0 && globals.ranks != comm.size()) {
       throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
@@ -96,6 +107,7 @@ ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communic
                    const JobOptions& options) {
   const auto body = [&](Communicator& comm) { return traced(comm, globals, untraced); };
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
+  refuse_lone_tasks();
   if (globals.ranks > 1) {
     JobOptions limited = options;
     limited.hang_limit = globals.hang_limit();
