@@ -192,6 +192,17 @@ def crowd(site):
     check("once they have left", status, 200)
 
 
+def idle_connections(site):
+    """Connections that say nothing, more than are kept, keep nobody out who has the token."""
+    idle = [socket.create_connection((site.host, site.port), timeout=20) for _ in range(60)]
+    begin = time.monotonic()
+    check("beside idle connections", site.ask("/status")[0], 200)
+    if time.monotonic() - begin > 5:
+        complain("an answer beside idle connections took longer than these are given")
+    for one in idle:
+        one.close()
+
+
 def serve(folder, ranks):
     process = subprocess.Popen([HPR, "wall", "run", WALL, *SCENE, "--display", "web", "--spp", "1", "--target-ms", "60000",
                                 "--ranks", ranks], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -205,6 +216,7 @@ def serve(folder, ranks):
         screen = pages(site)
         pictures(site, folder, screen)
         crowd(site)
+        idle_connections(site)
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=30)[1]
         check(f"SIGINT with {ranks} ranks ({said[-500:]!r})", process.returncode, 0)

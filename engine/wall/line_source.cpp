@@ -39,8 +39,14 @@ void LineSource::accept_client() {
   auto socket = listener_->accept();
   if (!socket) return;
   if (clients_.size() >= kMaxClients) {
-    log::warning("a client of the console was turned away: there are too many");
-    return;
+    // Who has not shown the token keeps nobody out: the oldest of them makes room.
+    const auto wait = [](const auto& client) { return client.second.trusted ? -1.0 : client.second.since.ms(); };
+    const auto oldest = std::ranges::max_element(clients_, {}, wait);
+    if (oldest->second.trusted) {
+      log::warning("a client of the console was turned away: there are too many");
+      return;
+    }
+    clients_.erase(oldest);
   }
   Client& client = clients_[socket->descriptor()];
   client.trusted = token_.empty();

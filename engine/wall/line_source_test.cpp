@@ -9,7 +9,10 @@
 
 #include <array>
 #include <cstring>
+#include <memory>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -99,6 +102,21 @@ TEST_F(LineSourceTest, AClientOfTcpSaysTheTokenFirst) {
   EXPECT_EQ(unauthenticated.received(), "");
   const Client guest(port);
   guest.send("token " + source.token() + "\nhelp\n");
+  const auto line = next_line(source);
+  ASSERT_TRUE(line);
+  EXPECT_EQ(line->text, "help");
+}
+
+TEST_F(LineSourceTest, ClientsWithoutATokenKeepNobodyOut) {
+  LineSource source({.listen = "127.0.0.1:0"});
+  const auto port = static_cast<std::uint16_t>(std::stoi(source.address().substr(source.address().rfind(':') + 1)));
+  std::vector<std::unique_ptr<Client>> idle;
+  for (int i = 0; i < 20; ++i) {
+    idle.push_back(std::make_unique<Client>(port));
+    EXPECT_FALSE(source.next(milliseconds(1)));
+  }
+  const Client client(port);
+  client.send("token " + source.token() + "\nhelp\n");
   const auto line = next_line(source);
   ASSERT_TRUE(line);
   EXPECT_EQ(line->text, "help");

@@ -7,6 +7,8 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <chrono>
+#include <list>
+#include <optional>
 #include <set>
 #include <thread>
 #include <utility>
@@ -31,7 +33,8 @@ using Task = asio::awaitable<Value>;
 using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
-constexpr int kMaxConnections = 8;
+constexpr int kMaxConnections = 8;               ///< of those who know the token
+constexpr std::size_t kMaxUnauthenticated = 32;  ///< connections that have not shown it
 constexpr std::uint64_t kMaxBody_bytes = 4096;
 constexpr std::uint32_t kMaxHeader_bytes = 8192;
 constexpr seconds kToRead{10};  ///< a request, and between two of a connection
@@ -126,18 +129,34 @@ class WebServer::Implementation {
   /// One of the connections that are counted.
   class ConnectionSlot {
    public:
-    explicit ConnectionSlot(int& used) : used_(&used) { ++*used_; }
+    explicit ConnectionSlot(int& used) : used_(used) { ++used_; }
     ConnectionSlot(const ConnectionSlot&) = delete;
-    ConnectionSlot(ConnectionSlot&& other) noexcept : used_(std::exchange(other.used_, nullptr)) {}
     ConnectionSlot& operator=(const ConnectionSlot&) = delete;
-    ConnectionSlot& operator=(ConnectionSlot&&) = delete;
-    ~ConnectionSlot() {
-      if (used_ != nullptr) --*used_;
-    }
+    ~ConnectionSlot() { --used_; }
 
    private:
-    int* used_;
+    int& used_;
   };
+
+  /// A connection that has not shown the token.
+  class Unauthenticated {
+   public:
+    Unauthenticated(std::list<beast::tcp_stream*>& all, beast::tcp_stream& stream)
+        : all_(all), position_(all.insert(all.end(), &stream)) {}
+    Unauthenticated(const Unauthenticated&) = delete;
+    Unauthenticated& operator=(const Unauthenticated&) = delete;
+    ~Unauthenticated() { all_.erase(position_); }
+
+   private:
+    std::list<beast::tcp_stream*>& all_;
+    std::list<beast::tcp_stream*>::iterator position_;
+  };
+
+  /// Whoever has waited longest without the token makes room, so that strangers keep nobody out.
+  void close_oldest_unauthenticated() {
+    unauthenticated_.front()->close();  // its coroutine ends, later
+    unauthenticated_.splice(unauthenticated_.end(), unauthenticated_, unauthenticated_.begin());
+  }
 
   Task<void> accept() {
     while (true) {
@@ -150,11 +169,8 @@ class WebServer::Implementation {
       }
       socket.set_option(tcp::no_delay(true), error);
       beast::tcp_stream stream(std::move(socket));
-      if (connections_ < kMaxConnections) {
-        asio::co_spawn(io_, serve(std::move(stream), ConnectionSlot(connections_)), warn_of);
-      } else if (refused_ < kMaxConnections) {
-        asio::co_spawn(io_, turn_away(std::move(stream), ConnectionSlot(refused_)), warn_of);
-      }
+      if (unauthenticated_.size() >= kMaxUnauthenticated) close_oldest_unauthenticated();
+      asio::co_spawn(io_, serve(std::move(stream)), warn_of);
     }
   }
 
@@ -214,20 +230,23 @@ class WebServer::Implementation {
     }
   }
 
-  Task<void> turn_away(beast::tcp_stream stream, ConnectionSlot /*place*/) {
+  Task<void> serve(beast::tcp_stream stream) {
     beast::flat_buffer buffer(kMaxHeader_bytes + kMaxBody_bytes);
-    Request request;
-    if (!co_await read(stream, buffer, request)) co_return;
-    Response response = refusal(request, http::status::service_unavailable, "eight connections are open already");
-    response.set(http::field::retry_after, "5");
-    co_await end(stream, std::move(response));
-  }
-
-  Task<void> serve(beast::tcp_stream stream, ConnectionSlot /*place*/) {
-    beast::flat_buffer buffer(kMaxHeader_bytes + kMaxBody_bytes);
+    std::optional<Unauthenticated> unauthenticated(std::in_place, unauthenticated_, stream);
+    std::optional<ConnectionSlot> slot;
     while (true) {
       Request request;
       if (!co_await read(stream, buffer, request)) co_return;
+      if (!slot && has_key(request)) {
+        if (connections_ == kMaxConnections) {
+          Response response = refusal(request, http::status::service_unavailable, "eight connections are open already");
+          response.set(http::field::retry_after, "5");
+          co_await end(stream, std::move(response));
+          co_return;
+        }
+        slot.emplace(connections_);
+        unauthenticated.reset();
+      }
       if (const auto which = stream_asked_for(request)) {
         co_await send_stream(stream, *which);
         co_return;
@@ -369,9 +388,9 @@ class WebServer::Implementation {
   milliseconds to_write_;
   std::string token_;
   std::string cookie_;
+  std::list<beast::tcp_stream*> unauthenticated_;  ///< the oldest first; outlives what io_ still has of them
   asio::io_context io_{1};
   int connections_ = 0;
-  int refused_ = 0;
   std::set<asio::steady_timer*> waiting_;  ///< of streams
   tcp::acceptor acceptor_;
   std::jthread thread_;  ///< last: it ends before what it uses

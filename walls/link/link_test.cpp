@@ -304,6 +304,40 @@ TEST_F(LinkTest, TcpTakesTheSameTokenOnBothEnds) {
   EXPECT_EQ(refusal(run), "accepted");
 }
 
+/// Whoever connects and says nothing.
+Socket idle_connection(const LinkAddress& address) {
+  while (true) {
+    try {
+      return start_connecting(address);
+    } catch (const LinkError&) {  // the queue of those who wait is full
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+}
+
+TEST_F(LinkTest, IdleConnectionsKeepNobodyOut) {
+  const RunningDisplay display(wall_, "localhost", receiver());
+  std::vector<Socket> idle;
+  for (int i = 0; i < 100; ++i) idle.push_back(idle_connection(address("localhost")));
+  const double begin = link_seconds();
+  EXPECT_EQ(refusal(sender()), "accepted");
+  EXPECT_LT(link_seconds() - begin, 1.0) << "before the idle ones have had their time";
+}
+
+TEST(LinkToken, AShortSecretIsNone) {
+  const char* const before = std::getenv("HPR_TOKEN");
+  const std::string kept = before == nullptr ? "" : before;
+  for (const auto& [secret, good] : {std::pair("1234567", false), std::pair("12345678", true), std::pair("", true)}) {
+    ASSERT_EQ(::setenv("HPR_TOKEN", secret, 1), 0);
+    if (good) {
+      EXPECT_EQ(link_token(), secret);
+    } else {
+      EXPECT_THROW((void)link_token(), Error);
+    }
+  }
+  before == nullptr ? ::unsetenv("HPR_TOKEN") : ::setenv("HPR_TOKEN", kept.c_str(), 1);
+}
+
 TEST_F(LinkTest, AMissingDisplayHoldsNoFrameUp) {
   WallSender sender(wall_, owners(), this->sender());
   sender.wait_for_displays(Seconds(0.05));

@@ -218,7 +218,13 @@ std::string link_build() {
 
 std::string link_token() {
   const char* const token = std::getenv("HPR_TOKEN");  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
-  return token == nullptr ? "" : token;
+  const std::string secret = token == nullptr ? "" : token;
+  constexpr std::size_t kMinLength = 8;
+  if (!secret.empty() && secret.size() < kMinLength) {
+    throw Error(ExitCode::Usage, fmt::format("the secret in HPR_TOKEN has fewer than {} characters", kMinLength),
+                "make one that nobody can guess: HPR_TOKEN=$(od -An -N32 -tx1 /dev/urandom | tr -d ' \\n')");
+  }
+  return secret;
 }
 
 LinkNonce make_nonce() {

@@ -154,8 +154,12 @@ void FrameReceiver::step() {
 
 void FrameReceiver::accept(const Listener& listener) {
   while (auto socket = listener.accept()) {
-    const auto unknown = std::ranges::count_if(peers_, [](const auto& peer) { return !peer->open; });
-    if (peers_.size() >= kMaxPeers || static_cast<std::size_t>(unknown) >= kMaxUnknownPeers) continue;
+    if (peers_.size() >= kMaxPeers) continue;
+    const auto unknown = [](const auto& peer) { return !peer->open; };
+    if (static_cast<std::size_t>(std::ranges::count_if(peers_, unknown)) >= kMaxUnknownPeers) {
+      // The one that has waited longest makes room: ranks take milliseconds to say who they are.
+      peers_.erase(std::ranges::find_if(peers_, unknown));
+    }
     auto peer = std::make_unique<Peer>(Peer{Connection(std::move(*socket)), listener.tcp()});
     peer->nonce = make_nonce();
     peer->since = settings_.clock();
