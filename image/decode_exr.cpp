@@ -10,8 +10,10 @@
 #include <array>
 #include <cstring>
 #include <exception>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "core/error.h"
 #include "image/stored_picture.h"
@@ -41,28 +43,124 @@ class ExrInput final : public Imf::IStream {
   std::size_t position_ = 0;
 };
 
-/// Whether every attribute of the first part's header lies in the file: OpenEXR makes room for one before it reads it.
-bool has_whole_header(std::span<const std::byte> bytes) {
-  constexpr std::size_t kVersion = 8;  // of the file, with the magic number
-  std::string_view left(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  left.remove_prefix(std::min(kVersion, left.size()));
-  const auto skip_text = [&] {
-    const std::size_t end = left.find('\0');
-    const bool found = end != std::string_view::npos;
-    left.remove_prefix(found ? end + 1 : left.size());
+/// Reads the heads of attributes as they lie in a file.
+class AttributeReader {
+ public:
+  explicit AttributeReader(std::string_view left) : left_(left) {}
+
+  [[nodiscard]] std::size_t left() const { return left_.size(); }
+  /// Up to the next 0, which is taken too; none where there is none.
+  std::optional<std::string_view> text() {
+    const std::size_t end = left_.find('\0');
+    if (end == std::string_view::npos) return std::nullopt;
+    const std::string_view found = left_.substr(0, end);
+    left_.remove_prefix(end + 1);
     return found;
-  };
-  while (!left.empty() && left.front() != '\0') {
-    std::int32_t size = 0;
-    const bool named = skip_text();
-    const bool typed = skip_text();
-    if (!named || !typed || left.size() < sizeof(size)) return false;
-    std::memcpy(&size, left.data(), sizeof(size));
-    left.remove_prefix(sizeof(size));
-    if (size < 0 || static_cast<std::size_t>(size) > left.size()) return false;
-    left.remove_prefix(static_cast<std::size_t>(size));
   }
-  return !left.empty();
+  std::optional<std::uint32_t> number() {
+    std::uint32_t value = 0;
+    const auto bytes = take(sizeof(value));
+    if (!bytes) return std::nullopt;
+    std::memcpy(&value, bytes->data(), sizeof(value));
+    return value;
+  }
+  std::optional<std::string_view> take(std::size_t count) {
+    if (count > left_.size()) return std::nullopt;
+    const std::string_view taken = left_.substr(0, count);
+    left_.remove_prefix(count);
+    return taken;
+  }
+
+ private:
+  std::string_view left_;
+};
+
+/// Whether the list of channels ends where its attribute does.
+bool is_whole_channel_list(AttributeReader value) {
+  constexpr std::size_t kChannel = 16;  // bytes after the name
+  while (const auto name = value.text()) {
+    if (name->empty()) return value.left() == 0;
+    if (!value.take(kChannel)) return false;
+  }
+  return false;
+}
+
+bool is_whole_string_list(AttributeReader value) {
+  while (value.left() > 0) {
+    const auto length = value.number();
+    if (!length || !value.take(*length)) return false;
+  }
+  return true;
+}
+
+bool is_whole_preview(AttributeReader value) {
+  const auto width = value.number();
+  const auto height = value.number();
+  constexpr std::uint64_t kMaxSide = 1U << 16U;
+  return width && height && *width <= kMaxSide && *height <= kMaxSide &&
+         value.left() == std::uint64_t{4} * *width * *height;
+}
+
+/// Whether OpenEXR will take as many bytes for the value of an attribute as the file says it has. It goes by the type
+/// and makes room for lengths it finds on the way, where the two differ gigabytes of them.
+bool is_whole_value(std::string_view type, std::string_view value) {
+  constexpr std::array<std::pair<std::string_view, std::size_t>, 25> kSizes{{{"box2i", 16},
+                                                                             {"box2f", 16},
+                                                                             {"chromaticities", 32},
+                                                                             {"compression", 1},
+                                                                             {"deepImageState", 1},
+                                                                             {"double", 8},
+                                                                             {"envmap", 1},
+                                                                             {"float", 4},
+                                                                             {"int", 4},
+                                                                             {"keycode", 28},
+                                                                             {"lineOrder", 1},
+                                                                             {"m33f", 36},
+                                                                             {"m33d", 72},
+                                                                             {"m44f", 64},
+                                                                             {"m44d", 128},
+                                                                             {"rational", 8},
+                                                                             {"tiledesc", 9},
+                                                                             {"timecode", 8},
+                                                                             {"v2i", 8},
+                                                                             {"v2f", 8},
+                                                                             {"v2d", 16},
+                                                                             {"v3i", 12},
+                                                                             {"v3f", 12},
+                                                                             {"v3d", 24},
+                                                                             {"half", 2}}};
+  const auto fixed = std::ranges::find(kSizes, type, &std::pair<std::string_view, std::size_t>::first);
+  if (fixed != kSizes.end()) return value.size() == fixed->second;
+  if (type == "chlist") return is_whole_channel_list(AttributeReader(value));
+  if (type == "stringvector") return is_whole_string_list(AttributeReader(value));
+  if (type == "preview") return is_whole_preview(AttributeReader(value));
+  if (type == "floatvector") return value.size() % 4 == 0;
+  return true;  // texts, and what OpenEXR does not know, are as long as they say
+}
+
+/// The attributes of one header, up to the 0 behind the last.
+bool is_whole_header(AttributeReader& file) {
+  while (const auto name = file.text()) {
+    if (name->empty()) return true;
+    const auto type = file.text();
+    const auto size = type ? file.number() : std::nullopt;
+    const auto value = size ? file.take(*size) : std::nullopt;
+    if (!value || !is_whole_value(*type, *value)) return false;
+  }
+  return false;
+}
+
+/// Whether every attribute of the file's headers lies in the file and has the length of its type.
+bool has_whole_headers(std::span<const std::byte> bytes) {
+  constexpr std::uint32_t kManyParts = 0x1000;  // then headers follow each other, an empty one last
+  AttributeReader file({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const auto magic = file.number();
+  const auto version = file.number();
+  if (!magic || !version || !is_whole_header(file)) return false;
+  if ((*version & kManyParts) == 0) return true;
+  for (std::size_t before = file.left(); is_whole_header(file); before = file.left())
+    if (before - file.left() == 1) return true;
+  return false;
 }
 
 /// The first part's header, read without what OpenEXR allocates for pixels.
@@ -137,7 +235,7 @@ void read_pixels(Imf::InputFile& file, const std::vector<ExrChannel>& channels, 
 }  // namespace
 
 FloatImage decode_exr(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
-  if (!has_whole_header(bytes)) throw_undecodable(name, "the header is cut short");
+  if (!has_whole_headers(bytes)) throw_undecodable(name, "its header does not hold together");
   try {
     ExrInput input(bytes, name);
     const Imf::Header header = read_header(input);

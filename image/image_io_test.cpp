@@ -460,6 +460,33 @@ TEST(ImageIo, AnExrAttributeThatIsLargerThanItsFileIsRefused) {
   }
 }
 
+/// OpenEXR goes by an attribute's type, not by the length the file gives it: what follows would be read out of step, a
+/// length in it as gigabytes.
+TEST(ImageIo, ExrAttributesHaveTheLengthOfTheirType) {
+  const Bytes good = encode_exr(Image<Rgb>({2, 2}), {{"note", "x"}});
+  EXPECT_EQ(code_of([&] { (void)decode_float_image(good, "a.exr", {}); }), ExitCode::Done);
+  for (const std::string_view head :
+       {std::string_view("channels\0chlist", 15), std::string_view("dataWindow\0box2i", 16),
+        std::string_view("compression\0compression", 23), std::string_view("screenWindowWidth\0float", 23)}) {
+    for (const std::int32_t more : {-1, 1}) {
+      Bytes file = good;
+      const auto found = std::ranges::search(file, std::as_bytes(std::span(head.data(), head.size() + 1)));
+      ASSERT_FALSE(found.empty()) << head;
+      std::int32_t size = 0;
+      std::memcpy(&size, &*found.end(), sizeof size);
+      size += more;
+      std::memcpy(&*found.end(), &size, sizeof size);
+      try {
+        (void)decode_float_image(file, "a.exr", {});
+        ADD_FAILURE() << head;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ExitCode::BadInput);
+        EXPECT_NE(std::string(error.what()).find("does not hold together"), std::string::npos) << error.what();
+      }
+    }
+  }
+}
+
 TEST(ImageIo, RadianceFilesAreReadByTheirModule) {
   Bytes file;
   for (const char c : std::string_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"))

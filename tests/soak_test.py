@@ -90,8 +90,14 @@ class Run:
 
     def end(self):
         """What became of it."""
-        subprocess.run([HPR, "wall", "stop"], cwd=self.folder, env=environment(self.folder), capture_output=True, timeout=60,
-                       check=False)
+        until, answers = time.monotonic() + 60, []
+        while time.monotonic() < until and self.process.poll() is None:  # a job that is starting cannot be told yet
+            stop = subprocess.run([HPR, "wall", "stop"], cwd=self.folder, env=environment(self.folder), capture_output=True,
+                                  text=True, timeout=60, check=False)
+            answers.append(stop.stderr.strip())
+            if stop.returncode == 0:
+                break
+            time.sleep(2)
         try:
             code = self.process.wait(timeout=60)
         except subprocess.TimeoutExpired:
@@ -105,7 +111,7 @@ class Run:
         return {"exit": code, "killed": self.killed, "restarts": len(re.findall(r"starting it again", said)),
                 "crashes": len(re.findall(r"signal (?:4|6|7|8|11)\b|corrupted|double free|Sanitizer", both)),
                 "refused": len(re.findall(r"refuses:", said)), "commands": [self.commands_taken, self.commands],
-                "samples": self.samples, "said": said[-2000:] if code != 0 else ""}
+                "samples": self.samples, "stop": answers, "said": said[-2000:] if code != 0 else ""}
 
 
 def leaks(samples):

@@ -1,0 +1,114 @@
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "scene/gltf/gltf.h"
+#include "scene/load_scene.h"
+#include "tests/fuzz/fuzz.h"
+
+// Scenes of strangers: .glb and .gltf with data URIs.
+namespace hpr::fuzz {
+namespace {
+
+constexpr std::string_view kText = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+"nodes":[{"mesh":0,"children":[1],"rotation":[0,0,0,1]},{"camera":0,"scale":[1,2,3]},{"skin":0,"mesh":0,"weights":[0.5]}],
+"cameras":[{"type":"perspective","perspective":{"yfov":0.7,"znear":0.1,"zfar":100}}],
+"skins":[{"joints":[1]}],
+"materials":[{"pbrMetallicRoughness":{"baseColorFactor":[1,0,0,1],"baseColorTexture":{"index":0,"texCoord":0}},
+"alphaMode":"MASK","alphaCutoff":0.4,"extensions":{"KHR_materials_ior":{"ior":1.4}}}],
+"textures":[{"source":0,"sampler":0}],"samplers":[{"wrapS":33071}],
+"images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="}],
+"extensionsUsed":["KHR_materials_ior"],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":2,"JOINTS_0":3,"WEIGHTS_0":4},"indices":1,"material":0,"mode":4,
+"targets":[{"POSITION":0}]}],"weights":[0]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0],
+"sparse":{"count":1,"indices":{"bufferView":1,"componentType":5123},"values":{"bufferView":0}}},
+{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"},{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"},
+{"bufferView":0,"componentType":5121,"count":3,"type":"VEC4"},{"bufferView":0,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}],
+"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":6}],
+"buffers":[{"byteLength":44,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA="}]})";
+
+void append_u32(Bytes& bytes, std::size_t value) {
+  const auto number = static_cast<std::uint32_t>(value);
+  const auto part = std::as_bytes(std::span(&number, 1));
+  bytes.insert(bytes.end(), part.begin(), part.end());
+}
+
+/// The text as the first chunk of a .glb.
+Bytes to_glb(std::string_view text) {
+  std::string padded(text);
+  padded.resize((padded.size() + 3) / 4 * 4, ' ');
+  Bytes file = to_bytes("glTF");
+  append_u32(file, 2);
+  append_u32(file, 12 + 8 + padded.size());
+  append_u32(file, padded.size());
+  const Bytes type = to_bytes("JSON");
+  file.insert(file.end(), type.begin(), type.end());
+  const Bytes body = to_bytes(padded);
+  file.insert(file.end(), body.begin(), body.end());
+  return file;
+}
+
+/// A folder of this process's own, whose file is written over and over.
+class ScratchFolder {
+ public:
+  ScratchFolder() : path_(std::filesystem::temp_directory_path() / ("hpr-fuzz-" + std::to_string(::getpid()))) {
+    std::filesystem::create_directory(path_);
+  }
+  ~ScratchFolder() {
+    std::error_code error;
+    std::filesystem::remove_all(path_, error);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  [[nodiscard]] std::filesystem::path write(std::span<const std::byte> input) const {
+    const bool binary = input.size() >= 4 && std::memcmp(input.data(), "glTF", 4) == 0;
+    std::filesystem::path file = path_ / (binary ? "scene.glb" : "scene.gltf");
+    std::ofstream(file, std::ios::binary)
+        .write(reinterpret_cast<const char*>(input.data()), static_cast<std::streamsize>(input.size()));
+    return file;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+std::vector<Bytes> seeds() {
+  return {to_bytes(kText), to_glb(kText)};
+}
+
+bool run(std::span<const std::byte> input) {
+  static const ScratchFolder folder;
+  log::configure(log::Level::Error, "");
+  SceneLimits limits;
+  limits.memory_bytes = std::uint64_t{256} << 20U;
+  limits.image = {.side = 1024, .pixels = 1U << 20U};
+  try {
+    (void)load_gltf(folder.write(input), limits);
+    return true;
+  } catch (const Error& error) {
+    if (error.code() == ExitCode::Internal) throw;  // a fault of the program's
+    return false;
+  }
+}
+
+/// Of a .glb the lengths.
+Bytes repaired(Bytes input) {
+  constexpr std::size_t kHeads = 20;
+  if (input.size() < kHeads || std::memcmp(input.data(), "glTF", 4) != 0) return input;
+  const auto size = static_cast<std::uint32_t>(input.size());
+  const auto chunk = static_cast<std::uint32_t>(size - kHeads);
+  std::memcpy(input.data() + 8, &size, sizeof(size));
+  std::memcpy(input.data() + 12, &chunk, sizeof(chunk));
+  return input;
+}
+
+}  // namespace hpr::fuzz
