@@ -49,7 +49,7 @@ class AttributeReader {
   explicit AttributeReader(std::string_view left) : left_(left) {}
 
   [[nodiscard]] std::size_t left() const { return left_.size(); }
-  /// Up to the next 0, which is taken too; none where there is none.
+  /// Up to the next 0, which goes too; none where there is none.
   std::optional<std::string_view> text() {
     const std::size_t end = left_.find('\0');
     if (end == std::string_view::npos) return std::nullopt;
@@ -66,9 +66,9 @@ class AttributeReader {
   }
   std::optional<std::string_view> take(std::size_t count) {
     if (count > left_.size()) return std::nullopt;
-    const std::string_view taken = left_.substr(0, count);
+    const std::string_view part = left_.substr(0, count);
     left_.remove_prefix(count);
-    return taken;
+    return part;
   }
 
  private:

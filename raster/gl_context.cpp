@@ -71,8 +71,8 @@ void check_gl_backend(const std::string& backend) {
 
 std::unique_ptr<GlContext> make_gl_context(const GlOptions& options) {
   check_gl_backend(options.backend);
-  // llvmpipe reads it when its screen is made, which is with the first context. 0 is no thread beside the caller's, and so
-  // none to race with when a fence ends (Mesa 22.3). What the user says counts.
+  // llvmpipe reads it when its screen is made, which is with the first context. 0 is no thread beside the caller's, and
+  // so none to race with when a fence ends (Mesa 22.3). What the user says counts.
   const int helpers = options.threads == 1 ? 0 : options.threads;
   // NOLINTNEXTLINE(concurrency-mt-unsafe): contexts are made before a process starts threads that read the environment
   if (options.threads > 0) setenv("LP_NUM_THREADS", std::to_string(helpers).c_str(), 0);

@@ -86,10 +86,10 @@ class Mutator {
     constexpr std::size_t kMaxBytes = 1 << 16;
     const std::size_t at = below(input.size() + 1);
     const std::size_t length = std::min(1 + below(below(2) == 0 ? 8 : 200), input.size() - at);
-    const auto place = input.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto position = input.begin() + static_cast<std::ptrdiff_t>(at);
     switch (below(8)) {
       case 0:
-        if (at < input.size()) *place ^= std::byte{1} << below(8);
+        if (at < input.size()) *position ^= std::byte{1} << below(8);
         break;
       case 1: {  // a number, of either byte order
         std::uint64_t number = odd_number();
@@ -99,11 +99,11 @@ class Mutator {
         break;
       }
       case 2:
-        input.erase(place, place + static_cast<std::ptrdiff_t>(length));
+        input.erase(position, position + static_cast<std::ptrdiff_t>(length));
         break;
       case 3: {  // a piece twice
-        const Bytes piece(place, place + static_cast<std::ptrdiff_t>(length));
-        if (input.size() + length <= kMaxBytes) input.insert(place, piece.begin(), piece.end());
+        const Bytes piece(position, position + static_cast<std::ptrdiff_t>(length));
+        if (input.size() + length <= kMaxBytes) input.insert(position, piece.begin(), piece.end());
         break;
       }
       case 4: {  // a piece of another seed
@@ -111,7 +111,8 @@ class Mutator {
         const std::size_t from = below(other.size());
         const std::size_t count = std::min(1 + below(200), other.size() - from);
         const auto first = other.begin() + static_cast<std::ptrdiff_t>(from);
-        if (input.size() + count <= kMaxBytes) input.insert(place, first, first + static_cast<std::ptrdiff_t>(count));
+        if (input.size() + count <= kMaxBytes)
+          input.insert(position, first, first + static_cast<std::ptrdiff_t>(count));
         break;
       }
       case 5:
@@ -122,7 +123,7 @@ class Mutator {
         break;
       default: {  // a digit, a bracket, a quote: most of what text formats are made of
         constexpr std::string_view kSigns = "0123456789-.eE+[]{}\"',:=#\n\\ \x7F\xFF";
-        if (at < input.size()) *place = static_cast<std::byte>(kSigns[below(kSigns.size())]);
+        if (at < input.size()) *position = static_cast<std::byte>(kSigns[below(kSigns.size())]);
         break;
       }
     }
