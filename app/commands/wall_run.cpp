@@ -376,7 +376,8 @@ class WallRunCommand final : public Command {
     options.option("--path", run_.path, "where the camera goes in these frames, see docs/commands.md").type("FILE");
     declare_target_ms(options, run_.target_ms, "what a frame may take; what is given up for it is in the manifest");
     options.option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples");
-    options.option("--restarts", run_.restarts, "how often a job of several ranks that is lost is started again")
+    options
+        .option("--restarts", run_.restarts, "how often an hour a job of several ranks that is lost is started again")
         .range(0, 1000)
         .show_default();
     run_.link.declare(options, run_.settings);

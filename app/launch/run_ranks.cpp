@@ -119,6 +119,13 @@ ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communic
   return code;
 }
 
+bool RestartLimit::use(Clock::time_point now) {
+  while (!uses_.empty() && now - uses_.front() >= period_) uses_.pop_front();
+  if (uses_.size() >= static_cast<std::size_t>(count_)) return false;
+  uses_.push_back(now);
+  return true;
+}
+
 ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interrupts,
                         const std::function<ExitCode(Communicator&)>& body) {
   if (inside_mpi_job() || globals.ranks <= 1 || restarts <= 0)
@@ -130,7 +137,8 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
       .interrupts = interrupts,
       .hang_limit = globals.hang_limit()};
   std::optional<std::size_t> ended_at;
-  for (int restart = 0;; ++restart) {
+  RestartLimit limit(restarts);
+  while (true) {
     std::optional<Error> lost;
     try {
       const auto code = static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
@@ -141,13 +149,15 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
       lost.emplace(error);
     }
     const std::size_t done = journal.read().frames.size();
-    if (restart == restarts || ended_at == done) {
+    if (ended_at == done || !limit.use(RestartLimit::Clock::now())) {
       throw Error(lost->code(), fmt::format("{}; {} of its frames are done", lost->what(), done),
-                  ended_at == done ? "frame " + std::to_string(done) + " ended two jobs; draw it alone to see why"
-                                   : fmt::format("it was started again {} times; see --restarts", restart));
+                  ended_at == done
+                      ? "frame " + std::to_string(done) + " ended two jobs; draw it alone to see why"
+                      : fmt::format("it was started again {} times within an hour; see --restarts", restarts));
     }
     ended_at = done;
-    log::warning("{}; starting it again from frame {} (restart {} of {})", lost->what(), done, restart + 1, restarts);
+    log::warning("{}; starting it again from frame {} (restart {} of {} in this hour)", lost->what(), done,
+                 limit.used(), restarts);
     journal.add_restart(lost->what());
   }
 }
