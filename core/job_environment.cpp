@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <fstream>
 
 // NOLINTBEGIN(concurrency-mt-unsafe): nobody writes the environment
 namespace hpr {
@@ -40,7 +41,13 @@ bool is_one_host() {
                                               "COBALT_JOBID",
                                               "OMPI_MCA_orte_default_hostfile",
                                               "OMPI_MCA_orte_rankfile"};
-  return std::ranges::none_of(kHosts, [](const char* name) { return std::getenv(name) != nullptr; });
+  if (std::ranges::any_of(kHosts, [](const char* name) { return std::getenv(name) != nullptr; })) return false;
+  std::ifstream hosts("/etc/openmpi/openmpi-default-hostfile");
+  for (std::string line; std::getline(hosts, line);) {
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    if (first != std::string::npos && line[first] != '#') return false;
+  }
+  return true;
 }
 
 bool launched_by_hpr() {

@@ -23,7 +23,7 @@ inline constexpr const char* kReportStartVariable = "OMPI_HPR_SAY_START";
 /// How many tasks srun started of which this process is one; 1 where it was not srun.
 [[nodiscard]] int srun_tasks();
 
-/// Whether the environment names no other hosts: no batch system's allocation, no file of hosts.
+/// Whether nothing names other hosts: no batch system's allocation, no file of hosts, nor the system's own.
 [[nodiscard]] bool is_one_host();
 
 /// This process's rank as its launcher wrote it into the environment. 0 outside a job.

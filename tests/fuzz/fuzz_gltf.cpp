@@ -1,13 +1,10 @@
-#include <unistd.h>
-
 #include <cstring>
-#include <filesystem>
-#include <fstream>
+#include <string>
 
 #include "core/error.h"
-#include "core/file.h"
 #include "core/log.h"
 #include "scene/gltf/gltf.h"
+#include "scene/gltf/test_tools.h"
 #include "scene/load_scene.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -54,30 +51,9 @@ Bytes to_glb(std::string_view text) {
   return file;
 }
 
-/// A folder of this process's own, whose file is written over and over.
-class ScratchFolder {
- public:
-  ScratchFolder() : path_(std::filesystem::temp_directory_path() / ("hpr-fuzz-" + std::to_string(::getpid()))) {
-    std::filesystem::create_directory(path_);
-  }
-  ~ScratchFolder() {
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  [[nodiscard]] std::filesystem::path write(std::span<const std::byte> input) const {
-    const bool binary = input.size() >= 4 && std::memcmp(input.data(), "glTF", 4) == 0;
-    std::filesystem::path file = path_ / (binary ? "scene.glb" : "scene.gltf");
-    std::ofstream(file, std::ios::binary)
-        .write(reinterpret_cast<const char*>(input.data()), static_cast<std::streamsize>(input.size()));
-    return file;
-  }
-
- private:
-  std::filesystem::path path_;
-};
+bool is_binary(std::span<const std::byte> input) {
+  return input.size() >= 4 && std::memcmp(input.data(), "glTF", 4) == 0;
+}
 
 }  // namespace
 
@@ -86,13 +62,14 @@ std::vector<Bytes> seeds() {
 }
 
 bool run(std::span<const std::byte> input) {
-  static const ScratchFolder folder;
+  static const test::TemporaryFolder folder;
   log::configure(log::Level::Error, "");
   SceneLimits limits;
   limits.memory_bytes = std::uint64_t{256} << 20U;
   limits.image = {.side = 1024, .pixels = 1U << 20U};
   try {
-    (void)load_gltf(folder.write(input), limits);
+    const std::string text(reinterpret_cast<const char*>(input.data()), input.size());
+    (void)load_gltf(folder.write(is_binary(input) ? "scene.glb" : "scene.gltf", text), limits);
     return true;
   } catch (const Error& error) {
     if (error.code() == ExitCode::Internal) throw;  // a fault of the program's
@@ -103,7 +80,7 @@ bool run(std::span<const std::byte> input) {
 /// Of a .glb the lengths.
 Bytes repaired(Bytes input) {
   constexpr std::size_t kHeads = 20;
-  if (input.size() < kHeads || std::memcmp(input.data(), "glTF", 4) != 0) return input;
+  if (input.size() < kHeads || !is_binary(input)) return input;
   const auto size = static_cast<std::uint32_t>(input.size());
   const auto chunk = static_cast<std::uint32_t>(size - kHeads);
   std::memcpy(input.data() + 8, &size, sizeof(size));

@@ -21,13 +21,14 @@
 // one.
 
 /// The sanitizers', where they are linked.
+// NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming): theirs
 extern "C" __attribute__((weak)) void __sanitizer_set_death_callback(void (*callback)());
 
 namespace hpr::fuzz {
 namespace {
 
 constexpr unsigned kMaxSeconds = 10;  ///< of one input
-constexpr long kMaxMemory_KiB = 1L << 20;
+constexpr long kMaxMemoryKib = 1L << 20;
 std::span<const std::byte> current;
 
 /// Only async-signal-safe calls.
@@ -55,7 +56,7 @@ bool try_input(std::span<const std::byte> input) {
   ::alarm(kMaxSeconds);
   const bool good = run(input);
   ::alarm(0);
-  if (memory_kib() > kMaxMemory_KiB) {
+  if (memory_kib() > kMaxMemoryKib) {
     fmt::print("an input took {} MiB\n", memory_kib() / 1024);
     std::abort();
   }
