@@ -68,6 +68,7 @@ ExitCode run(const std::vector<std::string>& arguments) {
   configure_log(globals);
   (void)globals.scene_limits();  // malformed sizes and durations are found before any work
   (void)globals.hang_limit();
+  (void)globals.starter(1);
   settle_backend(globals, *command);
   if (!inside_mpi_job() || (launched_rank() == 0 && !command->collective())) check_trace(globals);
   if (command->collective()) return command->run(globals);

@@ -33,11 +33,19 @@ function(hpr_unit_test target)
   endif()
   gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}." NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
-  # gtest_discover_tests keeps only the first value of a list, so the environment is set once the tests are known.
-  set(environment_script ${CMAKE_CURRENT_BINARY_DIR}/${target}_environment.cmake)
-  file(WRITE ${environment_script}
-    "if(${target}_TESTS)\n  set_tests_properties(\${${target}_TESTS} PROPERTIES ENVIRONMENT \"${HPR_TEST_ENVIRONMENT}\")\nendif()\n")
-  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${environment_script})
+  # gtest_discover_tests keeps only the first value of a list, so lists are set once the tests are known.
+  set(properties_script ${CMAKE_CURRENT_BINARY_DIR}/${target}_properties.cmake)
+  file(WRITE ${properties_script}
+    "if(${target}_TESTS)
+  set_tests_properties(\${${target}_TESTS} PROPERTIES ENVIRONMENT \"${HPR_TEST_ENVIRONMENT}\")
+endif()
+foreach(test IN LISTS ${target}_TESTS)
+  if(test MATCHES [[${HPR_FAULT_TESTS}]])
+    set_tests_properties(\${test} PROPERTIES LABELS \"${ARG_LABELS};fault\")
+  endif()
+endforeach()
+")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${properties_script})
 endfunction()
 
 # hpr_mpi_test(name DEPENDS ... RANKS 1 2 3 ...): name.cpp with the main of tests/mpi_main.cpp, under mpiexec once per rank

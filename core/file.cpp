@@ -318,12 +318,41 @@ TemporaryFile::TemporaryFile() : descriptor_(create_in(temporary_folder())) {
   path_ = fmt::format("/proc/{}/fd/{}", ::getpid(), descriptor_);
 }
 
+namespace {
+
+constexpr std::string_view kTemporaryName = ".hpr-temporary-";
+
+/// Removes those that nobody holds: whoever made them was killed.
+void remove_abandoned(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (!entry->path().filename().string().starts_with(kTemporaryName)) continue;
+    const Descriptor file(::open(entry->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    if (file.get() >= 0 && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
+  }
+}
+
+}  // namespace
+
+TemporaryFile::TemporaryFile(const std::filesystem::path& folder) {
+  const std::filesystem::path there = folder.empty() ? "." : folder;
+  remove_abandoned(there);
+  std::string name = std::filesystem::absolute(there / kTemporaryName).string() + "XXXXXX";
+  descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor_ < 0) fail("cannot write", name, errno);
+  ::flock(descriptor_, LOCK_EX | LOCK_NB);
+  path_ = name;
+  has_name_ = true;
+}
+
 TemporaryFile::~TemporaryFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  if (has_name_) ::unlink(path_.c_str());
 }
 
 TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), path_(std::move(other.path_)) {}
+    : descriptor_(std::exchange(other.descriptor_, -1)), path_(std::move(other.path_)), has_name_(other.has_name_) {}
 
 std::filesystem::path cache_folder() {
   std::filesystem::path folder = chosen_folder();

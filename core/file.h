@@ -89,23 +89,28 @@ class EmptyFolders {
 /// Where temporary files go: the folder that TMPDIR names, or /tmp. Only names it.
 [[nodiscard]] std::filesystem::path temporary_folder();
 
-/// An empty file there that only this user may open, without a name: gone with this process, however it ends.
+/// An empty file that only this user may open.
 class TemporaryFile {
  public:
-  /// Throws Error (Io) that names the folder, and the variable where that says which.
+  /// In temporary_folder(), without a name: gone with this process, however it ends. Throws Error (Io) that names the
+  /// folder, and the variable where that says which.
   TemporaryFile();
+  /// In `folder`, with a name by which other hosts find it too: gone with this object, or, where this process is
+  /// killed, when the next one is made there. Throws Error (Io).
+  explicit TemporaryFile(const std::filesystem::path& folder);
   ~TemporaryFile();
   TemporaryFile(TemporaryFile&& other) noexcept;
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
   TemporaryFile& operator=(TemporaryFile&&) = delete;
 
-  /// The path by which processes of this host open the file while this object lives.
+  /// The path by which other processes open the file while this object lives: those of this host where it has no name.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   int descriptor_;
   std::filesystem::path path_;
+  bool has_name_ = false;
 };
 
 /// Where HPR keeps what it could work out again: $HPR_CACHE, else hpr/ in $XDG_CACHE_HOME or ~/.cache. Made when it is

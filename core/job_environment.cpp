@@ -51,7 +51,9 @@ bool is_one_host() {
 }
 
 bool launched_by_hpr() {
-  return inside_mpi_job() && std::getenv(kReportStartVariable) != nullptr;
+  if (inside_mpi_job()) return std::getenv(kReportStartVariable) != nullptr;
+  const char* const launcher = std::getenv(kLoneRankVariable);
+  return launcher != nullptr && std::atoi(launcher) == ::getppid();
 }
 
 bool input_is_typed() {

@@ -17,6 +17,9 @@ inline constexpr const char* kReportStartVariable = "OMPI_HPR_SAY_START";
 /// True when this process was started by mpirun, mpiexec or srun as one rank of a job.
 [[nodiscard]] bool inside_mpi_job();
 
+/// Set for a rank that this program launched without MPI, as the only one: the launcher's process number.
+inline constexpr const char* kLoneRankVariable = "HPR_LONE_RANK";
+
 /// True when this program launched the job, in a process that waits for this one.
 [[nodiscard]] bool launched_by_hpr();
 

@@ -9,6 +9,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <iomanip>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -194,6 +196,21 @@ std::optional<std::pair<int, int>> parse_extent(std::string_view text) {
   const auto [end, y_error] = std::from_chars(x + 1, last, extent.second);
   if (y_error != std::errc{} || end != last || extent.first <= 0 || extent.second <= 0) return std::nullopt;
   return extent;
+}
+
+std::optional<std::vector<std::string>> split_line(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  std::string word;
+  while (stream >> std::ws && stream.peek() != '#' && !stream.eof()) {
+    const bool quoted = stream.peek() == '"';
+    if (!(stream >> std::quoted(word))) {
+      if (quoted) return std::nullopt;
+      break;
+    }
+    words.push_back(word);
+  }
+  return words;
 }
 
 std::string shell_quote(std::string_view text) {

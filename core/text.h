@@ -28,6 +28,10 @@ namespace hpr {
 /// The words between commas that are not empty.
 [[nodiscard]] std::vector<std::string> split_words(std::string_view list);
 
+/// The words of a line: separated by blanks, "quoted" where they hold some; what follows # is a comment. None where a
+/// quote is not closed.
+[[nodiscard]] std::optional<std::vector<std::string>> split_line(const std::string& line);
+
 /// "512", "64KiB", "1.5GB", "2G" in bytes (K, M, G, T are binary with or without "i", decimal with a plain "B" suffix).
 [[nodiscard]] std::optional<std::uint64_t> parse_bytes(std::string_view text);
 

@@ -5,6 +5,8 @@
 #include <mutex>
 #include <utility>
 
+#include "core/job_board.h"
+
 namespace hpr::trace {
 namespace {
 
@@ -37,12 +39,16 @@ Record finish() {
   return std::exchange(record, {});
 }
 
-Span::Span(const char* name, const char* detail, std::uint64_t amount) : records_(recording()) {
+Span::Span(const char* name, const char* detail, std::uint64_t amount)
+    : around_(current_phase()), records_(recording()) {
+  report_phase(name);
+  report_step();
   if (!records_) return;
   event_ = {name, now_ns(), 0, this_row.rank, this_row.lane, detail, amount};
 }
 
 Span::~Span() {
+  report_phase(around_);
   if (!records_) return;
   event_.end_ns = now_ns();
   const std::lock_guard lock(mutex);

@@ -21,8 +21,8 @@ class Stopwatch {
 
 }  // namespace hpr
 
-/// Spans of what this process does, as trace viewers show them. Costs the read of one flag while nothing
-/// records.
+/// Spans of what this process does, as trace viewers show them and its launcher is told (core/job_board.h). Costs a few
+/// stores while nothing records.
 namespace hpr::trace {
 
 /// Something that was done. Texts are literals.
@@ -65,6 +65,7 @@ class Span {
 
  private:
   Event event_;
+  const char* around_;  ///< the phase before
   bool records_;
 };
 

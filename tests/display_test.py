@@ -171,6 +171,14 @@ def no_display(folder):
         complain(case, "took far too long")
     if set(states(manifest(folder)["frames"], "wall-r0c0")) != {"lost"}:
         complain(case, "the manifest does not call the screens lost")
+    if run(folder, WALL, "--display", "remote", "--fail-on", "never").returncode != 0:
+        complain(case, "fails although --fail-on never was given")
+    (folder / "wall.toml").write_text(TWO_HOSTS)
+    with Display(folder, "wall.toml", "left"):
+        for fail_on, code in (("unseen", 0), ("lost", 7), ("stale", 7)):
+            half = run(folder, "wall.toml", "--display", "remote", "--fail-on", fail_on)
+            if half.returncode != code:
+                complain(case, f"one display of two, --fail-on {fail_on}: left with {half.returncode}: {half.stderr[-800:]}")
 
 
 class BadLine(threading.Thread):

@@ -91,6 +91,19 @@ def colors(folder):
         expect((b"\x1b[" in said) == wanted and b"temporary files" in said, f"doctor {'alone' if wanted else 'in a job'}: {said[:400]}")
 
 
+def doctor_starts_a_job(folder):
+    fake = folder / "fake"
+    fake.mkdir()
+    (fake / "mpiexec").write_text("#!/bin/sh\nexit 1\n")
+    (fake / "mpiexec").chmod(0o755)
+    for path, status, mention in ((os.environ["PATH"], "ok", "2 ranks start"),
+                                  (f"{fake}{os.pathsep}{os.environ['PATH']}", "warn", "only one rank can run")):
+        told = subprocess.run([HPR, "doctor", "--json"], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True,
+                              timeout=120, check=False)
+        found = {finding["name"]: finding for finding in json.loads(told.stdout)["findings"]}.get("MPI job", {})
+        expect(found.get("status") == status and mention in found.get("detail", ""), f"doctor: {found}, {told.stderr}")
+
+
 def has_begun(pid):
     """Whether a process is past its start: it has threads of its own."""
     try:
@@ -267,6 +280,7 @@ def main():
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
         without_ssh(folder)
+        doctor_starts_a_job(folder)
         ranks_that_listen(folder)
         lone_tasks(folder)
         asked_in_vain(folder)

@@ -109,7 +109,7 @@ def check_text(folder):
     for line in ("#SBATCH --nodes=2", "#SBATCH --nodelist=127.0.0.1,127.0.0.2", "#SBATCH --ntasks-per-node=2",
                  "#SBATCH --signal=USR1@60", "#SBATCH --time=8:00:00"):
         expect(f"\n{line}\n" in text, f"the script has no {line}:\n{text}")
-    expect("--kill-on-bad-exit" in text and "--mpi=pmix --label" in text, "the ranks' srun")
+    expect("--kill-on-bad-exit" in text and "--launcher \"srun --mpi=pmix" in text, "the ranks' srun")
     draws_only = (folder / "wall.toml").read_text().replace("nodes = [", 'nodes = [{ id = "r", host = "big", ranks = 3 },')
     (folder / "more.toml").write_text(draws_only)
     more = run(folder, "wall", "script", "more.toml", "--slurm").stdout
@@ -162,7 +162,7 @@ def check_time_limit(folder):
         job.process.kill()
         return
     os.kill(int((folder / "fake.log.step").read_text()), signal.SIGUSR1)
-    for pid in subprocess.run(["pgrep", "-f", f"display .*{job.out}"], capture_output=True, text=True, check=False).stdout.split():
+    for pid in subprocess.run(["pgrep", "-f", f" display --wall .*{job.out}"], capture_output=True, text=True, check=False).stdout.split():
         if int(pid) != job.process.pid:
             command = pathlib.Path(f"/proc/{pid}/cmdline").read_bytes()
             if command.startswith(HPR.encode()):

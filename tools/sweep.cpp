@@ -91,9 +91,11 @@ std::optional<std::string> job_request(const char* variable) {
 JobResult run_measuring_job(const Globals& globals, int ranks, const std::vector<std::string>& arguments,
                             const char* variable, const std::string& request) {
   JobResult result;
-  const int code = run_mpiexec(
-      ranks, arguments,
-      {.captured_stdout = &result.rows, .environment = {{variable, request}}, .hang_limit = globals.hang_limit()});
+  const int code = run_job(ranks, arguments,
+                           {.captured_stdout = &result.rows,
+                            .environment = {{variable, request}},
+                            .starter = globals.starter(ranks),
+                            .hang_limit = globals.hang_limit()});
   result.code = static_cast<ExitCode>(code);
   return result;
 }

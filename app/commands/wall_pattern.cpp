@@ -28,6 +28,7 @@ class PatternShow {
     for (const std::size_t screen : screens) patterns_.push_back(wall_pattern(wall, screen));
     for (std::size_t i = 0; i < screens.size(); ++i) pictures_.push_back({screens[i], patterns_[i]});
     if (link) {
+      fail_on_ = link->fail_on;
       sender_ = connect_displays(comm, wall, std::vector<int>(wall.screens.size(), 0), *link);
       return;
     }
@@ -54,7 +55,7 @@ class PatternShow {
   /// Whether anybody saw it.
   [[nodiscard]] bool finish() {
     RunManifest nothing;
-    if (sender_) return end_displays(comm_, *sender_, nothing);
+    if (sender_) return end_displays(comm_, *sender_, fail_on_, nothing);
     display_->finish();
     return true;
   }
@@ -64,6 +65,7 @@ class PatternShow {
   std::vector<Image<Rgba8>> patterns_;
   std::vector<ScreenPicture> pictures_;
   std::unique_ptr<WallSender> sender_;
+  MissedPictures fail_on_ = MissedPictures::Unseen;
   std::unique_ptr<Display> display_;
 };
 

@@ -292,7 +292,9 @@ void claim_folder(const WallJob& job, std::optional<FolderLock>& lock) {
 }  // namespace
 
 WallJob make_wall_job(const WallRun& run, const Globals& globals) {
-  const bool starts_job = globals.ranks > 1 && !inside_mpi_job();  // whose rank 0 reports the same findings
+  const int restarts = run.display.kind().stream ? 0 : run.restarts;
+  // Ranks of their own report the same findings.
+  const bool starts_job = supervises(restarts) || (globals.ranks > 1 && !inside_mpi_job());
   WallJob job{.wall = load_wall(run.wall, run.overrides, !starts_job),
               .wall_file = run.wall,
               .scene = run.scene,
@@ -323,7 +325,8 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
   job.inputs = files_read(run, job.wall);
   job.explain = run.report.explain;
   job.summary = run.summary;
-  job.restarts = run.restarts;
+  job.restarts = restarts;
+  if (!globals.hang_timeout.empty()) job.stall_limit = globals.hang_limit();
   check_together(run, job);
   return job;
 }
@@ -350,8 +353,8 @@ ExitCode run_wall(WallJob job, Globals globals) {
     Session session(comm, globals.session(), [&] { return job.load(job.scene, job.settings); });
     return drive(agreed, globals, session);
   };
-  const int restarts = job.display->stream ? 0 : job.restarts;
-  return run_supervised(globals, restarts, job.open_ended() ? Interrupts::Stop : Interrupts::End, body);
+  return run_supervised(globals, job.restarts, job.open_ended() ? Interrupts::Stop : Interrupts::End, folder_of(job),
+                        body);
 }
 
 namespace {
@@ -377,7 +380,8 @@ class WallRunCommand final : public Command {
     declare_target_ms(options, run_.target_ms, "what a frame may take; what is given up for it is in the manifest");
     options.option("--target-error", run_.target_error, "estimated relMSE at which a frame has enough samples");
     options
-        .option("--restarts", run_.restarts, "how often an hour a job of several ranks that is lost is started again")
+        .option("--restarts", run_.restarts,
+                "how often an hour ranks that are lost are started again; 0: a lone one draws in this process")
         .range(0, 1000)
         .show_default();
     run_.link.declare(options, run_.settings);

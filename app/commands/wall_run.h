@@ -28,7 +28,7 @@ struct WallRun {
   std::optional<double> target_error = {};  ///< estimated relMSE at which a frame has enough samples
   bool until_stopped = false;               ///< whatever shows it
   bool resume = false;                      ///< after the frames the folder's manifest has
-  int restarts = 3;                         ///< of a job of several ranks that was lost
+  int restarts = 3;                         ///< an hour, of ranks that were lost
   bool summary = false;                     ///< print what each pass did
   LinkOptions link = {};
   RenderSettings settings = {};

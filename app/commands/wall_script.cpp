@@ -90,10 +90,9 @@ done
 constexpr std::string_view kRun = R"(
 printf '%s\n' "${{ranks[@]}}" >"$out/hosts"
 code=0
-SLURM_HOSTFILE=$out/hosts srun --mpi=pmix --label --kill-on-bad-exit --overlap --cpu-bind=none \
-  --distribution=arbitrary --nodes={nodes} --ntasks={tasks} \
-  "$hpr" wall run "$wall" "$scene" --display remote --displays "$addresses" -o "$out" {length} \
-  "${{options[@]}}" || code=$?
+SLURM_HOSTFILE=$out/hosts "$hpr" wall run "$wall" "$scene" --display remote --displays "$addresses" -o "$out" {length} \
+  --ranks {tasks} --launcher "srun --mpi=pmix --kill-on-bad-exit --overlap --cpu-bind=none --distribution=arbitrary \
+--nodes={nodes} --ntasks={tasks}" "${{options[@]}}" || code=$?
 )";
 
 constexpr std::string_view kRequeue = R"(

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -22,6 +23,8 @@
 
 #include "app/doctor/doctor.h"
 #include "app/launch/launcher.h"
+#include "app/launch/run_ranks.h"
+#include "cluster/transport/collectives.h"
 #include "cluster/transport/mpi_communicator.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -174,6 +177,49 @@ Finding check_stack() {
 }
 
 }  // namespace
+
+namespace {
+
+constexpr const char* kJobVariable = "HPR_DOCTOR_JOB";
+constexpr int kJobRanks = 2;
+
+/// What the job prints once its ranks have exchanged messages.
+constexpr std::string_view kJobRuns = "ranks have met";
+
+Finding start_job() {
+  if (inside_mpi_job()) return ok("this is a rank of one");
+  std::string said;
+  const Stopwatch watch;
+  try {
+    const int code = run_job(
+        kJobRanks, {"doctor"},
+        {.captured_stdout = &said, .environment = {{kJobVariable, "1"}}, .hang_limit = std::chrono::seconds(10)});
+    if (code == 0 && said.find(kJobRuns) != std::string::npos)
+      return ok(fmt::format("{} ranks start, meet and end in {:.1f} s", kJobRanks, 1e-3 * watch.ms()));
+    return warn(fmt::format("a job of {} ranks left with {}: only one rank can run", kJobRanks, code),
+                "see what it says by: hpr demo --ranks 2");
+  } catch (const Error& error) {
+    return warn(fmt::format("{}: only one rank can run", error.what()), error.hint());
+  }
+}
+
+}  // namespace
+
+Check job_check() {
+  return {"MPI job", start_job};
+}
+
+bool is_doctors_job() {
+  return inside_mpi_job() && std::getenv(kJobVariable) != nullptr;  // NOLINT(concurrency-mt-unsafe): nobody writes it
+}
+
+ExitCode run_doctors_job(const Globals& globals) {
+  return run_ranks(globals, [](Communicator& comm) {
+    barrier(comm);
+    if (comm.rank() == 0 && comm.size() == kJobRanks) fmt::print("{}\n", kJobRuns);
+    return ExitCode::Done;
+  });
+}
 
 std::vector<Check> machine_checks() {
   return {

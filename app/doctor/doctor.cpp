@@ -101,8 +101,11 @@ class DoctorCommand final : public Command {
 
   void declare(const OptionSet& options) override { options.flag("--json", json_, "print the findings as JSON"); }
 
-  [[nodiscard]] ExitCode run(const Globals& /*globals*/) override {
+  [[nodiscard]] bool collective() const override { return is_doctors_job(); }
+  [[nodiscard]] ExitCode run(const Globals& globals) override {
+    if (is_doctors_job()) return run_doctors_job(globals);
     std::vector<Check> checks = machine_checks();
+    checks.push_back(job_check());
     const std::vector<Check> graphics = graphics_checks();
     checks.insert(checks.end(), graphics.begin(), graphics.end());
     const std::vector<Finding> findings = examine(checks);

@@ -5,7 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
+
 namespace hpr {
+
+struct Globals;
 
 /// What a check found: green, yellow (works, but something is slower or missing) or red (hpr cannot do its work).
 enum class FindingStatus { Ok, Warn, Fail };
@@ -26,6 +30,13 @@ struct Check {
 /// What any machine is asked: CPU, memory, Embree, MPI, shared memory, temporary folder, host name, image module,
 /// stack.
 [[nodiscard]] std::vector<Check> machine_checks();
+
+/// Whether a job of two ranks starts: takes this program's main, which knows what its ranks do.
+[[nodiscard]] Check job_check();
+/// Whether this process is a rank of the job that job_check() started.
+[[nodiscard]] bool is_doctors_job();
+/// What such a rank does. Collective.
+[[nodiscard]] ExitCode run_doctors_job(const Globals& globals);
 
 /// Runs `checks` in order.
 [[nodiscard]] std::vector<Finding> examine(std::span<const Check> checks);

@@ -25,9 +25,12 @@
 #include <utility>
 #include <vector>
 
+#include "app/launch/rank_watch.h"
 #include "core/error.h"
+#include "core/job_board.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/text.h"
 
 namespace hpr {
 
@@ -232,8 +235,13 @@ constexpr std::chrono::milliseconds kStartOfRank{500};
 constexpr std::chrono::seconds kMinEnd{2};
 constexpr std::chrono::seconds kMaxEnd{10};
 
+bool is_lone(const JobOptions& options) {
+  return options.starter && options.starter->empty();
+}
+
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
-[[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, int stdout_pipe, pid_t parent) {
+[[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, const std::string& board,
+                         int stdout_pipe, pid_t parent) {
   // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
   if (options.input == StandardInput::None) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -245,12 +253,17 @@ constexpr std::chrono::seconds kMaxEnd{10};
   const bool typed = options.input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
   ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
-  for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
-  if (is_one_host()) {
+  if (is_lone(options)) {
+    ::setenv(kLoneRankVariable, std::to_string(parent).c_str(), 1);
+  } else {
+    for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
+    ::setenv(kReportStartVariable, "1", 1);
+  }
+  if (!options.starter && is_one_host()) {
     for (const auto& [name, value] : kOneHost) ::setenv(name, value, 0);
   }
   if (typed) ::setenv(kTypedInputVariable, "1", 1);
-  ::setenv(kReportStartVariable, "1", 1);
+  ::setenv(JobBoard::kVariable, board.c_str(), 1);
   ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
@@ -299,15 +312,18 @@ class StartMark {
 };
 
 /// A job from its start to its end. Its standard output is collected, or copied to ours as it arrives: mpiexec
-/// does not report a reader that went away. No wait for mpiexec is without a limit.
+/// does not report a reader that went away. No wait for mpiexec is without a limit. `name`: what was started.
 class RunningJob {
  public:
-  RunningJob(pid_t child, int ranks, int output, const JobOptions& options)
+  RunningJob(pid_t child, std::string name, const JobBoard& board, int output, const JobOptions& options)
       : child_(child),
+        name_(std::move(name)),
+        watch_(board),
         output_(output),
         collected_(options.captured_stdout),
+        hang_limit_(options.hang_limit),
         start_limit_(std::min<std::chrono::nanoseconds>(options.hang_limit, kMaxWait) + kStartGrace +
-                     ranks * kStartOfRank),
+                     board.ranks() * kStartOfRank),
         end_limit_(std::clamp<std::chrono::nanoseconds>(options.hang_limit, kMinEnd, kMaxEnd)) {}
 
   /// Waits for its end; returns its status as waitpid has it.
@@ -317,9 +333,13 @@ class RunningJob {
       enforce_limits();
       if (has_output && !killed_) continue;
       int status = 0;
-      const pid_t ended = ::waitpid(child_, &status, WNOHANG);
-      if (ended < 0 && errno != EINTR) throw Error(ExitCode::Io, "lost track of mpiexec");
-      if (ended != child_) continue;
+      const pid_t changed = ::waitpid(child_, &status, WNOHANG | WUNTRACED | WCONTINUED);
+      if (changed < 0 && errno != EINTR) throw Error(ExitCode::Io, fmt::format("lost track of {}", name_));
+      if (changed != child_) continue;
+      if (WIFSTOPPED(status) || WIFCONTINUED(status)) {
+        note_stop(WIFSTOPPED(status));
+        continue;
+      }
       while (poll_output(0)) {  // its last output
       }
       if (output_ >= 0) ::close(output_);  // somebody it left behind holds the other end
@@ -330,6 +350,9 @@ class RunningJob {
   [[nodiscard]] bool has_output() const { return mark_.has_output(); }
   /// The errno of the write that failed and ended the job; 0: all output was written.
   [[nodiscard]] int output_error() const { return output_error_; }
+  /// It stood still, and was ended: what stood still. Empty: it did not.
+  [[nodiscard]] const std::string& hang() const { return hang_; }
+  [[nodiscard]] const RankWatch& ranks() const { return watch_; }
   /// Its ranks had not started in time, and it was ended.
   [[nodiscard]] bool late() const { return late_; }
   /// Whether the job was killed, because it did not end in time after SIGTERM.
@@ -340,11 +363,16 @@ class RunningJob {
   using Clock = std::chrono::steady_clock;
   static constexpr int kPollInterval_ms = 200;
   static constexpr int kToTheEnd_ms = 5;
+  static constexpr std::chrono::milliseconds kBetweenLooks{100};
+  static constexpr std::chrono::seconds kMaxBetweenLooks{1};
 
   /// Copies output that has arrived; waits at most `wait_ms`. False when there is none now, or none will come.
   bool poll_output(int wait_ms) {
-    pollfd waiting{.fd = output_, .events = POLLIN, .revents = 0};  // one below 0 is passed over
-    if (::poll(&waiting, 1, wait_ms) <= 0) return false;
+    std::vector<pollfd> waited{{.fd = output_, .events = POLLIN, .revents = 0}};  // one below 0 is passed over
+    watch_.add_to(waited);
+    if (::poll(waited.data(), waited.size(), wait_ms) <= 0) return false;
+    watch_.note_ends(waited);
+    if (waited.front().revents == 0) return false;
     std::array<char, 65536> buffer{};
     const ssize_t got = ::read(output_, buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) return true;
@@ -364,8 +392,36 @@ class RunningJob {
     return true;
   }
 
+  void note_stop(bool is_stopped) {
+    is_stopped_ = is_stopped;
+    stopped_for_ = {};
+    if (is_stopped) log::warning("{} was stopped, and nobody hears of its ranks", name_);
+  }
+
+  /// Ends the job where it stands still.
+  void look_at_ranks(Clock::time_point now) {
+    if (now - looked_at_ < kBetweenLooks) return;
+    // More than that has passed only where this process stood still itself, or the machine slept.
+    const auto passed = std::min<std::chrono::nanoseconds>(now - looked_at_, kMaxBetweenLooks);
+    looked_at_ = now;
+    watch_.look(passed);
+    if (is_stopped_) stopped_for_ += passed;
+    const std::chrono::nanoseconds limit = watch_.stall_limit().count() > 0 ? watch_.stall_limit() : hang_limit_;
+    if (watch_.stalled()) {
+      hang_ = fmt::format("no rank has got on for {:g} s: {}", std::chrono::duration<double>(limit).count(),
+                          watch_.roll_call());
+    } else if (stopped_for_ > limit) {
+      hang_ = fmt::format("{} has been stopped for {:g} s", name_, std::chrono::duration<double>(limit).count());
+    }
+    if (hang_.empty()) return;
+    end_requested_at_ = now;
+    ::kill(child_, SIGTERM);
+    ::kill(child_, SIGCONT);
+  }
+
   void enforce_limits() {
     const Clock::time_point now = Clock::now();
+    if (!end_requested_at_) look_at_ranks(now);
     if (!end_requested_at_ && (PassedSignals::ends() || output_error_ != 0)) end_requested_at_ = now;
     if (!end_requested_at_ && !mark_.has_output() && now - begin_ > start_limit_) {
       late_ = true;
@@ -373,19 +429,26 @@ class RunningJob {
       ::kill(child_, SIGTERM);
     }
     if (!end_requested_at_ || killed_ || now - *end_requested_at_ <= end_limit_) return;
-    log::warning("mpiexec has not ended {:g} s after it was told to, and is killed",
+    log::warning("{} has not ended {:g} s after it was told to, and is killed", name_,
                  std::chrono::duration<double>(end_limit_).count());
     kill_with_descendants(child_);
     killed_ = true;
   }
 
   pid_t child_;
+  std::string name_;
+  RankWatch watch_;
   int output_;
   std::string* collected_;
+  std::chrono::nanoseconds hang_limit_;
   std::chrono::nanoseconds start_limit_;
   std::chrono::nanoseconds end_limit_;
   StartMark mark_;
   Clock::time_point begin_ = Clock::now();
+  Clock::time_point looked_at_ = begin_;
+  bool is_stopped_ = false;
+  std::chrono::nanoseconds stopped_for_{0};
+  std::string hang_;
   std::optional<Clock::time_point> end_requested_at_;  ///< when it was sent SIGTERM, or another signal that ends it
   int output_error_ = 0;
   bool late_ = false;
@@ -413,34 +476,24 @@ void notify_launcher() {
   std::fflush(stdout);
 }
 
-int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options) {
-  if (!find_on_path("mpiexec")) {
-    throw Error(ExitCode::Io, fmt::format("cannot start {} ranks: there is no mpiexec on the PATH", ranks),
-                "install openmpi-bin, or run with --ranks 1");
-  }
-  std::vector<std::string> arguments{"mpiexec", "-n", std::to_string(ranks), program_path()};
-  arguments.insert(arguments.end(), args.begin(), args.end());
-  std::vector<char*> pointers;
-  pointers.reserve(arguments.size() + 1);
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  pointers.push_back(nullptr);
+namespace {
 
-  std::array<int, 2> pipe{-1, -1};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) {
-    throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
+/// Its first word is what is started.
+std::vector<std::string> command_line(int ranks, const std::vector<std::string>& args, const JobOptions& options) {
+  std::vector<std::string> words =
+      options.starter.value_or(std::vector<std::string>{"mpiexec", "-n", std::to_string(ranks)});
+  if (!words.empty() && words.front().find('/') == std::string::npos && !find_on_path(words.front())) {
+    throw Error(ExitCode::Io,
+                fmt::format("cannot start {} ranks: there is no {} on the PATH", ranks, printable(words.front())),
+                options.starter ? "see --launcher" : "install openmpi-bin, or run with --ranks 1");
   }
-  const PassedSignals passed(options);
-  const pid_t parent = ::getpid();
-  const pid_t child = ::fork();
-  if (child < 0)
-    throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
-  if (child == 0) become(pointers, options, pipe[1], parent);
-  PassedSignals::to(child);
+  words.push_back(program_path());
+  words.insert(words.end(), args.begin(), args.end());
+  return words;
+}
 
-  ::close(pipe[1]);
-  RunningJob job(child, ranks, pipe[0], options);
-  const int status = job.follow();
-  PassedSignals::to_nobody();
+/// Throws Error where a job ended by what was done to it. `code`: as a shell has it.
+void check_ending(const RunningJob& job, const std::string& name, int ranks, int code) {
   if (job.output_error() != 0) {
     throw Error(ExitCode::Io,
                 fmt::format("cannot write to standard output: {}", std::generic_category().message(job.output_error())),
@@ -448,22 +501,53 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
   }
   if (job.late()) {
     throw Error(
-        ExitCode::Io, fmt::format("mpiexec has not started {} ranks in {:g} s", ranks, job.start_limit().count()),
+        ExitCode::Io, fmt::format("{} has not started {} ranks in {:g} s", name, ranks, job.start_limit().count()),
         "its own words, if any, stand above; see that TMPDIR may be written and has space, and that no limit of "
         "file sizes (ulimit -f) is in its way; raise --hang-timeout if it only needs longer; or use --ranks 1");
   }
-  if (job.killed()) return 128 + PassedSignals::interrupted_by();
+  if (!job.hang().empty()) throw Error(ExitCode::Hang, job.hang(), "raise --hang-timeout if it only needs longer");
   // A rank that is killed shows as 128 + its signal in mpiexec's own code; an interrupt is the user's doing.
+  if (job.killed() || code <= 128 || code == 128 + SIGINT || code == 128 + SIGTERM || code == 128 + SIGHUP) return;
+  const char* const signal = ::sigdescr_np(code - 128);
+  const std::string end = fmt::format("ended by signal {} ({})", code - 128, signal ? signal : "unknown");
+  const std::string hint = "the system's log may say why (out of memory?); nothing partial was left";
+  if (const auto first = job.ranks().first_to_end())
+    throw Error(ExitCode::Lost, fmt::format("a rank was {}: {}", end, *first), hint);
+  throw Error(ExitCode::Lost, fmt::format("a rank or {} was {}", name, end), hint);
+}
+
+}  // namespace
+
+int run_job(int ranks, const std::vector<std::string>& args, const JobOptions& options) {
+  std::vector<std::string> words = command_line(ranks, args, options);
+  const std::string name = is_lone(options) ? "the rank" : std::filesystem::path(words.front()).filename().string();
+  std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+
+  std::array<int, 2> pipe{-1, -1};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+    throw Error(ExitCode::Io, fmt::format("cannot start {}: {}", name, std::generic_category().message(errno)));
+  }
+  const JobBoard board(ranks);
+  const PassedSignals passed(options);
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0)
+    throw Error(ExitCode::Io, fmt::format("cannot start {}: {}", name, std::generic_category().message(errno)));
+  if (child == 0) become(pointers, options, board.address(), pipe[1], parent);
+  PassedSignals::to(child);
+
+  ::close(pipe[1]);
+  RunningJob job(child, name, board, pipe[0], options);
+  const int status = job.follow();
+  PassedSignals::to_nobody();
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  if (code > 128 && code != 128 + SIGINT && code != 128 + SIGTERM && code != 128 + SIGHUP) {
-    const char* const signal = ::sigdescr_np(code - 128);
-    throw Error(ExitCode::Lost,
-                fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, signal ? signal : "unknown"),
-                "the system's log may say why (out of memory?); nothing partial was left");
-  }
-  if (code == 127) {
-    throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
-  }
+  check_ending(job, name, ranks, code);
+  if (job.killed()) return 128 + PassedSignals::interrupted_by();
+  if (code == 127)
+    throw Error(ExitCode::Io, fmt::format("cannot start {}", name), "run 'hpr doctor'; or use --ranks 1");
   // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
   if (code == static_cast<int>(ExitCode::CheckFailed) && !job.has_output() && PassedSignals::interrupted_by() == 0) {
     throw Error(
@@ -471,6 +555,9 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
         "its own words, if any, stand above; see that TMPDIR may be written and OMPI_MCA_* variables are right, "
         "or use --ranks 1");
   }
+  // The ranks that noticed it have reported themselves; whom they waited for has not.
+  if (code == static_cast<int>(ExitCode::Hang) && !job.ranks().roll_call().empty())
+    log::warning("where the ranks were: {}", job.ranks().roll_call());
   return code;
 }
 

@@ -29,6 +29,8 @@ enum class Interrupts : std::uint8_t {
 struct JobOptions {
   std::string* captured_stdout = nullptr;  ///< where its standard output is collected; null: it passes through
   std::map<std::string, std::string> environment = {};  ///< added to this process's own
+  /// The words that start them on hosts; none: mpiexec -n RANKS. Empty: nothing but this program, for one rank.
+  std::optional<std::vector<std::string>> starter = {};
   StandardInput input = StandardInput::None;
   Interrupts interrupts = Interrupts::End;
   std::chrono::nanoseconds hang_limit = kHangTimeout;  ///< how long its ranks wait for each other
@@ -38,14 +40,15 @@ struct JobOptions {
 /// and SIGUSR2 now, if they ever do.
 void notify_launcher();
 
-/// Starts `ranks` processes of this very program with `args` under mpiexec and waits for them: as root, in containers
-/// and with more ranks than cores, unbound and yielding when idle. Their stderr passes through. Returns mpiexec's exit
-/// code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks, once these have started,
-/// if this process watches for them (core/signals.h).
-/// A job that takes longer to start than `options.hang_limit`, 10 s and half a second a rank is ended; one that does
-/// not end after SIGTERM, in as long as that limit but at least 2 and at most 10 s, is killed. Throws Error: Io
-/// when mpiexec or MPI cannot be started, Lost when a rank or mpiexec itself was killed.
-int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
+/// Starts `ranks` processes of this very program with `args` under mpiexec, or what `options` name, and waits for them:
+/// as root, in containers and with more ranks than cores, unbound and yielding when idle. Their stderr passes through.
+/// Returns mpiexec's exit code. The job ends when this process does; SIGUSR1 and SIGUSR2 are passed on to its ranks,
+/// once these have started, if this process watches for them (core/signals.h). A job that takes longer to start than
+/// `options.hang_limit`, 10 s and half a second a rank is ended; one that does not end after SIGTERM, in as long as
+/// that limit but at least 2 and at most 10 s, is killed. Throws Error: Io when mpiexec or MPI cannot be started; Lost
+/// when a rank or mpiexec itself was killed; Hang when mpiexec was stopped, or no rank of this host has got on, for
+/// longer than the ranks report as their limit (core/job_board.h).
+int run_job(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 
 /// The first executable file of this name on the PATH.
 [[nodiscard]] std::optional<std::filesystem::path> find_on_path(std::string_view program);

@@ -12,12 +12,14 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "app/launch/launcher.h"
 #include "app/results.h"
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/mpi_communicator.h"
+#include "core/job_board.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "walls/manifest/run_journal.h"
@@ -29,7 +31,7 @@ namespace {
 /// that an error all ranks agreed on is printed once.
 [[noreturn]] void abort_job(int rank, const Error& error) {
   if (rank != 0) std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  print_error(error, said_by(rank));
+  if (claim_error(error.what())) print_error(error, said_by(rank));
   std::fflush(nullptr);
   MPI_Abort(MPI_COMM_WORLD, static_cast<int>(error.code()));
   std::abort();  // MPI_Abort does not return
@@ -81,6 +83,7 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
     limit.reset();
     if (comm.size() == 1) refuse_lone_tasks();
     if (rank == 0) notify_launcher();
+    join_job_board(rank);
     if (globals.ranks > 0 && globals.ranks != comm.size()) {
       throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
                   "leave --ranks out under mpirun or srun: the launcher sets the number");
@@ -110,8 +113,13 @@ ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communic
   refuse_lone_tasks();
   if (globals.ranks > 1) {
     JobOptions limited = options;
+    limited.starter = globals.starter(globals.ranks);
     limited.hang_limit = globals.hang_limit();
-    return static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, limited));
+    return static_cast<ExitCode>(run_job(globals.ranks, globals.args, limited));
+  }
+  if (launched_by_hpr()) {
+    notify_launcher();
+    join_job_board(0);
   }
   ExitCode code = ExitCode::Done;
   run_local_ranks(
@@ -126,36 +134,45 @@ bool RestartLimit::use(Clock::time_point now) {
   return true;
 }
 
+bool supervises(int restarts) {
+  return !inside_mpi_job() && !launched_by_hpr() && restarts > 0;
+}
+
 ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interrupts,
-                        const std::function<ExitCode(Communicator&)>& body) {
-  if (inside_mpi_job() || globals.ranks <= 1 || restarts <= 0)
-    return run_ranks(globals, body, {.interrupts = interrupts});
-  RunJournal journal;
-  // The launcher's own messages, which name the rank and its host, are wanted here.
-  const JobOptions options{
-      .environment = {{RunJournal::kVariable, journal.path().string()}, {"OMPI_MCA_orte_execute_quiet", "0"}},
-      .interrupts = interrupts,
-      .hang_limit = globals.hang_limit()};
-  std::optional<std::size_t> ended_at;
+                        const std::filesystem::path& folder, const std::function<ExitCode(Communicator&)>& body) {
+  if (!supervises(restarts)) return run_ranks(globals, body, {.interrupts = interrupts});
+  refuse_lone_tasks();
+  const int ranks = std::max(1, globals.ranks);
+  RunJournal journal(globals.launcher.empty() ? TemporaryFile() : TemporaryFile(folder));
+  const JobOptions options{.environment = {{RunJournal::kVariable, journal.path().string()}},
+                           .starter = ranks > 1 ? globals.starter(ranks) : std::vector<std::string>{},
+                           .interrupts = interrupts,
+                           .hang_limit = globals.hang_limit()};
+  std::optional<std::size_t> ended_at;  ///< by a job that drew
+  std::size_t begun = 0;
   RestartLimit limit(restarts);
   while (true) {
     std::optional<Error> lost;
     try {
-      const auto code = static_cast<ExitCode>(run_mpiexec(globals.ranks, globals.args, options));
+      const auto code = static_cast<ExitCode>(run_job(ranks, globals.args, options));
       if ((code != ExitCode::Hang && code != ExitCode::Lost) || journal.read().ended) return code;
       lost.emplace(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
     } catch (const Error& error) {
-      if (error.code() != ExitCode::Lost) throw;
+      if (error.code() != ExitCode::Lost && error.code() != ExitCode::Hang) throw;
+      // A job that came to its end may lose ranks that leave late; one that hung may end because it was told to.
+      if (error.code() == ExitCode::Lost && journal.read().ended) throw;
       lost.emplace(error);
     }
-    const std::size_t done = journal.read().frames.size();
-    if (ended_at == done || !limit.use(RestartLimit::Clock::now())) {
+    const RunJournal::Entries entries = journal.read();
+    const std::size_t done = entries.frames.size();
+    const bool drew = entries.begun > std::exchange(begun, entries.begun);
+    if ((drew && ended_at == done) || !limit.use(RestartLimit::Clock::now())) {
       throw Error(lost->code(), fmt::format("{}; {} of its frames are done", lost->what(), done),
-                  ended_at == done
+                  drew && ended_at == done
                       ? "frame " + std::to_string(done) + " ended two jobs; draw it alone to see why"
                       : fmt::format("it was started again {} times within an hour; see --restarts", restarts));
     }
-    ended_at = done;
+    if (drew) ended_at = done;
     log::warning("{}; starting it again from frame {} (restart {} of {} in this hour)", lost->what(), done,
                  limit.used(), restarts);
     journal.add_restart(lost->what());

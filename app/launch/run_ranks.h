@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <deque>
+#include <filesystem>
 #include <functional>
 
 #include "app/launch/launcher.h"
@@ -38,10 +39,16 @@ class RestartLimit {
   std::deque<Clock::time_point> uses_;
 };
 
-/// As run_ranks; where that starts a job of several ranks, one that loses a rank or stands still is started again, up
-/// to `restarts` times an hour (RestartLimit), with the journal of what was done. It is not where the frame after which
-/// it ended is the one an earlier job ended at: that frame would end the next one too. Throws Error (Lost) then.
+/// Whether this process is to start ranks, or a lone one, and start them again when they are lost.
+[[nodiscard]] bool supervises(int restarts);
+
+/// As run_ranks, but where this process supervises() the ranks are processes of their own, also a lone one: a job that
+/// loses a rank or stands still is started again, up to `restarts` times an hour (RestartLimit), with the journal of
+/// what was done. Under a launcher that takes rank 0 to another host the journal is in `folder`, which all hosts see.
+/// It is not where two jobs that drew ended at the same frame of a run that knows its last one: that frame would end
+/// the next one too. Throws Error (Lost) then.
 [[nodiscard]] ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interrupts,
+                                      const std::filesystem::path& folder,
                                       const std::function<ExitCode(Communicator&)>& body);
 
 }  // namespace hpr

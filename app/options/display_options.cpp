@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
+#include <string_view>
 #include <vector>
 
 #include "app/options/render_options.h"
@@ -101,6 +104,25 @@ std::chrono::duration<double> duration_of(const std::string& option, const std::
 
 }  // namespace
 
+namespace {
+
+struct FailOn {
+  std::string_view name;
+  MissedPictures what;
+};
+constexpr std::array<FailOn, 4> kFailOn{{{"never", MissedPictures::Never},
+                                         {"unseen", MissedPictures::Unseen},
+                                         {"lost", MissedPictures::Lost},
+                                         {"stale", MissedPictures::Stale}}};
+
+std::vector<std::string> fail_on_names() {
+  std::vector<std::string> names;
+  for (const FailOn& each : kFailOn) names.emplace_back(each.name);
+  return names;
+}
+
+}  // namespace
+
 void LinkOptions::declare(const OptionSet& options, RenderSettings& settings) {
   const std::string heading = "With --display remote";
   declared_ = {
@@ -116,6 +138,13 @@ void LinkOptions::declare(const OptionSet& options, RenderSettings& settings) {
           .group(heading),
       options.option("--in-flight", in_flight, "frames the run may be ahead of its displays")
           .range(1, 8)
+          .show_default()
+          .group(heading),
+      options
+          .option("--fail-on", fail_on,
+                  "what ends the run with 7: never, unseen (no display was ever there), lost (or one was gone for a "
+                  "frame), stale (or a frame was late)")
+          .choices(fail_on_names())
           .show_default()
           .group(heading),
       options.flag("--codec-deltas", codec_deltas, "send only the tiles that changed: for pictures that mostly stand")
@@ -140,6 +169,7 @@ SenderSettings LinkOptions::settings(const Wall& wall, const LinkCodec& codec) c
   settings.send_budget = duration_of("--send-budget", send_budget);
   settings.swap_timeout = duration_of("--swap-timeout", swap_timeout);
   settings.in_flight = in_flight;
+  settings.fail_on = std::ranges::find(kFailOn, fail_on, &FailOn::name)->what;
   settings.codec = codec.name;
   settings.codec_settings.quality = codec.quality;
   settings.codec_settings.error = codec.error;

@@ -48,6 +48,7 @@ struct LinkOptions {
   std::string swap_timeout = "100ms";
   int in_flight = 1;
   bool codec_deltas = false;
+  std::string fail_on = "unseen";
 
   /// The codec is one of the `settings`, which outlive parsing.
   void declare(const OptionSet& options, RenderSettings& settings);

@@ -60,6 +60,10 @@ void Globals::declare(const OptionSet& options) {
   options.option("--limit-mem", limit_mem, "refuse scenes larger than this, e.g. 4GiB").group(everywhere);
   options.option("--limit-image", limit_image, "refuse pictures larger than this, e.g. 8192x8192").group(everywhere);
   options.option("--hang-timeout", hang_timeout, "longest wait for another rank, e.g. 30s").group(everywhere);
+  options
+      .option("--launcher", launcher, "what starts the ranks in place of mpiexec, e.g. \"srun --mpi=pmix -n {ranks}\"")
+      .type("COMMAND")
+      .group(everywhere);
   options.flag("--force", force, "overwrite files").group(everywhere);
   options.option("--trace", trace, "write what ranks and threads did when, as chrome://tracing and Perfetto show it")
       .type("FILE.json")
@@ -90,6 +94,21 @@ ImageLimits Globals::picture_limits() const {
 
 std::chrono::nanoseconds Globals::hang_limit() const {
   return hang_timeout.empty() ? kHangTimeout : parse_time_limit("--hang-timeout", hang_timeout, "30s");
+}
+
+std::optional<std::vector<std::string>> Globals::starter(int count) const {
+  if (launcher.empty()) return std::nullopt;
+  auto words = split_line(launcher);
+  if (!words || words->empty()) {
+    throw Error(ExitCode::Usage, fmt::format("--launcher: '{}' is no command", printable(launcher)),
+                "write e.g. --launcher \"srun --mpi=pmix -n {ranks}\"");
+  }
+  constexpr std::string_view kRanks = "{ranks}";
+  for (std::string& word : *words) {
+    if (const std::size_t at = word.find(kRanks); at != std::string::npos)
+      word.replace(at, kRanks.size(), std::to_string(count));
+  }
+  return words;
 }
 
 SessionSettings Globals::session() const {

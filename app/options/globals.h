@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +31,7 @@ struct Globals {
   std::string limit_mem;
   std::string limit_image;
   std::string hang_timeout;
+  std::string launcher;           ///< command line that starts ranks; empty: mpiexec
   bool force = false;             ///< overwrite files
   std::string trace;              ///< file for the timeline of ranks and threads; empty: none
   int ranks = 0;                  ///< 0: as many as the launcher started, else 1
@@ -43,6 +45,8 @@ struct Globals {
   /// How large a picture may be that HPR itself draws or reads back: --limit-image, or kPictureLimits.
   [[nodiscard]] ImageLimits picture_limits() const;
   [[nodiscard]] std::chrono::nanoseconds hang_limit() const;
+  /// The words that start `count` ranks; none: as run_job() does by itself. Throws Error (Usage).
+  [[nodiscard]] std::optional<std::vector<std::string>> starter(int count) const;
   [[nodiscard]] SessionSettings session() const;
 };
 

@@ -13,6 +13,7 @@
 #include <atomic>
 #include <exception>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -20,6 +21,8 @@
 
 #include "cluster/transport/collectives.h"
 #include "core/error.h"
+#include "core/job_board.h"
+#include "core/job_environment.h"
 
 namespace hpr {
 namespace {
@@ -35,6 +38,12 @@ void check_mpi(int code, const char* call) {
   text.resize(static_cast<std::size_t>(length));
   throw Error(ExitCode::Lost, fmt::format("{}: {}", call, text),
               "see the other ranks' messages; a host or rank may be gone");
+}
+
+/// ", in composite" in an error.
+std::string in_phase() {
+  const std::string_view phase = current_phase();
+  return phase.empty() ? "" : fmt::format(", in {}", phase);
 }
 
 /// Where Open MPI keeps shared windows. More than it has room for would end in a bus error at the first touch.
@@ -201,19 +210,27 @@ MpiCommunicator::~MpiCommunicator() {
 
 template <typename Done>
 void MpiCommunicator::poll(Done done, std::string_view doing, int peer) {
-  const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
+  constexpr std::chrono::milliseconds kWorthTelling{100};
+  const auto begin = std::chrono::steady_clock::now();
+  bool reported = false;
   for (unsigned tries = 0; !done(); ++tries) {
     // Ranks may outnumber cores: after a short spin each failed look gives the core away.
     if (tries < 64) continue;
     sched_yield();
-    if (tries % 256 == 0 && std::chrono::steady_clock::now() > deadline) {
-      abandoned_ = true;
-      throw Error(ExitCode::Hang,
-                  fmt::format("rank {}: still {} rank {} after {:.1f} s", rank_, doing, peer,
-                              std::chrono::duration<double>(hang_timeout_).count()),
-                  "a rank stands still; raise --hang-timeout if it only needs longer");
+    if (tries % 256 != 0) continue;
+    const auto waited = std::chrono::steady_clock::now() - begin;
+    if (!reported && waited > kWorthTelling) {
+      report_wait(peer);
+      reported = true;
     }
+    if (waited <= hang_timeout_) continue;
+    abandoned_ = true;
+    throw Error(ExitCode::Hang,
+                fmt::format("rank {} on {}: still {} rank {} after {:.1f} s{}", rank_, host_name(), doing, peer,
+                            std::chrono::duration<double>(hang_timeout_).count(), in_phase()),
+                "a rank stands still; raise --hang-timeout if it only needs longer");
   }
+  if (reported) report_wait(std::nullopt);
 }
 
 void MpiCommunicator::wait(std::vector<MPI_Request>& requests, std::string_view doing, int peer) {

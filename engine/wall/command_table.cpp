@@ -6,38 +6,19 @@
 #include <charconv>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <iomanip>
-#include <sstream>
 
 #include "core/error.h"
 #include "core/text.h"
 
 namespace hpr {
-namespace {
-
-std::vector<std::string> split_arguments(const std::string& line) {
-  std::istringstream stream(line);
-  std::vector<std::string> arguments;
-  std::string text;
-  while (stream >> std::ws && stream.peek() != '#' && !stream.eof()) {
-    const bool quoted = stream.peek() == '"';
-    if (!(stream >> std::quoted(text))) {
-      if (quoted) refuse("a quote is not closed", "hide \"big chair\"");
-      break;
-    }
-    arguments.push_back(text);
-  }
-  return arguments;
-}
-
-}  // namespace
-
 CommandTable::CommandTable() {
   add({"help", "[COMMAND]", "what can be said here", [this](Arguments arguments) { return help(arguments); }});
 }
 
 std::string CommandTable::run(const std::string& line) const {
-  const std::vector<std::string> arguments = split_arguments(line);
+  const auto words = split_line(line);
+  if (!words) refuse("a quote is not closed", "hide \"big chair\"");
+  const std::vector<std::string>& arguments = *words;
   if (arguments.empty()) return "";
   const auto found = std::ranges::find(commands_, arguments.front(), &SessionCommand::name);
   if (found != commands_.end()) {

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <utility>
 
+#include "core/job_board.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "core/timing.h"
@@ -121,8 +122,12 @@ RunControl::RunControl(Session& session, RenderSettings& settings, std::uint64_t
 std::string RunControl::apply_command(const std::string& line) {
   const std::uint64_t before = controls_.changes();
   const RenderSettings settings = settings_;
+  const auto stall_limit = report_stall_limit({});  // a scene may take as long as it likes to load
   std::string answer = table_.run(line);
-  if (controls_.changes() == before) return answer;
+  if (controls_.changes() == before) {
+    report_stall_limit(stall_limit);
+    return answer;
+  }
   try {
     apply_();
   } catch (const Error& error) {

@@ -152,7 +152,7 @@ std::unique_ptr<WallSender> connect_displays(Communicator& comm, const Wall& wal
   return sender;
 }
 
-bool end_displays(Communicator& comm, WallSender& sender, RunManifest& manifest) {
+bool end_displays(Communicator& comm, WallSender& sender, MissedPictures fail_on, RunManifest& manifest) {
   // Rank 0 ends the run's links after the other ranks have sent their pictures.
   if (comm.rank() != 0) sender.finish();
   barrier(comm);
@@ -177,9 +177,11 @@ bool end_displays(Communicator& comm, WallSender& sender, RunManifest& manifest)
         "of {} frames, {} pictures came too late for their screens and {} found none; {:.1f} s with something missing",
         manifest.frames.size(), stale, lost, sender.degraded_seconds());
   }
-  if (sender.reached_any()) return true;
-  log::error("no display was there: {}", sender.why_unreached());
-  return false;
+  if (!sender.reached_any()) {
+    log::error("no display was there: {}", sender.why_unreached());
+    return fail_on == MissedPictures::Never;
+  }
+  return (fail_on < MissedPictures::Lost || lost == 0) && (fail_on < MissedPictures::Stale || stale == 0);
 }
 
 WallMonitors::WallMonitors(const Wall& wall) : wall_(wall) {

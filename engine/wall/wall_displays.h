@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -13,6 +14,7 @@ namespace hpr {
 
 class Communicator;
 class WallSender;
+enum class MissedPictures : std::uint8_t;
 struct RunManifest;
 struct SenderSettings;
 struct Wall;
@@ -28,8 +30,8 @@ struct Wall;
                                                            std::span<const int> owners, SenderSettings settings);
 
 /// Collective: ends the links of a run whose frames are in `manifest`, and writes down there, on rank 0, what the
-/// displays showed of them. Returns whether any display was ever there.
-[[nodiscard]] bool end_displays(Communicator& comm, WallSender& sender, RunManifest& manifest);
+/// displays showed of them. Returns false where they missed what `fail_on` says.
+[[nodiscard]] bool end_displays(Communicator& comm, WallSender& sender, MissedPictures fail_on, RunManifest& manifest);
 
 /// The operators' monitors of a wall, made of the screens' pictures where those are: only what a monitor shows of them
 /// is sent.

@@ -6,15 +6,18 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <iterator>
 #include <sstream>
 
 #include "cluster/transport/collectives.h"
+#include "cluster/transport/communicator.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
 #include "core/bytes.h"
 #include "core/file.h"
+#include "core/job_board.h"
 #include "core/log.h"
 #include "core/signals.h"
 #include "core/text.h"
@@ -50,6 +53,16 @@ std::optional<double> target_of(const WallJob& job) {
   constexpr double kResponsive_ms = 50.0;
   if (job.target_ms || !job.open_ended()) return job.target_ms;
   return kResponsive_ms;
+}
+
+/// How long the ranks may stand still between frames whose slowest took as long as that.
+std::chrono::nanoseconds stall_limit_of(const WallJob& job, double slowest_ms) {
+  constexpr std::chrono::seconds kMinLimit{10};
+  constexpr double kFrames = 5.0;
+  if (job.stall_limit) return *job.stall_limit;
+  if (!job.outputs.assembled.empty()) return kHangTimeout;  // a disk may take its time
+  const std::chrono::duration<double, std::milli> limit(kFrames * slowest_ms);
+  return std::max<std::chrono::nanoseconds>(kMinLimit, std::chrono::duration_cast<std::chrono::nanoseconds>(limit));
 }
 
 /// While nobody moves the camera, the picture of an open-ended run gets better.
@@ -147,6 +160,7 @@ void WallDriver::take_over() {
       manifest_.earlier = std::move(entries.frames);
     }
     std::ranges::move(entries.restarts, std::back_inserter(manifest_.restarts));
+    if (journal_ && !job_.open_ended()) journal_->add_begin();
   });
   first_frame_ = all_gather_value(session_.comm(), first_frame_)[0];
   replay(commands);
@@ -190,11 +204,15 @@ void WallDriver::resume(std::vector<std::string>& frames) {
 }
 
 bool WallDriver::apply_commands() {
+  report_step();
   control_.poll();
   return !control_.stops();
 }
 
 void WallDriver::plan_frames() {
+  // Other settings or scenes may take longer than any frame before.
+  report_stall_limit(std::chrono::nanoseconds::zero());
+  slowest_ms_ = 0.0;
   const Camera start = choose_camera(settings_.camera, session_.scene());
   if (start.eye != start_.eye || start.axes != start_.axes || settings_.camera.fov_degrees != fov_degrees_) {
     orbit_ = OrbitCamera(start, session_.scene().bounds);
@@ -223,6 +241,7 @@ WallDriver::~WallDriver() = default;
 
 void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const trace::Span span("frame", "number", number);
+  report_frame(number);
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   const std::vector<View> views = screens_in(number, heads_.at(number));
@@ -264,7 +283,7 @@ bool WallDriver::finish() {
     if (display_) display_->finish();
   });
   if (journal_) journal_->add_end();
-  return !remote_ || end_displays(session_.comm(), *remote_, manifest_);
+  return !remote_ || end_displays(session_.comm(), *remote_, job_.link->fail_on, manifest_);
 }
 
 std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
@@ -337,6 +356,8 @@ std::vector<ScreenRecord> WallDriver::record_screens() {
 
 void WallDriver::record(std::uint64_t number) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
+  slowest_ms_ = std::max(slowest_ms_, slowest);
+  report_stall_limit(stall_limit_of(job_, slowest_ms_));
   frames_->record_frame_time(slowest);
   FrameRecord frame{number, slowest, strategy(), record_screens()};
   if (frames_->report()) frame.budget = to_record(*frames_->report());

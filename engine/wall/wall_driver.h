@@ -103,6 +103,7 @@ class WallDriver {
   std::vector<Image<Rgba8>> monitor_pictures_;  ///< per monitor, on rank 0
   RunManifest manifest_;
   FrameCost last_cost_;
+  double slowest_ms_ = 0.0;            ///< of the frames since something was changed
   std::optional<RunJournal> journal_;  ///< on rank 0 of a job that is started again when it is lost
   std::uint64_t first_frame_ = 0;
   bool interrupted_ = false;

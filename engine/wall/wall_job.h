@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -55,10 +56,11 @@ struct WallJob {
   std::optional<double> target_ms = {};      ///< of a frame
   std::optional<double> target_relmse = {};  ///< estimated, at which a frame has enough samples
   WallOutputs outputs = {};
-  std::vector<std::string> inputs = {};  ///< files that are read beside the scene's
-  bool explain = false;                  ///< print the plan of the frames
-  bool summary = false;                  ///< print what each pass did
-  int restarts = 0;                      ///< of a job of several ranks that was lost
+  std::vector<std::string> inputs = {};                      ///< files that are read beside the scene's
+  std::optional<std::chrono::nanoseconds> stall_limit = {};  ///< that the user gave, see core/job_board.h
+  bool explain = false;                                      ///< print the plan of the frames
+  bool summary = false;                                      ///< print what each pass did
+  int restarts = 0;                                          ///< an hour, of ranks that were lost
 
   /// Whether it goes on until a viewer, SIGINT or SIGTERM ends it.
   [[nodiscard]] bool open_ended() const { return !frames && (until_stopped || display->interactive); }

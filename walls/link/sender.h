@@ -22,6 +22,14 @@
 
 namespace hpr {
 
+/// What displays have to miss for a run to count as failed, the worst first.
+enum class MissedPictures : std::uint8_t {
+  Never,   ///< nothing counts
+  Unseen,  ///< no display was ever there
+  Lost,    ///< or a screen had no display for a frame
+  Stale,   ///< or a frame came too late for a screen
+};
+
 struct SenderSettings {
   std::string build;  ///< of this program; displays of another one refuse
   std::uint64_t session = 0;
@@ -36,6 +44,7 @@ struct SenderSettings {
   int in_flight = 1;  ///< frames the job may be ahead of what displays are ready for
   std::string codec = "raw";
   CodecSettings codec_settings;
+  MissedPictures fail_on = MissedPictures::Unseen;  ///< what ends a run with Error (Lost)
 };
 
 /// Sends the pictures of one rank's screens to the display processes of their hosts, and on rank 0 has all displays of

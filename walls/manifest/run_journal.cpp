@@ -22,11 +22,12 @@ constexpr std::string_view kSecret = "secret ";
 constexpr std::string_view kFrame = "frame ";
 constexpr std::string_view kRestart = "restart ";
 constexpr std::string_view kCommand = "command ";
+constexpr std::string_view kBegin = "begin {}";
 constexpr std::string_view kEnd = "end {}";
 
 }  // namespace
 
-RunJournal::RunJournal() : file_(std::in_place), path_(file_->path()) {
+RunJournal::RunJournal(TemporaryFile file) : file_(std::move(file)), path_(file_->path()) {
   std::array<std::uint64_t, 2> secret{};
   fill_random(std::as_writable_bytes(std::span(secret)));
   append(fmt::format("{}{}\n", kSecret, Json(hex16(secret[0]) + hex16(secret[1])).dump()));
@@ -44,6 +45,10 @@ void RunJournal::append(const std::string& line) const {
   const bool written = file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
   if (file >= 0) ::close(file);
   if (!written) log::warning("cannot write '{}': a restart would begin anew", path_.string());
+}
+
+void RunJournal::add_begin() {
+  append(fmt::format("{}\n", kBegin));
 }
 
 void RunJournal::add_frame(const std::string& record) {
@@ -82,6 +87,7 @@ RunJournal::Entries RunJournal::read() const {
     if (line.starts_with(kFrame)) entries.frames.push_back(record);
     if (line.starts_with(kRestart)) entries.restarts.push_back(record);
     if (line.starts_with(kCommand)) entries.commands.push_back(json->string());
+    if (line == kBegin) ++entries.begun;
     entries.ended = entries.ended || line == kEnd;
   }
   return entries;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -13,11 +14,13 @@ namespace hpr {
 /// again. Written by rank 0 and the supervisor, in turn.
 class RunJournal {
  public:
-  /// The supervisor's: a temporary file, gone with this process, however it ends.
-  RunJournal();
+  /// The supervisor's, a TemporaryFile. Throws Error (Io).
+  explicit RunJournal(TemporaryFile file = {});
   /// A job's: the file the supervisor named in the environment; none where nobody supervises.
   [[nodiscard]] static std::optional<RunJournal> of_supervisor();
 
+  /// A job of a run that knows its last frame begins to draw the first of those that are left.
+  void add_begin();
   /// A frame is drawn and shown.
   void add_frame(const std::string& record);
   /// Adds a command line that changed something about the run.
@@ -33,6 +36,7 @@ class RunJournal {
     std::vector<std::string> frames;    ///< records, in order
     std::vector<std::string> restarts;  ///< JSON objects: the frame that was to come, and why
     std::vector<std::string> commands;  ///< lines, in order
+    std::size_t begun = 0;              ///< jobs that came to draw, of a run that knows its last frame
     bool ended = false;
   };
   /// A last line that was cut short is none.

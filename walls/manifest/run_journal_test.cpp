@@ -20,6 +20,9 @@ TEST(RunJournal, KeepsFramesAndRestartsInOrder) {
   EXPECT_EQ(entries.secret.size(), 32U);
   EXPECT_EQ(journal.read().secret, entries.secret);
   EXPECT_NE(RunJournal().read().secret, entries.secret);
+  EXPECT_EQ(entries.begun, 0U);
+  journal.add_begin();
+  EXPECT_EQ(journal.read().begun, 1U);
   journal.add_end();
   EXPECT_TRUE(journal.read().ended);
   EXPECT_EQ(journal.read().frames.size(), 3U);

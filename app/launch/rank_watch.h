@@ -1,0 +1,50 @@
+#pragma once
+
+#include <poll.h>
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/job_board.h"
+
+namespace hpr {
+
+/// Follows the ranks of a job on this host: who went first, and whether they get on.
+class RankWatch {
+ public:
+  explicit RankWatch(const JobBoard& board);
+  ~RankWatch();
+  RankWatch(const RankWatch&) = delete;
+  RankWatch& operator=(const RankWatch&) = delete;
+
+  /// Looks at the board again. `passed`: since the last look.
+  void look(std::chrono::nanoseconds passed);
+  /// For poll(): each becomes readable when a rank ends.
+  void add_to(std::vector<pollfd>& waited) const;
+  /// After that poll().
+  void note_ends(const std::vector<pollfd>& waited);
+
+  /// The rank that ended first and in doing what; where several had ended when it was noticed, all of those. None:
+  /// none is known to have ended.
+  [[nodiscard]] std::optional<std::string> first_to_end() const;
+  /// How long no rank may get on, as they report it; 0: as long as they like.
+  [[nodiscard]] std::chrono::nanoseconds stall_limit() const;
+  /// Whether no rank has got on for longer than that.
+  [[nodiscard]] bool stalled() const;
+  /// What each rank was last doing; empty where none is known.
+  [[nodiscard]] std::string roll_call() const;
+
+ private:
+  struct Rank {
+    int process = -1;  ///< a descriptor of it; -1: not known, or gone
+    std::optional<RankReport> report = {};
+  };
+  const JobBoard& board_;
+  std::vector<Rank> ranks_;
+  std::vector<int> first_;  ///< to end
+  std::chrono::nanoseconds still_{0};
+};
+
+}  // namespace hpr
