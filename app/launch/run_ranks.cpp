@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 
 #include "app/launch/launcher.h"
 #include "app/results.h"
@@ -138,6 +139,60 @@ bool supervises(int restarts) {
   return !inside_mpi_job() && !launched_by_hpr() && restarts > 0;
 }
 
+namespace {
+
+bool is_loss(ExitCode code) {
+  return code == ExitCode::Lost || code == ExitCode::Hang;
+}
+
+/// Runs one job of a supervised run, and returns its code, or how it was lost.
+std::variant<ExitCode, Error> run_one_job(int ranks, const Globals& globals, const JobOptions& options,
+                                          const RunJournal& journal) {
+  try {
+    const auto code = static_cast<ExitCode>(run_job(ranks, globals.args, options));
+    if (!is_loss(code) || journal.read().ended) return code;
+    return Error(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
+  } catch (const Error& error) {
+    // A job that came to its end may lose ranks that leave late; one that hung may end because it was told to.
+    if (!is_loss(error.code()) || (error.code() == ExitCode::Lost && journal.read().ended)) throw;
+    return error;
+  }
+}
+
+/// Decides whether a lost job is started again.
+class Restarts {
+ public:
+  Restarts(RunJournal& journal, int count) : journal_(journal), count_(count), limit_(count) {}
+
+  /// Writes the restart down. Throws Error where there is to be none.
+  void note(const Error& lost) {
+    const RunJournal::Entries entries = journal_.read();
+    const std::size_t done = entries.frames.size();
+    const bool drew = entries.begun > std::exchange(begun_, entries.begun);
+    if (drew && ended_at_ == done)
+      give_up(lost, done, fmt::format("frame {} ended two jobs; draw it alone to see why", done));
+    if (!limit_.use(RestartLimit::Clock::now()))
+      give_up(lost, done, fmt::format("it was started again {} times within an hour; see --restarts", count_));
+    if (drew) ended_at_ = done;
+    log::warning("{}; starting it again from frame {} (restart {} of {} in this hour)", lost.what(), done,
+                 limit_.used(), count_);
+    journal_.add_restart(lost.what());
+  }
+
+ private:
+  [[noreturn]] static void give_up(const Error& lost, std::size_t done, const std::string& hint) {
+    throw Error(lost.code(), fmt::format("{}; {} of its frames are done", lost.what(), done), hint);
+  }
+
+  RunJournal& journal_;
+  int count_;
+  RestartLimit limit_;
+  std::optional<std::size_t> ended_at_;  ///< by a job that drew
+  std::size_t begun_ = 0;
+};
+
+}  // namespace
+
 ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interrupts,
                         const std::filesystem::path& folder, const std::function<ExitCode(Communicator&)>& body) {
   if (!supervises(restarts)) return run_ranks(globals, body, {.interrupts = interrupts});
@@ -148,34 +203,11 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
                            .starter = ranks > 1 ? globals.starter(ranks) : std::vector<std::string>{},
                            .interrupts = interrupts,
                            .hang_limit = globals.hang_limit()};
-  std::optional<std::size_t> ended_at;  ///< by a job that drew
-  std::size_t begun = 0;
-  RestartLimit limit(restarts);
+  Restarts allowed(journal, restarts);
   while (true) {
-    std::optional<Error> lost;
-    try {
-      const auto code = static_cast<ExitCode>(run_job(ranks, globals.args, options));
-      if ((code != ExitCode::Hang && code != ExitCode::Lost) || journal.read().ended) return code;
-      lost.emplace(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::Lost && error.code() != ExitCode::Hang) throw;
-      // A job that came to its end may lose ranks that leave late; one that hung may end because it was told to.
-      if (error.code() == ExitCode::Lost && journal.read().ended) throw;
-      lost.emplace(error);
-    }
-    const RunJournal::Entries entries = journal.read();
-    const std::size_t done = entries.frames.size();
-    const bool drew = entries.begun > std::exchange(begun, entries.begun);
-    if ((drew && ended_at == done) || !limit.use(RestartLimit::Clock::now())) {
-      throw Error(lost->code(), fmt::format("{}; {} of its frames are done", lost->what(), done),
-                  drew && ended_at == done
-                      ? "frame " + std::to_string(done) + " ended two jobs; draw it alone to see why"
-                      : fmt::format("it was started again {} times within an hour; see --restarts", restarts));
-    }
-    if (drew) ended_at = done;
-    log::warning("{}; starting it again from frame {} (restart {} of {} in this hour)", lost->what(), done,
-                 limit.used(), restarts);
-    journal.add_restart(lost->what());
+    const auto outcome = run_one_job(ranks, globals, options, journal);
+    if (const auto* const code = std::get_if<ExitCode>(&outcome)) return *code;
+    allowed.note(std::get<Error>(outcome));
   }
 }
 

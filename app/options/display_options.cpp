@@ -117,6 +117,7 @@ constexpr std::array<FailOn, 4> kFailOn{{{"never", MissedPictures::Never},
 
 std::vector<std::string> fail_on_names() {
   std::vector<std::string> names;
+  names.reserve(kFailOn.size());
   for (const FailOn& each : kFailOn) names.emplace_back(each.name);
   return names;
 }

@@ -382,8 +382,9 @@ std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
   // Displays have not reported the latest frames yet.
   const std::uint64_t awaited = job_.link ? static_cast<std::uint64_t>(job_.link->in_flight) + 1 : 0;
-  if (!remote_ || last < first_frame_ + awaited) return std::vector<ScreenState>(owners_.size(), ScreenState::Fresh);
-  return remote_->outcome(last - awaited).screens;
+  std::vector<ScreenState> states(owners_.size(), ScreenState::Fresh);
+  if (remote_ && last >= first_frame_ + awaited) states = remote_->outcome(last - awaited).screens;
+  return states;
 }
 
 std::string WallDriver::strategy() const {
