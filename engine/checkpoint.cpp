@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
@@ -15,6 +16,7 @@
 #include "core/text.h"
 #include "engine/film.h"
 #include "engine/plan.h"
+#include "engine/samples.h"
 #include "engine/session.h"
 #include "engine/settings_table.h"
 #include "rt/passes/pass_list.h"
@@ -94,6 +96,28 @@ void put_layer(Writer& out, const TileLayer<Pixel>& layer) {
 }
 
 template <typename Pixel>
+bool is_possible(const Pixel& /*first*/) {
+  return true;  // of the first sample, where a depth may be infinite
+}
+bool is_possible(double sum) {
+  return std::isfinite(sum);
+}
+bool is_possible(const ColorSum& sum) {
+  return std::isfinite(sum.r) && std::isfinite(sum.g) && std::isfinite(sum.b);
+}
+bool is_possible(const PixelSamples& pixel) {
+  return pixel.wanted <= AdaptiveSampling::kMaxSamples && std::isfinite(pixel.squares) &&
+         std::ranges::all_of(pixel.weights, [](double weight) { return std::isfinite(weight); });
+}
+
+/// Whether a run can have come to that, in a film of this kind.
+bool is_possible(const Film& film, const Film::Counters& counters, const SampleProgress& progress) {
+  const bool agree = film.is_adaptive() ? progress.budget >= film.pilot() : progress.samples == counters.samples;
+  return agree && std::isfinite(counters.weights[0]) && std::isfinite(counters.weights[1]) &&
+         std::isfinite(progress.seconds) && progress.seconds >= 0.0;
+}
+
+template <typename Pixel>
 void get_layer(Reader& in, TileLayer<Pixel>& layer) {
   if (in.get<std::uint64_t>() != sizeof(Pixel)) in.fail();
   const auto count = in.get<std::uint64_t>();
@@ -102,6 +126,7 @@ void get_layer(Reader& in, TileLayer<Pixel>& layer) {
     const auto tile = in.get<std::uint64_t>();
     if (tile >= layer.tiles() || layer.active(tile)) in.fail();
     in.take(std::as_writable_bytes(layer.tile(tile)));
+    if (!std::ranges::all_of(layer.tile(tile), [](const Pixel& pixel) { return is_possible(pixel); })) in.fail();
     layer.set_active(tile);
   }
 }
@@ -189,6 +214,7 @@ SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::st
   progress.budget = in.get<std::uint32_t>();
   progress.seconds = in.get<double>();
   if (const auto relmse = in.get<double>(); relmse >= 0.0) progress.relmse = relmse;
+  if (!is_possible(film, counters, progress)) in.fail();
   film.each_layer([&](auto& layer) { get_layer(in, layer); });
   if (in.left() != 0) in.fail();
   film.set_counters(counters);

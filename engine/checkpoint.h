@@ -43,7 +43,7 @@ struct CheckpointSettings {
 
 /// Fills `film`, a new one of the same layout and content. `name` stands in errors. Throws Error (BadInput) when
 /// `bytes` are no checkpoint, damaged, of another version, or of a run with another identity: then the error names what
-/// differs. Nothing of damaged bytes but the header is looked at.
+/// differs. Nothing of damaged bytes but the header is looked at, and of others no sum is taken that a run cannot have.
 [[nodiscard]] SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name,
                                                const RunIdentity& identity, Film& film);
 

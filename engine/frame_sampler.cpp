@@ -249,6 +249,11 @@ void FrameSampler::finish() {
   if (!ownership_) {  // a checkpoint that had reached the goal: rank 0 has it all
     ownership_.emplace(session_.comm(), plan_.layout, tiles());
   }
+  const auto [even, odd] = film_.counters().weights;
+  if (even + odd == 0.0) {  // which no filter's are, but those a checkpoint claims may be; the same on all ranks
+    throw Error(ExitCode::BadInput, "the weights of the samples add up to 0: the checkpoint is not one of a run",
+                "start anew, without --resume");
+  }
   frame_.owned = ownership_->mine();
   frame_.radiance = TileLayer<Rgb>(plan_.layout);
   frame_.aovs = AovLayers(plan_.layout, plan_.aovs);
