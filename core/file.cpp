@@ -35,9 +35,13 @@ class Descriptor {
   int fd_;
 };
 
+ExitCode code_of(int error) {
+  return error == ENOMEM ? ExitCode::Limit : ExitCode::Io;
+}
+
 [[noreturn]] void fail(std::string_view doing, const std::filesystem::path& path, int error) {
   const std::string reason = std::generic_category().message(error);
-  throw Error(ExitCode::Io, fmt::format("{} '{}': {}", doing, printable(path.string(), 300), reason),
+  throw Error(code_of(error), fmt::format("{} '{}': {}", doing, printable(path.string(), 300), reason),
               file_error_hint(error));
 }
 
@@ -210,9 +214,9 @@ AtomicFile::~AtomicFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-void AtomicFile::commit() {
+void AtomicFile::commit(Sync sync) {
   HPR_CHECK(descriptor_ >= 0);
-  if (::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
+  if (sync == Sync::Disk && ::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
   if (temporary_.empty()) {  // a link replaces nothing, so what is there is replaced by a rename
     const int linked = with_temporary_name(folder_of(target_), temporary_, [&](const char* name) {
       return ::linkat(AT_FDCWD, link_of(descriptor_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW);
@@ -226,6 +230,7 @@ void AtomicFile::commit() {
   if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write", path_, errno);
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot write", path_, errno);
   temporary_.clear();
+  if (sync == Sync::None) return;
   // The rename itself is on disk only once the folder is synced; some file systems refuse that, and lose nothing by it.
   const Descriptor folder(::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.get() >= 0) ::fsync(folder.get());
@@ -237,8 +242,10 @@ void write_file_atomically(const std::filesystem::path& path, std::span<const st
   file.commit();
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
-  write_file_atomically(path, std::as_bytes(std::span(text)));
+void write_file_atomically(const std::filesystem::path& path, std::string_view text, AtomicFile::Sync sync) {
+  AtomicFile file(path);
+  write_all(file.descriptor(), std::as_bytes(std::span(text)), path);
+  file.commit(sync);
 }
 
 void check_writable(const std::filesystem::path& path, bool overwrite) {
@@ -260,17 +267,17 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
 void check_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::path there = std::filesystem::absolute(folder, error).lexically_normal();
+  int problem = error.value();
   while (there.has_relative_path() && !std::filesystem::exists(std::filesystem::symlink_status(there, error))) {
     there = there.parent_path();
   }
-  int problem = 0;
-  if (!std::filesystem::is_directory(there, error)) {
+  if (problem == 0 && !std::filesystem::is_directory(there, error)) {
     problem = ENOTDIR;
-  } else if (::access(there.c_str(), W_OK | X_OK) != 0) {
+  } else if (problem == 0 && ::access(there.c_str(), W_OK | X_OK) != 0) {
     problem = errno;
   }
   if (problem == 0) return;
-  throw Error(ExitCode::Io,
+  throw Error(code_of(problem),
               fmt::format("cannot make the folder '{}': {}", printable(folder.string(), 300),
                           std::generic_category().message(problem)),
               "name a folder that can be written with -o");

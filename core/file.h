@@ -37,8 +37,10 @@ class AtomicFile {
   /// What is to be written to.
   [[nodiscard]] int descriptor() const { return descriptor_; }
 
-  /// Once, when all is written: syncs and closes it, gives it its name, syncs the folder. Throws Error (Io).
-  void commit();
+  enum class Sync { Disk, None };
+  /// Once, when all is written: syncs and closes it, gives it its name, syncs the folder. Throws Error (Io). Without
+  /// syncs it survives the process, and maybe not the machine.
+  void commit(Sync sync = Sync::Disk);
 
  private:
   std::filesystem::path path_;    ///< for errors
@@ -49,7 +51,8 @@ class AtomicFile {
 
 /// Writes `bytes` so that `path` is either complete or untouched, as an AtomicFile. Throws Error (Io).
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
-void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+void write_file_atomically(const std::filesystem::path& path, std::string_view text,
+                           AtomicFile::Sync sync = AtomicFile::Sync::Disk);
 
 /// Throws Error (Io) when `path` exists and may not be overwritten, is no regular file, or its folder is missing or not
 /// writable: asked before long work.

@@ -106,6 +106,19 @@ TEST_F(FileTest, AWriteThatFailsLeavesTheOldFileAndNothingElse) {
   EXPECT_EQ(files(), 1U);
 }
 
+TEST_F(FileTest, AFileThatIsNotSyncedIsWholeOrUntouchedAsWell) {
+  write_file_atomically(path("a"), "old", AtomicFile::Sync::None);
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_EQ(code_of([&] { write_file_atomically(path("a"), std::string(5000, 'x'), AtomicFile::Sync::None); }),
+              ExitCode::Io);
+  }
+  EXPECT_EQ(text_of(path("a")), "old");
+  write_file_atomically(path("a"), "new", AtomicFile::Sync::None);
+  EXPECT_EQ(text_of(path("a")), "new");
+  EXPECT_EQ(files(), 1U);
+}
+
 TEST_F(FileTest, AFileWrittenInPiecesHasItsNameOnceItIsCommitted) {
   write_file_atomically(path("a"), "old");
   const auto put = [](const AtomicFile& file, std::string_view text) {

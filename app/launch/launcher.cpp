@@ -232,6 +232,10 @@ constexpr std::chrono::milliseconds kStartOfRank{500};
 constexpr std::chrono::seconds kMinEnd{2};
 constexpr std::chrono::seconds kMaxEnd{10};
 
+/// What the child between fork and exec leaves with where it cannot become mpiexec.
+constexpr int kNoMemory = 126;
+constexpr int kNotStarted = 127;
+
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, int stdout_pipe, pid_t parent) {
   // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
@@ -245,17 +249,20 @@ constexpr std::chrono::seconds kMaxEnd{10};
   const bool typed = options.input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
   ::dup2(stdout_pipe, STDOUT_FILENO);
   // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
-  for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
+  bool set = true;  // a job that lacked one would be another one
+  for (const auto& [name, value] : kEnvironment) set &= ::setenv(name, value, 0) == 0;
   if (is_one_host()) {
-    for (const auto& [name, value] : kOneHost) ::setenv(name, value, 0);
+    for (const auto& [name, value] : kOneHost) set &= ::setenv(name, value, 0) == 0;
   }
-  if (typed) ::setenv(kTypedInputVariable, "1", 1);
-  ::setenv(kReportStartVariable, "1", 1);
-  ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
-  for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
+  if (typed) set &= ::setenv(kTypedInputVariable, "1", 1) == 0;
+  set &= ::setenv(kReportStartVariable, "1", 1) == 0;
+  const bool terminal = ::isatty(STDERR_FILENO) == 1;
+  set &= (terminal ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable)) == 0;
+  for (const auto& [name, value] : options.environment) set &= ::setenv(name.c_str(), value.c_str(), 1) == 0;
+  if (!set) ::_exit(kNoMemory);
   // NOLINTEND(concurrency-mt-unsafe)
   ::execvp(pointers.front(), pointers.data());
-  ::_exit(127);
+  ::_exit(errno == ENOMEM ? kNoMemory : kNotStarted);
 }
 
 /// The path of the running program.
@@ -461,7 +468,10 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
                 fmt::format("a rank or mpiexec was ended by signal {} ({})", code - 128, signal ? signal : "unknown"),
                 "the system's log may say why (out of memory?); nothing partial was left");
   }
-  if (code == 127) {
+  if (code == kNoMemory) {
+    throw Error(ExitCode::Limit, "cannot start mpiexec: out of memory", "end other programs, or use --ranks 1");
+  }
+  if (code == kNotStarted) {
     throw Error(ExitCode::Io, "cannot start mpiexec", "run 'hpr doctor'; or use --ranks 1");
   }
   // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.

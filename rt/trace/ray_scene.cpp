@@ -62,7 +62,7 @@ class Failure {
 
   void check() const {
     if (!noted_) return;
-    throw Error(ExitCode::NoDevice,
+    throw Error(code_ == RTC_ERROR_OUT_OF_MEMORY ? ExitCode::Limit : ExitCode::NoDevice,
                 fmt::format("cannot build the ray scene: Embree error {}: {}", static_cast<int>(code_), text_.data()),
                 "give the process more memory, or render without ray passes: --passes none");
   }

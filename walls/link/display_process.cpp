@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <exception>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/json.h"
 #include "core/log.h"
 #include "image/image.h"
@@ -70,7 +71,7 @@ DisplayProcess::DisplayProcess(const Wall& wall, std::string host, Display& disp
     while (!wake.wait_for(lock, stop, kStatusEvery, [&] { return stop.stop_requested(); })) {
       try {
         write_status();
-      } catch (const Error& error) {
+      } catch (const std::exception& error) {  // also where memory is short
         log::debug("{}", error.what());
       }
     }
@@ -167,15 +168,7 @@ void DisplayProcess::write_status() {
   const std::string text = status();
   if (text == written_) return;
   // Whole at any time, and not worth waiting for the disk: it says what is, not what was.
-  const std::filesystem::path file = settings_.folder / "display.json";
-  const std::filesystem::path next = settings_.folder / ".display.json.next";
-  std::ofstream stream(next);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error(ExitCode::Io, fmt::format("cannot write '{}'", next.string()));
-  std::error_code error;
-  std::filesystem::rename(next, file, error);
-  if (error) throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", file.string(), error.message()));
+  write_file_atomically(settings_.folder / "display.json", text, AtomicFile::Sync::None);
   written_ = text;
 }
 

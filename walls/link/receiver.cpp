@@ -50,6 +50,7 @@ std::optional<Presentation> FrameReceiver::next(double limit) {
   const double until = settings_.clock() + limit;
   std::unique_lock lock(mutex_);
   while (true) {
+    if (failure_) std::rethrow_exception(failure_);
     const double now = settings_.clock();
     const double wake = orders_.empty() ? until : std::min(until, orders_.front().second);
     if (!orders_.empty() && now >= orders_.front().second) break;
@@ -110,12 +111,18 @@ ReceiverReport FrameReceiver::report() const {
 }
 
 void FrameReceiver::run(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    wait_for_news();
-    {
-      const std::lock_guard lock(mutex_);
-      step();
+  try {
+    while (!stop.stop_requested()) {
+      wait_for_news();
+      {
+        const std::lock_guard lock(mutex_);
+        step();
+      }
+      news_.notify_all();
     }
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
     news_.notify_all();
   }
 }
