@@ -57,29 +57,6 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
-/// Where a write to `path` ends up: a rename would replace a symbolic link, not what it points at. Refuses what a
-/// rename must not replace: folders, and devices and pipes (a run as root would turn /dev/null into a file).
-std::filesystem::path target_of(const std::filesystem::path& path) {
-  if (!path.has_filename()) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it names no file", path.string()), "name a file");
-  }
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (std::filesystem::is_directory(status)) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
-  }
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': not a regular file", path.string()),
-                "name a file, not a pipe or device");
-  }
-  std::filesystem::path target = path;
-  // Ends: status() above has followed the same links, and a loop of them is an error there and at the write.
-  for (int links = 0; links < 40 && std::filesystem::is_symlink(target, error); ++links) {
-    target = folder_of(target) / std::filesystem::read_symlink(target, error);
-  }
-  return target;
-}
-
 /// Calls `make` with one name after the other in `folder` until it does not fail for the name being taken; returns what
 /// it did, and the name. Names are short whatever the final one is, so that none the file system allows is too long.
 template <typename Make>
@@ -190,7 +167,29 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_
   return bytes;
 }
 
-AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(target_of(path_)) {
+std::filesystem::path written_file(const std::filesystem::path& path) {
+  if (!path.has_filename()) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it names no file", path.string()), "name a file");
+  }
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (std::filesystem::is_directory(status)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
+  }
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': not a regular file", path.string()),
+                "name a file, not a pipe or device");
+  }
+  // A rename would replace a symbolic link, not what it points at.
+  std::filesystem::path target = path;
+  // Ends: status() above has followed the same links, and a loop of them is an error there and at the write.
+  for (int links = 0; links < 40 && std::filesystem::is_symlink(target, error); ++links) {
+    target = folder_of(target) / std::filesystem::read_symlink(target, error);
+  }
+  return target;
+}
+
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(written_file(path_)) {
   descriptor_ = create_unnamed(folder_of(target_));
   if (descriptor_ >= 0) return;
   descriptor_ = with_temporary_name(folder_of(target_), temporary_, [](const char* name) {
@@ -210,7 +209,7 @@ AtomicFile::~AtomicFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-void AtomicFile::commit() {
+void AtomicFile::commit(const std::filesystem::path& former) {
   HPR_CHECK(descriptor_ >= 0);
   if (::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
   if (temporary_.empty()) {  // a link replaces nothing, so what is there is replaced by a rename
@@ -224,6 +223,9 @@ void AtomicFile::commit() {
     }
   }
   if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write", path_, errno);
+  if (!former.empty() && ::rename(target_.c_str(), former.c_str()) != 0 && errno != ENOENT) {
+    fail("cannot replace", former, errno);
+  }
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot write", path_, errno);
   temporary_.clear();
   // The rename itself is on disk only once the folder is synced; some file systems refuse that, and lose nothing by it.
@@ -231,10 +233,11 @@ void AtomicFile::commit() {
   if (folder.get() >= 0) ::fsync(folder.get());
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                           const std::filesystem::path& former) {
   AtomicFile file(path);
   write_all(file.descriptor(), bytes, path);
-  file.commit();
+  file.commit(former);
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
@@ -242,7 +245,7 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 }
 
 void check_writable(const std::filesystem::path& path, bool overwrite) {
-  const std::filesystem::path folder = folder_of(target_of(path));
+  const std::filesystem::path folder = folder_of(written_file(path));
   std::error_code error;
   if (!overwrite && std::filesystem::exists(path, error)) {
     throw Error(ExitCode::Io, fmt::format("'{}' exists", printable(path.string(), 300)),

@@ -20,6 +20,10 @@ namespace hpr {
 /// `text` less the byte order mark that some editors and spreadsheets put before UTF-8.
 [[nodiscard]] std::string_view without_mark(std::string_view text);
 
+/// The file that a write to `path` makes or replaces: where symbolic links lead. Throws Error (Io) for what no write
+/// replaces: folders, pipes and devices.
+[[nodiscard]] std::filesystem::path written_file(const std::filesystem::path& path);
+
 /// A file that is written piece by piece: `path` is either complete or untouched, also when the disk fills or the
 /// process dies. A symbolic link stays, what it points at is replaced.
 class AtomicFile {
@@ -38,7 +42,8 @@ class AtomicFile {
   [[nodiscard]] int descriptor() const { return descriptor_; }
 
   /// Once, when all is written: syncs and closes it, gives it its name, syncs the folder. Throws Error (Io).
-  void commit();
+  /// `former`: what had the name gets that one first, in the same file system; empty: it is replaced.
+  void commit(const std::filesystem::path& former = {});
 
  private:
   std::filesystem::path path_;    ///< for errors
@@ -47,8 +52,10 @@ class AtomicFile {
   int descriptor_ = -1;
 };
 
-/// Writes `bytes` so that `path` is either complete or untouched, as an AtomicFile. Throws Error (Io).
-void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
+/// Writes `bytes` so that `path` is either complete or untouched, as an AtomicFile. With `former` it may be missing
+/// instead, while what it was stands there. Throws Error (Io).
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                           const std::filesystem::path& former = {});
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
 /// Throws Error (Io) when `path` exists and may not be overwritten, is no regular file, or its folder is missing or not

@@ -24,7 +24,7 @@ namespace hpr {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'H', 'P', 'R', 'C', 'K', 'P', 'T', '\n'};
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 
 class Writer {
  public:
@@ -132,7 +132,7 @@ void compare_identities(const RunIdentity& found, const RunIdentity& expected, c
 std::span<const std::byte> checked_part(std::span<const std::byte> bytes, const std::string& name) {
   constexpr std::size_t kHead = kMagic.size() + sizeof kFormat;
   if (bytes.size() < kMagic.size() || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
-    throw Error(ExitCode::BadInput, fmt::format("{}: not a checkpoint", name), "name one that hpr wrote");
+    throw DamagedCheckpoint(ExitCode::BadInput, fmt::format("{}: not a checkpoint", name), "name one that hpr wrote");
   }
   std::uint32_t format = 0;
   if (bytes.size() >= kHead) std::memcpy(&format, bytes.data() + kMagic.size(), sizeof format);
@@ -146,15 +146,23 @@ std::span<const std::byte> checked_part(std::span<const std::byte> bytes, const 
                 fmt::format("{}: a checkpoint of format {}; this hpr reads {}", name, format, kFormat),
                 "go on with the hpr that wrote it, or start anew without --resume");
   }
-  throw Error(ExitCode::BadInput, fmt::format("{}: the checkpoint is damaged", name), "start anew, without --resume");
+  throw DamagedCheckpoint(ExitCode::BadInput, fmt::format("{}: the checkpoint is damaged", name),
+                          "start anew, without --resume");
+}
+
+/// What stands before the identity.
+bool get_asked_for(Reader& in) {
+  return in.get<std::uint32_t>() != 0;
 }
 
 }  // namespace
 
-std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film, const SampleProgress& progress) {
+std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film, const SampleProgress& progress,
+                                         bool asked_for) {
   Writer out;
   out.put(kMagic);
   out.put(kFormat);
+  out.put(std::uint32_t{asked_for ? 1U : 0U});
   out.put(std::uint64_t{identity.size()});
   for (const auto& [field, value] : identity) {
     out.put(field);
@@ -172,14 +180,25 @@ std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film
   return out.take();
 }
 
+void check_whole(std::span<const std::byte> bytes, const std::string& name) {
+  (void)checked_part(bytes, name);
+}
+
+bool was_asked_for(std::span<const std::byte> bytes, const std::string& name) {
+  Reader in(checked_part(bytes, name), name);
+  return get_asked_for(in);
+}
+
 RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name) {
   Reader in(checked_part(bytes, name), name);
+  (void)get_asked_for(in);
   return get_identity(in);
 }
 
 SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name, const RunIdentity& identity,
                                  Film& film) {
   Reader in(checked_part(bytes, name), name);
+  (void)get_asked_for(in);
   compare_identities(get_identity(in), identity, name);
   Film::Counters counters;
   counters.samples = in.get<std::uint32_t>();
