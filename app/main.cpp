@@ -16,6 +16,7 @@
 #include "app/results.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/signals.h"
 #include "engine/settings_table.h"
 #include "raster/gl_context.h"
 
@@ -46,6 +47,8 @@ void configure_log(Globals& globals) {
   const bool errors_only = globals.verbosity < 0 || (launched_rank() != 0 && globals.verbosity < 2);
   if (globals.verbosity < 0 && globals.progress == "auto") globals.progress = "none";
   log::configure(errors_only ? log::Level::Error : globals.verbosity == 0 ? log::Level::Info : log::Level::Debug, "");
+  // Of a job the launcher speaks; one that is not of this program passes signals to every rank.
+  if (!errors_only && launched_rank() == 0 && !launched_by_hpr()) announce_ends(stderr_is_terminal());
 }
 
 /// Checks --backend, also for commands that draw nothing. Windows are GLFW's, whatever draws their pictures.

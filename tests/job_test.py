@@ -61,6 +61,39 @@ def interrupted(folder, ranks, number, whole_session):
     expect(frames == later, f"{name}: {later - frames} files were written after hpr had left")
 
 
+ENDING = "hpr: ending; Ctrl-C again ends it at once"
+
+
+def announced(folder):
+    """That a signal was heard is said at once and once, by the launcher or by a run that comes to an orderly end; not by
+    one that says errors only."""
+    endless = ["wall", "run", "2x1@64x48", "gen:cornell", "--quality", "draft", "--passes", "none", "--display", "none"]
+    render = ["render", "gen:gallery", "-o", "announced.png", "--spp", "1000000", "--photons", "1000", "--progress", "none"]
+    for case, arguments, number, spoken in (("render", [*render, "--ranks", "2"], signal.SIGINT, True),
+                                            ("render, told to end", [*render, "--ranks", "2"], signal.SIGTERM, True),
+                                            ("quiet", [*render, "--ranks", "2", "-q"], signal.SIGINT, False),
+                                            ("wall", [*endless, "--until-stopped"], signal.SIGINT, True),
+                                            ("wall, two ranks", [*endless, "--until-stopped", "--ranks", "2"], signal.SIGINT, True)):
+        run = subprocess.Popen([HPR, *arguments], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+        until = time.monotonic() + 60
+        while run.poll() is None and time.monotonic() < until:
+            processes = ranks_of(run.pid) if "--ranks" in arguments else [run.pid]
+            if processes and all(map(has_begun, processes)):
+                break
+            time.sleep(0.02)
+        time.sleep(1)
+        run.send_signal(number)
+        begin = time.monotonic()
+        said = b""
+        while ENDING.encode() not in said and (more := os.read(run.stderr.fileno(), 4096)):
+            said += more
+        after = time.monotonic() - begin
+        said = (said + run.communicate(timeout=60)[1]).decode()
+        expect(said.count(ENDING) == (1 if spoken else 0), f"{case}: an end is not announced as it should: {said[-600:]}")
+        expect(not spoken or after < 1.0, f"{case}: an end is announced after {after:.2f} s")  # 0.1 s where nothing else runs
+        expect(run.returncode == (0 if "wall" in case else -number), f"{case}: left with {run.returncode}: {said[-600:]}")
+
+
 def stopped(folder, ranks):
     """SIGUSR1 is an orderly end before all frames are done: what was drawn is written down."""
     name = f"stopped-{ranks}"
@@ -266,6 +299,7 @@ def main():
             output_nobody_takes(folder, ranks)
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
+        announced(folder)
         without_ssh(folder)
         ranks_that_listen(folder)
         lone_tasks(folder)

@@ -28,6 +28,7 @@
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/signals.h"
 
 namespace hpr {
 
@@ -98,6 +99,7 @@ extern "C" void pass_on(int signal) {
   if (signal == SIGALRM) started.store(true);
   if (signal == SIGINT || signal == SIGTERM || signal == SIGHUP) {
     const bool again = interrupt.exchange(signal) != 0;
+    announce_end();
     ending.store(again || !stops.load());
     if (stops.load()) {
       signal = again ? SIGTERM : SIGUSR1;
