@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <ctime>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -57,6 +58,9 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
+constexpr std::string_view kPartPrefix = ".hpr-";
+constexpr std::string_view kPartSuffix = ".part";
+
 /// Calls `make` with one name after the other in `folder` until it does not fail for the name being taken; returns what
 /// it did, and the name. Names are short whatever the final one is, so that none the file system allows is too long.
 template <typename Make>
@@ -64,7 +68,7 @@ int with_temporary_name(const std::filesystem::path& folder, std::string& name, 
   constexpr int kTries = 10000;  // each one is a file that a killed run left behind
   int result = -1;
   for (int i = 0; i < kTries; ++i) {
-    name = (folder / fmt::format(".hpr-{}-{}.part", ::getpid(), i)).string();
+    name = (folder / fmt::format("{}{}-{}{}", kPartPrefix, ::getpid(), i, kPartSuffix)).string();
     result = make(name.c_str());
     if (result >= 0 || errno != EEXIST) break;
   }
@@ -82,6 +86,11 @@ int create_unnamed(const std::filesystem::path& folder) {
   if (file < 0 || ::access(link_of(file).c_str(), F_OK) == 0) return file;
   ::close(file);
   return -1;
+}
+
+int create_named(const std::filesystem::path& folder, std::string& name) {
+  return with_temporary_name(
+      folder, name, [](const char* path) { return ::open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
 }
 
 constexpr const char* kTemporaryVariable = "TMPDIR";
@@ -191,11 +200,9 @@ std::filesystem::path written_file(const std::filesystem::path& path) {
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(written_file(path_)) {
   descriptor_ = create_unnamed(folder_of(target_));
-  if (descriptor_ >= 0) return;
-  descriptor_ = with_temporary_name(folder_of(target_), temporary_, [](const char* name) {
-    return ::open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  });
+  if (descriptor_ < 0) descriptor_ = create_named(folder_of(target_), temporary_);
   if (descriptor_ < 0) fail("cannot write", path_, errno);
+  (void)::flock(descriptor_, LOCK_EX | LOCK_NB);  // nobody takes it for abandoned
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
@@ -222,6 +229,7 @@ void AtomicFile::commit(const std::filesystem::path& former) {
       fail("cannot write", path_, error);
     }
   }
+  const Descriptor locked(::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0));  // until the name is the final one
   if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write", path_, errno);
   if (!former.empty() && ::rename(target_.c_str(), former.c_str()) != 0 && errno != ENOENT) {
     fail("cannot replace", former, errno);
@@ -244,6 +252,28 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
   write_file_atomically(path, std::as_bytes(std::span(text)));
 }
 
+namespace {
+
+bool is_abandoned(const std::filesystem::path& path) {
+  constexpr std::time_t kYoungSeconds = 60;
+  const Descriptor file(::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat info {};
+  if (file.get() < 0 || ::fstat(file.get(), &info) != 0) return false;
+  return S_ISREG(info.st_mode) && info.st_uid == ::geteuid() && info.st_mtime + kYoungSeconds < std::time(nullptr) &&
+         ::flock(file.get(), LOCK_EX | LOCK_NB) == 0;
+}
+
+}  // namespace
+
+void remove_abandoned_files(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(kPartPrefix) || !name.ends_with(kPartSuffix)) continue;
+    if (is_abandoned(entry->path())) ::unlink(entry->path().c_str());
+  }
+}
+
 void check_writable(const std::filesystem::path& path, bool overwrite) {
   const std::filesystem::path folder = folder_of(written_file(path));
   std::error_code error;
@@ -258,6 +288,7 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
                 "create the folder first");
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
+  remove_abandoned_files(folder);
 }
 
 void check_folder(const std::filesystem::path& folder) {
@@ -283,7 +314,10 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
     : folder_(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (folder_ < 0 && errno == EACCES) return;  // it may still be written to
   if (folder_ < 0) fail("cannot open", folder, errno);
-  if (::flock(folder_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  if (::flock(folder_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) {
+    remove_abandoned_files(folder.empty() ? "." : folder);
+    return;
+  }
   ::close(folder_);
   throw Error(ExitCode::Io, fmt::format("another run writes into '{}'", printable(folder.string(), 300)),
               "wait for it, or name another folder with -o");

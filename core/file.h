@@ -58,8 +58,12 @@ void write_file_atomically(const std::filesystem::path& path, std::span<const st
                            const std::filesystem::path& former = {});
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
+/// Removes what processes of this user that were killed while they wrote files left in `folder`: an AtomicFile that has
+/// a name of its own holds a lock. Nothing younger than a minute, which may have none yet.
+void remove_abandoned_files(const std::filesystem::path& folder);
+
 /// Throws Error (Io) when `path` exists and may not be overwritten, is no regular file, or its folder is missing or not
-/// writable: asked before long work.
+/// writable: asked before long work. Removes abandoned files from that folder.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
 /// Throws Error (Io) when `folder` is there and no folder that can be written to, or is not there and cannot be made:
@@ -67,7 +71,7 @@ void check_writable(const std::filesystem::path& path, bool overwrite);
 void check_folder(const std::filesystem::path& folder);
 
 /// Keeps other processes of this host from writing their results into a folder, if they call this too.
-/// Where it cannot be locked it keeps nobody.
+/// Where it cannot be locked it keeps nobody. Removes abandoned files from the folder.
 class FolderLock {
  public:
   /// Throws Error (Io) when another process holds it, or there is no such folder.

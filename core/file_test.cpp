@@ -2,12 +2,14 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -265,6 +267,35 @@ std::string refusal() {
     return error.what();
   }
   return {};
+}
+
+TEST_F(FileTest, WhatKilledWritersLeftIsRemovedAndNothingElse) {
+  const fs::path left = path(".hpr-1-0.part");
+  const fs::path held = path(".hpr-1-1.part");
+  const fs::path other = path("a.part");
+  const fs::path young = path(".hpr-1-2.part");
+  for (const fs::path& each : {left, held, other, young}) std::ofstream(each) << "half";
+  for (const fs::path& each : {left, held, other}) {
+    fs::last_write_time(each, fs::file_time_type::clock::now() - std::chrono::minutes(5));
+  }
+  const int lock = ::open(held.c_str(), O_RDONLY | O_CLOEXEC);
+  ASSERT_EQ(::flock(lock, LOCK_EX | LOCK_NB), 0);
+  check_writable(path("result"), false);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_TRUE(fs::exists(held));
+  EXPECT_TRUE(fs::exists(other));
+  EXPECT_TRUE(fs::exists(young));
+  ::close(lock);
+  { const FolderLock folder(folder_); }
+  EXPECT_FALSE(fs::exists(held));
+}
+
+TEST_F(FileTest, AFileThatIsBeingWrittenIsLocked) {
+  const AtomicFile file(path("a"));
+  const int again = ::open(("/proc/self/fd/" + std::to_string(file.descriptor())).c_str(), O_WRONLY | O_CLOEXEC);
+  ASSERT_GE(again, 0);
+  EXPECT_NE(::flock(again, LOCK_EX | LOCK_NB), 0);
+  ::close(again);
 }
 
 TEST(TemporaryFile, HasNoNameAndGoesWithItsOwner) {

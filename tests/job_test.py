@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-from processes import ranks_of
+from processes import children_of, ranks_of, wait_gone
 from program import HPR, expect, failures
 
 WALL = ["wall", "run", "2x1@64x48", "gen:cornell", "--quality", "draft", "--passes", "none", "--frames", "100000"]
@@ -92,6 +92,55 @@ def announced(folder):
         expect(said.count(ENDING) == (1 if spoken else 0), f"{case}: an end is not announced as it should: {said[-600:]}")
         expect(not spoken or after < 1.0, f"{case}: an end is announced after {after:.2f} s")  # 0.1 s where nothing else runs
         expect(run.returncode == (0 if "wall" in case else -number), f"{case}: left with {run.returncode}: {said[-600:]}")
+
+
+def mpi_files(pids):
+    """What MPI and the launcher keep outside the job's own memory: of these processes' open files and maps."""
+    found = set()
+    for pid in pids:
+        for line in pathlib.Path(f"/proc/{pid}/maps").read_text().splitlines():
+            if line.partition("/")[2].startswith("dev/shm/") and "deleted" not in line:
+                found.add("/" + line.partition("/")[2])
+    return found
+
+
+def swept(folder):
+    """What a killed mpiexec, or a whole job that is killed, leaves is gone after the next job; a living one's is not."""
+    temporary = folder / "temporary"
+    temporary.mkdir()
+    environment = plain_environment(TMPDIR=str(temporary))
+    command = [HPR, "render", "gen:gallery", "--spp", "1000000", "--photons", "1000", "--progress", "none", "--ranks", "2", "-o"]
+    jobs = [subprocess.Popen([*command, f"swept{i}.png"], cwd=folder, env=environment, stderr=subprocess.DEVNULL) for i in range(3)]
+    until = time.monotonic() + 60
+    files = []
+    for job in jobs:
+        while job.poll() is None and time.monotonic() < until and not (len(ranks_of(job.pid)) == 2 and mpi_files(ranks_of(job.pid))):
+            time.sleep(0.05)
+        files.append(mpi_files(ranks_of(job.pid)))
+        expect(files[-1], "a job of two ranks shares no memory")
+    killed, lone, living = jobs
+    everybody = [pid for job in (killed, lone) for pid in (*children_of(job.pid), *ranks_of(job.pid))]
+    for pid in [killed.pid, *children_of(killed.pid), *ranks_of(killed.pid), *children_of(lone.pid)]:
+        os.kill(pid, signal.SIGKILL)
+    for job in (killed, lone):
+        job.wait(timeout=60)
+    for pid in everybody:
+        expect(wait_gone(pid), f"{pid} outlives its job")
+    expect(lone.returncode == 7, f"a job whose mpiexec was killed left with {lone.returncode}")
+    expect(len(list(temporary.iterdir())) in (2, 3), f"three jobs have {list(temporary.iterdir())}")
+    result = subprocess.run([HPR, "render", "gen:cornell", "-o", "next.png", "--size", "32x24", "--ranks", "2"], cwd=folder,
+                            env=environment, capture_output=True, text=True, timeout=60, check=False)
+    expect(result.returncode == 0, f"the next job left with {result.returncode}: {result.stderr}")
+    for path in files[0] | files[1]:
+        expect(not os.path.exists(path), f"{path} of a dead job is there")
+    for path in files[2]:
+        expect(os.path.exists(path), f"{path} of a living job is gone")
+    expect(len(list(temporary.iterdir())) == 1, f"one job has {list(temporary.iterdir())}")
+    living.terminate()
+    living.wait(timeout=60)
+    expect(not list(temporary.iterdir()), f"jobs that have ended leave {list(temporary.iterdir())}")
+    for path in files[2]:
+        expect(not os.path.exists(path), f"{path} of a job that ended is there")
 
 
 def stopped(folder, ranks):
@@ -300,6 +349,7 @@ def main():
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
         announced(folder)
+        swept(folder)
         without_ssh(folder)
         ranks_that_listen(folder)
         lone_tasks(folder)

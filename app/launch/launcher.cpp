@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/launch/job_folder.h"
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/log.h"
@@ -235,7 +236,8 @@ constexpr std::chrono::seconds kMinEnd{2};
 constexpr std::chrono::seconds kMaxEnd{10};
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
-[[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, int stdout_pipe, pid_t parent) {
+[[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, const JobFolder& folder,
+                         int stdout_pipe, pid_t parent) {
   // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
   if (options.input == StandardInput::None) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -256,6 +258,7 @@ constexpr std::chrono::seconds kMaxEnd{10};
   ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   // NOLINTEND(concurrency-mt-unsafe)
+  folder.pass_on();
   ::execvp(pointers.front(), pointers.data());
   ::_exit(127);
 }
@@ -432,11 +435,12 @@ int run_mpiexec(int ranks, const std::vector<std::string>& args, const JobOption
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
   }
   const PassedSignals passed(options);
+  const JobFolder folder;  // gone before `passed` ends this process
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start mpiexec: {}", std::generic_category().message(errno)));
-  if (child == 0) become(pointers, options, pipe[1], parent);
+  if (child == 0) become(pointers, options, folder, pipe[1], parent);
   PassedSignals::to(child);
 
   ::close(pipe[1]);
