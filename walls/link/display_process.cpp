@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kTick = 0.1;
 constexpr std::chrono::milliseconds kStatusEvery{200};
+constexpr double kRetryEveryMs = 1000.0;
 constexpr int kBadgeHeight = 24;
 constexpr Rgba8 kBadgeColor{176, 32, 32, 255};
 constexpr Rgba8 kBadgeText{255, 255, 255, 255};
@@ -34,6 +35,8 @@ std::string_view to_string(ShownState state) {
       return "fresh";
     case ShownState::Stale:
       return "stale";
+    case ShownState::Failed:
+      return "failed";
     case ShownState::Ended:
       break;
   }
@@ -90,7 +93,11 @@ DisplayProcess::~DisplayProcess() {
 
 void DisplayProcess::run(const std::function<bool()>& stop) {
   while (!stop() && !display_.take_input().stop) {
-    if (auto presentation = receiver_.next(kTick)) present(*presentation);
+    if (auto presentation = receiver_.next(kTick)) {
+      present(*presentation);
+    } else {
+      retry();
+    }
     const ReceiverReport report = receiver_.report();
     update(report);
     if (settings_.once && report.runs > 0 && report.idle && !report.connected) break;
@@ -101,7 +108,12 @@ void DisplayProcess::run(const std::function<bool()>& stop) {
 void DisplayProcess::present(Presentation& presentation) {
   std::vector<ScreenPicture> pictures;
   for (const auto& [screen, picture] : presentation.pictures) pictures.push_back({screen, picture});
-  if (!pictures.empty()) display_.show({presentation.frame, pictures});
+  if (!pictures.empty() && !try_to_show({presentation.frame, pictures})) {
+    receiver_.not_shown(presentation);
+    unshown_ = std::move(presentation);
+    return;
+  }
+  unshown_.reset();
   if (!receiver_.shown(presentation)) return;
   for (auto& [screen, picture] : presentation.pictures) {
     screens_[screen].picture = std::move(picture);
@@ -109,17 +121,42 @@ void DisplayProcess::present(Presentation& presentation) {
   }
 }
 
+bool DisplayProcess::try_to_show(const WallFrame& frame) {
+  try {
+    display_.show(frame);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::Io || !display_.recovers()) throw;
+    if (!failing_) log::error("{}: frame {} is not shown; {}", error.what(), frame.number, error.hint());
+    failing_ = true;
+    since_failure_.restart();
+    return false;
+  }
+  if (failing_) log::info("frame {} is shown again", frame.number);
+  failing_ = false;
+  return true;
+}
+
+/// Nothing newer may come for long.
+void DisplayProcess::retry() {
+  if (!unshown_ || since_failure_.ms() < kRetryEveryMs) return;
+  Presentation again = std::move(*unshown_);
+  unshown_.reset();
+  present(again);
+}
+
 void DisplayProcess::update(const ReceiverReport& report) {
   const double now = receiver_.now();
   for (std::size_t i = 0; i < screens_.size(); ++i) {
     const ScreenReport& of = report.screens[i];
     ShownState state = ShownState::Fresh;
-    if (!of.frame || !of.arrived) {
+    if (!of.arrived || (!of.frame && !failing_)) {
       state = ShownState::Waiting;
     } else if (report.ended) {
       state = ShownState::Ended;
     } else if (now - *of.arrived > settings_.stale_after.count()) {
       state = ShownState::Stale;
+    } else if (failing_) {
+      state = ShownState::Failed;
     }
     const ShownState before = screens_[i].state;
     if (state == before) continue;
@@ -139,7 +176,7 @@ void DisplayProcess::update(const ReceiverReport& report) {
 
 void DisplayProcess::show_again(std::size_t screen, const Image<Rgba8>& picture) {
   const std::vector<ScreenPicture> pictures{{screen, picture}};
-  display_.show({screens_[screen].frame, pictures});
+  (void)try_to_show({screens_[screen].frame, pictures});
 }
 
 std::string DisplayProcess::status() const {

@@ -95,6 +95,17 @@ bool FrameReceiver::shown(const Presentation& presentation) {
   return true;
 }
 
+void FrameReceiver::not_shown(const Presentation& presentation) {
+  const std::lock_guard lock(mutex_);
+  showing_ = false;
+  Peer* const swap = presentation.session == session_ ? swap_peer() : nullptr;
+  if (swap != nullptr) {
+    swap->connection.queue(encode_packet({.type = PacketType::NotShown, .frame = presentation.frame, .time = now()}));
+  }
+  announce();
+  raise_alarm(alarm_);
+}
+
 std::vector<std::string> FrameReceiver::addresses() const {
   std::vector<std::string> all;
   for (const Listener& listener : listeners_) all.push_back(listener.address());

@@ -71,6 +71,8 @@ class FrameReceiver {
   [[nodiscard]] std::optional<Presentation> next(double limit);
   /// The frame next() returned is on the screens. False: it was another run's than the one that shows now.
   bool shown(const Presentation& presentation);
+  /// The frame next() returned could not be shown; shown() may be called for it later.
+  void not_shown(const Presentation& presentation);
   /// Seconds of the clock all its times are of.
   [[nodiscard]] double now() const { return settings_.clock(); }
   [[nodiscard]] ReceiverReport report() const;

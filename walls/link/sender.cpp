@@ -339,6 +339,9 @@ void WallSender::take_answer(std::size_t display, const Packet& packet, double n
       // Before the first round trip nothing is known of its clock but when its words come.
       barrier_.shown(display, header.frame, swap.clock.known() ? header.time - swap.clock.seconds() : now);
       break;
+    case PacketType::NotShown:
+      barrier_.not_shown(display, header.frame, now);
+      break;
     case PacketType::Pong: {
       if (header.frame > swap.pings || header.frame + swap.ping_sent.size() <= swap.pings) break;  // of no known ping
       ByteReader times(packet.payload);
@@ -378,6 +381,9 @@ void WallSender::report_event(const SwapEvent& event) const {
       log::warning("screen {} ({}) lost, frame {}; retrying", id, host.host, event.frame);
     } else if (event.kind == SwapEvent::Kind::Stale) {
       log::warning("screen {} ({}) is behind, frame {}", id, host.host, event.frame);
+    } else if (event.kind == SwapEvent::Kind::Failed) {
+      log::warning("screen {} ({}) cannot be shown, frame {}; the log of its display says why", id, host.host,
+                   event.frame);
     } else {
       log::info("screen {} ({}) back, frame {}", id, host.host, event.frame);
     }
