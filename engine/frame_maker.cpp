@@ -91,6 +91,12 @@ bool FrameMaker::is_resting(std::span<const View> screens) const {
   return std::ranges::equal(screens, last_screens_, same_projection);
 }
 
+VerifyCounts FrameMaker::verified() const {
+  const VerifyCounts& all = times_.verified;
+  const VerifyCounts& before = times_before_.verified;
+  return {all.tiles - before.tiles, all.mismatches - before.mismatches, all.unmended - before.unmended};
+}
+
 bool FrameMaker::refined(std::span<const View> screens) const {
   return refining_ && is_resting(screens) && reached(resting_, sampler_->sample_progress());
 }

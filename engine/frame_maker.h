@@ -47,6 +47,8 @@ class FrameMaker {
   [[nodiscard]] const FrameTimes& times() const { return times_; }
   /// The part of times() that earlier frames of a refined picture took.
   [[nodiscard]] const FrameTimes& times_before() const { return times_before_; }
+  /// What verifying the last frame found; of a refined picture, in the samples that this frame added.
+  [[nodiscard]] VerifyCounts verified() const;
   [[nodiscard]] std::optional<double> relmse() const { return relmse_; }
   /// The degradations of the last frame; none without a target.
   [[nodiscard]] const std::optional<BudgetReport>& report() const { return report_; }

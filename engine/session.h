@@ -60,6 +60,10 @@ class Session {
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
+  /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where
+  /// rays meet a part of the scene.
+  [[nodiscard]] Rasterizer& whole_rasterizer();
+  [[nodiscard]] PrimaryRays& whole_primary_rays(const RaySettings& settings);
   /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
   /// asked for. Asking for one built in another way ends it, and the shader and primary rays that use it.
   [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
@@ -113,6 +117,7 @@ class Session {
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
+  std::unique_ptr<Rasterizer> whole_rasterizer_;
   RayBuild ray_build_;                             ///< of the ray scenes and primary rays below
   std::optional<std::vector<SurfaceRange>> part_;  ///< the part of the scene they hold; see RaySettings::part
   std::unique_ptr<RayForwarding> forwarding_;      ///< where there is a part
@@ -120,6 +125,7 @@ class Session {
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_part_;  ///< of primary_rays_; none where ray_scene_ is
   std::unique_ptr<PrimaryRays> primary_rays_;
+  std::unique_ptr<PrimaryRays> whole_primary_rays_;
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<DeferredShader> shader_;
   Group group_;

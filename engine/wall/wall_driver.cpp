@@ -341,6 +341,7 @@ void WallDriver::record(std::uint64_t number) {
   FrameRecord frame{number, slowest, strategy(), record_screens()};
   if (frames_->report()) frame.budget = to_record(*frames_->report());
   frame.slowest = slowest_of(session_, *frames_, hosts_);
+  if (plan().verify_percent > 0.0) frame.verify = to_record({plan().verify_percent, frames_->verified()});
   frame.heads = heads_.report();
   for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor) {
     frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, monitor_pictures_[monitor], ScreenState::Fresh));

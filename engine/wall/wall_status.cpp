@@ -62,6 +62,10 @@ BudgetRecord to_record(const BudgetReport& report) {
   return {report.target_ms, report.resolution_scale, report.samples, report.given_up, report.resting};
 }
 
+VerifyRecord to_record(const VerifyReport& report) {
+  return {report.percent, report.counts.tiles, report.counts.mismatches};
+}
+
 std::string describe_status(std::span<const double> frame_ms, const FrameRecord& last,
                             std::span<const ScreenState> states) {
   std::vector<double> sorted(frame_ms.begin(), frame_ms.end());

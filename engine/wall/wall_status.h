@@ -17,6 +17,7 @@ namespace hpr {
 
 /// As manifests have it.
 [[nodiscard]] BudgetRecord to_record(const BudgetReport& report);
+[[nodiscard]] VerifyRecord to_record(const VerifyReport& report);
 
 /// "24.1 fps (min 11.0), slowest rank 3 on wall05: shadow 21.0 ms; stale: wall-r0c1": the frames that took `frame_ms`
 /// each, what the last of them was held up by, and what its screens show; `states` per screen of `last`.

@@ -52,6 +52,7 @@ Json json_of(const FrameRecord& frame) {
                          {"pass", frame.slowest->pass},
                          {"pass_ms", frame.slowest->pass_ms}};
   }
+  if (frame.verify) record["verify"] = verify_json(*frame.verify);
   for (const HeadRecord& head : frame.heads) record["heads"].push_back(json_of(head));
   for (const ScreenRecord& monitor : frame.monitors) record["monitors"].push_back(picture_json(monitor));
   if (frame.swap) record["swap"] = {{"skew_ms", frame.swap->skew_ms}};
@@ -125,6 +126,10 @@ Json budget_json(const BudgetRecord& budget) {
           {"samples", budget.samples},
           {"given_up", budget.given_up},
           {"resting", budget.resting}};
+}
+
+Json verify_json(const VerifyRecord& verify) {
+  return {{"percent", verify.percent}, {"tiles", verify.tiles}, {"mismatches", verify.mismatches}};
 }
 
 std::string to_json(const FrameRecord& frame) {
