@@ -78,13 +78,17 @@ std::uint32_t FrameMaker::max_samples() const {
 void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
   const bool same_plan = plan_.layout.tiles() > 0 && effort.degradations == effort_.degradations &&
                          effort.scale_step == effort_.scale_step;
-  effort_ = effort;
   const double scale = settings_.resolution_scale * scale_of_step(effort.scale_step);
   blocks_ = cut_blocks(at_resolution(screens, scale));
   if (same_plan) return;
   sampler_.reset();  // it holds on to the plan
   const auto count = static_cast<std::size_t>(effort.degradations);
   plan_ = plan_frame(session_, apply_degradations(settings_, std::span(degradations_).first(count)), blocks_.views);
+  effort_ = effort;
+}
+
+void FrameMaker::discard() {
+  refining_ = false;
 }
 
 bool FrameMaker::is_resting(std::span<const View> screens) const {

@@ -38,6 +38,9 @@ class FrameMaker {
   /// Collective. Records the time of the slowest rank for the last frame, equal on all ranks; the budget follows it.
   void record_frame_time(double slowest_ms);
 
+  /// After a frame that failed: what was refined so far is not trusted, and made anew.
+  void discard();
+
   /// Whether the same screens once more would give the last frame again: it was refined as far as it is to be.
   [[nodiscard]] bool refined(std::span<const View> screens) const;
 

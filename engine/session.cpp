@@ -243,7 +243,7 @@ TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& stra
     return keys_;
   }
   keys_ = {};  // before as much is taken again
-  keys_ = shared ? shared_layer(layout, strategy, members) : TileLayer<Key>(layout);
+  agree_on_failure(comm_, [&] { keys_ = shared ? shared_layer(layout, strategy, members) : TileLayer<Key>(layout); });
   keys_shared_ = shared;
   keys_members_.assign(members.begin(), members.end());
   return keys_;

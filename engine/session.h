@@ -77,7 +77,8 @@ class Session {
   /// The strategy of this name with its scratch memory, for that group; kept until another one is asked for.
   [[nodiscard]] Compositor& compositor(const std::string& strategy, std::span<const int> members);
   /// A cleared layer of keys of this layout, reused from frame to frame. With a strategy that merges in place, the
-  /// ranks of one host see the layers of their group's members; collective over the group.
+  /// ranks of one host see the layers of their group's members. Collective. All ranks throw alike where one has no
+  /// memory for it.
   [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout, const std::string& strategy,
                                      std::span<const int> members);
   /// `count` cleared layers of keys that are not composited, reused from frame to frame.

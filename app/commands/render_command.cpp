@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <span>
+#include <utility>
 
 #include "app/command.h"
 #include "app/launch/run_ranks.h"
@@ -20,6 +23,7 @@
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
+#include "engine/wall/frame_retry.h"
 
 namespace hpr {
 namespace {
@@ -116,6 +120,23 @@ class RenderCommand final : public Command {
     if (files_.colors != ColorFormat::Float32) fmt::print("{}\n", files_.explain_colors());
   }
 
+  /// Collective. Draws the picture, once more where that fails; null where it stopped before its goal, with a
+  /// checkpoint.
+  [[nodiscard]] std::unique_ptr<FrameSampler> draw_samples(Session& session, const FramePlan& plan,
+                                                           const Sampling& sampling, std::span<const View> views,
+                                                           const CheckpointSettings& checkpoint,
+                                                           Progress& progress) const {
+    std::unique_ptr<FrameSampler> drawn;
+    bool is_whole = false;
+    const std::optional<Error> failure = draw_with_retry(session.comm(), "the picture", [&] {
+      drawn.reset();  // frees its memory before the next one takes some
+      drawn = std::make_unique<FrameSampler>(session, plan, sampling, 0, !files_.raw.empty());
+      is_whole = drawn->draw(views, checkpoint, progress);
+    });
+    if (failure) throw AgreedError(*failure);
+    return is_whole ? std::move(drawn) : nullptr;
+  }
+
   ExitCode draw(Session& session, const Globals& globals, const RenderSettings& settings, Size size) {
     const Sampling& sampling = settings.sampling;
     const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
@@ -131,7 +152,6 @@ class RenderCommand final : public Command {
     prepare(session, plan);
     const Stopwatch watch;
     const std::size_t sent_before = session.comm().bytes_sent();
-    FrameSampler sampler(session, plan, sampling, 0, !files_.raw.empty());
     Progress progress(is_root ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
     std::optional<RunIdentity> identity;
     const CheckpointSettings checkpoint{checkpoint_, resume_, [&] {
@@ -140,7 +160,10 @@ class RenderCommand final : public Command {
                                                 identity_of(session, plan, blocks.views, settings, !files_.raw.empty());
                                           return *identity;
                                         }};
-    if (!sampler.draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
+    const std::unique_ptr<FrameSampler> drawn =
+        draw_samples(session, plan, sampling, blocks.views, checkpoint, progress);
+    if (!drawn) return ExitCode::Stopped;
+    FrameSampler& sampler = *drawn;
     progress.end();
     const CollectedPicture picture(session, sampler.frame(), blocks, size, files_);
     const FrameCost cost{watch.ms(), session.comm().bytes_sent() - sent_before};

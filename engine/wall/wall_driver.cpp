@@ -147,6 +147,8 @@ void WallDriver::take_over() {
       manifest_.earlier = std::move(entries.frames);
     }
     std::ranges::move(entries.restarts, std::back_inserter(manifest_.restarts));
+    for (const std::uint64_t frame : failed_frames(manifest_.earlier)) failed_.add_failed(frame);
+    failed_.add_drawn();
   });
   first_frame_ = all_gather_value(session_.comm(), first_frame_)[0];
   replay(commands);
@@ -226,14 +228,40 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   const std::vector<View> views = screens_in(number, heads_.at(number));
-  Frame& frame = frames_->make(curved_->drawn(views), number, progress);
-  std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
-  curved_->finish(views, pictures, session_.threads());
-  pictures_ = compose_screens(wall_, std::move(pictures));
-  monitor_pictures_ = monitors_.draw(session_.comm(), pictures_, owners_);
+  verified_ = {};
+  const std::optional<Error> failure = draw_with_retry(session_.comm(), fmt::format("frame {}", number),
+                                                       [&] { make_pictures(views, number, progress); });
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
+  if (failure) {
+    failed_.add_failed(number);
+    if (pictures_.empty() || failed_.in_a_row() >= kMaxFailedInARow) throw AgreedError(*failure);
+    if (session_.rank() == 0) log::error("frame {} failed: {}", number, failure->what());
+  } else {
+    failed_.add_drawn();
+  }
   agree_on_failure(session_.comm(), [&] { show(number); });
-  record(number);
+  record(number, failure);
+}
+
+void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress) {
+  try {
+    Frame& frame = frames_->make(curved_->drawn(views), number, progress);
+    verified_ += frames_->verified();
+    if (const std::uint64_t unmended = frames_->verified().unmended; unmended > 0) {
+      throw AgreedError(ExitCode::CheckFailed,
+                        fmt::format("of {} tile{} no two of three drawings agree", unmended, unmended == 1 ? "" : "s"),
+                        "memory, a GPU or a link of these ranks flips bits: replace it");
+    }
+    std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
+    curved_->finish(views, pictures, session_.threads());
+    pictures = compose_screens(wall_, std::move(pictures));
+    std::vector<Image<Rgba8>> monitor_pictures = monitors_.draw(session_.comm(), pictures, owners_);
+    pictures_ = std::move(pictures);
+    monitor_pictures_ = std::move(monitor_pictures);
+  } catch (...) {
+    frames_->discard();
+    throw;
+  }
 }
 
 bool WallDriver::follow_viewers() {
@@ -335,13 +363,18 @@ std::vector<ScreenRecord> WallDriver::record_screens() {
   return screens;
 }
 
-void WallDriver::record(std::uint64_t number) {
+void WallDriver::record(std::uint64_t number, const std::optional<Error>& failure) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
-  frames_->record_frame_time(slowest);
   FrameRecord frame{number, slowest, strategy(), record_screens()};
-  if (frames_->report()) frame.budget = to_record(*frames_->report());
-  frame.slowest = slowest_of(session_, *frames_, hosts_);
-  if (plan().verify_percent > 0.0) frame.verify = to_record({plan().verify_percent, frames_->verified()});
+  if (failure) {
+    frame.failed = failure->what();
+    for (ScreenRecord& screen : frame.screens) screen.state = ScreenState::Stale;
+  } else {
+    frames_->record_frame_time(slowest);
+    if (frames_->report()) frame.budget = to_record(*frames_->report());
+    frame.slowest = slowest_of(session_, *frames_, hosts_);
+  }
+  if (plan().verify_percent > 0.0) frame.verify = to_record({plan().verify_percent, verified_});
   frame.heads = heads_.report();
   for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor) {
     frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, monitor_pictures_[monitor], ScreenState::Fresh));
@@ -362,8 +395,9 @@ std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
   // Displays have not reported the latest frames yet.
   const std::uint64_t awaited = job_.link ? static_cast<std::uint64_t>(job_.link->in_flight) + 1 : 0;
-  if (!remote_ || last < first_frame_ + awaited) return std::vector<ScreenState>(owners_.size(), ScreenState::Fresh);
-  return remote_->outcome(last - awaited).screens;
+  if (remote_ && last >= first_frame_ + awaited) return remote_->outcome(last - awaited).screens;
+  std::vector<ScreenState> all(owners_.size(), failed_.in_a_row() > 0 ? ScreenState::Stale : ScreenState::Fresh);
+  return all;
 }
 
 std::string WallDriver::strategy() const {

@@ -79,6 +79,7 @@ struct FrameRecord {
   std::vector<ScreenRecord> monitors = {};
   std::optional<SlowestRecord> slowest = {};
   std::optional<VerifyRecord> verify = {};
+  std::string failed = {};  ///< why it could not be drawn, so that the screens kept their pictures; empty: it was
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
@@ -123,6 +124,9 @@ struct WallStatusRecord {
 
 /// One JSON document, schema hpr.wall-run/1; hashes are 16 hex digits, a NaN becomes null.
 [[nodiscard]] std::string to_json(const RunManifest& manifest);
+
+/// The numbers of the frames that failed, as those records say that an earlier job of a run left.
+[[nodiscard]] std::vector<std::uint64_t> failed_frames(std::span<const std::string> records);
 
 /// A manifest as a run left it: what another run, or a drawing, needs of it.
 struct ManifestFile {
