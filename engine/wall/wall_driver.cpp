@@ -372,7 +372,9 @@ void WallDriver::record(std::uint64_t number, const std::optional<Error>& failur
   } else {
     frames_->record_frame_time(slowest);
     if (frames_->report()) frame.budget = to_record(*frames_->report());
-    frame.slowest = slowest_of(session_, *frames_, hosts_);
+    const std::vector<RankWork> works = works_of(session_, *frames_);
+    frame.slowest = slowest_of(works, *frames_, hosts_);
+    warn_of_slow_ranks(works);
   }
   if (plan().verify_percent > 0.0) frame.verify = to_record({plan().verify_percent, verified_});
   frame.heads = heads_.report();
@@ -389,6 +391,14 @@ void WallDriver::record(std::uint64_t number, const std::optional<Error>& failur
     if (remote_ && session_.comm().rank() == 0) remote_->forget_before(manifest_.frames.front().frame);
   }
   manifest_.frames.push_back(std::move(frame));
+}
+
+void WallDriver::warn_of_slow_ranks(std::span<const RankWork> works) {
+  if (session_.rank() != 0) return;
+  for (const SlowRank& slow : slow_ranks_.add(works, session_.comm().seconds())) {
+    const std::string& host = hosts_[static_cast<std::size_t>(slow.rank)];
+    log::warning("{}", describe(slow, host, pass_name(*frames_, slow.pass)));
+  }
 }
 
 std::vector<ScreenState> WallDriver::states() const {

@@ -12,6 +12,7 @@
 #include "engine/session.h"
 #include "engine/wall/frame_retry.h"
 #include "engine/wall/run_control.h"
+#include "engine/wall/slow_ranks.h"
 #include "engine/wall/viewpoint.h"
 #include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_job.h"
@@ -86,6 +87,7 @@ class WallDriver {
   void show(std::uint64_t number);
   void make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress);
   void record(std::uint64_t number, const std::optional<Error>& failure);
+  void warn_of_slow_ranks(std::span<const RankWork> works);
   [[nodiscard]] std::vector<ScreenRecord> record_screens();
   [[nodiscard]] std::string strategy() const;
 
@@ -112,6 +114,7 @@ class WallDriver {
   FrameCost last_cost_;
   VerifyCounts verified_;  ///< in the last frame, all its attempts
   FailedFrames failed_;
+  SlowRankWatch slow_ranks_;           ///< on rank 0
   std::optional<RunJournal> journal_;  ///< on rank 0 of a job that is started again when it is lost
   std::uint64_t first_frame_ = 0;
   bool interrupted_ = false;
