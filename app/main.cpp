@@ -13,9 +13,12 @@
 #include <thread>
 
 #include "app/command.h"
+#include "app/launch/launcher.h"
+#include "app/launch/run_ranks.h"
 #include "app/results.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/signals.h"
 #include "engine/settings_table.h"
 #include "raster/gl_context.h"
 
@@ -46,6 +49,8 @@ void configure_log(Globals& globals) {
   const bool errors_only = globals.verbosity < 0 || (launched_rank() != 0 && globals.verbosity < 2);
   if (globals.verbosity < 0 && globals.progress == "auto") globals.progress = "none";
   log::configure(errors_only ? log::Level::Error : globals.verbosity == 0 ? log::Level::Info : log::Level::Debug, "");
+  // Of a job the launcher speaks; one that is not of this program passes signals to every rank.
+  if (!errors_only && launched_rank() == 0 && !launched_by_hpr()) announce_ends(stderr_is_terminal());
 }
 
 /// Checks --backend, also for commands that draw nothing. Windows are GLFW's, whatever draws their pictures.
@@ -70,6 +75,7 @@ ExitCode run(const std::vector<std::string>& arguments) {
   (void)globals.hang_limit();
   (void)globals.starter(1);
   settle_backend(globals, *command);
+  globals.force |= is_started_again();
   if (!inside_mpi_job() || (launched_rank() == 0 && !command->collective())) check_trace(globals);
   if (command->collective()) return command->run(globals);
   return launched_rank() == 0 ? traced_alone(globals, [&] { return command->run(globals); }) : ExitCode::Done;
@@ -98,6 +104,10 @@ int main(int argc, char** argv) {
                        "free some space, or see who closed the pipe");
     }
     return static_cast<int>(code);
+  } catch (const hpr::Interrupted& interrupted) {
+    std::fflush(nullptr);
+    (void)std::raise(interrupted.signal);  // as if it had not been caught
+    return 128 + interrupted.signal;
   } catch (const hpr::Error& error) {
     // An error that every rank of a job finds before MPI starts is printed once: rank 0's exit ends the others while
     // they wait.

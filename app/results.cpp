@@ -121,6 +121,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
             {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
             {"ranks", stats.ranks}};
   if (stats.budget) json["budget"] = budget_json(to_record(*stats.budget));
+  if (stats.verify) json["verify"] = verify_json(to_record(*stats.verify));
   write_file_atomically(path, json.dump(2) + "\n");
 }
 

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <new>
 
 #include "core/error.h"
 
@@ -20,6 +21,7 @@ std::string hex16(std::uint64_t hash) {
 }
 
 ContentHash::ContentHash() : state_(XXH64_createState()) {
+  if (state_ == nullptr) throw std::bad_alloc();
   XXH64_reset(static_cast<XXH64_state_t*>(state_.get()), 0);
 }
 

@@ -9,11 +9,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <ctime>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "core/error.h"
+#include "core/job_environment.h"
 #include "core/text.h"
 
 namespace hpr {
@@ -35,9 +37,13 @@ class Descriptor {
   int fd_;
 };
 
+ExitCode code_of(int error) {
+  return error == ENOMEM ? ExitCode::Limit : ExitCode::Io;
+}
+
 [[noreturn]] void fail(std::string_view doing, const std::filesystem::path& path, int error) {
   const std::string reason = std::generic_category().message(error);
-  throw Error(ExitCode::Io, fmt::format("{} '{}': {}", doing, printable(path.string(), 300), reason),
+  throw Error(code_of(error), fmt::format("{} '{}': {}", doing, printable(path.string(), 300), reason),
               file_error_hint(error));
 }
 
@@ -57,27 +63,12 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
-/// Where a write to `path` ends up: a rename would replace a symbolic link, not what it points at. Refuses what a
-/// rename must not replace: folders, and devices and pipes (a run as root would turn /dev/null into a file).
-std::filesystem::path target_of(const std::filesystem::path& path) {
-  if (!path.has_filename()) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it names no file", path.string()), "name a file");
-  }
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (std::filesystem::is_directory(status)) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
-  }
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw Error(ExitCode::Io, fmt::format("cannot write '{}': not a regular file", path.string()),
-                "name a file, not a pipe or device");
-  }
-  std::filesystem::path target = path;
-  // Ends: status() above has followed the same links, and a loop of them is an error there and at the write.
-  for (int links = 0; links < 40 && std::filesystem::is_symlink(target, error); ++links) {
-    target = folder_of(target) / std::filesystem::read_symlink(target, error);
-  }
-  return target;
+constexpr std::string_view kPartPrefix = ".hpr-";
+constexpr std::string_view kPartSuffix = ".part";
+
+/// Of this host: locks may not reach others.
+std::string part_prefix() {
+  return fmt::format("{}{:.64}-", kPartPrefix, host_name());
 }
 
 /// Calls `make` with one name after the other in `folder` until it does not fail for the name being taken; returns what
@@ -87,7 +78,7 @@ int with_temporary_name(const std::filesystem::path& folder, std::string& name, 
   constexpr int kTries = 10000;  // each one is a file that a killed run left behind
   int result = -1;
   for (int i = 0; i < kTries; ++i) {
-    name = (folder / fmt::format(".hpr-{}-{}.part", ::getpid(), i)).string();
+    name = (folder / fmt::format("{}{}-{}{}", part_prefix(), ::getpid(), i, kPartSuffix)).string();
     result = make(name.c_str());
     if (result >= 0 || errno != EEXIST) break;
   }
@@ -105,6 +96,11 @@ int create_unnamed(const std::filesystem::path& folder) {
   if (file < 0 || ::access(link_of(file).c_str(), F_OK) == 0) return file;
   ::close(file);
   return -1;
+}
+
+int create_named(const std::filesystem::path& folder, std::string& name) {
+  return with_temporary_name(
+      folder, name, [](const char* path) { return ::open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
 }
 
 constexpr const char* kTemporaryVariable = "TMPDIR";
@@ -190,13 +186,33 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_
   return bytes;
 }
 
-AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(target_of(path_)) {
+std::filesystem::path written_file(const std::filesystem::path& path) {
+  if (!path.has_filename()) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it names no file", path.string()), "name a file");
+  }
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (std::filesystem::is_directory(status)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': it is a folder", path.string()), "name a file");
+  }
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw Error(ExitCode::Io, fmt::format("cannot write '{}': not a regular file", path.string()),
+                "name a file, not a pipe or device");
+  }
+  // A rename would replace a symbolic link, not what it points at.
+  std::filesystem::path target = path;
+  // Ends: status() above has followed the same links, and a loop of them is an error there and at the write.
+  for (int links = 0; links < 40 && std::filesystem::is_symlink(target, error); ++links) {
+    target = folder_of(target) / std::filesystem::read_symlink(target, error);
+  }
+  return target;
+}
+
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(written_file(path_)) {
   descriptor_ = create_unnamed(folder_of(target_));
-  if (descriptor_ >= 0) return;
-  descriptor_ = with_temporary_name(folder_of(target_), temporary_, [](const char* name) {
-    return ::open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  });
+  if (descriptor_ < 0) descriptor_ = create_named(folder_of(target_), temporary_);
   if (descriptor_ < 0) fail("cannot write", path_, errno);
+  (void)::flock(descriptor_, LOCK_EX | LOCK_NB);  // nobody takes it for abandoned
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
@@ -210,9 +226,9 @@ AtomicFile::~AtomicFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-void AtomicFile::commit() {
+void AtomicFile::commit(Sync sync, const std::filesystem::path& former) {
   HPR_CHECK(descriptor_ >= 0);
-  if (::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
+  if (sync == Sync::Disk && ::fsync(descriptor_) != 0) fail("cannot write", path_, errno);
   if (temporary_.empty()) {  // a link replaces nothing, so what is there is replaced by a rename
     const int linked = with_temporary_name(folder_of(target_), temporary_, [&](const char* name) {
       return ::linkat(AT_FDCWD, link_of(descriptor_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW);
@@ -223,26 +239,56 @@ void AtomicFile::commit() {
       fail("cannot write", path_, error);
     }
   }
+  const Descriptor locked(::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0));  // until the name is the final one
   if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write", path_, errno);
+  if (!former.empty() && ::rename(target_.c_str(), former.c_str()) != 0 && errno != ENOENT) {
+    fail("cannot replace", former, errno);
+  }
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot write", path_, errno);
   temporary_.clear();
+  if (sync == Sync::None) return;
   // The rename itself is on disk only once the folder is synced; some file systems refuse that, and lose nothing by it.
   const Descriptor folder(::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.get() >= 0) ::fsync(folder.get());
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                           const std::filesystem::path& former) {
   AtomicFile file(path);
   write_all(file.descriptor(), bytes, path);
-  file.commit();
+  file.commit(AtomicFile::Sync::Disk, former);
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
-  write_file_atomically(path, std::as_bytes(std::span(text)));
+void write_file_atomically(const std::filesystem::path& path, std::string_view text, AtomicFile::Sync sync) {
+  AtomicFile file(path);
+  write_all(file.descriptor(), std::as_bytes(std::span(text)), path);
+  file.commit(sync);
+}
+
+namespace {
+
+bool is_abandoned(const std::filesystem::path& path) {
+  constexpr std::time_t kYoungSeconds = 60;
+  const Descriptor file(::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat info {};
+  if (file.get() < 0 || ::fstat(file.get(), &info) != 0) return false;
+  return S_ISREG(info.st_mode) && info.st_uid == ::geteuid() && info.st_mtime + kYoungSeconds < std::time(nullptr) &&
+         ::flock(file.get(), LOCK_EX | LOCK_NB) == 0;
+}
+
+}  // namespace
+
+void remove_abandoned_files(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(part_prefix()) || !name.ends_with(kPartSuffix)) continue;
+    if (is_abandoned(entry->path())) ::unlink(entry->path().c_str());
+  }
 }
 
 void check_writable(const std::filesystem::path& path, bool overwrite) {
-  const std::filesystem::path folder = folder_of(target_of(path));
+  const std::filesystem::path folder = folder_of(written_file(path));
   std::error_code error;
   if (!overwrite && std::filesystem::exists(path, error)) {
     throw Error(ExitCode::Io, fmt::format("'{}' exists", printable(path.string(), 300)),
@@ -255,22 +301,23 @@ void check_writable(const std::filesystem::path& path, bool overwrite) {
                 "create the folder first");
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) fail("cannot write", path, errno);
+  remove_abandoned_files(folder);
 }
 
 void check_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::path there = std::filesystem::absolute(folder, error).lexically_normal();
+  int problem = error.value();
   while (there.has_relative_path() && !std::filesystem::exists(std::filesystem::symlink_status(there, error))) {
     there = there.parent_path();
   }
-  int problem = 0;
-  if (!std::filesystem::is_directory(there, error)) {
+  if (problem == 0 && !std::filesystem::is_directory(there, error)) {
     problem = ENOTDIR;
-  } else if (::access(there.c_str(), W_OK | X_OK) != 0) {
+  } else if (problem == 0 && ::access(there.c_str(), W_OK | X_OK) != 0) {
     problem = errno;
   }
   if (problem == 0) return;
-  throw Error(ExitCode::Io,
+  throw Error(code_of(problem),
               fmt::format("cannot make the folder '{}': {}", printable(folder.string(), 300),
                           std::generic_category().message(problem)),
               "name a folder that can be written with -o");
@@ -280,7 +327,10 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
     : folder_(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (folder_ < 0 && errno == EACCES) return;  // it may still be written to
   if (folder_ < 0) fail("cannot open", folder, errno);
-  if (::flock(folder_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  if (::flock(folder_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) {
+    remove_abandoned_files(folder.empty() ? "." : folder);
+    return;
+  }
   ::close(folder_);
   throw Error(ExitCode::Io, fmt::format("another run writes into '{}'", printable(folder.string(), 300)),
               "wait for it, or name another folder with -o");
@@ -318,31 +368,16 @@ TemporaryFile::TemporaryFile() : descriptor_(create_in(temporary_folder())) {
   path_ = fmt::format("/proc/{}/fd/{}", ::getpid(), descriptor_);
 }
 
-namespace {
-
-constexpr std::string_view kTemporaryName = ".hpr-temporary-";
-
-/// Removes those that nobody holds: whoever made them was killed.
-void remove_abandoned(const std::filesystem::path& folder) {
+TemporaryFile::TemporaryFile(const std::filesystem::path& folder) : has_name_(true) {
+  remove_abandoned_files(folder.empty() ? "." : folder);
   std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (!entry->path().filename().string().starts_with(kTemporaryName)) continue;
-    const Descriptor file(::open(entry->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
-    if (file.get() >= 0 && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
-  }
-}
-
-}  // namespace
-
-TemporaryFile::TemporaryFile(const std::filesystem::path& folder) {
-  const std::filesystem::path there = folder.empty() ? "." : folder;
-  remove_abandoned(there);
-  std::string name = std::filesystem::absolute(there / kTemporaryName).string() + "XXXXXX";
-  descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+  std::string name;
+  descriptor_ =
+      with_temporary_name(std::filesystem::absolute(folder.empty() ? "." : folder, error), name,
+                          [](const char* path) { return ::open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600); });
   if (descriptor_ < 0) fail("cannot write", name, errno);
   ::flock(descriptor_, LOCK_EX | LOCK_NB);
   path_ = name;
-  has_name_ = true;
 }
 
 TemporaryFile::~TemporaryFile() {

@@ -20,6 +20,10 @@ namespace hpr {
 /// `text` less the byte order mark that some editors and spreadsheets put before UTF-8.
 [[nodiscard]] std::string_view without_mark(std::string_view text);
 
+/// The file that a write to `path` makes or replaces: where symbolic links lead. Throws Error (Io) for what no write
+/// replaces: folders, pipes and devices.
+[[nodiscard]] std::filesystem::path written_file(const std::filesystem::path& path);
+
 /// A file that is written piece by piece: `path` is either complete or untouched, also when the disk fills or the
 /// process dies. A symbolic link stays, what it points at is replaced.
 class AtomicFile {
@@ -37,8 +41,11 @@ class AtomicFile {
   /// What is to be written to.
   [[nodiscard]] int descriptor() const { return descriptor_; }
 
-  /// Once, when all is written: syncs and closes it, gives it its name, syncs the folder. Throws Error (Io).
-  void commit();
+  enum class Sync { Disk, None };
+  /// Once, when all is written: syncs and closes it, gives it its name, syncs the folder. Throws Error (Io). Without
+  /// syncs it survives the process, and maybe not the machine.
+  /// `former`: what had the name gets that one first, in the same file system; empty: it is replaced.
+  void commit(Sync sync = Sync::Disk, const std::filesystem::path& former = {});
 
  private:
   std::filesystem::path path_;    ///< for errors
@@ -47,12 +54,19 @@ class AtomicFile {
   int descriptor_ = -1;
 };
 
-/// Writes `bytes` so that `path` is either complete or untouched, as an AtomicFile. Throws Error (Io).
-void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
-void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+/// Writes `bytes` so that `path` is either complete or untouched, as an AtomicFile. With `former` it may be missing
+/// instead, while what it was stands there. Throws Error (Io).
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                           const std::filesystem::path& former = {});
+void write_file_atomically(const std::filesystem::path& path, std::string_view text,
+                           AtomicFile::Sync sync = AtomicFile::Sync::Disk);
+
+/// Removes what processes of this user that were killed while they wrote files left in `folder`: an AtomicFile that has
+/// a name of its own holds a lock. Nothing younger than a minute, which may have none yet.
+void remove_abandoned_files(const std::filesystem::path& folder);
 
 /// Throws Error (Io) when `path` exists and may not be overwritten, is no regular file, or its folder is missing or not
-/// writable: asked before long work.
+/// writable: asked before long work. Removes abandoned files from that folder.
 void check_writable(const std::filesystem::path& path, bool overwrite);
 
 /// Throws Error (Io) when `folder` is there and no folder that can be written to, or is not there and cannot be made:
@@ -60,7 +74,7 @@ void check_writable(const std::filesystem::path& path, bool overwrite);
 void check_folder(const std::filesystem::path& folder);
 
 /// Keeps other processes of this host from writing their results into a folder, if they call this too.
-/// Where it cannot be locked it keeps nobody.
+/// Where it cannot be locked it keeps nobody. Removes abandoned files from the folder.
 class FolderLock {
  public:
   /// Throws Error (Io) when another process holds it, or there is no such folder.
@@ -96,7 +110,7 @@ class TemporaryFile {
   /// folder, and the variable where that says which.
   TemporaryFile();
   /// In `folder`, with a name by which other hosts find it too: gone with this object, or, where this process is
-  /// killed, when the next one is made there. Throws Error (Io).
+  /// killed, with remove_abandoned_files(). Throws Error (Io).
   explicit TemporaryFile(const std::filesystem::path& folder);
   ~TemporaryFile();
   TemporaryFile(TemporaryFile&& other) noexcept;

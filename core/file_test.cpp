@@ -2,12 +2,14 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -16,6 +18,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/job_environment.h"
 
 namespace hpr {
 namespace {
@@ -103,6 +106,19 @@ TEST_F(FileTest, AWriteThatFailsLeavesTheOldFileAndNothingElse) {
     EXPECT_EQ(code_of([&] { write_file_atomically(path("b"), std::string(5000, 'x')); }), ExitCode::Io);
   }
   EXPECT_EQ(text_of(path("a")), "old");
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FileTest, AFileThatIsNotSyncedIsWholeOrUntouchedAsWell) {
+  write_file_atomically(path("a"), "old", AtomicFile::Sync::None);
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_EQ(code_of([&] { write_file_atomically(path("a"), std::string(5000, 'x'), AtomicFile::Sync::None); }),
+              ExitCode::Io);
+  }
+  EXPECT_EQ(text_of(path("a")), "old");
+  write_file_atomically(path("a"), "new", AtomicFile::Sync::None);
+  EXPECT_EQ(text_of(path("a")), "new");
   EXPECT_EQ(files(), 1U);
 }
 
@@ -265,6 +281,35 @@ std::string refusal() {
     return error.what();
   }
   return {};
+}
+
+TEST_F(FileTest, WhatKilledWritersLeftIsRemovedAndNothingElse) {
+  const fs::path left = path(".hpr-" + host_name() + "-1-0.part");
+  const fs::path held = path(".hpr-" + host_name() + "-1-1.part");
+  const fs::path other = path(".hpr-" + host_name() + "er-1-0.part");
+  const fs::path young = path(".hpr-" + host_name() + "-1-2.part");
+  for (const fs::path& each : {left, held, other, young}) std::ofstream(each) << "half";
+  for (const fs::path& each : {left, held, other}) {
+    fs::last_write_time(each, fs::file_time_type::clock::now() - std::chrono::minutes(5));
+  }
+  const int lock = ::open(held.c_str(), O_RDONLY | O_CLOEXEC);
+  ASSERT_EQ(::flock(lock, LOCK_EX | LOCK_NB), 0);
+  check_writable(path("result"), false);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_TRUE(fs::exists(held));
+  EXPECT_TRUE(fs::exists(other));
+  EXPECT_TRUE(fs::exists(young));
+  ::close(lock);
+  { const FolderLock folder(folder_); }
+  EXPECT_FALSE(fs::exists(held));
+}
+
+TEST_F(FileTest, AFileThatIsBeingWrittenIsLocked) {
+  const AtomicFile file(path("a"));
+  const int again = ::open(("/proc/self/fd/" + std::to_string(file.descriptor())).c_str(), O_WRONLY | O_CLOEXEC);
+  ASSERT_GE(again, 0);
+  EXPECT_NE(::flock(again, LOCK_EX | LOCK_NB), 0);
+  ::close(again);
 }
 
 TEST(TemporaryFile, HasNoNameAndGoesWithItsOwner) {

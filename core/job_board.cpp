@@ -21,8 +21,11 @@ namespace {
 
 using Text = std::array<char, 64>;
 
+constexpr std::uint64_t kMagic = 0x3164'7262'7270'6800;
+
 /// Two processes see it. Each field is read for itself: a report may be half an older one.
 struct alignas(64) Slot {
+  std::uint64_t magic = kMagic;  ///< first
   Text host{};
   Text phase{};
   std::atomic<std::int64_t> frame = -1;
@@ -103,8 +106,11 @@ void join_job_board(int rank) {
   if (memory < 0) return;
   const auto bytes = static_cast<std::size_t>(std::max<off_t>(::lseek(memory, 0, SEEK_END), 0));
   const auto slot = static_cast<std::size_t>(rank);
-  void* const mapped =
-      slot < bytes / sizeof(Slot) ? ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, memory, 0) : MAP_FAILED;
+  // Hosts may have one name, and processes of theirs one number: then it is anything.
+  std::uint64_t magic = 0;
+  const bool is_board = slot < bytes / sizeof(Slot) && ::fcntl(memory, F_GET_SEALS) >= 0 &&
+                        ::pread(memory, &magic, sizeof magic, 0) == sizeof magic && magic == kMagic;
+  void* const mapped = is_board ? ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, memory, 0) : MAP_FAILED;
   ::close(memory);
   if (mapped == MAP_FAILED) return;
   Slot& joined = static_cast<Slot*>(mapped)[slot];  // stays mapped: reports come to the end

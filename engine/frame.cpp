@@ -6,6 +6,7 @@
 #include "core/timing.h"
 #include "engine/session.h"
 #include "engine/tile_ownership.h"
+#include "engine/verification.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
 #include "rt/trace/primary_rays.h"
@@ -158,6 +159,13 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
 
 }  // namespace
 
+VerifyCounts& VerifyCounts::operator+=(const VerifyCounts& other) {
+  tiles += other.tiles;
+  mismatches += other.mismatches;
+  unmended += other.unmended;
+  return *this;
+}
+
 FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   primary_ms += other.primary_ms;
   primary += other.primary;
@@ -168,6 +176,7 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
     for (std::size_t i = 0; i < other.passes.size(); ++i) passes.at(i).ms += other.passes[i].ms;
   }
   rays += other.rays;
+  verified += other.verified;
   samples += other.samples;
   return *this;
 }
@@ -204,6 +213,10 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   spent.composite_ms = watch.ms();
 
   shade(session, plan, views, sample, frame, spent);
+  if (plan.verify_percent > 0.0) {
+    const JitteredViews drawn{{views.begin(), views.end()}, sample};
+    spent.verified = verify(session, plan, std::span(&drawn, 1), std::span(&frame, 1));
+  }
   spent.samples = 1;
   if (times != nullptr) *times = spent;
   return frame;
@@ -245,6 +258,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
   DeferredShader& shader = session.shader(plan.rays);
   shader.shade(samples, frames.front().owned);
   add_light(shader, times);
+  if (plan.verify_percent > 0.0) times.verified = verify(session, plan, jittered, frames);
   times.samples = static_cast<int>(jittered.size());
   return frames;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -26,6 +27,16 @@ struct Frame {
   AovLayers aovs;                  ///< of owned tiles
 };
 
+/// What verifying some of a frame's tiles found; the same on all ranks.
+struct VerifyCounts {
+  std::uint64_t tiles = 0;       ///< drawn again, counted once a sample
+  std::uint64_t mismatches = 0;  ///< whose second drawing differed, in any of the samples drawn together
+  std::uint64_t unmended = 0;    ///< of these, those of which a third drawing agreed with neither
+
+  VerifyCounts& operator+=(const VerifyCounts& other);
+  bool operator==(const VerifyCounts&) const = default;
+};
+
 /// Times and ray counts of a frame on this rank; summed over its samples.
 struct FrameTimes {
   double primary_ms = 0.0;  ///< the keys, drawn or traced
@@ -33,6 +44,7 @@ struct FrameTimes {
   double composite_ms = 0.0;
   std::vector<PassTime> passes;  ///< summed over threads
   RayCounts rays;
+  VerifyCounts verified;
   int samples = 0;
 
   FrameTimes& operator+=(const FrameTimes& other);

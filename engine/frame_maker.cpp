@@ -9,7 +9,7 @@
 #include "cluster/transport/collectives.h"
 #include "core/progress.h"
 #include "engine/budget.h"
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
@@ -78,17 +78,27 @@ std::uint32_t FrameMaker::max_samples() const {
 void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
   const bool same_plan = plan_.layout.tiles() > 0 && effort.degradations == effort_.degradations &&
                          effort.scale_step == effort_.scale_step;
-  effort_ = effort;
   const double scale = settings_.resolution_scale * scale_of_step(effort.scale_step);
   blocks_ = cut_blocks(at_resolution(screens, scale));
   if (same_plan) return;
   sampler_.reset();  // it holds on to the plan
   const auto count = static_cast<std::size_t>(effort.degradations);
   plan_ = plan_frame(session_, apply_degradations(settings_, std::span(degradations_).first(count)), blocks_.views);
+  effort_ = effort;
+}
+
+void FrameMaker::discard() {
+  refining_ = false;
 }
 
 bool FrameMaker::is_resting(std::span<const View> screens) const {
   return std::ranges::equal(screens, last_screens_, same_projection);
+}
+
+VerifyCounts FrameMaker::verified() const {
+  const VerifyCounts& all = times_.verified;
+  const VerifyCounts& before = times_before_.verified;
+  return {all.tiles - before.tiles, all.mismatches - before.mismatches, all.unmended - before.unmended};
 }
 
 bool FrameMaker::refined(std::span<const View> screens) const {

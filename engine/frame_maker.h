@@ -38,6 +38,9 @@ class FrameMaker {
   /// Collective. Records the time of the slowest rank for the last frame, equal on all ranks; the budget follows it.
   void record_frame_time(double slowest_ms);
 
+  /// After a frame that failed: what was refined so far is not trusted, and made anew.
+  void discard();
+
   /// Whether the same screens once more would give the last frame again: it was refined as far as it is to be.
   [[nodiscard]] bool refined(std::span<const View> screens) const;
 
@@ -47,6 +50,8 @@ class FrameMaker {
   [[nodiscard]] const FrameTimes& times() const { return times_; }
   /// The part of times() that earlier frames of a refined picture took.
   [[nodiscard]] const FrameTimes& times_before() const { return times_before_; }
+  /// What verifying the last frame found; of a refined picture, in the samples that this frame added.
+  [[nodiscard]] VerifyCounts verified() const;
   [[nodiscard]] std::optional<double> relmse() const { return relmse_; }
   /// The degradations of the last frame; none without a target.
   [[nodiscard]] const std::optional<BudgetReport>& report() const { return report_; }

@@ -3,20 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
+#include <chrono>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "cluster/transport/collectives.h"
 #include "compositing/assembly.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/signals.h"
 #include "core/timing.h"
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
 #include "engine/session.h"
 
 namespace hpr {
@@ -26,6 +26,7 @@ namespace {
 struct RankState {
   Request request = Request::None;
   double seconds = 0.0;  ///< rank 0's clock is everybody's
+  bool due = false;      ///< a checkpoint, by rank 0's clock
 };
 
 RankState agree(Communicator& comm, const RankState& mine) {
@@ -40,6 +41,11 @@ std::string describe(const SampleGoal& goal, const SampleProgress& progress) {
   if (progress.relmse) text += fmt::format(", relMSE about {:.2g}", *progress.relmse);
   if (const auto left = remaining_seconds(goal, progress)) text += fmt::format(", {:.0f} s left", *left);
   return text;
+}
+
+bool is_due(const CheckpointSettings& checkpoint, const Stopwatch& written) {
+  if (checkpoint.path.empty() || checkpoint.every <= std::chrono::nanoseconds::zero()) return false;
+  return std::chrono::duration<double, std::milli>(written.ms()) >= checkpoint.every;
 }
 
 }  // namespace
@@ -68,8 +74,7 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
   };
   Start start;
   check_on_root(session_.comm(), [&] {
-    const auto bytes = read_file(checkpoint.path, std::numeric_limits<std::uint64_t>::max());
-    const SampleProgress found = decode_checkpoint(bytes, checkpoint.path.string(), checkpoint.identity(), film_);
+    const SampleProgress found = checkpoint_file_->read(checkpoint.identity(), film_);
     start = {film_.counters(), found.samples, found.budget, found.seconds, found.relmse.value_or(-1.0)};
     if (checkpoint.takes_more || found.samples <= sampling_.goal.samples.value_or(found.samples)) return;
     throw Error(ExitCode::BadInput,
@@ -87,27 +92,33 @@ void FrameSampler::load(const CheckpointSettings& checkpoint) {
   if (session_.rank() == 0) log::info("going on after {} samples", progress_.samples);
 }
 
-void FrameSampler::write(const CheckpointSettings& checkpoint) {
+void FrameSampler::write(const CheckpointSettings& checkpoint, bool asked_for) {
   const std::vector<int> to_root(plan_.layout.screens(), 0);
   film_.each_layer([&](auto& layer) {
     if (layer.tiles() > 0) session_.assembler().assemble(session_.comm(), layer, ownership_->mine(), to_root);
   });
   agree_on_failure(session_.comm(), [&] {
     if (session_.rank() != 0) return;
-    write_file_atomically(checkpoint.path, encode_checkpoint(checkpoint.identity(), film_, progress_));
+    checkpoint_file_->write(checkpoint.identity(), film_, progress_, asked_for);
   });
 }
 
-bool FrameSampler::try_to_write(const CheckpointSettings& checkpoint) {
+bool FrameSampler::try_to_write(const CheckpointSettings& checkpoint, bool asked_for) {
   try {
-    write(checkpoint);
+    write(checkpoint, asked_for);
   } catch (const Error& error) {
     // On every rank alike. Samples that cannot be written are not to be lost as well.
     if (session_.rank() == 0) log::error("{}: going on without a checkpoint; {}", error.what(), error.hint());
     return false;
   }
-  if (session_.rank() == 0) log::info("{} samples are in '{}'", progress_.samples, checkpoint.path.string());
+  if (session_.rank() != 0) return true;
+  const std::string text = fmt::format("{} samples are in '{}'", progress_.samples, checkpoint.path.string());
+  log::write(asked_for ? log::Level::Info : log::Level::Debug, text);
   return true;
+}
+
+void FrameSampler::remove_unasked_checkpoints() {
+  if (checkpoint_file_) checkpoint_file_->remove_unasked();
 }
 
 JitteredViews FrameSampler::jittered_views(std::span<const View> views, std::uint32_t number, double& weight) {
@@ -212,25 +223,29 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
     progress_.samples = 1;
     return true;
   }
+  checkpoint_file_.emplace(checkpoint.path, checkpoint.keeps_previous);
   if (checkpoint.resume) load(checkpoint);
   const double before = progress_.seconds;
   const Stopwatch watch;
-  std::optional<Stopwatch> written;
+  std::optional<Stopwatch> requested;
+  Stopwatch written;
   while (!reached(sampling_, progress_)) {
     add_samples(views, size_of_round());
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.
-    if (request == Request::Write && written && written->ms() < 1000.0) request = Request::None;
-    const RankState agreed = agree(session_.comm(), {request, before + 1e-3 * watch.ms()});
+    if (request == Request::Write && requested && requested->ms() < 1000.0) request = Request::None;
+    const RankState agreed = agree(session_.comm(), {request, before + 1e-3 * watch.ms(), is_due(checkpoint, written)});
     report_progress(agreed.seconds);
     progress.show(progress_.samples, describe(sampling_.goal, progress_));
-    if (agreed.request == Request::None || reached(sampling_, progress_)) continue;
-    progress.end();
-    if (try_to_write(checkpoint) && agreed.request == Request::Stop) return false;
-    written.emplace();
+    const bool asked_for = agreed.request != Request::None;
+    if (!(asked_for || agreed.due) || reached(sampling_, progress_)) continue;
+    if (asked_for) progress.end();
+    if (try_to_write(checkpoint, asked_for) && agreed.request == Request::Stop) return false;
+    if (asked_for) requested.emplace();
+    written.restart();
   }
-  if (checkpoint.at_end && ownership_) write(checkpoint);
+  if (checkpoint.at_end && ownership_) write(checkpoint, true);
   finish();
   return true;
 }
@@ -240,7 +255,7 @@ void FrameSampler::refine(std::span<const View> views) {
     const Stopwatch watch;
     add_samples(views, 1);
     const double seconds = progress_.seconds + 1e-3 * watch.ms();
-    report_progress(agree(session_.comm(), {Request::None, seconds}).seconds);
+    report_progress(agree(session_.comm(), {Request::None, seconds, false}).seconds);
   }
   finish();
 }
@@ -248,6 +263,11 @@ void FrameSampler::refine(std::span<const View> views) {
 void FrameSampler::finish() {
   if (!ownership_) {  // a checkpoint that had reached the goal: rank 0 has it all
     ownership_.emplace(session_.comm(), plan_.layout, tiles());
+  }
+  const auto [even, odd] = film_.counters().weights;
+  if (even + odd == 0.0) {  // which no filter's are, but those a checkpoint claims may be; the same on all ranks
+    throw Error(ExitCode::BadInput, "the weights of the samples add up to 0: the checkpoint is not one of a run",
+                "start anew, without --resume");
   }
   frame_.owned = ownership_->mine();
   frame_.radiance = TileLayer<Rgb>(plan_.layout);

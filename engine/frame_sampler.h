@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/checkpoint/checkpoint_file.h"
 #include "engine/film.h"
 #include "engine/frame.h"
 #include "engine/samples.h"
@@ -25,9 +26,12 @@ class FrameSampler {
   FrameSampler(Session& session, const FramePlan& plan, const Sampling& sampling, std::uint64_t frame, bool keeps_keys);
 
   /// Collective. views[i] is screen i of the plan's layout. Between samples all ranks exchange received signals (see
-  /// Request). False when it stopped before its goal: then a checkpoint was written. Throws Error as decode_checkpoint
-  /// does, and Io.
+  /// Request) and rank 0's clock, which says when a checkpoint is due. False when it stopped before its goal: then a
+  /// checkpoint was written. Throws Error as CheckpointFile does.
   [[nodiscard]] bool draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress);
+
+  /// After draw(), on rank 0, once what became of its frame is written: removes checkpoints nobody asked for.
+  void remove_unasked_checkpoints();
 
   /// Collective. Draws one more sample unless the goal is reached; frame() is the means of those so far. Signals wait.
   void refine(std::span<const View> views);
@@ -40,9 +44,9 @@ class FrameSampler {
 
  private:
   void load(const CheckpointSettings& checkpoint);
-  void write(const CheckpointSettings& checkpoint);
-  /// Writes a checkpoint; false, with a warning, where it cannot.
-  bool try_to_write(const CheckpointSettings& checkpoint);
+  void write(const CheckpointSettings& checkpoint, bool asked_for);
+  /// Writes a checkpoint; false, with an error's lines, where it cannot.
+  bool try_to_write(const CheckpointSettings& checkpoint, bool asked_for);
   /// Draws `count` samples together, at most size_of_round().
   void add_samples(std::span<const View> views, std::uint32_t count);
   /// How many samples to draw together.
@@ -69,6 +73,7 @@ class FrameSampler {
   std::uint32_t resumed_ = 0;  ///< samples that came from a checkpoint
   bool scattered_ = true;      ///< false: rank 0 alone has the sums of a checkpoint
   std::optional<TileOwnership> ownership_;
+  std::optional<CheckpointFile> checkpoint_file_;
   SampleProgress progress_;
   Frame frame_;
   FrameTimes times_;

@@ -41,6 +41,7 @@ struct FrameSettings {
   bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
   bool photons_fit_frame = false;   ///< no more photons a sample than the frame has pixels
   double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged
+  double verify_percent = 0.0;      ///< of the tiles that are drawn again and compared; see engine/verification.h
   std::vector<Aov> aovs;            ///< with deferred shading only
 };
 

@@ -111,6 +111,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
     log::warning("{} samples of pixels had no finite radiance and are black, the first in pixel {},{} of screen {}",
                  stats.rays.not_finite, first.x, first.y, first.screen);
   }
+  if (plan.verify_percent > 0.0) stats.verify = {plan.verify_percent, times.verified};
   stats.samples = times.samples;
   stats.samples_in_all = times.samples;
   for (const std::size_t sent : all_gather_value(comm, cost.bytes_sent)) stats.bytes_sent += sent;

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "engine/aov.h"
 #include "engine/budget.h"
+#include "engine/frame.h"
 #include "image/color.h"
 #include "image/image.h"
 #include "image/tiles.h"
@@ -21,9 +22,7 @@ namespace hpr {
 
 class Session;
 struct ExrLayer;
-struct Frame;
 struct FramePlan;
-struct FrameTimes;
 
 /// Screens cut into the blocks that are rasterised at once; most screens are one block.
 struct Blocks {
@@ -47,6 +46,12 @@ template <typename Pixel>
   return image;
 }
 
+/// What verifying a frame found, and how much of it was verified.
+struct VerifyReport {
+  double percent = 0.0;  ///< of the tiles
+  VerifyCounts counts;
+};
+
 /// Times and counts of a run of frames, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {
   double ms = 0.0;                     ///< one frame, all its samples, slowest rank
@@ -54,6 +59,7 @@ struct RunStats {
   int samples_in_all = 1;              ///< of the picture: with those of a checkpoint
   std::optional<double> relmse;        ///< of a frame of several samples, estimated from their halves
   std::optional<BudgetReport> budget;  ///< of a frame with a target time
+  std::optional<VerifyReport> verify;  ///< of a frame some of whose tiles were verified
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
@@ -74,9 +80,11 @@ struct FrameCost {
 [[nodiscard]] RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times,
                                     const FrameCost& cost);
 
-/// The exit code of a finished run: `strict` makes pixels without finite radiance a failed check.
+/// The exit code of a finished run: a tile whose drawings all differ is a failed check, and `strict` makes pixels
+/// without finite radiance one.
 [[nodiscard]] inline ExitCode verdict(const RunStats& stats, bool strict) {
-  return strict && stats.rays.not_finite > 0 ? ExitCode::CheckFailed : ExitCode::Done;
+  const bool is_unmended = stats.verify && stats.verify->counts.unmended > 0;
+  return is_unmended || (strict && stats.rays.not_finite > 0) ? ExitCode::CheckFailed : ExitCode::Done;
 }
 
 /// The views of `screens` with round(`scale` times) their pixels, at least one a side: for frames that are made smaller

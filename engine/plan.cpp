@@ -311,6 +311,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.rays = settings.rays;
   if (settings.photons_fit_frame) plan.rays.photons = photons_for(plan.rays.photons, views);
   plan.aovs = settings.aovs;
+  plan.verify_percent = settings.verify_percent;
   plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
                                plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
   if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
@@ -333,6 +334,10 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
+  if (plan.verify_percent > 0.0) {
+    plan.explained.push_back(fmt::format("verify: {} % of the tiles, drawn again by {} (as asked)", plan.verify_percent,
+                                         ranks > 1 ? "another rank" : "the same rank, as there is one"));
+  }
   return plan;
 }
 

@@ -26,7 +26,8 @@ struct FramePlan {
   Shading shading = Shading::Deferred;
   RaySettings rays;
   std::vector<Aov> aovs;
-  bool lit = true;  ///< false: only the keys are wanted, no light is spent on them
+  double verify_percent = 0.0;  ///< of the tiles; see engine/verification.h
+  bool lit = true;              ///< false: only the keys are wanted, no light is spent on them
   FrameLayout layout;
   Assignment mine;                     ///< this rank's part
   std::vector<std::size_t> tiles;      ///< of this rank's group, ascending

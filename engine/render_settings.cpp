@@ -82,6 +82,21 @@ void check_camera(const CameraChoice& camera) {
   if (camera.up && !camera.eye) throw Error(ExitCode::Usage, "--up requires --eye", "cameras of scenes have their own");
 }
 
+void check_verify(const FrameSettings& frame) {
+  if (frame.verify_percent == 0.0) return;
+  if (frame.shading == Shading::Local || frame.partitioned) {
+    throw Error(
+        ExitCode::Usage,
+        "--verify has a tile drawn whole by another rank, which --shading local and --data partitioned leave to "
+        "many",
+        "use it with --shading deferred and --data replicated");
+  }
+  if (!frame.rays.build.same_instructions) {
+    throw Error(ExitCode::Usage, "--verify compares bits, which --deterministic off lets differ between machines",
+                "use one of them");
+  }
+}
+
 /// What of the settings excludes each other.
 void check_combination(const RenderSettings& settings) {
   const FrameSettings& frame = settings.frame;
@@ -146,6 +161,7 @@ RenderSettings resolve(RenderSettings settings, std::uint64_t seed) {
   if (rays.denoise && settings.sampling.filter) rays.filter = *settings.sampling.filter;
   check_camera(settings.camera);
   check_combination(settings);
+  check_verify(settings.frame);
   check_sampling(settings.sampling);
   return settings;
 }

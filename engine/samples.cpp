@@ -107,7 +107,7 @@ namespace {
 
 /// Fewer samples are too few to estimate a variance.
 constexpr std::uint32_t kMinFirstStage = 8;
-constexpr std::uint32_t kMaxSamples = std::uint32_t{1} << 30U;
+constexpr std::uint32_t kMaxSamples = AdaptiveSampling::kMaxSamples;
 constexpr std::size_t kLevels = 32;  ///< of powers of two
 
 /// Samples in proportion to this power of the variance.

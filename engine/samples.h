@@ -83,6 +83,8 @@ class AdaptiveSampling {
   /// asked for.
   [[nodiscard]] static std::uint32_t pilot_of(const Sampling& sampling);
   static constexpr std::uint32_t kMinPilot = 16;
+  /// The most that a pixel is given.
+  static constexpr std::uint32_t kMaxSamples = std::uint32_t{1} << 30U;
 
   explicit AdaptiveSampling(const Sampling& sampling);
 

@@ -95,6 +95,7 @@ void Session::release_scene() {
   forwarding_.reset();
   traced_objects_.clear();
   rasterizer_.reset();
+  whole_rasterizer_.reset();
   objects_.clear();
 }
 
@@ -125,6 +126,7 @@ void Session::release_rays() {
   shader_.reset();
   ray_settings_.reset();
   primary_rays_.reset();
+  whole_primary_rays_.reset();
   traced_part_.reset();
   ray_scene_.reset();
 }
@@ -161,6 +163,26 @@ PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const 
         std::make_unique<PrimaryRays>(scene_, everything ? ray_scene(ray_build_) : *traced_part_, host_.threads);
   }
   return *primary_rays_;
+}
+
+Rasterizer& Session::whole_rasterizer() {
+  const std::vector<SurfaceRange> everything = covering_part();
+  if (rasterizer_ && merged_ranges(objects_, scene_.triangles) == everything) return *rasterizer_;
+  if (!whole_rasterizer_) {
+    const trace::Span span("upload geometry");
+    whole_rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, everything, host_.threads);
+  }
+  return *whole_rasterizer_;
+}
+
+PrimaryRays& Session::whole_primary_rays(const RaySettings& settings) {
+  HPR_CHECK(!settings.part);
+  partition_rays(settings);
+  if (primary_rays_ && !traced_part_) return *primary_rays_;
+  if (!whole_primary_rays_) {
+    whole_primary_rays_ = std::make_unique<PrimaryRays>(scene_, ray_scene(ray_build_), host_.threads);
+  }
+  return *whole_primary_rays_;
 }
 
 /// Of the surfaces that cover what is behind them, those that rays meet at home.
@@ -221,7 +243,7 @@ TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& stra
     return keys_;
   }
   keys_ = {};  // before as much is taken again
-  keys_ = shared ? shared_layer(layout, strategy, members) : TileLayer<Key>(layout);
+  agree_on_failure(comm_, [&] { keys_ = shared ? shared_layer(layout, strategy, members) : TileLayer<Key>(layout); });
   keys_shared_ = shared;
   keys_members_.assign(members.begin(), members.end());
   return keys_;

@@ -60,6 +60,10 @@ class Session {
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
+  /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where
+  /// rays meet a part of the scene.
+  [[nodiscard]] Rasterizer& whole_rasterizer();
+  [[nodiscard]] PrimaryRays& whole_primary_rays(const RaySettings& settings);
   /// Embree's scene of all surfaces that cover what is behind them, for all who trace on this rank; built when first
   /// asked for. Asking for one built in another way ends it, and the shader and primary rays that use it.
   [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
@@ -73,7 +77,8 @@ class Session {
   /// The strategy of this name with its scratch memory, for that group; kept until another one is asked for.
   [[nodiscard]] Compositor& compositor(const std::string& strategy, std::span<const int> members);
   /// A cleared layer of keys of this layout, reused from frame to frame. With a strategy that merges in place, the
-  /// ranks of one host see the layers of their group's members; collective over the group.
+  /// ranks of one host see the layers of their group's members. Collective. All ranks throw alike where one has no
+  /// memory for it.
   [[nodiscard]] TileLayer<Key>& keys(const FrameLayout& layout, const std::string& strategy,
                                      std::span<const int> members);
   /// `count` cleared layers of keys that are not composited, reused from frame to frame.
@@ -113,6 +118,7 @@ class Session {
   std::unique_ptr<GlContext> gl_;
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
+  std::unique_ptr<Rasterizer> whole_rasterizer_;
   RayBuild ray_build_;                             ///< of the ray scenes and primary rays below
   std::optional<std::vector<SurfaceRange>> part_;  ///< the part of the scene they hold; see RaySettings::part
   std::unique_ptr<RayForwarding> forwarding_;      ///< where there is a part
@@ -120,6 +126,7 @@ class Session {
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_part_;  ///< of primary_rays_; none where ray_scene_ is
   std::unique_ptr<PrimaryRays> primary_rays_;
+  std::unique_ptr<PrimaryRays> whole_primary_rays_;
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<DeferredShader> shader_;
   Group group_;

@@ -470,6 +470,13 @@ std::vector<Setting> make_table() {
            [](const std::string& name) { return name.empty() ? std::string("auto") : name; }),
        .initial = "auto",
        .decides_bits = false},
+      {.name = "verify",
+       .help = "percent of a frame's tiles that are drawn again, by another rank, and compared bit for bit",
+       .value = number(
+           0.0, 100.0, [](Settings& s) -> double& { return s.frame.verify_percent; }, "0 to 100 percent"),
+       .initial = "0",
+       .decides_bits = false,
+       .scope = SettingScope::Single},
 
       // What is made of the picture.
       {.name = "exposure",

@@ -142,7 +142,8 @@ TEST(RenderSettings, WhatExcludesEachOtherIsRefused) {
         Pairs{{"adaptive", "true"}, {"half-resolution", "shadow"}}, Pairs{{"aov", "depth"}, {"shading", "local"}},
         Pairs{{"aov", "depth"}, {"resolution-scale", "0.5"}},
         Pairs{{"half-resolution", "shadow"}, {"shading", "local"}}, Pairs{{"denoise", "true"}, {"reference", "true"}},
-        Pairs{{"denoise", "true"}, {"filter", "mitchell"}}}) {
+        Pairs{{"denoise", "true"}, {"filter", "mitchell"}}, Pairs{{"verify", "1"}, {"shading", "local"}},
+        Pairs{{"verify", "1"}, {"data", "partitioned"}}, Pairs{{"verify", "1"}, {"deterministic", "off"}}}) {
     RenderSettings settings;
     std::string all;
     for (const auto& [name, value] : pairs) {

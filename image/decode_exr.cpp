@@ -10,6 +10,7 @@
 #include <array>
 #include <cstring>
 #include <exception>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
@@ -254,6 +255,8 @@ FloatImage decode_exr(std::span<const std::byte> bytes, const std::string& name,
     return image;
   } catch (const Error&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw Error(ExitCode::Limit, fmt::format("{}: out of memory", name), "use a smaller picture");
   } catch (const std::exception& error) {
     throw_undecodable(name, error.what());
   }

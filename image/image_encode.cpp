@@ -10,6 +10,7 @@
 #include <array>
 #include <cstring>
 #include <exception>
+#include <new>
 
 #include "core/error.h"
 #include "image/image_io.h"
@@ -100,6 +101,8 @@ std::vector<std::byte> encode_exr(const Image<Rgb>& image, const std::map<std::s
       file.writePixels(image.height());
     }
     return bytes.take();
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& error) {
     throw Error(ExitCode::Io, fmt::format("cannot encode exr: {}", error.what()), "check the picture's size");
   }

@@ -4,17 +4,21 @@ that is resumed, by any number of ranks, ends with the bits of one that was not 
 
 usage: checkpoint_test.py HPR
 
-Signals go to hpr itself, which passes them to its mpiexec, and to a single rank of a job of several. Prints what is
+Runs that are killed at random times go on from what they wrote by the clock, and so do those whose newest checkpoint is
+lost. Signals go to hpr itself, which passes them to its mpiexec, and to a single rank of a job of several. Prints what is
 wrong and leaves with 1.
 """
 
 import os
 import pathlib
+import random
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 import processes
 from program import HPR, expect, failures
@@ -173,6 +177,151 @@ def nowhere_to_write(folder, whole):
     expect((folder / "i.exr").exists() and (folder / "i.exr").read_bytes() == whole, "no folder for USR2: other bits")
 
 
+def start(folder, *arguments):
+    """A run that writes checkpoints by the clock."""
+    return subprocess.Popen([HPR, *ARGUMENTS, "--spp", str(SAMPLES), "--checkpoint-every", "0.2s", *arguments], cwd=folder,
+                            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def generations(folder, name):
+    """What is there of a checkpoint: the times of both files."""
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob(f"{name}*")}
+
+
+def kill_job(process):
+    """Nobody has time to tidy up."""
+    job = [process.pid, *processes.ranks_of(process.pid), *processes.children_of(process.pid)]
+    for pid in job:
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+    message = process.communicate(timeout=60)[1]
+    for pid in job:
+        expect(processes.wait_gone(pid), f"{pid} outlives its death")
+    return message
+
+
+def until(process, true, what):
+    """Waits for that while the process lives."""
+    end = time.monotonic() + 120
+    while process.poll() is None and not true():
+        if time.monotonic() > end:
+            expect(False, f"{what}: not within 120 s")
+            break
+        time.sleep(0.005)
+    return process.poll() is None
+
+
+def killed_at_random(folder, whole):
+    """However often and whenever a run dies, what was drawn up to its last checkpoint is there, and the picture ends as
+    that of an unbroken run."""
+    chance = random.Random(14)
+    deaths = 0
+    for name, ranks in (("k.exr", "1"), ("l.exr", "2")):
+        state = f"{name}.checkpoint"
+        for attempt in range(40):
+            before = generations(folder, state)
+            resume = ["--resume"] if before else []
+            process = start(folder, "-o", name, "--ranks", ranks, *resume)
+            alive = attempt < 3 and until(process, lambda: generations(folder, state) != before, f"{name}: a checkpoint")
+            if alive:
+                time.sleep(chance.uniform(0.0, 0.7))
+            if alive and process.poll() is None:
+                kill_job(process)
+                deaths += 1
+                expect(bool(generations(folder, state)), f"{name}: killed, and no checkpoint is there")
+                continue
+            message = process.communicate(timeout=300)[1]
+            expect(process.returncode == 0, f"{name}: left with {process.returncode}: {message[-800:]}")
+            break
+        same = (folder / name).exists() and (folder / name).read_bytes() == whole
+        expect(same, f"{name}: other bits than a run without a break")
+        left = sorted(path.name for path in folder.glob(f"{state}*"))
+        expect(not left, f"{name}: a finished run leaves {left}")
+    expect(deaths >= 4, f"no more than {deaths} runs were killed")
+
+
+def two_generations(folder, name, *arguments):
+    """Kills a run once it has written two checkpoints."""
+    process = start(folder, "-o", name, *arguments)
+    alive = until(process, lambda: len(generations(folder, f"{name}.checkpoint")) == 2, "two checkpoints")
+    kill_job(process)
+    expect(alive, f"{name}: ended before it had two checkpoints")
+
+
+def lost_newest(folder, whole):
+    state = folder / "m.exr.checkpoint"
+    previous = folder / "m.exr.checkpoint.previous"
+    two_generations(folder, "m.exr")
+    newest, older = state.read_bytes(), previous.read_bytes()
+    result = run(folder, "-o", "m.exr", "--spp", str(SAMPLES))
+    expect(result.returncode == 4 and "--resume goes on with it, --force begins anew" in result.stderr,
+           f"samples in the way: left with {result.returncode}: {result.stderr}")
+    flipped = bytearray(newest)
+    flipped[len(newest) // 3] ^= 1
+    for case, damaged, said in (("flipped", bytes(flipped), "damaged"), ("missing", None, "cannot read")):
+        previous.write_bytes(older)
+        state.unlink(missing_ok=True)
+        if damaged is not None:
+            state.write_bytes(damaged)
+        elif run(folder, "-o", "m.exr", "--spp", str(SAMPLES)).returncode != 4:
+            expect(False, "an unfinished run's previous checkpoint is passed over")
+        for auto in ([], ["--primary", "auto"]):
+            if case != "missing" and auto:
+                continue
+            result = run(folder, "-o", "m.exr", "--spp", str(SAMPLES), "--resume", "--force", *auto)
+            told = [line for line in result.stderr.splitlines() if line.startswith("hpr: warning")]
+            expect(result.returncode == 0 and len(told) == 1 and said in told[0] and "going on from" in told[0],
+                   f"{case}: left with {result.returncode} and {told}: {result.stderr[-800:]}")
+            expect((folder / "m.exr").read_bytes() == whole, f"{case}: other bits than a run without a break")
+            expect(not state.exists() and not previous.exists(), f"{case}: a finished run leaves a checkpoint")
+            previous.write_bytes(older)
+    (folder / "m.exr").unlink()
+    state.write_bytes(newest)
+    result = run(folder, "-o", "m.exr", "--spp", str(SAMPLES), "--resume", "--seed", "5")
+    expect(result.returncode == 3 and "another run: its seed" in result.stderr, f"another seed: {result.returncode}: {result.stderr}")
+    state.write_bytes(bytes(flipped))
+    result = run(folder, "-o", "m.exr", "--spp", str(SAMPLES), "--resume", "--seed", "5")
+    expect(result.returncode == 3 and "damaged; " in result.stderr and "another run: its seed" in result.stderr,
+           f"damaged, and another seed before: {result.returncode}: {result.stderr}")
+    previous.write_bytes(older[:-1])
+    result = run(folder, "-o", "m.exr", "--spp", str(SAMPLES), "--resume", "--ranks", "2")
+    expect(result.returncode == 3 and result.stderr.count("the checkpoint is damaged") == 2,
+           f"both damaged: {result.returncode}: {result.stderr}")
+    for path in (state, previous):
+        path.unlink()
+
+
+def full_disk(folder, whole):
+    """A limit of file sizes that comes down on a running process stands for a disk that is full."""
+    state = folder / "n.exr.checkpoint"
+    process = start(folder, "-o", "n.exr")
+    until(process, state.exists, "a checkpoint")
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (200_000, 200_000))  # more than the picture has
+    lines = []
+    for line in process.stderr:
+        lines.append(line)
+        if "going on without a checkpoint" in line:
+            break
+    expect(state.exists() or (folder / "n.exr.checkpoint.previous").exists(), "full disk: the checkpoint before is gone")
+    kept = generations(folder, "n.exr.checkpoint")
+    message = process.communicate(timeout=300)[1]
+    expect(process.returncode == 0, f"full disk: left with {process.returncode}: {message[-800:]}")
+    expect(bool(lines) and "going on without" in lines[-1] and bool(kept), "full disk: nothing is said of it")
+    expect((folder / "n.exr").exists() and (folder / "n.exr").read_bytes() == whole, "full disk: other bits")
+
+
+def how_often(folder):
+    for wrong in ("often", "-1s", "5 parsecs"):
+        result = run(folder, "-o", "o.exr", "--spp", "2", "--checkpoint-every", wrong)
+        expect(result.returncode == 2 and "--checkpoint-every" in result.stderr, f"every {wrong}: {result.returncode}: {result.stderr}")
+    for never in ("0", "never"):
+        result = run(folder, "-o", "o.exr", "--spp", "12", "--checkpoint-every", never, "-v")
+        expect(result.returncode == 0 and "samples are in" not in result.stderr, f"every {never}: {result.returncode}: {result.stderr[-800:]}")
+        (folder / "o.exr").unlink(missing_ok=True)
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-checkpoint-") as scratch:
         folder = pathlib.Path(scratch)
@@ -203,6 +352,10 @@ def main():
         enough_samples(folder)
         by_what_was_chosen_before(folder)
         nowhere_to_write(folder, whole)
+        killed_at_random(folder, whole)
+        lost_newest(folder, whole)
+        full_disk(folder, whole)
+        how_often(folder)
     return 1 if failures else 0
 
 

@@ -9,6 +9,7 @@ Prints what is wrong and leaves with 1.
 import json
 import pathlib
 import random
+import resource
 import select
 import signal
 import socket
@@ -155,6 +156,49 @@ def frozen_display(folder):
         for words in ("screen wall-r0c1 (right) is behind, frame ", "screen wall-r0c1 (right) back, frame "):
             if words not in said:
                 complain(case, f"does not say {words!r}: {said[-800:]}")
+    return None
+
+
+def full_disk(folder):
+    """A limit of file sizes that comes down on a running display stands for a disk that is full: it goes on, says it
+    once, tells the run, and shows again when it can."""
+    case = "full disk"
+    write_path(folder)
+    with Display(folder, WALL, "localhost") as display:
+        process = start(folder, WALL, 100000)
+
+        def limit(size):
+            resource.prlimit(display.process.pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+        def shows(seconds):
+            before = display.frame()
+            return wait_until(lambda: display.frame() > before + 3, seconds)
+
+        try:
+            if not wait_until(lambda: display.frame() > 0, 30):
+                return complain(case, "nothing was ever shown")
+            limit(1500)  # more than its status and its log have, less than a picture
+            if not wait_until(lambda: display.status()["screens"][0]["state"] == "failed", 10):
+                complain(case, f"its status says {display.status()}")
+            time.sleep(0.5)
+            limit(resource.RLIM_INFINITY)
+            if not shows(10):
+                complain(case, "it shows nothing though there is space again")
+            limit(16)  # not even its log
+            time.sleep(1.0)
+            limit(resource.RLIM_INFINITY)
+            if not shows(10):
+                complain(case, "it shows nothing after its log was full")
+            if display.process.poll() is not None:
+                complain(case, f"the display left with {display.process.returncode}: {display.said()[-800:]}")
+        finally:
+            process.send_signal(signal.SIGTERM)
+            said = process.communicate(timeout=30)[1]
+        if display.said().count("is not shown") != 1 or "is shown again" not in display.said():
+            complain(case, f"the display does not say it once: {display.said()[-800:]}")
+        told = "screen wall-r0c0 (localhost) cannot be shown, frame "
+        if said.count(told) != 2 or "screen wall-r0c0 (localhost) back, frame " not in said.split(told)[-1]:
+            complain(case, f"the run does not say that the screen fails and is back: {said[-800:]}")
     return None
 
 
@@ -322,7 +366,7 @@ def refusals(folder):
 
 def main():
     names = sys.argv[2:]
-    for case in (same_pictures, killed_display, killed_display_in_manifest, frozen_display, no_display, bad_line, refusals):
+    for case in (same_pictures, killed_display, killed_display_in_manifest, frozen_display, full_disk, no_display, bad_line, refusals):
         if names and case.__name__ not in names:
             continue
         with tempfile.TemporaryDirectory(prefix="hpr-display-") as scratch:

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-from processes import ranks_of
+from processes import children_of, ranks_of, wait_gone
 from program import HPR, expect, failures
 
 WALL = ["wall", "run", "2x1@64x48", "gen:cornell", "--quality", "draft", "--passes", "none", "--frames", "100000"]
@@ -59,6 +59,88 @@ def interrupted(folder, ranks, number, whole_session):
     later = len(list((folder / name).iterdir()))
     expect(run.returncode == -number, f"{name}: left with {run.returncode}")
     expect(frames == later, f"{name}: {later - frames} files were written after hpr had left")
+
+
+ENDING = "hpr: ending; Ctrl-C again ends it at once"
+
+
+def announced(folder):
+    """That a signal was heard is said at once and once, by the launcher or by a run that comes to an orderly end; not by
+    one that says errors only."""
+    endless = ["wall", "run", "2x1@64x48", "gen:cornell", "--quality", "draft", "--passes", "none", "--display", "none"]
+    render = ["render", "gen:gallery", "-o", "announced.png", "--spp", "1000000", "--photons", "1000", "--progress", "none"]
+    for case, arguments, number, spoken in (("render", [*render, "--ranks", "2"], signal.SIGINT, True),
+                                            ("render, told to end", [*render, "--ranks", "2"], signal.SIGTERM, True),
+                                            ("quiet", [*render, "--ranks", "2", "-q"], signal.SIGINT, False),
+                                            ("wall", [*endless, "--until-stopped"], signal.SIGINT, True),
+                                            ("wall, two ranks", [*endless, "--until-stopped", "--ranks", "2"], signal.SIGINT, True)):
+        run = subprocess.Popen([HPR, *arguments], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+        until = time.monotonic() + 60
+        while run.poll() is None and time.monotonic() < until:
+            processes = ranks_of(run.pid) if "--ranks" in arguments else [run.pid]
+            if processes and all(map(has_begun, processes)):
+                break
+            time.sleep(0.02)
+        time.sleep(1)
+        run.send_signal(number)
+        begin = time.monotonic()
+        said = b""
+        while ENDING.encode() not in said and (more := os.read(run.stderr.fileno(), 4096)):
+            said += more
+        after = time.monotonic() - begin
+        said = (said + run.communicate(timeout=60)[1]).decode()
+        expect(said.count(ENDING) == (1 if spoken else 0), f"{case}: an end is not announced as it should: {said[-600:]}")
+        expect(not spoken or after < 3.0, f"{case}: an end is announced after {after:.2f} s")  # 0.1 s where nothing else runs
+        expect(run.returncode == (0 if "wall" in case else -number), f"{case}: left with {run.returncode}: {said[-600:]}")
+
+
+def mpi_files(pids):
+    """What MPI and the launcher keep outside the job's own memory: of these processes' open files and maps."""
+    found = set()
+    for pid in pids:
+        for line in pathlib.Path(f"/proc/{pid}/maps").read_text().splitlines():
+            if line.partition("/")[2].startswith("dev/shm/") and "deleted" not in line:
+                found.add("/" + line.partition("/")[2])
+    return found
+
+
+def swept(folder):
+    """What a killed mpiexec, or a whole job that is killed, leaves is gone after the next job; a living one's is not."""
+    temporary = folder / "temporary"
+    temporary.mkdir()
+    environment = plain_environment(TMPDIR=str(temporary))
+    command = [HPR, "render", "gen:gallery", "--spp", "1000000", "--photons", "1000", "--progress", "none", "--ranks", "2", "-o"]
+    jobs = [subprocess.Popen([*command, f"swept{i}.png"], cwd=folder, env=environment, stderr=subprocess.DEVNULL) for i in range(3)]
+    until = time.monotonic() + 60
+    files = []
+    for job in jobs:
+        while job.poll() is None and time.monotonic() < until and not (len(ranks_of(job.pid)) == 2 and mpi_files(ranks_of(job.pid))):
+            time.sleep(0.05)
+        files.append(mpi_files(ranks_of(job.pid)))
+        expect(files[-1], "a job of two ranks shares no memory")
+    killed, lone, living = jobs
+    everybody = [pid for job in (killed, lone) for pid in (*children_of(job.pid), *ranks_of(job.pid))]
+    for pid in [killed.pid, *children_of(killed.pid), *ranks_of(killed.pid), *children_of(lone.pid)]:
+        os.kill(pid, signal.SIGKILL)
+    for job in (killed, lone):
+        job.wait(timeout=60)
+    for pid in everybody:
+        expect(wait_gone(pid), f"{pid} outlives its job")
+    expect(lone.returncode == 7, f"a job whose mpiexec was killed left with {lone.returncode}")
+    expect(len(list(temporary.iterdir())) in (2, 3), f"three jobs have {list(temporary.iterdir())}")
+    result = subprocess.run([HPR, "render", "gen:cornell", "-o", "next.png", "--size", "32x24", "--ranks", "2"], cwd=folder,
+                            env=environment, capture_output=True, text=True, timeout=60, check=False)
+    expect(result.returncode == 0, f"the next job left with {result.returncode}: {result.stderr}")
+    for path in files[0] | files[1]:
+        expect(not os.path.exists(path), f"{path} of a dead job is there")
+    for path in files[2]:
+        expect(os.path.exists(path), f"{path} of a living job is gone")
+    expect(len(list(temporary.iterdir())) == 1, f"one job has {list(temporary.iterdir())}")
+    living.terminate()
+    living.wait(timeout=60)
+    expect(not list(temporary.iterdir()), f"jobs that have ended leave {list(temporary.iterdir())}")
+    for path in files[2]:
+        expect(not os.path.exists(path), f"{path} of a job that ended is there")
 
 
 def stopped(folder, ranks):
@@ -279,6 +361,8 @@ def main():
             output_nobody_takes(folder, ranks)
             stopped(folder, ranks)
             interrupted(folder, ranks, signal.SIGTERM, False)
+        announced(folder)
+        swept(folder)
         without_ssh(folder)
         doctor_starts_a_job(folder)
         ranks_that_listen(folder)

@@ -1,6 +1,7 @@
 """The processes of a job that a run has started."""
 
 import pathlib
+import time
 
 
 def children_of(pid):
@@ -18,3 +19,16 @@ def children_of(pid):
 def ranks_of(pid):
     """The ranks of the job of a run: children of its mpiexec, the youngest last."""
     return sorted(rank for mpiexec in children_of(pid) for rank in children_of(mpiexec))
+
+
+def wait_gone(pid, seconds=20.0):
+    """Whether the process ends within that time; one that nobody waited for has ended."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        try:
+            if pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z":
+                return True
+        except OSError:
+            return True
+        time.sleep(0.02)
+    return False

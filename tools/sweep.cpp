@@ -63,6 +63,7 @@ std::vector<double> median_times(const std::vector<std::function<void()>>& conte
     if (counts) times[contender].push_back(clock() - start);
   });
   std::vector<double> medians;
+  medians.reserve(times.size());
   for (std::vector<double>& of_one : times) medians.push_back(median(std::move(of_one)));
   return medians;
 }

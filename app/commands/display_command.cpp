@@ -16,6 +16,7 @@
 #include "walls/link/display_process.h"
 #include "walls/link/hosts.h"
 #include "walls/link/protocol.h"
+#include "walls/link/socket.h"
 
 namespace hpr {
 namespace {
@@ -87,6 +88,7 @@ class DisplayCommand final : public Command {
     const auto display = kind.make(wall, options);
     // What writes pictures is loaded now, not when the first frame is to be shown.
     if (kind.name == "file") (void)encode_png(Image<Rgba8>({1, 1}));
+    remove_left_sockets(socket_folder());
     FrameReceiver receiver(std::move(settings));
     DisplayProcess process(wall, host.host, *display, receiver, {folder, *stale_after, once_});
     log::info("display of host '{}': {} screen{}, listening on {}", host.host, wall.screens.size(),

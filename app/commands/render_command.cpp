@@ -1,8 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
+#include <chrono>
+#include <filesystem>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "app/command.h"
 #include "app/launch/run_ranks.h"
@@ -16,10 +23,12 @@
 #include "core/signals.h"
 #include "core/text.h"
 #include "core/timing.h"
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
+#include "engine/checkpoint/checkpoint_file.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
+#include "engine/wall/frame_retry.h"
 
 namespace hpr {
 namespace {
@@ -40,6 +49,11 @@ class RenderCommand final : public Command {
         .option("--checkpoint", checkpoint_,
                 "where SIGUSR1 (and stop) and SIGUSR2 (and go on) put the samples so far (default: OUTPUT.checkpoint)")
         .type("FILE");
+    options
+        .option("--checkpoint-every", checkpoint_every_,
+                "how often they go there unasked, e.g. 30s; 0 or never: not at all")
+        .type("DURATION")
+        .show_default();
     options.flag("--resume", resume_, "go on with the samples of the checkpoint");
     declare_settings(options, settings_);
     report_.declare(options);
@@ -50,6 +64,7 @@ class RenderCommand final : public Command {
     if (!extent) throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", size_), "write e.g. 1920x1080");
     const Size size{extent->first, extent->second};
     check_size(size, globals.picture_limits());
+    (void)checkpoint_interval();
     const RenderSettings settings = resolve(settings_, globals.seed);
     files_.aovs = settings.frame.aovs;
     files_.exposure = settings.exposure_stops;
@@ -73,6 +88,27 @@ class RenderCommand final : public Command {
   }
 
  private:
+  [[nodiscard]] std::chrono::nanoseconds checkpoint_interval() const {
+    const auto interval =
+        checkpoint_every_ == "never" ? std::chrono::nanoseconds::zero() : parse_duration(checkpoint_every_);
+    if (interval) return *interval;
+    throw Error(ExitCode::Usage, fmt::format("--checkpoint-every: '{}' is no duration", printable(checkpoint_every_)),
+                "write e.g. 30s or 5min, or never");
+  }
+
+  void check_checkpoints(const Globals& globals) const {
+    if (checkpoint_.empty()) return;
+    for (const std::filesystem::path& path : {std::filesystem::path(checkpoint_), previous_checkpoint(checkpoint_)}) {
+      std::error_code error;
+      if (globals.force || resume_ || !std::filesystem::exists(path, error)) {
+        check_writable(path, true);
+      } else {
+        throw Error(ExitCode::Io, fmt::format("'{}' exists: samples of an earlier run", printable(path.string(), 300)),
+                    "--resume goes on with it, --force begins anew");
+      }
+    }
+  }
+
   void check_outputs(const RenderSettings& settings, const Globals& globals) const {
     if (files_.picture.empty() && files_.raw.empty() && report_.stats.empty() && !report_.explain) {
       throw Error(ExitCode::Usage, "nothing to write", "name a picture with -o, or use --raw, --stats or --explain");
@@ -94,19 +130,23 @@ class RenderCommand final : public Command {
                   "ask for more with --spp, and name the picture with -o or the file with --checkpoint");
     }
     const std::string beside = files_.is_png() ? files_.aov_file() : "";
-    const std::vector<std::string> results{files_.picture, files_.raw, report_.stats, beside, checkpoint_};
-    check_distinct(results, globals.trace);
-    check_spared(source_, globals.scene_limits(), std::span(&settings.environment, 1), results);
+    const std::vector<std::string> results{files_.picture, files_.raw, report_.stats, beside};
+    std::vector<std::string> replaced = results;
+    if (!checkpoint_.empty()) replaced.insert(replaced.end(), {checkpoint_, previous_checkpoint(checkpoint_).string()});
+    check_distinct(replaced, globals.trace);
+    check_spared(source_, globals.scene_limits(), std::span(&settings.environment, 1), replaced);
     for (const std::string& path : results) {
-      if (!path.empty()) check_writable(path, globals.force || (resume_ && path == checkpoint_));
+      if (!path.empty()) check_writable(path, globals.force);
     }
+    check_checkpoints(globals);
   }
 
   /// Measured again, the choice may be another one; a checkpoint says which it was.
   [[nodiscard]] Primary primary_before(Communicator& comm) const {
     Primary primary = Primary::Auto;
     check_on_root(comm, [&] {
-      primary = primary_of(identity_in(read_file(checkpoint_, std::numeric_limits<std::uint64_t>::max()), checkpoint_));
+      const StoredCheckpoint stored = read_checkpoint(checkpoint_);
+      primary = primary_of(identity_in(stored.bytes, stored.path.string()));
     });
     return all_gather_value(comm, primary).front();
   }
@@ -114,6 +154,23 @@ class RenderCommand final : public Command {
   void print_plan(const FramePlan& plan) const {
     for (const std::string& line : plan.explained) fmt::print("{}\n", line);
     if (files_.colors != ColorFormat::Float32) fmt::print("{}\n", files_.explain_colors());
+  }
+
+  /// Collective. Draws the picture, once more where that fails; null where it stopped before its goal, with a
+  /// checkpoint.
+  [[nodiscard]] std::unique_ptr<FrameSampler> draw_samples(Session& session, const FramePlan& plan,
+                                                           const Sampling& sampling, std::span<const View> views,
+                                                           const CheckpointSettings& checkpoint,
+                                                           Progress& progress) const {
+    std::unique_ptr<FrameSampler> drawn;
+    bool is_whole = false;
+    const std::optional<Error> failure = draw_with_retry(session.comm(), "the picture", [&] {
+      drawn.reset();  // frees its memory before the next one takes some
+      drawn = std::make_unique<FrameSampler>(session, plan, sampling, 0, !files_.raw.empty());
+      is_whole = drawn->draw(views, checkpoint, progress);
+    });
+    if (failure) throw AgreedError(*failure);
+    return is_whole ? std::move(drawn) : nullptr;
   }
 
   ExitCode draw(Session& session, const Globals& globals, const RenderSettings& settings, Size size) {
@@ -131,16 +188,23 @@ class RenderCommand final : public Command {
     prepare(session, plan);
     const Stopwatch watch;
     const std::size_t sent_before = session.comm().bytes_sent();
-    FrameSampler sampler(session, plan, sampling, 0, !files_.raw.empty());
     Progress progress(is_root ? globals.progress : "none", "sample", sampling.goal.samples.value_or(0));
     std::optional<RunIdentity> identity;
-    const CheckpointSettings checkpoint{checkpoint_, resume_, [&] {
-                                          if (!identity)
-                                            identity =
-                                                identity_of(session, plan, blocks.views, settings, !files_.raw.empty());
-                                          return *identity;
-                                        }};
-    if (!sampler.draw(blocks.views, checkpoint, progress)) return ExitCode::Stopped;
+    const CheckpointSettings checkpoint{.path = checkpoint_,
+                                        .resume = resume_,
+                                        .identity =
+                                            [&] {
+                                              if (!identity)
+                                                identity = identity_of(session, plan, blocks.views, settings,
+                                                                       !files_.raw.empty());
+                                              return *identity;
+                                            },
+                                        .every = checkpoint_interval(),
+                                        .keeps_previous = true};
+    const std::unique_ptr<FrameSampler> drawn =
+        draw_samples(session, plan, sampling, blocks.views, checkpoint, progress);
+    if (!drawn) return ExitCode::Stopped;
+    FrameSampler& sampler = *drawn;
     progress.end();
     const CollectedPicture picture(session, sampler.frame(), blocks, size, files_);
     const FrameCost cost{watch.ms(), session.comm().bytes_sent() - sent_before};
@@ -151,6 +215,7 @@ class RenderCommand final : public Command {
       if (!is_root) return;
       picture.write(session.scene().name);
       if (!report_.stats.empty()) write_stats(report_.stats, stats);
+      sampler.remove_unasked_checkpoints();
     });
     if (is_root) {
       log::info("{} triangles, {}x{} pixels, {} rank{}: {:.1f} ms{}", session.scene().triangles, size.width,
@@ -164,6 +229,7 @@ class RenderCommand final : public Command {
   std::string size_ = "1280x720";
   PictureFiles files_;
   std::string checkpoint_;
+  std::string checkpoint_every_ = "5min";
   bool resume_ = false;
   RenderSettings settings_;
   ReportOptions report_;

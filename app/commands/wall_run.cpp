@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -43,9 +44,11 @@ namespace {
 /// How well the target time was kept.
 void report_budget(const RunManifest& manifest) {
   std::vector<double> ms;
+  double target_ms = 0.0;
   std::map<std::string, std::size_t> given_up;
   for (const FrameRecord& frame : manifest.frames) {
-    if (frame.budget->resting) continue;
+    if (!frame.budget || frame.budget->resting) continue;
+    target_ms = frame.budget->target_ms;
     ms.push_back(frame.ms);
     for (const std::string& what : frame.budget->given_up) ++given_up[what];
   }
@@ -56,8 +59,7 @@ void report_budget(const RunManifest& manifest) {
   parts.reserve(given_up.size());
   for (const auto& [what, frames] : given_up) parts.push_back(fmt::format("{} in {}", what, frames));
   log::info("{} frames: half took up to {:.1f} ms, 95 % up to {:.1f} ms, target {:.1f} ms; given up: {}", ms.size(),
-            within(50), within(95), manifest.frames.back().budget->target_ms,
-            parts.empty() ? "nothing" : fmt::format("{}", fmt::join(parts, ", ")));
+            within(50), within(95), target_ms, parts.empty() ? "nothing" : fmt::format("{}", fmt::join(parts, ", ")));
 }
 
 void print_summary(const RunStats& stats, const Wall& wall, const Scene& scene) {
@@ -148,11 +150,23 @@ void print_end(const WallJob& job, const WallDriver& driver, bool stopped, const
   }
 }
 
+/// Collective. The layers of the last frame, if that was drawn.
+void write_last_layers(const WallJob& job, WallDriver& driver, Session& session) {
+  if (driver.failed().in_a_row() == 0) {
+    write_layers(job.outputs.layers, driver.plan().aovs, driver, session);
+  } else if (!job.outputs.layers.empty() && session.rank() == 0) {
+    log::warning("the last frame failed: there are no files of its layers");
+  }
+}
+
 ExitCode drive(const WallJob& job, const Globals& globals, Session& session) {
   const bool reports = session.comm().rank() == 0;
   check_same_wall(session.comm(), job.wall, job.wall_file);
   WallDriver driver(job, session);
-  if (job.explain && reports) fmt::print("{}\n", fmt::join(driver.explained(), "\n"));
+  if (job.explain && reports) {
+    fmt::print("{}\n", fmt::join(driver.explained(), "\n"));
+    std::fflush(stdout);  // a pipe of the launcher's
+  }
   prepare(session, driver.plan());
   const bool ended_early = draw_frames(job, driver, reports && globals.verbosity >= 0 ? globals.progress : "none");
   if (ended_early) driver.note_stop(job.frame_count());
@@ -162,7 +176,7 @@ ExitCode drive(const WallJob& job, const Globals& globals, Session& session) {
   stats.relmse = driver.relmse();
   stats.budget = driver.frames().report();
   if (reports && stats.budget) report_budget(driver.manifest());
-  write_layers(job.outputs.layers, driver.plan().aovs, driver, session);
+  write_last_layers(job, driver, session);
   std::vector<Image<Rgba8>> pictures;
   if (!job.outputs.assembled.empty() || !job.outputs.picture.empty()) pictures = driver.collect_pictures();
   agree_on_failure(session.comm(), [&] {
@@ -170,7 +184,11 @@ ExitCode drive(const WallJob& job, const Globals& globals, Session& session) {
   });
   if (!seen) return ExitCode::Lost;
   if (reports) print_end(job, driver, stopped, stats, session.scene());
-  return stopped && !job.outputs.manifest.empty() ? ExitCode::Stopped : verdict(stats, job.settings.strict);
+  if (reports && driver.failed().count() > 0) {
+    log::error("{}; the screens kept the pictures of the frames before", driver.failed().describe());
+  }
+  if (stopped && !job.outputs.manifest.empty()) return ExitCode::Stopped;
+  return driver.failed().count() > 0 ? ExitCode::CheckFailed : verdict(stats, job.settings.strict);
 }
 
 /// Beside the scene's.
@@ -332,8 +350,6 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
 }
 
 ExitCode run_wall(WallJob job, Globals globals) {
-  // What stands there is what the job that was lost had written.
-  if (const auto journal = RunJournal::of_supervisor()) globals.force |= !journal->read().restarts.empty();
   globals.force |= job.resume;
   job.display_options.overwrite |= globals.force;
   const EmptyFolders tidy(folder_of(job));

@@ -21,7 +21,7 @@
 #include "core/progress.h"
 #include "core/text.h"
 #include "core/timing.h"
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"

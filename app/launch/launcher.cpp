@@ -25,11 +25,13 @@
 #include <utility>
 #include <vector>
 
+#include "app/launch/job_folder.h"
 #include "app/launch/rank_watch.h"
 #include "core/error.h"
 #include "core/job_board.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/signals.h"
 #include "core/text.h"
 
 namespace hpr {
@@ -40,7 +42,7 @@ namespace hpr {
 class PassedSignals {
  public:
   explicit PassedSignals(const JobOptions& options);
-  /// Where a job was interrupted, and that was to end it, so is this process, as if the signal had not been caught.
+  /// A signal that came too late for check() ends this process, as if it had not been caught.
   ~PassedSignals();
   PassedSignals(const PassedSignals&) = delete;
   PassedSignals& operator=(const PassedSignals&) = delete;
@@ -55,10 +57,15 @@ class PassedSignals {
   [[nodiscard]] static bool ends();
   /// The last signal that interrupted the job; 0: none did.
   [[nodiscard]] static int interrupted_by();
+  /// Throws Interrupted where the job was interrupted, and that was to end it.
+  void check();
 
  private:
   static constexpr std::array kSignals{SIGALRM, SIGUSR1, SIGUSR2, SIGINT, SIGTERM, SIGHUP};
   std::size_t count_;  ///< how many of kSignals are handled, from the front
+  bool checked_ = false;
+  bool suspends_;  ///< SIGTSTP too
+  struct sigaction suspend_before_ {};
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
@@ -101,6 +108,7 @@ extern "C" void pass_on(int signal) {
   if (signal == SIGALRM) started.store(true);
   if (signal == SIGINT || signal == SIGTERM || signal == SIGHUP) {
     const bool again = interrupt.exchange(signal) != 0;
+    announce_end();
     ending.store(again || !stops.load());
     if (stops.load()) {
       signal = again ? SIGTERM : SIGUSR1;
@@ -115,10 +123,25 @@ extern "C" void pass_on(int signal) {
   errno = error;
 }
 
+/// Ctrl-Z: the rank, in a group of its own, stands still as long as this process.
+extern "C" void suspend(int /*signal*/) {
+  const int error = errno;
+  const pid_t rank = launched.load();
+  if (rank > 0) ::kill(rank, SIGSTOP);
+  (void)::raise(SIGSTOP);
+  if (rank > 0) ::kill(rank, SIGCONT);
+  errno = error;
+}
+
+bool is_lone(const JobOptions& options) {
+  return options.starter && options.starter->empty();
+}
+
 }  // namespace
 
 PassedSignals::PassedSignals(const JobOptions& options)
-    : count_(options.input == StandardInput::None ? kSignals.size() : 3) {
+    : count_(options.input == StandardInput::None ? kSignals.size() : 3),
+      suspends_(is_lone(options) && options.input == StandardInput::None) {
   launched.store(0);
   early.store(0);
   started.store(false);
@@ -134,13 +157,25 @@ PassedSignals::PassedSignals(const JobOptions& options)
     // What nohup, or a shell for its background, has us ignore stays ignored, and so do requests nobody here takes.
     if (before_.at(i).sa_handler != SIG_IGN) ::sigaction(kSignals.at(i), &action, nullptr);
   }
+  if (!suspends_) return;
+  ::sigaction(SIGTSTP, nullptr, &suspend_before_);
+  action.sa_handler = suspend;
+  if (suspend_before_.sa_handler != SIG_IGN) ::sigaction(SIGTSTP, &action, nullptr);
 }
 
 PassedSignals::~PassedSignals() {
   for (std::size_t i = count_; i-- > 1;) ::sigaction(kSignals.at(i), &before_.at(i), nullptr);
   ::alarm(0);  // no handler sets it any more
   ::sigaction(kSignals.front(), &before_.front(), nullptr);
-  if (const int signal = interrupt.load(); signal != 0 && !stops.load()) ::raise(signal);
+  if (suspends_) ::sigaction(SIGTSTP, &suspend_before_, nullptr);
+  if (const int signal = interrupt.load(); signal != 0 && !stops.load() && !checked_) ::raise(signal);
+}
+
+void PassedSignals::check() {
+  const int signal = interrupt.load();
+  if (signal == 0 || stops.load()) return;
+  checked_ = true;
+  throw Interrupted{signal};
 }
 
 void PassedSignals::to(pid_t child) {
@@ -235,45 +270,64 @@ constexpr std::chrono::milliseconds kStartOfRank{500};
 constexpr std::chrono::seconds kMinEnd{2};
 constexpr std::chrono::seconds kMaxEnd{10};
 
-bool is_lone(const JobOptions& options) {
-  return options.starter && options.starter->empty();
+/// What the child between fork and exec leaves with where it cannot become what it is to start.
+constexpr int kNoMemory = 126;
+constexpr int kNotStarted = 127;
+
+/// In the child between fork and exec. False where there was no memory for it: a job that lacked a variable would be
+/// another one.
+bool set_environment(const JobOptions& options, const std::string& board, bool is_typed, pid_t parent) {
+  // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
+  bool set = true;
+  const auto put = [&](const char* name, const char* value, bool replace) {
+    set = ::setenv(name, value, replace ? 1 : 0) == 0 && set;
+  };
+  if (is_lone(options)) {
+    put(kLoneRankVariable, std::to_string(parent).c_str(), true);
+  } else {
+    // It alone can name lost ranks of other hosts.
+    if (options.starter || !is_one_host()) put("OMPI_MCA_orte_execute_quiet", "0", false);
+    for (const auto& [name, value] : kEnvironment) put(name, value, false);
+    put(kReportStartVariable, "1", true);
+  }
+  if (!options.starter && is_one_host()) {
+    for (const auto& [name, value] : kOneHost) put(name, value, false);
+  }
+  if (is_typed) put(kTypedInputVariable, "1", true);
+  put(JobBoard::kVariable, board.c_str(), true);
+  ::unsetenv(kTerminalVariable);
+  if (::isatty(STDERR_FILENO) == 1) put(kTerminalVariable, "1", true);
+  for (const auto& [name, value] : options.environment) put(name.c_str(), value.c_str(), true);
+  // NOLINTEND(concurrency-mt-unsafe)
+  return set;
 }
 
 /// Runs in the child between fork and exec: only async-signal-safe calls and environment set-up of a single thread.
 [[noreturn]] void become(const std::vector<char*>& pointers, const JobOptions& options, const std::string& board,
-                         int stdout_pipe, pid_t parent) {
+                         const std::optional<JobFolder>& folder, int stdout_pipe, pid_t parent) {
+  const bool reads = options.input == StandardInput::OfRank0;
   // Ctrl-C is then for the parent alone, which passes on what it stands for. Who reads a terminal stays in its group.
-  if (options.input == StandardInput::None) ::setpgid(0, 0);
+  if (!reads) ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
-  if (options.input == StandardInput::None) {
+  if (!reads) {
     const int null = ::open("/dev/null", O_RDONLY);
     if (null >= 0) ::dup2(null, STDIN_FILENO);
   }
-  const bool typed = options.input == StandardInput::OfRank0 && ::isatty(STDIN_FILENO) == 1;
+  const bool is_typed = reads && ::isatty(STDIN_FILENO) == 1;
   ::dup2(stdout_pipe, STDOUT_FILENO);
-  // NOLINTBEGIN(concurrency-mt-unsafe): after fork there is one thread
-  if (is_lone(options)) {
-    ::setenv(kLoneRankVariable, std::to_string(parent).c_str(), 1);
-  } else {
-    for (const auto& [name, value] : kEnvironment) ::setenv(name, value, 0);
-    ::setenv(kReportStartVariable, "1", 1);
-  }
-  if (!options.starter && is_one_host()) {
-    for (const auto& [name, value] : kOneHost) ::setenv(name, value, 0);
-  }
-  if (typed) ::setenv(kTypedInputVariable, "1", 1);
-  ::setenv(JobBoard::kVariable, board.c_str(), 1);
-  ::isatty(STDERR_FILENO) == 1 ? ::setenv(kTerminalVariable, "1", 1) : ::unsetenv(kTerminalVariable);
-  for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
-  // NOLINTEND(concurrency-mt-unsafe)
+  if (!set_environment(options, board, is_typed, parent)) ::_exit(kNoMemory);
+  if (folder) folder->pass_on();
+  // Also when the file was replaced or removed since: what runs on is what ran before.
+  if (is_lone(options)) ::execv("/proc/self/exe", pointers.data());
   ::execvp(pointers.front(), pointers.data());
-  ::_exit(127);
+  ::_exit(errno == ENOMEM ? kNoMemory : kNotStarted);
 }
 
-/// The path of the running program.
-std::string program_path() {
-  return std::filesystem::read_symlink("/proc/self/exe").string();
+/// The path of the running program, as it was at the first call.
+const std::string& program_path() {
+  static const std::string path = std::filesystem::read_symlink("/proc/self/exe").string();
+  return path;
 }
 
 /// False with errno. A reader that stands still keeps nobody who wants to end this.
@@ -329,21 +383,15 @@ class RunningJob {
   /// Waits for its end; returns its status as waitpid has it.
   int follow() {
     while (true) {
-      const bool has_output = poll_output(output_ < 0 ? kToTheEnd_ms : kPollInterval_ms);
+      const bool has_output = poll_output(output_ < 0 ? kToTheEnd_ms : is_starting() ? kStart_ms : kPollInterval_ms);
       enforce_limits();
       if (has_output && !killed_) continue;
-      int status = 0;
-      const pid_t changed = ::waitpid(child_, &status, WNOHANG | WUNTRACED | WCONTINUED);
-      if (changed < 0 && errno != EINTR) throw Error(ExitCode::Io, fmt::format("lost track of {}", name_));
-      if (changed != child_) continue;
-      if (WIFSTOPPED(status) || WIFCONTINUED(status)) {
-        note_stop(WIFSTOPPED(status));
-        continue;
-      }
+      const std::optional<int> status = check_end();
+      if (!status) continue;
       while (poll_output(0)) {  // its last output
       }
       if (output_ >= 0) ::close(output_);  // somebody it left behind holds the other end
-      return status;
+      return *status;
     }
   }
 
@@ -363,6 +411,8 @@ class RunningJob {
   using Clock = std::chrono::steady_clock;
   static constexpr int kPollInterval_ms = 200;
   static constexpr int kToTheEnd_ms = 5;
+  static constexpr int kStart_ms = 20;
+  static constexpr std::chrono::seconds kMaxStart{30};
   static constexpr std::chrono::milliseconds kBetweenLooks{100};
   static constexpr std::chrono::seconds kMaxBetweenLooks{1};
 
@@ -392,15 +442,29 @@ class RunningJob {
     return true;
   }
 
+  /// Its status once it has ended.
+  std::optional<int> check_end() {
+    int status = 0;
+    const pid_t changed = ::waitpid(child_, &status, WNOHANG | WUNTRACED | WCONTINUED);
+    if (changed < 0 && errno != EINTR) throw Error(ExitCode::Io, fmt::format("lost track of {}", name_));
+    if (changed != child_) return std::nullopt;
+    if (!WIFSTOPPED(status) && !WIFCONTINUED(status)) return status;
+    note_stop(WIFSTOPPED(status));
+    return std::nullopt;
+  }
+
   void note_stop(bool is_stopped) {
     is_stopped_ = is_stopped;
     stopped_for_ = {};
-    if (is_stopped) log::warning("{} was stopped, and nobody hears of its ranks", name_);
+    if (is_stopped) log::warning("{} was stopped", name_);
   }
+
+  /// Whether ranks may still join the board.
+  [[nodiscard]] bool is_starting() const { return !watch_.knows_all() && Clock::now() - begin_ < kMaxStart; }
 
   /// Ends the job where it stands still.
   void look_at_ranks(Clock::time_point now) {
-    if (now - looked_at_ < kBetweenLooks) return;
+    if (now - looked_at_ < kBetweenLooks && !is_starting()) return;
     // More than that has passed only where this process stood still itself, or the machine slept.
     const auto passed = std::min<std::chrono::nanoseconds>(now - looked_at_, kMaxBetweenLooks);
     looked_at_ = now;
@@ -500,7 +564,7 @@ void check_ending(const RunningJob& job, const std::string& name, int ranks, int
                 "free some space, or see who closed the pipe");
   }
   if (job.late()) {
-    throw Error(
+    throw LateStart(
         ExitCode::Io, fmt::format("{} has not started {} ranks in {:g} s", name, ranks, job.start_limit().count()),
         "its own words, if any, stand above; see that TMPDIR may be written and has space, and that no limit of "
         "file sizes (ulimit -f) is in its way; raise --hang-timeout if it only needs longer; or use --ranks 1");
@@ -518,6 +582,10 @@ void check_ending(const RunningJob& job, const std::string& name, int ranks, int
 
 }  // namespace
 
+int last_job_interrupt() {
+  return PassedSignals::interrupted_by();
+}
+
 int run_job(int ranks, const std::vector<std::string>& args, const JobOptions& options) {
   std::vector<std::string> words = command_line(ranks, args, options);
   const std::string name = is_lone(options) ? "the rank" : std::filesystem::path(words.front()).filename().string();
@@ -531,22 +599,28 @@ int run_job(int ranks, const std::vector<std::string>& args, const JobOptions& o
     throw Error(ExitCode::Io, fmt::format("cannot start {}: {}", name, std::generic_category().message(errno)));
   }
   const JobBoard board(ranks);
-  const PassedSignals passed(options);
+  PassedSignals passed(options);
+  std::optional<JobFolder> folder;
+  if (!options.starter) folder.emplace();
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0)
     throw Error(ExitCode::Io, fmt::format("cannot start {}: {}", name, std::generic_category().message(errno)));
-  if (child == 0) become(pointers, options, board.address(), pipe[1], parent);
+  if (child == 0) become(pointers, options, board.address(), folder, pipe[1], parent);
   PassedSignals::to(child);
 
   ::close(pipe[1]);
   RunningJob job(child, name, board, pipe[0], options);
   const int status = job.follow();
   PassedSignals::to_nobody();
+  passed.check();
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   check_ending(job, name, ranks, code);
   if (job.killed()) return 128 + PassedSignals::interrupted_by();
-  if (code == 127)
+  if (code == kNoMemory)
+    throw Error(ExitCode::Limit, fmt::format("cannot start {}: out of memory", name),
+                "end other programs, or use --ranks 1");
+  if (code == kNotStarted)
     throw Error(ExitCode::Io, fmt::format("cannot start {}", name), "run 'hpr doctor'; or use --ranks 1");
   // Open MPI's own failures end with 1 as well, and so do ranks whose MPI_Init fails.
   if (code == static_cast<int>(ExitCode::CheckFailed) && !job.has_output() && PassedSignals::interrupted_by() == 0) {

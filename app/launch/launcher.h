@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cluster/transport/communicator.h"
+#include "core/error.h"
 
 namespace hpr {
 
@@ -24,6 +25,21 @@ enum class Interrupts : std::uint8_t {
   End,   ///< end it
   Stop,  ///< the first one reaches its ranks as SIGUSR1: they come to an orderly end by themselves
 };
+
+/// A signal interrupted a job that it was to end (Interrupts::End), and is to end this process too, once what it made
+/// is put away.
+struct Interrupted {
+  int signal;
+};
+
+/// The ranks of a job had not started in time. Open MPI also waits for ever where one is lost while it starts.
+class LateStart final : public Error {
+ public:
+  using Error::Error;
+};
+
+/// The signal that interrupted the last job; 0: none did.
+[[nodiscard]] int last_job_interrupt();
 
 /// How a job is started.
 struct JobOptions {
@@ -47,7 +63,8 @@ void notify_launcher();
 /// `options.hang_limit`, 10 s and half a second a rank is ended; one that does not end after SIGTERM, in as long as
 /// that limit but at least 2 and at most 10 s, is killed. Throws Error: Io when mpiexec or MPI cannot be started; Lost
 /// when a rank or mpiexec itself was killed; Hang when mpiexec was stopped, or no rank of this host has got on, for
-/// longer than the ranks report as their limit (core/job_board.h).
+/// longer than the ranks report as their limit (core/job_board.h). Throws
+/// Interrupted.
 int run_job(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 
 /// The first executable file of this name on the PATH.

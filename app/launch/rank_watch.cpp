@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <utility>
 
 namespace hpr {
@@ -27,7 +28,9 @@ void RankWatch::look(std::chrono::nanoseconds passed) {
     const bool is_new = !rank.report;
     moved = moved || is_new || report->steps != rank.report->steps;
     rank.report = std::move(report);
-    if (is_new) rank.process = static_cast<int>(::syscall(SYS_pidfd_open, rank.report->process, 0));
+    if (!is_new) continue;
+    rank.process = static_cast<int>(::syscall(SYS_pidfd_open, rank.report->process, 0));
+    if (rank.process < 0 && errno == ESRCH && first_.empty()) first_.push_back(static_cast<int>(i));
   }
   still_ = moved ? std::chrono::nanoseconds::zero() : still_ + passed;
 }
@@ -51,7 +54,7 @@ void RankWatch::note_ends(const std::vector<pollfd>& waited) {
 }
 
 std::optional<std::string> RankWatch::first_to_end() const {
-  if (first_.empty()) return std::nullopt;
+  if (first_.empty() || !knows_all()) return std::nullopt;
   std::vector<std::string> all;
   for (const int rank : first_) {
     // What it reported after the last look is still there.
@@ -60,12 +63,19 @@ std::optional<std::string> RankWatch::first_to_end() const {
   return fmt::format("{}", fmt::join(all, ", or "));
 }
 
+bool RankWatch::knows_all() const {
+  return std::ranges::all_of(ranks_, [](const Rank& rank) { return rank.report.has_value(); });
+}
+
 std::chrono::nanoseconds RankWatch::stall_limit() const {
+  // Ranks of this host wait for those of others without getting on.
+  constexpr std::chrono::seconds kOfOtherHosts{60};
   std::chrono::nanoseconds limit{0};
   for (const Rank& rank : ranks_) {
     if (rank.report) limit = std::max(limit, rank.report->stall_limit);
   }
-  return limit;
+  if (limit == std::chrono::nanoseconds::zero() || knows_all()) return limit;
+  return std::max<std::chrono::nanoseconds>(limit, kOfOtherHosts);
 }
 
 bool RankWatch::stalled() const {
@@ -73,10 +83,18 @@ bool RankWatch::stalled() const {
 }
 
 std::string RankWatch::roll_call() const {
-  std::vector<std::string> all;
+  constexpr std::size_t kMaxNamed = 8;
+  std::vector<std::string> awaited;
+  std::vector<std::string> waiting;
   for (int rank = 0; rank < board_.ranks(); ++rank) {
-    if (const auto report = board_.read(rank)) all.push_back(describe(rank, *report));
+    if (const auto report = board_.read(rank))
+      (report->awaited_rank ? waiting : awaited).push_back(describe(rank, *report));
   }
+  std::vector<std::string> all = std::move(awaited);
+  all.insert(all.end(), waiting.begin(), waiting.end());
+  const std::size_t count = all.size();
+  all.resize(std::min(count, kMaxNamed));
+  if (count > kMaxNamed) all.push_back(fmt::format("and {} more", count - kMaxNamed));
   return fmt::format("{}", fmt::join(all, "; "));
 }
 

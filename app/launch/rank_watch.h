@@ -26,14 +26,16 @@ class RankWatch {
   /// After that poll().
   void note_ends(const std::vector<pollfd>& waited);
 
+  /// Whether all ranks are on this host, and have started.
+  [[nodiscard]] bool knows_all() const;
   /// The rank that ended first and in doing what; where several had ended when it was noticed, all of those. None:
-  /// none is known to have ended.
+  /// none is known to have ended, or it may be one of another host.
   [[nodiscard]] std::optional<std::string> first_to_end() const;
-  /// How long no rank may get on, as they report it; 0: as long as they like.
+  /// How long no rank may get on, as they report it, longer where some are on other hosts; 0: as long as they like.
   [[nodiscard]] std::chrono::nanoseconds stall_limit() const;
   /// Whether no rank has got on for longer than that.
   [[nodiscard]] bool stalled() const;
-  /// What each rank was last doing; empty where none is known.
+  /// What each rank was last doing, at most a few of them: those first that wait for nobody. Empty where none is known.
   [[nodiscard]] std::string roll_call() const;
 
  private:

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -23,6 +24,7 @@
 #include "core/job_board.h"
 #include "core/job_environment.h"
 #include "core/log.h"
+#include "core/signals.h"
 #include "walls/manifest/run_journal.h"
 
 namespace hpr {
@@ -70,6 +72,13 @@ void refuse_lone_tasks() {
               fmt::format("run srun --mpi=pmix -n {} hpr ...; srun --mpi=list shows what it has", srun_tasks()));
 }
 
+/// What --launcher names has to start ranks of MPI: a program that is none would start it again.
+void refuse_launcher_without_mpi() {
+  if (std::getenv(kReportStartVariable) == nullptr) return;  // NOLINT(concurrency-mt-unsafe): nobody writes it
+  throw Error(ExitCode::Usage, "what --launcher names started hpr, but not as a rank of an MPI job",
+              "name a launcher of MPI, e.g. --launcher \"srun --mpi=pmix -n {ranks}\"");
+}
+
 /// MPI_Init and, on success only, MPI_Finalize: a rank that left early would hang in it.
 ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
   std::optional<CallLimit> limit;
@@ -112,11 +121,13 @@ ExitCode run_ranks(const Globals& globals, const std::function<ExitCode(Communic
   const auto body = [&](Communicator& comm) { return traced(comm, globals, untraced); };
   if (inside_mpi_job()) return run_in_mpi_job(globals, body);
   refuse_lone_tasks();
-  if (globals.ranks > 1) {
+  refuse_launcher_without_mpi();
+  if (globals.ranks > 1 || !globals.launcher.empty()) {
+    const int ranks = std::max(1, globals.ranks);
     JobOptions limited = options;
-    limited.starter = globals.starter(globals.ranks);
+    limited.starter = globals.starter(ranks);
     limited.hang_limit = globals.hang_limit();
-    return static_cast<ExitCode>(run_job(globals.ranks, globals.args, limited));
+    return static_cast<ExitCode>(run_job(ranks, globals.args, limited));
   }
   if (launched_by_hpr()) {
     notify_launcher();
@@ -135,11 +146,19 @@ bool RestartLimit::use(Clock::time_point now) {
   return true;
 }
 
+bool is_started_again() {
+  const auto journal = RunJournal::of_supervisor();
+  return journal && !journal->read().restarts.empty();
+}
+
 bool supervises(int restarts) {
   return !inside_mpi_job() && !launched_by_hpr() && restarts > 0;
 }
 
 namespace {
+
+/// What a supervised job may take to start, unless the user says otherwise.
+constexpr std::chrono::seconds kSupervisedLimit{60};
 
 bool is_loss(ExitCode code) {
   return code == ExitCode::Lost || code == ExitCode::Hang;
@@ -148,10 +167,15 @@ bool is_loss(ExitCode code) {
 /// Runs one job of a supervised run, and returns its code, or how it was lost.
 std::variant<ExitCode, Error> run_one_job(int ranks, const Globals& globals, const JobOptions& options,
                                           const RunJournal& journal) {
+  const bool is_first = journal.read().restarts.empty();
   try {
     const auto code = static_cast<ExitCode>(run_job(ranks, globals.args, options));
-    if (!is_loss(code) || journal.read().ended) return code;
+    // A lone rank that leaves by itself knows what it lost: its desktop, a display.
+    if (!is_loss(code) || ranks == 1 || journal.read().ended) return code;
     return Error(code, code == ExitCode::Hang ? "the job stood still" : "the job lost a rank");
+  } catch (const LateStart& error) {
+    if (is_first) throw;  // another one would hardly start either
+    return error;
   } catch (const Error& error) {
     // A job that came to its end may lose ranks that leave late; one that hung may end because it was told to.
     if (!is_loss(error.code()) || (error.code() == ExitCode::Lost && journal.read().ended)) throw;
@@ -197,16 +221,19 @@ ExitCode run_supervised(const Globals& globals, int restarts, Interrupts interru
                         const std::filesystem::path& folder, const std::function<ExitCode(Communicator&)>& body) {
   if (!supervises(restarts)) return run_ranks(globals, body, {.interrupts = interrupts});
   refuse_lone_tasks();
+  refuse_launcher_without_mpi();
   const int ranks = std::max(1, globals.ranks);
   RunJournal journal(globals.launcher.empty() ? TemporaryFile() : TemporaryFile(folder));
-  const JobOptions options{.environment = {{RunJournal::kVariable, journal.path().string()}},
-                           .starter = ranks > 1 ? globals.starter(ranks) : std::vector<std::string>{},
-                           .interrupts = interrupts,
-                           .hang_limit = globals.hang_limit()};
+  const JobOptions options{
+      .environment = {{RunJournal::kVariable, journal.path().string()}},
+      .starter = ranks > 1 || !globals.launcher.empty() ? globals.starter(ranks) : std::vector<std::string>{},
+      .interrupts = interrupts,
+      .hang_limit = globals.hang_timeout.empty() ? kSupervisedLimit : globals.hang_limit()};
   Restarts allowed(journal, restarts);
   while (true) {
     const auto outcome = run_one_job(ranks, globals, options, journal);
     if (const auto* const code = std::get_if<ExitCode>(&outcome)) return *code;
+    if (last_job_interrupt() != 0 || take_request() == Request::Stop) throw Error(std::get<Error>(outcome));
     allowed.note(std::get<Error>(outcome));
   }
 }

@@ -42,6 +42,9 @@ class RestartLimit {
 /// Whether this process is to start ranks, or a lone one, and start them again when they are lost.
 [[nodiscard]] bool supervises(int restarts);
 
+/// Whether this is a job of a run that lost an earlier one, which may have written what is to be written again.
+[[nodiscard]] bool is_started_again();
+
 /// As run_ranks, but where this process supervises() the ranks are processes of their own, also a lone one: a job that
 /// loses a rank or stands still is started again, up to `restarts` times an hour (RestartLimit), with the journal of
 /// what was done. Under a launcher that takes rank 0 to another host the journal is in `folder`, which all hosts see.

@@ -70,7 +70,7 @@ void throw_if_packed(std::span<const std::byte> bytes) {
   bytes = bytes.subspan(1);
   const std::string what = take_text(bytes);
   const std::string hint = take_text(bytes);
-  throw Error(code, what, hint, take_text(bytes));
+  throw AgreedError(code, what, hint, take_text(bytes));
 }
 
 template <typename Work>

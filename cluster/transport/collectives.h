@@ -52,14 +52,22 @@ template <typename Value>
 /// Each rank's text, in order of rank, on every rank.
 [[nodiscard]] std::vector<std::string> all_gather_texts(Communicator& comm, const std::string& text);
 
-/// Runs `work` on rank 0 alone and returns its bytes on every rank; an Error it throws is thrown on every rank, so that
-/// no rank waits for one that gave up.
+/// An Error that all ranks of a communicator throw alike, at the same place of what they do together: they may go on
+/// together.
+class AgreedError : public Error {
+ public:
+  using Error::Error;
+  explicit AgreedError(const Error& error) : Error(error) {}
+};
+
+/// Runs `work` on rank 0 alone and returns its bytes on every rank; an Error it throws is thrown on every rank
+/// (AgreedError), so that no rank waits for one that gave up.
 [[nodiscard]] std::vector<std::byte> on_root(Communicator& comm, const std::function<std::vector<std::byte>()>& work);
 
-/// Runs `check` on rank 0 alone; when it fails, every rank throws its Error.
+/// Runs `check` on rank 0 alone; when it fails, every rank throws its Error (AgreedError).
 void check_on_root(Communicator& comm, const std::function<void()>& check);
 
-/// Runs `work` on every rank; when it fails on any, all throw the lowest rank's Error.
+/// Runs `work` on every rank; when it fails on any, all throw the lowest rank's Error (AgreedError).
 void agree_on_failure(Communicator& comm, const std::function<void()>& work);
 
 }  // namespace hpr

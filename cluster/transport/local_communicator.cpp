@@ -319,6 +319,9 @@ void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communica
     } catch (const std::system_error& error) {
       office.close();  // those that run already must not wait for those that never will
       throw Error(ExitCode::Limit, fmt::format("cannot start {} threads: {}", size, error.what()), "use fewer ranks");
+    } catch (...) {
+      office.close();
+      throw;
     }
     run(0);  // on the caller's thread: a single rank starts no thread, and a GL context stays where it was made
   }

@@ -29,10 +29,11 @@ constexpr std::string_view kPrefix = "wall-";
 constexpr std::string_view kSuffix = ".sock";
 constexpr std::string_view kRefused = "error ";  ///< then the exit code's number, and why
 
-/// socket_folder(), made if missing: where running walls of this user are reached, and nobody else may write. Throws
-/// Error (Io) when it cannot be made, or is another's.
+/// socket_folder(), made if missing, without what killed processes left: where running walls of this user are reached,
+/// and nobody else may write. Throws Error (Io) when it cannot be made, or is another's.
 std::filesystem::path control_folder() {
   make_private_folder(socket_folder());
+  remove_left_sockets(socket_folder());
   return socket_folder();
 }
 
@@ -42,23 +43,6 @@ Socket connect_to(const std::filesystem::path& path) {
   Socket socket = start_connecting(address);
   finish_connecting(socket, address.tcp);
   return socket;
-}
-
-/// What a killed run left refuses; a run in the middle of a frame may be too busy to accept.
-bool is_left_over(const std::filesystem::path& path) {
-  try {
-    (void)connect_to(path);
-    return false;
-  } catch (const LinkError& error) {
-    return error.code() == ECONNREFUSED || error.code() == ENOENT;
-  }
-}
-
-/// A run that begins has a socket for an instant before it listens, and refuses as one that was killed does.
-bool is_young(const std::filesystem::path& path) {
-  constexpr std::chrono::seconds kToBegin{10};
-  std::error_code gone;
-  return std::filesystem::last_write_time(path, gone) + kToBegin > std::filesystem::file_time_type::clock::now();
 }
 
 /// Throws Error (Io).
@@ -123,7 +107,13 @@ std::string RunControl::apply_command(const std::string& line) {
   const std::uint64_t before = controls_.changes();
   const RenderSettings settings = settings_;
   const auto stall_limit = report_stall_limit({});  // a scene may take as long as it likes to load
-  std::string answer = table_.run(line);
+  std::string answer;
+  try {
+    answer = table_.run(line);
+  } catch (const Error&) {
+    report_stall_limit(stall_limit);
+    throw;
+  }
   if (controls_.changes() == before) {
     report_stall_limit(stall_limit);
     return answer;
@@ -168,14 +158,10 @@ void RunControl::poll() {
 
 std::vector<RunningWall> running_walls() {
   std::vector<RunningWall> walls;
-  std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(control_folder())) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
-    if (is_left_over(entry.path())) {
-      if (!is_young(entry.path())) std::filesystem::remove(entry.path(), ignored);
-      continue;
-    }
+    if (is_refusing(entry.path())) continue;  // it begins, or was killed just now
     walls.push_back({name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size()), entry.path()});
   }
   std::ranges::sort(walls, {}, &RunningWall::run);

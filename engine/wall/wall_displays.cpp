@@ -162,7 +162,11 @@ bool end_displays(Communicator& comm, WallSender& sender, MissedPictures fail_on
   std::size_t lost = 0;
   for (FrameRecord& frame : manifest.frames) {
     const SwapOutcome outcome = sender.outcome(frame.frame);
-    for (std::size_t i = 0; i < frame.screens.size(); ++i) frame.screens[i].state = outcome.screens[i];
+    for (std::size_t i = 0; i < frame.screens.size(); ++i) {
+      // The displays showed the pictures of the frame before.
+      const bool is_stale = !frame.failed.empty() && outcome.screens[i] == ScreenState::Fresh;
+      frame.screens[i].state = is_stale ? ScreenState::Stale : outcome.screens[i];
+    }
     frame.swap = SwapRecord{};
     if (outcome.skew_s) frame.swap->skew_ms = *outcome.skew_s * 1000.0;
     const auto count = [&](ScreenState state) {

@@ -57,12 +57,17 @@ std::optional<double> target_of(const WallJob& job) {
 
 /// How long the ranks may stand still between frames whose slowest took as long as that.
 std::chrono::nanoseconds stall_limit_of(const WallJob& job, double slowest_ms) {
+  using Nanoseconds = std::chrono::nanoseconds;
   constexpr std::chrono::seconds kMinLimit{10};
+  constexpr std::chrono::seconds kShownHere{45};  // windows and pipes have limits of their own, of 30 s
   constexpr double kFrames = 5.0;
   if (job.stall_limit) return *job.stall_limit;
   if (!job.outputs.assembled.empty()) return kHangTimeout;  // a disk may take its time
   const std::chrono::duration<double, std::milli> limit(kFrames * slowest_ms);
-  return std::max<std::chrono::nanoseconds>(kMinLimit, std::chrono::duration_cast<std::chrono::nanoseconds>(limit));
+  const auto budget = job.link ? std::chrono::duration_cast<Nanoseconds>(job.link->send_budget) : Nanoseconds::zero();
+  const bool shows_here = !job.link && job.display->name != "none";
+  return std::max<Nanoseconds>((shows_here ? kShownHere : kMinLimit) + budget,
+                               std::chrono::duration_cast<Nanoseconds>(limit));
 }
 
 /// While nobody moves the camera, the picture of an open-ended run gets better.
@@ -153,6 +158,7 @@ void WallDriver::take_over() {
     }
     commands = fmt::format("{}", fmt::join(entries.commands, "\n"));
     if (job_.resume && entries.frames.empty()) resume(entries.frames);
+    const std::size_t entries_count = entries.frames.size();
     if (!job_.open_ended()) {
       // The last picture is needed for what is written at the end.
       entries.frames.resize(std::min(entries.frames.size(), static_cast<std::size_t>(job_.frame_count() - 1)));
@@ -161,6 +167,9 @@ void WallDriver::take_over() {
     }
     std::ranges::move(entries.restarts, std::back_inserter(manifest_.restarts));
     if (journal_ && !job_.open_ended()) journal_->add_begin();
+    journaled_ = entries_count;
+    for (const std::uint64_t frame : failed_frames(manifest_.earlier)) failed_.add_failed(frame);
+    failed_.add_drawn();
   });
   first_frame_ = all_gather_value(session_.comm(), first_frame_)[0];
   replay(commands);
@@ -245,14 +254,41 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   const std::vector<View> views = screens_in(number, heads_.at(number));
-  Frame& frame = frames_->make(curved_->drawn(views), number, progress);
-  std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
-  curved_->finish(views, pictures, session_.threads());
-  pictures_ = compose_screens(wall_, std::move(pictures));
-  monitor_pictures_ = monitors_.draw(session_.comm(), pictures_, owners_);
+  verified_ = {};
+  const std::optional<Error> failure = draw_with_retry(session_.comm(), fmt::format("frame {}", number),
+                                                       [&] { make_pictures(views, number, progress); });
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
+  if (failure) {
+    failed_.add_failed(number);
+    if (pictures_.empty() || failed_.in_a_row() >= kMaxFailedInARow) throw AgreedError(*failure);
+    if (session_.rank() == 0) log::error("frame {} failed: {}", number, failure->what());
+  } else {
+    failed_.add_drawn();
+  }
   agree_on_failure(session_.comm(), [&] { show(number); });
-  record(number);
+  shown_ms_ = watch.ms();
+  record(number, failure);
+}
+
+void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress) {
+  try {
+    Frame& frame = frames_->make(curved_->drawn(views), number, progress);
+    verified_ += frames_->verified();
+    if (const std::uint64_t unmended = frames_->verified().unmended; unmended > 0) {
+      throw AgreedError(ExitCode::CheckFailed,
+                        fmt::format("of {} tile{} no two of three drawings agree", unmended, unmended == 1 ? "" : "s"),
+                        "memory, a GPU or a link of these ranks flips bits: replace it");
+    }
+    std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
+    curved_->finish(views, pictures, session_.threads());
+    pictures = compose_screens(wall_, std::move(pictures));
+    std::vector<Image<Rgba8>> monitor_pictures = monitors_.draw(session_.comm(), pictures, owners_);
+    pictures_ = std::move(pictures);
+    monitor_pictures_ = std::move(monitor_pictures);
+  } catch (...) {
+    frames_->discard();
+    throw;
+  }
 }
 
 bool WallDriver::follow_viewers() {
@@ -279,6 +315,7 @@ bool WallDriver::settled() {
 }
 
 bool WallDriver::finish() {
+  report_stall_limit({});  // results may take as long as they like to be gathered and written
   agree_on_failure(session_.comm(), [&] {
     if (display_) display_->finish();
   });
@@ -354,21 +391,30 @@ std::vector<ScreenRecord> WallDriver::record_screens() {
   return screens;
 }
 
-void WallDriver::record(std::uint64_t number) {
+void WallDriver::record(std::uint64_t number, const std::optional<Error>& failure) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
-  slowest_ms_ = std::max(slowest_ms_, slowest);
+  slowest_ms_ = std::max({slowest_ms_, slowest, shown_ms_});
   report_stall_limit(stall_limit_of(job_, slowest_ms_));
-  frames_->record_frame_time(slowest);
   FrameRecord frame{number, slowest, strategy(), record_screens()};
-  if (frames_->report()) frame.budget = to_record(*frames_->report());
-  frame.slowest = slowest_of(session_, *frames_, hosts_);
+  if (failure) {
+    frame.failed = failure->what();
+    for (ScreenRecord& screen : frame.screens) screen.state = ScreenState::Stale;
+  } else {
+    frames_->record_frame_time(slowest);
+    if (frames_->report()) frame.budget = to_record(*frames_->report());
+    const std::vector<RankWork> works = works_of(session_, *frames_);
+    frame.slowest = slowest_of(works, *frames_, hosts_);
+    warn_of_slow_ranks(works);
+  }
+  if (plan().verify_percent > 0.0) frame.verify = to_record({plan().verify_percent, verified_});
   frame.heads = heads_.report();
   for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor) {
     frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, monitor_pictures_[monitor], ScreenState::Fresh));
   }
   // Of an open-ended run only now and then: that it gets on is all that counts.
   constexpr std::uint64_t kFramesPerEntry = 1000;
-  if (journal_ && (job_.frames || number % kFramesPerEntry == 0)) journal_->add_frame(to_json(frame));
+  const bool is_news = job_.frames ? number >= journaled_ : number % kFramesPerEntry == 0;
+  if (journal_ && is_news) journal_->add_frame(to_json(frame));
   // An open-ended run keeps its last frames only.
   constexpr std::size_t kMaxRecords = 10'000;
   if (!job_.frames && manifest_.frames.size() == kMaxRecords) {
@@ -378,13 +424,21 @@ void WallDriver::record(std::uint64_t number) {
   manifest_.frames.push_back(std::move(frame));
 }
 
+void WallDriver::warn_of_slow_ranks(std::span<const RankWork> works) {
+  if (session_.rank() != 0) return;
+  for (const SlowRank& slow : slow_ranks_.add(works, session_.comm().seconds())) {
+    const std::string& host = hosts_[static_cast<std::size_t>(slow.rank)];
+    log::warning("{}", describe(slow, host, pass_name(*frames_, slow.pass)));
+  }
+}
+
 std::vector<ScreenState> WallDriver::states() const {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
   // Displays have not reported the latest frames yet.
   const std::uint64_t awaited = job_.link ? static_cast<std::uint64_t>(job_.link->in_flight) + 1 : 0;
-  std::vector<ScreenState> states(owners_.size(), ScreenState::Fresh);
-  if (remote_ && last >= first_frame_ + awaited) states = remote_->outcome(last - awaited).screens;
-  return states;
+  if (remote_ && last >= first_frame_ + awaited) return remote_->outcome(last - awaited).screens;
+  std::vector<ScreenState> all(owners_.size(), failed_.in_a_row() > 0 ? ScreenState::Stale : ScreenState::Fresh);
+  return all;
 }
 
 std::string WallDriver::strategy() const {

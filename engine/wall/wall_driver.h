@@ -10,7 +10,9 @@
 #include "engine/frame_maker.h"
 #include "engine/output.h"
 #include "engine/session.h"
+#include "engine/wall/frame_retry.h"
 #include "engine/wall/run_control.h"
+#include "engine/wall/slow_ranks.h"
 #include "engine/wall/viewpoint.h"
 #include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_job.h"
@@ -50,8 +52,13 @@ class WallDriver {
   /// Collective. Runs the commands that arrived since the last frame; false when one of them ended the run.
   [[nodiscard]] bool apply_commands();
 
-  /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` shows its samples.
+  /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` shows its samples. A frame
+  /// that fails is drawn once more (draw_with_retry); where that fails too, the screens show their last pictures again
+  /// and the frame counts as failed. Throws its error where this is the job's first frame, or kMaxFailedInARow failed.
   void draw(std::uint64_t number, Progress& progress);
+  static constexpr int kMaxFailedInARow = 10;
+  /// Of the run: earlier jobs' too.
+  [[nodiscard]] const FailedFrames& failed() const { return failed_; }
 
   /// Collective. Moves the camera by the input of viewers on all ranks since the last call; a camera on a path stays on
   /// it. False once one of them, or a signal, ended the run.
@@ -78,7 +85,9 @@ class WallDriver {
   void resume(std::vector<std::string>& frames);
   [[nodiscard]] std::string status() const;
   void show(std::uint64_t number);
-  void record(std::uint64_t number);
+  void make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress);
+  void record(std::uint64_t number, const std::optional<Error>& failure);
+  void warn_of_slow_ranks(std::span<const RankWork> works);
   [[nodiscard]] std::vector<ScreenRecord> record_screens();
   [[nodiscard]] std::string strategy() const;
 
@@ -103,7 +112,12 @@ class WallDriver {
   std::vector<Image<Rgba8>> monitor_pictures_;  ///< per monitor, on rank 0
   RunManifest manifest_;
   FrameCost last_cost_;
-  double slowest_ms_ = 0.0;            ///< of the frames since something was changed
+  double shown_ms_ = 0.0;      ///< of the last frame, until this rank had shown it
+  std::size_t journaled_ = 0;  ///< frames that the journal had when this job began
+  double slowest_ms_ = 0.0;    ///< of the frames since something was changed
+  VerifyCounts verified_;      ///< in the last frame, all its attempts
+  FailedFrames failed_;
+  SlowRankWatch slow_ranks_;           ///< on rank 0
   std::optional<RunJournal> journal_;  ///< on rank 0 of a job that is started again when it is lost
   std::uint64_t first_frame_ = 0;
   bool interrupted_ = false;

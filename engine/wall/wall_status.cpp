@@ -11,16 +11,10 @@
 namespace hpr {
 namespace {
 
-/// What a rank did for a frame itself. What it took to composite is left out: most of that is waiting.
-struct Work {
-  double ms = 0.0;
-  double pass_ms = 0.0;
-  std::uint64_t pass = 0;  ///< that took most; 0: the keys
-};
-
-Work work_of(const FrameTimes& times, const FrameTimes& before, int threads) {
+/// What it took to composite is left out: most of that is waiting.
+RankWork work_of(const FrameTimes& times, const FrameTimes& before, int threads) {
   const double primary_ms = times.primary_ms - before.primary_ms;
-  Work work{primary_ms, primary_ms, 0};
+  RankWork work{primary_ms, primary_ms, 0};
   for (std::size_t i = 0; i < times.passes.size(); ++i) {
     const double earlier_ms = i < before.passes.size() ? before.passes[i].ms : 0.0;
     const double ms = (times.passes[i].ms - earlier_ms) / threads;
@@ -47,19 +41,28 @@ std::string screens_in(ScreenState state, const FrameRecord& frame, std::span<co
 
 }  // namespace
 
-SlowestRecord slowest_of(Session& session, const FrameMaker& frames, std::span<const std::string> hosts) {
-  const FrameTimes& times = frames.times();
-  const std::vector<Work> works =
-      all_gather_value(session.comm(), work_of(times, frames.times_before(), session.threads()));
-  const auto most = std::ranges::max_element(works, {}, &Work::ms);
+std::vector<RankWork> works_of(Session& session, const FrameMaker& frames) {
+  return all_gather_value(session.comm(), work_of(frames.times(), frames.times_before(), session.threads()));
+}
+
+std::string pass_name(const FrameMaker& frames, std::size_t pass) {
+  if (pass > 0) return frames.times().passes.at(pass - 1).name;
+  return frames.plan().primary == Primary::Rays ? "primary-rays" : "raster";
+}
+
+SlowestRecord slowest_of(std::span<const RankWork> works, const FrameMaker& frames,
+                         std::span<const std::string> hosts) {
+  const auto most = std::ranges::max_element(works, {}, &RankWork::ms);
   const auto rank = static_cast<std::size_t>(most - works.begin());
-  std::string pass = frames.plan().primary == Primary::Rays ? "primary-rays" : "raster";
-  if (most->pass > 0) pass = times.passes.at(most->pass - 1).name;
-  return {static_cast<int>(rank), hosts[rank], most->ms, pass, most->pass_ms};
+  return {static_cast<int>(rank), hosts[rank], most->ms, pass_name(frames, most->pass), most->pass_ms};
 }
 
 BudgetRecord to_record(const BudgetReport& report) {
   return {report.target_ms, report.resolution_scale, report.samples, report.given_up, report.resting};
+}
+
+VerifyRecord to_record(const VerifyReport& report) {
+  return {report.percent, report.counts.tiles, report.counts.mismatches};
 }
 
 std::string describe_status(std::span<const double> frame_ms, const FrameRecord& last,

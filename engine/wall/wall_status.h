@@ -7,16 +7,24 @@
 
 #include "core/progress.h"
 #include "engine/frame_maker.h"
+#include "engine/wall/slow_ranks.h"
 #include "walls/manifest/manifest.h"
 
 namespace hpr {
 
-/// Collective. The rank that did most for a frame: the times of `frames` that are its own work count. `hosts`:
-/// per rank.
-[[nodiscard]] SlowestRecord slowest_of(Session& session, const FrameMaker& frames, std::span<const std::string> hosts);
+/// Collective. What each rank did for the last of `frames`.
+[[nodiscard]] std::vector<RankWork> works_of(Session& session, const FrameMaker& frames);
+
+/// The name of RankWork::pass.
+[[nodiscard]] std::string pass_name(const FrameMaker& frames, std::size_t pass);
+
+/// The rank that did most for the last of `frames`. `works` and `hosts`: per rank.
+[[nodiscard]] SlowestRecord slowest_of(std::span<const RankWork> works, const FrameMaker& frames,
+                                       std::span<const std::string> hosts);
 
 /// As manifests have it.
 [[nodiscard]] BudgetRecord to_record(const BudgetReport& report);
+[[nodiscard]] VerifyRecord to_record(const VerifyReport& report);
 
 /// "24.1 fps (min 11.0), slowest rank 3 on wall05: shadow 21.0 ms; stale: wall-r0c1": the frames that took `frame_ms`
 /// each, what the last of them was held up by, and what its screens show; `states` per screen of `last`.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -16,6 +17,7 @@ struct RayBuild {
   /// Every rank traces by AVX2, so that all round alike. Else each by the widest instructions its processor has, whose
   /// distances may differ from AVX2's in the last bit.
   bool same_instructions = true;
+  std::size_t max_bytes = 0;  ///< Embree may allocate, beyond which memory has run out; 0: as many as there are
 
   bool operator==(const RayBuild&) const = default;
 };

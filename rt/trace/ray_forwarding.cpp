@@ -300,13 +300,13 @@ void RayForwarding::for_each(int threads, std::size_t count, const std::function
   State all = State::Failed;
   {
     std::vector<std::jthread> team;
-    for (std::size_t i = 0; i < size; ++i) {
-      team.emplace_back([this, &run, i, rank = trace::row_of_this_thread().rank] {
-        const trace::InRow row({rank, static_cast<int>(i)});
-        work(run);
-      });
-    }
     try {
+      for (std::size_t i = 0; i < size; ++i) {
+        team.emplace_back([this, &run, i, rank = trace::row_of_this_thread().rank] {
+          const trace::InRow row({rank, static_cast<int>(i)});
+          work(run);
+        });
+      }
       all = run_rounds(run);
     } catch (...) {
       run.failure = std::current_exception();

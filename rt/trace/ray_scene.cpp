@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <map>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -47,6 +48,15 @@ using OwnedDevice = Owned<RTCDevice, rtcReleaseDevice>;
 using OwnedScene = Owned<RTCScene, rtcReleaseScene>;
 using OwnedGeometry = Owned<RTCGeometry, rtcReleaseGeometry>;
 
+Error embree_error(std::string_view doing, RTCError code, std::string_view text) {
+  if (code == RTC_ERROR_OUT_OF_MEMORY) {
+    return {ExitCode::Limit, fmt::format("cannot {}: out of memory", doing),
+            "use more ranks or a smaller scene, or render without rays: --passes none --primary raster"};
+  }
+  return {ExitCode::NoDevice, fmt::format("cannot {}: Embree error {}: {}", doing, static_cast<int>(code), text),
+          "render without rays: --passes none --primary raster"};
+}
+
 /// Embree reports through a callback, perhaps from several of its threads and perhaps because memory ran out: it
 /// neither throws nor allocates. The first report waits here until the call that brought it has returned.
 class Failure {
@@ -62,15 +72,28 @@ class Failure {
 
   void check() const {
     if (!noted_) return;
-    throw Error(ExitCode::NoDevice,
-                fmt::format("cannot build the ray scene: Embree error {}: {}", static_cast<int>(code_), text_.data()),
-                "give the process more memory, or render without ray passes: --passes none");
+    throw embree_error("build the ray scene", code_, text_.data());
   }
 
  private:
   std::atomic<bool> noted_ = false;
   RTCError code_ = RTC_ERROR_NONE;
   std::array<char, 256> text_{};
+};
+
+/// Counts what Embree allocates, and refuses what goes beyond a limit. Called from several threads.
+class Allocation {
+ public:
+  void limit_to(std::size_t bytes) { limit_ = static_cast<std::int64_t>(bytes); }
+
+  static bool count(void* self, ssize_t bytes, bool /*done*/) noexcept {
+    auto& allocation = *static_cast<Allocation*>(self);
+    return allocation.bytes_.fetch_add(bytes) + bytes <= allocation.limit_;
+  }
+
+ private:
+  std::int64_t limit_ = 0;
+  std::atomic<std::int64_t> bytes_ = 0;
 };
 
 bool tracable(const float* p) {
@@ -154,6 +177,7 @@ using SharedPart = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  // 
 
 struct RayScene::Embree {
   Failure failure;
+  Allocation allocation;  ///< outlives what is freed below
   OwnedDevice device;
   std::map<SharedPart, OwnedScene> shared;
   OwnedScene top;
@@ -173,13 +197,12 @@ void RayScene::Embree::start(int threads, const RayBuild& build) {
   const char* const isa = build.same_instructions && __builtin_cpu_supports("avx2") ? ",isa=avx2" : "";
   device = OwnedDevice(rtcNewDevice(fmt::format("threads={},set_affinity=0{}", std::max(threads, 1), isa).c_str()));
   if (device.get() == nullptr) {
-    const RTCError error = rtcGetDeviceError(nullptr);
-    if (error == RTC_ERROR_OUT_OF_MEMORY)
-      throw Error(ExitCode::Limit, "out of memory in Embree", "use fewer ranks or a smaller scene");
-    throw Error(ExitCode::NoDevice, fmt::format("cannot start Embree: error {}", static_cast<int>(error)),
-                "render without ray passes: --passes none");
+    throw embree_error("start Embree", rtcGetDeviceError(nullptr), "it names no reason");
   }
   rtcSetDeviceErrorFunction(device.get(), &Failure::note, &failure);
+  if (build.max_bytes == 0) return;
+  allocation.limit_to(build.max_bytes);
+  rtcSetDeviceMemoryMonitorFunction(device.get(), &Allocation::count, &allocation);
 }
 
 OwnedScene RayScene::Embree::new_scene() const {

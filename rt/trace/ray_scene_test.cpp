@@ -7,7 +7,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <random>
+#include <string>
 
+#include "core/error.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -56,6 +58,43 @@ TEST(RayScene, FindsWhatABruteForceSearchFinds) {
     EXPECT_EQ(blocked[i] != 0, surfaces[i] != kNoSurface);
   }
   EXPECT_LE(differing, 2U);  // rays within a rounding of an edge
+}
+
+/// Two spheres of their own triangles, and twenty that share theirs.
+Scene spheres() {
+  Scene scene;
+  for (int i = 0; i < 2; ++i) {
+    test::place_mesh(scene, test::add_mesh(scene, test::sphere(1.0, 40, 0)),
+                     glm::translate(glm::dmat4(1.0), {0.3, i, 0.0}));
+  }
+  const std::uint32_t shared = test::add_mesh(scene, test::sphere(0.5, 40, 0));
+  for (int i = 0; i < 20; ++i) {
+    test::place_mesh(scene, shared, glm::translate(glm::dmat4(1.0), {std::cos(i), 0.1 * i - 1.0, std::sin(i)}));
+  }
+  finish_scene(scene);
+  return scene;
+}
+
+/// Whether Embree's memory sufficed. Any other failure than that is a failure of the test.
+bool is_built_within(const Scene& scene, std::size_t max_bytes) {
+  try {
+    const RayScene rays(scene, RaySpace(scene.bounds), 2, std::array{SurfaceRange{0, scene.triangles}},
+                        {.max_bytes = max_bytes});
+    return true;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Limit) << error.what();
+    EXPECT_NE(error.hint().find("more ranks"), std::string::npos) << error.hint();
+    return false;
+  }
+}
+
+TEST(RayScene, MemoryThatEndsAnywhereIsALimitAndNotAMissingDevice) {
+  const Scene scene = spheres();
+  std::size_t bytes = 1;
+  int refused = 0;
+  for (; !is_built_within(scene, bytes); bytes += 1 + bytes / 8) ++refused;
+  EXPECT_GT(refused, 20);
+  EXPECT_LT(bytes, std::size_t{1} << 30U);
 }
 
 /// Surfaces met by rays from random places, many of them into the edges of triangles.

@@ -14,7 +14,7 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/progress.h"
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
@@ -371,6 +371,7 @@ std::string plot_speed_up(const ScaleReport& report) {
   const Scales scales{LogScale::of({cores.begin(), cores.end()}, kField.left + 30, kField.right - 30),
                       LogScale::of(std::move(speed_ups), kField.bottom, kField.top)};
   std::vector<Tick> ticks;
+  ticks.reserve(cores.size());
   for (const int count : cores) ticks.push_back({scales.cores.at(count), fmt::format("{}", count)});
   plot.draw_y_ticks(scales.speed_up.ticks());
   plot.draw_x_ticks(ticks);

@@ -72,6 +72,9 @@ class Display {
   /// Returns when the frame is handed over; its pictures may then change. Throws Error (Io, Lost).
   virtual void show(const WallFrame& frame) = 0;
 
+  /// Whether show() may succeed again after it threw Error (Io).
+  [[nodiscard]] virtual bool recovers() const { return false; }
+
   /// What the last frame's screens took; empty where it is not known.
   [[nodiscard]] virtual std::vector<ScreenCost> costs() const { return {}; }
 

@@ -59,6 +59,8 @@ class FileDisplay final : public Display {
 
   [[nodiscard]] std::string_view name() const override { return "file"; }
 
+  [[nodiscard]] bool recovers() const override { return true; }
+
   void show(const WallFrame& frame) override {
     const std::filesystem::path kept = folder_ / fmt::format("frame-{:06}", frame.number);
     if (keeps_frames_ && !(frame.screens.empty() && frame.monitors.empty())) make_folder(kept);

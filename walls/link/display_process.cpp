@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <exception>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/json.h"
 #include "core/log.h"
 #include "image/image.h"
@@ -20,6 +21,7 @@ namespace {
 
 constexpr double kTick = 0.1;
 constexpr std::chrono::milliseconds kStatusEvery{200};
+constexpr double kRetryEveryMs = 1000.0;
 constexpr int kBadgeHeight = 24;
 constexpr Rgba8 kBadgeColor{176, 32, 32, 255};
 constexpr Rgba8 kBadgeText{255, 255, 255, 255};
@@ -34,6 +36,8 @@ std::string_view to_string(ShownState state) {
       return "fresh";
     case ShownState::Stale:
       return "stale";
+    case ShownState::Failed:
+      return "failed";
     case ShownState::Ended:
       break;
   }
@@ -70,7 +74,7 @@ DisplayProcess::DisplayProcess(const Wall& wall, std::string host, Display& disp
     while (!wake.wait_for(lock, stop, kStatusEvery, [&] { return stop.stop_requested(); })) {
       try {
         write_status();
-      } catch (const Error& error) {
+      } catch (const std::exception& error) {  // also where memory is short
         log::debug("{}", error.what());
       }
     }
@@ -90,7 +94,11 @@ DisplayProcess::~DisplayProcess() {
 
 void DisplayProcess::run(const std::function<bool()>& stop) {
   while (!stop() && !display_.take_input().stop) {
-    if (auto presentation = receiver_.next(kTick)) present(*presentation);
+    if (auto presentation = receiver_.next(kTick)) {
+      present(*presentation);
+    } else {
+      retry();
+    }
     const ReceiverReport report = receiver_.report();
     update(report);
     if (settings_.once && report.runs > 0 && report.idle && !report.connected) break;
@@ -101,7 +109,12 @@ void DisplayProcess::run(const std::function<bool()>& stop) {
 void DisplayProcess::present(Presentation& presentation) {
   std::vector<ScreenPicture> pictures;
   for (const auto& [screen, picture] : presentation.pictures) pictures.push_back({screen, picture});
-  if (!pictures.empty()) display_.show({presentation.frame, pictures});
+  if (!pictures.empty() && !try_to_show({presentation.frame, pictures})) {
+    receiver_.not_shown(presentation);
+    unshown_ = std::move(presentation);
+    return;
+  }
+  unshown_.reset();
   if (!receiver_.shown(presentation)) return;
   for (auto& [screen, picture] : presentation.pictures) {
     screens_[screen].picture = std::move(picture);
@@ -109,17 +122,42 @@ void DisplayProcess::present(Presentation& presentation) {
   }
 }
 
+bool DisplayProcess::try_to_show(const WallFrame& frame) {
+  try {
+    display_.show(frame);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::Io || !display_.recovers()) throw;
+    if (!failing_) log::error("{}: frame {} is not shown; {}", error.what(), frame.number, error.hint());
+    failing_ = true;
+    since_failure_.restart();
+    return false;
+  }
+  if (failing_) log::info("frame {} is shown again", frame.number);
+  failing_ = false;
+  return true;
+}
+
+/// Nothing newer may come for long.
+void DisplayProcess::retry() {
+  if (!unshown_ || since_failure_.ms() < kRetryEveryMs) return;
+  Presentation again = std::move(*unshown_);
+  unshown_.reset();
+  present(again);
+}
+
 void DisplayProcess::update(const ReceiverReport& report) {
   const double now = receiver_.now();
   for (std::size_t i = 0; i < screens_.size(); ++i) {
     const ScreenReport& of = report.screens[i];
     ShownState state = ShownState::Fresh;
-    if (!of.frame || !of.arrived) {
+    if (!of.arrived || (!of.frame && !failing_)) {
       state = ShownState::Waiting;
     } else if (report.ended) {
       state = ShownState::Ended;
     } else if (now - *of.arrived > settings_.stale_after.count()) {
       state = ShownState::Stale;
+    } else if (failing_) {
+      state = ShownState::Failed;
     }
     const ShownState before = screens_[i].state;
     if (state == before) continue;
@@ -139,7 +177,7 @@ void DisplayProcess::update(const ReceiverReport& report) {
 
 void DisplayProcess::show_again(std::size_t screen, const Image<Rgba8>& picture) {
   const std::vector<ScreenPicture> pictures{{screen, picture}};
-  display_.show({screens_[screen].frame, pictures});
+  (void)try_to_show({screens_[screen].frame, pictures});
 }
 
 std::string DisplayProcess::status() const {
@@ -167,15 +205,7 @@ void DisplayProcess::write_status() {
   const std::string text = status();
   if (text == written_) return;
   // Whole at any time, and not worth waiting for the disk: it says what is, not what was.
-  const std::filesystem::path file = settings_.folder / "display.json";
-  const std::filesystem::path next = settings_.folder / ".display.json.next";
-  std::ofstream stream(next);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error(ExitCode::Io, fmt::format("cannot write '{}'", next.string()));
-  std::error_code error;
-  std::filesystem::rename(next, file, error);
-  if (error) throw Error(ExitCode::Io, fmt::format("cannot write '{}': {}", file.string(), error.message()));
+  write_file_atomically(settings_.folder / "display.json", text, AtomicFile::Sync::None);
   written_ = text;
 }
 

@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
 
+#include "core/timing.h"
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
 #include "walls/link/receiver.h"
@@ -19,8 +21,9 @@ namespace hpr {
 enum class ShownState : std::uint8_t {
   Waiting,  ///< no frame yet
   Fresh,
-  Stale,  ///< no frame for too long
-  Ended,  ///< the run is over; its last frame stays
+  Stale,   ///< no frame for too long
+  Ended,   ///< the run is over; its last frame stays
+  Failed,  ///< what came could not be shown: the disk is full
 };
 
 [[nodiscard]] std::string_view to_string(ShownState state);
@@ -45,11 +48,15 @@ class DisplayProcess {
   DisplayProcess& operator=(const DisplayProcess&) = delete;
 
   /// Until `stop` or whoever looks says so, asked several times a second, or with `once` the first run has ended.
-  /// Throws what the display throws.
+  /// Throws what the display throws, but for errors it recovers from: those are said once, and shown is what comes
+  /// next, or the same once more every second.
   void run(const std::function<bool()>& stop);
 
  private:
   void present(Presentation& presentation);
+  /// False, and said once, where the display cannot now but may later.
+  [[nodiscard]] bool try_to_show(const WallFrame& frame);
+  void retry();
   void update(const ReceiverReport& report);
   void show_again(std::size_t screen, const Image<Rgba8>& picture);
   [[nodiscard]] std::string status() const;
@@ -67,6 +74,9 @@ class DisplayProcess {
   FrameReceiver& receiver_;
   ProcessSettings settings_;
   std::vector<Screen> screens_;
+  bool failing_ = false;                 ///< the display could not show the last frame
+  std::optional<Presentation> unshown_;  ///< that frame
+  Stopwatch since_failure_;
   mutable std::mutex mutex_;  ///< of the screens' states
   std::string written_;
   std::jthread writer_;  ///< writing waits for the disk; showing must not

@@ -2,9 +2,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <thread>
@@ -26,7 +28,12 @@ constexpr const char* kToken = "a shared secret";
 class KeepingDisplay final : public Display {
  public:
   [[nodiscard]] std::string_view name() const override { return "keeping"; }
+  [[nodiscard]] bool recovers() const override { return true; }
   void show(const WallFrame& frame) override {
+    if (full_) {
+      ++refused_;
+      throw Error(ExitCode::Io, "no space", "make some");
+    }
     for (const ScreenPicture& picture : frame.screens) {
       const std::lock_guard lock(mutex_);
       shown_.emplace_back(picture.screen, frame.number, picture.image);
@@ -41,8 +48,13 @@ class KeepingDisplay final : public Display {
     const std::lock_guard lock(mutex_);
     return shown_;
   }
+  /// From now on nothing can be shown, or it can again.
+  void set_full(bool full) { full_ = full; }
+  [[nodiscard]] int refused() const { return refused_; }
 
  private:
+  std::atomic<bool> full_ = false;
+  std::atomic<int> refused_ = 0;
   mutable std::mutex mutex_;
   std::vector<Shown> shown_;
 };
@@ -58,6 +70,7 @@ class RunningDisplay {
         thread_([this](const std::stop_token& stop) { process_.run([&] { return stop.stop_requested(); }); }) {}
 
   [[nodiscard]] const KeepingDisplay& display() const { return display_; }
+  [[nodiscard]] KeepingDisplay& display() { return display_; }
   [[nodiscard]] ReceiverReport report() const { return receiver_.report(); }
 
  private:
@@ -441,6 +454,27 @@ TEST_F(LinkTest, AScreenWithoutFramesIsMarkedAndUnmarkedByTheNext) {
   EXPECT_EQ(display.display().shown()[4].picture, picture(display.display().shown()[4].screen, 1));
 }
 
+TEST_F(LinkTest, ADisplayThatCannotShowGoesOnAndShowsTheFrameOnceItCan) {
+  RunningDisplay display(wall_, "localhost", receiver());
+  WallSender sender(wall_, owners(), this->sender());
+  sender.wait_for_displays(Seconds(2.0));
+  show(sender, 0);
+  ASSERT_TRUE(within(3.0, [&] { return display.display().shown().size() == 2; }));
+  display.display().set_full(true);
+  show(sender, 1);
+  show(sender, 2);
+  EXPECT_TRUE(within(5.0, [&] { return display.display().refused() >= 2; }));
+  EXPECT_EQ(sender.outcome(1).screens[0], ScreenState::Stale);
+  EXPECT_EQ(display.display().shown().size(), 2U);
+  display.display().set_full(false);
+  // Nothing newer comes.
+  ASSERT_TRUE(within(5.0, [&] { return display.display().shown().size() == 4; }));
+  EXPECT_EQ(display.display().shown().back().frame, 2U);
+  EXPECT_TRUE(within(3.0, [&] { return sender.outcome(2).screens[0] == ScreenState::Fresh; }));
+  sender.finish();
+  EXPECT_GT(sender.degraded_seconds(), 0.0);
+}
+
 TEST_F(LinkTest, ASocketSomebodyListensOnIsNotTakenAndADeadOneIs) {
   const LinkAddress where = address("taken");
   {
@@ -455,6 +489,28 @@ TEST_F(LinkTest, ASocketSomebodyListensOnIsNotTakenAndADeadOneIs) {
   const Socket dead(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   ASSERT_EQ(::bind(dead.descriptor(), reinterpret_cast<const sockaddr*>(&where.storage), where.length), 0);
   EXPECT_NO_THROW({ const Listener again(where); });
+}
+
+TEST_F(LinkTest, SocketsOfDeadProcessesAreRemovedAndNoOthers) {
+  const LinkAddress dead = address("dead");
+  const LinkAddress young = address("young");
+  const LinkAddress busy = address("busy");
+  const LinkAddress file = address("file");
+  const Listener listener(busy);
+  for (const LinkAddress& each : {dead, young}) {
+    const Socket socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    ASSERT_EQ(::bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&each.storage), each.length), 0);
+  }
+  std::ofstream(file.text) << "no socket";
+  for (const LinkAddress& each : {dead, busy, file}) {
+    std::filesystem::last_write_time(each.text,
+                                     std::filesystem::file_time_type::clock::now() - std::chrono::minutes(1));
+  }
+  remove_left_sockets(std::filesystem::path(dead.text).parent_path());
+  EXPECT_FALSE(std::filesystem::exists(dead.text));
+  EXPECT_TRUE(std::filesystem::exists(young.text));
+  EXPECT_TRUE(std::filesystem::exists(busy.text));
+  EXPECT_TRUE(std::filesystem::exists(file.text));
 }
 
 TEST(WallHosts, ScreensGoToTheirNodesHostsAndTheRestToThisOne) {

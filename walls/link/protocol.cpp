@@ -20,7 +20,7 @@ namespace hpr {
 namespace {
 
 constexpr std::string_view kBlockMagic = "HPRLINK\n";
-constexpr std::uint32_t kLinkProtocol = 2;
+constexpr std::uint32_t kLinkProtocol = 3;
 constexpr std::uint32_t kPacketMagic = 0x4B525048;  // "HPRK"
 /// Written as it lies in memory: what comes out as another number comes from a machine of another byte order.
 constexpr std::uint32_t kByteOrder = 0x01020304;
@@ -199,7 +199,7 @@ PacketHeader decode_header(std::span<const std::byte> bytes) {
   if (hashed.u32() != kPacketMagic) throw LinkError("a packet of another kind of program");
   PacketHeader header;
   const std::uint32_t type = hashed.u32();
-  if (type < static_cast<std::uint32_t>(PacketType::Frame) || type > static_cast<std::uint32_t>(PacketType::Bye)) {
+  if (type < static_cast<std::uint32_t>(PacketType::Frame) || type > static_cast<std::uint32_t>(PacketType::NotShown)) {
     throw LinkError("a packet of an unknown type");
   }
   header.type = static_cast<PacketType>(type);
@@ -218,7 +218,7 @@ std::string link_build() {
 
 std::string link_token() {
   const char* const token = std::getenv("HPR_TOKEN");  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
-  const std::string secret = token == nullptr ? "" : token;
+  std::string secret = token == nullptr ? "" : token;
   constexpr std::size_t kMinLength = 8;
   if (!secret.empty() && secret.size() < kMinLength) {
     throw Error(ExitCode::Usage, fmt::format("the secret in HPR_TOKEN has fewer than {} characters", kMinLength),

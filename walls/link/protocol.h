@@ -166,6 +166,7 @@ enum class PacketType : std::uint32_t {
   Ping = 6,       ///< rank 0 -> display
   Pong = 7,       ///< display -> rank 0: payload: when the ping came, when this left (display's clock)
   Bye = 8,        ///< rank -> display: the run is over as meant
+  NotShown = 9,   ///< display -> rank 0: it could not be shown, and may be later
 };
 
 struct PacketHeader {

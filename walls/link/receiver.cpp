@@ -50,6 +50,7 @@ std::optional<Presentation> FrameReceiver::next(double limit) {
   const double until = settings_.clock() + limit;
   std::unique_lock lock(mutex_);
   while (true) {
+    if (failure_) std::rethrow_exception(failure_);
     const double now = settings_.clock();
     const double wake = orders_.empty() ? until : std::min(until, orders_.front().second);
     if (!orders_.empty() && now >= orders_.front().second) break;
@@ -95,6 +96,17 @@ bool FrameReceiver::shown(const Presentation& presentation) {
   return true;
 }
 
+void FrameReceiver::not_shown(const Presentation& presentation) {
+  const std::lock_guard lock(mutex_);
+  showing_ = false;
+  Peer* const swap = presentation.session == session_ ? swap_peer() : nullptr;
+  if (swap != nullptr) {
+    swap->connection.queue(encode_packet({.type = PacketType::NotShown, .frame = presentation.frame, .time = now()}));
+  }
+  announce();
+  raise_alarm(alarm_);
+}
+
 std::vector<std::string> FrameReceiver::addresses() const {
   std::vector<std::string> all;
   for (const Listener& listener : listeners_) all.push_back(listener.address());
@@ -110,12 +122,18 @@ ReceiverReport FrameReceiver::report() const {
 }
 
 void FrameReceiver::run(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    wait_for_news();
-    {
-      const std::lock_guard lock(mutex_);
-      step();
+  try {
+    while (!stop.stop_requested()) {
+      wait_for_news();
+      {
+        const std::lock_guard lock(mutex_);
+        step();
+      }
+      news_.notify_all();
     }
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
     news_.notify_all();
   }
 }

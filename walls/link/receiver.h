@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -67,10 +68,12 @@ class FrameReceiver {
   FrameReceiver(const FrameReceiver&) = delete;
   FrameReceiver& operator=(const FrameReceiver&) = delete;
 
-  /// Waits for a frame's moment, for `limit` seconds at the most.
+  /// Waits for a frame's moment, for `limit` seconds at the most. Throws what ended its thread: std::bad_alloc.
   [[nodiscard]] std::optional<Presentation> next(double limit);
   /// The frame next() returned is on the screens. False: it was another run's than the one that shows now.
   bool shown(const Presentation& presentation);
+  /// The frame next() returned could not be shown; shown() may be called for it later.
+  void not_shown(const Presentation& presentation);
   /// Seconds of the clock all its times are of.
   [[nodiscard]] double now() const { return settings_.clock(); }
   [[nodiscard]] ReceiverReport report() const;
@@ -125,6 +128,7 @@ class FrameReceiver {
   std::uint32_t start_ = 0;
   std::vector<Screen> screens_;
   std::deque<std::pair<std::uint64_t, double>> orders_;  ///< frame, when
+  std::exception_ptr failure_;                           ///< that ended its thread
   bool showing_ = false;
   bool ended_ = false;
   std::uint64_t runs_ = 0;

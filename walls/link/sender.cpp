@@ -145,6 +145,7 @@ void WallSender::post(FrameLink& link, const WallFrame& frame, std::span<const S
 void WallSender::show(const WallFrame& frame) {
   const std::vector<ScreenPacket> packets = encode_all(frame);
   std::unique_lock lock(mutex_);
+  if (failure_) std::rethrow_exception(failure_);
   for (FrameLink& link : frames_) post(link, frame, packets);
   if (swaps_.empty()) {
     raise_alarm(alarm_);
@@ -191,8 +192,11 @@ void WallSender::finish() {
   std::unique_lock lock(mutex_);
   const std::uint64_t newest = barrier_.newest().value_or(0);
   const auto limit = std::max(settings_.send_budget + settings_.swap_timeout, kMinEnd);
-  const auto done = [&] { return all_sent() && (swaps_.empty() || barrier_.all_shown(newest)); };
+  const auto done = [&] {
+    return failure_ != nullptr || (all_sent() && (swaps_.empty() || barrier_.all_shown(newest)));
+  };
   (void)news_.wait_for(lock, limit, done);
+  if (failure_) std::rethrow_exception(failure_);
   degraded_s_ = barrier_.degraded_seconds(link_seconds());
   finishing_ = true;
   for (SwapLink& swap : swaps_) {
@@ -230,13 +234,19 @@ std::string WallSender::why_unreached() const {
 }
 
 void WallSender::run(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    {
-      const std::lock_guard lock(mutex_);
-      step(link_seconds());
+  try {
+    while (!stop.stop_requested()) {
+      {
+        const std::lock_guard lock(mutex_);
+        step(link_seconds());
+      }
+      news_.notify_all();
+      wait_for_news(link_seconds());
     }
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
     news_.notify_all();
-    wait_for_news(link_seconds());
   }
 }
 
@@ -339,6 +349,9 @@ void WallSender::take_answer(std::size_t display, const Packet& packet, double n
       // Before the first round trip nothing is known of its clock but when its words come.
       barrier_.shown(display, header.frame, swap.clock.known() ? header.time - swap.clock.seconds() : now);
       break;
+    case PacketType::NotShown:
+      barrier_.not_shown(display, header.frame, now);
+      break;
     case PacketType::Pong: {
       if (header.frame > swap.pings || header.frame + swap.ping_sent.size() <= swap.pings) break;  // of no known ping
       ByteReader times(packet.payload);
@@ -378,6 +391,9 @@ void WallSender::report_event(const SwapEvent& event) const {
       log::warning("screen {} ({}) lost, frame {}; retrying", id, host.host, event.frame);
     } else if (event.kind == SwapEvent::Kind::Stale) {
       log::warning("screen {} ({}) is behind, frame {}", id, host.host, event.frame);
+    } else if (event.kind == SwapEvent::Kind::Failed) {
+      log::warning("screen {} ({}) cannot be shown, frame {}; the log of its display says why", id, host.host,
+                   event.frame);
     } else {
       log::info("screen {} ({}) back, frame {}", id, host.host, event.frame);
     }

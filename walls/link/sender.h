@@ -3,6 +3,7 @@
 #include <array>
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -141,6 +142,7 @@ class WallSender {
   SwapBarrier barrier_;
   double degraded_s_ = 0.0;
   bool finishing_ = false;
+  std::exception_ptr failure_;  ///< that ended its thread
   Socket alarm_;
   std::jthread thread_;
 };

@@ -15,6 +15,7 @@
 #include <charconv>
 #include <csignal>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -139,8 +140,7 @@ void remove_stale_socket(const LinkAddress& address) {
   if (!S_ISSOCK(found.st_mode)) {
     throw Error(ExitCode::Io, fmt::format("'{}' is there and no socket", address.text), "name another place");
   }
-  const Socket probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (::connect(probe.descriptor(), plain(address), address.length) == 0 || errno != ECONNREFUSED) {
+  if (!is_refusing(address.text)) {
     throw Error(ExitCode::Usage, fmt::format("another process listens on '{}'", address.text),
                 "end the other one, or name another place with --listen");
   }
@@ -191,6 +191,26 @@ void make_private_folder(const std::filesystem::path& folder) {
   if (!owner_is_trusted || others_may_write) {
     throw Error(ExitCode::Io, fmt::format("others may change the folder '{}'", folder.string()),
                 "take it from them (chown, chmod 0700), or name another place with --listen");
+  }
+}
+
+bool is_refusing(const std::filesystem::path& socket) {
+  const LinkAddress address = socket_address(socket);
+  const Socket probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  // EAGAIN: whoever listens is busy, and others wait already.
+  return ::connect(probe.descriptor(), plain(address), address.length) != 0 &&
+         (errno == ECONNREFUSED || errno == ENOENT);
+}
+
+void remove_left_sockets(const std::filesystem::path& folder) {
+  constexpr std::time_t kYoungSeconds = 10;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    struct stat info {};
+    const std::string path = entry->path().string();
+    if (::lstat(path.c_str(), &info) != 0 || !S_ISSOCK(info.st_mode) || info.st_uid != ::geteuid()) continue;
+    if (path.size() >= sizeof(sockaddr_un::sun_path)) continue;
+    if (info.st_mtime + kYoungSeconds < std::time(nullptr) && is_refusing(path)) ::unlink(path.c_str());
   }
 }
 

@@ -53,6 +53,13 @@ class Socket {
 /// when it cannot be made, or others may change what is ours in it.
 void make_private_folder(const std::filesystem::path& folder);
 
+/// Whether nobody listens on this Unix socket (any more), or there is none.
+[[nodiscard]] bool is_refusing(const std::filesystem::path& socket);
+
+/// Removes this user's Unix sockets in `folder` on which nobody listens any more. Nothing younger than ten seconds: a
+/// process that begins has a socket for an instant before it listens.
+void remove_left_sockets(const std::filesystem::path& folder);
+
 /// A listening socket; a Unix socket's file goes with it.
 class Listener {
  public:

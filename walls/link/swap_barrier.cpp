@@ -57,6 +57,7 @@ void SwapBarrier::post(std::uint64_t number, double now) {
   posted_ = number;
   Frame frame;
   frame.shown.resize(displays_.size());
+  frame.failed.resize(displays_.size());
   for (const Screen& screen : screens_) {
     frame.screens.push_back(displays_[screen.display].up ? ScreenState::Stale : ScreenState::Lost);
   }
@@ -89,6 +90,19 @@ void SwapBarrier::ready(std::size_t screen, std::uint64_t number, double now) {
 void SwapBarrier::shown(std::size_t display, std::uint64_t number, double at) {
   const auto frame = frames_.find(number);
   if (frame != frames_.end() && !frame->second.shown[display]) frame->second.shown[display] = at;
+  if (!displays_[display].failing) return;
+  displays_[display].failing = false;
+  events_.push_back({SwapEvent::Kind::Back, display, number});
+  count_degraded(at);
+}
+
+void SwapBarrier::not_shown(std::size_t display, std::uint64_t number, double now) {
+  const auto frame = frames_.find(number);
+  if (frame != frames_.end()) frame->second.failed[display] = true;
+  if (displays_[display].failing) return;
+  displays_[display].failing = true;
+  events_.push_back({SwapEvent::Kind::Failed, display, number});
+  count_degraded(now);
 }
 
 std::uint64_t SwapBarrier::oldest_undecided() const {
@@ -135,7 +149,7 @@ bool SwapBarrier::all_shown(std::uint64_t number) const {
   const auto frame = frames_.find(number);
   if (frame == frames_.end()) return true;
   for (std::size_t i = 0; i < displays_.size(); ++i) {
-    if (waited_for(i, number) && !frame->second.shown[i]) return false;
+    if (waited_for(i, number) && !frame->second.shown[i] && !frame->second.failed[i]) return false;
   }
   return true;
 }
@@ -230,13 +244,14 @@ void SwapBarrier::catch_up(std::size_t display, double now) {
   if (back.reported_lost || back.reported_stale) {
     events_.push_back({SwapEvent::Kind::Back, display, posted_.value_or(0)});
   }
-  back = {.up = true};
+  back = {.up = true, .failing = back.failing};
   count_degraded(now);
 }
 
 void SwapBarrier::count_degraded(double now) {
-  const bool degraded =
-      posted_ && std::ranges::any_of(displays_, [](const Display& display) { return !display.up || display.late; });
+  const bool degraded = posted_ && std::ranges::any_of(displays_, [](const Display& each) {
+                          return !each.up || each.late || each.failing;
+                        });
   if (degraded && !degraded_since_) degraded_since_ = now;
   if (!degraded && degraded_since_) degraded_s_ += now - *std::exchange(degraded_since_, std::nullopt);
 }

@@ -20,7 +20,7 @@ struct SwapDecision {
 
 /// Something about a display that its user wants to read once.
 struct SwapEvent {
-  enum class Kind : std::uint8_t { Lost, Stale, Back };
+  enum class Kind : std::uint8_t { Lost, Stale, Failed, Back };
   Kind kind = Kind::Lost;
   std::size_t display = 0;
   std::uint64_t frame = 0;
@@ -46,6 +46,8 @@ class SwapBarrier {
   void post(std::uint64_t frame, double now);
   void ready(std::size_t screen, std::uint64_t frame, double now);
   void shown(std::size_t display, std::uint64_t frame, double at);
+  /// The display is there and has the frame, but cannot put it on its screens.
+  void not_shown(std::size_t display, std::uint64_t frame, double now);
 
   /// What is to be shown now; each is returned once.
   [[nodiscard]] std::vector<SwapDecision> due(double now);
@@ -76,6 +78,7 @@ class SwapBarrier {
     std::optional<double> late_since{};  ///< cleared when caught up
     bool reported_lost = false;
     bool reported_stale = false;
+    bool failing = false;  ///< could not show its last frame
   };
   struct Screen {
     std::size_t display = 0;
@@ -86,6 +89,7 @@ class SwapBarrier {
     bool presented = false;
     std::vector<ScreenState> screens;
     std::vector<std::optional<double>> shown;  ///< per display
+    std::vector<bool> failed;                  ///< per display: said that it could not be shown
   };
 
   /// Frames before it were shown, or are older than what any display still holds.

@@ -150,6 +150,29 @@ TEST(SwapBarrier, APictureThatNeverCameLeavesTheOthersTheirFrame) {
   EXPECT_EQ(barrier.outcome(0).screens[2], ScreenState::Stale);
 }
 
+TEST(SwapBarrier, WhoCannotShowIsToldOfOnceAndWaitedForNoLonger) {
+  SwapBarrier barrier = two_displays();
+  for (const std::uint64_t frame : {0U, 1U}) {
+    const double now = 1.0 + static_cast<double>(frame);
+    barrier.post(frame, now);
+    ready(barrier, {0, 1, 2}, frame, now);
+    ASSERT_EQ(barrier.due(now).size(), 2U);
+    barrier.shown(0, frame, now);
+    EXPECT_FALSE(barrier.all_shown(frame));
+    barrier.not_shown(1, frame, now);
+    EXPECT_TRUE(barrier.all_shown(frame));
+    EXPECT_EQ(barrier.outcome(frame).screens[2], ScreenState::Stale);
+  }
+  barrier.shown(1, 1, 4.0);
+  EXPECT_EQ(barrier.outcome(1).screens[2], ScreenState::Fresh);
+  EXPECT_DOUBLE_EQ(barrier.degraded_seconds(9.0), 3.0);
+  const auto events = barrier.take_events();
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].kind, SwapEvent::Kind::Failed);
+  EXPECT_EQ(events[0].display, 1U);
+  EXPECT_EQ(events[1].kind, SwapEvent::Kind::Back);
+}
+
 TEST(SwapBarrier, GivingUpMakesTheSlowOneLate) {
   SwapBarrier barrier = two_displays();
   barrier.post(0, 1.0);

@@ -52,6 +52,8 @@ Json json_of(const FrameRecord& frame) {
                          {"pass", frame.slowest->pass},
                          {"pass_ms", frame.slowest->pass_ms}};
   }
+  if (!frame.failed.empty()) record["failed"] = frame.failed;
+  if (frame.verify) record["verify"] = verify_json(*frame.verify);
   for (const HeadRecord& head : frame.heads) record["heads"].push_back(json_of(head));
   for (const ScreenRecord& monitor : frame.monitors) record["monitors"].push_back(picture_json(monitor));
   if (frame.swap) record["swap"] = {{"skew_ms", frame.swap->skew_ms}};
@@ -127,8 +129,22 @@ Json budget_json(const BudgetRecord& budget) {
           {"resting", budget.resting}};
 }
 
+Json verify_json(const VerifyRecord& verify) {
+  return {{"percent", verify.percent}, {"tiles", verify.tiles}, {"mismatches", verify.mismatches}};
+}
+
 std::string to_json(const FrameRecord& frame) {
   return json_of(frame).dump();
+}
+
+std::vector<std::uint64_t> failed_frames(std::span<const std::string> records) {
+  std::vector<std::uint64_t> failed;
+  for (const std::string& text : records) {
+    const Json record = Json::parse(text);
+    if (record.find("failed") == nullptr || !record["frame"].is_unsigned()) continue;
+    failed.push_back(record["frame"].get<std::uint64_t>());
+  }
+  return failed;
 }
 
 std::string to_json(const RunManifest& manifest) {

@@ -50,6 +50,13 @@ struct BudgetRecord {
   bool resting = false;               ///< it added to a picture seen from one place, and has no target
 };
 
+/// What was found where some of a frame's tiles were drawn again and compared.
+struct VerifyRecord {
+  double percent = 0.0;          ///< of the tiles
+  std::uint64_t tiles = 0;       ///< drawn again, counted once a sample
+  std::uint64_t mismatches = 0;  ///< whose second drawing differed
+};
+
 /// How the displays outside the job showed a frame.
 struct SwapRecord {
   std::optional<double> skew_ms = {};  ///< between the first and the last display; none: fewer than two showed it
@@ -71,6 +78,8 @@ struct FrameRecord {
   std::vector<HeadRecord> heads = {};
   std::vector<ScreenRecord> monitors = {};
   std::optional<SlowestRecord> slowest = {};
+  std::optional<VerifyRecord> verify = {};
+  std::string failed = {};  ///< why it could not be drawn, so that the screens kept their pictures; empty: it was
 };
 
 /// What a wall run did, so that it can be replayed elsewhere and checked screen by screen.
@@ -104,6 +113,9 @@ struct WallStatusRecord {
 /// The member "budget" of a frame's record and of --stats.
 [[nodiscard]] Json budget_json(const BudgetRecord& budget);
 
+/// The member "verify" of a frame's record and of --stats.
+[[nodiscard]] Json verify_json(const VerifyRecord& verify);
+
 /// One frame's record, as the manifest has it, on one line.
 [[nodiscard]] std::string to_json(const FrameRecord& frame);
 
@@ -112,6 +124,9 @@ struct WallStatusRecord {
 
 /// One JSON document, schema hpr.wall-run/1; hashes are 16 hex digits, a NaN becomes null.
 [[nodiscard]] std::string to_json(const RunManifest& manifest);
+
+/// The numbers of the frames that failed, as those records say that an earlier job of a run left.
+[[nodiscard]] std::vector<std::uint64_t> failed_frames(std::span<const std::string> records);
 
 /// A manifest as a run left it: what another run, or a drawing, needs of it.
 struct ManifestFile {

@@ -61,6 +61,15 @@ TEST(ManifestFile, TellsWhetherItsFramesAreThoseOfAWall) {
   EXPECT_THROW(check_records(parse_manifest(text, "m"), {&screen, 1}, "m"), Error);
 }
 
+TEST(ManifestFile, FramesThatFailedAreFoundAgain) {
+  RunManifest run = manifest();
+  EXPECT_TRUE(failed_frames(parse_manifest(to_json(run), "m").frames).empty());
+  run.frames[1].failed = "OpenGL ran out of memory";
+  const ManifestFile file = parse_manifest(to_json(run), "m");
+  EXPECT_EQ(failed_frames(file.frames), std::vector<std::uint64_t>{1});
+  EXPECT_NE(file.frames[1].find("\"failed\":\"OpenGL ran out of memory\""), std::string::npos) << file.frames[1];
+}
+
 TEST(ManifestFile, RefusesWhatIsNone) {
   const std::string sound = to_json(manifest());
   const auto with = [&](const std::string& from, const std::string& to) {

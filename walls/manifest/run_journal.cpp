@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/bytes.h"
+#include "core/job_environment.h"
 #include "core/json.h"
 #include "core/log.h"
 
@@ -35,7 +36,7 @@ RunJournal::RunJournal(TemporaryFile file) : file_(std::move(file)), path_(file_
 
 std::optional<RunJournal> RunJournal::of_supervisor() {
   const char* const path = std::getenv(kVariable);  // NOLINT(concurrency-mt-unsafe): nobody writes the environment
-  if (path == nullptr) return std::nullopt;
+  if (path == nullptr || !launched_by_hpr()) return std::nullopt;  // a process of theirs may have it too
   return RunJournal(std::filesystem::path(path));
 }
 

@@ -1,9 +1,12 @@
 #include "walls/manifest/run_journal.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
+
+#include "core/job_environment.h"
 
 namespace hpr {
 namespace {
@@ -47,11 +50,14 @@ TEST(RunJournal, ReachesJobsThroughTheEnvironmentAndGoesWithItsOwner) {
     RunJournal journal;
     path = journal.path();
     ASSERT_EQ(::setenv(RunJournal::kVariable, path.c_str(), 1), 0);
+    EXPECT_FALSE(RunJournal::of_supervisor()) << "of a process that was not launched by one";
+    ASSERT_EQ(::setenv(kLoneRankVariable, std::to_string(::getppid()).c_str(), 1), 0);
     auto of_job = RunJournal::of_supervisor();
     ASSERT_TRUE(of_job);
     of_job->add_frame("{}");
     EXPECT_EQ(journal.read().frames.size(), 1U);
     ::unsetenv(RunJournal::kVariable);
+    ::unsetenv(kLoneRankVariable);
     EXPECT_FALSE(RunJournal::of_supervisor());
   }
   EXPECT_FALSE(std::filesystem::exists(path));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -8,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/error.h"
 #include "engine/frame_settings.h"
 
 namespace hpr {
@@ -30,12 +32,27 @@ struct CheckpointSettings {
   std::function<RunIdentity()> identity;  ///< called when it is needed: it hashes the whole scene
   bool at_end = false;                    ///< also when the goal is reached, for a later run that wants more
   bool takes_more = false;                ///< a checkpoint with more samples than the goal is accepted
+  std::chrono::nanoseconds every{0};      ///< how often one is written unasked; 0: never
+  bool keeps_previous = false;            ///< see CheckpointFile
 };
 
-/// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, the identity, the
-/// counters, every layer's active tiles, and the XXH64 of all that.
+/// A file that is no whole checkpoint: cut short, damaged, or no checkpoint at all.
+class DamagedCheckpoint : public Error {
+ public:
+  using Error::Error;
+};
+
+/// A film that holds all tiles of its frame, and how far it has come, as a file: a versioned header, whether the user
+/// asked for it, the identity, the counters, every layer's active tiles, and the XXH64 of all that.
 [[nodiscard]] std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film,
-                                                       const SampleProgress& progress);
+                                                       const SampleProgress& progress, bool asked_for = true);
+
+/// Throws DamagedCheckpoint unless `bytes` are a whole checkpoint, and Error (BadInput) where that is of another
+/// format.
+void check_whole(std::span<const std::byte> bytes, const std::string& name);
+
+/// Whether the user asked for this checkpoint. Throws as check_whole().
+[[nodiscard]] bool was_asked_for(std::span<const std::byte> bytes, const std::string& name);
 
 /// The identity of the run that wrote a checkpoint. Throws Error (BadInput) when `bytes` are no checkpoint, damaged, or
 /// of another version.
@@ -43,7 +60,7 @@ struct CheckpointSettings {
 
 /// Fills `film`, a new one of the same layout and content. `name` stands in errors. Throws Error (BadInput) when
 /// `bytes` are no checkpoint, damaged, of another version, or of a run with another identity: then the error names what
-/// differs. Nothing of damaged bytes but the header is looked at.
+/// differs. Nothing of damaged bytes but the header is looked at, and of others no sum is taken that a run cannot have.
 [[nodiscard]] SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name,
                                                const RunIdentity& identity, Film& film);
 

@@ -1,10 +1,12 @@
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "core/error.h"
@@ -33,6 +35,7 @@ Film some_film() {
       }
     }
   });
+  for (PixelSamples& pixel : film.pixel_samples().tile(0)) pixel.wanted = 16;
   film.set_counters({17, {8.0, 9.0}});
   return film;
 }
@@ -92,6 +95,30 @@ TEST(Checkpoint, OtherFormatsAreNamed) {
   bytes[8] = std::byte{1};
   EXPECT_NE(refusal(bytes).find("format 1"), std::string::npos);
   EXPECT_NE(refusal(std::as_bytes(std::span("no checkpoint at all"))).find("not a checkpoint"), std::string::npos);
+}
+
+TEST(Checkpoint, WhatNoRunCanHaveComeToIsRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refusal_of = [](const auto& change) {
+    Film film = some_film();
+    SampleProgress progress{15, 3.5, 0.25, 64};
+    change(film, progress);
+    return refusal(encode_checkpoint(kIdentity, film, progress));
+  };
+  EXPECT_EQ(refusal_of([](Film&, SampleProgress&) {}), "");
+  // A step for every power of two up to what a pixel wants: past 2^31 there is no end of them.
+  EXPECT_NE(refusal_of([](Film& film, SampleProgress&) { film.pixel_samples().tile(0)[5].wanted = 0xC0000000U; }), "");
+  EXPECT_NE(refusal_of([&](Film& film, SampleProgress&) { film.pixel_samples().tile(0)[5].weights[1] = nan; }), "");
+  EXPECT_NE(refusal_of([&](Film& film, SampleProgress&) { film.set_counters({17, {1.0, nan}}); }), "");
+  EXPECT_NE(refusal_of([](Film&, SampleProgress& progress) { progress.budget = kContent.pilot - 1; }), "");
+  EXPECT_NE(refusal_of([&](Film&, SampleProgress& progress) { progress.seconds = nan; }), "");
+  EXPECT_NE(refusal_of([&](Film& film, SampleProgress&) {
+              film.each_layer([&](auto& layer) {
+                using Pixel = std::remove_cvref_t<decltype(layer.tile(0)[0])>;
+                if constexpr (std::is_same_v<Pixel, ColorSum>) layer.tile(0)[9].g = nan;
+              });
+            }),
+            "");
 }
 
 TEST(Checkpoint, ARightSumOverWrongContentIsRefusedToo) {

@@ -1,4 +1,4 @@
-#include "engine/checkpoint.h"
+#include "engine/checkpoint/checkpoint.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
@@ -15,6 +16,7 @@
 #include "core/text.h"
 #include "engine/film.h"
 #include "engine/plan.h"
+#include "engine/samples.h"
 #include "engine/session.h"
 #include "engine/settings_table.h"
 #include "rt/passes/pass_list.h"
@@ -24,7 +26,7 @@ namespace hpr {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'H', 'P', 'R', 'C', 'K', 'P', 'T', '\n'};
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 
 class Writer {
  public:
@@ -94,6 +96,28 @@ void put_layer(Writer& out, const TileLayer<Pixel>& layer) {
 }
 
 template <typename Pixel>
+bool is_possible(const Pixel& /*first*/) {
+  return true;  // of the first sample, where a depth may be infinite
+}
+bool is_possible(double sum) {
+  return std::isfinite(sum);
+}
+bool is_possible(const ColorSum& sum) {
+  return std::isfinite(sum.r) && std::isfinite(sum.g) && std::isfinite(sum.b);
+}
+bool is_possible(const PixelSamples& pixel) {
+  return pixel.wanted <= AdaptiveSampling::kMaxSamples && std::isfinite(pixel.squares) &&
+         std::ranges::all_of(pixel.weights, [](double weight) { return std::isfinite(weight); });
+}
+
+/// Whether a run can have come to that, in a film of this kind.
+bool is_possible(const Film& film, const Film::Counters& counters, const SampleProgress& progress) {
+  const bool agree = film.is_adaptive() ? progress.budget >= film.pilot() : progress.samples == counters.samples;
+  return agree && std::isfinite(counters.weights[0]) && std::isfinite(counters.weights[1]) &&
+         std::isfinite(progress.seconds) && progress.seconds >= 0.0;
+}
+
+template <typename Pixel>
 void get_layer(Reader& in, TileLayer<Pixel>& layer) {
   if (in.get<std::uint64_t>() != sizeof(Pixel)) in.fail();
   const auto count = in.get<std::uint64_t>();
@@ -102,6 +126,7 @@ void get_layer(Reader& in, TileLayer<Pixel>& layer) {
     const auto tile = in.get<std::uint64_t>();
     if (tile >= layer.tiles() || layer.active(tile)) in.fail();
     in.take(std::as_writable_bytes(layer.tile(tile)));
+    if (!std::ranges::all_of(layer.tile(tile), [](const Pixel& pixel) { return is_possible(pixel); })) in.fail();
     layer.set_active(tile);
   }
 }
@@ -132,7 +157,7 @@ void compare_identities(const RunIdentity& found, const RunIdentity& expected, c
 std::span<const std::byte> checked_part(std::span<const std::byte> bytes, const std::string& name) {
   constexpr std::size_t kHead = kMagic.size() + sizeof kFormat;
   if (bytes.size() < kMagic.size() || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
-    throw Error(ExitCode::BadInput, fmt::format("{}: not a checkpoint", name), "name one that hpr wrote");
+    throw DamagedCheckpoint(ExitCode::BadInput, fmt::format("{}: not a checkpoint", name), "name one that hpr wrote");
   }
   std::uint32_t format = 0;
   if (bytes.size() >= kHead) std::memcpy(&format, bytes.data() + kMagic.size(), sizeof format);
@@ -146,15 +171,23 @@ std::span<const std::byte> checked_part(std::span<const std::byte> bytes, const 
                 fmt::format("{}: a checkpoint of format {}; this hpr reads {}", name, format, kFormat),
                 "go on with the hpr that wrote it, or start anew without --resume");
   }
-  throw Error(ExitCode::BadInput, fmt::format("{}: the checkpoint is damaged", name), "start anew, without --resume");
+  throw DamagedCheckpoint(ExitCode::BadInput, fmt::format("{}: the checkpoint is damaged", name),
+                          "start anew, without --resume");
+}
+
+/// What stands before the identity.
+bool get_asked_for(Reader& in) {
+  return in.get<std::uint32_t>() != 0;
 }
 
 }  // namespace
 
-std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film, const SampleProgress& progress) {
+std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film, const SampleProgress& progress,
+                                         bool asked_for) {
   Writer out;
   out.put(kMagic);
   out.put(kFormat);
+  out.put(std::uint32_t{asked_for ? 1U : 0U});
   out.put(std::uint64_t{identity.size()});
   for (const auto& [field, value] : identity) {
     out.put(field);
@@ -172,14 +205,25 @@ std::vector<std::byte> encode_checkpoint(const RunIdentity& identity, Film& film
   return out.take();
 }
 
+void check_whole(std::span<const std::byte> bytes, const std::string& name) {
+  (void)checked_part(bytes, name);
+}
+
+bool was_asked_for(std::span<const std::byte> bytes, const std::string& name) {
+  Reader in(checked_part(bytes, name), name);
+  return get_asked_for(in);
+}
+
 RunIdentity identity_in(std::span<const std::byte> bytes, const std::string& name) {
   Reader in(checked_part(bytes, name), name);
+  (void)get_asked_for(in);
   return get_identity(in);
 }
 
 SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::string& name, const RunIdentity& identity,
                                  Film& film) {
   Reader in(checked_part(bytes, name), name);
+  (void)get_asked_for(in);
   compare_identities(get_identity(in), identity, name);
   Film::Counters counters;
   counters.samples = in.get<std::uint32_t>();
@@ -189,6 +233,7 @@ SampleProgress decode_checkpoint(std::span<const std::byte> bytes, const std::st
   progress.budget = in.get<std::uint32_t>();
   progress.seconds = in.get<double>();
   if (const auto relmse = in.get<double>(); relmse >= 0.0) progress.relmse = relmse;
+  if (!is_possible(film, counters, progress)) in.fail();
   film.each_layer([&](auto& layer) { get_layer(in, layer); });
   if (in.left() != 0) in.fail();
   film.set_counters(counters);
