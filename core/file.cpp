@@ -98,9 +98,9 @@ int create_unnamed(const std::filesystem::path& folder) {
   return -1;
 }
 
-int create_named(const std::filesystem::path& folder, std::string& name) {
+int create_named(const std::filesystem::path& folder, std::string& name, int access, mode_t mode) {
   return with_temporary_name(
-      folder, name, [](const char* path) { return ::open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
+      folder, name, [&](const char* path) { return ::open(path, access | O_CREAT | O_EXCL | O_CLOEXEC, mode); });
 }
 
 constexpr const char* kTemporaryVariable = "TMPDIR";
@@ -210,7 +210,7 @@ std::filesystem::path written_file(const std::filesystem::path& path) {
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), target_(written_file(path_)) {
   descriptor_ = create_unnamed(folder_of(target_));
-  if (descriptor_ < 0) descriptor_ = create_named(folder_of(target_), temporary_);
+  if (descriptor_ < 0) descriptor_ = create_named(folder_of(target_), temporary_, O_WRONLY, 0666);
   if (descriptor_ < 0) fail("cannot write", path_, errno);
   (void)::flock(descriptor_, LOCK_EX | LOCK_NB);  // nobody takes it for abandoned
 }
@@ -372,9 +372,7 @@ TemporaryFile::TemporaryFile(const std::filesystem::path& folder) : has_name_(tr
   remove_abandoned_files(folder.empty() ? "." : folder);
   std::error_code error;
   std::string name;
-  descriptor_ =
-      with_temporary_name(std::filesystem::absolute(folder.empty() ? "." : folder, error), name,
-                          [](const char* path) { return ::open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600); });
+  descriptor_ = create_named(std::filesystem::absolute(folder.empty() ? "." : folder, error), name, O_RDWR, 0600);
   if (descriptor_ < 0) fail("cannot write", name, errno);
   ::flock(descriptor_, LOCK_EX | LOCK_NB);
   path_ = name;

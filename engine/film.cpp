@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "cluster/transport/collectives.h"
@@ -225,11 +224,8 @@ double estimated_relmse(Communicator& comm, const Film& film, std::span<const st
   std::vector<TileError> mine;
   for (std::size_t i = 0; i < tiles.size(); ++i) mine.push_back({tiles[i], errors[i]});
   std::vector<TileError> all;
-  for (const auto& bytes : all_gather(comm, std::as_bytes(std::span(mine)))) {
-    const std::size_t before = all.size();
-    all.resize(before + bytes.size() / sizeof(TileError));
-    if (!bytes.empty()) std::memcpy(&all[before], bytes.data(), bytes.size());
-  }
+  for (const auto& of_rank : all_gather_lists(comm, std::span<const TileError>(mine)))
+    all.insert(all.end(), of_rank.begin(), of_rank.end());
   std::ranges::sort(all, {}, &TileError::tile);  // one order of summing for any number of ranks
   double sum = 0.0;
   for (const TileError& each : all) sum += each.error;

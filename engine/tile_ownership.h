@@ -10,6 +10,45 @@
 
 namespace hpr {
 
+/// Who has a tile of a layer, and who is to get it.
+struct TileMove {
+  std::size_t tile = 0;
+  int from = 0;
+  int to = 0;
+};
+
+/// Collective, in one round of messages. Tiles of `source` come to `target`, which may be the same layer. `moves`: the
+/// same on all ranks; those between two ranks in ascending order of tiles.
+template <typename Pixel>
+void move_tiles(Communicator& comm, std::span<const TileMove> moves, const TileLayer<Pixel>& source,
+                TileLayer<Pixel>& target, TileReader& reader) {
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  std::vector<std::vector<std::size_t>> leaving(ranks);
+  std::vector<std::vector<std::size_t>> arriving(ranks);
+  for (const TileMove& move : moves) {
+    if (move.from == comm.rank()) leaving[static_cast<std::size_t>(move.to)].push_back(move.tile);
+    if (move.to == comm.rank()) arriving[static_cast<std::size_t>(move.from)].push_back(move.tile);
+  }
+  std::vector<TileMessage> messages(ranks);
+  std::vector<Outgoing> out;
+  std::vector<int> from;
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    const auto peer = static_cast<std::size_t>(rank);
+    if (rank == comm.rank()) {
+      if (&source != &target) copy_tiles(source, target, leaving[peer]);
+      continue;
+    }
+    if (!arriving[peer].empty()) from.push_back(rank);
+    if (leaving[peer].empty()) continue;
+    messages[peer].start();
+    messages[peer].add(source, leaving[peer]);
+    out.push_back(messages[peer].to(rank));
+  }
+  comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
+    reader.replace(comm, peer, message, target, arriving[static_cast<std::size_t>(peer)]);
+  });
+}
+
 /// Which rank keeps the sums of which tile. A sort-last strategy may leave a tile with another rank in every sample;
 /// its keys then travel to the rank that had it in the first one, which lights it. Sums stay where they are, and each
 /// is made by one rank in the order of the samples.
@@ -31,21 +70,11 @@ class TileOwnership {
   /// Collective over `comm`. `layer` of rank 0 holds all tiles; after it every rank has its own of them.
   template <typename Pixel>
   void scatter(Communicator& comm, TileLayer<Pixel>& layer) {
-    if (comm.rank() != 0) {
-      comm.exchange({}, std::vector<int>{0}, [&](int from, std::span<const std::byte> message) {
-        reader_.replace(comm, from, message, layer, mine_);
-      });
-      return;
-    }
-    std::vector<TileMessage> messages(static_cast<std::size_t>(comm.size()));
-    std::vector<Outgoing> out;
+    std::vector<TileMove> moves;
     for (int rank = 1; rank < comm.size(); ++rank) {
-      TileMessage& message = messages[static_cast<std::size_t>(rank)];
-      message.start();
-      message.add(layer, of(rank));
-      out.push_back(message.to(rank));
+      for (const std::size_t tile : of(rank)) moves.push_back({tile, 0, rank});
     }
-    comm.exchange(out, {}, {});
+    move_tiles(comm, moves, layer, layer, reader_);
   }
 
  private:

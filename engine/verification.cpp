@@ -5,16 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <iterator>
 #include <optional>
 
 #include "cluster/transport/collectives.h"
-#include "compositing/tile_codec.h"
 #include "core/bytes.h"
 #include "core/log.h"
 #include "core/timing.h"
 #include "engine/session.h"
+#include "engine/tile_ownership.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
 #include "rt/trace/primary_rays.h"
@@ -93,17 +92,6 @@ std::uint64_t hash_of(std::span<const TileSample> samples, std::size_t tile, con
   return hash.value();
 }
 
-/// The values of all ranks, in order of rank.
-template <typename Value>
-std::vector<std::vector<Value>> all_gather_lists(Communicator& comm, std::span<const Value> mine) {
-  std::vector<std::vector<Value>> lists;
-  for (const auto& bytes : all_gather(comm, std::as_bytes(mine))) {
-    lists.emplace_back(bytes.size() / sizeof(Value));
-    if (!bytes.empty()) std::memcpy(lists.back().data(), bytes.data(), bytes.size());
-  }
-  return lists;
-}
-
 /// Collective. The verified tiles of all ranks, ascending.
 std::vector<VerifiedTile> find_tiles(Communicator& comm, const VerifiedSamples& samples,
                                      std::span<const std::size_t> owned) {
@@ -127,44 +115,6 @@ std::vector<VerifiedTile> find_tiles(Communicator& comm, const VerifiedSamples& 
   return tiles;
 }
 
-/// Who has a tile of a layer, and who is to get it.
-struct TileMove {
-  std::size_t tile = 0;
-  int from = 0;
-  int to = 0;
-};
-
-/// Collective. `moves` are the same on all ranks, their tiles in ascending order.
-template <typename Pixel>
-void move_tiles(Communicator& comm, std::span<const TileMove> moves, const TileLayer<Pixel>& source,
-                TileLayer<Pixel>& target) {
-  std::vector<TileMessage> messages(static_cast<std::size_t>(comm.size()));
-  std::vector<std::vector<std::size_t>> arriving(static_cast<std::size_t>(comm.size()));
-  std::vector<Outgoing> out;
-  std::vector<int> from;
-  for (int rank = 0; rank < comm.size(); ++rank) {
-    const auto peer = static_cast<std::size_t>(rank);
-    std::vector<std::size_t> leaving;
-    for (const TileMove& move : moves) {
-      if (move.from == comm.rank() && move.to == rank) leaving.push_back(move.tile);
-      if (move.from == rank && move.to == comm.rank()) arriving[peer].push_back(move.tile);
-    }
-    if (rank == comm.rank()) {
-      copy_tiles(source, target, leaving);
-      continue;
-    }
-    if (!arriving[peer].empty()) from.push_back(rank);
-    if (leaving.empty()) continue;
-    messages[peer].start();
-    messages[peer].add(source, leaving);
-    out.push_back(messages[peer].to(rank));
-  }
-  TileReader reader;
-  comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
-    reader.replace(comm, peer, message, target, arriving[static_cast<std::size_t>(peer)]);
-  });
-}
-
 /// Draws tiles for other ranks and makes the hashes known.
 class Redrawing {
  public:
@@ -179,7 +129,7 @@ class Redrawing {
       wanted = PixelMask(layout_);
       std::vector<TileMove> moves;
       for (const VerifiedTile& each : tiles) moves.push_back({each.tile, each.owner, each.*rank});
-      move_tiles(comm_, moves, *samples_.wanted, wanted);
+      move_tiles(comm_, moves, *samples_.wanted, wanted, reader_);
     }
     const PixelMask* const mask = samples_.wanted != nullptr ? &wanted : nullptr;
     std::vector<std::size_t> mine;
@@ -212,6 +162,7 @@ class Redrawing {
   const VerifiedSamples& samples_;
   const FrameLayout& layout_;
   const DrawTiles& draw_;
+  TileReader reader_;
 };
 
 /// Where two drawings of a tile differ first.
@@ -291,11 +242,12 @@ VerifyCounts verify_tiles(Communicator& comm, const std::string& host, const Ver
   moves.reserve(tiles.size());
   for (const VerifiedTile& each : tiles) moves.push_back({each.tile, each.checker, each.owner});
   std::vector<TileDrawing> received;
+  TileReader reader;
   for (const TileDrawing& drawing : second) {
     received.push_back({TileLayer<Key>(drawing.keys.layout()), TileLayer<Rgb>(drawing.keys.layout())});
     received.back().keys.set_depth_format(drawing.keys.depth_format());
-    move_tiles(comm, moves, drawing.keys, received.back().keys);
-    if (samples.lit) move_tiles(comm, moves, drawing.radiance, received.back().radiance);
+    move_tiles(comm, moves, drawing.keys, received.back().keys, reader);
+    if (samples.lit) move_tiles(comm, moves, drawing.radiance, received.back().radiance, reader);
   }
   std::vector<Difference> mine;
   for (const VerifiedTile& each : tiles) {

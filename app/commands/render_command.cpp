@@ -25,10 +25,10 @@
 #include "core/timing.h"
 #include "engine/checkpoint/checkpoint.h"
 #include "engine/checkpoint/checkpoint_file.h"
+#include "engine/frame_retry.h"
 #include "engine/frame_sampler.h"
 #include "engine/output.h"
 #include "engine/session.h"
-#include "engine/wall/frame_retry.h"
 
 namespace hpr {
 namespace {

@@ -311,9 +311,7 @@ void claim_folder(const WallJob& job, std::optional<FolderLock>& lock) {
 
 WallJob make_wall_job(const WallRun& run, const Globals& globals) {
   const int restarts = run.display.kind().stream ? 0 : run.restarts;
-  // Ranks of their own report the same findings.
-  const bool starts_job = supervises(restarts) || (globals.ranks > 1 && !inside_mpi_job());
-  WallJob job{.wall = load_wall(run.wall, run.overrides, !starts_job),
+  WallJob job{.wall = load_wall(run.wall, run.overrides, !starts_ranks(globals, restarts)),
               .wall_file = run.wall,
               .scene = run.scene,
               .settings = run.settings,

@@ -176,10 +176,6 @@ Finding check_stack() {
                                                            : warn(std::move(detail), "ulimit -s 8192");
 }
 
-}  // namespace
-
-namespace {
-
 constexpr const char* kJobVariable = "HPR_DOCTOR_JOB";
 constexpr int kJobRanks = 2;
 

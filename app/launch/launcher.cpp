@@ -413,8 +413,8 @@ class RunningJob {
   static constexpr int kToTheEnd_ms = 5;
   static constexpr int kStart_ms = 20;
   static constexpr std::chrono::seconds kMaxStart{30};
-  static constexpr std::chrono::milliseconds kBetweenLooks{100};
-  static constexpr std::chrono::seconds kMaxBetweenLooks{1};
+  static constexpr std::chrono::milliseconds kUpdateInterval{100};
+  static constexpr std::chrono::seconds kMaxUpdateInterval{1};
 
   /// Copies output that has arrived; waits at most `wait_ms`. False when there is none now, or none will come.
   bool poll_output(int wait_ms) {
@@ -463,12 +463,12 @@ class RunningJob {
   [[nodiscard]] bool is_starting() const { return !watch_.knows_all() && Clock::now() - begin_ < kMaxStart; }
 
   /// Ends the job where it stands still.
-  void look_at_ranks(Clock::time_point now) {
-    if (now - looked_at_ < kBetweenLooks && !is_starting()) return;
+  void check_ranks(Clock::time_point now) {
+    if (now - updated_at_ < kUpdateInterval && !is_starting()) return;
     // More than that has passed only where this process stood still itself, or the machine slept.
-    const auto passed = std::min<std::chrono::nanoseconds>(now - looked_at_, kMaxBetweenLooks);
-    looked_at_ = now;
-    watch_.look(passed);
+    const auto passed = std::min<std::chrono::nanoseconds>(now - updated_at_, kMaxUpdateInterval);
+    updated_at_ = now;
+    watch_.update(passed);
     if (is_stopped_) stopped_for_ += passed;
     const std::chrono::nanoseconds limit = watch_.stall_limit().count() > 0 ? watch_.stall_limit() : hang_limit_;
     if (watch_.stalled()) {
@@ -485,7 +485,7 @@ class RunningJob {
 
   void enforce_limits() {
     const Clock::time_point now = Clock::now();
-    if (!end_requested_at_) look_at_ranks(now);
+    if (!end_requested_at_) check_ranks(now);
     if (!end_requested_at_ && (PassedSignals::ends() || output_error_ != 0)) end_requested_at_ = now;
     if (!end_requested_at_ && !mark_.has_output() && now - begin_ > start_limit_) {
       late_ = true;
@@ -509,7 +509,7 @@ class RunningJob {
   std::chrono::nanoseconds end_limit_;
   StartMark mark_;
   Clock::time_point begin_ = Clock::now();
-  Clock::time_point looked_at_ = begin_;
+  Clock::time_point updated_at_ = begin_;
   bool is_stopped_ = false;
   std::chrono::nanoseconds stopped_for_{0};
   std::string hang_;

@@ -19,7 +19,7 @@ RankWatch::~RankWatch() {
   }
 }
 
-void RankWatch::look(std::chrono::nanoseconds passed) {
+void RankWatch::update(std::chrono::nanoseconds passed) {
   bool moved = false;
   for (std::size_t i = 0; i < ranks_.size(); ++i) {
     Rank& rank = ranks_[i];
@@ -57,7 +57,7 @@ std::optional<std::string> RankWatch::first_to_end() const {
   if (first_.empty() || !knows_all()) return std::nullopt;
   std::vector<std::string> all;
   for (const int rank : first_) {
-    // What it reported after the last look is still there.
+    // What it reported after the last update() is still there.
     all.push_back(describe(rank, board_.read(rank).value_or(RankReport{})));
   }
   return fmt::format("{}", fmt::join(all, ", or "));

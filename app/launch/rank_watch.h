@@ -19,8 +19,8 @@ class RankWatch {
   RankWatch(const RankWatch&) = delete;
   RankWatch& operator=(const RankWatch&) = delete;
 
-  /// Looks at the board again. `passed`: since the last look.
-  void look(std::chrono::nanoseconds passed);
+  /// Reads the board again. `passed`: since the last time.
+  void update(std::chrono::nanoseconds passed);
   /// For poll(): each becomes readable when a rank ends.
   void add_to(std::vector<pollfd>& waited) const;
   /// After that poll().

@@ -151,6 +151,10 @@ bool is_started_again() {
   return journal && !journal->read().restarts.empty();
 }
 
+bool starts_ranks(const Globals& globals, int restarts) {
+  return supervises(restarts) || (!inside_mpi_job() && (globals.ranks > 1 || !globals.launcher.empty()));
+}
+
 bool supervises(int restarts) {
   return !inside_mpi_job() && !launched_by_hpr() && restarts > 0;
 }

@@ -42,6 +42,9 @@ class RestartLimit {
 /// Whether this process is to start ranks, or a lone one, and start them again when they are lost.
 [[nodiscard]] bool supervises(int restarts);
 
+/// Whether run_supervised() draws in other processes, which report what they find themselves.
+[[nodiscard]] bool starts_ranks(const Globals& globals, int restarts);
+
 /// Whether this is a job of a run that lost an earlier one, which may have written what is to be written again.
 [[nodiscard]] bool is_started_again();
 

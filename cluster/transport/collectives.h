@@ -46,6 +46,19 @@ template <typename Value>
   return values;
 }
 
+/// Each rank's values, as many as it has, in order of rank, on every rank.
+template <typename Value>
+[[nodiscard]] std::vector<std::vector<Value>> all_gather_lists(Communicator& comm, std::span<const Value> mine) {
+  static_assert(std::is_trivially_copyable_v<Value>);
+  std::vector<std::vector<Value>> lists;
+  for (const auto& bytes : all_gather(comm, std::as_bytes(mine))) {
+    HPR_CHECK(bytes.size() % sizeof(Value) == 0);
+    lists.emplace_back(bytes.size() / sizeof(Value));
+    if (!bytes.empty()) std::memcpy(lists.back().data(), bytes.data(), bytes.size());
+  }
+  return lists;
+}
+
 /// The text of rank 0, on every rank.
 [[nodiscard]] std::string broadcast_text(Communicator& comm, const std::string& text);
 

@@ -8,9 +8,9 @@
 
 #include "core/progress.h"
 #include "engine/frame_maker.h"
+#include "engine/frame_retry.h"
 #include "engine/output.h"
 #include "engine/session.h"
-#include "engine/wall/frame_retry.h"
 #include "engine/wall/run_control.h"
 #include "engine/wall/slow_ranks.h"
 #include "engine/wall/viewpoint.h"

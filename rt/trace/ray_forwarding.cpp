@@ -177,11 +177,8 @@ RayForwarding::RayForwarding(Communicator& comm, const Scene& scene, const RaySp
                              std::span<const SurfaceRange> part)
     : comm_(comm) {
   const std::vector<RayBox> mine = enclosing_boxes(scene, space, part);
-  for (const auto& bytes : all_gather(comm, std::as_bytes(std::span(mine)))) {
-    boxes_.emplace_back(bytes.size() / sizeof(RayBox));
-    if (!bytes.empty()) std::memcpy(boxes_.back().data(), bytes.data(), bytes.size());
-    bounds_.push_back(enclosing_box(boxes_.back()));
-  }
+  boxes_ = all_gather_lists(comm, std::span(mine));
+  for (const std::vector<RayBox>& boxes : boxes_) bounds_.push_back(enclosing_box(boxes));
 }
 
 std::uint32_t RayForwarding::add(const RayScene& part) {

@@ -1,4 +1,4 @@
-#include "engine/wall/frame_retry.h"
+#include "engine/frame_retry.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
