@@ -81,6 +81,39 @@ ExitCode run(const std::vector<std::string>& arguments) {
   return launched_rank() == 0 ? traced_alone(globals, [&] { return command->run(globals); }) : ExitCode::Done;
 }
 
+ExitCode run_and_flush(const std::vector<std::string>& arguments) {
+  const ExitCode code = run(arguments);
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    throw Error(ExitCode::Io, "cannot write to standard output", "free some space, or see who closed the pipe");
+  }
+  return code;
+}
+
+/// Prints the exception that is being handled; returns what to leave with. Throws std::bad_alloc.
+int report_exception() {
+  try {
+    throw;
+  } catch (const Interrupted& interrupted) {
+    std::fflush(nullptr);
+    (void)std::raise(interrupted.signal);  // as if it had not been caught
+    return 128 + interrupted.signal;
+  } catch (const Error& error) {
+    // An error that every rank of a job finds before MPI starts is printed once: rank 0's exit ends the others while
+    // they wait.
+    if (launched_rank() != 0) std::this_thread::sleep_for(std::chrono::seconds(2));
+    print_error(error, said_by(launched_rank()));
+    return static_cast<int>(error.code());
+  } catch (const std::system_error& error) {  // how fmt reports a failed print
+    print_error({ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});
+    return static_cast<int>(ExitCode::Io);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    print_error({ExitCode::Internal, error.what(), "this is a defect of hpr: please report it with the command line"});
+    return static_cast<int>(ExitCode::Internal);
+  }
+}
+
 }  // namespace
 
 }  // namespace hpr
@@ -98,31 +131,13 @@ int main(int argc, char** argv) {
     if (::fcntl(standard, F_GETFD) < 0) (void)::open(standard == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR);
   }
   try {
-    const hpr::ExitCode code = hpr::run(std::vector<std::string>(argv + 1, argv + argc));
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-      throw hpr::Error(hpr::ExitCode::Io, "cannot write to standard output",
-                       "free some space, or see who closed the pipe");
+    return static_cast<int>(hpr::run_and_flush(std::vector<std::string>(argv + 1, argv + argc)));
+  } catch (...) {
+    try {
+      return hpr::report_exception();
+    } catch (...) {  // std::bad_alloc, of the run or of the report: this takes no memory
+      std::fputs("hpr: error: out of memory\n  hint: use a smaller picture or scene\n", stderr);
+      return static_cast<int>(hpr::ExitCode::Limit);
     }
-    return static_cast<int>(code);
-  } catch (const hpr::Interrupted& interrupted) {
-    std::fflush(nullptr);
-    (void)std::raise(interrupted.signal);  // as if it had not been caught
-    return 128 + interrupted.signal;
-  } catch (const hpr::Error& error) {
-    // An error that every rank of a job finds before MPI starts is printed once: rank 0's exit ends the others while
-    // they wait.
-    if (hpr::launched_rank() != 0) std::this_thread::sleep_for(std::chrono::seconds(2));
-    hpr::print_error(error, hpr::said_by(hpr::launched_rank()));
-    return static_cast<int>(error.code());
-  } catch (const std::system_error& error) {  // how fmt reports a failed print
-    hpr::print_error({hpr::ExitCode::Io, error.what(), "free some space, or see who closed the pipe"});
-    return static_cast<int>(hpr::ExitCode::Io);
-  } catch (const std::bad_alloc&) {
-    hpr::print_error({hpr::ExitCode::Limit, "out of memory", "use a smaller picture or scene"});
-    return static_cast<int>(hpr::ExitCode::Limit);
-  } catch (const std::exception& error) {
-    hpr::print_error(
-        {hpr::ExitCode::Internal, error.what(), "this is a defect of hpr: please report it with the command line"});
-    return static_cast<int>(hpr::ExitCode::Internal);
   }
 }

@@ -43,6 +43,7 @@ ExitCode traced(Communicator& comm, const Globals& globals, const std::function<
 ExitCode traced_alone(const Globals& globals, const std::function<ExitCode()>& body);
 
 /// Prints an error on stderr in at most three lines: what and where, the offending line where there is one, a hint.
+/// Throws std::bad_alloc.
 void print_error(const Error& error, std::string_view who = "");
 
 }  // namespace hpr

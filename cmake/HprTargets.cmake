@@ -1,21 +1,31 @@
-# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ...): one folder, one static library, its unit tests
-# beside it.
+# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ... [TESTS_DRAW]): one folder, one static library, its
+# unit tests beside it; TESTS_DRAW: some of them use OpenGL.
 function(hpr_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS" ${ARGN})
+  cmake_parse_arguments(ARG "TESTS_DRAW" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS" ${ARGN})
   add_library(hpr_${name} STATIC ${ARG_SOURCES})
   add_library(hpr::${name} ALIAS hpr_${name})
   target_link_libraries(hpr_${name} PUBLIC hpr::options ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
   target_precompile_headers(hpr_${name} REUSE_FROM hpr_library_headers)
   if(ARG_TESTS AND BUILD_TESTING)
-    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name})
+    set(draw)
+    if(ARG_TESTS_DRAW)
+      set(draw DRAW)
+    endif()
+    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name} ${draw})
   endif()
 endfunction()
 
-# hpr_unit_test(target SOURCES ... DEPENDS ... PREFIX p [LABELS ...] [TIMEOUT s]): GoogleTests of one process. The label is
-# `unit` (also run under the sanitizers) unless others are given.
+# hpr_unit_test(target SOURCES ... DEPENDS ... PREFIX p [LABELS ...] [TIMEOUT s] [DRAW]): GoogleTests of one process. The
+# label is `unit` (also run under the sanitizers) unless others are given. DRAW: they use OpenGL. Software GL hands the
+# unwinder code made at run time; looking that up, the unwinder allocates while it holds its lock, and an allocation that
+# the address sanitizer unwinds the slow way waits for that lock for ever. So these unwind by frame pointers.
 add_custom_target(hpr_unit_tests)  # every test program with label `unit`: all that the sanitizers need built
 function(hpr_unit_test target)
-  cmake_parse_arguments(ARG "" "PREFIX;TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "DRAW" "PREFIX;TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  set(environment "${HPR_TEST_ENVIRONMENT}")
+  if(ARG_DRAW)
+    string(REPLACE "fast_unwind_on_malloc=0" "fast_unwind_on_malloc=1" environment "${environment}")
+  endif()
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
@@ -37,7 +47,7 @@ function(hpr_unit_test target)
   set(properties_script ${CMAKE_CURRENT_BINARY_DIR}/${target}_properties.cmake)
   file(WRITE ${properties_script}
     "if(${target}_TESTS)
-  set_tests_properties(\${${target}_TESTS} PROPERTIES ENVIRONMENT \"${HPR_TEST_ENVIRONMENT}\")
+  set_tests_properties(\${${target}_TESTS} PROPERTIES ENVIRONMENT \"${environment}\")
 endif()
 foreach(test IN LISTS ${target}_TESTS)
   if(test MATCHES [[${HPR_FAULT_TESTS}]])

@@ -1,5 +1,6 @@
 #include "core/file.h"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
@@ -10,7 +11,9 @@
 #include <cerrno>
 #include <cstdlib>
 #include <ctime>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -278,12 +281,28 @@ bool is_abandoned(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> entries;
+  const std::unique_ptr<DIR, int (*)(DIR*)> stream(::opendir(folder.c_str()), ::closedir);
+  if (!stream) return entries;
+  while (const dirent* const entry = ::readdir(stream.get())) {  // NOLINT(concurrency-mt-unsafe): the stream is its own
+    const std::string_view name = entry->d_name;
+    if (name != "." && name != "..") entries.push_back(folder / name);
+  }
+  return entries;
+}
+
+void remove_tree(const std::filesystem::path& path) {
+  if (::unlink(path.c_str()) == 0) return;
+  for (const std::filesystem::path& entry : entries_of(path)) remove_tree(entry);
+  ::rmdir(path.c_str());
+}
+
 void remove_abandoned_files(const std::filesystem::path& folder) {
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
+  for (const std::filesystem::path& path : entries_of(folder)) {
+    const std::string name = path.filename().string();
     if (!name.starts_with(part_prefix()) || !name.ends_with(kPartSuffix)) continue;
-    if (is_abandoned(entry->path())) ::unlink(entry->path().c_str());
+    if (is_abandoned(path)) ::unlink(path.c_str());
   }
 }
 

@@ -61,6 +61,14 @@ void write_file_atomically(const std::filesystem::path& path, std::span<const st
 void write_file_atomically(const std::filesystem::path& path, std::string_view text,
                            AtomicFile::Sync sync = AtomicFile::Sync::Disk);
 
+/// What a folder holds, in no order, as far as it can be read. Throws std::bad_alloc, where libstdc++'s
+/// directory_iterator and remove_all() end the program.
+[[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
+
+/// Removes a file, or a folder with all that it holds, as far as that can be done; follows no links. Throws
+/// std::bad_alloc.
+void remove_tree(const std::filesystem::path& path);
+
 /// Removes what processes of this user that were killed while they wrote files left in `folder`: an AtomicFile that has
 /// a name of its own holds a lock. Nothing younger than a minute, which may have none yet.
 void remove_abandoned_files(const std::filesystem::path& folder);

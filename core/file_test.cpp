@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -16,6 +17,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/job_environment.h"
@@ -331,6 +333,23 @@ TEST(TemporaryFile, HasNoNameAndGoesWithItsOwner) {
   }
   EXPECT_FALSE(fs::exists(path));
   fs::remove_all(name);
+}
+
+TEST_F(FileTest, ATreeIsRemovedWithoutWhatItsLinksName) {
+  const fs::path tree = folder_ / "tree";
+  fs::create_directories(tree / "inner/empty");
+  std::ofstream(folder_ / "kept") << "kept";
+  std::ofstream(tree / "inner/file") << "gone";
+  fs::create_symlink("../kept", tree / "link");
+  fs::create_directory_symlink("..", tree / "folder link");
+  std::vector<fs::path> entries = entries_of(tree);
+  std::ranges::sort(entries);
+  EXPECT_EQ(entries, (std::vector<fs::path>{tree / "folder link", tree / "inner", tree / "link"}));
+
+  remove_tree(tree);
+  EXPECT_EQ(entries_of(folder_), std::vector<fs::path>{folder_ / "kept"});
+  remove_tree(tree);
+  EXPECT_TRUE(entries_of(tree).empty());
 }
 
 TEST(TemporaryFile, AFolderThatCannotBeWrittenIsNamedWithItsVariable) {

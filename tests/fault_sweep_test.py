@@ -100,6 +100,8 @@ CASES = [
          ["out/manifest.json"], {NO_RANK: ["alloc", "socket"]}, display="run"),
     Case("display", light("wall", "run", WALL, SCENE, "--passes", "none", "--frames", "2", "--display", "remote", "-o", "out"),
          ["out/manifest.json"], {NO_RANK: ["alloc", "socket", *FILES]}, code=143, display="display"),
+    # What is new here is how the error is made and printed.
+    Case("refused", ["render", "none.glb", "-o", "x.png"], [], {NO_RANK: ["alloc"]}, code=4),
 ]
 
 

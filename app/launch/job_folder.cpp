@@ -9,7 +9,6 @@
 #include <cstdlib>
 #include <new>
 #include <string>
-#include <system_error>
 
 #include "core/file.h"
 #include "core/job_environment.h"
@@ -39,13 +38,11 @@ bool is_removed(int folder) {
 }
 
 void sweep(const std::filesystem::path& parent) {
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(parent, error), end; !error && entry != end; entry.increment(error)) {
-    if (!entry->path().filename().string().starts_with(prefix())) continue;
-    const int lock = try_to_lock(entry->path());
+  for (const std::filesystem::path& folder : entries_of(parent)) {
+    if (!folder.filename().string().starts_with(prefix())) continue;
+    const int lock = try_to_lock(folder);
     if (lock < 0) continue;
-    std::error_code ignored;
-    std::filesystem::remove_all(entry->path(), ignored);
+    remove_tree(folder);
     ::close(lock);
   }
 }
@@ -61,8 +58,7 @@ JobFolder::JobFolder() {
 JobFolder::~JobFolder() {
   for (const Locked& folder : folders_) {
     try {
-      std::error_code ignored;
-      std::filesystem::remove_all(folder.path, ignored);
+      remove_tree(folder.path);
     } catch (const std::bad_alloc&) {  // the next start removes it
     }
     ::close(folder.lock);

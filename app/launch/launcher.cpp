@@ -28,6 +28,7 @@
 #include "app/launch/job_folder.h"
 #include "app/launch/rank_watch.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/job_board.h"
 #include "core/job_environment.h"
 #include "core/log.h"
@@ -217,13 +218,11 @@ pid_t parent_of(const std::filesystem::path& process) {
 /// A process before those it started.
 std::vector<pid_t> with_descendants(pid_t process) {
   std::vector<std::pair<pid_t, pid_t>> parents;  ///< a process and its parent
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry("/proc", error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
+  for (const std::filesystem::path& entry : entries_of("/proc")) {
+    const std::string name = entry.filename().string();
     pid_t number = 0;
     const auto [stop, wrong] = std::from_chars(name.data(), name.data() + name.size(), number);
-    if (wrong == std::errc() && stop == name.data() + name.size())
-      parents.emplace_back(number, parent_of(entry->path()));
+    if (wrong == std::errc() && stop == name.data() + name.size()) parents.emplace_back(number, parent_of(entry));
   }
   std::vector<pid_t> found{process};
   for (std::size_t i = 0; i < found.size(); ++i) {

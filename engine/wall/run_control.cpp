@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <utility>
 
+#include "core/file.h"
 #include "core/job_board.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -158,11 +159,11 @@ void RunControl::poll() {
 
 std::vector<RunningWall> running_walls() {
   std::vector<RunningWall> walls;
-  for (const auto& entry : std::filesystem::directory_iterator(control_folder())) {
-    const std::string name = entry.path().filename().string();
+  for (const std::filesystem::path& entry : entries_of(control_folder())) {
+    const std::string name = entry.filename().string();
     if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
-    if (is_refusing(entry.path())) continue;  // it begins, or was killed just now
-    walls.push_back({name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size()), entry.path()});
+    if (is_refusing(entry)) continue;  // it begins, or was killed just now
+    walls.push_back({name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size()), entry});
   }
   std::ranges::sort(walls, {}, &RunningWall::run);
   return walls;

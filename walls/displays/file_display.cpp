@@ -29,11 +29,9 @@ bool is_frame_folder(const std::string& name) {
 
 /// Frames of another run among this one's would pass for its own.
 void refuse_kept_frames(const std::filesystem::path& folder) {
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (!is_frame_folder(entry.path().filename().string())) continue;
-    throw Error(ExitCode::Io,
-                fmt::format("'{}' holds frames of another run already", printable(entry.path().parent_path().string())),
+  for (const std::filesystem::path& entry : entries_of(folder)) {
+    if (!is_frame_folder(entry.filename().string())) continue;
+    throw Error(ExitCode::Io, fmt::format("'{}' holds frames of another run already", printable(folder.string())),
                 "name an empty folder, or overwrite them with --force");
   }
 }

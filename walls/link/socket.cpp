@@ -24,6 +24,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/text.h"
 #include "walls/link/protocol.h"
 
@@ -204,10 +205,9 @@ bool is_refusing(const std::filesystem::path& socket) {
 
 void remove_left_sockets(const std::filesystem::path& folder) {
   constexpr std::time_t kYoungSeconds = 10;
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (const std::filesystem::path& entry : entries_of(folder)) {
     struct stat info {};
-    const std::string path = entry->path().string();
+    const std::string path = entry.string();
     if (::lstat(path.c_str(), &info) != 0 || !S_ISSOCK(info.st_mode) || info.st_uid != ::geteuid()) continue;
     if (path.size() >= sizeof(sockaddr_un::sun_path)) continue;
     if (info.st_mtime + kYoungSeconds < std::time(nullptr) && is_refusing(path)) ::unlink(path.c_str());
