@@ -117,6 +117,8 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
             {"rays_cut", stats.rays.cut},
             {"rays_invalid", stats.rays.invalid},
             {"not_finite", not_finite_json(stats.rays)},
+            {"exposure", stats.display ? Json(stats.display->exposure_stops) : Json()},
+            {"tone", stats.display ? Json(name_of(stats.display->tone)) : Json()},
             {"bytes_sent", stats.bytes_sent},
             {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
             {"ranks", stats.ranks}};

@@ -59,29 +59,22 @@ std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_b
   return owners;
 }
 
-void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, double exposure_stops) {
-  const auto gain = static_cast<float>(std::exp2(exposure_stops));
-  std::ranges::transform(radiance, display.begin(), [gain](const Rgb& color) {
-    return to_srgb({color.r * gain, color.g * gain, color.b * gain});
-  });
-}
-
-/// Converts a picture to display colors, `exposure_stops` brighter.
-Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, double exposure_stops) {
+/// Converts a picture to display colours.
+Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, const DisplayTransform& transform) {
   Image<Rgba8> display(radiance.size());
   parallel_for(threads, static_cast<std::size_t>(radiance.height()), [&](std::size_t row) {
     const int y = static_cast<int>(row);
-    to_display(radiance.row(y), display.row(y), exposure_stops);
+    to_display(radiance.row(y), display.row(y), transform);
   });
   return display;
 }
 
-/// Converts a frame's tiles to display colors, `exposure_stops` brighter.
-TileLayer<Rgba8> to_display(const Frame& frame, int threads, double exposure_stops) {
+/// Converts a frame's tiles to display colours.
+TileLayer<Rgba8> to_display(const Frame& frame, int threads, const DisplayTransform& transform) {
   TileLayer<Rgba8> display(frame.radiance.layout());
   for (const std::size_t tile : frame.owned) display.set_active(tile);
   parallel_for(threads, frame.owned.size(), [&](std::size_t i) {
-    to_display(frame.radiance.tile(frame.owned[i]), display.tile(frame.owned[i]), exposure_stops);
+    to_display(frame.radiance.tile(frame.owned[i]), display.tile(frame.owned[i]), transform);
   });
   return display;
 }
@@ -158,7 +151,7 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
   const std::vector<int> owners = block_owners(blocks, showing.shown_by);
   TileLayer<Rgba8> display;  // a third of the bytes of the radiance, but no light to filter
   if (as_made) {
-    display = to_display(frame, session.threads(), showing.exposure_stops);
+    display = to_display(frame, session.threads(), showing.transform);
     session.assembler().assemble(session.comm(), display, frame.owned, owners);
   } else {
     session.assembler().assemble(session.comm(), frame.radiance, frame.owned, owners);
@@ -171,7 +164,7 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
     } else {
       const Image<Rgb> small = join_blocks(frame.radiance, blocks, screen);
       pictures[screen] = to_display(enlarge(small, showing.sizes[screen], session.threads()), session.threads(),
-                                    showing.exposure_stops);
+                                    showing.transform);
     }
   }
   return pictures;
@@ -196,8 +189,9 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
   const auto collect = [&](auto& layer) { session.assembler().assemble(session.comm(), layer, frame.owned, to_root); };
   // A PNG holds display colours, a third of the bytes of the radiance an EXR holds.
   const bool display_colors = files_.is_png() && !enlarged();
+  if (files_.is_png()) transform_ = transform_for(session, frame, files_.display);
   if (display_colors) {
-    display_ = to_display(frame, session.threads(), files_.exposure);
+    display_ = to_display(frame, session.threads(), *transform_);
     collect(display_);
   }
   // What is shown at another size than it was made in is enlarged on rank 0 before it is rounded to display colours.
@@ -283,7 +277,7 @@ void CollectedPicture::write(const std::string& scene_name) const {
 void CollectedPicture::write_picture(const std::string& scene_name) const {
   if (files_.is_png()) {
     write_png(files_.picture,
-              enlarged() ? to_display(radiance(), threads_, files_.exposure) : join_blocks(display_, blocks_, 0));
+              enlarged() ? to_display(radiance(), threads_, *transform_) : join_blocks(display_, blocks_, 0));
   }
   if (files_.is_png() && files_.aovs.empty()) return;
   const std::string exr = files_.is_png() ? files_.aov_file() : files_.picture;

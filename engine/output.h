@@ -10,10 +10,12 @@
 #include "core/error.h"
 #include "engine/aov.h"
 #include "engine/budget.h"
+#include "engine/exposure.h"
 #include "engine/frame.h"
 #include "image/color.h"
 #include "image/image.h"
 #include "image/tiles.h"
+#include "image/tone.h"
 #include "rt/passes/pass_id.h"
 #include "rt/ray_counts.h"
 #include "scene/view.h"
@@ -60,6 +62,7 @@ struct RunStats {
   std::optional<double> relmse;        ///< of a frame of several samples, estimated from their halves
   std::optional<BudgetReport> budget;  ///< of a frame with a target time
   std::optional<VerifyReport> verify;  ///< of a frame some of whose tiles were verified
+  std::optional<DisplayTransform> display;  ///< of a frame that was shown
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
@@ -95,7 +98,7 @@ struct FrameCost {
 struct Showing {
   std::vector<Size> sizes;    ///< per screen, pixels; a frame made of fewer or more is enlarged by a filter
   std::vector<int> shown_by;  ///< per screen the rank
-  double exposure_stops = 0.0;
+  DisplayTransform transform;
 };
 
 /// Collective. Brings the frame, which was made in `blocks`, to the ranks that show it. Per screen its display colours,
@@ -107,7 +110,7 @@ struct Showing {
 struct PictureFiles {
   std::string picture;    ///< .png or .exr
   std::string raw;        ///< keys
-  double exposure = 0.0;  ///< stops, of a .png
+  DisplaySettings display;  ///< of a .png
   std::vector<Aov> aovs;
   ColorFormat colors = ColorFormat::Float32;  ///< as sent to the rank that writes an .exr
 
@@ -133,6 +136,8 @@ class CollectedPicture {
   void write(const std::string& scene_name) const;
   /// On rank 0, for an .exr: what it will hold.
   [[nodiscard]] Image<Rgb> radiance() const;
+  /// On all ranks, for a .png: how radiance became its colours.
+  [[nodiscard]] const std::optional<DisplayTransform>& transform() const { return transform_; }
 
  private:
   void write_picture(const std::string& scene_name) const;
@@ -144,6 +149,7 @@ class CollectedPicture {
   Size size_;
   int threads_;
   PictureFiles files_;
+  std::optional<DisplayTransform> transform_;
   TileLayer<Rgba8> display_;  ///< where a .png is wanted
 };
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/exposure.h"
 #include "engine/frame_settings.h"
 #include "engine/samples.h"
 #include "image/color.h"
@@ -51,7 +52,7 @@ struct RenderSettings {
   Sampling sampling;
   FrameSettings frame;
   std::string environment;                          ///< see load_environment; empty: the scene's own
-  double exposure_stops = 0.0;                      ///< of display colors
+  DisplaySettings display;
   ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;
   bool strict = false;  ///< values that are not finite are errors, not replaced

@@ -209,6 +209,21 @@ int parse_codec_error(std::string levels) {
   throw Error(ExitCode::Usage, fmt::format("'{}' is no number of levels", printable(levels)), "write e.g. 3/255, or 3");
 }
 
+SettingValue exposure() {
+  constexpr double kMaxStops = 30.0;
+  return text(
+      "auto|STOPS", fmt::format("auto, or {:g} to {:g} stops", -kMaxStops, kMaxStops),
+      [](Settings& s) -> std::optional<double>& { return s.display.exposure_stops; },
+      [=](const std::string& written) -> std::optional<double> {
+        if (written == "auto") return std::nullopt;
+        const auto parsed = parse_number<double>(written);
+        if (parsed && std::abs(*parsed) <= kMaxStops) return parsed;
+        throw Error(ExitCode::Usage, fmt::format("'{}' is no exposure", printable(written)),
+                    fmt::format("write auto, or a number of stops from {:g} to {:g}", -kMaxStops, kMaxStops));
+      },
+      [](const std::optional<double>& stops) { return stops ? fmt::format("{}", *stops) : std::string("auto"); });
+}
+
 bool sends_photons(const Settings& settings) {
   const RaySettings& rays = settings.frame.rays;
   const bool named = std::ranges::any_of(rays.passes, [](PassId pass) { return info_of(pass).needs_photons; });
@@ -479,10 +494,17 @@ std::vector<Setting> make_table() {
        .scope = SettingScope::Single},
 
       // What is made of the picture.
+      {.name = "tone",
+       .help = "how bright light fits a display: neutral keeps the colors of lit surfaces, aces and filmic have more "
+               "contrast, agx less, none clips; EXR files stay as lit",
+       .value = choice(kToneNames, [](Settings& s) -> Tone& { return s.display.tone; }),
+       .initial = "neutral",
+       .decides_bits = false},
       {.name = "exposure",
-       .help = "brightens (or darkens) display colors by so many stops; EXR files stay as lit",
-       .value = number(-30.0, 30.0, [](Settings& s) -> double& { return s.exposure_stops; }),
-       .initial = "0",
+       .help = "brightens (or darkens) display colors by so many stops; auto: as the light of all that is seen asks "
+               "for, alike on all screens; EXR files stay as lit",
+       .value = exposure(),
+       .initial = "auto",
        .decides_bits = false},
       {.name = "aov",
        .help =

@@ -67,7 +67,7 @@ class RenderCommand final : public Command {
     (void)checkpoint_interval();
     const RenderSettings settings = resolve(settings_, globals.seed);
     files_.aovs = settings.frame.aovs;
-    files_.exposure = settings.exposure_stops;
+    files_.display = settings.display;
     files_.colors = settings.color_format;
     if (checkpoint_.empty() && !files_.picture.empty()) checkpoint_ = files_.picture + ".checkpoint";
     if (!settings.sampling.sums()) checkpoint_.clear();
@@ -210,6 +210,7 @@ class RenderCommand final : public Command {
     const FrameCost cost{watch.ms(), session.comm().bytes_sent() - sent_before};
     RunStats stats = gather_stats(session, plan, sampler.times(), cost);
     stats.relmse = sampler.sample_progress().relmse;
+    stats.display = picture.transform();
     stats.samples_in_all = static_cast<int>(sampler.sample_progress().samples);
     agree_on_failure(session.comm(), [&] {
       if (!is_root) return;

@@ -52,7 +52,7 @@ class Console {
     FramePlan plan;
     Blocks blocks;
     Size size;
-    double exposure = 0.0;
+    DisplaySettings display;
     ColorFormat colors = ColorFormat::Float32;
     std::unique_ptr<FrameSampler> sampler;
     RunStats stats;
@@ -117,7 +117,7 @@ std::string Console::render() {
   const View seen = view();
   auto picture = std::make_unique<Picture>();
   picture->size = size_;
-  picture->exposure = settings.exposure_stops;
+  picture->display = settings.display;
   picture->colors = settings.color_format;
   picture->scene_name = session_.scene().name;
   picture->blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.frame.resolution_scale));
@@ -154,7 +154,7 @@ std::string Console::save(Arguments arguments) {
   check_on_root(session_.comm(), [&] { check_writable(arguments[0], globals_.force); });
   PictureFiles files;
   files.picture = arguments[0];
-  files.exposure = last.exposure;
+  files.display = last.display;
   files.aovs = last.plan.aovs;
   files.colors = last.colors;
   const CollectedPicture collected(session_, last.sampler->frame(), last.blocks, last.size, files);

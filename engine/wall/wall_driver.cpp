@@ -124,7 +124,8 @@ void WallDriver::start_frames() {
   const FrameSettings used = settings_for(wall_, settings.frame);
   curved_.emplace(views, used.primary == Primary::Rays);
   for (const Size& size : curved_->sizes()) check_size(size, job_.picture_limits);
-  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), settings.exposure_stops};
+  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), {}};
+  display_settings_ = settings.display;
   frames_.emplace(session_, used, sampling_of(job_, settings), curved_->drawn(views), target_of(job_),
                   resting_of(job_, settings), !job_.outputs.layers.raw.empty());
 }
@@ -279,12 +280,18 @@ void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
                         fmt::format("of {} tile{} no two of three drawings agree", unmended, unmended == 1 ? "" : "s"),
                         "memory, a GPU or a link of these ranks flips bits: replace it");
     }
+    showing_.transform = transform_for(session_, frame, display_settings_);
+    SmoothExposure exposure = exposure_;
+    if (!display_settings_.exposure_stops) {
+      showing_.transform.exposure_stops = exposure.next(showing_.transform.exposure_stops);
+    }
     std::vector<Image<Rgba8>> pictures = bring_to_screens(session_, frame, frames_->blocks(), showing_);
     curved_->finish(views, pictures, session_.threads());
     pictures = compose_screens(wall_, std::move(pictures));
     std::vector<Image<Rgba8>> monitor_pictures = monitors_.draw(session_.comm(), pictures, owners_);
     pictures_ = std::move(pictures);
     monitor_pictures_ = std::move(monitor_pictures);
+    exposure_ = exposure;
   } catch (...) {
     frames_->discard();
     throw;
@@ -402,6 +409,8 @@ void WallDriver::record(std::uint64_t number, const std::optional<Error>& failur
   } else {
     frames_->record_frame_time(slowest);
     if (frames_->report()) frame.budget = to_record(*frames_->report());
+    frame.exposure_stops = showing_.transform.exposure_stops;
+    frame.tone = name_of(showing_.transform.tone);
     const std::vector<RankWork> works = works_of(session_, *frames_);
     frame.slowest = slowest_of(works, *frames_, hosts_);
     warn_of_slow_ranks(works);

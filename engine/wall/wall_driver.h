@@ -104,6 +104,8 @@ class WallDriver {
   std::vector<std::string> hosts_;  ///< per rank
   std::vector<int> owners_;         ///< per screen the rank that shows it
   Showing showing_;                 ///< of the pictures of screen_eyes()
+  DisplaySettings display_settings_;
+  SmoothExposure exposure_;  ///< of the frames that were shown
   std::optional<CurvedScreens> curved_;
   std::optional<FrameMaker> frames_;
   std::unique_ptr<Display> display_;

@@ -92,7 +92,7 @@ class Bench {
  public:
   /// `settings` are resolved.
   Bench(Session& session, const RenderSettings& settings, Size size)
-      : session_(session), sampling_(settings.sampling), exposure_(settings.exposure_stops) {
+      : session_(session), sampling_(settings.sampling), transform_(fixed_transform(settings.display)) {
     const Scene& scene = session.scene();
     camera_ = choose_camera(settings.camera, scene);
     view_ = make_view(camera_, size, scene.bounds);
@@ -110,7 +110,7 @@ class Bench {
       FrameSampler sampler(session_, plan_, sampling_, 0, false);
       (void)sampler.draw(blocks_.views, {}, silent);  // it stops before its goal for a checkpoint only
       const double drawn = watch.ms();
-      (void)bring_to_screens(session_, sampler.frame(), blocks_, {{view_.screen}, {0}, exposure_});
+      (void)bring_to_screens(session_, sampler.frame(), blocks_, {{view_.screen}, {0}, transform_});
       if (counts) frames_.push_back({sampler.times(), watch.ms() - drawn, watch.ms()});
     });
   }
@@ -173,7 +173,7 @@ class Bench {
 
   Session& session_;
   Sampling sampling_;
-  double exposure_;
+  DisplayTransform transform_;
   Camera camera_;
   View view_;
   Blocks blocks_;

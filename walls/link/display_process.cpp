@@ -68,10 +68,8 @@ DisplayProcess::DisplayProcess(const Wall& wall, std::string host, Display& disp
   if (settings_.folder.empty()) return;
   write_status();
   writer_ = std::jthread([this](const std::stop_token& stop) {
-    std::mutex mutex;
-    std::condition_variable_any wake;
-    std::unique_lock lock(mutex);
-    while (!wake.wait_for(lock, stop, kStatusEvery, [&] { return stop.stop_requested(); })) {
+    std::unique_lock lock(waiting_);
+    while (!wake_.wait_for(lock, stop, kStatusEvery, [&] { return stop.stop_requested(); })) {
       try {
         write_status();
       } catch (const std::exception& error) {  // also where memory is short

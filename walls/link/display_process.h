@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <filesystem>
 #include <functional>
 #include <mutex>
@@ -79,6 +80,8 @@ class DisplayProcess {
   Stopwatch since_failure_;
   mutable std::mutex mutex_;  ///< of the screens' states
   std::string written_;
+  std::mutex waiting_;
+  std::condition_variable_any wake_;
   std::jthread writer_;  ///< writing waits for the disk; showing must not
 };
 

@@ -36,6 +36,8 @@ Json json_of(const FrameRecord& frame) {
     picture["state"] = to_string(screen.state);
     record["screens"].push_back(std::move(picture));
   }
+  record["exposure"] = frame.exposure_stops;
+  record["tone"] = frame.tone;
   if (frame.budget) record["budget"] = budget_json(*frame.budget);
   // Apart from the screens: those are the same from run to run.
   for (const ScreenRecord& screen : frame.screens) {

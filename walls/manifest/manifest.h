@@ -73,6 +73,8 @@ struct FrameRecord {
   double ms = 0.0;
   std::string strategy;
   std::vector<ScreenRecord> screens;
+  double exposure_stops = 0.0;
+  std::string tone = {};  ///< how light was fitted to the display colours
   std::optional<BudgetRecord> budget = {};
   std::optional<SwapRecord> swap = {};  ///< only with such displays
   std::vector<HeadRecord> heads = {};

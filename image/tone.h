@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "image/color.h"
+
+namespace hpr {
+
+/// How light that may have any strength becomes what a display can show.
+enum class Tone : std::uint8_t {
+  Neutral,  ///< Khronos PBR Neutral: colours up to 0.8 as they are, brighter ones towards white
+  Aces,     ///< filmic contrast, bright colours turn white: Academy Color Encoding System, Hill's fit
+  Agx,      ///< low contrast, bright colours fade softly: AgX, Wrensch's fit
+  Filmic,   ///< film with a soft toe and shoulder, channel by channel: Hable's curve
+  None,     ///< clips at 1
+};
+inline constexpr std::array<std::string_view, 5> kToneNames{"neutral", "aces", "agx", "filmic", "none"};
+[[nodiscard]] constexpr std::string_view name_of(Tone tone) {
+  return kToneNames.at(static_cast<std::size_t>(tone));
+}
+
+/// Linear radiance to linear display light from 0 to 1. What is negative or no number counts as 0.
+[[nodiscard]] Rgb tone_map(Tone tone, Rgb radiance);
+
+/// How radiance becomes display colours.
+struct DisplayTransform {
+  double exposure_stops = 0.0;  ///< radiance is multiplied by 2 to the power of it first
+  Tone tone = Tone::None;
+
+  bool operator==(const DisplayTransform&) const = default;
+};
+
+/// radiance[i] becomes display[i], with alpha 255.
+void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, const DisplayTransform& transform);
+
+}  // namespace hpr
