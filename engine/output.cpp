@@ -1,5 +1,6 @@
 #include "engine/output.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -163,11 +164,35 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
       pictures[screen] = join_blocks(display, blocks, screen);
     } else {
       const Image<Rgb> small = join_blocks(frame.radiance, blocks, screen);
-      pictures[screen] = to_display(enlarge(small, showing.sizes[screen], session.threads()), session.threads(),
-                                    showing.transform);
+      pictures[screen] =
+          to_display(enlarge(small, showing.sizes[screen], session.threads()), session.threads(), showing.transform);
     }
   }
   return pictures;
+}
+
+std::string advice_on(const Image<Rgba8>& picture) {
+  constexpr double kTooMuch = 0.9;
+  const auto share_of = [&](const auto& is) {
+    return static_cast<double>(std::ranges::count_if(picture.pixels(), is)) /
+           static_cast<double>(picture.size().area());
+  };
+  const auto brightest = [](const Rgba8& color) { return std::max({color.r, color.g, color.b}); };
+  const double black = share_of([&](const Rgba8& color) { return brightest(color) <= 1; });
+  if (black > kTooMuch) {
+    return fmt::format(
+        "{:.0f} % of the picture is black: --environment studio adds light, --exposure auto brightens, --eye and --at "
+        "look elsewhere; --explain says what lights the scene",
+        100.0 * black);
+  }
+  const double clipped = share_of([&](const Rgba8& color) { return brightest(color) == 255; });
+  if (clipped > kTooMuch) {
+    return fmt::format(
+        "{:.0f} % of the picture is clipped: --exposure auto or fewer stops darken it, --tone neutral "
+        "keeps bright colours apart",
+        100.0 * clipped);
+  }
+  return {};
 }
 
 std::string PictureFiles::aov_file() const {
@@ -276,8 +301,10 @@ void CollectedPicture::write(const std::string& scene_name) const {
 
 void CollectedPicture::write_picture(const std::string& scene_name) const {
   if (files_.is_png()) {
-    write_png(files_.picture,
-              enlarged() ? to_display(radiance(), threads_, *transform_) : join_blocks(display_, blocks_, 0));
+    const Image<Rgba8> colors =
+        enlarged() ? to_display(radiance(), threads_, *transform_) : join_blocks(display_, blocks_, 0);
+    write_png(files_.picture, colors, texts_of(*transform_));
+    if (const std::string advice = advice_on(colors); !advice.empty()) log::warning("{}", advice);
   }
   if (files_.is_png() && files_.aovs.empty()) return;
   const std::string exr = files_.is_png() ? files_.aov_file() : files_.picture;

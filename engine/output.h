@@ -56,12 +56,12 @@ struct VerifyReport {
 
 /// Times and counts of a run of frames, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {
-  double ms = 0.0;                     ///< one frame, all its samples, slowest rank
-  int samples = 1;                     ///< drawn by this run
-  int samples_in_all = 1;              ///< of the picture: with those of a checkpoint
-  std::optional<double> relmse;        ///< of a frame of several samples, estimated from their halves
-  std::optional<BudgetReport> budget;  ///< of a frame with a target time
-  std::optional<VerifyReport> verify;  ///< of a frame some of whose tiles were verified
+  double ms = 0.0;                          ///< one frame, all its samples, slowest rank
+  int samples = 1;                          ///< drawn by this run
+  int samples_in_all = 1;                   ///< of the picture: with those of a checkpoint
+  std::optional<double> relmse;             ///< of a frame of several samples, estimated from their halves
+  std::optional<BudgetReport> budget;       ///< of a frame with a target time
+  std::optional<VerifyReport> verify;       ///< of a frame some of whose tiles were verified
   std::optional<DisplayTransform> display;  ///< of a frame that was shown
   std::vector<std::string> plan;
   std::vector<PassPlan> passes;
@@ -106,10 +106,14 @@ struct Showing {
 [[nodiscard]] std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const Blocks& blocks,
                                                          const Showing& showing);
 
+/// What is wrong with a picture of which more than nine tenths are black or clipped (a channel at 255), and what to do:
+/// one line; empty where nothing is.
+[[nodiscard]] std::string advice_on(const Image<Rgba8>& picture);
+
 /// The files one picture may become; empty names are not written.
 struct PictureFiles {
-  std::string picture;    ///< .png or .exr
-  std::string raw;        ///< keys
+  std::string picture;      ///< .png or .exr
+  std::string raw;          ///< keys
   DisplaySettings display;  ///< of a .png
   std::vector<Aov> aovs;
   ColorFormat colors = ColorFormat::Float32;  ///< as sent to the rank that writes an .exr

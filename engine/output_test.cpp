@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "scene/scene.h"
 #include "scene/view.h"
 
@@ -40,6 +42,20 @@ TEST(AtResolution, MakesAScreenOfSeveralBlocksOfFewer) {
   const std::vector<View> blocks = split_into_blocks(at_resolution(wide, 0.5).front(), kRasterLimit);
   ASSERT_EQ(blocks.size(), 2U);
   EXPECT_EQ(blocks[1].block, (Rect{kRasterLimit, 0, 20000, 5}));
+}
+
+Image<Rgba8> with(int of_hundred, Rgba8 color) {
+  Image<Rgba8> picture({10, 10}, {90, 90, 90, 255});
+  std::ranges::fill(picture.pixels().first(static_cast<std::size_t>(of_hundred)), color);
+  return picture;
+}
+
+TEST(Advice, IsGivenOnPicturesThatShowNextToNothing) {
+  EXPECT_EQ(advice_on(with(90, {0, 0, 0, 255})), "");
+  EXPECT_TRUE(advice_on(with(91, {1, 0, 1, 255})).starts_with("91 % of the picture is black: "));
+  EXPECT_EQ(advice_on(with(100, {2, 0, 0, 255})), "");
+  EXPECT_EQ(advice_on(with(90, {255, 255, 255, 255})), "");
+  EXPECT_TRUE(advice_on(with(95, {255, 10, 0, 255})).starts_with("95 % of the picture is clipped: "));
 }
 
 }  // namespace

@@ -125,6 +125,7 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
     lines.push_back(
         fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
   }
+  if (const std::string& note = session.scene().environment_note; !note.empty()) lines.push_back("light: " + note);
   if (!gives_light(session.scene())) {
     lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
   } else if (session.scene().triangles > 0 && !session.requirements().indirect.needed &&

@@ -48,6 +48,14 @@ void note_not_finite(const std::string& name, Scene& scene) {
                                        environment.first_not_finite / width));
 }
 
+/// Gives a scene the environment that was asked for.
+void set_environment(const std::string& wanted, const ImageLimits& pictures, Scene& scene) {
+  if (wanted.empty() || wanted == kNoEnvironment) return;
+  scene.environment = load_environment(wanted, pictures);
+  scene.environment_note = fmt::format("the environment {} (as asked)", printable(wanted));
+  note_not_finite(printable(wanted), scene);
+}
+
 /// The pass that needs photons, if it is named.
 std::optional<PassId> named_photon_pass(const RaySettings& rays) {
   const auto found = std::ranges::find_if(rays.passes, [](PassId pass) { return info_of(pass).needs_photons; });
@@ -185,10 +193,7 @@ Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
 Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
                  const ImageLimits& pictures) {
   Scene scene = load_scene(source, limits);
-  if (!settings.environment.empty()) {
-    scene.environment = load_environment(settings.environment, pictures);
-    note_not_finite(printable(settings.environment), scene);
-  }
+  set_environment(settings.environment, pictures, scene);
   if (settings.strict && scene.not_finite > 0) {
     const auto named = std::ranges::find_if(
         scene.warnings, [](const std::string& text) { return text.find("no finite numbers") != std::string::npos; });

@@ -33,6 +33,9 @@ struct CameraChoice {
 };
 inline constexpr double kDefaultFovDegrees = 45.0;
 
+/// The value of RenderSettings::environment that adds nothing to what the scene brings.
+inline constexpr std::string_view kNoEnvironment = "none";
+
 /// Which defaults the settings without a given value take.
 enum class Quality : std::uint8_t { Draft, Good, Best };
 inline constexpr std::array<std::string_view, 3> kQualityNames{"draft", "good", "best"};
@@ -51,7 +54,7 @@ struct RenderSettings {
   Quality quality = Quality::Good;
   Sampling sampling;
   FrameSettings frame;
-  std::string environment;                          ///< see load_environment; empty: the scene's own
+  std::string environment;  ///< see load_environment; empty or kNoEnvironment: the scene's own
   DisplaySettings display;
   ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;

@@ -269,8 +269,9 @@ std::vector<Setting> make_table() {
        .value = number(0.001, 179.0, [](Settings& s) -> double& { return s.camera.fov_degrees; }),
        .decides_bits = false},
       {.name = "environment",
-       .help = "light from all around: a latitude-longitude picture, or one radiance R,G,B; replaces the scene's own",
-       .value = plain_text("FILE|R,G,B", "a picture or a radiance",
+       .help = "light from all around, in place of the scene's own: a latitude-longitude picture, one radiance R,G,B, "
+               "or studio, a neutral one; none: what the scene brings alone",
+       .value = plain_text("studio|none|FILE|R,G,B", "studio, none, a picture or a radiance",
                            [](Settings& s) -> std::string& { return s.environment; }),
        .decides_bits = false,
        .fixed_in_session = true},
@@ -498,13 +499,13 @@ std::vector<Setting> make_table() {
        .help = "how bright light fits a display: neutral keeps the colors of lit surfaces, aces and filmic have more "
                "contrast, agx less, none clips; EXR files stay as lit",
        .value = choice(kToneNames, [](Settings& s) -> Tone& { return s.display.tone; }),
-       .initial = "neutral",
+       .initial = "none",
        .decides_bits = false},
       {.name = "exposure",
        .help = "brightens (or darkens) display colors by so many stops; auto: as the light of all that is seen asks "
                "for, alike on all screens; EXR files stay as lit",
        .value = exposure(),
-       .initial = "auto",
+       .initial = "0",
        .decides_bits = false},
       {.name = "aov",
        .help =

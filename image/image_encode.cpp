@@ -54,7 +54,7 @@ void add_channels(Imf::Header& header, Imf::FrameBuffer& pixels, std::span<const
 
 }  // namespace
 
-std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
+std::vector<std::byte> encode_png(const Image<Rgba8>& image, const PngTexts& texts) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = static_cast<png_uint_32>(image.width());
@@ -70,6 +70,7 @@ std::vector<std::byte> encode_png(const Image<Rgba8>& image) {
                 "check the picture's size");
   }
   file.resize(size);
+  add_png_texts(file, texts);
   return file;
 }
 

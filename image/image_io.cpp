@@ -130,7 +130,9 @@ FloatImage decode_float_image(std::span<const std::byte> bytes, const std::strin
   }
   if (format == Format::Exr) return decode_exr(bytes, name, limits);
   if (format == Format::Radiance) return decode_radiance(bytes, name, limits);
-  return to_floats(decode_stored(*format, bytes, name, limits));
+  FloatImage image = to_floats(decode_stored(*format, bytes, name, limits));
+  if (format == Format::Png) image.texts = png_texts(bytes);
+  return image;
 }
 
 FloatImage read_image(const std::filesystem::path& path, const ImageLimits& limits) {
@@ -151,8 +153,8 @@ void write_image(const std::filesystem::path& path, const Image<Rgb>& image,
   }
 }
 
-void write_png(const std::filesystem::path& path, const Image<Rgba8>& image) {
-  write_file_atomically(path, encode_png(image));
+void write_png(const std::filesystem::path& path, const Image<Rgba8>& image, const PngTexts& texts) {
+  write_file_atomically(path, encode_png(image, texts));
 }
 
 }  // namespace hpr

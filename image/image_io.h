@@ -10,6 +10,7 @@
 
 #include "image/color.h"
 #include "image/image.h"
+#include "image/png_texts.h"
 
 namespace hpr {
 
@@ -35,6 +36,7 @@ struct FloatImage {
   std::uint32_t levels = 0;  ///< values are whole multiples of 1 / levels; 0: any numbers
   /// Channels stored as unsigned integers, [height][width], bit by bit; `values` has them as fractions of 2^32 - 1.
   std::map<std::string, std::vector<std::uint32_t>> integers = {};
+  PngTexts texts = {};  ///< of a PNG
 };
 
 /// One more channel set of an EXR file, e.g. depth or surface ids; floats survive bit by bit.
@@ -45,7 +47,7 @@ struct ExrLayer {
 };
 
 /// PNG, 8 bit RGBA, sRGB.
-[[nodiscard]] std::vector<std::byte> encode_png(const Image<Rgba8>& image);
+[[nodiscard]] std::vector<std::byte> encode_png(const Image<Rgba8>& image, const PngTexts& texts = {});
 
 /// EXR, 32-bit float R G B (bit-exact, NaN included) and `layers` in one part; `attributes` go into the header.
 [[nodiscard]] std::vector<std::byte> encode_exr(const Image<Rgb>& image,
@@ -69,6 +71,6 @@ struct ExrLayer {
 /// others.
 void write_image(const std::filesystem::path& path, const Image<Rgb>& image,
                  const std::map<std::string, std::string>& attributes = {});
-void write_png(const std::filesystem::path& path, const Image<Rgba8>& image);
+void write_png(const std::filesystem::path& path, const Image<Rgba8>& image, const PngTexts& texts = {});
 
 }  // namespace hpr

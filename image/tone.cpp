@@ -1,8 +1,11 @@
 #include "image/tone.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "core/error.h"
 
@@ -116,6 +119,11 @@ Rgb tone_map(Tone tone, Rgb radiance) {
       return clipped(color);
   }
   HPR_CHECK(false);
+}
+
+PngTexts texts_of(const DisplayTransform& transform) {
+  return {{kExposureText, fmt::format("{:.4g}", transform.exposure_stops)},
+          {kToneText, std::string(name_of(transform.tone))}};
 }
 
 void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, const DisplayTransform& transform) {

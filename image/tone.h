@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "image/color.h"
+#include "image/png_texts.h"
 
 namespace hpr {
 
@@ -33,6 +34,11 @@ struct DisplayTransform {
 
   bool operator==(const DisplayTransform&) const = default;
 };
+
+/// The keywords by which a PNG says how its colours were made: a name of kToneNames, and stops.
+inline constexpr const char* kToneText = "hpr:tone";
+inline constexpr const char* kExposureText = "hpr:exposure";
+[[nodiscard]] PngTexts texts_of(const DisplayTransform& transform);
 
 /// radiance[i] becomes display[i], with alpha 255.
 void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, const DisplayTransform& transform);

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "scene/generators/generators.h"
+#include "scene/studio.h"
 
 namespace hpr {
 namespace {
@@ -121,11 +122,12 @@ Environment load_environment(const std::string& text, const ImageLimits& limits)
     }
     return {Image<Rgb>({1, 1}, {(*numbers)[0], (*numbers)[1], (*numbers)[2]})};
   }
+  if (text == kStudioName) return make_studio();
   const std::string extension = extension_of(text);
   if (extension != ".hdr" && extension != ".exr" && extension != ".png" && extension != ".jpg" &&
       extension != ".jpeg") {
     throw Error(ExitCode::Usage, fmt::format("'{}' is no environment", printable(text)),
-                "name a .hdr, .exr, .png or .jpg picture, or give a radiance as R,G,B");
+                "name a .hdr, .exr, .png or .jpg picture, give a radiance as R,G,B, or write studio or none");
   }
   return environment_of(read_image(text, limits), printable(text));
 }

@@ -161,6 +161,8 @@ struct Scene {
   std::vector<Instance> instances;  ///< in ascending order of first_surface
   /// The nodes that placed them: one per instance, or none at all. Nothing a picture shows: no part of content_hash.
   std::vector<std::string> node_names;
+  /// What environment there is and why, for people: no part of content_hash either.
+  std::string environment_note;
   std::vector<Light> lights;  ///< see gives_light for when the renderer adds a headlight
   std::vector<Camera> cameras;
   Rgb background;  ///< radiance where no surface is and no environment; lights nothing

@@ -155,7 +155,7 @@ class SpanSource final : public std::streambuf {
 void save(const Scene& scene, std::streambuf& sink, bool with_names) {
   std::ostream stream(&sink);
   cereal::BinaryOutputArchive archive(stream);
-  if (with_names) archive(scene.node_names);
+  if (with_names) archive(scene.node_names, scene.environment_note);
   archive(const_cast<Scene&>(scene));
 }
 
@@ -172,7 +172,7 @@ Scene scene_from_bytes(std::span<const std::byte> bytes) {
   std::istream stream(&source);
   cereal::BinaryInputArchive archive(stream);
   Scene scene;
-  archive(scene.node_names, scene);
+  archive(scene.node_names, scene.environment_note, scene);
   return scene;
 }
 

@@ -82,8 +82,8 @@ void write_results(const WallJob& job, const WallDriver& driver, const RunStats&
                    std::span<const Image<Rgba8>> pictures) {
   const WallOutputs& outputs = job.outputs;
   if (!outputs.assembled.empty() || !outputs.picture.empty()) {
-    const std::vector<std::byte> picture =
-        encode_png(draw_wall(job.wall, wall_picture(job.wall, kMaxPictureSide), pictures));
+    const std::vector<std::byte> picture = encode_png(
+        draw_wall(job.wall, wall_picture(job.wall, kMaxPictureSide), pictures), texts_of(driver.transform()));
     if (!outputs.assembled.empty()) write_file_atomically(outputs.assembled, picture);
     if (!outputs.picture.empty()) write_file_atomically(outputs.picture, picture);
   }
@@ -175,6 +175,7 @@ ExitCode drive(const WallJob& job, const Globals& globals, Session& session) {
   RunStats stats = gather_stats(session, driver.plan(), driver.times(), driver.last_cost());
   stats.relmse = driver.relmse();
   stats.budget = driver.frames().report();
+  stats.display = driver.transform();
   if (reports && stats.budget) report_budget(driver.manifest());
   write_last_layers(job, driver, session);
   std::vector<Image<Rgba8>> pictures;

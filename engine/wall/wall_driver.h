@@ -41,6 +41,8 @@ class WallDriver {
   /// One line per decision, with its reason.
   [[nodiscard]] std::vector<std::string> explained() const;
   [[nodiscard]] const RunManifest& manifest() const { return manifest_; }
+  /// How radiance became the colours of the last frame.
+  [[nodiscard]] const DisplayTransform& transform() const { return showing_.transform; }
   [[nodiscard]] const FrameTimes& times() const { return frames_->times(); }
   [[nodiscard]] const FrameCost& last_cost() const { return last_cost_; }
   [[nodiscard]] std::optional<double> relmse() const { return frames_->relmse(); }

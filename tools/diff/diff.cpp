@@ -17,6 +17,7 @@
 #include "image/color.h"
 #include "image/flip.h"
 #include "image/metrics.h"
+#include "image/tone.h"
 #include "tools/report/canvas.h"
 #include "tools/report/table.h"
 
@@ -317,6 +318,7 @@ DiffReport diff_pictures(const FloatImage& a, const std::string& name_a, const F
   DiffReport report;
   report.size = a.size;
   report.channels = a.channels;
+  report.texts = {a.texts, b.texts};
   const std::size_t channels = a.channels.size();
   if (asks_for_colors(metrics)) report.colors = compare_colors(a, b, metrics, threads);
   const std::vector<double> differences = picture_differences(b, a);
@@ -397,6 +399,24 @@ Image<Rgba8> heat_map(const DiffReport& report) {
   return image;
 }
 
+namespace {
+
+/// What a picture says about itself; "unknown" where it does not.
+std::string said_in(const PngTexts& texts, const std::string& keyword) {
+  const auto found = texts.find(keyword);
+  return found == texts.end() ? "unknown" : printable(found->second, 40);
+}
+
+/// How display colours were made (engine's DisplayTransform), by the word for it: of pictures that say so.
+constexpr std::array<std::pair<const char*, const char*>, 2> kDisplayTexts{
+    {{"tone", kToneText}, {"exposure", kExposureText}}};
+
+bool says(const DiffReport& report, const std::string& keyword) {
+  return std::ranges::any_of(report.texts, [&](const PngTexts& texts) { return texts.contains(keyword); });
+}
+
+}  // namespace
+
 std::string diff_table(const DiffReport& report, std::span<const std::string> metrics) {
   const Difference& d = report.difference;
   using Row = std::pair<std::string, std::string>;
@@ -410,6 +430,11 @@ std::string diff_table(const DiffReport& report, std::span<const std::string> me
     }
   } else {
     row("size", fmt::format("{}x{} {}", report.size.width, report.size.height, fmt::join(report.channels, ",")));
+    for (const auto& [word, keyword] : kDisplayTexts) {
+      const std::string a = said_in(report.texts[0], keyword);
+      const std::string b = said_in(report.texts[1], keyword);
+      if (says(report, keyword)) row(word, a == b ? a : fmt::format("{} in A, {} in B", a, b));
+    }
     for (const std::string& metric : diff_metrics()) {
       if (asks_for(metrics, metric)) row(metric, picture_value(report, metric));
     }
@@ -431,6 +456,10 @@ std::string diff_json(const DiffReport& report, std::span<const std::string> met
   if (report.keys) {
     json["other_surface"] = report.other_surface;
   } else {
+    for (const auto& [word, keyword] : kDisplayTexts) {
+      if (says(report, keyword))
+        json[word] = Json::array({said_in(report.texts[0], keyword), said_in(report.texts[1], keyword)});
+    }
     add_picture(json, report, metrics);
   }
   if (asks_for(metrics, "max")) json["max"] = d.max;

@@ -57,6 +57,7 @@ struct DiffReport {
   std::size_t other_surface = 0;      ///< of keys: pixels that show another surface
   std::size_t beyond = 0;             ///< pixels with a value past the tolerance
   bool passed = true;
+  std::array<PngTexts, 2> texts;  ///< of pictures: what `a` and `b` say about themselves
   std::vector<double> largest;  ///< of pictures, per pixel: its largest absolute difference; infinite where one is NaN
 };
 
