@@ -170,7 +170,7 @@ TEST(GltfQuantization, MorphTargetsOfEveryType) {
 TEST(GltfQuantization, TypesThatItDoesNotAllowAreRefusedOrWarnedOf) {
   const auto with = [](const std::string& name, std::size_t width, ComponentType type, bool declared) {
     test::ModelWriter writer = write_plain(random_model(0));
-    const std::size_t count = writer.json["accessors"][0]["count"].get<std::size_t>();
+    const auto count = writer.json["accessors"][0]["count"].get<std::size_t>();
     const Elements elements{type.id, width, type.normalized,
                             std::vector<std::byte>(count * width * (type.id == 5125 ? 4 : 2), std::byte{1})};
     put(writer, {name}, add_aligned(writer, elements));

@@ -75,7 +75,7 @@ test::RandomModel small_model(std::uint32_t seed) {
 Bytes with_webp(test::ModelWriter writer) {
   constexpr int kWidth = 9;
   constexpr int kHeight = 7;
-  std::array<std::uint8_t, kWidth * kHeight * 4> levels{};
+  std::array<std::uint8_t, std::size_t{kWidth} * kHeight * 4> levels{};
   for (std::size_t i = 0; i < levels.size(); ++i) levels.at(i) = static_cast<std::uint8_t>(i * i);
   std::uint8_t* out = nullptr;
   const std::size_t bytes = WebPEncodeLosslessRGBA(levels.data(), kWidth, kHeight, kWidth * 4, &out);
@@ -89,10 +89,10 @@ Bytes with_webp(test::ModelWriter writer) {
 
 /// The place of the head of the second chunk, or the end.
 std::size_t second_chunk(std::span<const std::byte> file) {
-  constexpr std::string_view kType("BIN\0", 4);
-  const auto found = std::ranges::search(file, std::as_bytes(std::span(kType)));
-  const auto at = static_cast<std::size_t>(found.begin() - file.begin());
-  return found.empty() || at < 24 ? file.size() : at - 4;
+  const Bytes type = to_bytes(std::string_view("BIN\0", 4));
+  const auto found = std::search(file.begin(), file.end(), type.begin(), type.end());
+  const auto at = static_cast<std::size_t>(found - file.begin());
+  return found == file.end() || at < 24 ? file.size() : at - 4;
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ Bytes webp_of(float quality) {
   constexpr int kWidth = 19;
   constexpr int kHeight = 17;
   constexpr int kStride = kWidth * 4;
-  std::array<std::uint8_t, kStride * kHeight> levels{};
+  std::array<std::uint8_t, std::size_t{kStride} * kHeight> levels{};
   for (std::size_t i = 0; i < levels.size(); ++i) levels.at(i) = static_cast<std::uint8_t>(i * i / 7);
   std::uint8_t* out = nullptr;
   const std::size_t size = quality > 100.0F ? WebPEncodeLosslessRGBA(levels.data(), kWidth, kHeight, kStride, &out)
