@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <optional>
@@ -45,7 +46,7 @@ FloatImage decode_radiance(std::span<const std::byte> bytes, const std::string& 
   return image;
 }
 
-enum class Format { Png, Jpeg, Exr, Radiance };
+enum class Format { Png, Jpeg, WebP, Exr, Radiance };
 
 /// The format that the first bytes tell; file names and MIME types may lie.
 std::optional<Format> format_of(std::span<const std::byte> bytes) {
@@ -55,13 +56,27 @@ std::optional<Format> format_of(std::span<const std::byte> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   for (const auto& [format, start] : kStarts)
     if (text.starts_with(start)) return format;
+  if (text.starts_with("RIFF"sv) && text.substr(std::min<std::size_t>(text.size(), 8)).starts_with("WEBP"sv)) {
+    return Format::WebP;
+  }
   return std::nullopt;
 }
 
-/// Of a PNG or JPEG file.
+/// Throws Error (BadInput) for a format that HPR does not read; `read` names those it does.
+[[noreturn]] void throw_unknown(std::span<const std::byte> bytes, const std::string& name, std::string_view read) {
+  using namespace std::string_view_literals;
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\xABKTX 20\xBB\r\n\x1A\n"sv)) {
+    throw Error(ExitCode::BadInput, fmt::format("{}: HPR reads no KTX 2 pictures", name), std::string(kKtxHint));
+  }
+  throw Error(ExitCode::BadInput, fmt::format("{}: not a {} picture", name, read), "convert the picture");
+}
+
+/// Of a PNG, JPEG or WebP file.
 StoredPicture decode_stored(Format format, std::span<const std::byte> bytes, const std::string& name,
                             const ImageLimits& limits) {
-  return format == Format::Png ? decode_png(bytes, name, limits) : decode_jpeg(bytes, name, limits);
+  if (format == Format::Png) return decode_png(bytes, name, limits);
+  return format == Format::Jpeg ? decode_jpeg(bytes, name, limits) : decode_webp(bytes, name, limits);
 }
 
 FloatImage to_floats(const StoredPicture& stored) {
@@ -103,8 +118,8 @@ std::uint32_t StoredPicture::level(std::size_t index) const {
 
 Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
   const std::optional<Format> format = format_of(bytes);
-  if (format != Format::Png && format != Format::Jpeg) {
-    throw Error(ExitCode::BadInput, fmt::format("{}: not a PNG or JPEG picture", name), "convert the picture");
+  if (format != Format::Png && format != Format::Jpeg && format != Format::WebP) {
+    throw_unknown(bytes, name, "PNG, JPEG or WebP");
   }
   const StoredPicture stored = decode_stored(*format, bytes, name, limits);
   const auto level = [&](std::size_t index) {
@@ -124,10 +139,7 @@ Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& n
 
 FloatImage decode_float_image(std::span<const std::byte> bytes, const std::string& name, const ImageLimits& limits) {
   const std::optional<Format> format = format_of(bytes);
-  if (!format) {
-    throw Error(ExitCode::BadInput, fmt::format("{}: not a PNG, EXR, Radiance or JPEG picture", name),
-                "convert the picture");
-  }
+  if (!format) throw_unknown(bytes, name, "PNG, JPEG, WebP, EXR or Radiance");
   if (format == Format::Exr) return decode_exr(bytes, name, limits);
   if (format == Format::Radiance) return decode_radiance(bytes, name, limits);
   FloatImage image = to_floats(decode_stored(*format, bytes, name, limits));

@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "image/color.h"
@@ -20,6 +21,10 @@ struct ImageLimits {
   std::uint64_t pixels = std::uint64_t{1} << 27;  ///< 128 Mi
 };
 
+/// The hint for pictures of GPU formats (KTX 2 with Basis Universal), which no library of Debian 12 reads.
+inline constexpr std::string_view kKtxHint =
+    "convert it: npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb (a scene), or ktx extract IN.ktx2 OUT.png";
+
 /// The default limits of pictures that HPR itself draws or reads back.
 inline constexpr ImageLimits kPictureLimits{.side = 1 << 20, .pixels = std::uint64_t{1} << 31};
 
@@ -27,7 +32,7 @@ inline constexpr ImageLimits kPictureLimits{.side = 1 << 20, .pixels = std::uint
 void check_size(Size size, const ImageLimits& limits);
 
 /// A picture read from a file: `values` [height][width][channels], linear for EXR and Radiance (.hdr), the stored level
-/// / 255 for PNG and JPEG.
+/// / 255 for PNG, JPEG and WebP.
 struct FloatImage {
   Size size;
   std::vector<std::string> channels;
@@ -54,14 +59,14 @@ struct ExrLayer {
                                                 const std::map<std::string, std::string>& attributes,
                                                 std::span<const ExrLayer> layers = {});
 
-/// Decodes PNG or JPEG (known by their first bytes). Alpha is 255 where the file has none; grey becomes r = g = b;
-/// 16-bit values are rounded to 8. `name` stands in errors. Throws Error: BadInput, or Limit before any pixel is
-/// allocated.
+/// Decodes PNG, JPEG or WebP without animation (known by their first bytes). Alpha is 255 where the file has none; grey
+/// becomes r = g = b; 16-bit values are rounded to 8. `name` stands in errors. Throws Error: BadInput, or Limit before
+/// any pixel is allocated.
 [[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& name,
                                         const ImageLimits& limits);
 
-/// Decodes PNG, JPEG, EXR or Radiance (.hdr). `name` stands in errors. Throws Error: BadInput, or Limit before any
-/// pixel is allocated.
+/// Decodes PNG, JPEG, WebP, EXR or Radiance (.hdr). `name` stands in errors. Throws Error: BadInput, or Limit before
+/// any pixel is allocated.
 [[nodiscard]] FloatImage decode_float_image(std::span<const std::byte> bytes, const std::string& name,
                                             const ImageLimits& limits);
 /// Reads such a file. Throws Error (Io, BadInput, Limit).

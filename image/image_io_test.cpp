@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <webp/decode.h>
+#include <webp/encode.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +11,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <random>
+#include <span>
 #include <string_view>
 
 #include "core/error.h"
@@ -221,6 +225,121 @@ TEST(ImageIo, JpegPastTheLimitOrDamagedIsRefused) {
   for (std::size_t kept = 3; kept + 2 < good.size(); ++kept) {
     EXPECT_EQ(decode_code({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(kept)}), ExitCode::BadInput)
         << kept;
+  }
+}
+
+/// Random levels, of one colour with neighbours, so that some of it can be predicted.
+std::vector<std::uint8_t> random_levels(std::mt19937& random, Size size, std::size_t channels) {
+  std::vector<std::uint8_t> levels(size.area() * channels);
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const bool repeats = i >= channels && random() % 3 != 0;
+    levels[i] = repeats ? levels[i - channels] : static_cast<std::uint8_t>(random());
+  }
+  return levels;
+}
+
+/// What WebPEncode... made, copied from its memory.
+Bytes webp_bytes(std::uint8_t* memory, std::size_t size) {
+  EXPECT_GT(size, 0U);
+  const auto bytes = std::as_bytes(std::span(memory, size));
+  Bytes copy(bytes.begin(), bytes.end());
+  WebPFree(memory);
+  return copy;
+}
+
+Bytes lossless_webp(const std::vector<std::uint8_t>& levels, Size size, std::size_t channels) {
+  std::uint8_t* out = nullptr;
+  const int stride = size.width * static_cast<int>(channels);
+  const std::size_t bytes = channels == 4 ? WebPEncodeLosslessRGBA(levels.data(), size.width, size.height, stride, &out)
+                                          : WebPEncodeLosslessRGB(levels.data(), size.width, size.height, stride, &out);
+  return webp_bytes(out, bytes);
+}
+
+TEST(ImageIo, LosslessWebpGivesBackEveryByte) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 20; ++i) {
+    const Size size{1 + static_cast<int>(random() % 90), 1 + static_cast<int>(random() % 90)};
+    const std::size_t channels = i % 2 == 0 ? 4 : 3;
+    std::vector<std::uint8_t> levels = random_levels(random, size, channels);
+    // The encoder drops the colour where nothing is to be seen.
+    for (std::size_t k = 3; channels == 4 && k < levels.size(); k += 4)
+      levels[k] = std::max<std::uint8_t>(levels[k], 1);
+    const Image<Rgba8> image = decode_image(lossless_webp(levels, size, channels), "a.webp", {});
+    ASSERT_EQ(image.size(), size);
+    for (std::size_t p = 0; p < size.area(); ++p) {
+      const std::uint8_t* const from = levels.data() + p * channels;
+      const Rgba8 expected{from[0], from[1], from[2], channels == 4 ? from[3] : std::uint8_t{255}};
+      ASSERT_EQ(image.pixels()[p], expected) << i << " " << p;
+    }
+  }
+}
+
+TEST(ImageIo, LossyWebpIsClose) {
+  const Size size{64, 48};
+  std::vector<std::uint8_t> levels;
+  for (int i = 0; i < size.width * size.height; ++i) {
+    for (const int level : {i % 64 * 4, i / 64 * 5, 128, 255 - i / 64 * 4})
+      levels.push_back(static_cast<std::uint8_t>(level));
+  }
+  std::uint8_t* out = nullptr;
+  const std::size_t bytes = WebPEncodeRGBA(levels.data(), size.width, size.height, size.width * 4, 95.0F, &out);
+  const Image<Rgba8> image = decode_image(webp_bytes(out, bytes), "a.webp", {});
+  double sum = 0.0;
+  for (std::size_t p = 0; p < size.area(); ++p) {
+    sum += std::abs(image.pixels()[p].r - levels[4 * p]) + std::abs(image.pixels()[p].g - levels[4 * p + 1]) +
+           std::abs(image.pixels()[p].b - levels[4 * p + 2]);
+    EXPECT_EQ(image.pixels()[p].a, levels[4 * p + 3]);
+  }
+  EXPECT_LT(sum / static_cast<double>(3 * size.area()), 3.0);
+}
+
+TEST(ImageIo, WebpFilesReadAsLevelsOver255) {
+  const FloatImage image = through_file(lossless_webp({51, 102, 255}, {1, 1}, 3), ".webp");
+  EXPECT_EQ(image.channels, (std::vector<std::string>{"R", "G", "B"}));
+  EXPECT_EQ(image.values, (std::vector<float>{51 / 255.0F, 102 / 255.0F, 1.0F}));
+  EXPECT_FALSE(image.linear);
+}
+
+TEST(ImageIo, WebpPastTheLimitAnimatedOrDamagedIsRefused) {
+  std::mt19937 random(2);
+  const Size size{40, 30};
+  const Bytes good = lossless_webp(random_levels(random, size, 3), size, 3);
+  EXPECT_EQ(decode_code(good, {.side = 39, .pixels = 1 << 20}), ExitCode::Limit);
+  EXPECT_EQ(decode_code(good, {.side = 100, .pixels = 1199}), ExitCode::Limit);
+  for (std::size_t length = 12; length < good.size(); ++length) {
+    EXPECT_EQ(decode_code(Bytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length))), ExitCode::BadInput)
+        << length;
+  }
+  for (int i = 0; i < 500; ++i) {
+    Bytes bad = good;
+    for (int k = 0; k < 3; ++k) bad[12 + random() % (bad.size() - 12)] ^= static_cast<std::byte>(1 + random() % 255);
+    const ExitCode code = decode_code(bad);
+    EXPECT_TRUE(code == ExitCode::Done || code == ExitCode::BadInput || code == ExitCode::Limit);
+  }
+  // VP8X with the flag of animations, and no frame; then 16384 x 16384 pixels that are not there.
+  const Bytes animated = bytes_of({'R', 'I', 'F', 'F', 22, 0, 0, 0, 'W', 'E', 'B', 'P', 'V', 'P', '8',
+                                   'X', 10,  0,   0,   0,  2, 0, 0, 0,   7,   0,   0,   7,   0,   0});
+  try {
+    (void)decode_image(animated, "a.webp", {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("animation"), std::string::npos) << error.what();
+  }
+  const Bytes huge = bytes_of({'R', 'I', 'F', 'F',  26,   0,    0,    0,    'W', 'E', 'B', 'P', 'V', 'P', '8', 'L', 14,
+                               0,   0,   0,   0x2F, 0xFF, 0xFF, 0xFF, 0x0F, 0,   0,   0,   0,   0,   0,   0,   0,   0});
+  const long before = max_memory_kib();
+  EXPECT_EQ(decode_code(huge), ExitCode::Limit);
+  EXPECT_LT(max_memory_kib() - before, 64L << 10);
+}
+
+TEST(ImageIo, Ktx2IsRefusedWithTheProgramThatConvertsIt) {
+  const Bytes file = bytes_of({0xAB, 'K', 'T', 'X', ' ', '2', '0', 0xBB, '\r', '\n', 0x1A, '\n', 0, 0, 0, 0});
+  try {
+    (void)decode_image(file, "a.ktx2", {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::BadInput);
+    EXPECT_NE(std::string(error.hint()).find("ktx extract"), std::string::npos) << error.hint();
   }
 }
 

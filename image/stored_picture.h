@@ -14,7 +14,7 @@
 
 namespace hpr {
 
-/// What a PNG or JPEG file stores, before anybody says what it means.
+/// What a PNG, JPEG or WebP file stores, before anybody says what it means.
 struct StoredPicture {
   Size size;
   std::size_t channels = 0;         ///< 1: grey, 2: grey and alpha, 3: RGB, 4: RGBA
@@ -52,6 +52,8 @@ inline void check_header(std::uint64_t width, std::uint64_t height, std::uint64_
 [[nodiscard]] StoredPicture decode_png(std::span<const std::byte> bytes, const std::string& name,
                                        const ImageLimits& limits);
 [[nodiscard]] StoredPicture decode_jpeg(std::span<const std::byte> bytes, const std::string& name,
+                                        const ImageLimits& limits);
+[[nodiscard]] StoredPicture decode_webp(std::span<const std::byte> bytes, const std::string& name,
                                         const ImageLimits& limits);
 [[nodiscard]] FloatImage decode_exr(std::span<const std::byte> bytes, const std::string& name,
                                     const ImageLimits& limits);

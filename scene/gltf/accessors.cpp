@@ -25,14 +25,47 @@ std::vector<std::byte> GltfBuffers::resolve(const std::string& uri, const std::s
   return bytes;
 }
 
+namespace {
+
+const Json& meshopt_of(const Json& item) {
+  return item["extensions"]["EXT_meshopt_compression"];
+}
+
+/// Which buffers some view reads: of a compressed view that of its compressed bytes.
+std::vector<bool> buffers_read(const Json& root, std::size_t buffers) {
+  std::vector<bool> read(buffers, false);
+  const Json* const views = root.find("bufferViews");
+  if (views == nullptr) return read;
+  for (const Json& view : views->elements()) {
+    const Json& compressed = meshopt_of(view);
+    read[(compressed.is_object() ? compressed : view)["buffer"].get<std::size_t>()] = true;
+  }
+  return read;
+}
+
+/// a + b * c, none past 2^64.
+std::optional<std::uint64_t> sum_of(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+  std::uint64_t product = 0;
+  std::uint64_t sum = 0;
+  if (__builtin_mul_overflow(b, c, &product) || __builtin_add_overflow(a, product, &sum)) return std::nullopt;
+  return sum;
+}
+
+}  // namespace
+
 void GltfBuffers::load(const Json& root, GltfContext& context) {
   const Json* const found = root.find("buffers");
   if (found == nullptr) return;
+  const std::vector<bool> read = buffers_read(root, found->size());
   owned_.resize(found->size());
   for (std::size_t i = 0; i < found->size(); ++i) {
     const Json& buffer = (*found)[i];
     const std::string where = fmt::format("buffers[{}]", i);
     std::span<const std::byte> bytes;
+    if (!read[i] && meshopt_of(buffer).value("fallback", false)) {
+      bytes_.push_back(bytes);
+      continue;
+    }
     if (buffer.contains("uri")) {
       const auto uri = buffer["uri"].get<std::string>();
       if (uri.starts_with("data:image/")) context.warn(where, "its data URI says that it is a picture");
@@ -52,15 +85,23 @@ void GltfBuffers::load(const Json& root, GltfContext& context) {
   }
 }
 
-namespace {
-
-/// a + b * c, none past 2^64.
-std::optional<std::uint64_t> sum_of(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
-  std::uint64_t product = 0;
-  std::uint64_t sum = 0;
-  if (__builtin_mul_overflow(b, c, &product) || __builtin_add_overflow(a, product, &sum)) return std::nullopt;
-  return sum;
+std::size_t GltfBuffers::add(std::vector<std::byte> bytes) {
+  bytes_.emplace_back(owned_.emplace_back(std::move(bytes)));
+  return bytes_.size() - 1;
 }
+
+std::span<const std::byte> GltfBuffers::range(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
+                                              const std::string& where, const GltfContext& context) const {
+  const std::span<const std::byte> bytes = bytes_[buffer];
+  const auto end = sum_of(offset, length, 1);
+  if (!end || *end > bytes.size()) {
+    context.fail(where,
+                 fmt::format("{} bytes at {} leave buffer {}, which has {}", length, offset, buffer, bytes.size()));
+  }
+  return bytes.subspan(offset, length);
+}
+
+namespace {
 
 std::size_t component_bytes(int component_type) {
   switch (component_type) {
@@ -190,13 +231,8 @@ GltfData::GltfData(const tinygltf::Model& model, const GltfBuffers& buffers, Glt
 
 void GltfData::check_view(std::size_t index) const {
   const tinygltf::BufferView& view = model_->bufferViews[index];
-  const std::size_t size = (*buffers_)[to_size(view.buffer)].size();
-  const auto end = sum_of(view.byteOffset, view.byteLength, 1);
-  if (!end || *end > size) {
-    context_->fail(fmt::format("bufferViews[{}]", index),
-                   fmt::format("{} bytes at {} leave buffer {}, which has {}", view.byteLength, view.byteOffset,
-                               view.buffer, size));
-  }
+  (void)buffers_->range(to_size(view.buffer), view.byteOffset, view.byteLength, fmt::format("bufferViews[{}]", index),
+                        *context_);
 }
 
 void GltfData::check_accessor(std::size_t index) const {

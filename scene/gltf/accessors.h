@@ -26,11 +26,18 @@ class GltfBuffers {
   /// `parts` must outlive this.
   GltfBuffers(std::filesystem::path folder, const GltfParts& parts) : folder_(std::move(folder)), parts_(&parts) {}
 
-  /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength. Throws Error.
+  /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength. One that only
+  /// stands in for compressed views (EXT_meshopt_compression) and that nothing reads stays empty. Throws Error.
   void load(const Json& root, GltfContext& context);
+
+  /// Adds a buffer that the document does not have; returns its index.
+  std::size_t add(std::vector<std::byte> bytes);
 
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   [[nodiscard]] std::span<const std::byte> operator[](std::size_t buffer) const { return bytes_[buffer]; }
+  /// Part of a buffer. Throws Error (BadInput), naming `where`, for one that leaves the buffer.
+  [[nodiscard]] std::span<const std::byte> range(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
+                                                 const std::string& where, const GltfContext& context) const;
 
   /// What a "uri" member holds: a data URI's bytes or a file's. Throws Error (Io, BadInput, Limit).
   [[nodiscard]] std::vector<std::byte> resolve(const std::string& uri, const std::string& where,

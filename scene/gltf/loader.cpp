@@ -14,6 +14,7 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "scene/gltf/accessors.h"
+#include "scene/gltf/compression.h"
 #include "scene/gltf/document.h"
 #include "scene/gltf/gltf.h"
 #include "scene/gltf/materials.h"
@@ -449,6 +450,8 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
 
   GltfBuffers buffers(path.parent_path(), file.parts);
   buffers.load(root, context);
+  decode_meshopt_views(root, buffers, context);
+  decode_draco_primitives(root, buffers, context);
   const Json images = root.contains("images") ? std::move(root["images"]) : Json();
   const tinygltf::Model model = parse_model(std::move(root), context);
   const GltfData data(model, buffers, context);

@@ -1,8 +1,12 @@
 // What a glTF file says of surfaces beyond the core's factors: maps of detail, glass, vertex colours and tangents.
 #include <gtest/gtest.h>
+#include <webp/encode.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <span>
 
 #include "scene/gltf/test_tools.h"
 
@@ -207,6 +211,84 @@ TEST(GltfMaterial, TangentsMoveWithMorphTargetsAndJoints) {
   document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   document.json["skins"].push_back({{"joints", Json::array({1})}});
   EXPECT_EQ(load(document.json).meshes[0].tangents[0], glm::vec4(-1, 0, 0, -1));
+}
+
+/// As a data URI.
+Json picture_of(std::span<const std::byte> bytes) {
+  return {{"uri", "data:application/octet-stream;base64," + base64(bytes)}};
+}
+
+std::vector<std::byte> webp_of(const Image<Rgba8>& image) {
+  std::uint8_t* out = nullptr;
+  const Size size = image.size();
+  const std::size_t count = WebPEncodeLosslessRGBA(reinterpret_cast<const std::uint8_t*>(image.pixels().data()),
+                                                   size.width, size.height, size.width * 4, &out);
+  const auto bytes = std::as_bytes(std::span(out, count));
+  std::vector<std::byte> copy(bytes.begin(), bytes.end());
+  WebPFree(out);
+  return copy;
+}
+
+Image<Rgba8> random_picture(std::mt19937& random) {
+  Image<Rgba8> image({1 + static_cast<int>(random() % 40), 1 + static_cast<int>(random() % 40)});
+  for (Rgba8& pixel : image.pixels()) {
+    const auto level = [&] { return static_cast<std::uint8_t>(1 + random() % 255); };
+    pixel = {level(), level(), level(), level()};
+  }
+  return image;
+}
+
+TEST(GltfTextures, WebpPicturesAreThoseOfPng) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 20; ++i) {
+    auto document = dressed(Json::parse(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})"));
+    const Image<Rgba8> image = random_picture(random);
+    document.json["images"][0] = picture_of(encode_png(image));
+    const Scene plain = load(document.json);
+    // Beside the WebP picture stands another one, for renderers that do not read WebP.
+    document.json["images"][0] = picture_of(encode_png(random_picture(random)));
+    document.json["images"].push_back(picture_of(webp_of(image)));
+    document.json["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = 1;
+    document.json["extensionsUsed"] = Json::array({"EXT_texture_webp"});
+    if (i % 2 == 0) {
+      document.json["extensionsRequired"] = Json::array({"EXT_texture_webp"});
+      document.json["textures"][0].erase("source");
+    }
+    const Scene packed = load(document.json);
+    EXPECT_TRUE(packed.warnings.empty()) << packed.warnings.front();
+    ASSERT_EQ(packed.textures.size(), 1U);
+    EXPECT_EQ(packed.textures[0].image.size(), image.size());
+    EXPECT_TRUE(std::ranges::equal(packed.textures[0].image.pixels(), plain.textures.at(0).image.pixels()));
+  }
+}
+
+TEST(GltfTextures, BrokenWebpIsLeftOutWithAWarning) {
+  auto document = dressed(Json::parse(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})"));
+  std::mt19937 random(1);
+  std::vector<std::byte> bytes = webp_of(random_picture(random));
+  bytes.resize(bytes.size() / 2);
+  document.json["images"][0] = picture_of(bytes);
+  document.json["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = 0;
+  EXPECT_TRUE(test::warns_of(load(document.json), "ends too early"));
+  document.json["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = 1;
+  expect_refused(document.json, "textures[0].extensions.EXT_texture_webp.source");
+}
+
+TEST(GltfTextures, Ktx2IsRefusedUnlessAnotherPictureStandsBesideIt) {
+  auto document = dressed(Json::parse(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})"));
+  document.json["textures"][0]["extensions"]["KHR_texture_basisu"]["source"] = 0;
+  document.json["extensionsUsed"] = Json::array({"KHR_texture_basisu"});
+  for (const bool required : {false, true}) {
+    if (required) document.json["extensionsRequired"] = Json::array({"KHR_texture_basisu"});
+    const Scene scene = load(document.json);
+    EXPECT_EQ(scene.textures.size(), 1U);
+    EXPECT_TRUE(test::warns_of(scene, "textures[0]"));
+  }
+  document.json["textures"][0].erase("source");
+  expect_refused(document.json, "textures[0]");
+  EXPECT_NE(refusal(document.json).hint.find("ktxdecompress"), std::string::npos);
+  document.json.erase("extensionsRequired");
+  expect_refused(document.json, "textures[0]");
 }
 
 }  // namespace

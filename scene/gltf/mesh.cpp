@@ -74,6 +74,11 @@ class PrimitiveCheck {
     if (!quantized_) warn(where, "is not made of floats, although KHR_mesh_quantization is not used");
   }
 
+  void check_texture_coordinates(int index, const std::string& where) const {
+    data_.require_type(index, {TINYGLTF_TYPE_VEC2}, where);
+    if (!is_fraction(data_.accessor(index))) check_components(data_.accessor(index), where);
+  }
+
   void check_attribute(const std::string& name, int index, const std::string& where) const {
     check_count(index, where);
     const tinygltf::Accessor& accessor = data_.accessor(index);
@@ -83,8 +88,7 @@ class PrimitiveCheck {
       data_.require_type(index, {TINYGLTF_TYPE_VEC4}, where);
       check_components(accessor, where);
     } else if (name.starts_with("TEXCOORD_")) {
-      data_.require_type(index, {TINYGLTF_TYPE_VEC2}, where);
-      if (!is_fraction(accessor) && !quantized_) warn(where, "is made neither of floats nor of normalised integers");
+      check_texture_coordinates(index, where);
     } else if (name.starts_with("COLOR_")) {
       data_.require_type(index, {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, where);
       if (!is_fraction(accessor)) data_.context().fail(where, "must be floats or normalised integers");
@@ -106,7 +110,7 @@ class PrimitiveCheck {
   void check_target(const std::string& name, int index, const std::string& where) const {
     check_count(index, where);
     if (name == "POSITION" || name == "NORMAL" || name == "TANGENT") return check_vector(index, where);
-    if (name == "TEXCOORD_0" || name == "TEXCOORD_1") return data_.require_type(index, {TINYGLTF_TYPE_VEC2}, where);
+    if (name == "TEXCOORD_0" || name == "TEXCOORD_1") return check_texture_coordinates(index, where);
     if (name == "COLOR_0") return data_.require_type(index, {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, where);
     if (!name.starts_with('_')) warn(where, "is not read");
   }

@@ -42,6 +42,10 @@ void check_buffers(const GltfItem& root) {
   root.each("buffers", kOptional, [](const GltfItem& buffer) {
     buffer.text("uri");
     buffer.whole("byteLength", kRequired, 1);
+    const auto extensions = buffer.object("extensions");
+    if (const auto meshopt = extensions ? extensions->object("EXT_meshopt_compression") : std::nullopt) {
+      meshopt->flag("fallback");
+    }
   });
   root.each("bufferViews", kOptional, [](const GltfItem& view) {
     view.index("buffer", "buffers", kRequired);
@@ -50,6 +54,16 @@ void check_buffers(const GltfItem& root) {
     const auto stride = view.whole("byteStride", kOptional, 1, 252);
     if (stride && *stride % 4 != 0) view.fail("byteStride", fmt::format("is {}, not a multiple of 4", *stride));
     view.whole("target");
+    const auto extensions = view.object("extensions");
+    const auto meshopt = extensions ? extensions->object("EXT_meshopt_compression") : std::nullopt;
+    if (!meshopt) return;
+    meshopt->index("buffer", "buffers", kRequired);
+    meshopt->whole("byteOffset");
+    meshopt->whole("byteLength", kRequired, 1);
+    meshopt->whole("byteStride", kRequired, 1, 256);
+    meshopt->whole("count", kRequired, 1);
+    meshopt->text("mode", kRequired);
+    meshopt->text("filter");
   });
 }
 
@@ -90,15 +104,15 @@ void check_accessors(const GltfItem& root) {
   });
 }
 
-/// A primitive whose data exist only in compressed form: its accessors have no bytes of their own.
-void check_compression(const GltfItem& primitive) {
-  constexpr const char* kDraco = "KHR_draco_mesh_compression";
+void check_draco(const GltfItem& primitive) {
   const auto extensions = primitive.object("extensions");
-  if (!extensions || !extensions->has(kDraco)) return;
-  for (const auto& [name, accessor] : primitive.value()["attributes"].members()) {
-    if (!primitive.top("accessors", accessor.get<std::size_t>()).contains("bufferView")) {
-      primitive.fail("", fmt::format("is compressed with {}, which HPR cannot read", kDraco), kDecompressHint);
-    }
+  const auto draco = extensions ? extensions->object("KHR_draco_mesh_compression") : std::nullopt;
+  if (!draco) return;
+  draco->index("bufferView", "bufferViews", kRequired);
+  const auto attributes = draco->object("attributes", kRequired);
+  constexpr std::uint64_t kMaxId = std::numeric_limits<std::uint32_t>::max();
+  for (const auto& [name, value] : attributes->value().members()) {
+    attributes->whole(name.c_str(), kRequired, 0, kMaxId);
   }
 }
 
@@ -109,7 +123,7 @@ void check_meshes(const GltfItem& root) {
       if (primitive.index_map("attributes", "accessors", kRequired) == 0) {
         primitive.fail("attributes", "is empty");
       }
-      check_compression(primitive);
+      check_draco(primitive);
       primitive.index("indices", "accessors");
       primitive.index("material", "materials");
       primitive.whole("mode", kOptional, 0, 6);
@@ -204,6 +218,22 @@ std::optional<GltfItem> check_texture_info(const GltfItem& material, const char*
   return info;
 }
 
+/// Makes a WebP picture the texture's own: the PNG or JPEG beside it is for renderers that do not read WebP.
+/// KHR_texture_basisu cannot be read; what stands beside it can.
+void choose_picture(const GltfItem& texture) {
+  const auto extensions = texture.object("extensions");
+  if (!extensions) return;
+  const bool basisu = extensions->object("KHR_texture_basisu").has_value();
+  if (const auto webp = extensions->object("EXT_texture_webp")) {
+    if (const auto source = webp->index("source", "images")) texture.value()["source"] = *source;
+  }
+  if (!basisu) return;
+  if (!texture.has("source")) {
+    texture.fail("", "has but a KTX 2 picture (KHR_texture_basisu), which HPR cannot read", kKtxHint);
+  }
+  texture.warn("", "has a KTX 2 picture (KHR_texture_basisu), which HPR cannot read; drawn with the one beside it");
+}
+
 void check_textures(const GltfItem& root) {
   root.each("images", kOptional, [](const GltfItem& image) {
     image.text("uri");
@@ -216,6 +246,7 @@ void check_textures(const GltfItem& root) {
   root.each("textures", kOptional, [](const GltfItem& texture) {
     texture.index("sampler", "samplers");
     texture.index("source", "images");
+    choose_picture(texture);
   });
 }
 
@@ -382,21 +413,28 @@ void check_shape(Json& document, GltfContext& context) {
 
 namespace {
 
-constexpr std::array<std::string_view, 9> kSupported{
-    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
-    "KHR_materials_ior",       "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_volume",    "KHR_mesh_quantization",      "KHR_texture_transform"};
+constexpr std::array<std::string_view, 12> kSupported{
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression",    "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
+    "KHR_materials_ior",          "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_materials_volume",       "KHR_mesh_quantization",      "KHR_texture_transform"};
 
 /// Drawn approximately where it stands alone; check_shape warns of it.
 constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
-constexpr std::array<std::string_view, 10> kAppearanceOnly{
-    "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion", "KHR_materials_iridescence", kStandsIn,
-    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_variants",
-    "KHR_xmp_json_ld"};
+constexpr std::array<std::string_view, 11> kAppearanceOnly{"KHR_materials_anisotropy",
+                                                           "KHR_materials_clearcoat",
+                                                           "KHR_materials_diffuse_transmission",
+                                                           "KHR_materials_dispersion",
+                                                           "KHR_materials_iridescence",
+                                                           kStandsIn,
+                                                           "KHR_materials_sheen",
+                                                           "KHR_materials_specular",
+                                                           "KHR_materials_variants",
+                                                           "KHR_texture_basisu",
+                                                           "KHR_xmp_json_ld"};
 
 bool contains(const auto& names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();

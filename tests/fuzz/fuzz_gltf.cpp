@@ -1,14 +1,19 @@
+#include <webp/encode.h>
+
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <string>
 
 #include "core/error.h"
 #include "core/log.h"
 #include "scene/gltf/gltf.h"
+#include "scene/gltf/random_models.h"
 #include "scene/gltf/test_tools.h"
 #include "scene/load_scene.h"
 #include "tests/fuzz/fuzz.h"
 
-// Scenes of strangers: .glb and .gltf with data URIs.
+// Scenes of strangers: .glb and .gltf with data URIs, their meshes and pictures compressed or not.
 namespace hpr::fuzz {
 namespace {
 
@@ -55,10 +60,54 @@ bool is_binary(std::span<const std::byte> input) {
   return input.size() >= 4 && std::memcmp(input.data(), "glTF", 4) == 0;
 }
 
+/// A model of few vertices.
+test::RandomModel small_model(std::uint32_t seed) {
+  test::Random random(seed);
+  test::RandomModel model;
+  do {
+    model.primitives = {test::random_primitive(random, seed % 2 == 0 ? 5123 : 5125)};
+  } while (model.primitives[0].indices.size() > 120);
+  test::add_random_attributes(random, model.primitives[0]);
+  return model;
+}
+
+/// The model drawn with a WebP picture of 9 x 7 pixels.
+Bytes with_webp(test::ModelWriter writer) {
+  constexpr int kWidth = 9;
+  constexpr int kHeight = 7;
+  std::array<std::uint8_t, std::size_t{kWidth} * kHeight * 4> levels{};
+  for (std::size_t i = 0; i < levels.size(); ++i) levels.at(i) = static_cast<std::uint8_t>(i * i);
+  std::uint8_t* out = nullptr;
+  const std::size_t bytes = WebPEncodeLosslessRGBA(levels.data(), kWidth, kHeight, kWidth * 4, &out);
+  const std::size_t view = writer.add_view(std::as_bytes(std::span(out, bytes)));
+  WebPFree(out);
+  writer.json["images"].push_back({{"bufferView", view}, {"mimeType", "image/webp"}});
+  writer.json["textures"].push_back({{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}});
+  writer.json["materials"][0]["emissiveTexture"]["index"] = 0;
+  return writer.glb();
+}
+
+/// The place of the head of the second chunk, or the end.
+std::size_t second_chunk(std::span<const std::byte> file) {
+  const Bytes type = to_bytes(std::string_view("BIN\0", 4));
+  const auto found = std::search(file.begin(), file.end(), type.begin(), type.end());
+  const auto at = static_cast<std::size_t>(found - file.begin());
+  return found == file.end() || at < 24 ? file.size() : at - 4;
+}
+
 }  // namespace
 
 std::vector<Bytes> seeds() {
-  return {to_bytes(kText), to_glb(kText)};
+  std::vector<Bytes> all{to_bytes(kText), to_glb(kText)};
+  for (std::uint32_t seed = 0; seed < 4; ++seed) {
+    const test::RandomModel model = small_model(seed);
+    all.push_back(write_draco(model, {.lossless = seed % 2 == 0, .speed = static_cast<int>(seed) * 3}).glb());
+    all.push_back(write_draco(model, {.sequential = true, .lossless = seed % 2 == 0, .speed = 9}).glb());
+    all.push_back(with_webp(write_meshopt(model, {.index_mode = seed % 2 == 0 ? "TRIANGLES" : "INDICES",
+                                                  .direction_bytes = seed % 3,
+                                                  .mantissa_bits = seed % 2 == 0 ? 15 : 0})));
+  }
+  return all;
 }
 
 bool run(std::span<const std::byte> input) {
@@ -77,14 +126,19 @@ bool run(std::span<const std::byte> input) {
   }
 }
 
-/// Of a .glb the lengths.
+/// Of a .glb the lengths: of the file, its text and what follows the text.
 Bytes repaired(Bytes input) {
   constexpr std::size_t kHeads = 20;
+  constexpr std::size_t kHead = 8;
   if (input.size() < kHeads || !is_binary(input)) return input;
-  const auto size = static_cast<std::uint32_t>(input.size());
-  const auto chunk = static_cast<std::uint32_t>(size - kHeads);
-  std::memcpy(input.data() + 8, &size, sizeof(size));
-  std::memcpy(input.data() + 12, &chunk, sizeof(chunk));
+  const auto put = [&](std::size_t at, std::size_t value) {
+    const auto number = static_cast<std::uint32_t>(value);
+    std::memcpy(input.data() + at, &number, sizeof(number));
+  };
+  const std::size_t second = second_chunk(input);
+  put(8, input.size());
+  put(12, second - kHeads);
+  if (second < input.size()) put(second, input.size() - second - kHead);
   return input;
 }
 

@@ -1,3 +1,6 @@
+#include <webp/encode.h>
+
+#include <array>
 #include <cstring>
 
 #include "core/error.h"
@@ -5,7 +8,7 @@
 #include "image/test_files.h"
 #include "tests/fuzz/fuzz.h"
 
-// Textures, environments and pictures to compare: PNG, JPEG, EXR and Radiance, as textures and as floats.
+// Textures, environments and pictures to compare: PNG, JPEG, WebP, EXR and Radiance, as textures and as floats.
 namespace hpr::fuzz {
 namespace {
 
@@ -22,6 +25,22 @@ std::uint32_t big_endian(const std::byte* bytes) {
 /// A PNG of zeros, and of the chunks that few files have.
 Bytes png_of(int bits, int color_type, int interlaced, const std::vector<test::Chunk>& chunks) {
   return test::make_png(9, 7, bits, color_type, {Bytes(1000)}, chunks, interlaced);
+}
+
+/// A WebP picture; past a quality of 100 without loss.
+Bytes webp_of(float quality) {
+  constexpr int kWidth = 19;
+  constexpr int kHeight = 17;
+  constexpr int kStride = kWidth * 4;
+  std::array<std::uint8_t, std::size_t{kStride} * kHeight> levels{};
+  for (std::size_t i = 0; i < levels.size(); ++i) levels.at(i) = static_cast<std::uint8_t>(i * i / 7);
+  std::uint8_t* out = nullptr;
+  const std::size_t size = quality > 100.0F ? WebPEncodeLosslessRGBA(levels.data(), kWidth, kHeight, kStride, &out)
+                                            : WebPEncodeRGBA(levels.data(), kWidth, kHeight, kStride, quality, &out);
+  const auto bytes = std::as_bytes(std::span(out, size));
+  Bytes copy(bytes.begin(), bytes.end());
+  WebPFree(out);
+  return copy;
 }
 
 }  // namespace
@@ -43,6 +62,7 @@ std::vector<Bytes> seeds() {
       radiance.push_back(static_cast<std::byte>(value));
   }
   all.push_back(radiance);
+  for (const float quality : {0.0F, 90.0F, 101.0F}) all.push_back(webp_of(quality));
   const Image<Rgb> picture({9, 7}, {0.5F, 1.0F, 2.0F});
   all.push_back(encode_exr(picture, {{"note", "text"}}));
   all.push_back(encode_exr(picture, {}, std::vector<ExrLayer>{{{"id.X"}, {}, std::vector<std::uint32_t>(63)}}));
