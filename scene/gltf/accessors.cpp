@@ -35,7 +35,7 @@ void GltfBuffers::load(const Json& root, GltfContext& context) {
     std::span<const std::byte> bytes;
     if (buffer.contains("uri")) {
       const auto uri = buffer["uri"].get<std::string>();
-      if (uri.starts_with("data:image/")) context.warn(where, "its data URI says that it is a picture");
+      if (is_picture_uri(uri)) context.warn(where, "its data URI says that it is a picture");
       owned_[i] = resolve(uri, where, context);
       bytes = owned_[i];
     } else if (i == 0 && parts_->has_binary) {

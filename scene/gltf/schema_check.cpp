@@ -23,19 +23,25 @@ constexpr double kMaxRadius = 1e12;  // of a light, metres
 
 void check_asset(const GltfItem& root) {
   const auto asset = root.object("asset", kRequired);
-  const auto read_major = [&](const char* key, Presence presence) {
+  const auto read_version = [&](const char* key, Presence presence) -> std::string {
     if (asset->has(key) && asset->value()[key].is_number()) {
       asset->warn(key, "should be text");
       asset->value()[key] = fmt::format("{:.1f}", asset->value()[key].get<double>());
     }
     const auto text = asset->text(key, presence);
-    if (!text) return;
+    if (!text) return "2.0";
     const bool known =
         text->size() >= 3 && text->starts_with("2.") && text->find_first_not_of("0123456789", 2) == std::string::npos;
     if (!known) asset->fail(key, fmt::format("is \"{}\"; HPR reads glTF 2", printable(*text)));
+    return *text;
   };
-  read_major("version", kRequired);
-  read_major("minVersion", kOptional);
+  read_version("version", kRequired);
+  // Later minor versions stay readable by what reads 2.0, unless they say otherwise (glTF 2.0, section 3.2).
+  const std::string min_version = read_version("minVersion", kOptional);
+  if (min_version.find_first_not_of('0', 2) != std::string::npos) {
+    asset->fail("minVersion", fmt::format("is \"{}\"; HPR reads glTF 2.0", printable(min_version)),
+                "export the scene as glTF 2.0");
+  }
 }
 
 void check_buffers(const GltfItem& root) {
