@@ -26,7 +26,8 @@ class GltfBuffers {
   /// `parts` must outlive this.
   GltfBuffers(std::filesystem::path folder, const GltfParts& parts) : folder_(std::move(folder)), parts_(&parts) {}
 
-  /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength. Throws Error.
+  /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength, but for those that
+  /// cannot be loaded and are not used: they are empty. Throws Error.
   void load(const Json& root, GltfContext& context);
 
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
@@ -37,6 +38,8 @@ class GltfBuffers {
                                                GltfContext& context) const;
 
  private:
+  [[nodiscard]] std::span<const std::byte> load_buffer(const Json& buffer, std::size_t index, GltfContext& context);
+
   std::filesystem::path folder_;
   const GltfParts* parts_;
   std::vector<std::vector<std::byte>> owned_;
@@ -47,7 +50,7 @@ class GltfBuffers {
 /// (check_shape); the constructor checks every range of bytes, so that reading cannot leave a buffer.
 class GltfData {
  public:
-  /// All three must outlive this. Throws Error (BadInput) for a view or accessor that leaves what holds it.
+  /// All three must outlive this. Throws Error (BadInput) for a view or accessor that leaves what holds it and is used.
   GltfData(const tinygltf::Model& model, const GltfBuffers& buffers, GltfContext& context);
 
   [[nodiscard]] const tinygltf::Model& model() const { return *model_; }

@@ -82,35 +82,50 @@ glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where, Gl
   return from_parts(vector(node.translation, 0.0), rotation, vector(node.scale, 1.0));
 }
 
-/// The one parent of every node, -1 for roots.
-std::vector<int> parents_of(const std::vector<tinygltf::Node>& nodes, const GltfContext& context) {
+/// The one parent of every node, -1 for roots. Nodes that are used get theirs before others claim them.
+std::vector<int> parents_of(const std::vector<tinygltf::Node>& nodes, GltfContext& context) {
   std::vector<int> parents(nodes.size(), -1);
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    for (const int child : nodes[i].children) {
+  const auto adopt = [&](std::size_t node) {
+    for (const int child : nodes[node].children) {
       int& parent = parents[GltfData::to_size(child)];
       if (parent >= 0) {
-        context.fail(node_path(i) + ".children", fmt::format("node {} is already a child of node {}", child, parent));
+        context.fail(node_path(node) + ".children",
+                     fmt::format("node {} is already a child of node {}", child, parent));
       }
-      parent = static_cast<int>(i);
+      parent = static_cast<int>(node);
+    }
+  };
+  for (const bool used : {true, false}) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (context.is_used("nodes", i) == used) context.check_entry("nodes", i, [&] { adopt(i); });
     }
   }
   return parents;
 }
 
-/// All nodes below `roots`, parents first, in the order of the document.
-std::vector<int> descend(const std::vector<tinygltf::Node>& nodes, const std::vector<int>& roots) {
+/// All nodes at and below `roots`, each once, parents first where no root is another's descendant, in the order of the
+/// document.
+std::vector<int> descend(const std::vector<tinygltf::Node>& nodes, const std::vector<int>& parents,
+                         const std::vector<int>& roots) {
   std::vector<int> order;
+  std::vector<bool> reached(nodes.size(), false);
   std::vector<int> open(roots.rbegin(), roots.rend());
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
+    if (reached[GltfData::to_size(node)]) continue;
+    reached[GltfData::to_size(node)] = true;
     order.push_back(node);
     const auto& children = nodes[GltfData::to_size(node)].children;
-    open.insert(open.end(), children.rbegin(), children.rend());
+    for (auto child = children.rbegin(); child != children.rend(); ++child) {
+      if (parents[GltfData::to_size(*child)] == node) open.push_back(*child);
+    }
   }
   return order;
 }
 
+/// The nodes of the drawn scene from which its others descend. A node that is another's child stands where that puts it
+/// (glTF 2.0, section 3.5.3), also where the scene names it as a root.
 std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& parents, const std::vector<int>& roots) {
   const tinygltf::Model& model = data.model();
   if (model.scenes.empty()) {
@@ -120,15 +135,20 @@ std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& paren
   const std::size_t active = model.defaultScene >= 0 ? GltfData::to_size(model.defaultScene) : 0;
   const std::string where = fmt::format("scenes[{}].nodes", active);
   std::vector<bool> seen(model.nodes.size(), false);
-  for (const int node : model.scenes[active].nodes) {
+  std::vector<int> named = model.scenes[active].nodes;
+  for (const int node : named) {
     const std::size_t i = GltfData::to_size(node);
-    if (seen[i]) data.context().fail(where, fmt::format("names node {} twice", node));
+    if (seen[i]) data.context().warn(where, fmt::format("names node {} twice; it is drawn once", node));
     if (parents[i] >= 0) {
-      data.context().fail(where, fmt::format("node {} is a child of node {}, not a root", node, parents[i]));
+      data.context().warn(
+          where,
+          fmt::format("node {} is a child of node {}, not a root; it is drawn once, as that child", node, parents[i]));
     }
     seen[i] = true;
   }
-  return model.scenes[active].nodes;
+  // Those that descend from others come last, when they have been reached already.
+  std::ranges::stable_partition(named, [&](int node) { return parents[GltfData::to_size(node)] < 0; });
+  return named;
 }
 
 /// How many instances the attributes of EXT_mesh_gpu_instancing describe.
@@ -142,9 +162,9 @@ std::size_t instance_count(const GltfData& data, const tinygltf::Value& attribut
   return count;
 }
 
-/// Checks that nodes form trees (no node twice, no cycle) and composes their transforms in double; without recursion,
-/// so that a chain may be as long as it likes. Throws Error (BadInput) also for projective matrices and transforms
-/// that overflow.
+/// Checks that nodes that are used form trees (no node twice, no cycle) and composes their transforms in double;
+/// without recursion, so that a chain may be as long as it likes. Throws Error (BadInput) also for projective matrices
+/// and transforms that overflow.
 GltfNodes place_nodes(const GltfData& data) {
   const auto& nodes = data.model().nodes;
   data.context().charge(nodes.size() * (sizeof(glm::dmat4) + 4 * sizeof(int)), "the nodes");
@@ -154,12 +174,15 @@ GltfNodes place_nodes(const GltfData& data) {
     if (parents[i] < 0) roots.push_back(static_cast<int>(i));
   }
   // With at most one parent each, nodes that no root reaches can only lie on or below a cycle.
-  const std::vector<int> order = descend(nodes, roots);
+  const std::vector<int> order = descend(nodes, parents, roots);
   if (order.size() != nodes.size()) {
     std::vector<bool> reached(nodes.size(), false);
     for (const int node : order) reached[GltfData::to_size(node)] = true;
-    const auto missing = std::ranges::find(reached, false) - reached.begin();
-    data.context().fail(node_path(static_cast<std::size_t>(missing)), "is its own ancestor");
+    // A cycle below a node that is used makes each of its nodes used, as it is where joints lie on one.
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (reached[i]) continue;
+      data.context().check_entry("nodes", i, [&] { data.context().fail(node_path(i), "is its own ancestor"); });
+    }
   }
 
   GltfNodes placed;
@@ -167,13 +190,15 @@ GltfNodes place_nodes(const GltfData& data) {
   for (const int node : order) {
     const std::size_t i = GltfData::to_size(node);
     const std::string where = node_path(i);
-    glm::dmat4 matrix = local_matrix(nodes[i], where, data.context());
-    if (parents[i] >= 0) matrix = placed.to_world[GltfData::to_size(parents[i])] * matrix;
-    if (!all_finite(matrix)) data.context().fail(where, "its transform overflows");
-    for (int column = 0; column < 4; ++column) matrix[column][3] = column == 3 ? 1.0 : 0.0;
-    placed.to_world[i] = matrix;
+    data.context().check_entry("nodes", i, [&] {
+      glm::dmat4 matrix = local_matrix(nodes[i], where, data.context());
+      if (parents[i] >= 0) matrix = placed.to_world[GltfData::to_size(parents[i])] * matrix;
+      if (!all_finite(matrix)) data.context().fail(where, "its transform overflows");
+      for (int column = 0; column < 4; ++column) matrix[column][3] = column == 3 ? 1.0 : 0.0;
+      placed.to_world[i] = matrix;
+    });
   }
-  placed.drawn = descend(nodes, scene_roots(data, parents, roots));
+  placed.drawn = descend(nodes, parents, scene_roots(data, parents, roots));
   return placed;
 }
 
@@ -219,10 +244,11 @@ std::vector<glm::dmat4> gpu_instances(const GltfData& data, int node) {
 }
 
 /// tinygltf's model of the document, without its buffers and pictures: those are read by us alone, so that the library
-/// never opens a file or decodes anything.
+/// never opens a file or decodes anything. Nor does it get animations, which are not played.
 tinygltf::Model parse_model(Json root, const GltfContext& context) {
   root.erase("buffers");
   root.erase("images");
+  root.erase("animations");
   // tinygltf refuses indices without a bufferView (zeros, or sparse ones); it does not get to see any.
   std::vector<int> indices;
   if (Json* const meshes = root.find("meshes")) {
@@ -394,20 +420,17 @@ class SceneBuilder {
   std::size_t singular_ = 0;
 };
 
-void check_skins(const GltfData& data) {
-  const auto& skins = data.model().skins;
-  for (std::size_t i = 0; i < skins.size(); ++i) {
-    const int matrices = skins[i].inverseBindMatrices;
-    if (matrices < 0) continue;
-    const std::string where = fmt::format("skins[{}].inverseBindMatrices", i);
-    data.require_type(matrices, {TINYGLTF_TYPE_MAT4}, where);
-    if (data.accessor(matrices).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) {
-      data.context().fail(where, "must be floats");
-    }
-    if (data.count(matrices) < skins[i].joints.size()) {
-      data.context().fail(where,
-                          fmt::format("{} matrices for {} joints", data.count(matrices), skins[i].joints.size()));
-    }
+void check_skin(const GltfData& data, std::size_t index) {
+  const tinygltf::Skin& skin = data.model().skins[index];
+  const int matrices = skin.inverseBindMatrices;
+  if (matrices < 0) return;
+  const std::string where = fmt::format("skins[{}].inverseBindMatrices", index);
+  data.require_type(matrices, {TINYGLTF_TYPE_MAT4}, where);
+  if (data.accessor(matrices).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) {
+    data.context().fail(where, "must be floats");
+  }
+  if (data.count(matrices) < skin.joints.size()) {
+    data.context().fail(where, fmt::format("{} matrices for {} joints", data.count(matrices), skin.joints.size()));
   }
 }
 
@@ -437,6 +460,12 @@ std::vector<std::filesystem::path> files_beside(const std::filesystem::path& pat
   return files;
 }
 
+/// The scene that the document names, else the first.
+std::size_t drawn_scene(const Json& root) {
+  const auto named = whole_number(root["scene"]);
+  return named && *named >= 0 ? static_cast<std::size_t>(*named) : 0;
+}
+
 }  // namespace
 
 Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
@@ -445,6 +474,7 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
   Json root = parse_json(file.parts.json, context);
   if (!root.is_object()) context.fail("", "this is no glTF: the JSON is not an object");
   check_extensions(root, context);
+  context.set_usage(usage_of(root, drawn_scene(root)));
   check_shape(root, context);
 
   GltfBuffers buffers(path.parent_path(), file.parts);
@@ -453,7 +483,9 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
   const tinygltf::Model model = parse_model(std::move(root), context);
   const GltfData data(model, buffers, context);
   check_meshes(data);
-  check_skins(data);
+  for (std::size_t i = 0; i < model.skins.size(); ++i) {
+    context.check_entry("skins", i, [&] { check_skin(data, i); });
+  }
 
   Scene scene;
   scene.name = path.stem().string();

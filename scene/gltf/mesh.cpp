@@ -146,21 +146,25 @@ class PrimitiveCheck {
   bool quantized_ = false;
 };
 
+void check_mesh(const GltfData& data, std::size_t index) {
+  const tinygltf::Mesh& mesh = data.model().meshes[index];
+  std::size_t targets = 0;
+  for (std::size_t p = 0; p < mesh.primitives.size(); ++p) {
+    PrimitiveCheck(data, mesh.primitives[p], fmt::format("meshes[{}].primitives[{}]", index, p)).run();
+    targets = std::max(targets, mesh.primitives[p].targets.size());
+  }
+  if (!mesh.weights.empty() && mesh.weights.size() != targets) {
+    data.context().warn(fmt::format("meshes[{}].weights", index),
+                        fmt::format("{} weights for {} morph targets", mesh.weights.size(), targets));
+  }
+}
+
 }  // namespace
 
 void check_meshes(const GltfData& data) {
   const auto& meshes = data.model().meshes;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
-    std::size_t targets = 0;
-    for (std::size_t p = 0; p < meshes[m].primitives.size(); ++p) {
-      const tinygltf::Primitive& primitive = meshes[m].primitives[p];
-      PrimitiveCheck(data, primitive, fmt::format("meshes[{}].primitives[{}]", m, p)).run();
-      targets = std::max(targets, primitive.targets.size());
-    }
-    if (!meshes[m].weights.empty() && meshes[m].weights.size() != targets) {
-      data.context().warn(fmt::format("meshes[{}].weights", m),
-                          fmt::format("{} weights for {} morph targets", meshes[m].weights.size(), targets));
-    }
+    data.context().check_entry("meshes", m, [&] { check_mesh(data, m); });
   }
 }
 

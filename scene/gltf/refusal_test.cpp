@@ -96,7 +96,10 @@ TEST(GltfRefusal, ReferencesToNothingAreRefused) {
 TEST(GltfRefusal, NodesFormTrees) {
   auto document = triangle();
   document.json["nodes"] = Json::parse(R"([{"mesh": 0}, {"children": [2]}, {"children": [1]}])");
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   expect_refused(document.json, "nodes[1]");
+  document.json["scenes"][0]["nodes"] = Json::array({0});
+  EXPECT_TRUE(test::warns_of(test::load(document.json), "nodes[1]: is its own ancestor"));
   document.json["nodes"] = Json::parse(R"([{"children": [0]}])");
   expect_refused(document.json, "nodes[0]");
   document.json["nodes"] = Json::parse(R"([{"children": [1, 2]}, {"children": [2]}, {"mesh": 0}])");

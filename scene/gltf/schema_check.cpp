@@ -45,11 +45,11 @@ void check_asset(const GltfItem& root) {
 }
 
 void check_buffers(const GltfItem& root) {
-  root.each("buffers", kOptional, [](const GltfItem& buffer) {
+  root.each_entry("buffers", kOptional, [](const GltfItem& buffer) {
     buffer.text("uri");
     buffer.whole("byteLength", kRequired, 1);
   });
-  root.each("bufferViews", kOptional, [](const GltfItem& view) {
+  root.each_entry("bufferViews", kOptional, [](const GltfItem& view) {
     view.index("buffer", "buffers", kRequired);
     view.whole("byteOffset");
     view.whole("byteLength", kRequired, 1);
@@ -67,7 +67,7 @@ void check_component_type(const GltfItem& item, const char* key) {
 }
 
 void check_accessors(const GltfItem& root) {
-  root.each("accessors", kOptional, [](const GltfItem& accessor) {
+  root.each_entry("accessors", kOptional, [](const GltfItem& accessor) {
     accessor.index("bufferView", "bufferViews");
     accessor.whole("byteOffset");
     check_component_type(accessor, "componentType");
@@ -109,7 +109,7 @@ void check_compression(const GltfItem& primitive) {
 }
 
 void check_meshes(const GltfItem& root) {
-  root.each("meshes", kOptional, [](const GltfItem& mesh) {
+  root.each_entry("meshes", kOptional, [](const GltfItem& mesh) {
     mesh.numbers("weights", 0);
     const std::size_t count = mesh.each("primitives", kRequired, [](const GltfItem& primitive) {
       if (primitive.index_map("attributes", "accessors", kRequired) == 0) {
@@ -139,7 +139,7 @@ void check_nodes(const GltfItem& root) {
   const auto punctual = extensions ? extensions->object("KHR_lights_punctual") : std::nullopt;
   const std::size_t lights = punctual && punctual->has("lights") ? punctual->value()["lights"].size() : 0;
 
-  root.each("nodes", kOptional, [&](const GltfItem& node) {
+  root.each_entry("nodes", kOptional, [&](const GltfItem& node) {
     node.text("name");
     node.index("mesh", "meshes");
     node.index("camera", "cameras");
@@ -171,16 +171,16 @@ void check_nodes(const GltfItem& root) {
 
 void check_scenes(const GltfItem& root) {
   root.index("scene", "scenes");
-  root.each("scenes", kOptional, [](const GltfItem& scene) {
+  root.each_entry("scenes", kOptional, [](const GltfItem& scene) {
     scene.text("name");
     scene.indices("nodes", "nodes");
   });
-  root.each("skins", kOptional, [](const GltfItem& skin) {
+  root.each_entry("skins", kOptional, [](const GltfItem& skin) {
     if (skin.indices("joints", "nodes", kRequired) == 0) skin.fail("joints", "is empty");
     skin.index("inverseBindMatrices", "accessors");
     skin.index("skeleton", "nodes");
   });
-  root.each("animations", kOptional, [](const GltfItem& animation) {
+  root.each_entry("animations", kOptional, [](const GltfItem& animation) {
     const std::size_t samplers = animation.each("samplers", kRequired, [](const GltfItem& sampler) {
       sampler.index("input", "accessors", kRequired);
       sampler.index("output", "accessors", kRequired);
@@ -211,15 +211,15 @@ std::optional<GltfItem> check_texture_info(const GltfItem& material, const char*
 }
 
 void check_textures(const GltfItem& root) {
-  root.each("images", kOptional, [](const GltfItem& image) {
+  root.each_entry("images", kOptional, [](const GltfItem& image) {
     image.text("uri");
     image.text("mimeType");
     image.index("bufferView", "bufferViews");
   });
-  root.each("samplers", kOptional, [](const GltfItem& sampler) {
+  root.each_entry("samplers", kOptional, [](const GltfItem& sampler) {
     for (const char* key : {"magFilter", "minFilter", "wrapS", "wrapT"}) sampler.whole(key, kOptional, 0, 65535);
   });
-  root.each("textures", kOptional, [](const GltfItem& texture) {
+  root.each_entry("textures", kOptional, [](const GltfItem& texture) {
     texture.index("sampler", "samplers");
     texture.index("source", "images");
   });
@@ -263,7 +263,7 @@ void stand_in_for_glossiness(const GltfItem& material) {
 }
 
 void check_materials(const GltfItem& root) {
-  root.each("materials", kOptional, [](const GltfItem& material) {
+  root.each_entry("materials", kOptional, [](const GltfItem& material) {
     material.text("name");
     stand_in_for_glossiness(material);
     if (const auto pbr = material.object("pbrMetallicRoughness")) {
@@ -311,7 +311,7 @@ void check_orthographic(const GltfItem& lens) {
 }
 
 void check_cameras(const GltfItem& root) {
-  root.each("cameras", kOptional, [](const GltfItem& camera) {
+  root.each_entry("cameras", kOptional, [](const GltfItem& camera) {
     camera.text("name");
     const auto type = camera.text("type", kRequired);
     if (*type == "perspective") {
@@ -344,7 +344,7 @@ void check_lights(const GltfItem& root) {
   const auto extensions = root.object("extensions");
   const auto punctual = extensions ? extensions->object("KHR_lights_punctual") : std::nullopt;
   if (!punctual) return;
-  punctual->each("lights", kRequired, [](const GltfItem& light) {
+  punctual->each_entry("lights", kRequired, [](const GltfItem& light) {
     light.text("name");
     const auto type = light.text("type", kRequired);
     if (*type != "point" && *type != "directional" && *type != "spot") {
@@ -424,16 +424,18 @@ std::set<std::string> names_in(const GltfItem& root, const char* key) {
 
 /// Warns of material extensions that are neither drawn nor declared, which check_extensions has not named yet.
 void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& declared) {
-  root.each("materials", Presence::Optional, [&](const GltfItem& material) {
-    const auto extensions = material.object("extensions");
-    if (!extensions) return;
+  const Json* const materials = section_of(root.value(), "materials");
+  if (materials == nullptr) return;
+  for (const Json& material : materials->elements()) {
+    const Json& extensions = material["extensions"];
+    if (!extensions.is_object()) continue;  // check_shape says so
     std::set<std::string> names;
-    for (const auto& [name, value] : extensions->value().members()) names.insert(name);
+    for (const auto& [name, value] : extensions.members()) names.insert(name);
     for (const std::string& name : names) {
       if (declared.contains(name) || contains(kSupported, name) || name == kStandsIn) continue;
       root.warn("materials", fmt::format("{} is ignored", printable(name)));  // once, however many have it
     }
-  });
+  }
 }
 
 }  // namespace
