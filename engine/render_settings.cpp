@@ -184,7 +184,7 @@ Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
 
 Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
                  const ImageLimits& pictures) {
-  Scene scene = load_scene(source, limits);
+  Scene scene = load_scene(source, limits, settings.scene);
   if (!settings.environment.empty()) {
     scene.environment = load_environment(settings.environment, pictures);
     note_not_finite(printable(settings.environment), scene);

@@ -187,9 +187,12 @@ std::optional<std::size_t> GltfItem::index(const char* key, const char* section,
 }
 
 std::size_t GltfItem::indices(const char* key, const char* section, Presence presence) const {
+  return indices_below(key, section_size(section), presence);
+}
+
+std::size_t GltfItem::indices_below(const char* key, std::size_t count, Presence presence) const {
   Json* const list = array(key, presence);
   if (list == nullptr) return 0;
-  const std::size_t count = section_size(section);
   for (std::size_t i = 0; i < list->size(); ++i) {
     Json& value = (*list)[i];
     const auto number = whole_number(value);

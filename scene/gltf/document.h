@@ -136,8 +136,9 @@ class GltfItem {
   /// An index into the top-level array `section`, or into `count` entries.
   std::optional<std::size_t> index(const char* key, const char* section, Presence presence = Presence::Optional) const;
   std::optional<std::size_t> index_below(const char* key, std::size_t count, Presence presence) const;
-  /// An array of indices into `section`; returns how many.
+  /// An array of indices into `section`, or into `count` entries; returns how many.
   std::size_t indices(const char* key, const char* section, Presence presence = Presence::Optional) const;
+  std::size_t indices_below(const char* key, std::size_t count, Presence presence) const;
   /// An object whose values are all indices into `section`.
   std::size_t index_map(const char* key, const char* section, Presence presence) const;
   /// A number in [low, high].

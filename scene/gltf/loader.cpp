@@ -19,6 +19,7 @@
 #include "scene/gltf/materials.h"
 #include "scene/gltf/mesh.h"
 #include "scene/gltf/scan.h"
+#include "scene/gltf/selection.h"
 #include "scene/gltf/uri.h"
 
 namespace hpr {
@@ -27,6 +28,7 @@ namespace {
 /// Where the nodes stand.
 struct GltfNodes {
   std::vector<glm::dmat4> to_world;  ///< of every node, also of those outside the scene
+  std::vector<bool> hidden;          ///< of every node: KHR_node_visibility, its own or an ancestor's
   std::vector<int> drawn;            ///< nodes of the active scene, parents first
 };
 
@@ -151,6 +153,11 @@ std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& paren
   return named;
 }
 
+bool is_hidden(const tinygltf::Node& node) {
+  const auto found = node.extensions.find("KHR_node_visibility");
+  return found != node.extensions.end() && found->second.Has("visible") && !found->second.Get("visible").Get<bool>();
+}
+
 /// How many instances the attributes of EXT_mesh_gpu_instancing describe.
 std::size_t instance_count(const GltfData& data, const tinygltf::Value& attributes, const std::string& where) {
   std::size_t count = 0;
@@ -187,8 +194,10 @@ GltfNodes place_nodes(const GltfData& data) {
 
   GltfNodes placed;
   placed.to_world.assign(nodes.size(), glm::dmat4(1.0));
+  placed.hidden.assign(nodes.size(), false);
   for (const int node : order) {
     const std::size_t i = GltfData::to_size(node);
+    placed.hidden[i] = is_hidden(nodes[i]) || (parents[i] >= 0 && placed.hidden[GltfData::to_size(parents[i])]);
     const std::string where = node_path(i);
     data.context().check_entry("nodes", i, [&] {
       glm::dmat4 matrix = local_matrix(nodes[i], where, data.context());
@@ -322,11 +331,12 @@ class SceneBuilder {
   void add_node(int node) {
     const tinygltf::Node& from = data_.model().nodes[GltfData::to_size(node)];
     const glm::dmat4& to_world = nodes_.to_world[GltfData::to_size(node)];
-    if (auto light = light_of(data_, node, to_world)) scene_.lights.push_back(*std::move(light));
     if (auto camera = camera_of(data_, node, to_world)) {
       if (camera->name.empty()) camera->name = fmt::format("camera{}", scene_.cameras.size());
       scene_.cameras.push_back(*std::move(camera));
     }
+    if (nodes_.hidden[GltfData::to_size(node)]) return;
+    if (auto light = light_of(data_, node, to_world)) scene_.lights.push_back(*std::move(light));
     if (from.mesh < 0) {
       if (from.skin >= 0) context().warn(fmt::format("nodes[{}]", node), "has a skin but no mesh");
       return;
@@ -460,22 +470,24 @@ std::vector<std::filesystem::path> files_beside(const std::filesystem::path& pat
   return files;
 }
 
-/// The scene that the document names, else the first.
-std::size_t drawn_scene(const Json& root) {
-  const auto named = whole_number(root["scene"]);
-  return named && *named >= 0 ? static_cast<std::size_t>(*named) : 0;
-}
-
 }  // namespace
 
-Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
+Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice) {
   GltfContext context(path.string(), limits);
   const GltfFile file = open_gltf(path, context);
   Json root = parse_json(file.parts.json, context);
   if (!root.is_object()) context.fail("", "this is no glTF: the JSON is not an object");
   check_extensions(root, context);
-  context.set_usage(usage_of(root, drawn_scene(root)));
+  const std::size_t drawn = find_scene(root, choice.scene, context);
+  if (!choice.scene.empty()) root["scene"] = drawn;
+  apply_variant(root, choice.variant, context);
+  context.set_usage(usage_of(root, drawn));
   check_shape(root, context);
+
+  Scene scene;
+  scene.name = path.stem().string();
+  scene.scenes = scene_names(root);
+  scene.variants = variant_names(root);
 
   GltfBuffers buffers(path.parent_path(), file.parts);
   buffers.load(root, context);
@@ -487,8 +499,6 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
     context.check_entry("skins", i, [&] { check_skin(data, i); });
   }
 
-  Scene scene;
-  scene.name = path.stem().string();
   GltfMaterials(data, buffers, images).build(scene);
   SceneBuilder(data, scene).build();
   scene.warnings = context.take_warnings();

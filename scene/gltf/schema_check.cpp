@@ -11,6 +11,7 @@
 
 #include "core/text.h"
 #include "scene/gltf/document.h"
+#include "scene/gltf/selection.h"
 
 namespace hpr {
 namespace {
@@ -108,14 +109,27 @@ void check_compression(const GltfItem& primitive) {
   }
 }
 
+/// KHR_materials_variants; apply_variant has removed what no variant asks for.
+void check_mappings(const GltfItem& primitive, std::size_t variants) {
+  const auto extensions = primitive.object("extensions");
+  const auto own = extensions ? extensions->object("KHR_materials_variants") : std::nullopt;
+  if (!own) return;
+  own->each("mappings", kRequired, [&](const GltfItem& mapping) {
+    mapping.indices_below("variants", variants, kRequired);
+    mapping.index("material", "materials", kRequired);
+  });
+}
+
 void check_meshes(const GltfItem& root) {
-  root.each_entry("meshes", kOptional, [](const GltfItem& mesh) {
+  const std::size_t variants = variant_names(root.value()).size();
+  root.each_entry("meshes", kOptional, [&](const GltfItem& mesh) {
     mesh.numbers("weights", 0);
-    const std::size_t count = mesh.each("primitives", kRequired, [](const GltfItem& primitive) {
+    const std::size_t count = mesh.each("primitives", kRequired, [&](const GltfItem& primitive) {
       if (primitive.index_map("attributes", "accessors", kRequired) == 0) {
         primitive.fail("attributes", "is empty");
       }
       check_compression(primitive);
+      check_mappings(primitive, variants);
       primitive.index("indices", "accessors");
       primitive.index("material", "materials");
       primitive.whole("mode", kOptional, 0, 6);
@@ -163,6 +177,7 @@ void check_nodes(const GltfItem& root) {
         own->value().erase("KHR_lights_punctual");
       }
     }
+    if (const auto visibility = own->object("KHR_node_visibility")) visibility->flag("visible");
     if (const auto instancing = own->object("EXT_mesh_gpu_instancing")) {
       instancing->index_map("attributes", "accessors", kRequired);
     }
@@ -388,21 +403,21 @@ void check_shape(Json& document, GltfContext& context) {
 
 namespace {
 
-constexpr std::array<std::string_view, 9> kSupported{
+constexpr std::array<std::string_view, 11> kSupported{
     "EXT_mesh_gpu_instancing", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
     "KHR_materials_ior",       "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_volume",    "KHR_mesh_quantization",      "KHR_texture_transform"};
+    "KHR_materials_variants",  "KHR_materials_volume",       "KHR_mesh_quantization",
+    "KHR_node_visibility",     "KHR_texture_transform"};
 
 /// Drawn approximately where it stands alone; check_shape warns of it.
 constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
-constexpr std::array<std::string_view, 10> kAppearanceOnly{
+constexpr std::array<std::string_view, 9> kAppearanceOnly{
     "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion", "KHR_materials_iridescence", kStandsIn,
-    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_materials_variants",
-    "KHR_xmp_json_ld"};
+    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_xmp_json_ld"};
 
 bool contains(const auto& names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();

@@ -103,7 +103,8 @@ class UsageFinder {
   }
 
   void follow_member(std::string_view key, const Json& value) {
-    if (key == "extras") return;
+    // The material of the chosen variant is the primitive's own by now.
+    if (key == "extras" || key == "KHR_materials_variants") return;
     if (const std::string_view section = section_referred_to(key, value); !section.empty()) {
       each_index(value, [&](std::size_t index) { open(section, index); });
     } else if (key == "joints") {
