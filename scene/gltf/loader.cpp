@@ -381,6 +381,7 @@ class SceneBuilder {
     const auto known = meshes_.find(key);
     if (known != meshes_.end()) return known->second;
 
+    check_weights(node, from);
     const GltfPose pose{own_weights ? node.weights : from.weights, joints_of(node.skin)};
     std::vector<std::uint32_t> made;
     for (std::size_t p = 0; p < from.primitives.size(); ++p) {
@@ -394,6 +395,14 @@ class SceneBuilder {
       scene_.meshes.push_back(*std::move(mesh));
     }
     return meshes_.emplace(std::move(key), std::move(made)).first->second;
+  }
+
+  void check_weights(const tinygltf::Node& node, const tinygltf::Mesh& mesh) const {
+    if (node.weights.empty() || mesh.primitives.empty()) return;
+    const std::size_t targets = mesh.primitives.front().targets.size();
+    if (node.weights.size() == targets) return;
+    context().warn(fmt::format("nodes[{}].weights", &node - data_.model().nodes.data()),
+                   fmt::format("{} weights for {} morph targets", node.weights.size(), targets));
   }
 
   /// Every joint's way from the mesh to the world.
@@ -483,6 +492,11 @@ Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits, co
   apply_variant(root, choice.variant, context);
   context.set_usage(usage_of(root, drawn));
   check_shape(root, context);
+  if (const std::size_t animations = root["animations"].size(); animations > 0) {
+    context.warn(
+        "animations",
+        fmt::format("the file has {}; they are not played, things stand where its nodes put them", animations));
+  }
 
   Scene scene;
   scene.name = path.stem().string();
