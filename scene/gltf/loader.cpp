@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <string>
@@ -84,6 +85,13 @@ glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where, Gl
   return from_parts(vector(node.translation, 0.0), rotation, vector(node.scale, 1.0));
 }
 
+/// A node's transform to the world, its last row made exact. Throws Error where it overflows.
+glm::dmat4 checked_affine(glm::dmat4 matrix, const std::string& where, const GltfContext& context) {
+  if (!all_finite(matrix)) context.fail(where, "its transform overflows");
+  for (int column = 0; column < 4; ++column) matrix[column][3] = column == 3 ? 1.0 : 0.0;
+  return matrix;
+}
+
 /// The one parent of every node, -1 for roots. Nodes that are used get theirs before others claim them.
 std::vector<int> parents_of(const std::vector<tinygltf::Node>& nodes, GltfContext& context) {
   std::vector<int> parents(nodes.size(), -1);
@@ -118,10 +126,10 @@ std::vector<int> descend(const std::vector<tinygltf::Node>& nodes, const std::ve
     if (reached[GltfData::to_size(node)]) continue;
     reached[GltfData::to_size(node)] = true;
     order.push_back(node);
-    const auto& children = nodes[GltfData::to_size(node)].children;
-    for (auto child = children.rbegin(); child != children.rend(); ++child) {
-      if (parents[GltfData::to_size(*child)] == node) open.push_back(*child);
-    }
+    std::vector<int> below;
+    std::ranges::copy_if(nodes[GltfData::to_size(node)].children, std::back_inserter(below),
+                         [&](int child) { return parents[GltfData::to_size(child)] == node; });
+    open.insert(open.end(), below.rbegin(), below.rend());
   }
   return order;
 }
@@ -149,8 +157,20 @@ std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& paren
     seen[i] = true;
   }
   // Those that descend from others come last, when they have been reached already.
-  std::ranges::stable_partition(named, [&](int node) { return parents[GltfData::to_size(node)] < 0; });
+  std::stable_partition(named.begin(), named.end(), [&](int node) { return parents[GltfData::to_size(node)] < 0; });
   return named;
+}
+
+/// Refuses nodes that are used and lie on or below a cycle: with at most one parent each, those that no root reaches.
+/// Descent from a used node makes all nodes of a cycle used.
+void check_cycles(GltfContext& context, std::size_t nodes, const std::vector<int>& order) {
+  if (order.size() == nodes) return;
+  std::vector<bool> reached(nodes, false);
+  for (const int node : order) reached[GltfData::to_size(node)] = true;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (reached[i]) continue;
+    context.check_entry("nodes", i, [&] { context.fail(node_path(i), "is its own ancestor"); });
+  }
 }
 
 bool is_hidden(const tinygltf::Node& node) {
@@ -180,17 +200,8 @@ GltfNodes place_nodes(const GltfData& data) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (parents[i] < 0) roots.push_back(static_cast<int>(i));
   }
-  // With at most one parent each, nodes that no root reaches can only lie on or below a cycle.
   const std::vector<int> order = descend(nodes, parents, roots);
-  if (order.size() != nodes.size()) {
-    std::vector<bool> reached(nodes.size(), false);
-    for (const int node : order) reached[GltfData::to_size(node)] = true;
-    // A cycle below a node that is used makes each of its nodes used, as it is where joints lie on one.
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (reached[i]) continue;
-      data.context().check_entry("nodes", i, [&] { data.context().fail(node_path(i), "is its own ancestor"); });
-    }
-  }
+  check_cycles(data.context(), nodes.size(), order);
 
   GltfNodes placed;
   placed.to_world.assign(nodes.size(), glm::dmat4(1.0));
@@ -198,13 +209,11 @@ GltfNodes place_nodes(const GltfData& data) {
   for (const int node : order) {
     const std::size_t i = GltfData::to_size(node);
     placed.hidden[i] = is_hidden(nodes[i]) || (parents[i] >= 0 && placed.hidden[GltfData::to_size(parents[i])]);
-    const std::string where = node_path(i);
     data.context().check_entry("nodes", i, [&] {
-      glm::dmat4 matrix = local_matrix(nodes[i], where, data.context());
-      if (parents[i] >= 0) matrix = placed.to_world[GltfData::to_size(parents[i])] * matrix;
-      if (!all_finite(matrix)) data.context().fail(where, "its transform overflows");
-      for (int column = 0; column < 4; ++column) matrix[column][3] = column == 3 ? 1.0 : 0.0;
-      placed.to_world[i] = matrix;
+      const std::string where = node_path(i);
+      const glm::dmat4 local = local_matrix(nodes[i], where, data.context());
+      placed.to_world[i] = checked_affine(
+          parents[i] >= 0 ? placed.to_world[GltfData::to_size(parents[i])] * local : local, where, data.context());
     });
   }
   placed.drawn = descend(nodes, parents, scene_roots(data, parents, roots));

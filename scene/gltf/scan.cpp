@@ -60,7 +60,8 @@ GlbChunk take_chunk(std::span<const std::byte>& rest, const std::string& where, 
   return {type, body};
 }
 
-GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
+/// The chunks of a file as its header, which is checked, declares them.
+std::span<const std::byte> check_header(std::span<const std::byte> file, GltfContext& context) {
   if (file.size() < kHeaderBytes)
     context.fail("header", fmt::format("{} bytes are no binary glTF", file.size()), kDamaged);
   const std::uint32_t version = little_endian_32(file, 4);
@@ -72,10 +73,13 @@ GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
   if (length < file.size()) {
     context.warn("header", fmt::format("{} bytes follow the {} it tells of; ignored", file.size() - length, length));
   }
+  return file.first(length).subspan(kHeaderBytes);
+}
 
+GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
   GltfParts parts;
   bool has_json = false;
-  std::span<const std::byte> rest = file.first(length).subspan(kHeaderBytes);
+  std::span<const std::byte> rest = check_header(file, context);
   for (int chunk = 0; !rest.empty(); ++chunk) {
     const std::string where = fmt::format("chunk {}", chunk);
     if (chunk > 0 && !starts_chunk(rest)) {
