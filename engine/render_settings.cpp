@@ -192,7 +192,7 @@ Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
 
 Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
                  const ImageLimits& pictures) {
-  Scene scene = load_scene(source, limits);
+  Scene scene = load_scene(source, limits, settings.scene);
   set_environment(settings.environment, pictures, scene);
   if (settings.strict && scene.not_finite > 0) {
     const auto named = std::ranges::find_if(

@@ -13,6 +13,7 @@
 #include "engine/frame_settings.h"
 #include "engine/samples.h"
 #include "image/color.h"
+#include "scene/scene_choice.h"
 
 namespace hpr {
 
@@ -50,6 +51,7 @@ struct LinkCodec {
 /// How a scene is drawn: everything that a user may choose about a picture. engine/settings_table.cpp lists each
 /// setting once; the command line, the console, sweeps, checkpoints and docs come from that table.
 struct RenderSettings {
+  SceneChoice scene;
   CameraChoice camera;
   Quality quality = Quality::Good;
   Sampling sampling;

@@ -244,6 +244,16 @@ std::vector<Setting> make_table() {
   const std::vector<Dependency> on_photons{{"reference", traces_passes}, {"passes", sends_photons}};
   return {
       // What is seen.
+      {.name = "scene",
+       .help = "name or index of one of the file's scenes (default: the one that the file names, else the first)",
+       .value = plain_text("NAME|INDEX", "a scene", [](Settings& s) -> std::string& { return s.scene.scene; }),
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "variant",
+       .help = "name of one of the file's variants of materials (default: the materials without any)",
+       .value = plain_text("NAME", "a variant", [](Settings& s) -> std::string& { return s.scene.variant; }),
+       .decides_bits = false,
+       .fixed_in_session = true},
       {.name = "camera",
        .help = "name or index of a camera of the scene",
        .value = plain_text("NAME|INDEX", "a camera", [](Settings& s) -> std::string& { return s.camera.name; }),

@@ -56,6 +56,16 @@ SceneImporter importer_for(const std::string& source) {
   return found == importers.end() ? importers.front() : *found;
 }
 
+/// Throws Error (Usage) for a choice that a generated scene does not give.
+void check_generated(const std::string& source, const SceneChoice& choice) {
+  const auto refuse = [&](std::string_view kind, const std::string& wanted, std::string_view hint) {
+    throw Error(ExitCode::Usage, fmt::format("{} has no {} '{}'", printable(source), kind, printable(wanted)),
+                std::string(hint));
+  };
+  if (!choice.scene.empty() && choice.scene != "0") refuse("scene", choice.scene, "it is one scene, 0");
+  if (!choice.variant.empty()) refuse("variant", choice.variant, "it has none at all: leave --variant out");
+}
+
 constexpr float kMaxRadiance = 1e12F;  ///< radiance a user may ask for
 constexpr float kMaxHalf = 65504.0F;
 
@@ -94,8 +104,9 @@ std::array<std::size_t, 3> color_channels(const FloatImage& picture, const std::
 
 }  // namespace
 
-Scene load_scene(const std::string& source, const SceneLimits& limits) {
-  if (!source.starts_with(kGenerated)) return importer_for(source).load(source, limits);
+Scene load_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice) {
+  if (!source.starts_with(kGenerated)) return importer_for(source).load(source, limits, choice);
+  check_generated(source, choice);
   Scene scene = generate_scene(std::string_view(source).substr(kGenerated.size()));
   if (const std::uint64_t bytes = memory_of(scene); bytes > limits.memory_bytes) {
     throw Error(ExitCode::Limit,

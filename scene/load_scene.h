@@ -8,6 +8,7 @@
 
 #include "image/image_io.h"
 #include "scene/scene.h"
+#include "scene/scene_choice.h"
 
 namespace hpr {
 
@@ -21,8 +22,8 @@ struct SceneLimits {
 /// A format of scene files.
 struct SceneImporter {
   std::vector<std::string_view> extensions;  ///< in small letters, with their dots
-  /// Loads a file into a finished scene. Throws Error (Io, BadInput, Limit).
-  Scene (*load)(const std::filesystem::path& path, const SceneLimits& limits);
+  /// Loads a file into a finished scene. Throws Error (Io, BadInput, Limit; Usage for a choice that it lacks).
+  Scene (*load)(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice);
   /// The files that `load` reads beside the scene's own; none of one it would refuse.
   std::vector<std::filesystem::path> (*files_beside)(const std::filesystem::path& path, const SceneLimits& limits);
 };
@@ -37,8 +38,9 @@ HPR_SCENE_IMPORTERS(HPR_DECLARE_IMPORTER)
 
 /// Loads what the command line calls SCENE: a file that an importer reads (.gltf, .glb), or
 /// `gen:NAME?key=value&key=value`. The result is finished (finish_scene) and may be drawn as it is. Throws Error (Io,
-/// BadInput, Limit, Usage).
-[[nodiscard]] Scene load_scene(const std::string& source, const SceneLimits& limits = {});
+/// BadInput, Limit, Usage). Generated scenes are the one scene of their source, 0, without variants.
+[[nodiscard]] Scene load_scene(const std::string& source, const SceneLimits& limits = {},
+                               const SceneChoice& choice = {});
 
 /// The files load_scene(source, limits) may read: the scene's own, and the buffers and pictures that a glTF names. None
 /// of a generated scene; of a file that load_scene would refuse just that file.

@@ -167,6 +167,10 @@ struct Scene {
   std::vector<Camera> cameras;
   Rgb background;  ///< radiance where no surface is and no environment; lights nothing
   std::optional<Environment> environment;
+  /// The names of all scenes and variants of materials that the file holds, of which one was loaded. Known where it was
+  /// loaded.
+  std::vector<std::string> scenes;
+  std::vector<std::string> variants;
   std::vector<std::string> warnings;  ///< what was odd but could be drawn
   std::uint64_t not_finite = 0;  ///< values of the file that were no finite numbers and were replaced, as `warnings`
                                  ///< say; known where it was loaded

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "app/command.h"
+#include "app/options/render_options.h"
 #include "core/file.h"
 #include "core/json.h"
 #include "core/log.h"
@@ -40,6 +41,8 @@ Json info_json(const Scene& scene) {
           {"textures", scene.textures.size()},
           {"lights", scene.lights.size()},
           {"cameras", cameras},
+          {"scenes", scene.scenes},
+          {"variants", scene.variants},
           {"bounds", Json::array({corner(scene.bounds.low), corner(scene.bounds.high)})},
           {"requires", needed},
           {"warnings", scene.warnings}};
@@ -55,12 +58,19 @@ void print_info(const Scene& scene) {
              scene.lights.size());
   fmt::print("  bounds     {:g} {:g} {:g} to {:g} {:g} {:g} m\n", low.x, low.y, low.z, high.x, high.y, high.z);
   for (const Camera& camera : scene.cameras) fmt::print("  camera     {}\n", printable(camera.name));
+  for (const std::string& name : scene.scenes) fmt::print("  scene      {}\n", printable(name));
+  for (const std::string& name : scene.variants) fmt::print("  variant    {}\n", printable(name));
   const Requirements required = requirements_of(scene);
   for (const PassInfo& pass : all_passes()) {
     if (pass.required_by == nullptr) continue;
     const Requirement& requirement = required.*pass.required_by;
     fmt::print("  {:<10} {}: {}\n", pass.name, requirement.needed ? "needed" : "not needed", requirement.why);
   }
+}
+
+/// Declares the options that choose among what a file holds.
+void declare_choice(const OptionSet& options, RenderSettings& settings) {
+  for (const char* const name : {"scene", "variant"}) (void)declare_setting(options, settings, *find_setting(name));
 }
 
 void log_warnings(const Scene& scene) {
@@ -74,11 +84,12 @@ class SceneInfoCommand final : public Command {
 
   void declare(const OptionSet& options) override {
     options.option("SCENE", source_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    declare_choice(options, settings_);
     options.flag("--json", json_, "one JSON document");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
-    const Scene scene = load_scene(source_, globals.scene_limits());
+    const Scene scene = load_scene(source_, globals.scene_limits(), settings_.scene);
     if (json_) {
       fmt::print("{}\n", info_json(scene).dump(2));
     } else {
@@ -90,6 +101,7 @@ class SceneInfoCommand final : public Command {
 
  private:
   std::string source_;
+  RenderSettings settings_;
   bool json_ = false;
 };
 
@@ -102,13 +114,14 @@ class SceneValidateCommand final : public Command {
 
   void declare(const OptionSet& options) override {
     options.option("SCENE", source_, "a .gltf or .glb file, or gen:NAME?key=value").required();
+    declare_choice(options, settings_);
     options.flag("--json", json_, "one JSON document");
   }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     Json json{{"schema", "hpr.scene-validate/1"}, {"scene", source_}};
     try {
-      const Scene scene = load_scene(source_, globals.scene_limits());
+      const Scene scene = load_scene(source_, globals.scene_limits(), settings_.scene);
       log_warnings(scene);
       if (json_) {
         json["verdict"] = scene.warnings.empty() ? "ok" : "warn";
@@ -132,6 +145,7 @@ class SceneValidateCommand final : public Command {
 
  private:
   std::string source_;
+  RenderSettings settings_;
   bool json_ = false;
 };
 

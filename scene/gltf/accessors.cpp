@@ -58,36 +58,37 @@ void GltfBuffers::load(const Json& root, GltfContext& context) {
   if (found == nullptr) return;
   const std::vector<bool> read = buffers_read(root, found->size());
   owned_.resize(found->size());
+  bytes_.resize(found->size());
   for (std::size_t i = 0; i < found->size(); ++i) {
-    const Json& buffer = (*found)[i];
-    const std::string where = fmt::format("buffers[{}]", i);
-    std::span<const std::byte> bytes;
-    if (!read[i] && meshopt_of(buffer).value("fallback", false)) {
-      bytes_.push_back(bytes);
-      continue;
-    }
-    if (buffer.contains("uri")) {
-      const auto uri = buffer["uri"].get<std::string>();
-      if (uri.starts_with("data:image/")) context.warn(where, "its data URI says that it is a picture");
-      owned_[i] = resolve(uri, where, context);
-      bytes = owned_[i];
-    } else if (i == 0 && parts_->has_binary) {
-      bytes = parts_->binary;
-    } else {
-      context.fail(where, "has neither a uri nor a BIN chunk", "export the scene again with its buffers");
-    }
-    const auto length = buffer["byteLength"].get<std::uint64_t>();
-    if (bytes.size() < length) {
-      context.fail(where, fmt::format("must have {} bytes, but there are {}", length, bytes.size()),
-                   "the file is cut off or belongs to another scene");
-    }
-    bytes_.push_back(bytes.first(length));
+    if (!read[i] && meshopt_of((*found)[i]).value("fallback", false)) continue;
+    context.check_entry("buffers", i, [&] { bytes_[i] = load_buffer((*found)[i], i, context); });
   }
 }
 
 std::size_t GltfBuffers::add(std::vector<std::byte> bytes) {
   bytes_.emplace_back(owned_.emplace_back(std::move(bytes)));
   return bytes_.size() - 1;
+}
+
+std::span<const std::byte> GltfBuffers::load_buffer(const Json& buffer, std::size_t index, GltfContext& context) {
+  const std::string where = fmt::format("buffers[{}]", index);
+  std::span<const std::byte> bytes;
+  if (buffer.contains("uri")) {
+    const auto uri = buffer["uri"].get<std::string>();
+    if (is_picture_uri(uri)) context.warn(where, "its data URI says that it is a picture");
+    owned_[index] = resolve(uri, where, context);
+    bytes = owned_[index];
+  } else if (index == 0 && parts_->has_binary) {
+    bytes = parts_->binary;
+  } else {
+    context.fail(where, "has neither a uri nor a BIN chunk", "export the scene again with its buffers");
+  }
+  const auto length = buffer["byteLength"].get<std::uint64_t>();
+  if (bytes.size() < length) {
+    context.fail(where, fmt::format("must have {} bytes, but there are {}", length, bytes.size()),
+                 "the file is cut off or belongs to another scene");
+  }
+  return bytes.first(length);
 }
 
 std::span<const std::byte> GltfBuffers::range(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
@@ -225,14 +226,23 @@ bool is_unsigned(int component_type) {
 
 GltfData::GltfData(const tinygltf::Model& model, const GltfBuffers& buffers, GltfContext& context)
     : model_(&model), buffers_(&buffers), context_(&context) {
-  for (std::size_t i = 0; i < model.bufferViews.size(); ++i) check_view(i);
-  for (std::size_t i = 0; i < model.accessors.size(); ++i) check_accessor(i);
+  for (std::size_t i = 0; i < model.bufferViews.size(); ++i) {
+    // One warning of a buffer that could not be loaded is enough.
+    const std::size_t buffer = to_size(model.bufferViews[i].buffer);
+    if (buffer >= buffers.size() || buffers[buffer].empty()) continue;
+    context.check_entry("bufferViews", i, [&] { check_view(i); });
+  }
+  for (std::size_t i = 0; i < model.accessors.size(); ++i) {
+    context.check_entry("accessors", i, [&] { check_accessor(i); });
+  }
 }
 
 void GltfData::check_view(std::size_t index) const {
   const tinygltf::BufferView& view = model_->bufferViews[index];
-  (void)buffers_->range(to_size(view.buffer), view.byteOffset, view.byteLength, fmt::format("bufferViews[{}]", index),
-                        *context_);
+  const std::size_t buffer = to_size(view.buffer);
+  const std::string where = fmt::format("bufferViews[{}]", index);
+  if (buffer >= buffers_->size()) context_->fail(where, fmt::format("there is no buffer {}", view.buffer));
+  (void)buffers_->range(buffer, view.byteOffset, view.byteLength, where, *context_);
 }
 
 void GltfData::check_accessor(std::size_t index) const {
@@ -289,6 +299,7 @@ void GltfData::check_sparse(const tinygltf::Accessor& accessor, const std::strin
 }
 
 std::span<const std::byte> GltfData::view(int index) const {
+  if (!context_->is_used("bufferViews", to_size(index))) check_view(to_size(index));  // it may be wrong
   const tinygltf::BufferView& view = model_->bufferViews[to_size(index)];
   return (*buffers_)[to_size(view.buffer)].subspan(view.byteOffset, view.byteLength);
 }
@@ -318,6 +329,7 @@ std::vector<std::uint32_t> GltfData::sparse_targets(int index) const {
 }
 
 void GltfData::read_floats(int index, float* out, std::size_t width) const {
+  HPR_CHECK(context_->is_used("accessors", to_size(index)));
   const tinygltf::Accessor& from = accessor(index);
   const Shape shape = shape_of(from.type);
   HPR_CHECK(shape.columns * shape.rows == width);
@@ -338,6 +350,7 @@ void GltfData::read_floats(int index, float* out, std::size_t width) const {
 }
 
 std::vector<std::uint32_t> GltfData::integers(int index) const {
+  HPR_CHECK(context_->is_used("accessors", to_size(index)));
   const tinygltf::Accessor& from = accessor(index);
   HPR_CHECK(is_unsigned(from.componentType));
   const std::size_t width = shape_of(from.type).rows;

@@ -26,8 +26,9 @@ class GltfBuffers {
   /// `parts` must outlive this.
   GltfBuffers(std::filesystem::path folder, const GltfParts& parts) : folder_(std::move(folder)), parts_(&parts) {}
 
-  /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength. One that only
-  /// stands in for compressed views (EXT_meshopt_compression) and that nothing reads stays empty. Throws Error.
+  /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength, but for those that
+  /// cannot be loaded and are not used, and one that only stands in for compressed views (EXT_meshopt_compression) and
+  /// that nothing reads: they are empty. Throws Error.
   void load(const Json& root, GltfContext& context);
 
   /// Adds a buffer that the document does not have; returns its index.
@@ -44,6 +45,8 @@ class GltfBuffers {
                                                GltfContext& context) const;
 
  private:
+  [[nodiscard]] std::span<const std::byte> load_buffer(const Json& buffer, std::size_t index, GltfContext& context);
+
   std::filesystem::path folder_;
   const GltfParts* parts_;
   std::vector<std::vector<std::byte>> owned_;
@@ -54,7 +57,7 @@ class GltfBuffers {
 /// (check_shape); the constructor checks every range of bytes, so that reading cannot leave a buffer.
 class GltfData {
  public:
-  /// All three must outlive this. Throws Error (BadInput) for a view or accessor that leaves what holds it.
+  /// All three must outlive this. Throws Error (BadInput) for a view or accessor that leaves what holds it and is used.
   GltfData(const tinygltf::Model& model, const GltfBuffers& buffers, GltfContext& context);
 
   [[nodiscard]] const tinygltf::Model& model() const { return *model_; }

@@ -34,6 +34,14 @@ void GltfContext::warn_not_finite(std::string_view where, std::uint64_t count, s
   warn(where, fmt::format("{} values are no finite numbers, the first at vertex {}; replaced", count, first_vertex));
 }
 
+void GltfContext::warn_unused(const Error& error) {
+  const ExitCode code = error.code();
+  if (code != ExitCode::BadInput && code != ExitCode::Io && code != ExitCode::Limit) throw;
+  std::string_view what = error.what();
+  if (const std::string prefix = name_ + ": "; what.starts_with(prefix)) what.remove_prefix(prefix.size());
+  warn("", fmt::format("{}; the scene does not use it", what));
+}
+
 void GltfContext::check_room(std::uint64_t bytes, std::string_view what) const {
   if (bytes > memory_left()) {
     fail("", fmt::format("{} would take the scene past the memory limit of {} bytes", what, limits_.memory_bytes),
@@ -58,8 +66,9 @@ std::string shown(const Json& value) {
   return printable(value.dump_ascii(), 40);
 }
 
-/// A whole number as JSON may write it, 3.0 included; none for anything else.
-std::optional<std::int64_t> whole_value(const Json& value) {
+}  // namespace
+
+std::optional<std::int64_t> whole_number(const Json& value) {
   if (value.is_unsigned()) {
     const auto number = value.get<std::uint64_t>();
     if (number > GltfItem::kMaxWhole) return std::nullopt;
@@ -71,8 +80,6 @@ std::optional<std::int64_t> whole_value(const Json& value) {
   if (std::abs(number) > static_cast<double>(GltfItem::kMaxWhole) || number != std::floor(number)) return std::nullopt;
   return static_cast<std::int64_t>(number);
 }
-
-}  // namespace
 
 std::string GltfItem::path() const {
   if (parent_ == nullptr) return {};
@@ -111,6 +118,20 @@ GltfItem GltfItem::element(const char* key, std::size_t position) const {
   return item;
 }
 
+Json GltfItem::stand_in(std::string_view section) {
+  if (section == "buffers") return {{"byteLength", 1}, {"uri", "data:,0"}};
+  if (section == "bufferViews") return {{"buffer", 0}, {"byteLength", 1}};
+  if (section == "accessors") return {{"componentType", 5121}, {"count", 1}, {"type", "SCALAR"}};
+  if (section == "meshes") return {{"primitives", Json::array()}};
+  if (section == "skins") return {{"joints", Json::array()}};
+  if (section == "animations") return {{"channels", Json::array()}, {"samplers", Json::array()}};
+  if (section == "lights") return {{"type", "point"}};
+  if (section == "cameras") {
+    return {{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 1.0}}}};
+  }
+  return Json::object();
+}
+
 std::optional<GltfItem> GltfItem::object(const char* key, Presence presence) const {
   Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
@@ -136,7 +157,7 @@ std::optional<std::uint64_t> GltfItem::whole(const char* key, Presence presence,
                                              std::uint64_t high) const {
   Json* const value = find(key, presence);
   if (value == nullptr) return std::nullopt;
-  const auto number = whole_value(*value);
+  const auto number = whole_number(*value);
   if (!number || *number < 0 || static_cast<std::uint64_t>(*number) < low ||
       static_cast<std::uint64_t>(*number) > high) {
     fail(key, fmt::format("must be a whole number from {} to {}, not {}", low, high, shown(*value)));
@@ -146,7 +167,7 @@ std::optional<std::uint64_t> GltfItem::whole(const char* key, Presence presence,
 }
 
 void GltfItem::check_index(Json& value, std::string_view where, std::size_t count) const {
-  const auto number = whole_value(value);
+  const auto number = whole_number(value);
   if (!number || *number < 0) fail(where, fmt::format("must be an index, not {}", shown(value)));
   if (static_cast<std::uint64_t>(*number) >= count) {
     fail(where, fmt::format("is {}, but there are only {}", *number, count));
@@ -166,12 +187,15 @@ std::optional<std::size_t> GltfItem::index(const char* key, const char* section,
 }
 
 std::size_t GltfItem::indices(const char* key, const char* section, Presence presence) const {
+  return indices_below(key, section_size(section), presence);
+}
+
+std::size_t GltfItem::indices_below(const char* key, std::size_t count, Presence presence) const {
   Json* const list = array(key, presence);
   if (list == nullptr) return 0;
-  const std::size_t count = section_size(section);
   for (std::size_t i = 0; i < list->size(); ++i) {
     Json& value = (*list)[i];
-    const auto number = whole_value(value);
+    const auto number = whole_number(value);
     if (!number || *number < 0 || static_cast<std::uint64_t>(*number) >= count) {
       check_index(value, fmt::format("{}[{}]", key, i), count);
     }

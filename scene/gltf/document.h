@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/json.h"
+#include "scene/gltf/usage.h"
 #include "scene/load_scene.h"
 
 namespace hpr {
@@ -39,6 +40,28 @@ class GltfContext {
   /// The number of all values that warn_not_finite counted.
   [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
 
+  /// From here on, what `usage` does not contain may be wrong. Before, everything counts as used.
+  void set_usage(GltfUsage usage) { usage_ = std::move(usage); }
+  [[nodiscard]] bool is_used(std::string_view section, std::size_t entry) const {
+    return !usage_ || usage_->contains(section, entry);
+  }
+  /// Runs `check`, which looks at one entry of a section and throws Error where it is wrong; of an entry that is not
+  /// used that becomes a warning. Returns whether the entry is right.
+  template <typename Check>
+  bool check_entry(std::string_view section, std::size_t entry, const Check& check) {
+    if (is_used(section, entry)) {
+      check();
+      return true;
+    }
+    try {
+      check();
+      return true;
+    } catch (const Error& error) {
+      warn_unused(error);
+      return false;
+    }
+  }
+
   /// Counts `bytes` that are about to be allocated for `what`; throws Error (Limit) past limits().memory_bytes.
   void charge(std::uint64_t bytes, std::string_view what);
   /// Throws Error (Limit) as charge() does, for memory that is soon released: it is not counted.
@@ -48,14 +71,20 @@ class GltfContext {
   [[nodiscard]] std::vector<std::string> take_warnings();
 
  private:
+  void warn_unused(const Error& error);
+
   std::string name_;
   SceneLimits limits_;
+  std::optional<GltfUsage> usage_;
   std::vector<std::string> warnings_;
   std::unordered_set<std::string> seen_;
   std::uint64_t dropped_ = 0;
   std::uint64_t charged_ = 0;
   std::uint64_t not_finite_ = 0;
 };
+
+/// A whole number as JSON may write it, 3.0 included, of up to 53 bits; none for anything else.
+[[nodiscard]] std::optional<std::int64_t> whole_number(const Json& value);
 
 enum class Presence { Optional, Required };
 
@@ -88,6 +117,17 @@ class GltfItem {
     return list->size();
   }
 
+  /// each() for a section of the document, see GltfContext::check_entry: in place of an entry that is wrong and not
+  /// used stands one that does no harm.
+  template <typename Body>
+  void each_entry(const char* section, Presence presence, const Body& body) const {
+    Json* const list = array(section, presence);
+    if (list == nullptr) return;
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      if (!context_->check_entry(section, i, [&] { body(element(section, i)); })) (*list)[i] = stand_in(section);
+    }
+  }
+
   std::optional<std::string> text(const char* key, Presence presence = Presence::Optional) const;
   std::optional<bool> flag(const char* key) const;
   /// A whole number in [low, high]; 3.0 counts as 3 and is rewritten so, because stricter readers follow.
@@ -96,8 +136,9 @@ class GltfItem {
   /// An index into the top-level array `section`, or into `count` entries.
   std::optional<std::size_t> index(const char* key, const char* section, Presence presence = Presence::Optional) const;
   std::optional<std::size_t> index_below(const char* key, std::size_t count, Presence presence) const;
-  /// An array of indices into `section`; returns how many.
+  /// An array of indices into `section`, or into `count` entries; returns how many.
   std::size_t indices(const char* key, const char* section, Presence presence = Presence::Optional) const;
+  std::size_t indices_below(const char* key, std::size_t count, Presence presence) const;
   /// An object whose values are all indices into `section`.
   std::size_t index_map(const char* key, const char* section, Presence presence) const;
   /// A number in [low, high].
@@ -120,6 +161,7 @@ class GltfItem {
   [[nodiscard]] Json* find(const char* key, Presence presence) const;
   [[nodiscard]] Json* array(const char* key, Presence presence) const;
   [[nodiscard]] GltfItem element(const char* key, std::size_t position) const;
+  [[nodiscard]] static Json stand_in(std::string_view section);
   void check_index(Json& value, std::string_view where, std::size_t count) const;
   bool clamp_value(Json& value, double low, double high) const;
 
@@ -137,9 +179,10 @@ class GltfItem {
 [[nodiscard]] Json parse_json(std::string_view text, const GltfContext& context);
 
 /// Checks the shape of a glTF document before the model is built from it: the types of all members HPR reads, required
-/// ones, and that every index points into its section. Values of materials and lights outside of what the
-/// specification allows are brought inside, with a warning. What depends on several members (ranges of bytes, the
-/// node hierarchy) is checked on the model, see accessors.h, mesh.h and loader.cpp. Throws Error (BadInput).
+/// ones, and that every index points into its section. Entries that are wrong and not used are replaced. Values of
+/// materials and lights outside of what the specification allows are brought inside, with a warning. What depends on
+/// several members (ranges of bytes, the node hierarchy) is checked on the model, see accessors.h, mesh.h and
+/// loader.cpp. Throws Error (BadInput).
 void check_shape(Json& root, GltfContext& context);
 
 /// Refuses documents that require extensions HPR does not have, by name, and warns once of each one it ignores.

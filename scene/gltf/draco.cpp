@@ -335,6 +335,7 @@ void decode_draco_primitives(Json& root, GltfBuffers& buffers, GltfContext& cont
   if (meshes == nullptr) return;
   std::map<std::size_t, std::vector<CompressedPrimitive>> views;
   for (std::size_t m = 0; m < meshes->size(); ++m) {
+    if (!context.is_used("meshes", m)) continue;
     Json& primitives = (*meshes)[m]["primitives"];
     for (std::size_t p = 0; p < primitives.size(); ++p) {
       Json& primitive = primitives[p];

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <string>
@@ -20,6 +21,7 @@
 #include "scene/gltf/materials.h"
 #include "scene/gltf/mesh.h"
 #include "scene/gltf/scan.h"
+#include "scene/gltf/selection.h"
 #include "scene/gltf/uri.h"
 
 namespace hpr {
@@ -28,6 +30,7 @@ namespace {
 /// Where the nodes stand.
 struct GltfNodes {
   std::vector<glm::dmat4> to_world;  ///< of every node, also of those outside the scene
+  std::vector<bool> hidden;          ///< of every node: KHR_node_visibility, its own or an ancestor's
   std::vector<int> drawn;            ///< nodes of the active scene, parents first
 };
 
@@ -83,35 +86,57 @@ glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where, Gl
   return from_parts(vector(node.translation, 0.0), rotation, vector(node.scale, 1.0));
 }
 
-/// The one parent of every node, -1 for roots.
-std::vector<int> parents_of(const std::vector<tinygltf::Node>& nodes, const GltfContext& context) {
+/// A node's transform to the world, its last row made exact. Throws Error where it overflows.
+glm::dmat4 checked_affine(glm::dmat4 matrix, const std::string& where, const GltfContext& context) {
+  if (!all_finite(matrix)) context.fail(where, "its transform overflows");
+  for (int column = 0; column < 4; ++column) matrix[column][3] = column == 3 ? 1.0 : 0.0;
+  return matrix;
+}
+
+/// The one parent of every node, -1 for roots. Nodes that are used get theirs before others claim them.
+std::vector<int> parents_of(const std::vector<tinygltf::Node>& nodes, GltfContext& context) {
   std::vector<int> parents(nodes.size(), -1);
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    for (const int child : nodes[i].children) {
+  const auto adopt = [&](std::size_t node) {
+    for (const int child : nodes[node].children) {
       int& parent = parents[GltfData::to_size(child)];
       if (parent >= 0) {
-        context.fail(node_path(i) + ".children", fmt::format("node {} is already a child of node {}", child, parent));
+        context.fail(node_path(node) + ".children",
+                     fmt::format("node {} is already a child of node {}", child, parent));
       }
-      parent = static_cast<int>(i);
+      parent = static_cast<int>(node);
+    }
+  };
+  for (const bool used : {true, false}) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (context.is_used("nodes", i) == used) context.check_entry("nodes", i, [&] { adopt(i); });
     }
   }
   return parents;
 }
 
-/// All nodes below `roots`, parents first, in the order of the document.
-std::vector<int> descend(const std::vector<tinygltf::Node>& nodes, const std::vector<int>& roots) {
+/// All nodes at and below `roots`, each once, parents first where no root is another's descendant, in the order of the
+/// document.
+std::vector<int> descend(const std::vector<tinygltf::Node>& nodes, const std::vector<int>& parents,
+                         const std::vector<int>& roots) {
   std::vector<int> order;
+  std::vector<bool> reached(nodes.size(), false);
   std::vector<int> open(roots.rbegin(), roots.rend());
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
+    if (reached[GltfData::to_size(node)]) continue;
+    reached[GltfData::to_size(node)] = true;
     order.push_back(node);
-    const auto& children = nodes[GltfData::to_size(node)].children;
-    open.insert(open.end(), children.rbegin(), children.rend());
+    std::vector<int> below;
+    std::ranges::copy_if(nodes[GltfData::to_size(node)].children, std::back_inserter(below),
+                         [&](int child) { return parents[GltfData::to_size(child)] == node; });
+    open.insert(open.end(), below.rbegin(), below.rend());
   }
   return order;
 }
 
+/// The nodes of the drawn scene from which its others descend. A node that is another's child stands where that puts it
+/// (glTF 2.0, section 3.5.3), also where the scene names it as a root.
 std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& parents, const std::vector<int>& roots) {
   const tinygltf::Model& model = data.model();
   if (model.scenes.empty()) {
@@ -121,15 +146,37 @@ std::vector<int> scene_roots(const GltfData& data, const std::vector<int>& paren
   const std::size_t active = model.defaultScene >= 0 ? GltfData::to_size(model.defaultScene) : 0;
   const std::string where = fmt::format("scenes[{}].nodes", active);
   std::vector<bool> seen(model.nodes.size(), false);
-  for (const int node : model.scenes[active].nodes) {
+  std::vector<int> named = model.scenes[active].nodes;
+  for (const int node : named) {
     const std::size_t i = GltfData::to_size(node);
-    if (seen[i]) data.context().fail(where, fmt::format("names node {} twice", node));
+    if (seen[i]) data.context().warn(where, fmt::format("names node {} twice; it is drawn once", node));
     if (parents[i] >= 0) {
-      data.context().fail(where, fmt::format("node {} is a child of node {}, not a root", node, parents[i]));
+      data.context().warn(
+          where,
+          fmt::format("node {} is a child of node {}, not a root; it is drawn once, as that child", node, parents[i]));
     }
     seen[i] = true;
   }
-  return model.scenes[active].nodes;
+  // Those that descend from others come last, when they have been reached already.
+  std::stable_partition(named.begin(), named.end(), [&](int node) { return parents[GltfData::to_size(node)] < 0; });
+  return named;
+}
+
+/// Refuses nodes that are used and lie on or below a cycle: with at most one parent each, those that no root reaches.
+/// Descent from a used node makes all nodes of a cycle used.
+void check_cycles(GltfContext& context, std::size_t nodes, const std::vector<int>& order) {
+  if (order.size() == nodes) return;
+  std::vector<bool> reached(nodes, false);
+  for (const int node : order) reached[GltfData::to_size(node)] = true;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (reached[i]) continue;
+    context.check_entry("nodes", i, [&] { context.fail(node_path(i), "is its own ancestor"); });
+  }
+}
+
+bool is_hidden(const tinygltf::Node& node) {
+  const auto found = node.extensions.find("KHR_node_visibility");
+  return found != node.extensions.end() && found->second.Has("visible") && !found->second.Get("visible").Get<bool>();
 }
 
 /// How many instances the attributes of EXT_mesh_gpu_instancing describe.
@@ -143,9 +190,9 @@ std::size_t instance_count(const GltfData& data, const tinygltf::Value& attribut
   return count;
 }
 
-/// Checks that nodes form trees (no node twice, no cycle) and composes their transforms in double; without recursion,
-/// so that a chain may be as long as it likes. Throws Error (BadInput) also for projective matrices and transforms
-/// that overflow.
+/// Checks that nodes that are used form trees (no node twice, no cycle) and composes their transforms in double;
+/// without recursion, so that a chain may be as long as it likes. Throws Error (BadInput) also for projective matrices
+/// and transforms that overflow.
 GltfNodes place_nodes(const GltfData& data) {
   const auto& nodes = data.model().nodes;
   data.context().charge(nodes.size() * (sizeof(glm::dmat4) + 4 * sizeof(int)), "the nodes");
@@ -154,27 +201,23 @@ GltfNodes place_nodes(const GltfData& data) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (parents[i] < 0) roots.push_back(static_cast<int>(i));
   }
-  // With at most one parent each, nodes that no root reaches can only lie on or below a cycle.
-  const std::vector<int> order = descend(nodes, roots);
-  if (order.size() != nodes.size()) {
-    std::vector<bool> reached(nodes.size(), false);
-    for (const int node : order) reached[GltfData::to_size(node)] = true;
-    const auto missing = std::ranges::find(reached, false) - reached.begin();
-    data.context().fail(node_path(static_cast<std::size_t>(missing)), "is its own ancestor");
-  }
+  const std::vector<int> order = descend(nodes, parents, roots);
+  check_cycles(data.context(), nodes.size(), order);
 
   GltfNodes placed;
   placed.to_world.assign(nodes.size(), glm::dmat4(1.0));
+  placed.hidden.assign(nodes.size(), false);
   for (const int node : order) {
     const std::size_t i = GltfData::to_size(node);
-    const std::string where = node_path(i);
-    glm::dmat4 matrix = local_matrix(nodes[i], where, data.context());
-    if (parents[i] >= 0) matrix = placed.to_world[GltfData::to_size(parents[i])] * matrix;
-    if (!all_finite(matrix)) data.context().fail(where, "its transform overflows");
-    for (int column = 0; column < 4; ++column) matrix[column][3] = column == 3 ? 1.0 : 0.0;
-    placed.to_world[i] = matrix;
+    placed.hidden[i] = is_hidden(nodes[i]) || (parents[i] >= 0 && placed.hidden[GltfData::to_size(parents[i])]);
+    data.context().check_entry("nodes", i, [&] {
+      const std::string where = node_path(i);
+      const glm::dmat4 local = local_matrix(nodes[i], where, data.context());
+      placed.to_world[i] = checked_affine(
+          parents[i] >= 0 ? placed.to_world[GltfData::to_size(parents[i])] * local : local, where, data.context());
+    });
   }
-  placed.drawn = descend(nodes, scene_roots(data, parents, roots));
+  placed.drawn = descend(nodes, parents, scene_roots(data, parents, roots));
   return placed;
 }
 
@@ -220,10 +263,11 @@ std::vector<glm::dmat4> gpu_instances(const GltfData& data, int node) {
 }
 
 /// tinygltf's model of the document, without its buffers and pictures: those are read by us alone, so that the library
-/// never opens a file or decodes anything.
+/// never opens a file or decodes anything. Nor does it get animations, which are not played.
 tinygltf::Model parse_model(Json root, const GltfContext& context) {
   root.erase("buffers");
   root.erase("images");
+  root.erase("animations");
   // tinygltf refuses indices without a bufferView (zeros, or sparse ones); it does not get to see any.
   std::vector<int> indices;
   if (Json* const meshes = root.find("meshes")) {
@@ -297,11 +341,12 @@ class SceneBuilder {
   void add_node(int node) {
     const tinygltf::Node& from = data_.model().nodes[GltfData::to_size(node)];
     const glm::dmat4& to_world = nodes_.to_world[GltfData::to_size(node)];
-    if (auto light = light_of(data_, node, to_world)) scene_.lights.push_back(*std::move(light));
     if (auto camera = camera_of(data_, node, to_world)) {
       if (camera->name.empty()) camera->name = fmt::format("camera{}", scene_.cameras.size());
       scene_.cameras.push_back(*std::move(camera));
     }
+    if (nodes_.hidden[GltfData::to_size(node)]) return;
+    if (auto light = light_of(data_, node, to_world)) scene_.lights.push_back(*std::move(light));
     if (from.mesh < 0) {
       if (from.skin >= 0) context().warn(fmt::format("nodes[{}]", node), "has a skin but no mesh");
       return;
@@ -346,6 +391,7 @@ class SceneBuilder {
     const auto known = meshes_.find(key);
     if (known != meshes_.end()) return known->second;
 
+    check_weights(node, from);
     const GltfPose pose{own_weights ? node.weights : from.weights, joints_of(node.skin)};
     std::vector<std::uint32_t> made;
     for (std::size_t p = 0; p < from.primitives.size(); ++p) {
@@ -359,6 +405,14 @@ class SceneBuilder {
       scene_.meshes.push_back(*std::move(mesh));
     }
     return meshes_.emplace(std::move(key), std::move(made)).first->second;
+  }
+
+  void check_weights(const tinygltf::Node& node, const tinygltf::Mesh& mesh) const {
+    if (node.weights.empty() || mesh.primitives.empty()) return;
+    const std::size_t targets = mesh.primitives.front().targets.size();
+    if (node.weights.size() == targets) return;
+    context().warn(fmt::format("nodes[{}].weights", &node - data_.model().nodes.data()),
+                   fmt::format("{} weights for {} morph targets", node.weights.size(), targets));
   }
 
   /// Every joint's way from the mesh to the world.
@@ -395,20 +449,17 @@ class SceneBuilder {
   std::size_t singular_ = 0;
 };
 
-void check_skins(const GltfData& data) {
-  const auto& skins = data.model().skins;
-  for (std::size_t i = 0; i < skins.size(); ++i) {
-    const int matrices = skins[i].inverseBindMatrices;
-    if (matrices < 0) continue;
-    const std::string where = fmt::format("skins[{}].inverseBindMatrices", i);
-    data.require_type(matrices, {TINYGLTF_TYPE_MAT4}, where);
-    if (data.accessor(matrices).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) {
-      data.context().fail(where, "must be floats");
-    }
-    if (data.count(matrices) < skins[i].joints.size()) {
-      data.context().fail(where,
-                          fmt::format("{} matrices for {} joints", data.count(matrices), skins[i].joints.size()));
-    }
+void check_skin(const GltfData& data, std::size_t index) {
+  const tinygltf::Skin& skin = data.model().skins[index];
+  const int matrices = skin.inverseBindMatrices;
+  if (matrices < 0) return;
+  const std::string where = fmt::format("skins[{}].inverseBindMatrices", index);
+  data.require_type(matrices, {TINYGLTF_TYPE_MAT4}, where);
+  if (data.accessor(matrices).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) {
+    data.context().fail(where, "must be floats");
+  }
+  if (data.count(matrices) < skin.joints.size()) {
+    data.context().fail(where, fmt::format("{} matrices for {} joints", data.count(matrices), skin.joints.size()));
   }
 }
 
@@ -440,26 +491,41 @@ std::vector<std::filesystem::path> files_beside(const std::filesystem::path& pat
 
 }  // namespace
 
-Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits) {
+Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice) {
   GltfContext context(path.string(), limits);
   const GltfFile file = open_gltf(path, context);
   Json root = parse_json(file.parts.json, context);
   if (!root.is_object()) context.fail("", "this is no glTF: the JSON is not an object");
   check_extensions(root, context);
+  const std::size_t drawn = find_scene(root, choice.scene, context);
+  if (!choice.scene.empty()) root["scene"] = drawn;
+  apply_variant(root, choice.variant, context);
+  context.set_usage(usage_of(root, drawn));
   check_shape(root, context);
+  if (const std::size_t animations = root["animations"].size(); animations > 0) {
+    context.warn(
+        "animations",
+        fmt::format("the file has {}; they are not played, things stand where its nodes put them", animations));
+  }
+
+  Scene scene;
+  scene.name = path.stem().string();
+  scene.scenes = scene_names(root);
+  scene.variants = variant_names(root);
 
   GltfBuffers buffers(path.parent_path(), file.parts);
   buffers.load(root, context);
   decode_meshopt_views(root, buffers, context);
   decode_draco_primitives(root, buffers, context);
+  context.set_usage(usage_of(root, drawn));  // with what decoding added
   const Json images = root.contains("images") ? std::move(root["images"]) : Json();
   const tinygltf::Model model = parse_model(std::move(root), context);
   const GltfData data(model, buffers, context);
   check_meshes(data);
-  check_skins(data);
+  for (std::size_t i = 0; i < model.skins.size(); ++i) {
+    context.check_entry("skins", i, [&] { check_skin(data, i); });
+  }
 
-  Scene scene;
-  scene.name = path.stem().string();
   GltfMaterials(data, buffers, images).build(scene);
   SceneBuilder(data, scene).build();
   scene.warnings = context.take_warnings();

@@ -235,6 +235,44 @@ TEST(GltfLoader, MorphTargetsMoveVerticesByTheNodesWeights) {
   EXPECT_EQ(load(document.json).meshes[0].positions[0], glm::vec3(0, 0, 2));
 }
 
+TEST(GltfLoader, PrimitivesOfAMeshThatDifferInMorphTargetsAreWarnedOf) {
+  auto document = triangle();
+  const int target = document.add_vec3({0, 0, 1, 0, 0, 1, 0, 0, 1});
+  document.json["meshes"][0]["primitives"].push_back(document.primitive());
+  document.json["meshes"][0]["primitives"][0]["targets"] =
+      Json::array({{{"POSITION", target}}, {{"POSITION", target}}});
+  document.json["meshes"][0]["primitives"][1]["targets"] = Json::array({{{"POSITION", target}}});
+  document.node()["weights"] = Json::array({1, 1});
+  const Scene scene = load(document.json);
+  EXPECT_TRUE(test::warns_of(scene, "meshes[0].primitives: some have 2 morph targets, others 1"));
+  EXPECT_EQ(scene.meshes.at(0).positions.at(0), glm::vec3(0, 0, 2));
+  EXPECT_EQ(scene.meshes.at(1).positions.at(0), glm::vec3(0, 0, 1));
+}
+
+TEST(GltfLoader, WeightsOfANodeThatAreNotAsManyAsTargetsAreWarnedOf) {
+  auto document = triangle();
+  document.node()["weights"] = Json::array({1});
+  EXPECT_TRUE(test::warns_of(load(document.json), "nodes[0].weights: 1 weights for 0 morph targets"));
+  const int target = document.add_vec3({0, 0, 1, 0, 0, 1, 0, 0, 1});
+  document.primitive()["targets"] = Json::array({{{"POSITION", target}}});
+  EXPECT_TRUE(load(document.json).warnings.empty());
+}
+
+TEST(GltfLoader, AnimationsAreWarnedOfOnce) {
+  auto document = triangle();
+  const int times = document.add(std::vector<float>{0, 1}, "SCALAR", 5126, 2);
+  const int positions = document.add_vec3({0, 0, 0, 5, 0, 0});
+  document.json["animations"] = Json::array(
+      {{{"samplers", Json::array({{{"input", times}, {"output", positions}}})},
+        {"channels", Json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}})}}});
+  document.json["animations"].push_back(document.json["animations"][0]);
+  const Scene scene = load(document.json);
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_TRUE(test::warns_of(scene, "animations: the file has 2"));
+  document.json["animations"] = Json::array();
+  EXPECT_TRUE(load(document.json).warnings.empty());
+}
+
 TEST(GltfLoader, MorphTargetsMoveColoursAndTextureCoordinatesToo) {
   auto document = triangle();
   auto& attributes = document.primitive()["attributes"];

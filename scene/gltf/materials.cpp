@@ -72,7 +72,9 @@ void GltfMaterials::build(Scene& scene) {
   const auto& materials = data_.model().materials;
   data_.context().charge(materials.size() * sizeof(Material), "the materials");
   for (std::size_t i = 0; i < materials.size(); ++i) {
-    scene.materials.push_back(material(materials[i], fmt::format("materials[{}]", i), scene));
+    scene.materials.emplace_back().name = materials[i].name;
+    data_.context().check_entry(
+        "materials", i, [&] { scene.materials[i] = material(materials[i], fmt::format("materials[{}]", i), scene); });
   }
 }
 

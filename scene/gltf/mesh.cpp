@@ -150,21 +150,32 @@ class PrimitiveCheck {
   bool quantized_ = false;
 };
 
+void check_mesh(const GltfData& data, std::size_t index) {
+  const tinygltf::Mesh& mesh = data.model().meshes[index];
+  std::size_t targets = 0;
+  std::size_t min_targets = std::numeric_limits<std::size_t>::max();
+  for (std::size_t p = 0; p < mesh.primitives.size(); ++p) {
+    PrimitiveCheck(data, mesh.primitives[p], fmt::format("meshes[{}].primitives[{}]", index, p)).run();
+    targets = std::max(targets, mesh.primitives[p].targets.size());
+    min_targets = std::min(min_targets, mesh.primitives[p].targets.size());
+  }
+  if (min_targets < targets) {
+    data.context().warn(fmt::format("meshes[{}].primitives", index),
+                        fmt::format("some have {} morph targets, others {}; those that are missing move nothing",
+                                    targets, min_targets));
+  }
+  if (!mesh.weights.empty() && mesh.weights.size() != targets) {
+    data.context().warn(fmt::format("meshes[{}].weights", index),
+                        fmt::format("{} weights for {} morph targets", mesh.weights.size(), targets));
+  }
+}
+
 }  // namespace
 
 void check_meshes(const GltfData& data) {
   const auto& meshes = data.model().meshes;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
-    std::size_t targets = 0;
-    for (std::size_t p = 0; p < meshes[m].primitives.size(); ++p) {
-      const tinygltf::Primitive& primitive = meshes[m].primitives[p];
-      PrimitiveCheck(data, primitive, fmt::format("meshes[{}].primitives[{}]", m, p)).run();
-      targets = std::max(targets, primitive.targets.size());
-    }
-    if (!meshes[m].weights.empty() && meshes[m].weights.size() != targets) {
-      data.context().warn(fmt::format("meshes[{}].weights", m),
-                          fmt::format("{} weights for {} morph targets", meshes[m].weights.size(), targets));
-    }
+    data.context().check_entry("meshes", m, [&] { check_mesh(data, m); });
   }
 }
 
@@ -365,35 +376,55 @@ class PrimitiveBuilder {
     add(data_.vec3s(index), mesh.colors);
   }
 
+  /// Four of the joints that move each vertex, and their weights: JOINTS_n and WEIGHTS_n.
+  struct JointSet {
+    std::vector<std::uint32_t> joints;  ///< four per vertex
+    std::vector<glm::vec4> weights;
+  };
+
+  [[nodiscard]] std::vector<JointSet> read_joint_sets() const {
+    std::vector<JointSet> sets;
+    for (;;) {
+      const auto joints = primitive_.attributes.find(fmt::format("JOINTS_{}", sets.size()));
+      const auto weights = primitive_.attributes.find(fmt::format("WEIGHTS_{}", sets.size()));
+      const bool has_joints = joints != primitive_.attributes.end();
+      const bool has_weights = weights != primitive_.attributes.end();
+      if (!has_joints || !has_weights) {
+        if (!sets.empty() && has_joints != has_weights) {
+          data_.context().warn(where_,
+                               fmt::format("has only one of JOINTS_{0} and WEIGHTS_{0}; left out", sets.size()));
+        }
+        return sets;
+      }
+      sets.push_back({data_.integers(joints->second), data_.vec4s(weights->second)});
+    }
+  }
+
   void skin(Mesh& mesh, const std::vector<glm::dmat4>& joints) const {
-    const auto indices = primitive_.attributes.find("JOINTS_0");
-    const auto weights = primitive_.attributes.find("WEIGHTS_0");
-    if (indices == primitive_.attributes.end() || weights == primitive_.attributes.end()) {
+    std::vector<JointSet> sets = read_joint_sets();
+    if (sets.empty()) {
       data_.context().warn(where_, "has a skin, but not JOINTS_0 and WEIGHTS_0; drawn by its first joint");
-      const std::vector<std::uint32_t> first(mesh.positions.size() * 4, 0);
-      return bend(mesh, joints, first, std::vector(mesh.positions.size(), glm::vec4(1.0F, 0.0F, 0.0F, 0.0F)));
+      sets.push_back({std::vector<std::uint32_t>(mesh.positions.size() * 4, 0),
+                      std::vector(mesh.positions.size(), glm::vec4(1.0F, 0.0F, 0.0F, 0.0F))});
     }
-    if (primitive_.attributes.contains("JOINTS_1")) {
-      data_.context().warn(where_, "joints past the fourth of a vertex are ignored");
-    }
-    bend(mesh, joints, data_.integers(indices->second), data_.vec4s(weights->second));
+    bend(mesh, joints, sets);
   }
 
   /// What a vertex's joints do to it; sets `odd` where its weights are of no use.
   [[nodiscard]] glm::dmat4 blend_of(std::size_t vertex, const std::vector<glm::dmat4>& joints,
-                                    const std::vector<std::uint32_t>& indices, const glm::vec4& weights,
-                                    bool& odd) const {
+                                    const std::vector<JointSet>& sets, bool& odd) const {
     glm::dmat4 blend(0.0);
     double sum = 0.0;
-    for (int k = 0; k < 4; ++k) {
-      const std::uint32_t joint = indices[4 * vertex + static_cast<std::size_t>(k)];
-      const double weight = weights[k];
+    for (std::size_t k = 0; k < 4 * sets.size(); ++k) {
+      const JointSet& set = sets[k / 4];
+      const std::uint32_t joint = set.joints[4 * vertex + k % 4];
+      const double weight = set.weights[vertex][static_cast<int>(k % 4)];
       if (!(weight > 0.0) || !std::isfinite(weight)) {
         odd = odd || weight != 0.0;
         continue;
       }
       if (joint >= joints.size()) {
-        data_.context().fail(where_ + ".attributes.JOINTS_0",
+        data_.context().fail(fmt::format("{}.attributes.JOINTS_{}", where_, k / 4),
                              fmt::format("vertex {} names joint {} of {}", vertex, joint, joints.size()));
       }
       blend += weight * joints[joint];
@@ -403,11 +434,10 @@ class PrimitiveBuilder {
     return sum > 0.0 ? blend / sum : joints[0];
   }
 
-  void bend(Mesh& mesh, const std::vector<glm::dmat4>& joints, const std::vector<std::uint32_t>& indices,
-            const std::vector<glm::vec4>& weights) const {
+  void bend(Mesh& mesh, const std::vector<glm::dmat4>& joints, const std::vector<JointSet>& sets) const {
     bool odd = false;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      const glm::dmat4 blend = blend_of(i, joints, indices, weights[i], odd);
+      const glm::dmat4 blend = blend_of(i, joints, sets, odd);
       mesh.positions[i] = glm::vec3(blend * glm::dvec4(mesh.positions[i], 1.0));
       if (!mesh.normals.empty()) {
         // The inverse transpose but for its scale, which also exists for singular matrices.
@@ -422,7 +452,7 @@ class PrimitiveBuilder {
         tangent = glm::vec4(glm::vec3(glm::dmat3(blend) * glm::dvec3(tangent)), tangent.w);
       }
     }
-    if (odd) data_.context().warn(where_ + ".attributes.WEIGHTS_0", "some vertices have no usable weights");
+    if (odd) data_.context().warn(where_, "some vertices have weights that are of no use");
     check_positions(mesh.positions);
   }
 

@@ -18,8 +18,8 @@ struct GltfPose {
   std::vector<glm::dmat4> joints;  ///< mesh -> world per joint of the skin; empty: no skin
 };
 
-/// Checks types, counts and names of the attributes, indices and morph targets of every mesh, drawn or not. Reads no
-/// vertex. Throws Error (BadInput).
+/// Checks types, counts and names of the attributes, indices and morph targets of every mesh. Reads no vertex. Throws
+/// Error (BadInput) for one that is used.
 void check_meshes(const GltfData& data);
 
 /// One primitive as triangles: strips and fans taken apart, morphed and skinned as `pose` says, with flat normals on

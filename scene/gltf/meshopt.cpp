@@ -139,7 +139,7 @@ void decode_meshopt_views(Json& root, GltfBuffers& buffers, GltfContext& context
   for (std::size_t i = 0; i < views->size(); ++i) {
     Json& view = (*views)[i];
     const Json& extension = std::as_const(view)["extensions"][kMeshopt];
-    if (!extension.is_object()) continue;
+    if (!extension.is_object() || !context.is_used("bufferViews", i)) continue;
     const std::string where = fmt::format("bufferViews[{}].{}", i, kMeshopt);
     const CompressedView described = describe(extension, buffers, where, context);
     if (const Json* const stride = view.find("byteStride"); stride && stride->get<std::size_t>() != described.stride) {

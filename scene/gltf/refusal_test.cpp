@@ -24,6 +24,20 @@ TEST(GltfRefusal, TheDocumentsTheseTestsBreakAreSound) {
   EXPECT_TRUE(test::load(triangle().json).warnings.empty());
 }
 
+TEST(GltfRefusal, VersionsThatNeedMoreThanGltf20AreRefused) {
+  for (const char* bad : {"2.1", "2.01", "2.10", "2.9", "3.0", "1.0"}) {
+    auto document = triangle();
+    document.json["asset"]["version"] = "2.1";
+    document.json["asset"]["minVersion"] = bad;
+    expect_refused(document.json, "asset.minVersion");
+  }
+  auto document = triangle();
+  document.json["asset"]["version"] = "2.1";
+  EXPECT_EQ(refusal(document.json).code, ExitCode::Done) << "readers of 2.0 read 2.1";
+  document.json["asset"]["minVersion"] = "2.0";
+  EXPECT_EQ(refusal(document.json).code, ExitCode::Done);
+}
+
 TEST(GltfRefusal, AccessorsThatLeaveTheirViewByOneByteAreRefused) {
   auto document = triangle();
   document.json["accessors"][0]["byteOffset"] = 1;
@@ -82,7 +96,10 @@ TEST(GltfRefusal, ReferencesToNothingAreRefused) {
 TEST(GltfRefusal, NodesFormTrees) {
   auto document = triangle();
   document.json["nodes"] = Json::parse(R"([{"mesh": 0}, {"children": [2]}, {"children": [1]}])");
+  document.json["scenes"][0]["nodes"] = Json::array({0, 1});
   expect_refused(document.json, "nodes[1]");
+  document.json["scenes"][0]["nodes"] = Json::array({0});
+  EXPECT_TRUE(test::warns_of(test::load(document.json), "nodes[1]: is its own ancestor"));
   document.json["nodes"] = Json::parse(R"([{"children": [0]}])");
   expect_refused(document.json, "nodes[0]");
   document.json["nodes"] = Json::parse(R"([{"children": [1, 2]}, {"children": [2]}, {"mesh": 0}])");

@@ -37,6 +37,14 @@ struct GlbChunk {
   std::span<const std::byte> body;
 };
 
+/// Whether `rest` starts with a chunk. What it starts with else would be ignored were it whole: chunks of types that
+/// glTF does not know are, and a file that was cut off is shorter than its header says.
+bool starts_chunk(std::span<const std::byte> rest) {
+  if (rest.size() < kChunkHeaderBytes) return false;
+  const std::uint32_t type = little_endian_32(rest, 4);
+  return type == kJsonChunk || type == kBinChunk || little_endian_32(rest, 0) <= rest.size() - kChunkHeaderBytes;
+}
+
 /// The chunk that starts `rest`, which becomes what follows it.
 GlbChunk take_chunk(std::span<const std::byte>& rest, const std::string& where, GltfContext& context) {
   if (rest.size() < kChunkHeaderBytes) context.fail(where, "its header is cut off", kDamaged);
@@ -52,21 +60,32 @@ GlbChunk take_chunk(std::span<const std::byte>& rest, const std::string& where, 
   return {type, body};
 }
 
-GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
+/// The chunks of a file as its header, which is checked, declares them.
+std::span<const std::byte> check_header(std::span<const std::byte> file, GltfContext& context) {
   if (file.size() < kHeaderBytes)
     context.fail("header", fmt::format("{} bytes are no binary glTF", file.size()), kDamaged);
   const std::uint32_t version = little_endian_32(file, 4);
   if (version != 2) context.fail("header", fmt::format("glTF version {}", version), "convert the scene to glTF 2.0");
   const std::uint32_t length = little_endian_32(file, 8);
-  if (length != file.size()) {
+  if (length < kHeaderBytes || length > file.size()) {
     context.fail("header", fmt::format("it tells of {} bytes, the file has {}", length, file.size()), kDamaged);
   }
+  if (length < file.size()) {
+    context.warn("header", fmt::format("{} bytes follow the {} it tells of; ignored", file.size() - length, length));
+  }
+  return file.first(length).subspan(kHeaderBytes);
+}
 
+GltfParts split_glb(std::span<const std::byte> file, GltfContext& context) {
   GltfParts parts;
   bool has_json = false;
-  std::span<const std::byte> rest = file.subspan(kHeaderBytes);
+  std::span<const std::byte> rest = check_header(file, context);
   for (int chunk = 0; !rest.empty(); ++chunk) {
     const std::string where = fmt::format("chunk {}", chunk);
+    if (chunk > 0 && !starts_chunk(rest)) {
+      context.warn(where, fmt::format("{} bytes that are no chunk; ignored", rest.size()));
+      break;
+    }
     const auto [type, body] = take_chunk(rest, where, context);
     if (chunk == 0) {
       if (type != kJsonChunk) context.fail(where, "the first chunk must be JSON", kDamaged);

@@ -22,7 +22,7 @@ struct GltfParts {
 inline constexpr int kGltfJsonDepth = 64;
 
 /// Tells text from binary glTF by the first bytes, checks the container (magic, version, lengths, order and bounds of
-/// chunks) and then the text. Throws Error (BadInput).
+/// chunks) and then the text. Bytes after the last chunk are warned of. Throws Error (BadInput).
 [[nodiscard]] GltfParts scan_gltf(std::span<const std::byte> file, GltfContext& context);
 
 /// A file's bytes and its parts, which may be parsed.

@@ -50,6 +50,30 @@ TEST(GltfScan, EveryPrefixOfABinaryFileIsRefused) {
   }
 }
 
+TEST(GltfScan, BytesAfterTheLastChunkAreWarnedOf) {
+  const std::string chunks = chunk(kJson, "{}  ") + chunk(kBin, "abcd");
+  const std::string whole = glb(chunks);
+  const std::string cut_chunk = word(1000) + word(7) + "unknown";
+  for (const std::string& trailing :
+       {std::string(1, '\0'), std::string("\n"), std::string("12345678"), whole, cut_chunk}) {
+    for (const std::string& file : {whole + trailing, glb(chunks + trailing)}) {
+      GltfContext context("x.glb", {});
+      const GltfParts parts = scan(file, context);
+      EXPECT_EQ(parts.json, "{}  ");
+      EXPECT_EQ(parts.binary.size(), 4U);
+      EXPECT_FALSE(context.take_warnings().empty()) << trailing.size() << " bytes";
+    }
+  }
+}
+
+TEST(GltfScan, AChunkOfDataThatIsCutOffIsRefusedWhateverTheHeaderSays) {
+  GltfContext context("x.glb", {});
+  const std::string file = glb(chunk(kJson, "{}  ") + word(8) + word(kBin) + "abcd");
+  EXPECT_THROW((void)scan(file, context), Error);
+  const std::string short_length = "glTF" + word(2) + word(11) + chunk(kJson, "{}  ");
+  EXPECT_THROW((void)scan(short_length, context), Error);
+}
+
 TEST(GltfScan, ChunkLengthsBeyondTheFileAreRefused) {
   for (const std::uint32_t length : {5U, 0x7FFFFFFFU, 0xFFFFFFF8U, 0xFFFFFFFFU}) {
     GltfContext context("x.glb", {});

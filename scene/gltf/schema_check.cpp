@@ -11,6 +11,7 @@
 
 #include "core/text.h"
 #include "scene/gltf/document.h"
+#include "scene/gltf/selection.h"
 
 namespace hpr {
 namespace {
@@ -23,23 +24,29 @@ constexpr double kMaxRadius = 1e12;  // of a light, metres
 
 void check_asset(const GltfItem& root) {
   const auto asset = root.object("asset", kRequired);
-  const auto read_major = [&](const char* key, Presence presence) {
+  const auto read_version = [&](const char* key, Presence presence) -> std::string {
     if (asset->has(key) && asset->value()[key].is_number()) {
       asset->warn(key, "should be text");
       asset->value()[key] = fmt::format("{:.1f}", asset->value()[key].get<double>());
     }
     const auto text = asset->text(key, presence);
-    if (!text) return;
+    if (!text) return "2.0";
     const bool known =
         text->size() >= 3 && text->starts_with("2.") && text->find_first_not_of("0123456789", 2) == std::string::npos;
     if (!known) asset->fail(key, fmt::format("is \"{}\"; HPR reads glTF 2", printable(*text)));
+    return *text;
   };
-  read_major("version", kRequired);
-  read_major("minVersion", kOptional);
+  read_version("version", kRequired);
+  // Later minor versions stay readable by what reads 2.0, unless they say otherwise (glTF 2.0, section 3.2).
+  const std::string min_version = read_version("minVersion", kOptional);
+  if (min_version.find_first_not_of('0', 2) != std::string::npos) {
+    asset->fail("minVersion", fmt::format("is \"{}\"; HPR reads glTF 2.0", printable(min_version)),
+                "export the scene as glTF 2.0");
+  }
 }
 
 void check_buffers(const GltfItem& root) {
-  root.each("buffers", kOptional, [](const GltfItem& buffer) {
+  root.each_entry("buffers", kOptional, [](const GltfItem& buffer) {
     buffer.text("uri");
     buffer.whole("byteLength", kRequired, 1);
     const auto extensions = buffer.object("extensions");
@@ -47,7 +54,7 @@ void check_buffers(const GltfItem& root) {
       meshopt->flag("fallback");
     }
   });
-  root.each("bufferViews", kOptional, [](const GltfItem& view) {
+  root.each_entry("bufferViews", kOptional, [](const GltfItem& view) {
     view.index("buffer", "buffers", kRequired);
     view.whole("byteOffset");
     view.whole("byteLength", kRequired, 1);
@@ -75,7 +82,7 @@ void check_component_type(const GltfItem& item, const char* key) {
 }
 
 void check_accessors(const GltfItem& root) {
-  root.each("accessors", kOptional, [](const GltfItem& accessor) {
+  root.each_entry("accessors", kOptional, [](const GltfItem& accessor) {
     accessor.index("bufferView", "bufferViews");
     accessor.whole("byteOffset");
     check_component_type(accessor, "componentType");
@@ -116,14 +123,27 @@ void check_draco(const GltfItem& primitive) {
   }
 }
 
+/// KHR_materials_variants; apply_variant has removed what no variant asks for.
+void check_mappings(const GltfItem& primitive, std::size_t variants) {
+  const auto extensions = primitive.object("extensions");
+  const auto own = extensions ? extensions->object("KHR_materials_variants") : std::nullopt;
+  if (!own) return;
+  own->each("mappings", kRequired, [&](const GltfItem& mapping) {
+    mapping.indices_below("variants", variants, kRequired);
+    mapping.index("material", "materials", kRequired);
+  });
+}
+
 void check_meshes(const GltfItem& root) {
-  root.each("meshes", kOptional, [](const GltfItem& mesh) {
+  const std::size_t variants = variant_names(root.value()).size();
+  root.each_entry("meshes", kOptional, [&](const GltfItem& mesh) {
     mesh.numbers("weights", 0);
-    const std::size_t count = mesh.each("primitives", kRequired, [](const GltfItem& primitive) {
+    const std::size_t count = mesh.each("primitives", kRequired, [&](const GltfItem& primitive) {
       if (primitive.index_map("attributes", "accessors", kRequired) == 0) {
         primitive.fail("attributes", "is empty");
       }
       check_draco(primitive);
+      check_mappings(primitive, variants);
       primitive.index("indices", "accessors");
       primitive.index("material", "materials");
       primitive.whole("mode", kOptional, 0, 6);
@@ -147,7 +167,7 @@ void check_nodes(const GltfItem& root) {
   const auto punctual = extensions ? extensions->object("KHR_lights_punctual") : std::nullopt;
   const std::size_t lights = punctual && punctual->has("lights") ? punctual->value()["lights"].size() : 0;
 
-  root.each("nodes", kOptional, [&](const GltfItem& node) {
+  root.each_entry("nodes", kOptional, [&](const GltfItem& node) {
     node.text("name");
     node.index("mesh", "meshes");
     node.index("camera", "cameras");
@@ -171,6 +191,7 @@ void check_nodes(const GltfItem& root) {
         own->value().erase("KHR_lights_punctual");
       }
     }
+    if (const auto visibility = own->object("KHR_node_visibility")) visibility->flag("visible");
     if (const auto instancing = own->object("EXT_mesh_gpu_instancing")) {
       instancing->index_map("attributes", "accessors", kRequired);
     }
@@ -179,16 +200,16 @@ void check_nodes(const GltfItem& root) {
 
 void check_scenes(const GltfItem& root) {
   root.index("scene", "scenes");
-  root.each("scenes", kOptional, [](const GltfItem& scene) {
+  root.each_entry("scenes", kOptional, [](const GltfItem& scene) {
     scene.text("name");
     scene.indices("nodes", "nodes");
   });
-  root.each("skins", kOptional, [](const GltfItem& skin) {
+  root.each_entry("skins", kOptional, [](const GltfItem& skin) {
     if (skin.indices("joints", "nodes", kRequired) == 0) skin.fail("joints", "is empty");
     skin.index("inverseBindMatrices", "accessors");
     skin.index("skeleton", "nodes");
   });
-  root.each("animations", kOptional, [](const GltfItem& animation) {
+  root.each_entry("animations", kOptional, [](const GltfItem& animation) {
     const std::size_t samplers = animation.each("samplers", kRequired, [](const GltfItem& sampler) {
       sampler.index("input", "accessors", kRequired);
       sampler.index("output", "accessors", kRequired);
@@ -235,15 +256,15 @@ void choose_picture(const GltfItem& texture) {
 }
 
 void check_textures(const GltfItem& root) {
-  root.each("images", kOptional, [](const GltfItem& image) {
+  root.each_entry("images", kOptional, [](const GltfItem& image) {
     image.text("uri");
     image.text("mimeType");
     image.index("bufferView", "bufferViews");
   });
-  root.each("samplers", kOptional, [](const GltfItem& sampler) {
+  root.each_entry("samplers", kOptional, [](const GltfItem& sampler) {
     for (const char* key : {"magFilter", "minFilter", "wrapS", "wrapT"}) sampler.whole(key, kOptional, 0, 65535);
   });
-  root.each("textures", kOptional, [](const GltfItem& texture) {
+  root.each_entry("textures", kOptional, [](const GltfItem& texture) {
     texture.index("sampler", "samplers");
     texture.index("source", "images");
     choose_picture(texture);
@@ -288,7 +309,7 @@ void stand_in_for_glossiness(const GltfItem& material) {
 }
 
 void check_materials(const GltfItem& root) {
-  root.each("materials", kOptional, [](const GltfItem& material) {
+  root.each_entry("materials", kOptional, [](const GltfItem& material) {
     material.text("name");
     stand_in_for_glossiness(material);
     if (const auto pbr = material.object("pbrMetallicRoughness")) {
@@ -336,7 +357,7 @@ void check_orthographic(const GltfItem& lens) {
 }
 
 void check_cameras(const GltfItem& root) {
-  root.each("cameras", kOptional, [](const GltfItem& camera) {
+  root.each_entry("cameras", kOptional, [](const GltfItem& camera) {
     camera.text("name");
     const auto type = camera.text("type", kRequired);
     if (*type == "perspective") {
@@ -369,7 +390,7 @@ void check_lights(const GltfItem& root) {
   const auto extensions = root.object("extensions");
   const auto punctual = extensions ? extensions->object("KHR_lights_punctual") : std::nullopt;
   if (!punctual) return;
-  punctual->each("lights", kRequired, [](const GltfItem& light) {
+  punctual->each_entry("lights", kRequired, [](const GltfItem& light) {
     light.text("name");
     const auto type = light.text("type", kRequired);
     if (*type != "point" && *type != "directional" && *type != "spot") {
@@ -413,28 +434,23 @@ void check_shape(Json& document, GltfContext& context) {
 
 namespace {
 
-constexpr std::array<std::string_view, 12> kSupported{
+constexpr std::array<std::string_view, 14> kSupported{
     "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression",    "EXT_texture_webp",
     "KHR_draco_mesh_compression", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
     "KHR_materials_ior",          "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_volume",       "KHR_mesh_quantization",      "KHR_texture_transform"};
+    "KHR_materials_variants",     "KHR_materials_volume",       "KHR_mesh_quantization",
+    "KHR_node_visibility",        "KHR_texture_transform"};
 
 /// Drawn approximately where it stands alone; check_shape warns of it.
 constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
-constexpr std::array<std::string_view, 11> kAppearanceOnly{"KHR_materials_anisotropy",
-                                                           "KHR_materials_clearcoat",
-                                                           "KHR_materials_diffuse_transmission",
-                                                           "KHR_materials_dispersion",
-                                                           "KHR_materials_iridescence",
-                                                           kStandsIn,
-                                                           "KHR_materials_sheen",
-                                                           "KHR_materials_specular",
-                                                           "KHR_materials_variants",
-                                                           "KHR_texture_basisu",
-                                                           "KHR_xmp_json_ld"};
+constexpr std::array<std::string_view, 10> kAppearanceOnly{
+    "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion", "KHR_materials_iridescence", kStandsIn,
+    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_texture_basisu",
+    "KHR_xmp_json_ld"};
 
 bool contains(const auto& names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();
@@ -456,16 +472,18 @@ std::set<std::string> names_in(const GltfItem& root, const char* key) {
 
 /// Warns of material extensions that are neither drawn nor declared, which check_extensions has not named yet.
 void warn_of_undeclared(const GltfItem& root, const std::set<std::string>& declared) {
-  root.each("materials", Presence::Optional, [&](const GltfItem& material) {
-    const auto extensions = material.object("extensions");
-    if (!extensions) return;
+  const Json* const materials = section_of(root.value(), "materials");
+  if (materials == nullptr) return;
+  for (const Json& material : materials->elements()) {
+    const Json& extensions = material["extensions"];
+    if (!extensions.is_object()) continue;  // check_shape says so
     std::set<std::string> names;
-    for (const auto& [name, value] : extensions->value().members()) names.insert(name);
+    for (const auto& [name, value] : extensions.members()) names.insert(name);
     for (const std::string& name : names) {
       if (declared.contains(name) || contains(kSupported, name) || name == kStandsIn) continue;
       root.warn("materials", fmt::format("{} is ignored", printable(name)));  // once, however many have it
     }
-  });
+  }
 }
 
 }  // namespace

@@ -87,9 +87,12 @@ inline Document square() {
   return document;
 }
 
-inline Scene load(const Json& json, const SceneLimits& limits = {}) {
+inline Scene load(const Json& json, const SceneLimits& limits = {}, const SceneChoice& choice = {}) {
   const TemporaryFolder folder;
-  return load_gltf(folder.write("scene.gltf", json.dump()), limits);
+  return load_gltf(folder.write("scene.gltf", json.dump()), limits, choice);
+}
+inline Scene load(const Json& json, const SceneChoice& choice) {
+  return load(json, {}, choice);
 }
 
 /// What loading `json` complains of.

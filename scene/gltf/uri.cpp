@@ -53,6 +53,14 @@ class Descriptor {
   int fd_;
 };
 
+/// Whether `text` starts with `prefix`, which is in small letters, in letters of any case.
+bool starts_with_any_case(std::string_view text, std::string_view prefix) {
+  const auto same = [](char letter, char small) {
+    return (letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter + ('a' - 'A')) : letter) == small;
+  };
+  return text.size() >= prefix.size() && std::ranges::equal(text.substr(0, prefix.size()), prefix, same);
+}
+
 constexpr int kFlags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
 
 /// Opens component by component and follows no symbolic link: for kernels before 5.6 and sandboxes without openat2.
@@ -145,7 +153,11 @@ std::optional<std::vector<std::byte>> base64_decoded(std::string_view text) {
 }
 
 bool is_data_uri(std::string_view uri) {
-  return uri.starts_with("data:");
+  return starts_with_any_case(uri, "data:");
+}
+
+bool is_picture_uri(std::string_view uri) {
+  return starts_with_any_case(uri, "data:image/");
 }
 
 std::vector<std::byte> data_uri_bytes(std::string_view uri, const std::string& what) {
@@ -154,15 +166,22 @@ std::vector<std::byte> data_uri_bytes(std::string_view uri, const std::string& w
   };
   const std::size_t comma = uri.find(',');
   if (comma == std::string_view::npos) fail("has no comma");
-  const std::string_view data = uri.substr(std::min(uri.size(), comma + 1));
-  if (uri.substr(0, comma).ends_with(";base64")) {
+  std::string_view data = uri.substr(std::min(uri.size(), comma + 1));
+  std::string unescaped;
+  if (data.find('%') != std::string_view::npos) {
+    auto text = percent_decoded(data);
+    if (!text) fail("has a broken % escape");
+    unescaped = *std::move(text);
+    data = unescaped;
+  }
+  constexpr std::string_view kBase64 = ";base64";
+  const std::string_view type = uri.substr(0, comma);
+  if (type.size() >= kBase64.size() && starts_with_any_case(type.substr(type.size() - kBase64.size()), kBase64)) {
     auto bytes = base64_decoded(data);
     if (!bytes) fail("is no valid base64");
     return *std::move(bytes);
   }
-  const auto text = percent_decoded(data);
-  if (!text) fail("has a broken % escape");
-  const auto bytes = std::as_bytes(std::span(*text));
+  const auto bytes = std::as_bytes(std::span(data));
   return {bytes.begin(), bytes.end()};
 }
 
@@ -178,7 +197,7 @@ std::string jailed_path(std::string_view uri, const std::string& what) {
   }
   if (path.find('\\') != std::string::npos) refuse(what, uri, "holds a backslash");
   if (path.starts_with('/')) refuse(what, uri, "is an absolute path");
-  if (path.find(':') < path.find('/')) refuse(what, uri, "names a scheme or drive");
+  if (uri.find(':') < uri.find('/')) refuse(what, uri, "names a scheme or drive");
   for (std::size_t start = 0; start <= path.size();) {
     const std::size_t end = std::min(path.find('/', start), path.size());
     if (const std::string_view part(path.data() + start, end - start); part == "..") {

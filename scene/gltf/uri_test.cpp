@@ -30,10 +30,40 @@ TEST(GltfUri, Base64IsStrict) {
   }
 }
 
+TEST(GltfUri, DataUrisHaveASchemeInAnyCaseAndMayEscapeWhatTheyHold) {
+  // One triangle's worth of text that base64 writes with both of its signs and padding: "a>?b" is "YT4/Yg==".
+  for (const char* uri : {
+           "data:;base64,YT4/Yg==",
+           "data:application/octet-stream;base64,YT4%2FYg%3D%3D",
+           "data:application/octet-stream;base64,YT4%2fYg%3d=",
+           "data:application/octet-stream;base64,%59T4/Yg==",
+           "DATA:application/octet-stream;BASE64,YT4/Yg==",
+           "Data:application/gltf-buffer;charset=utf-8;Base64,YT4/Yg==",
+           "dAtA:;bAsE64,YT4%2FYg%3D%3D",
+           "data:,a>?b",
+           "DATA:,a%3E%3Fb",
+           "data:application/octet-stream,%61%3e%3f%62",
+           "data:base64,a%3E?b",
+       }) {
+    EXPECT_TRUE(is_data_uri(uri)) << uri;
+    EXPECT_EQ(text(data_uri_bytes(uri, "t")), "a>?b") << uri;
+  }
+  for (const char* bad : {"data:;base64,YT4%2", "data:;base64,YT4%2FYg", "data:;base64,YT4/Yg==%zz", "data:,a%3",
+                          "data:a", "data:;base64,YT4%20/Yg=="}) {
+    EXPECT_THROW((void)data_uri_bytes(bad, "t"), Error) << bad;
+  }
+  EXPECT_FALSE(is_data_uri("database.bin"));
+  EXPECT_FALSE(is_data_uri("dat"));
+  EXPECT_TRUE(is_picture_uri("Data:Image/PNG;base64,AA=="));
+  EXPECT_FALSE(is_picture_uri("data:application/octet-stream;base64,AA=="));
+}
+
 TEST(GltfUri, OnlyPathsBelowTheFolderAreLetThrough) {
   EXPECT_EQ(jailed_path("a.bin", "t"), "a.bin");
   EXPECT_EQ(jailed_path("sub/a%20b.bin", "t"), "sub/a b.bin");
   EXPECT_EQ(jailed_path("..a/b..", "t"), "..a/b..");
+  EXPECT_EQ(jailed_path("gr%C3%BC%C3%9Fe%23%3F%25.bin", "t"), "gr\u00fc\u00dfe#?%.bin");
+  EXPECT_EQ(jailed_path("a%3Ab.bin", "t"), "a:b.bin");
   for (const char* bad : {"",           "../a",   "a/../b",      "a/..",          "..",
                           "%2e%2e/a",   "%2E./a", "/etc/passwd", "%2fetc/passwd", "file:///etc/passwd",
                           "http://x/y", "C:\\a",  "c:a",         "..\\a",         "\\\\host\\a",
