@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "engine/aov.h"
 #include "engine/budget.h"
-#include "engine/exposure.h"
+#include "engine/display/exposure.h"
 #include "engine/frame.h"
 #include "image/color.h"
 #include "image/image.h"

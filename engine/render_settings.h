@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/exposure.h"
+#include "engine/display/exposure.h"
 #include "engine/frame_settings.h"
 #include "engine/samples.h"
 #include "image/color.h"

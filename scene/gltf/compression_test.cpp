@@ -169,6 +169,8 @@ TEST(GltfMeshopt, WhatIsDecodedCountsAgainstTheLimitBeforeItIsAllocated) {
   test::ModelWriter writer;
   const std::vector<std::byte> zeros(1 << 20);
   const std::size_t view = add_meshopt_view(writer, zeros, 16, "ATTRIBUTES", nullptr);
+  writer.json["accessors"].push_back({{"componentType", 5126}, {"count", 3}, {"type", "VEC3"}, {"bufferView", view}});
+  writer.add_primitive({{"attributes", {{"POSITION", writer.json["accessors"].size() - 1}}}});
   Json document = writer.gltf();
   EXPECT_EQ(refusal(document).code, ExitCode::Done);
   SceneLimits limits;

@@ -290,7 +290,8 @@ TradeoffPoint measure_point(Session& session, const RenderSettings& settings, co
   agree_on_failure(session.comm(), [&] {
     if (session.rank() != 0) return;
     Image<float> flip;
-    point.error = compare(picture, reference, settings.display.exposure_stops.value_or(0.0), how.metrics, session.threads(), &flip);
+    point.error = compare(picture, reference, settings.display.exposure_stops.value_or(0.0), how.metrics,
+                          session.threads(), &flip);
     point.crop_png = crop_as_png(picture, crop, true);
     if (flip.size() == picture.size()) {
       point.flip_png = png_of(flip, crop, [](float value) { return heat_color(static_cast<double>(value)); });

@@ -1,4 +1,4 @@
-#include "engine/exposure.h"
+#include "engine/display/exposure.h"
 
 #include <gtest/gtest.h>
 

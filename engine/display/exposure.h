@@ -18,10 +18,10 @@ struct Frame;
 /// Eight bins for each factor of two from 2^-20 to 2^20. What is darker counts nowhere: nothing is there, or no light.
 class LuminanceHistogram {
  public:
-  static constexpr int kLowestStop = -20;
-  static constexpr int kHighestStop = 20;
+  static constexpr int kMinStop = -20;
+  static constexpr int kMaxStop = 20;
   static constexpr int kBinsPerStop = 8;
-  static constexpr std::size_t kBins = std::size_t{kHighestStop - kLowestStop} * kBinsPerStop;
+  static constexpr std::size_t kBins = std::size_t{kMaxStop - kMinStop} * kBinsPerStop;
 
   void add(const Rgb& radiance);
   LuminanceHistogram& operator+=(const LuminanceHistogram& other);

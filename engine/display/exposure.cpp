@@ -1,4 +1,4 @@
-#include "engine/exposure.h"
+#include "engine/display/exposure.h"
 
 #include <algorithm>
 #include <bit>
@@ -29,16 +29,16 @@ float luminance(const Rgb& color) {
 double stops_of(std::size_t bin) {
   const auto stop = static_cast<double>(bin / LuminanceHistogram::kBinsPerStop);
   const auto part = static_cast<double>(bin % LuminanceHistogram::kBinsPerStop) + 0.5;
-  return LuminanceHistogram::kLowestStop + stop + std::log2(1.0 + part / LuminanceHistogram::kBinsPerStop);
+  return LuminanceHistogram::kMinStop + stop + std::log2(1.0 + part / LuminanceHistogram::kBinsPerStop);
 }
 
 }  // namespace
 
 void LuminanceHistogram::add(const Rgb& radiance) {
   const float value = luminance(radiance);
-  if (!(value >= std::ldexp(1.0F, kLowestStop))) return;
+  if (!(value >= std::ldexp(1.0F, kMinStop))) return;
   // The exponent and the first bits of the mantissa count eighths of a factor of two.
-  constexpr auto kFirst = std::uint32_t{kExponentBias + kLowestStop} << kBinBits;
+  constexpr auto kFirst = std::uint32_t{kExponentBias + kMinStop} << kBinBits;
   const std::uint32_t bin = (std::bit_cast<std::uint32_t>(value) >> (kMantissaBits - kBinBits)) - kFirst;
   ++bins_[std::min<std::size_t>(bin, kBins - 1)];
 }
