@@ -27,9 +27,10 @@ float luminance(const Rgb& color) {
 
 /// The logarithm of the middle of a bin.
 double stops_of(std::size_t bin) {
-  const auto stop = static_cast<double>(bin / LuminanceHistogram::kBinsPerStop);
+  const auto stop = static_cast<int>(bin) / LuminanceHistogram::kBinsPerStop;
   const auto part = static_cast<double>(bin % LuminanceHistogram::kBinsPerStop) + 0.5;
-  return LuminanceHistogram::kMinStop + stop + std::log2(1.0 + part / LuminanceHistogram::kBinsPerStop);
+  return static_cast<double>(LuminanceHistogram::kMinStop + stop) +
+         std::log2(1.0 + part / LuminanceHistogram::kBinsPerStop);
 }
 
 }  // namespace
