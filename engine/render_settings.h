@@ -13,7 +13,7 @@
 #include "engine/frame_settings.h"
 #include "engine/samples.h"
 #include "image/color.h"
-#include "scene/scene_choice.h"
+#include "scene/load_scene.h"
 
 namespace hpr {
 

@@ -8,7 +8,6 @@
 
 #include "image/image_io.h"
 #include "scene/scene.h"
-#include "scene/scene_choice.h"
 
 namespace hpr {
 
@@ -17,6 +16,14 @@ struct SceneLimits {
   std::uint64_t file_bytes = std::uint64_t{4} << 30U;
   std::uint64_t memory_bytes = std::uint64_t{16} << 30U;  ///< of the loaded scene, estimated before it is allocated
   ImageLimits image;
+};
+
+/// Which of the scenes and variants that a file holds is loaded.
+struct SceneChoice {
+  std::string scene = {};    ///< its name or index; empty: the one that the file names, else the first
+  std::string variant = {};  ///< of materials; empty: the materials that the file has without any
+
+  bool operator==(const SceneChoice&) const = default;
 };
 
 /// A format of scene files.

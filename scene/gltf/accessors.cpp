@@ -38,7 +38,8 @@ std::vector<bool> buffers_read(const Json& root, std::size_t buffers) {
   if (views == nullptr) return read;
   for (const Json& view : views->elements()) {
     const Json& compressed = meshopt_of(view);
-    read[(compressed.is_object() ? compressed : view)["buffer"].get<std::size_t>()] = true;
+    const auto buffer = (compressed.is_object() ? compressed : view)["buffer"].get<std::size_t>();
+    if (buffer < buffers) read[buffer] = true;  // what stands in for a wrong view may name one there is not
   }
   return read;
 }
@@ -175,28 +176,14 @@ void convert_elements(const std::byte* from, std::size_t stride, std::size_t cou
 /// Elements of `width` components, `stride` bytes apart, as float.
 void to_floats(int component_type, bool normalized, const std::byte* from, std::size_t stride, std::size_t count,
                std::size_t width, float* out) {
-  const auto run = [&]<typename Component>(Component) {
+  if (component_type == TINYGLTF_COMPONENT_TYPE_FLOAT && stride == width * sizeof(float)) {
+    std::memcpy(out, from, count * stride);
+    return;
+  }
+  visit_component(component_type, [&]<typename Component>(Component) {
     convert_elements<Component>(from, stride, count, width, out,
                                 [&](Component value) { return to_float(value, normalized); });
-  };
-  switch (component_type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return run(std::int8_t{});
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return run(std::uint8_t{});
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return run(std::int16_t{});
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return run(std::uint16_t{});
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return run(std::uint32_t{});
-    default:
-      if (stride == width * sizeof(float)) {
-        std::memcpy(out, from, count * stride);
-        return;
-      }
-      return run(float{});
-  }
+  });
 }
 
 void to_integers(int component_type, const std::byte* from, std::size_t stride, std::size_t count, std::size_t width,

@@ -20,6 +20,25 @@
 
 namespace hpr {
 
+/// Calls visit with a zero of the type that a component type of accessors stands for; float for what is none.
+template <typename Visit>
+decltype(auto) visit_component(int component_type, const Visit& visit) {
+  switch (component_type) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return visit(std::int8_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return visit(std::uint8_t{});
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return visit(std::int16_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return visit(std::uint16_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return visit(std::uint32_t{});
+    default:
+      return visit(float{});
+  }
+}
+
 /// The bytes behind a document's buffers and pictures. Reads files only below the scene's folder.
 class GltfBuffers {
  public:

@@ -158,25 +158,11 @@ bool convert_to(const draco::PointAttribute& attribute, std::size_t points, std:
 /// do not fit into it.
 std::optional<std::vector<std::byte>> values_of(const draco::PointAttribute& attribute, std::size_t points,
                                                 int component_type) {
-  const auto run = [&]<typename Component>(Component) -> std::optional<std::vector<std::byte>> {
+  return visit_component(component_type, [&]<typename Component>(Component) -> std::optional<std::vector<std::byte>> {
     std::vector<std::byte> out(points * attribute.num_components() * sizeof(Component));
     if (!convert_to<Component>(attribute, points, out)) return std::nullopt;
     return out;
-  };
-  switch (component_type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return run(std::int8_t{});
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return run(std::uint8_t{});
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return run(std::int16_t{});
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return run(std::uint16_t{});
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return run(std::uint32_t{});
-    default:
-      return run(float{});
-  }
+  });
 }
 
 struct CompressedPrimitive {

@@ -228,5 +228,12 @@ TEST(GltfUsage, FollowsReferencesOfExtensionsAndSparseAccessors) {
   EXPECT_FALSE(usage.contains("buffers", 100));
 }
 
+TEST(GltfUsage, AWrongViewOfNoBufferAtAllIsLeftOut) {
+  Json json =
+      Json::parse(R"({"asset": {"version": "2.0"}, "buffers": [], "bufferViews": [{"buffer": 7, "byteLength": 4}]})");
+  EXPECT_EQ(refusal(json).message, "");
+  EXPECT_TRUE(warns_of(load(json), "bufferViews[0].buffer"));
+}
+
 }  // namespace
 }  // namespace hpr

@@ -18,7 +18,7 @@ class DiffCommand final : public Command {
  public:
   [[nodiscard]] std::string_view name() const override { return "diff"; }
   [[nodiscard]] std::string_view summary() const override {
-    return "how far two pictures (PNG, JPEG, EXR) or two files of keys are apart";
+    return "how far two pictures (PNG, JPEG, WebP, EXR) or two files of keys are apart";
   }
 
   void declare(const OptionSet& options) override {
