@@ -164,7 +164,8 @@ Finding check_image_module() {
             "OpenImageIO does not return the pixel of a Radiance picture",
             "apt-get install --reinstall libopenimageio2.4"};
   }
-  return ok(fmt::format("PNG, JPEG, WebP and EXR are built in; OpenImageIO, for Radiance, opens in {:.0f} ms", watch.ms()));
+  return ok(
+      fmt::format("PNG, JPEG, WebP and EXR are built in; OpenImageIO, for Radiance, opens in {:.0f} ms", watch.ms()));
 }
 
 Finding check_stack() {
