@@ -241,6 +241,7 @@ struct KeyTimes {
 /// in a run of frames. Returns why, with both times.
 std::string choose_primary(Session& session, FramePlan& plan, std::span<const View> views) {
   KeyTimes mine;
+  session.start_gl();
   if (!plan.mine.area.empty()) {
     double fraction = 1.0;
     const FramePlan some = sampled(plan, fraction);
@@ -331,6 +332,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
+  if (plan.primary == Primary::Raster) session.start_gl();
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);

@@ -113,7 +113,7 @@ WallDriver::WallDriver(const WallJob& job, Session& session)
   manifest_.wall_hash = wall_.hash;
   manifest_.seed = job_.seed;
   manifest_.versions = {
-      {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
+      {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl_description()}};
   take_over();
 }
 
