@@ -62,6 +62,13 @@ void Session::start_gl() {
   compare_rasterizers();
 }
 
+bool Session::draws_by_software() {
+  const auto of_any = [this](bool mine) { return std::ranges::count(all_gather_value(comm_, mine ? 1 : 0), 1) > 0; };
+  if (of_any(!has_gpu_device())) return true;
+  start_gl();
+  return of_any(gl_->software());
+}
+
 std::string Session::gl_description() const {
   return gl_ ? gl_->description() : "not started, as nothing was drawn by it";
 }

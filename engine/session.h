@@ -55,6 +55,8 @@ class Session {
   /// Collective. Starts OpenGL where it does not run yet, which costs more than a small picture by rays. Compares the
   /// ranks' rasterisers and names those that differ. Throws Error (NoDevice) on all ranks where one has no OpenGL.
   void start_gl();
+  /// Collective. Whether the CPU of any rank does OpenGL's work; starts OpenGL only where a rank may have a GPU.
+  [[nodiscard]] bool draws_by_software();
   /// Renderer, version and device of OpenGL, for people.
   [[nodiscard]] std::string gl_description() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <iterator>
 #include <string_view>
+#include <system_error>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "raster/gl.h"
@@ -67,6 +70,15 @@ void check_gl_backend(const std::string& backend) {
   if (std::ranges::find(choices, backend) != choices.end()) return;
   throw Error(ExitCode::Usage, fmt::format("unknown backend '{}'", printable(backend)),
               unknown_name_hint(backend, choices));
+}
+
+bool has_gpu_device() {
+  constexpr std::array<std::string_view, 2> kDevices{"/dev/nvidiactl", "/dev/dxg"};  // of NVIDIA, of WSL
+  std::error_code error;
+  if (std::ranges::any_of(kDevices, [&](std::string_view path) { return std::filesystem::exists(path, error); })) {
+    return true;
+  }
+  return !entries_of("/dev/dri").empty();
 }
 
 void limit_software_gl(int threads) {

@@ -43,6 +43,9 @@ struct GlOptions {
 /// Throws Error (Usage), with the choices, unless `backend` is "auto" or one of all_gl_backends().
 void check_gl_backend(const std::string& backend);
 
+/// Whether this machine has the device of a GPU. Without one every context is a software renderer's.
+[[nodiscard]] bool has_gpu_device();
+
 /// Bounds the threads of software renderers, unless the environment already does; 0: they decide. For a process's first
 /// context, and before the process starts threads that read the environment.
 void limit_software_gl(int threads);
