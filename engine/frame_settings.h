@@ -23,7 +23,7 @@ inline constexpr std::array<std::string_view, 2> kShadingNames{"deferred", "loca
 enum class Primary {
   Raster,  ///< OpenGL
   Rays,    ///< Embree, one ray through each pixel's centre; other surfaces are seen at some edges
-  Auto,    ///< whichever a measurement finds quicker
+  Auto,    ///< see choose_primary()
 };
 inline constexpr std::array<std::string_view, 3> kPrimaryNames{"raster", "rays", "auto"};
 
@@ -33,12 +33,13 @@ struct FrameSettings {
   std::optional<Distribution> distribution;  ///< none: chosen by plan_frame
   int groups = 0;                            ///< of Hybrid; 0: default_groups
   std::string strategy;                      ///< empty: chosen by plan_frame
-  Primary primary = Primary::Raster;
-  DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Primary::Raster only
+  Primary primary = Primary::Auto;
+  DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Raster, which Auto then is
   Shading shading = Shading::Deferred;
   RaySettings rays;
   bool partitioned = false;         ///< each rank's ray scene holds its share of the objects only, and rays travel
   bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
+  bool single_picture = false;      ///< whether nothing but one sample of one picture is drawn
   bool photons_fit_frame = false;   ///< no more photons a sample than the frame has pixels
   double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged
   double verify_percent = 0.0;      ///< of the tiles that are drawn again and compared; see engine/verification.h

@@ -6,16 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <vector>
 
 #include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
-#include "core/log.h"
-#include "core/timing.h"
-#include "engine/frame.h"
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
 #include "rt/sampling/sampler.h"
@@ -23,6 +19,7 @@
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {
@@ -195,73 +192,27 @@ std::optional<double> open_sky(Session& session, const RaySettings& settings, st
   return static_cast<double>(std::ranges::count(blocked, 0)) / static_cast<double>(blocked.size());
 }
 
-/// A prime, so that the tiles drawn do not stand in columns.
-constexpr std::size_t kEachTile = 7;
+// Processor time in ns on an Intel Xeon, as bench/primary_bench.cpp measures it. Only their ratios decide.
+constexpr double kTriangleCost = 100.0;  ///< OpenGL's, beyond what its pixels take
+constexpr double kPixelCost = 100.0;     ///< of rays
+constexpr double kBuildCost = 350.0;     ///< of a triangle in Embree's scene
+constexpr double kStartCost = 52e6;      ///< of OpenGL, with its first shaders
 
-double quickest_ms(TileLayer<Key>& keys, const std::function<void()>& draw) {
-  double best = 0.0;
-  for (int attempt = 0; attempt < 2; ++attempt) {
-    keys.clear();
-    const Stopwatch watch;
-    draw();
-    best = attempt == 0 ? watch.ms() : std::min(best, watch.ms());
-  }
-  return best;
-}
+/// What is done once is shared out among so many frames, unless it is known to be for one.
+constexpr double kFrames = 8.0;
 
-/// The plan with every seventh tile of its area; `fraction` is set to how much of the area that is.
-FramePlan sampled(const FramePlan& plan, double& fraction) {
-  FramePlan some = plan;
-  some.mine.area.clear();
-  std::size_t all_pixels = 0;
-  std::size_t some_pixels = 0;
-  std::size_t seen = 0;
-  for (const ScreenRect& rect : plan.mine.area) {
-    all_pixels += rect.pixels.area();
-    for (int y = rect.pixels.y0; y < rect.pixels.y1; y += kTileSide) {
-      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide) {
-        if (seen++ % kEachTile != 0) continue;
-        const Rect tile = intersection(rect.pixels, {x, y, x + kTileSide, y + kTileSide});
-        some.mine.area.push_back({rect.screen, tile});
-        some_pixels += tile.area();
-      }
-    }
-  }
-  fraction = some_pixels > 0 ? static_cast<double>(some_pixels) / static_cast<double>(all_pixels) : 1.0;
-  return some;
-}
-
-struct KeyTimes {
-  double raster_ms = 0.0;
-  double rays_ms = 0.0;
-};
-
-/// Collective. Sets `plan.primary` to what makes the keys sooner, on the slowest rank: each draws its share both ways,
-/// all of it by OpenGL (whose work with vertices does not shrink with the area) and every seventh tile by rays, twice,
-/// and the quicker try counts. What both need but once (uploads, Embree's scene, shaders) is left out, as it would be
-/// in a run of frames. Returns why, with both times.
-std::string choose_primary(Session& session, FramePlan& plan, std::span<const View> views) {
-  KeyTimes mine;
-  if (!plan.mine.area.empty()) {
-    double fraction = 1.0;
-    const FramePlan some = sampled(plan, fraction);
-    TileLayer<Key> keys(plan.layout);
-    mine.raster_ms = quickest_ms(keys, [&] { rasterize(session, plan, views, keys); });
-    (void)session.primary_rays(plan.mine.objects, plan.rays);
-    const JitteredViews jittered{{views.begin(), views.end()}, {}};
-    TileLayer<Key>* const layer = &keys;
-    const auto trace = [&] { (void)trace_primary(session, some, std::span(&jittered, 1), std::span(&layer, 1)); };
-    mine.rays_ms = quickest_ms(keys, trace) / fraction;
-  }
-  KeyTimes worst;
-  for (const KeyTimes& times : all_gather_value(session.comm(), mine)) {
-    worst.raster_ms = std::max(worst.raster_ms, times.raster_ms);
-    worst.rays_ms = std::max(worst.rays_ms, times.rays_ms);
-  }
-  plan.primary = worst.rays_ms < worst.raster_ms ? Primary::Rays : Primary::Raster;
-  std::string why = fmt::format("measured: {:.1f} ms by rays, {:.1f} ms by OpenGL", worst.rays_ms, worst.raster_ms);
-  if (session.comm().rank() == 0) log::info("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", why);
-  return why;
+/// Collective where the choice is left open: who makes the keys, and why.
+PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
+                               std::span<const View> views) {
+  if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
+  KeyWork work{.triangles = session.scene().triangles, .single_picture = settings.single_picture};
+  for (const Mesh& mesh : session.scene().meshes) work.own_triangles += mesh.triangles.size();
+  for (const View& view : views) work.pixels += view.size().area();
+  work.rounds_depth = settings.depth_format != DepthFormat::Float32;
+  work.software_gl = work.rounds_depth || session.draws_by_software();
+  work.ray_scene_is_for_keys = std::ranges::none_of(plan_passes(session.requirements(), plan.rays),
+                                                    [](const PassPlan& pass) { return pass.runs; });
+  return choose_primary(work);
 }
 
 /// Whether rays or photons are to bring indirect light, where the scene leaves the choice.
@@ -294,6 +245,24 @@ void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan
 
 }  // namespace
 
+PrimaryChoice choose_primary(const KeyWork& work) {
+  if (work.rounds_depth) return {Primary::Raster, "OpenGL alone rounds depths"};
+  if (!work.software_gl) return {Primary::Raster, "by a GPU"};
+  const double build_ns = work.ray_scene_is_for_keys ? kBuildCost * static_cast<double>(work.own_triangles) : 0.0;
+  const double trace_ns = kPixelCost * static_cast<double>(work.pixels);
+  const double rays_ns = trace_ns + build_ns / (work.single_picture ? 1.0 : kFrames);
+  const double start_ns = kStartCost / kFrames;
+  const double raster_ns = kTriangleCost * static_cast<double>(work.triangles) + start_ns;
+  if (rays_ns > raster_ns) {
+    return {Primary::Raster, fmt::format("{} pixels are many beside {} triangles{}", work.pixels, work.triangles,
+                                         build_ns > 0.0 ? ", as nothing else needs Embree's scene" : "")};
+  }
+  return {Primary::Rays, trace_ns <= start_ns
+                             ? fmt::format("{} pixels are too few to start OpenGL on a CPU for", work.pixels)
+                             : fmt::format("{} pixels are few beside {} triangles that a CPU would rasterise",
+                                           work.pixels, work.triangles)};
+}
+
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
   const int ranks = session.comm().size();
   FramePlan plan;
@@ -306,7 +275,6 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.distribution = choice.distribution;
   plan.groups = std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
-  plan.primary = settings.primary;
   plan.depth_format = settings.depth_format;
   plan.shading = settings.shading;
   plan.rays = settings.rays;
@@ -328,10 +296,11 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   }
 
   explain_distribution(plan, settings, choice, ranks);
-  const char* const asked = plan.primary == Primary::Raster ? "unless asked for rays or a choice" : "as asked";
-  const std::string measured = plan.primary == Primary::Auto ? choose_primary(session, plan, views) : asked;
+  const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
+  plan.primary = primary.primary;
   plan.explained.push_back(
-      fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", measured));
+      fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", primary.why));
+  if (plan.primary == Primary::Raster) session.start_gl();
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -34,8 +35,30 @@ struct FramePlan {
   std::vector<std::string> explained;  ///< one line per decision, with its reason
 };
 
-/// Collective, as it may measure (`Primary::Auto`).
+/// Collective. Starts OpenGL where the frame is drawn by it, or that is left to whether it has a GPU.
 [[nodiscard]] FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views);
+
+/// What decides whether OpenGL or rays make the keys of a frame: nothing that a clock says, nor how many ranks share
+/// the work, so that the same picture has the same bits however it is made. Equal on all ranks.
+struct KeyWork {
+  std::uint64_t triangles = 0;         ///< of all instances
+  std::uint64_t own_triangles = 0;     ///< of meshes, each once however many instances it has
+  std::uint64_t pixels = 0;            ///< of all views
+  bool software_gl = false;            ///< whether any rank draws by its CPU
+  bool ray_scene_is_for_keys = false;  ///< whether no pass traces rays, so that keys alone pay for Embree's scene
+  bool single_picture = false;         ///< whether that scene serves a single sample of a single picture
+  bool rounds_depth = false;           ///< whether depths have fewer than 32 bits, as OpenGL alone draws them
+};
+
+struct PrimaryChoice {
+  Primary primary = Primary::Raster;  ///< never Auto
+  std::string why;
+};
+
+/// What Primary::Auto stands for. On a GPU OpenGL makes the keys. On a CPU it takes a time for each triangle and rays
+/// take as long for each pixel, so that rays make them where a frame has no more pixels than triangles; small pictures
+/// too, for which OpenGL would have to start (docs/decisions/0016-keys-by-rays-or-by-opengl.md).
+[[nodiscard]] PrimaryChoice choose_primary(const KeyWork& work);
 
 /// From so much of open sky on rays bring indirect light: with less noise than photons in the same time where spheres
 /// hang in the open, and with more in a room with a hole (docs/decisions/0009-even-skies-are-gathered.md).

@@ -113,7 +113,7 @@ void check_combination(const RenderSettings& settings) {
   const auto refuse = [](const std::string& what, const std::string& hint) {
     throw Error(ExitCode::Usage, what, hint);
   };
-  if (frame.depth_format != DepthFormat::Float32 && frame.primary != Primary::Raster) {
+  if (frame.depth_format != DepthFormat::Float32 && frame.primary == Primary::Rays) {
     refuse("--depth-format rounds depths before OpenGL compares them; rays compare their own",
            "use it with --primary raster");
   }

@@ -35,23 +35,43 @@ Scene load_scene_of_all(Communicator& comm, const std::function<Scene()>& load) 
 
 Session::Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load)
     : comm_(comm),
+      settings_(settings),
       host_(find_host_resources(comm, settings.threads)),
       scene_(load_scene_of_all(comm_, load)),
       requirements_(requirements_of(scene_)),
       assembler_(std::make_unique<Assembler>()) {
   warn_of_scene();
+  limit_software_gl(host_.threads);
+  if (settings_.backend != "auto" || settings_.device >= 0) start_gl();
+}
+
+Session::~Session() = default;
+
+void Session::start_gl() {
+  if (gl_) return;
+  std::unique_ptr<GlContext> context;
   agree_on_failure(comm_, [&] {
     const trace::Span span("start OpenGL");
-    gl_ = make_gl_context({.backend = settings.backend,
-                           .device = settings.device,
-                           .local_rank = host_.local_rank,
-                           .threads = host_.threads});
+    context = make_gl_context({.backend = settings_.backend,
+                               .device = settings_.device,
+                               .local_rank = host_.local_rank,
+                               .threads = host_.threads});
   });
+  gl_ = std::move(context);
   log::debug("OpenGL: {}", gl_->description());
   compare_rasterizers();
 }
 
-Session::~Session() = default;
+bool Session::draws_by_software() {
+  const auto of_any = [this](bool mine) { return std::ranges::count(all_gather_value(comm_, mine ? 1 : 0), 1) > 0; };
+  if (of_any(!has_gpu_device())) return true;
+  start_gl();
+  return of_any(gl_->software());
+}
+
+std::string Session::gl_description() const {
+  return gl_ ? gl_->description() : "not started, as nothing was drawn by it";
+}
 
 Session::HostResources Session::find_host_resources(Communicator& comm, int threads) {
   HostResources host;
@@ -113,6 +133,7 @@ void Session::compare_rasterizers() {
 }
 
 Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
+  HPR_CHECK(gl_);
   if (!rasterizer_ || !std::ranges::equal(objects, objects_)) {
     const trace::Span span("upload geometry");
     rasterizer_.reset();  // frees its GPU memory before the next one takes some
@@ -166,6 +187,7 @@ PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const 
 }
 
 Rasterizer& Session::whole_rasterizer() {
+  HPR_CHECK(gl_);
   const std::vector<SurfaceRange> everything = covering_part();
   if (rasterizer_ && merged_ranges(objects_, scene_.triangles) == everything) return *rasterizer_;
   if (!whole_rasterizer_) {

@@ -35,7 +35,7 @@ struct SessionSettings {
 /// the frame's memory. One per rank; construction is collective.
 class Session {
  public:
-  /// `load` runs on rank 0 alone. Compares the ranks' rasterisers and names those that differ.
+  /// `load` runs on rank 0 alone. Starts OpenGL where the settings name a backend or a device.
   Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load);
   ~Session();
   Session(const Session&) = delete;
@@ -52,10 +52,16 @@ class Session {
   [[nodiscard]] const Requirements& requirements() const { return requirements_; }
   [[nodiscard]] int threads() const { return host_.threads; }
   [[nodiscard]] const std::string& host() const { return host_.host; }
-  [[nodiscard]] const GlContext& gl() const { return *gl_; }
+  /// Collective. Starts OpenGL where it does not run yet, which costs more than a small picture by rays. Compares the
+  /// ranks' rasterisers and names those that differ. Throws Error (NoDevice) on all ranks where one has no OpenGL.
+  void start_gl();
+  /// Collective. Whether the CPU of any rank does OpenGL's work; starts OpenGL only where a rank may have a GPU.
+  [[nodiscard]] bool draws_by_software();
+  /// Renderer, version and device of OpenGL, for people.
+  [[nodiscard]] std::string gl_description() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }
 
-  /// The rasteriser that holds `objects`; kept until other objects are asked for.
+  /// The rasteriser that holds `objects`; kept until other objects are asked for. After start_gl().
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
@@ -112,10 +118,11 @@ class Session {
   };
 
   CountingCommunicator comm_;
+  SessionSettings settings_;
   HostResources host_;
   Scene scene_;
   Requirements requirements_;
-  std::unique_ptr<GlContext> gl_;
+  std::unique_ptr<GlContext> gl_;  ///< null before start_gl()
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
   std::unique_ptr<Rasterizer> whole_rasterizer_;

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <iterator>
 #include <string_view>
+#include <system_error>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "raster/gl.h"
@@ -69,14 +72,27 @@ void check_gl_backend(const std::string& backend) {
               unknown_name_hint(backend, choices));
 }
 
-std::unique_ptr<GlContext> make_gl_context(const GlOptions& options) {
-  check_gl_backend(options.backend);
+bool has_gpu_device() {
+  constexpr std::array<std::string_view, 2> kDevices{"/dev/nvidiactl", "/dev/dxg"};  // of NVIDIA, of WSL
+  std::error_code error;
+  if (std::ranges::any_of(kDevices, [&](std::string_view path) { return std::filesystem::exists(path, error); })) {
+    return true;
+  }
+  return !entries_of("/dev/dri").empty();
+}
+
+void limit_software_gl(int threads) {
+  if (threads <= 0) return;
   // llvmpipe reads it when its screen is made, which is with the first context. 0 is no thread beside the caller's, and
   // so none to race with when a fence ends (Mesa 22.3). What the user says counts.
-  const int helpers = options.threads == 1 ? 0 : options.threads;
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): contexts are made before a process starts threads that read the environment
-  if (options.threads > 0) setenv("LP_NUM_THREADS", std::to_string(helpers).c_str(), 0);
+  const int helpers = threads == 1 ? 0 : threads;
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread reads the environment yet
+  setenv("LP_NUM_THREADS", std::to_string(helpers).c_str(), 0);
+}
 
+std::unique_ptr<GlContext> make_gl_context(const GlOptions& options) {
+  check_gl_backend(options.backend);
+  limit_software_gl(options.threads);
   if (options.backend != "auto") return make_one(options.backend, options);
   if (options.device >= 0) return make_one("egl", options);  // the only one with devices
   std::string failures;

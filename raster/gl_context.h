@@ -34,7 +34,7 @@ struct GlOptions {
   std::string backend = "auto";  ///< "auto" or one of all_gl_backends()
   int device = -1;               ///< EGL device by index; -1: hardware devices are dealt out by local rank
   int local_rank = 0;            ///< of this process on its host
-  int threads = 0;               ///< of a software renderer, before the process's first context; 0: it decides
+  int threads = 0;               ///< see limit_software_gl()
 };
 
 /// The names of all backends, in the order in which "auto" tries them.
@@ -42,6 +42,13 @@ struct GlOptions {
 
 /// Throws Error (Usage), with the choices, unless `backend` is "auto" or one of all_gl_backends().
 void check_gl_backend(const std::string& backend);
+
+/// Whether this machine has the device of a GPU. Without one every context is a software renderer's.
+[[nodiscard]] bool has_gpu_device();
+
+/// Bounds the threads of software renderers, unless the environment already does; 0: they decide. For a process's first
+/// context, and before the process starts threads that read the environment.
+void limit_software_gl(int threads);
 
 /// A context, current on this thread. "auto" takes the first backend that works and logs what it passed over; with a
 /// device, EGL. Throws Error: NoDevice, with every attempt and its reason; Usage for an unknown backend.

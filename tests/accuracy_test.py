@@ -69,6 +69,13 @@ def depths(folder):
         seen.add(keys)
     expect(len(seen) == 3, "formats have the same keys")
     expect(sent[0] > sent[1] > sent[2], f"bytes sent do not shrink: {sent}")
+    for how, said in ((("--depth-format", "24"), "raster (OpenGL alone rounds depths)"), (("--primary", "rays"), "rays (as asked)"),
+                      (("--primary", "raster"), "raster (as asked)")):
+        result = hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *how)
+        expect(f"primary: {said}\n" in result.stdout, f"{how}: {result.stdout} {result.stderr}")
+    chosen = {hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *how).stdout.split("primary: ")[1].split("\n")[0]
+              for how in ((), ("--ranks", "2", "--distribute", "sort-last"), ("--primary", "auto", "--threads", "1"))}
+    expect(len(chosen) == 1 and "(" in chosen.copy().pop(), f"the same picture's keys are made by {chosen}")
     result = hpr(folder, "render", SCENE, "--explain", "--depth-format", "24", "--primary", "rays")
     expect(result.returncode == 2 and "--primary raster" in result.stderr, f"depths of rays: {result.stderr}")
 

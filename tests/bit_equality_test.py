@@ -24,7 +24,7 @@ SCENE = "gen:gallery"
 SIZE = (1280, 1024) if FULL else (200, 88)
 FEW = ["--photons", "2000"]
 WAYS = {
-    "raster": FEW,
+    "raster": ["--primary", "raster", *FEW],
     "rays": ["--primary", "rays", *FEW],
     "gathered": ["--passes", "shadow,reflection,refraction,gather", "--spp", "3"],
     "all passes": ["--passes", "shadow,reflection,refraction,ambient-occlusion,photon", "--spp", "4", *FEW],

@@ -57,9 +57,10 @@ def names(spans):
 
 def pictures(folder):
     base = ("render", "gen:gallery", "--size", "200x130", "-o", "a.png", "--spp", "2")
-    hpr(folder, *base)
+    raster = (*base, "--primary", "raster")
+    hpr(folder, *raster)
     plain = (folder / "a.png").read_bytes()
-    alone = trace_of(folder, 1, *base, "--threads", "2")[0]
+    alone = trace_of(folder, 1, *raster, "--threads", "2")[0]
     expect((folder / "a.png").read_bytes() == plain, "a trace changes the picture")
     wanted = {"run", "load scene", "start OpenGL", "upload geometry", "prepare light", "build ray scene", "sample", "raster",
               "photons", "light", "light tile", "write picture"}
@@ -70,7 +71,7 @@ def pictures(folder):
     expect(tiles == sorted(2 * list(range(12))), f"tiles of 200x130, twice: {tiles}")
     expect({s["tid"] for s in alone if s["name"] == "light tile"} <= {0, 1}, "two threads light in other rows than 0 and 1")
 
-    ranks = trace_of(folder, 3, *base, "--ranks", "3", "--distribute", "sort-last", "--strategy", "binary-swap")
+    ranks = trace_of(folder, 3, *raster, "--ranks", "3", "--distribute", "sort-last", "--strategy", "binary-swap")
     expect((folder / "a.png").read_bytes() == plain, "a trace of 3 ranks changes the picture")
     for rank, spans in enumerate(ranks):
         expect({"raster", "composite", "exchange"} <= names(spans), f"rank {rank} does not composite: {names(spans)}")
@@ -78,6 +79,9 @@ def pictures(folder):
     expect("write picture" in names(ranks[0]) and "write picture" not in names(ranks[1]), "who writes the picture")
     rays = trace_of(folder, 1, *base, "--primary", "rays")[0]
     expect({"primary rays", "trace tile"} <= names(rays) and "raster" not in names(rays), f"by rays: {names(rays)}")
+    expect("start OpenGL" not in names(rays), "OpenGL starts for keys by rays")
+    named = trace_of(folder, 1, *base, "--primary", "rays", "--backend", "egl")[0]
+    expect("start OpenGL" in names(named), "a backend that is named is not tried")
     expect("path trace tile" in names(trace_of(folder, 1, *base, "--reference")[0]), "the reference traces no tile")
 
 

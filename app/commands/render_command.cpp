@@ -141,7 +141,7 @@ class RenderCommand final : public Command {
     check_checkpoints(globals);
   }
 
-  /// Measured again, the choice may be another one; a checkpoint says which it was.
+  /// On another machine, which has a GPU or has none, the choice may be another one; a checkpoint says which it was.
   [[nodiscard]] Primary primary_before(Communicator& comm) const {
     Primary primary = Primary::Auto;
     check_on_root(comm, [&] {
@@ -178,6 +178,7 @@ class RenderCommand final : public Command {
     const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
     const Blocks blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.frame.resolution_scale));
     FrameSettings chosen = settings.frame;
+    chosen.single_picture = sampling.goal.one();
     if (resume_ && chosen.primary == Primary::Auto) chosen.primary = primary_before(session.comm());
     FramePlan plan = plan_frame(session, chosen, blocks.views);
     plan.lit = !files_.picture.empty() || !report_.stats.empty();

@@ -41,7 +41,7 @@ std::vector<int> picture_owners(const Wall& wall, const std::vector<int>& owners
   return shown_by;
 }
 
-/// OpenGL needs other pictures than rays where screens are no planes, so the choice cannot be left to a measurement.
+/// OpenGL needs other pictures than rays where screens are no planes, so the choice is not left to choose_primary().
 FrameSettings settings_for(const Wall& wall, FrameSettings settings) {
   const bool curved = std::ranges::any_of(wall.screens, has_position_map);
   if (curved && settings.primary == Primary::Auto) settings.primary = Primary::Rays;
@@ -113,7 +113,7 @@ WallDriver::WallDriver(const WallJob& job, Session& session)
   manifest_.wall_hash = wall_.hash;
   manifest_.seed = job_.seed;
   manifest_.versions = {
-      {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl().description()}};
+      {"hpr", std::string(kVersion)}, {"commit", std::string(kCommit)}, {"gl", session.gl_description()}};
   take_over();
 }
 

@@ -165,6 +165,7 @@ ScaleInput BenchScaleCommand::make_input(const Globals& globals) const {
     throw Error(ExitCode::Usage, "bench scale draws the same frame at every size: --spp until a time makes others",
                 "write e.g. --spp 16");
   }
+  if (!input.settings.is_given("primary")) input.settings.frame.primary = Primary::Raster;
   if (input.settings.frame.primary == Primary::Auto) {
     throw Error(ExitCode::Usage,
                 "bench scale draws the same frame at every size: --primary auto may choose another way",
