@@ -189,6 +189,9 @@ Scene load_scene(const std::string& source, const RenderSettings& settings, cons
     scene.environment = load_environment(settings.environment, pictures);
     note_not_finite(printable(settings.environment), scene);
   }
+  if (settings.cull == Cull::None) {
+    for (Material& material : scene.materials) material.double_sided = true;
+  }
   if (settings.strict && scene.not_finite > 0) {
     const auto named = std::ranges::find_if(
         scene.warnings, [](const std::string& text) { return text.find("no finite numbers") != std::string::npos; });

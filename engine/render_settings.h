@@ -36,6 +36,10 @@ inline constexpr double kDefaultFovDegrees = 45.0;
 enum class Quality : std::uint8_t { Draft, Good, Best };
 inline constexpr std::array<std::string_view, 3> kQualityNames{"draft", "good", "best"};
 
+/// Which faces of single-sided materials are drawn: the front ones, as glTF has it, or all.
+enum class Cull : std::uint8_t { Gltf, None };
+inline constexpr std::array<std::string_view, 2> kCullNames{"gltf", "none"};
+
 /// How pictures are encoded for displays outside the job.
 struct LinkCodec {
   std::string name = "auto";
@@ -50,7 +54,8 @@ struct RenderSettings {
   Quality quality = Quality::Good;
   Sampling sampling;
   FrameSettings frame;
-  std::string environment;                          ///< see load_environment; empty: the scene's own
+  std::string environment;  ///< see load_environment; empty: the scene's own
+  Cull cull = Cull::Gltf;
   double exposure_stops = 0.0;                      ///< of display colors
   ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;

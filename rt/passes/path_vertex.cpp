@@ -144,6 +144,7 @@ RayRequest eye_ray(const View& view, const TileJob& job, double x, double y) {
   RayRequest request;
   request.origin = ray.origin + ray.direction * view.near_distance;
   request.direction = glm::normalize(ray.direction);
+  request.faces = Faces::Front;
   request.reach = view.orthographic ? view.far_distance - view.near_distance : std::numeric_limits<double>::infinity();
   return request;
 }
@@ -227,6 +228,13 @@ glm::dvec3 sky_along(const LightContext& context, const LobeRay& ray, const glm:
   return balance_heuristic(context, ray.pdf, light_pdf) * ray.throughput * context.lights.environment(direction);
 }
 
+/// Rays that carry the eye's look on by mirrors and glass see what it sees; those that gather light meet what light
+/// meets, and so do those in a solid.
+Faces faces_met(const PathVertex& from, const PassInfo& pass, const glm::dvec3& direction) {
+  const bool looks = !from.gathered && !pass.gathers_all_lobes;
+  return looks && !leads_into_solid(from.surface, from.material, direction) ? Faces::Front : Faces::Both;
+}
+
 /// Makes a ray per point of the wave that follows the lobe: buffers.following and buffers.requests.
 void make_lobe_rays(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
                     RayBuffers& buffers, PixelSums& sums) {
@@ -245,7 +253,8 @@ void make_lobe_rays(const LightContext& context, const Wavefront& wave, const Pa
     if (throughput == glm::dvec3(0.0)) continue;
     rays.push_back({&point, throughput, sample->pdf, sampler});
     buffers.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
-                                std::numeric_limits<double>::infinity(), nullptr, 0});
+                                std::numeric_limits<double>::infinity(), nullptr, 0,
+                                faces_met(point, pass, sample->direction)});
     sums.count_ray(point.pixel);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) buffers.requests[i].sampler = &rays[i].sampler;

@@ -31,7 +31,8 @@ struct PathScene {
   RaySpace space;
   Surfaces surfaces;
   PathSettings settings;
-  bool has_coverage = false;  ///< some material lets rays pass by its alpha
+  bool has_coverage = false;      ///< some material lets rays pass by its alpha
+  bool has_single_sided = false;  ///< some material shows its front alone
 };
 
 /// A path on its way from the eye: the ray it goes next, and what must be known of the place it comes from.
@@ -50,8 +51,11 @@ struct Path {
   Sampler sampler;
   std::uint32_t pixel = 0;
   int segments = 1;  ///< including the one ahead
-  int passed = 0;    ///< surfaces since the last scattering, by chance
-  Passed last;       ///< the last of the surfaces passed
+  bool looks =
+      true;  ///< came from the eye by lobes the passes follow alone: it meets what is seen, not what light meets
+  Faces faces = Faces::Front;
+  int passed = 0;  ///< surfaces since the last scattering, by chance
+  Passed last;     ///< the last of the surfaces passed
 };
 
 /// Light on its way to a path's surface, if nothing stands between.
@@ -120,6 +124,10 @@ double power_heuristic(double own, double other) {
   return 1.0 / (1.0 + ratio * ratio);
 }
 
+double sum_of(const glm::dvec3& v) {
+  return v.x + v.y + v.z;
+}
+
 double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
 }
@@ -175,6 +183,17 @@ glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size
   return fraction;
 }
 
+/// Splits what a path carries on by chance: into what comes by lobes the passes follow, the share `followed` of it, and
+/// the rest, which meet other faces. Returns whether it is the former, and weights the path's throughput by it.
+bool looks_on(Path& path, const glm::dvec3& followed) {
+  const double all = sum_of(path.throughput);
+  const double looking = all > 0.0 ? std::clamp(sum_of(path.throughput * followed) / all, 0.0, 1.0) : 0.0;
+  if (looking == 0.0 || looking == 1.0) return looking == 1.0;
+  const bool looks = path.sampler.one() < looking;
+  path.throughput *= looks ? followed / looking : (1.0 - followed) / (1.0 - looking);
+  return looks;
+}
+
 std::size_t choose_lobe(const std::array<double, kLobes.size()>& chances, double u) {
   std::size_t last = 0;
   for (std::size_t i = 0; i < chances.size(); ++i) {
@@ -219,7 +238,7 @@ void PathWavefront::trace_paths() {
   met_.clear();
   for (const auto& paths : paths_) {
     for (const Path& path : paths) {
-      batch_.push(shared_.space.from_world(path.origin), path.direction, path.reach * shared_.space.scale);
+      batch_.push(shared_.space.from_world(path.origin), path.direction, path.reach * shared_.space.scale, path.faces);
       if (shared_.has_coverage) met_.push_back(path.last);
     }
   }
@@ -325,12 +344,18 @@ void PathWavefront::scatter(Path& path, const SurfacePoint& point, const Materia
     if (!(scattered.pdf > 0.0)) return;
     const double cosine = std::abs(glm::dot(material.normal, sample->direction));
     path.throughput *= scattered.value * (cosine / scattered.pdf);
-    path.followed *= followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
+    glm::dvec3 followed = followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
+    if (path.looks && shared_.has_single_sided) {
+      path.looks = looks_on(path, followed);
+      followed = glm::dvec3(path.looks ? 1.0 : 0.0);
+    }
+    path.followed *= followed;
     path.pdf = scattered.pdf;
   }
   if (lobe == Lobe::Transmission) path.radiance_scale *= radiance_scale;
   if (!survives_roulette(path)) return;
   path.media = media_towards(path.media, point, material, sample->direction);
+  path.faces = path.looks && !leads_into_solid(point, material, sample->direction) ? Faces::Front : Faces::Both;
   path.origin = ray_origin(point, sample->direction);
   path.direction = sample->direction;
   path.reach = std::numeric_limits<double>::infinity();
@@ -542,13 +567,15 @@ void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const 
 }
 
 PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSampler& lights, PathSettings settings)
-    : state_(std::make_unique<State>(PathScene{.scene = scene,
-                                               .rays = rays,
-                                               .lights = lights,
-                                               .space = RaySpace(scene.bounds),
-                                               .surfaces = Surfaces(scene, RaySpace(scene.bounds)),
-                                               .settings = settings,
-                                               .has_coverage = has_coverage(scene)})) {}
+    : state_(std::make_unique<State>(
+          PathScene{.scene = scene,
+                    .rays = rays,
+                    .lights = lights,
+                    .space = RaySpace(scene.bounds),
+                    .surfaces = Surfaces(scene, RaySpace(scene.bounds)),
+                    .settings = settings,
+                    .has_coverage = has_coverage(scene),
+                    .has_single_sided = !std::ranges::all_of(scene.materials, shows_both_sides)})) {}
 PathTracer::~PathTracer() = default;
 PathTracer::PathTracer(PathTracer&&) noexcept = default;
 PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;

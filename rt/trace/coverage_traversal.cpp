@@ -12,7 +12,7 @@ namespace hpr {
 
 void CoverageTraversal::push(const RayRequest& ray, RayBatch& batch) const {
   // Space is scaled by a power of two, so an infinite reach stays one.
-  batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale);
+  batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale, ray.faces);
 }
 
 double CoverageTraversal::size_of(const glm::dvec3& position) const {

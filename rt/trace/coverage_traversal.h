@@ -31,6 +31,7 @@ struct RayRequest {
   double reach = 0.0;          ///< metres; infinite: as far as it goes
   Sampler* sampler = nullptr;  ///< decides whether it passes surfaces of partial coverage
   std::uint32_t owner = 0;     ///< whatever the caller needs to know it again
+  Faces faces = Faces::Both;   ///< that it meets
 };
 
 /// Memory of one thread, kept from call to call.

@@ -144,7 +144,7 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
     const glm::dmat3 linear(to_world);
     const glm::dmat3 scaled = linear / std::max(row_sum_norm(linear), 1e-300);
     placed_[i].normal_matrix = cofactors(scaled);
-    placed_[i].swaps_handedness = glm::determinant(scaled) < 0.0;
+    placed_[i].swaps_handedness = is_mirrored(scene.instances[i]);
     if (shared[i] == 0) continue;
     placed_[i].distortion = distortion(linear);
     placed_[i].reach = row_sum_norm(linear) * mesh_reach[scene.instances[i].mesh] +
