@@ -263,6 +263,7 @@ LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& position
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return LightSample{};
   sample.to_light = to_goal / sample.distance;
   sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, to_goal);
+  sample.offset = triangle.offset;
   if (sample.pdf > 0.0) sample.weight = radiance(triangle, at) / sample.pdf;
   return sample;
 }

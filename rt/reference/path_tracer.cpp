@@ -399,12 +399,12 @@ void PathWavefront::sample_light(Path& path, const SurfacePoint& point, const Ma
   if (!std::isfinite(light->distance)) return;
   // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies on
   // a surface is not hidden by it.
-  const glm::dvec3 goal = shared_.space.from_world(light->goal);
   const glm::dvec3 to_goal = light->goal - ray.origin;
   const double distance = glm::length(to_goal);
   if (distance > 0.0) ray.direction = to_goal / distance;
-  const double size = std::max(largest(glm::abs(goal)), 1.0) / shared_.space.scale;
-  ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
+  const double before =
+      kOriginSteps * kFloatStep * distance + std::max(light->offset, shared_.space.rounding_at(light->goal));
+  ray.reach = std::max(distance - before, 0.0);
 }
 
 bool PathWavefront::survives_roulette(Path& path) {

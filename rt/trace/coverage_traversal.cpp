@@ -15,11 +15,6 @@ void CoverageTraversal::push(const RayRequest& ray, RayBatch& batch) const {
   batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale, ray.faces);
 }
 
-double CoverageTraversal::size_of(const glm::dvec3& position) const {
-  const glm::dvec3 seen = space_.from_world(position);
-  return std::max({std::abs(seen.x), std::abs(seen.y), std::abs(seen.z), 1.0}) / space_.scale;
-}
-
 double CoverageTraversal::coverage_of(const SurfacePoint& point) const {
   return evaluate_alpha(scene_, scene_.materials[point.material], point.uv, point.color.a);
 }

@@ -71,9 +71,7 @@ class CoverageTraversal {
   /// Calls `visit` for every surface of partial coverage along each ray, nearest first, while it passes_on.
   void visit_alpha_tested(std::span<const RayRequest> rays, TraversalScratch& scratch, const Visit& visit) const;
 
-  /// Metres: the largest coordinate of a place as rays see it, which says what rounding it costs.
-  [[nodiscard]] double size_of(const glm::dvec3& position) const;
-
+  [[nodiscard]] const RaySpace& space() const { return space_; }
   [[nodiscard]] bool has_alpha_tested() const { return alpha_tested_ != nullptr; }
 
  private:

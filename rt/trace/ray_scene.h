@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
@@ -20,6 +21,14 @@
 struct RTCSceneTy;
 
 namespace hpr {
+
+/// One unit in the last place of a float near 1: what a coordinate may lose on its way into Embree.
+inline constexpr double kFloatStep = 1.1920928955078125e-7;
+
+/// How many such steps of what rounding acts on a ray's origin is moved off its surface. Measured over object radii of
+/// 1e-9 to 1e9 and offsets of the centre up to 1e4 radii: no surface hits itself (Embree's triangle test needs about
+/// three).
+inline constexpr double kOriginSteps = 4.0;
 
 /// The float coordinates rays are traced in: world metres relative to the scene's centre, scaled by a power of two so
 /// that the scene's radius lies in [1, 2). Both steps are done in double; the scale is exact, so a scene scaled by a
@@ -41,14 +50,13 @@ struct RaySpace {
   }
 
   [[nodiscard]] glm::dvec3 from_world(const glm::dvec3& world) const { return (world - origin) * scale; }
+
+  /// Metres, with a margin: what rounding a place's coordinates may move it by, seldom as much.
+  [[nodiscard]] double rounding_at(const glm::dvec3& world) const {
+    const glm::dvec3 from_origin = glm::abs(world - origin);
+    return kOriginSteps * kFloatStep * std::max({from_origin.x, from_origin.y, from_origin.z});
+  }
 };
-
-/// One unit in the last place of a float near 1: what a coordinate may lose on its way into Embree.
-inline constexpr double kFloatStep = 1.1920928955078125e-7;
-
-/// How many such steps a ray's origin is moved off its surface. Measured over object radii of 1e-9 to 1e9 and offsets
-/// of the centre up to 1e4 radii: no surface hits itself (Embree's triangle test needs about three).
-inline constexpr double kOriginSteps = 4.0;
 
 /// Denormal numbers read and written as zero while it lives, as Embree advises; the thread's own mode returns after.
 class DenormalsAsZero {
