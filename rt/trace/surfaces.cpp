@@ -211,6 +211,18 @@ double Surfaces::offset_of(const WorldTriangle& triangle) const {
   return std::max(kStep * (along < most ? along : most), kMinOffset / space_.scale);
 }
 
+double Surfaces::coplanar_tolerance(const WorldTriangle& triangle, const SurfacePoint& point) const {
+  const Instance& instance = scene_.instances[triangle.instance];
+  const Mesh& mesh = scene_.mesh_of(instance);
+  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  glm::dvec3 farthest(0.0);
+  for (int corner = 0; corner < 3; ++corner) {
+    farthest = glm::max(farthest, glm::abs(glm::dvec3(mesh.positions[corners[corner]])));
+  }
+  const glm::dvec3 stored = magnitudes(glm::dmat3(instance.to_world)) * farthest;
+  return point.offset + kOriginSteps * kFloatStep * glm::dot(glm::abs(triangle.normal), stored);
+}
+
 void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
   constexpr std::size_t kAhead = 64;
   std::array<const Mesh*, kAhead> meshes;

@@ -84,6 +84,10 @@ class Surfaces {
   [[nodiscard]] SurfacePoint meet(const WorldTriangle& triangle, const glm::dvec3& origin,
                                   const glm::dvec3& direction) const;
 
+  /// Metres by which two surfaces that a file puts in one plane may lie apart where they meet, for each of them: what
+  /// the rounding of the mesh's own coordinates comes to along the normal, and what SurfacePoint::offset is for.
+  [[nodiscard]] double coplanar_tolerance(const WorldTriangle& triangle, const SurfacePoint& point) const;
+
  private:
   /// Barycentric coordinates of a triangle's corners.
   using Weights = std::array<double, 3>;
