@@ -170,7 +170,7 @@ std::optional<double> open_sky(Session& session, const RaySettings& settings, st
   const Surfaces surfaces(session.scene(), space);
   const std::vector<Ray> rays_from_eye = camera_rays(views);
   RayBatch rays;
-  for (const Ray& ray : rays_from_eye) rays.push(space.from_world(ray.origin), ray.direction, kInfinity);
+  for (const Ray& ray : rays_from_eye) rays.push(space.from_world(ray.origin), ray.direction, kInfinity, Faces::Front);
   std::vector<std::uint32_t> seen(rays_from_eye.size());
   std::vector<std::uint8_t> blocked;
   scene.for_each(1, 1, [&](std::size_t) {

@@ -194,6 +194,9 @@ Scene load_scene(const std::string& source, const RenderSettings& settings, cons
                  const ImageLimits& pictures) {
   Scene scene = load_scene(source, limits, settings.scene);
   set_environment(settings.environment, pictures, scene);
+  if (settings.cull == Cull::None) {
+    for (Material& material : scene.materials) material.double_sided = true;
+  }
   if (settings.strict && scene.not_finite > 0) {
     const auto named = std::ranges::find_if(
         scene.warnings, [](const std::string& text) { return text.find("no finite numbers") != std::string::npos; });

@@ -41,6 +41,10 @@ inline constexpr std::string_view kNoEnvironment = "none";
 enum class Quality : std::uint8_t { Draft, Good, Best };
 inline constexpr std::array<std::string_view, 3> kQualityNames{"draft", "good", "best"};
 
+/// Which faces of single-sided materials are drawn: the front ones, as glTF has it, or all.
+enum class Cull : std::uint8_t { Gltf, None };
+inline constexpr std::array<std::string_view, 2> kCullNames{"gltf", "none"};
+
 /// How pictures are encoded for displays outside the job.
 struct LinkCodec {
   std::string name = "auto";
@@ -57,6 +61,7 @@ struct RenderSettings {
   Sampling sampling;
   FrameSettings frame;
   std::string environment;  ///< see load_environment; empty or kNoEnvironment: the scene's own
+  Cull cull = Cull::Gltf;
   DisplaySettings display;
   ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;

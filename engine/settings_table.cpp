@@ -285,6 +285,12 @@ std::vector<Setting> make_table() {
                            [](Settings& s) -> std::string& { return s.environment; }),
        .decides_bits = false,
        .fixed_in_session = true},
+      {.name = "cull",
+       .help = "gltf: who looks at a single-sided material from behind looks through; none: all have two sides",
+       .value = choice(kCullNames, [](Settings& s) -> Cull& { return s.cull; }),
+       .initial = "gltf",
+       .decides_bits = false,
+       .fixed_in_session = true},
 
       // How light is computed, the settings that move most first.
       {.name = "quality",

@@ -118,6 +118,19 @@ void cull_piece(const Geometry& geometry, const Piece& piece, const Culler& cull
   }
 }
 
+Winding winding_of(const Scene& scene, const Instance& instance) {
+  if (shows_both_sides(scene.materials[scene.mesh_of(instance).material])) return Winding::Any;
+  return is_mirrored(instance) ? Winding::Clockwise : Winding::Counterclockwise;
+}
+
+/// Adds the last command of the list to its spans.
+void append_span(DrawList& list, Winding winding) {
+  if (list.spans.empty() || list.spans.back().winding != winding) {
+    list.spans.push_back({winding, list.commands.size() - 1, 0});
+  }
+  ++list.spans.back().count;
+}
+
 }  // namespace
 
 Culler::Culler(const glm::dmat4& clip_from_mesh, const View& view, const Rect& part)
@@ -247,6 +260,7 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View
     const auto record = static_cast<std::uint32_t>(list.records.size());
     list.commands.push_back({(run.last - run.first) * 3, 1, run.slot * 3, 0, record});
     list.records.push_back({rounded(matrix_of(run.instance)), scene.instances[run.instance].first_surface, {}});
+    append_span(list, winding_of(scene, scene.instances[run.instance]));
   }
   return list;
 }

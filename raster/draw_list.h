@@ -64,9 +64,20 @@ struct DrawRecord {
   std::array<std::uint32_t, 3> padding{};
 };
 
+/// Which triangles are drawn, by how they are wound on the screen.
+enum class Winding : std::uint8_t { Any, Counterclockwise, Clockwise };
+
+/// Commands [first, first + count) of a list, drawn alike.
+struct DrawSpan {
+  Winding winding = Winding::Any;
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
 /// What to draw into one rectangle: commands in ascending order of surface id.
 struct DrawList {
   std::vector<DrawCommand> commands;
+  std::vector<DrawSpan> spans;  ///< all commands, in their order; neighbors differ in their winding
   std::vector<DrawRecord> records;
   Rect pixels;  ///< of the part; nothing outside it can be drawn
   std::uint64_t triangles_drawn = 0;

@@ -31,6 +31,7 @@ namespace hpr {
   X(CreateRenderbuffers, PFNGLCREATERENDERBUFFERSPROC)                   \
   X(CreateShader, PFNGLCREATESHADERPROC)                                 \
   X(CreateVertexArrays, PFNGLCREATEVERTEXARRAYSPROC)                     \
+  X(CullFace, PFNGLCULLFACEPROC)                                         \
   X(DeleteBuffers, PFNGLDELETEBUFFERSPROC)                               \
   X(DeleteFramebuffers, PFNGLDELETEFRAMEBUFFERSPROC)                     \
   X(DeleteProgram, PFNGLDELETEPROGRAMPROC)                               \
@@ -45,6 +46,7 @@ namespace hpr {
   X(Enable, PFNGLENABLEPROC)                                             \
   X(EnableVertexArrayAttrib, PFNGLENABLEVERTEXARRAYATTRIBPROC)           \
   X(Finish, PFNGLFINISHPROC)                                             \
+  X(FrontFace, PFNGLFRONTFACEPROC)                                       \
   X(GetError, PFNGLGETERRORPROC)                                         \
   X(GetIntegerv, PFNGLGETINTEGERVPROC)                                   \
   X(GetProgramInfoLog, PFNGLGETPROGRAMINFOLOGPROC)                       \

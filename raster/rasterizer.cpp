@@ -165,12 +165,12 @@ class Rasterizer::Implementation {
 
   /// Everything that others who use the context may have changed.
   void set_state(const GlFunctions& gl) const {
-    constexpr std::array<GLenum, 9> kOff{GL_CULL_FACE,     GL_BLEND,  GL_STENCIL_TEST,       GL_POLYGON_OFFSET_FILL,
-                                         GL_DEPTH_CLAMP,   GL_DITHER, GL_RASTERIZER_DISCARD, GL_PRIMITIVE_RESTART,
-                                         GL_COLOR_LOGIC_OP};
+    constexpr std::array<GLenum, 8> kOff{GL_BLEND,  GL_STENCIL_TEST,       GL_POLYGON_OFFSET_FILL, GL_DEPTH_CLAMP,
+                                         GL_DITHER, GL_RASTERIZER_DISCARD, GL_PRIMITIVE_RESTART,   GL_COLOR_LOGIC_OP};
     for (const GLenum off : kOff) {
       gl.Disable(off);
     }
+    gl.CullFace(GL_BACK);
     gl.PolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl.DepthRangef(0.0F, 1.0F);
@@ -180,6 +180,19 @@ class Rasterizer::Implementation {
     gl.UseProgram(program_.name());
     gl.BindVertexArray(vertex_array_.name());
     gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
+  }
+
+  /// One after the other, as surfaces of equal depth are told apart by their order.
+  static void draw_span(const GlFunctions& gl, const DrawSpan& span) {
+    if (span.winding == Winding::Any) {
+      gl.Disable(GL_CULL_FACE);
+    } else {
+      gl.Enable(GL_CULL_FACE);
+      gl.FrontFace(span.winding == Winding::Clockwise ? GL_CW : GL_CCW);
+    }
+    gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
+                                 reinterpret_cast<const void*>(span.first * sizeof(DrawCommand)),
+                                 static_cast<GLsizei>(span.count), sizeof(DrawCommand));
   }
 
   void draw_part(const View& view, std::size_t screen, const Rect& part, TileLayer<Key>& layer) {
@@ -201,8 +214,7 @@ class Rasterizer::Implementation {
     set_state(gl);
     upload(gl, records_, list.records, GL_STREAM_DRAW);
     upload(gl, commands_, list.commands, GL_STREAM_DRAW);
-    gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(list.commands.size()),
-                                 sizeof(DrawCommand));
+    for (const DrawSpan& span : list.spans) draw_span(gl, span);
     gl.Finish();
     lap(stats_.draw_ms);
     target_.read(view.size(), list.pixels);

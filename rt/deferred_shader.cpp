@@ -199,7 +199,7 @@ void DeferredShader::State::build_reference() {
   own.terminator_fix = settings.terminator_fix;
   own.spread_in_pixel = false;  // views are jittered
   own.threads = settings.threads;
-  reference.emplace(scene, whole_scene(), lights, own);
+  reference.emplace(scene, *rays, lights, own);
 }
 
 const RayScene& DeferredShader::State::whole_scene() {

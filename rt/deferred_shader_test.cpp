@@ -360,5 +360,35 @@ TEST(DeferredShader, TheReferenceLiftsShadowRaysAsSettingsSay) {
   EXPECT_GT(sum(true), 1.1 * sum(false));
 }
 
+/// What the ground shows a centimetre under a roof that hides a lamp, or, without a roof, in its light.
+double seen_on_ground(double half_size, bool has_roof, const glm::dvec3& lamp, const RaySettings& settings) {
+  Scene scene;
+  const auto size = static_cast<float>(half_size);
+  test::add_material(scene, test::diffuse());
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-size, 0, -size}, {0, 0, 2 * size}, {2 * size, 0, 0}, 0)));
+  if (has_roof) {
+    test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, 0.01F, -1}, {0, 0, 2}, {2, 0, 0}, 0)));
+  }
+  Light light;
+  light.position = lamp;
+  scene.lights = {light};
+  finish_scene(scene);
+  const View view = test::view_from({0.1, 0.006, 0.2}, {0.1, 0, 0.2}, {3, 3}, scene, 0.5, {1, 0, 0});
+  return test::mean(test::shade(scene, view, settings).image);
+}
+
+TEST(DeferredShader, ContactShadowsStayHoweverWideTheGroundIs) {
+  for (const RaySettings& settings :
+       {RaySettings{.passes = {PassId::Shadow}}, RaySettings{.max_depth = 2, .reference = true}}) {
+    for (const double half_size : {10.0, 1e3, 1e6}) {
+      // High above, and close above the roof: neither end of a shadow ray lies past it.
+      for (const glm::dvec3& lamp : {glm::dvec3(2, 3, 1), glm::dvec3(0.1, 0.05, 0.2)}) {
+        EXPECT_EQ(seen_on_ground(half_size, true, lamp, settings), 0.0) << half_size << ' ' << lamp.y;
+        EXPECT_GT(seen_on_ground(half_size, false, lamp, settings), 0.01) << half_size << ' ' << lamp.y;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hpr

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 
 #include "core/error.h"
@@ -43,6 +44,15 @@ SurfaceLocation locate_surface(const Scene& scene, std::uint32_t surface) {
   const auto after = std::ranges::upper_bound(scene.instances, surface, {}, &Instance::first_surface);
   const auto index = static_cast<std::uint32_t>(after - scene.instances.begin()) - 1;
   return {index, surface - scene.instances[index].first_surface};
+}
+
+bool is_mirrored(const Instance& instance) {
+  const glm::dmat3 linear(instance.to_world);
+  double largest = 1e-300;  // scaled by it, tiny and huge matrices keep the sign of their determinant
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(linear[column][row]));
+  }
+  return glm::determinant(linear / largest) < 0.0;
 }
 
 glm::dvec3 world_position(const Instance& instance, const glm::vec3& position) {

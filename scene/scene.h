@@ -66,9 +66,16 @@ struct Material {
   float attenuation_distance = std::numeric_limits<float>::infinity();
   AlphaMode alpha_mode = AlphaMode::Opaque;
   float alpha_cutoff = 0.5F;
-  bool double_sided = false;
+  /// Where false, who looks from behind looks through (see shows_both_sides). glTF's own default is false.
+  bool double_sided = true;
   bool unlit = false;  ///< shows its base colour, whatever the light
 };
+
+/// Whether a material is seen from behind its faces too. The wall of a volume always is: KHR_materials_volume gives
+/// `doubleSided` no effect there, and who looks out of glass looks at its faces from behind.
+[[nodiscard]] inline bool shows_both_sides(const Material& material) {
+  return material.double_sided || material.thickness > 0.0F;
+}
 
 /// Triangles of one material in their own coordinates. All vertex data are finite, all indices in range.
 struct Mesh {
@@ -179,6 +186,10 @@ struct Scene {
 
   [[nodiscard]] const Mesh& mesh_of(const Instance& instance) const { return meshes[instance.mesh]; }
 };
+
+/// Whether an instance turns the winding of its triangles round: its matrix has a negative determinant. A front face is
+/// wound counterclockwise in the mesh's own coordinates, and so clockwise in the world where this is true.
+[[nodiscard]] bool is_mirrored(const Instance& instance);
 
 /// Surface ids [first, last).
 struct SurfaceRange {

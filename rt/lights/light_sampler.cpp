@@ -121,7 +121,7 @@ void LightSampler::sum_powers() {
     add(watts, watts);
   }
   for (std::size_t i = 0; i < triangles_.size(); ++i) {
-    add(2.0 * kPi * triangles_[i].area * triangles_[i].brightness, mean_of(triangles_.power(i)));
+    add(triangles_[i].sides() * kPi * triangles_[i].area * triangles_[i].brightness, mean_of(triangles_.power(i)));
   }
   if (environment_) {
     const double watts = 4.0 * kPi * kPi * lit_.radius * lit_.radius * mean_of(environment_->mean());

@@ -19,6 +19,7 @@ struct LightSample {
                               ///< the probability it was chosen with: times f and the cosine gives reflected radiance
   double pdf = 0.0;           ///< per solid angle, choice included; 0 for lights rays cannot meet
   glm::dvec3 goal{0.0};       ///< the light's place, world; meaningful at finite distance
+  double offset = 0.0;        ///< metres before the goal in which its own surface may be met
   bool casts_shadows = true;  ///< false: nothing can stand between (the headlight)
 };
 

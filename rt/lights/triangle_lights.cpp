@@ -184,6 +184,8 @@ TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
       light.area = 0.5 * glm::length(glm::cross(world.e1, world.e2));
       if (!(light.area > 0.0) || !std::isfinite(light.area) || world.normal == glm::dvec3(0.0)) continue;
       light.offset = world.offset;
+      light.two_sided = shows_both_sides(scene.materials[mesh.material]);
+      if (!light.two_sided && is_mirrored(scene.instances[i])) light.normal = -light.normal;
       light.surface = world.surface;
       light.instance = static_cast<std::uint32_t>(i);
       light.index = static_cast<std::uint32_t>(t);
@@ -250,6 +252,7 @@ std::optional<std::size_t> TriangleLights::find(std::uint32_t surface) const {
 
 LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& position, const glm::dvec2& u) const {
   const TriangleLight& triangle = triangles_[index];
+  if (!triangle.shines_on(position)) return LightSample{};
   const SphericalTriangle seen(position, triangle.v0, triangle.e1, triangle.e2);
   const bool by_angle = seen.can_sample();
   const glm::dvec2 at = by_angle ? met_at(triangle, position, seen.sample(u)) : uniform_in_triangle(u);
@@ -260,12 +263,14 @@ LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& position
   if (!(sample.distance > 0.0) || !std::isfinite(sample.distance)) return LightSample{};
   sample.to_light = to_goal / sample.distance;
   sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, to_goal);
+  sample.offset = triangle.offset;
   if (sample.pdf > 0.0) sample.weight = radiance(triangle, at) / sample.pdf;
   return sample;
 }
 
 double TriangleLights::pdf(std::size_t index, const glm::dvec3& position, const glm::dvec3& point) const {
   const TriangleLight& triangle = triangles_[index];
+  if (!triangle.shines_on(position)) return 0.0;
   const SphericalTriangle seen(position, triangle.v0, triangle.e1, triangle.e2);
   return seen.can_sample() ? 1.0 / seen.solid_angle() : area_pdf(triangle, point - position);
 }
@@ -276,15 +281,16 @@ PhotonStart TriangleLights::emit(std::size_t index, double u_side, const glm::dv
   const glm::dvec2 at = uniform_in_triangle(u_place);
   PhotonStart start;
   start.origin = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
-  start.direction = warp::cosine_lobe(u_side < 0.5 ? triangle.normal : -triangle.normal, u_direction);
-  start.flux = 2.0 * std::numbers::pi * triangle.area * radiance(triangle, at);
+  const bool is_front = !triangle.two_sided || u_side < 0.5;
+  start.direction = warp::cosine_lobe(is_front ? triangle.normal : -triangle.normal, u_direction);
+  start.flux = triangle.sides() * std::numbers::pi * triangle.area * radiance(triangle, at);
   start.surface = triangle.surface;
   start.offset = triangle.offset;
   return start;
 }
 
 glm::dvec3 TriangleLights::power(std::size_t index) const {
-  return 2.0 * std::numbers::pi * triangles_[index].area * triangles_[index].mean;
+  return triangles_[index].sides() * std::numbers::pi * triangles_[index].area * triangles_[index].mean;
 }
 
 LightBounds TriangleLights::bounds(std::size_t index) const {
@@ -296,7 +302,7 @@ LightBounds TriangleLights::bounds(std::size_t index) const {
   bounds.high = glm::max(triangle.v0, glm::max(v1, v2));
   bounds.strength = triangle.brightness * triangle.area;
   bounds.axis = triangle.normal;
-  bounds.two_sided = true;
+  bounds.two_sided = triangle.two_sided;
   return bounds;
 }
 

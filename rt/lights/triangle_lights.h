@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -36,12 +37,12 @@ class SphericalTriangle {
   double below_cos_c_ = 0;  ///< 1 - cos of the arc from a to b
 };
 
-/// A triangle of the scene that emits, from both its sides: that is how the emission of surfaces is shown.
+/// A triangle of the scene that emits, from the sides that its material shows.
 struct TriangleLight {
   glm::dvec3 v0{0.0};
   glm::dvec3 e1{0.0};
   glm::dvec3 e2{0.0};
-  glm::dvec3 normal{0.0};   ///< unit length
+  glm::dvec3 normal{0.0};   ///< unit length; of one that emits from its front alone, on that side
   double area = 0.0;        ///< m^2
   double offset = 0.0;      ///< metres by which ray origins must leave it
   glm::dvec3 mean{0.0};     ///< radiance over its area; an estimate where it is textured
@@ -49,6 +50,13 @@ struct TriangleLight {
   std::uint32_t surface = 0;
   std::uint32_t instance = 0;
   std::uint32_t index = 0;  ///< in the instance's mesh
+  bool two_sided = true;
+
+  /// Whether a place lies where it emits to.
+  [[nodiscard]] bool shines_on(const glm::dvec3& position) const {
+    return two_sided || glm::dot(position - v0, normal) > 0.0;
+  }
+  [[nodiscard]] double sides() const { return two_sided ? 2.0 : 1.0; }
 };
 
 /// Every triangle that emits, sampled by the solid angle it is seen under (Arvo, "Stratified Sampling of Spherical
@@ -67,11 +75,11 @@ class TriangleLights {
   /// Per solid angle: the density with which sample() picks the direction to `point` of the triangle.
   [[nodiscard]] double pdf(std::size_t triangle, const glm::dvec3& position, const glm::dvec3& point) const;
 
-  /// A photon, uniform over area and with a cosine lobe, from the front for `u_side` below a half. The mean of its flux
-  /// is the triangle's power.
+  /// A photon, uniform over area and with a cosine lobe; of two sides, from the front for `u_side` below a half. The
+  /// mean of its flux is the triangle's power.
   [[nodiscard]] PhotonStart emit(std::size_t triangle, double u_side, const glm::dvec2& u_place,
                                  const glm::dvec2& u_direction) const;
-  /// Watts of both sides.
+  /// Watts of all sides it emits from.
   [[nodiscard]] glm::dvec3 power(std::size_t triangle) const;
   [[nodiscard]] LightBounds bounds(std::size_t triangle) const;
 

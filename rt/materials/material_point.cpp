@@ -181,6 +181,8 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
     const double open = texel(material.occlusion_texture, Encoding::Linear).r;
     point.occlusion = 1.0 + static_cast<double>(material.occlusion_strength) * (open - 1.0);
   }
+  // What is not there for who looks from behind sends no light there either.
+  if (surface.inside && !shows_both_sides(material)) point.emission = glm::dvec3(0.0);
   if (!(material.transmission > 0.0F)) return point;
   double transmission = material.transmission;
   if (material.transmission_texture.present()) {

@@ -49,6 +49,12 @@ struct Media {
   return back ? media : Media{material.absorption, media.here};
 }
 
+/// Whether `direction` leads from `point` into the solid it bounds, by refraction or by reflection from within.
+[[nodiscard]] inline bool leads_into_solid(const SurfacePoint& point, const MaterialPoint& material,
+                                           const glm::dvec3& direction) {
+  return material.solid && (glm::dot(direction, point.geometric_normal) > 0.0) == point.inside;
+}
+
 /// The transmittance from a light `metres` away to `point`. Infinite distances count as 1: what
 /// they lead through has no far wall, or their shadow rays find it.
 [[nodiscard]] glm::dvec3 transmittance_to_light(const Media& media, const SurfacePoint& point,

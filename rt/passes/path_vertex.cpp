@@ -80,17 +80,17 @@ class PrimaryVertices {
   void trace_alpha_tested() {
     left_.assign(kTilePixels, 1.0);
     buffers_.requests.clear();
+    std::vector<SurfacePlane>& ends = buffers_.scratch.ends;
+    ends.clear();
     WorldTriangle triangle;
     for (int y = rows_.first; y < rows_.end; ++y) {
       for (int x = 0; x < job_.rect.width(); ++x) {
         const auto pixel = static_cast<std::uint32_t>(y * kTileSide + x);
         if (!job_.wants(pixel)) continue;
-        const Ray ray = ray_of(x, y);
         RayRequest request = eye_ray(*job_.view, job_, x + 0.5, y + 0.5);
+        ends.emplace_back();
         if (job_.keys[pixel] != kNoKey) {
-          context_.surfaces.load(key_surface(job_.keys[pixel]), triangle);
-          const SurfacePoint behind = context_.surfaces.meet(triangle, ray.origin, ray.direction);
-          request.reach = std::max(0.0, glm::dot(behind.position - request.origin, request.direction));
+          ends.back() = context_.rays->plane_at(key_surface(job_.keys[pixel]), request, triangle);
         }
         request.owner = pixel;
         buffers_.requests.push_back(request);
@@ -99,23 +99,25 @@ class PrimaryVertices {
     }
     buffers_.counts.primary += buffers_.requests.size();
     std::vector<RayRequest> rays = std::move(buffers_.requests);
-    context_.rays->visit_alpha_tested(rays, buffers_.scratch,
-                                      [&](std::size_t i, const SurfacePoint& surface, double coverage) {
-                                        const std::uint32_t pixel = rays[i].owner;
-                                        const int x = static_cast<int>(pixel) % kTileSide;
-                                        const int y = static_cast<int>(pixel) / kTileSide;
-                                        Sampler sampler = sampler_of(context_, job_, x, y).branch(surface.surface);
-                                        const double covered = left_[pixel] * coverage;
-                                        const double fraction = covered * russian_roulette_weight(covered, sampler);
-                                        if (fraction > 0.0) {
-                                          PathVertex& point = points_.emplace_back();
-                                          point.surface = surface;
-                                          start_vertex(context_, job_, x, y, fraction, point);
-                                        }
-                                        left_[pixel] *= 1.0 - coverage;
-                                        left_[pixel] *= russian_roulette_weight(left_[pixel], sampler);
-                                        return left_[pixel] > 0.0;
-                                      });
+    context_.rays->visit_alpha_tested(
+        rays, buffers_.scratch,
+        [&](std::size_t i, const SurfacePoint& surface, double coverage) {
+          const std::uint32_t pixel = rays[i].owner;
+          const int x = static_cast<int>(pixel) % kTileSide;
+          const int y = static_cast<int>(pixel) / kTileSide;
+          Sampler sampler = sampler_of(context_, job_, x, y).branch(surface.surface);
+          const double covered = left_[pixel] * coverage;
+          const double fraction = covered * russian_roulette_weight(covered, sampler);
+          if (fraction > 0.0) {
+            PathVertex& point = points_.emplace_back();
+            point.surface = surface;
+            start_vertex(context_, job_, x, y, fraction, point);
+          }
+          left_[pixel] *= 1.0 - coverage;
+          left_[pixel] *= russian_roulette_weight(left_[pixel], sampler);
+          return left_[pixel] > 0.0;
+        },
+        ends);
     buffers_.requests = std::move(rays);
   }
 
@@ -144,6 +146,7 @@ RayRequest eye_ray(const View& view, const TileJob& job, double x, double y) {
   RayRequest request;
   request.origin = ray.origin + ray.direction * view.near_distance;
   request.direction = glm::normalize(ray.direction);
+  request.faces = Faces::Front;
   request.reach = view.orthographic ? view.far_distance - view.near_distance : std::numeric_limits<double>::infinity();
   return request;
 }
@@ -227,6 +230,13 @@ glm::dvec3 sky_along(const LightContext& context, const LobeRay& ray, const glm:
   return balance_heuristic(context, ray.pdf, light_pdf) * ray.throughput * context.lights.environment(direction);
 }
 
+/// Rays that carry the eye's look on by mirrors and glass see what it sees; those that gather light meet what light
+/// meets, and so do those in a solid.
+Faces faces_met(const PathVertex& from, const PassInfo& pass, const glm::dvec3& direction) {
+  const bool looks = !from.gathered && !pass.gathers_all_lobes;
+  return looks && !leads_into_solid(from.surface, from.material, direction) ? Faces::Front : Faces::Both;
+}
+
 /// Makes a ray per point of the wave that follows the lobe: buffers.following and buffers.requests.
 void make_lobe_rays(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
                     RayBuffers& buffers, PixelSums& sums) {
@@ -245,7 +255,8 @@ void make_lobe_rays(const LightContext& context, const Wavefront& wave, const Pa
     if (throughput == glm::dvec3(0.0)) continue;
     rays.push_back({&point, throughput, sample->pdf, sampler});
     buffers.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
-                                std::numeric_limits<double>::infinity(), nullptr, 0});
+                                std::numeric_limits<double>::infinity(), nullptr, 0,
+                                faces_met(point, pass, sample->direction)});
     sums.count_ray(point.pixel);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) buffers.requests[i].sampler = &rays[i].sampler;

@@ -48,8 +48,9 @@ class ShadowPass final : public Pass {
     // on a surface is not hidden by it.
     const glm::dvec3 to_goal = light.goal - ray.origin;
     const double distance = glm::length(to_goal);
-    const double step = kOriginSteps * kFloatStep;
-    ray.reach = std::max(distance * (1.0 - step) - step * context.rays->size_of(light.goal), 0.0);
+    const double before =
+        kOriginSteps * kFloatStep * distance + std::max(light.offset, context.rays->space().rounding_at(light.goal));
+    ray.reach = std::max(distance - before, 0.0);
     if (distance > 0.0) ray.direction = to_goal / distance;
     return ray;
   }

@@ -182,7 +182,7 @@ void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double 
     if (begin->surface != kNoSurface) {
       surfaces_.load(begin->surface, block.triangle);
       const double side = glm::dot(block.triangle.normal, begin->direction) < 0.0 ? -1.0 : 1.0;
-      origin += side * begin->offset * block.triangle.normal;
+      origin += side * std::max(begin->offset, space_.rounding_at(origin)) * block.triangle.normal;
     }
     flight.origin = space_.from_world(origin);
     flight.photon = static_cast<std::uint32_t>(i);

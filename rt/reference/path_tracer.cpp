@@ -16,7 +16,6 @@
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/photons/photon_query.h"
-#include "rt/trace/coverage_traversal.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 
@@ -26,12 +25,12 @@ namespace {
 /// What all paths share.
 struct PathScene {
   const Scene& scene;
-  const RayScene& rays;
+  const CoverageTraversal& rays;
   const LightSampler& lights;
   RaySpace space;
   Surfaces surfaces;
   PathSettings settings;
-  bool has_coverage = false;  ///< some material lets rays pass by its alpha
+  bool has_single_sided = false;  ///< some material shows its front alone
 };
 
 /// A path on its way from the eye: the ray it goes next, and what must be known of the place it comes from.
@@ -49,9 +48,9 @@ struct Path {
   Media media;                  ///< that the ray goes through
   Sampler sampler;
   std::uint32_t pixel = 0;
-  int segments = 1;  ///< including the one ahead
-  int passed = 0;    ///< surfaces since the last scattering, by chance
-  Passed last;       ///< the last of the surfaces passed
+  int segments = 1;   ///< including the one ahead
+  bool looks = true;  ///< from the eye by followed lobes alone: it meets what is seen, not what light meets
+  Faces faces = Faces::Front;
 };
 
 /// Light on its way to a path's surface, if nothing stands between.
@@ -61,8 +60,6 @@ struct ShadowRay {
   double reach = 0.0;        ///< metres
   glm::dvec3 radiance{0.0};  ///< what reaches the pixel
   std::uint32_t pixel = 0;
-  int passed = 0;  ///< surfaces, by their coverage
-  Passed last;     ///< the last of the surfaces passed
 };
 
 /// The paths of some pixels, all in step: each step traces the rays of every path sorted by the lobe that sent them,
@@ -86,10 +83,7 @@ class PathWavefront {
   static std::size_t kind_of(Lobe lobe) { return 1 + static_cast<std::size_t>(lobe); }
 
   void trace_paths();
-  void arrive(Path& path, std::size_t kind, const Passed& met);
-  /// Finds the hits of the batch's rays. Where some materials let rays pass, met_ says what each has passed, and then
-  /// what it met.
-  void find_hits();
+  void arrive(Path& path, std::uint32_t surface);
   void miss(const Path& path);
   void add_emission(const Path& path, const SurfacePoint& point, std::uint32_t surface, const glm::dvec3& emission);
   void scatter(Path& path, const SurfacePoint& point, const MaterialPoint& material);
@@ -97,7 +91,6 @@ class PathWavefront {
                     const std::array<double, kLobes.size()>& chances);
   bool survives_roulette(Path& path);
   void trace_shadows();
-  void trace_through_coverage();
 
   const PathScene& shared_;
   const View* view_ = nullptr;
@@ -106,10 +99,10 @@ class PathWavefront {
   std::vector<ShadowRay> shadows_;
   std::vector<glm::dvec3> radiance_;
   PathCounts counts_;
-  RayBatch batch_;
+  std::vector<RayRequest> requests_;
   std::vector<std::uint32_t> hits_;
-  std::vector<Passed> met_;  ///< by the same rays; only where some materials let rays pass
-  std::vector<std::uint8_t> blocked_;
+  std::vector<float> passed_;  ///< per shadow ray: the share of its light that gets through
+  TraversalScratch scratch_;
   WorldTriangle triangle_;
 };
 
@@ -118,6 +111,10 @@ class PathWavefront {
 double power_heuristic(double own, double other) {
   const double ratio = other / own;
   return 1.0 / (1.0 + ratio * ratio);
+}
+
+double sum_of(const glm::dvec3& v) {
+  return v.x + v.y + v.z;
 }
 
 double largest(const glm::dvec3& v) {
@@ -175,6 +172,17 @@ glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size
   return fraction;
 }
 
+/// Splits what a path carries on by chance: into what comes by lobes the passes follow, the share `followed` of it, and
+/// the rest, which meet other faces. Returns whether it is the former, and weights the path's throughput by it.
+bool looks_on(Path& path, const glm::dvec3& followed) {
+  const double all = sum_of(path.throughput);
+  const double looking = all > 0.0 ? std::clamp(sum_of(path.throughput * followed) / all, 0.0, 1.0) : 0.0;
+  if (looking == 0.0 || looking == 1.0) return looking == 1.0;
+  const bool looks = path.sampler.one() < looking;
+  path.throughput *= looks ? followed / looking : (1.0 - followed) / (1.0 - looking);
+  return looks;
+}
+
 std::size_t choose_lobe(const std::array<double, kLobes.size()>& chances, double u) {
   std::size_t last = 0;
   for (std::size_t i = 0; i < chances.size(); ++i) {
@@ -206,39 +214,31 @@ void PathWavefront::run() {
     trace_shadows();
     std::swap(paths_, next_);
   }
-}
-
-void PathWavefront::find_hits() {
-  hits_.resize(batch_.size());
-  counts_.invalid +=
-      shared_.has_coverage ? shared_.rays.closest(batch_, met_, hits_) : shared_.rays.closest(batch_, hits_);
+  counts_.cut += std::exchange(scratch_.cut, 0);
 }
 
 void PathWavefront::trace_paths() {
-  batch_.clear();
-  met_.clear();
-  for (const auto& paths : paths_) {
-    for (const Path& path : paths) {
-      batch_.push(shared_.space.from_world(path.origin), path.direction, path.reach * shared_.space.scale);
-      if (shared_.has_coverage) met_.push_back(path.last);
+  requests_.clear();
+  for (auto& paths : paths_) {
+    for (Path& path : paths) {
+      requests_.push_back({path.origin, path.direction, path.reach, &path.sampler, path.pixel, path.faces});
     }
   }
-  find_hits();
-  shared_.surfaces.prefetch(hits_);
+  hits_.resize(requests_.size());
+  counts_.invalid += shared_.rays.closest(requests_, hits_, scratch_);
   counts_.primary += paths_[0].size();
   counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
   counts_.reflection += paths_[kind_of(Lobe::Reflection)].size();
   counts_.transmission += paths_[kind_of(Lobe::Transmission)].size();
   std::size_t ray = 0;
-  for (std::size_t kind = 0; kind < kKinds; ++kind) {
-    for (Path& path : paths_[kind]) {
-      const std::uint32_t surface = hits_[ray];
+  for (auto& paths : paths_) {
+    for (Path& path : paths) {
+      const std::uint32_t surface = hits_[ray++];
       if (surface == kNoSurface) {
         miss(path);
       } else {
-        arrive(path, kind, shared_.has_coverage ? met_[ray] : Passed{surface});
+        arrive(path, surface);
       }
-      ++ray;
     }
   }
 }
@@ -260,23 +260,9 @@ void PathWavefront::miss(const Path& path) {
   radiance_[path.pixel] += path.throughput * light * weight;
 }
 
-void PathWavefront::arrive(Path& path, std::size_t kind, const Passed& met) {
-  shared_.surfaces.load(met.surface, triangle_);
+void PathWavefront::arrive(Path& path, std::uint32_t surface) {
+  shared_.surfaces.load(surface, triangle_);
   const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
-  const Material& look = shared_.scene.materials[point.material];
-  if (look.alpha_mode != AlphaMode::Opaque) {
-    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
-    if (passes_by_chance(coverage, path.sampler)) {
-      const double gained = met.distance - path.last.distance;
-      path.last = met;
-      if (passes_on(path.passed, coverage, gained)) {
-        next_[kind].push_back(path);
-      } else {
-        ++counts_.cut;
-      }
-      return;
-    }
-  }
   const MaterialPoint material = evaluate_material(shared_.scene, point);
   const double metres = path.travelled + glm::distance(path.origin, point.position);
   path.throughput *= path.segments == 1 ? transmittance(path.media.here, metres)
@@ -286,7 +272,7 @@ void PathWavefront::arrive(Path& path, std::size_t kind, const Passed& met) {
     radiance_[path.pixel] += path.throughput * path.followed * material.emission;
     return;
   }
-  if (material.emission != glm::dvec3(0.0)) add_emission(path, point, met.surface, material.emission);
+  if (material.emission != glm::dvec3(0.0)) add_emission(path, point, surface, material.emission);
   if (path.segments >= shared_.settings.max_depth) {
     ++counts_.too_long;
     return;
@@ -325,20 +311,24 @@ void PathWavefront::scatter(Path& path, const SurfacePoint& point, const Materia
     if (!(scattered.pdf > 0.0)) return;
     const double cosine = std::abs(glm::dot(material.normal, sample->direction));
     path.throughput *= scattered.value * (cosine / scattered.pdf);
-    path.followed *= followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
+    glm::dvec3 followed = followed_share(bsdf, chances, scattered, shared_.settings.glossy_cutoff);
+    if (path.looks && shared_.has_single_sided) {
+      path.looks = looks_on(path, followed);
+      followed = glm::dvec3(path.looks ? 1.0 : 0.0);
+    }
+    path.followed *= followed;
     path.pdf = scattered.pdf;
   }
   if (lobe == Lobe::Transmission) path.radiance_scale *= radiance_scale;
   if (!survives_roulette(path)) return;
   path.media = media_towards(path.media, point, material, sample->direction);
+  path.faces = path.looks && !leads_into_solid(point, material, sample->direction) ? Faces::Front : Faces::Both;
   path.origin = ray_origin(point, sample->direction);
   path.direction = sample->direction;
   path.reach = std::numeric_limits<double>::infinity();
   path.from = point.position;
   path.from_normal = bsdf.light_normal();
   path.travelled = 0.0;
-  path.passed = 0;
-  path.last = {};
   ++path.segments;
   next_[kind_of(lobe)].push_back(path);
 }
@@ -374,12 +364,12 @@ void PathWavefront::sample_light(Path& path, const SurfacePoint& point, const Ma
   if (!std::isfinite(light->distance)) return;
   // Aimed from the moved origin, and stopped short of the light by what rounding may add, so that a light that lies on
   // a surface is not hidden by it.
-  const glm::dvec3 goal = shared_.space.from_world(light->goal);
   const glm::dvec3 to_goal = light->goal - ray.origin;
   const double distance = glm::length(to_goal);
   if (distance > 0.0) ray.direction = to_goal / distance;
-  const double size = std::max(largest(glm::abs(goal)), 1.0) / shared_.space.scale;
-  ray.reach = std::max(distance - kOriginSteps * kFloatStep * (distance + size), 0.0);
+  const double before =
+      kOriginSteps * kFloatStep * distance + std::max(light->offset, shared_.space.rounding_at(light->goal));
+  ray.reach = std::max(distance - before, 0.0);
 }
 
 bool PathWavefront::survives_roulette(Path& path) {
@@ -393,51 +383,14 @@ bool PathWavefront::survives_roulette(Path& path) {
 }
 
 void PathWavefront::trace_shadows() {
-  while (!shadows_.empty()) {
-    batch_.clear();
-    met_.clear();
-    for (const ShadowRay& ray : shadows_) {
-      batch_.push(shared_.space.from_world(ray.origin), ray.direction, ray.reach * shared_.space.scale);
-      if (shared_.has_coverage) met_.push_back(ray.last);
-    }
-    counts_.shadow += shadows_.size();
-    if (shared_.has_coverage) {
-      trace_through_coverage();
-      continue;
-    }
-    blocked_.resize(batch_.size());
-    counts_.invalid += shared_.rays.occluded(batch_, blocked_);
-    for (std::size_t i = 0; i < shadows_.size(); ++i) {
-      if (blocked_[i] == 0) radiance_[shadows_[i].pixel] += shadows_[i].radiance;
-    }
-    shadows_.clear();
-  }
-}
-
-void PathWavefront::trace_through_coverage() {
-  find_hits();
-  std::size_t left = 0;
+  requests_.clear();
+  for (const ShadowRay& ray : shadows_) requests_.push_back({ray.origin, ray.direction, ray.reach, nullptr, ray.pixel});
+  counts_.shadow += shadows_.size();
+  passed_.resize(requests_.size());
+  counts_.invalid += shared_.rays.passed(requests_, passed_, scratch_);
   for (std::size_t i = 0; i < shadows_.size(); ++i) {
-    ShadowRay ray = shadows_[i];
-    if (hits_[i] == kNoSurface) {
-      radiance_[ray.pixel] += ray.radiance;
-      continue;
-    }
-    shared_.surfaces.load(hits_[i], triangle_);
-    const SurfacePoint point = shared_.surfaces.meet(triangle_, ray.origin, ray.direction);
-    const Material& look = shared_.scene.materials[point.material];
-    const double coverage = evaluate_alpha(shared_.scene, look, point.uv, point.color.a);
-    ray.radiance *= 1.0 - coverage;
-    if (!(largest(ray.radiance) > 0.0)) continue;
-    const double gained = met_[i].distance - ray.last.distance;
-    ray.last = met_[i];
-    if (passes_on(ray.passed, coverage, gained)) {
-      shadows_[left++] = ray;
-    } else {
-      ++counts_.cut;
-    }
+    if (passed_[i] > 0.0F) radiance_[shadows_[i].pixel] += static_cast<double>(passed_[i]) * shadows_[i].radiance;
   }
-  shadows_.resize(left);
 }
 
 /// Paths that go together. Enough to fill packets for some bounces, few enough to stay in the second-level cache.
@@ -541,14 +494,16 @@ void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const 
   }
 }
 
-PathTracer::PathTracer(const Scene& scene, const RayScene& rays, const LightSampler& lights, PathSettings settings)
-    : state_(std::make_unique<State>(PathScene{.scene = scene,
-                                               .rays = rays,
-                                               .lights = lights,
-                                               .space = RaySpace(scene.bounds),
-                                               .surfaces = Surfaces(scene, RaySpace(scene.bounds)),
-                                               .settings = settings,
-                                               .has_coverage = has_coverage(scene)})) {}
+PathTracer::PathTracer(const Scene& scene, const CoverageTraversal& rays, const LightSampler& lights,
+                       PathSettings settings)
+    : state_(std::make_unique<State>(
+          PathScene{.scene = scene,
+                    .rays = rays,
+                    .lights = lights,
+                    .space = RaySpace(scene.bounds),
+                    .surfaces = Surfaces(scene, RaySpace(scene.bounds)),
+                    .settings = settings,
+                    .has_single_sided = !std::ranges::all_of(scene.materials, shows_both_sides)})) {}
 PathTracer::~PathTracer() = default;
 PathTracer::PathTracer(PathTracer&&) noexcept = default;
 PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
@@ -565,7 +520,7 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
 
   State& state = *state_;
   const std::vector<Media> eyes = state.media.of_eyes(views);
-  state.shared.rays.for_each(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
+  state.shared.rays.opaque().for_each(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const trace::Span span("path trace tile", "tile", tile);
     const TilePlace location = layout.place(tile);

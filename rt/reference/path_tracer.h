@@ -9,7 +9,7 @@
 #include "image/tiles.h"
 #include "rt/lights/light_sampler.h"
 #include "rt/sampling/sampler.h"
-#include "rt/trace/ray_scene.h"
+#include "rt/trace/coverage_traversal.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
@@ -58,14 +58,14 @@ struct PathCounts {
 
 /// The reference: Kajiya's rendering equation by unidirectional path tracing with next-event estimation, multiple
 /// importance sampling and Russian roulette (Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition,
-/// sections 13.2 to 13.4). Shares materials and lights with the passes, and nothing else. Unbiased up to max_depth,
-/// but for what no ray can find: point and directional lights seen through glass or by mirrors.
+/// sections 13.2 to 13.4). Shares materials, lights and what rays meet with the passes, and nothing else. Unbiased up
+/// to max_depth, but for what no ray can find: point and directional lights seen through glass or by mirrors.
 ///
 /// A sample depends on its number, its pixel and its view only: threads, tile lists and ranks change no bit.
 class PathTracer {
  public:
-  /// `rays` holds `scene` in RaySpace(scene.bounds). All must outlive this.
-  PathTracer(const Scene& scene, const RayScene& rays, const LightSampler& lights, PathSettings settings);
+  /// `rays` goes through `scene` in RaySpace(scene.bounds). All must outlive this.
+  PathTracer(const Scene& scene, const CoverageTraversal& rays, const LightSampler& lights, PathSettings settings);
   ~PathTracer();
   PathTracer(const PathTracer&) = delete;
   PathTracer& operator=(const PathTracer&) = delete;

@@ -7,6 +7,7 @@
 #include "rt/lights/light_sampler.h"
 #include "rt/reference/path_tracer.h"
 #include "rt/test_scene.h"
+#include "rt/trace/coverage_traversal.h"
 #include "rt/trace/ray_scene.h"
 
 /// Path tracing in tests, with the error that chance leaves.
@@ -14,9 +15,20 @@ namespace hpr::test {
 
 /// All that path tracing a scene takes.
 struct PathBench {
-  explicit PathBench(const Scene& traced) : scene(traced), rays(traced, RaySpace(traced.bounds), 1), lights(traced) {}
+  explicit PathBench(const Scene& traced)
+      : scene(traced),
+        space(traced.bounds),
+        surfaces(traced, space),
+        opaque(traced, space, 1, covering_surfaces(traced, false)),
+        alpha_tested(traced, space, 1, covering_surfaces(traced, true)),
+        rays(traced, surfaces, space, opaque, covering_surfaces(traced, true).empty() ? nullptr : &alpha_tested),
+        lights(traced) {}
   const Scene& scene;
-  RayScene rays;
+  RaySpace space;
+  Surfaces surfaces;
+  RayScene opaque;
+  RayScene alpha_tested;
+  CoverageTraversal rays;
   LightSampler lights;
 };
 

@@ -14,7 +14,7 @@
 namespace hpr {
 
 /// Surfaces of partial coverage that light is followed through in a row, by the passes and by the reference. Past
-/// them the passes see what covers wholly, the reference and photons nothing.
+/// them eyes see what covers wholly, and photons end.
 inline constexpr int kMaxPassed = 1000;
 
 /// Counts a surface that a ray has passed, and came `gained` metres farther by it; false when it is one too many. What
@@ -31,6 +31,22 @@ struct RayRequest {
   double reach = 0.0;          ///< metres; infinite: as far as it goes
   Sampler* sampler = nullptr;  ///< decides whether it passes surfaces of partial coverage
   std::uint32_t owner = 0;     ///< whatever the caller needs to know it again
+  Faces faces = Faces::Both;   ///< that it meets
+};
+
+/// Where a ray meets a surface, as far as it matters for which of two lies before the other. Those of one plane are
+/// told apart by what they are: the order of a decal and what it is on is no matter of rounding.
+struct SurfacePlane {
+  glm::dvec3 position{0.0};
+  glm::dvec3 normal{0.0};  ///< unit length, on the viewer's side; zero: none
+  double tolerance = 0.0;  ///< metres, see Surfaces::coplanar_tolerance
+};
+
+/// A surface of partial coverage that a ray meets.
+struct CoveringLayer {
+  SurfacePlane plane;
+  SurfacePoint point;
+  double coverage = 0.0;
 };
 
 /// Memory of one thread, kept from call to call.
@@ -40,10 +56,12 @@ struct TraversalScratch {
   std::vector<std::uint8_t> blocked;
   std::vector<std::uint32_t> waiting;
   std::vector<RayRequest> rest;
-  std::vector<int> passed;   ///< per ray, see passes_on
-  std::vector<Passed> last;  ///< per ray: what it passed
-  std::vector<Passed> met;   ///< per waiting ray
-  std::uint64_t cut = 0;     ///< rays that ended among too many surfaces; who reads it sets it back
+  std::vector<int> passed;                         ///< per ray, see passes_on
+  std::vector<Passed> last;                        ///< per ray: what it passed
+  std::vector<Passed> met;                         ///< per waiting ray
+  std::vector<SurfacePlane> ends;                  ///< per ray
+  std::vector<std::vector<CoveringLayer>> layers;  ///< per ray: of one plane, met and not yet visited
+  std::uint64_t cut = 0;  ///< rays that ended among too many surfaces; who reads it sets it back
 };
 
 /// Rays through a scene some of whose surfaces cover only part of what is behind them (alpha MASK and BLEND): such a
@@ -67,16 +85,35 @@ class CoverageTraversal {
 
   /// The callback of visit_alpha_tested: ray i meets a surface that covers so much; returns whether the ray goes on.
   using Visit = std::function<bool(std::size_t ray, const SurfacePoint& point, double coverage)>;
-  /// Calls `visit` for every surface of partial coverage along each ray, nearest first, while it passes_on.
-  void visit_alpha_tested(std::span<const RayRequest> rays, TraversalScratch& scratch, const Visit& visit) const;
+  /// Calls `visit` for every surface of partial coverage along each ray, nearest first and by id where they lie in one
+  /// plane, while it passes_on. Rays end at their reach, and where `ends` has planes, which cover all behind them,
+  /// there: what lies in such a plane lies before it.
+  void visit_alpha_tested(std::span<const RayRequest> rays, TraversalScratch& scratch, const Visit& visit,
+                          std::span<const SurfacePlane> ends = {}) const;
 
-  /// Metres: the largest coordinate of a place as rays see it, which says what rounding it costs.
-  [[nodiscard]] double size_of(const glm::dvec3& position) const;
+  /// The plane of a surface where a ray meets it. `triangle` keeps what was loaded.
+  [[nodiscard]] SurfacePlane plane_at(std::uint32_t surface, const RayRequest& ray, WorldTriangle& triangle) const;
 
+  [[nodiscard]] const RayScene& opaque() const { return opaque_; }
+  [[nodiscard]] const RaySpace& space() const { return space_; }
   [[nodiscard]] bool has_alpha_tested() const { return alpha_tested_ != nullptr; }
 
  private:
-  [[nodiscard]] double coverage_of(const SurfacePoint& point) const;
+  struct LayeredRays {
+    std::span<const RayRequest> requests;
+    std::span<const SurfacePlane> ends;  ///< per ray, or none at all
+
+    [[nodiscard]] bool ends_at_plane(std::uint32_t ray) const {
+      return !ends.empty() && ends[ray].normal != glm::dvec3(0.0);
+    }
+  };
+
+  void push_waiting(const LayeredRays& rays, TraversalScratch& scratch) const;
+  [[nodiscard]] bool add_layer(std::size_t i, const LayeredRays& rays, TraversalScratch& scratch,
+                               WorldTriangle& triangle, const Visit& visit) const;
+  [[nodiscard]] CoveringLayer layer_at(std::uint32_t surface, const RayRequest& ray, WorldTriangle& triangle) const;
+  [[nodiscard]] double reach_past(const SurfacePlane& end, const RayRequest& ray) const;
+  [[nodiscard]] SurfacePlane plane_of(const WorldTriangle& triangle, const SurfacePoint& point) const;
   void push(const RayRequest& ray, RayBatch& batch) const;
 
   const Scene& scene_;

@@ -112,4 +112,16 @@ inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay1
 }
 #endif
 
+/// Whether candidate `i` is met from behind, for a geometry's RayGeometry::behind. By the ray and the normal that
+/// Embree met it by: where rounding moves an edge of a closed mesh, both its triangles move, so no ray slips in
+/// between.
+[[nodiscard]] inline bool is_behind(const RTCFilterFunctionNArguments& candidates, unsigned int i, float behind) {
+  if (behind == 0.0F) return false;
+  const unsigned int n = candidates.N;
+  const float along = RTCRayN_dir_x(candidates.ray, n, i) * RTCHitN_Ng_x(candidates.hit, n, i) +
+                      RTCRayN_dir_y(candidates.ray, n, i) * RTCHitN_Ng_y(candidates.hit, n, i) +
+                      RTCRayN_dir_z(candidates.ray, n, i) * RTCHitN_Ng_z(candidates.hit, n, i);
+  return along * behind > 0.0F;
+}
+
 }  // namespace hpr::embree

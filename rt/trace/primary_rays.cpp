@@ -150,6 +150,10 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
     const unsigned int outer = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
     const RayGeometry& geometry =
         search.geometries[outer != RTC_INVALID_GEOMETRY_ID ? outer : RTCHitN_geomID(arguments->hit, arguments->N, i)];
+    if (embree::is_behind(*arguments, i, geometry.behind)) {
+      arguments->valid[i] = 0;
+      continue;
+    }
     const std::uint32_t primitive = RTCHitN_primID(arguments->hit, arguments->N, i);
     float& limit = RTCRayN_tfar(arguments->ray, arguments->N, i);
     const float distance = limit;

@@ -251,6 +251,16 @@ void RayScene::Embree::add_triangles(const Scene& scene, const InstanceRange& pa
   rtcAttachGeometryByID(top.get(), geometry.get(), id);
 }
 
+namespace {
+
+/// See RayGeometry::behind. Instances are tested in their meshes' own coordinates, where nothing is mirrored.
+float behind(const Scene& scene, const Instance& instance, bool is_instanced) {
+  if (shows_both_sides(scene.materials[scene.mesh_of(instance).material])) return 0.0F;
+  return !is_instanced && is_mirrored(instance) ? -1.0F : 1.0F;
+}
+
+}  // namespace
+
 RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads)
     : RayScene(scene, space, threads, std::array{SurfaceRange{0, scene.triangles}}) {}
 
@@ -265,8 +275,10 @@ RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::
        split_by_instance(scene, merged_ranges({objects.begin(), objects.end()}, scene.triangles))) {
     const Instance& instance = scene.instances[part.instance];
     const auto id = static_cast<unsigned int>(embree_->geometries.size());
-    embree_->geometries.push_back({part.instance, part.range.first, instance.first_surface + part.range.first});
-    if (is_shared[part.instance] != 0) {
+    const bool is_instanced = is_shared[part.instance] != 0;
+    embree_->geometries.push_back({part.instance, part.range.first, instance.first_surface + part.range.first,
+                                   behind(scene, instance, is_instanced)});
+    if (is_instanced) {
       embree_->add_instance(instance, id, embree_->shared_part(scene, part), space);
     } else {
       embree_->add_triangles(scene, part, id, space);
@@ -344,6 +356,7 @@ struct Closest {
   std::array<std::uint32_t, kWidth> surface;
   std::array<std::uint32_t, kWidth> instance;
   const Passed* passed;  ///< by lane; null: none has passed anything
+  const Faces* faces;    ///< by lane
 };
 
 /// Two triangles that share an edge put a ray's distance to it at most about this far apart, relative to the larger of
@@ -369,6 +382,10 @@ void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
     const unsigned int geometry =
         outer != RTC_INVALID_GEOMETRY_ID ? outer : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const RayGeometry& shown = closest.geometries[geometry];
+    if (closest.faces[lane] == Faces::Front && embree::is_behind(*arguments, i, shown.behind)) {
+      arguments->valid[i] = 0;
+      continue;
+    }
     const std::uint32_t surface = shown.first_surface + RTCHitN_primID(arguments->hit, arguments->N, i);
     const float distance = RTCRayN_tfar(arguments->ray, arguments->N, i);
     const bool later = distance == closest.distance[lane] && surface >= closest.surface[lane];
@@ -510,6 +527,7 @@ std::uint64_t RayScene::find_closest(const RayBatch& rays, Passed* passed, std::
     closest.distance.fill(std::numeric_limits<float>::quiet_NaN());
     closest.surface.fill(kNoSurface);
     closest.passed = passed != nullptr ? passed + first : nullptr;
+    closest.faces = rays.packets_[first / kWidth].faces;
     if (passed != nullptr) {
       // The filter decides; this only spares it most of what lies before.
       for (std::size_t i = 0; i < count; ++i) packet.ray.tnear[i] = passed[first + i].distance * (1.0F - kSameEdge);

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
@@ -20,6 +21,14 @@
 struct RTCSceneTy;
 
 namespace hpr {
+
+/// One unit in the last place of a float near 1: what a coordinate may lose on its way into Embree.
+inline constexpr double kFloatStep = 1.1920928955078125e-7;
+
+/// How many such steps of what rounding acts on a ray's origin is moved off its surface. Measured over object radii of
+/// 1e-9 to 1e9 and offsets of the centre up to 1e4 radii: no surface hits itself (Embree's triangle test needs about
+/// three).
+inline constexpr double kOriginSteps = 4.0;
 
 /// The float coordinates rays are traced in: world metres relative to the scene's centre, scaled by a power of two so
 /// that the scene's radius lies in [1, 2). Both steps are done in double; the scale is exact, so a scene scaled by a
@@ -41,14 +50,13 @@ struct RaySpace {
   }
 
   [[nodiscard]] glm::dvec3 from_world(const glm::dvec3& world) const { return (world - origin) * scale; }
+
+  /// Metres, with a margin: what rounding a place's coordinates may move it by, seldom as much.
+  [[nodiscard]] double rounding_at(const glm::dvec3& world) const {
+    const glm::dvec3 from_origin = glm::abs(world - origin);
+    return kOriginSteps * kFloatStep * std::max({from_origin.x, from_origin.y, from_origin.z});
+  }
 };
-
-/// One unit in the last place of a float near 1: what a coordinate may lose on its way into Embree.
-inline constexpr double kFloatStep = 1.1920928955078125e-7;
-
-/// How many such steps a ray's origin is moved off its surface. Measured over object radii of 1e-9 to 1e9 and offsets
-/// of the centre up to 1e4 radii: no surface hits itself (Embree's triangle test needs about three).
-inline constexpr double kOriginSteps = 4.0;
 
 /// Denormal numbers read and written as zero while it lives, as Embree advises; the thread's own mode returns after.
 class DenormalsAsZero {
@@ -67,6 +75,9 @@ inline constexpr std::uint32_t kNoSurface = 0xFFFFFFFFU;
 /// Embree's own limit is the square root of the largest float; past it (or at NaN) builds with assertions abort.
 inline constexpr float kMaxRayDistance = 1.8e18F;
 
+/// Which faces of single-sided materials (shows_both_sides) a ray meets: both, as light does, or those an eye sees.
+enum class Faces : std::uint32_t { Both, Front };
+
 /// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
 class RayBatch {
  public:
@@ -74,11 +85,12 @@ class RayBatch {
     std::array<float, 3> origin{};
     std::array<float, 3> direction{};
     float reach = 0.0F;
+    Faces faces = Faces::Both;
   };
 
   void clear() { size_ = 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
-  void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach) {
+  void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach, Faces faces = Faces::Both) {
     const std::size_t lane = size_ % kWidth;
     Packet& packet = next_packet();
     for (int axis = 0; axis < 3; ++axis) {
@@ -86,6 +98,7 @@ class RayBatch {
       packet.direction[axis][lane] = static_cast<float>(direction[axis]);
     }
     packet.reach[lane] = static_cast<float>(reach);
+    packet.faces[lane] = faces;
   }
   void push(const Ray& ray) {
     const std::size_t lane = size_ % kWidth;
@@ -95,6 +108,7 @@ class RayBatch {
       packet.direction[axis][lane] = ray.direction[axis];
     }
     packet.reach[lane] = ray.reach;
+    packet.faces[lane] = ray.faces;
   }
   [[nodiscard]] Ray ray(std::size_t i) const {
     const Packet& packet = packets_[i / kWidth];
@@ -104,6 +118,7 @@ class RayBatch {
       ray.direction[axis] = packet.direction[axis][i % kWidth];
     }
     ray.reach = packet.reach[i % kWidth];
+    ray.faces = packet.faces[i % kWidth];
     return ray;
   }
 
@@ -115,6 +130,7 @@ class RayBatch {
     float origin[3][kWidth];
     float direction[3][kWidth];
     float reach[kWidth];
+    Faces faces[kWidth];
   };
 
   /// Counts one more ray, which goes there.
@@ -150,6 +166,9 @@ struct RayGeometry {
   std::uint32_t instance = 0;
   std::uint32_t first_triangle = 0;  ///< of the instance's mesh
   std::uint32_t first_surface = 0;
+  /// 0 where both sides of its triangles are shown; else what a ray's direction times Embree's normal is to be
+  /// multiplied by to be positive for a ray that meets a triangle from behind.
+  float behind = 0.0F;
 };
 
 class RayForwarding;

@@ -27,7 +27,8 @@ struct WorldTriangle {
   glm::dvec3 e2{0.0};
   glm::dvec3 normal{0.0};               ///< unit length, by the winding; zero when the triangle has no area
   std::array<glm::dvec3, 3> normals{};  ///< unit length, of the corners
-  double offset = 0.0;                  ///< metres by which ray origins must leave it
+  /// Metres by which ray origins must leave it, wherever they lie on it. Where they do asks for RaySpace::rounding_at.
+  double offset = 0.0;
 };
 
 /// Where a ray meets a surface, and all that shading needs of the place. World coordinates, metres.
@@ -83,11 +84,16 @@ class Surfaces {
   [[nodiscard]] SurfacePoint meet(const WorldTriangle& triangle, const glm::dvec3& origin,
                                   const glm::dvec3& direction) const;
 
+  /// Metres by which two surfaces that a file puts in one plane may lie apart where they meet, for each of them: what
+  /// the rounding of the mesh's own coordinates comes to along the normal, and what SurfacePoint::offset is for.
+  [[nodiscard]] double coplanar_tolerance(const WorldTriangle& triangle, const SurfacePoint& point) const;
+
  private:
   /// Barycentric coordinates of a triangle's corners.
   using Weights = std::array<double, 3>;
 
   [[nodiscard]] std::uint8_t layer_of(const WorldTriangle& triangle, bool inside) const;
+  [[nodiscard]] double offset_of(const WorldTriangle& triangle) const;
   static void lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point);
   void add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const;
 
@@ -95,8 +101,9 @@ class Surfaces {
     glm::dmat3 normal_matrix{
         1.0};  ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
     bool swaps_handedness = false;  ///< turns windings round
-    double distortion = 0.0;        ///< 0: not instanced in the ray scene
-    double reach = 0.0;             ///< metres: |A| |vertex| + distortion |translation| of the instanced mesh
+    bool is_instanced = false;      ///< in the ray scene, whose rays are carried into its coordinates and back
+    glm::dmat3 spread{0.0};         ///< |A| |A^-1| of the instanced mesh: how far the rounding of a coordinate reaches
+    glm::dvec3 reach{0.0};          ///< metres: |A| |vertex| + spread |translation|
   };
 
   const Scene& scene_;

@@ -327,7 +327,11 @@ class SceneBuilder {
     for (const int node : nodes_.drawn) add_node(node);
     const bool needs_default =
         std::ranges::any_of(scene_.meshes, [&](const Mesh& mesh) { return mesh.material == default_material_; });
-    if (needs_default) scene_.materials.emplace_back().name = "default";
+    if (needs_default) {
+      Material& material = scene_.materials.emplace_back();
+      material.name = "default";
+      material.double_sided = false;
+    }
     if (singular_ > 0) context().warn("", fmt::format("{} nodes have a singular matrix", singular_));
     if (scene_.instances.empty()) context().warn("", "the scene has nothing to draw");
   }
