@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
+#include <cstdint>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "cluster/transport/local_communicator.h"
 #include "compositing/compositor.h"
 #include "compositing/test_layers.h"
+#include "core/error.h"
 
 /// The promises of Compositor::composite, as GoogleTests for any strategy. Include it in one source of a test program,
 /// which also says which strategies are to keep them:
@@ -139,6 +142,51 @@ TEST_P(CompositorContract, LayersMayLiveInSharedMemoryAndTheirScreensBeShown) {
     EXPECT_EQ(std::ranges::count(owners, 3), static_cast<std::ptrdiff_t>(tiles.size()));
     EXPECT_EQ(wrong_tiles, 0U);
     EXPECT_EQ(astray, 0U);
+  }
+}
+
+TEST_P(CompositorContract, ARankThatLeftOutAFrameIsNamedWithBothFrames) {
+  if (ranks_ == 1) return;
+  const FrameLayout layout({{130, 70}});
+  const std::vector<std::size_t> tiles = all_tiles(layout);
+  try {
+    run_local_ranks(
+        ranks_,
+        [&](Communicator& comm) {
+          const auto own = compositor();
+          for (const std::uint64_t frame : {7U, 8U}) {
+            TileLayer<Key> layer = random_layer(comm.rank(), layout);
+            comm.begin_frame(frame == 8 && comm.rank() == ranks_ - 1 ? 9 : frame);
+            (void)own->composite(comm, layer, tiles);
+          }
+        },
+        std::chrono::seconds(20));
+    ADD_FAILURE() << "frame 8 was composited with frame 9";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Internal);
+    const std::string what = error.what();
+    EXPECT_TRUE(what.find("frame 8") != std::string::npos && what.find("frame 9") != std::string::npos) << what;
+  }
+}
+
+TEST_P(CompositorContract, MessagesThatOvertakeEachOtherEndTheJob) {
+  if (ranks_ == 1) return;
+  const FrameLayout layout({{130, 70}});
+  const std::vector<std::size_t> tiles = all_tiles(layout);
+  const LocalRanks ranks{.size = ranks_, .hang_timeout = std::chrono::milliseconds(500), .overtaking = ranks_ - 1};
+  try {
+    run_local_ranks(ranks, [&](Communicator& comm) {
+      const auto own = compositor();
+      for (std::uint64_t frame = 1; frame <= 3; ++frame) {
+        TileLayer<Key> layer = random_layer(comm.rank(), layout);
+        comm.begin_frame(frame);
+        (void)own->composite(comm, layer, tiles);
+      }
+    });
+    ADD_FAILURE() << "frames were composited of each other's messages";
+  } catch (const Error& error) {
+    // Where the rank itself waits for what its peers cannot do yet, no message of its next frame comes.
+    EXPECT_TRUE(error.code() == ExitCode::Internal || error.code() == ExitCode::Hang) << error.what();
   }
 }
 

@@ -106,6 +106,7 @@ bool FrameMaker::refined(std::span<const View> screens) const {
 }
 
 Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress) {
+  session_.comm().begin_frame(number);
   if (!budget_) {
     plan_for({}, screens);
     make_anew(number, sampling_.goal.samples.value_or(0), progress);

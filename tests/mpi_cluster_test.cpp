@@ -1,5 +1,6 @@
 // The contract of Communicator, by MPI: run by mpiexec with 1 to 5 ranks. Each rank checks its own part; EXPECT, never
 // ASSERT, between collective calls, so that one failing rank leaves no other waiting.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <mpi.h>
 
@@ -170,6 +171,95 @@ TEST(Mpi, AMessageOfAnotherSizeIsAnInternalError) {
     code = error.code();
   }
   EXPECT_EQ(code, ExitCode::Internal);
+}
+
+/// What the error says that `receive` on rank 1 ends in when rank 0, in frame `sent_in`, sends it a message there.
+template <typename Receive>
+std::string met_in_frame(std::uint64_t frame, std::uint64_t sent_in, Receive receive) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  if (comm.rank() > 1) return {};
+  const std::vector<int> pair{0, 1};
+  const auto both = comm.subset(pair);
+  if (comm.rank() == 0) {
+    comm.begin_frame(sent_in);
+    both->send(test::message_of(0, 3), 1);
+    return {};
+  }
+  comm.begin_frame(frame);
+  try {
+    receive(*both);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Internal);
+    return error.what();
+  }
+  return "nothing";
+}
+
+TEST(Mpi, AMessageOfAnotherFrameIsAnErrorWithBothNumbers) {
+  if (MpiCommunicator(MPI_COMM_WORLD).size() == 1) return;
+  const auto whole = [](Communicator& comm) { (void)comm.receive(0); };
+  const auto known = [](Communicator& comm) {
+    Bytes three(3);
+    comm.receive(three, 0);
+  };
+  const auto exchanged = [](Communicator& comm) {
+    const int peer = 0;
+    comm.exchange({}, {&peer, 1}, [](int /*from*/, std::span<const std::byte> /*message*/) {});
+  };
+  const bool meets = MpiCommunicator(MPI_COMM_WORLD).rank() == 1;
+  const auto expected = [meets](std::string_view frames) {
+    return meets ? fmt::format(fmt::runtime(frames), "rank 1 is in frame", "and met rank 0 in frame") : std::string();
+  };
+  EXPECT_EQ(met_in_frame(8, 7, whole), expected("{} 8 {} 7"));
+  EXPECT_EQ(met_in_frame(7, 8, known), expected("{} 7 {} 8"));
+  EXPECT_EQ(met_in_frame(0, 3, exchanged), expected("{} 0 {} 3"));
+  const std::uint64_t late = std::uint64_t{1} << 40U;  // past MPI's tags
+  EXPECT_EQ(met_in_frame(late, late - 2, whole), expected("{} 1099511627776 {} 1099511627774"));
+  EXPECT_EQ(met_in_frame(late, late, whole), meets ? "nothing" : "");
+}
+
+TEST(Mpi, AMeetingOverFramesIsAnErrorOfTheLastToCome) {
+  int code = 0;
+  {
+    MpiCommunicator comm(MPI_COMM_WORLD, std::chrono::seconds(1));
+    const auto memory = comm.share(64);
+    memory->meet();
+    comm.begin_frame(comm.rank() == 0 ? 4 : 5);
+    try {
+      memory->meet();
+    } catch (const Error& error) {
+      code = static_cast<int>(error.code());
+      // The memory is that of a job which ends.
+      if (error.code() == ExitCode::Internal) {
+        EXPECT_NE(std::string(error.what()).find("frame 4"), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find("frame 5"), std::string::npos) << error.what();
+      }
+    }
+  }
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  std::array<std::uint64_t, 1> seen{static_cast<std::uint64_t>(code == static_cast<int>(ExitCode::Internal))};
+  comm.reduce_max(seen, 0);
+  if (comm.rank() == 0 && comm.size() > 1) {
+    EXPECT_EQ(seen[0], 1U);
+  }
+  if (comm.size() > 1) {
+    EXPECT_TRUE(code == static_cast<int>(ExitCode::Internal) || code == static_cast<int>(ExitCode::Hang)) << code;
+  }
+}
+
+TEST(Mpi, AReductionOverFramesIsAnErrorOnItsRoot) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  if (comm.size() == 1) return;
+  comm.begin_frame(comm.rank() == 0 ? 4 : 5);
+  std::array<std::uint64_t, 1> values{1};
+  std::string what;
+  try {
+    comm.reduce_max(values, 1);
+  } catch (const Error& error) {
+    what = error.what();
+  }
+  // Those that the root does not wait for have sent all by now, and the root takes what they sent.
+  EXPECT_EQ(what, comm.rank() == 1 ? "rank 1 is in frame 5 and reduces with ranks in frames 4 to 5" : "");
 }
 
 TEST(Mpi, AWaitEndsAtTheTimeLimitAndNamesTheRank) {

@@ -41,6 +41,11 @@ class Communicator {
 
   [[nodiscard]] virtual int rank() const = 0;
   [[nodiscard]] virtual int size() const = 0;
+  /// From here on this rank's messages, reductions and meetings in shared memory belong to frame `frame`, those of its
+  /// subsets too. Where ranks of different frames meet, the call of one of them throws Error (Internal) with both
+  /// numbers: some rank left a frame out, or did one twice.
+  virtual void begin_frame(std::uint64_t frame) = 0;
+
   /// "mpi" or "threads", as reports name it.
   [[nodiscard]] virtual std::string_view transport() const = 0;
 
@@ -80,6 +85,9 @@ class Communicator {
   /// Says that this rank has merged or copied `bytes` bytes of pixels, which a modelled clock takes into account.
   virtual void worked(std::size_t bytes) { (void)bytes; }
 };
+
+/// Throws Error (Internal) unless `rank`, in frame `frame`, may meet what `from` did in frame `sent_in`.
+void check_frame(int rank, std::uint64_t frame, int from, std::uint64_t sent_in);
 
 /// How long a wait for another rank may take before it counts as a hang, unless the user says otherwise.
 inline constexpr std::chrono::seconds kHangTimeout{300};

@@ -74,6 +74,74 @@ TEST(LocalRanks, AMessageOfAnotherSizeIsAnInternalError) {
   }
 }
 
+/// What the error says that `receive` on rank 1 of two ends in, in frame 8, when rank 0 sends it something in frame 7.
+template <typename Send, typename Receive>
+std::string met_in_next_frame(Send send, Receive receive) {
+  try {
+    run_local_ranks(2, [&](Communicator& comm) {
+      const std::vector<int> all{0, 1};
+      const auto subset = comm.subset(all);
+      comm.begin_frame(comm.rank() == 0 ? 7 : 8);
+      if (comm.rank() == 0) {
+        send(*subset);
+      } else {
+        receive(*subset);
+      }
+    });
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Internal);
+    return error.what();
+  }
+  return "nothing";
+}
+
+TEST(LocalRanks, AMessageOfAnotherFrameIsAnErrorWithBothNumbers) {
+  const std::string expected = "rank 1 is in frame 8 and met rank 0 in frame 7";
+  const auto send = [](Communicator& comm) { comm.send(letter('a'), 1); };
+  EXPECT_EQ(met_in_next_frame(send, [](Communicator& comm) { (void)comm.receive(0); }), expected);
+  EXPECT_EQ(met_in_next_frame(send,
+                              [](Communicator& comm) {
+                                Bytes one(1);
+                                comm.receive(one, 0);
+                              }),
+            expected);
+  EXPECT_EQ(met_in_next_frame(send,
+                              [](Communicator& comm) {
+                                const int peer = 0;
+                                comm.exchange({}, {&peer, 1}, [](int /*from*/, std::span<const std::byte> /*in*/) {});
+                              }),
+            expected);
+  const auto reduce = [](Communicator& comm) {
+    std::array<std::uint64_t, 1> values{1};
+    comm.reduce_max(values, 1);
+  };
+  EXPECT_EQ(met_in_next_frame(reduce, reduce), expected);
+}
+
+TEST(LocalRanks, AMessageThatOvertookAnotherIsNamed) {
+  const LocalRanks ranks{.size = 2, .hang_timeout = std::chrono::seconds(20), .overtaking = 0};
+  for (const int messages : {1, 2, 3}) {
+    std::string what;
+    try {
+      run_local_ranks(ranks, [&](Communicator& comm) {
+        for (const std::uint64_t frame : {1U, 2U}) {
+          comm.begin_frame(frame);
+          for (int i = 0; i < messages; ++i) {
+            if (comm.rank() == 0) {
+              comm.send(letter('a'), 1);
+            } else {
+              (void)comm.receive(0);
+            }
+          }
+        }
+      });
+    } catch (const Error& error) {
+      what = error.what();
+    }
+    EXPECT_EQ(what, "rank 1 is in frame 1 and met rank 0 in frame 2");
+  }
+}
+
 TEST(LocalRanks, ReduceMaxLeavesTheLargestOfEachOnTheRoot) {
   for (const int size : {1, 2, 3, 8, 17}) {
     for (int root = 0; root < size; ++root) {

@@ -21,6 +21,7 @@ class ForwardingCommunicator : public Communicator {
   [[nodiscard]] int rank() const override { return inner_->rank(); }
   [[nodiscard]] int size() const override { return inner_->size(); }
   [[nodiscard]] std::string_view transport() const override { return inner_->transport(); }
+  void begin_frame(std::uint64_t frame) override { inner_->begin_frame(frame); }
   void send(std::span<const std::byte> message, int to) override { inner_->send(message, to); }
   void receive(std::span<std::byte> message, int from) override { inner_->receive(message, from); }
   [[nodiscard]] std::vector<std::byte> receive(int from) override { return inner_->receive(from); }

@@ -20,7 +20,10 @@
 namespace hpr {
 namespace {
 
-using Message = std::vector<std::byte>;
+struct Message {
+  std::vector<std::byte> bytes;
+  std::uint64_t frame = 0;  ///< in which its sender was
+};
 
 /// Which communicator: empty is the world; below it each subset() adds its members, a -1 and how many of just these
 /// members came before. Every member knows these alike without asking the others, and no two are equal.
@@ -39,6 +42,8 @@ struct Route {
 struct Meeting {
   int here = 0;
   std::uint64_t round = 0;
+  int first = 0;            ///< the rank that came first
+  std::uint64_t frame = 0;  ///< in which it was
 };
 
 /// What the ranks of a communicator share.
@@ -58,7 +63,11 @@ class PostOffice {
 
   void put(const Route& route, Message message) {
     const std::lock_guard lock(mutex_);
-    boxes_[route].push_back(std::move(message));
+    if (route.from == ranks_.overtaking) {
+      overtake(route, std::move(message));
+    } else {
+      boxes_[route].push_back(std::move(message));
+    }
     arrived_.notify_all();
   }
 
@@ -104,9 +113,14 @@ class PostOffice {
   }
 
   /// Returns when `users` callers have come to a meeting that has room for them.
-  void meet(Meeting& meeting, int users, int rank) {
+  void meet(Meeting& meeting, int users, int rank, std::uint64_t frame) {
     std::unique_lock lock(mutex_);
     const std::uint64_t round = meeting.round;
+    if (meeting.here == 0) {
+      meeting.first = rank;
+      meeting.frame = frame;
+    }
+    check_frame(rank, frame, meeting.first, meeting.frame);
     if (++meeting.here == users) {
       meeting.here = 0;
       ++meeting.round;
@@ -133,11 +147,27 @@ class PostOffice {
     int users = 0;  ///< ranks that have it
   };
 
+  /// Lets a route's first message of a frame overtake the last one of the frame before.
+  void overtake(const Route& route, Message message) {
+    auto& box = boxes_[route];
+    const auto held = held_.find(route);
+    if (held == held_.end()) {
+      held_.emplace(route, std::move(message));
+    } else if (held->second.frame == message.frame) {
+      box.push_back(std::exchange(held->second, std::move(message)));
+    } else {
+      box.push_back(std::move(message));
+      box.push_back(std::move(held->second));
+      held_.erase(held);
+    }
+  }
+
   LocalRanks ranks_;
   std::chrono::nanoseconds hang_timeout_;
   std::mutex mutex_;
   std::condition_variable arrived_;
   std::map<Route, std::deque<Message>> boxes_;
+  std::map<Route, Message> held_;  ///< to be overtaken
   std::map<std::pair<Channel, int>, Shared> memories_;
   bool closed_ = false;
 };
@@ -145,9 +175,15 @@ class PostOffice {
 /// Equal parts of one block, one per rank, of which the ranks of other hosts are out of sight.
 class LocalPeerMemory final : public PeerMemory {
  public:
+  /// `frame`: the one that the rank is in.
   LocalPeerMemory(PostOffice& office, std::shared_ptr<SharedBlock> memory, std::size_t bytes, int rank,
-                  std::vector<int> hosts)
-      : office_(office), memory_(std::move(memory)), bytes_(bytes), rank_(rank), hosts_(std::move(hosts)) {}
+                  std::vector<int> hosts, std::shared_ptr<const std::uint64_t> frame)
+      : office_(office),
+        memory_(std::move(memory)),
+        bytes_(bytes),
+        rank_(rank),
+        hosts_(std::move(hosts)),
+        frame_(std::move(frame)) {}
 
   [[nodiscard]] std::span<std::byte> mine() override { return of(rank_); }
   [[nodiscard]] std::span<std::byte> of(int rank) override {
@@ -160,7 +196,7 @@ class LocalPeerMemory final : public PeerMemory {
     const int host = hosts_[static_cast<std::size_t>(rank_)];
     const auto first = std::ranges::find(hosts_, host) - hosts_.begin();
     office_.meet(memory_->meetings[static_cast<std::size_t>(first)], static_cast<int>(std::ranges::count(hosts_, host)),
-                 rank_);
+                 rank_, *frame_);
   }
 
   static std::size_t stride(std::size_t bytes) { return (bytes + 63) / 64 * 64; }
@@ -171,13 +207,16 @@ class LocalPeerMemory final : public PeerMemory {
   std::size_t bytes_;
   int rank_;
   std::vector<int> hosts_;  ///< per rank
+  std::shared_ptr<const std::uint64_t> frame_;
 };
 
 class LocalCommunicator final : public Communicator {
  public:
   /// `worlds`: per rank its number in the world, which decides its host.
-  LocalCommunicator(PostOffice& office, Channel channel, std::vector<int> worlds, int rank)
+  LocalCommunicator(PostOffice& office, Channel channel, std::vector<int> worlds, int rank,
+                    std::shared_ptr<std::uint64_t> frame)
       : office_(office),
+        frame_(std::move(frame)),
         channel_(std::move(channel)),
         worlds_(std::move(worlds)),
         random_(office.ranks().disorder + static_cast<std::uint64_t>(rank)),
@@ -191,12 +230,15 @@ class LocalCommunicator final : public Communicator {
   [[nodiscard]] int rank() const override { return rank_; }
   [[nodiscard]] int size() const override { return size_; }
   [[nodiscard]] std::string_view transport() const override { return "threads"; }
+  void begin_frame(std::uint64_t frame) override { *frame_ = frame; }
 
   void send(std::span<const std::byte> message, int to) override { put(channel_, message, to); }
   void receive(std::span<std::byte> message, int from) override { take(channel_, message, from); }
   [[nodiscard]] std::vector<std::byte> receive(int from) override {
     HPR_CHECK(from >= 0 && from < size());
-    return office_.take({channel_, from, rank_});
+    Message message = office_.take({channel_, from, rank_});
+    check_frame(rank_, *frame_, from, message.frame);
+    return std::move(message.bytes);
   }
   void exchange(std::span<const Outgoing> out, std::span<const int> from, const Arrived& arrived) override {
     for (const Outgoing& outgoing : out) {
@@ -214,7 +256,8 @@ class LocalCommunicator final : public Communicator {
       const auto [index, message] = office_.take_any(routes, office_.ranks().disorder == 0 ? 0 : random_());
       const int sender = routes[index].from;
       routes.erase(routes.begin() + static_cast<std::ptrdiff_t>(index));
-      arrived(sender, message);
+      check_frame(rank_, *frame_, sender, message.frame);
+      arrived(sender, message.bytes);
     }
   }
   void reduce_max(std::span<std::uint64_t> values, int root) override {
@@ -241,7 +284,7 @@ class LocalCommunicator final : public Communicator {
     std::vector<int> worlds;
     for (const int member : members) worlds.push_back(worlds_[static_cast<std::size_t>(member)]);
     return std::make_unique<LocalCommunicator>(office_, std::move(channel), std::move(worlds),
-                                               static_cast<int>(mine - members.begin()));
+                                               static_cast<int>(mine - members.begin()), frame_);
   }
   [[nodiscard]] std::shared_ptr<PeerMemory> share(std::size_t bytes) override {
     std::vector<int> hosts;
@@ -249,22 +292,23 @@ class LocalCommunicator final : public Communicator {
     for (const int world : worlds_) hosts.push_back(per_host > 0 ? world / per_host : 0);
     const std::size_t all = LocalPeerMemory::stride(bytes) * static_cast<std::size_t>(size_);
     return std::make_shared<LocalPeerMemory>(office_, office_.memory(channel_, shared_blocks_++, all, size_), bytes,
-                                             rank_, std::move(hosts));
+                                             rank_, std::move(hosts), frame_);
   }
 
  private:
   void put(const Channel& channel, std::span<const std::byte> message, int to) {
     HPR_CHECK(to >= 0 && to < size());
-    office_.put({channel, rank_, to}, Message(message.begin(), message.end()));
+    office_.put({channel, rank_, to}, {{message.begin(), message.end()}, *frame_});
   }
   void take(const Channel& channel, std::span<std::byte> message, int from) {
     HPR_CHECK(from >= 0 && from < size());
     const Message arrived = office_.take({channel, from, rank_});
-    if (arrived.size() != message.size()) {
+    check_frame(rank_, *frame_, from, arrived.frame);
+    if (arrived.bytes.size() != message.size()) {
       throw Error(ExitCode::Internal, fmt::format("rank {} expected {} bytes from rank {}, got {}", rank_,
-                                                  message.size(), from, arrived.size()));
+                                                  message.size(), from, arrived.bytes.size()));
     }
-    std::ranges::copy(arrived, message.begin());
+    std::ranges::copy(arrived.bytes, message.begin());
   }
 
   /// Lets other ranks go first now and then.
@@ -275,6 +319,7 @@ class LocalCommunicator final : public Communicator {
   }
 
   PostOffice& office_;
+  std::shared_ptr<std::uint64_t> frame_;  ///< one for all communicators of this rank
   Channel channel_;
   Channel reductions_;
   std::vector<int> worlds_;
@@ -300,7 +345,7 @@ void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communica
   std::mutex mutex;
   std::exception_ptr first_failure;
   const auto run = [&](int rank) {
-    LocalCommunicator comm(office, {}, worlds, rank);
+    LocalCommunicator comm(office, {}, worlds, rank, std::make_shared<std::uint64_t>(0));
     const trace::InRow row({rank, 0});
     try {
       body(comm);

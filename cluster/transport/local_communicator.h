@@ -19,6 +19,9 @@ struct LocalRanks {
   std::chrono::nanoseconds hang_timeout = kHangTimeout;
   int ranks_per_host = 0;      ///< makes ranks [n k, n (k + 1)) a host that shares memory; 0: all of them
   std::uint64_t disorder = 0;  ///< seed of random delays and orders of arrival; 0: none
+  /// A rank whose messages arrive as no network may let them, each frame's first before the last of the frame before;
+  /// -1: none.
+  int overtaking = -1;
 };
 void run_local_ranks(const LocalRanks& ranks, const std::function<void(Communicator&)>& body);
 

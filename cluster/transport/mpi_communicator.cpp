@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <exception>
 #include <limits>
@@ -26,8 +27,6 @@
 
 namespace hpr {
 namespace {
-
-constexpr int kTag = 0;
 
 /// Throws Error (Lost) with MPI's message when `call`, which returned `code`, failed.
 void check_mpi(int code, const char* call) {
@@ -56,14 +55,18 @@ std::uint64_t free_shared_memory() {
   return static_cast<std::uint64_t>(there.f_bavail) * there.f_frsize;
 }
 
+constexpr std::uint64_t kMinTags = 32768;  ///< that any MPI has
+
 constexpr int kPopulateWrite = 23;  ///< MADV_POPULATE_WRITE of Linux 5.14, which older headers lack
 
 /// One MPI-3 shared window per host: every rank of the host has a zeroed part of it. Constructing it is collective over
 /// `comm`, and whoever reads what another rank was given waits for all ranks to have returned. Throws Error (Limit)
-/// when MPI cannot allocate it. A meeting lasts `hang_timeout` at most.
+/// when MPI cannot allocate it. A meeting lasts `hang_timeout` at most; `frame`: the one that this rank is in.
 class WindowMemory final : public PeerMemory {
  public:
-  WindowMemory(MPI_Comm comm, std::size_t bytes, std::chrono::nanoseconds hang_timeout) : hang_timeout_(hang_timeout) {
+  WindowMemory(MPI_Comm comm, std::size_t bytes, std::chrono::nanoseconds hang_timeout,
+               std::shared_ptr<const std::uint64_t> frame)
+      : hang_timeout_(hang_timeout), frame_(std::move(frame)) {
     check_mpi(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host_), "MPI_Comm_split_type");
     check_mpi(MPI_Comm_size(host_, &ranks_here_), "MPI_Comm_size");
     MPI_Info info = MPI_INFO_NULL;
@@ -101,7 +104,9 @@ class WindowMemory final : public PeerMemory {
     const std::atomic_ref<std::uint32_t> here(meeting_->here);
     const std::atomic_ref<std::uint32_t> round(meeting_->round);
     const std::uint32_t now = round.load();
+    std::atomic_ref(own_->frame).store(*frame_);
     if (here.fetch_add(1) + 1 == static_cast<std::uint32_t>(ranks_here_)) {
+      check_frames();
       here.store(0);
       round.store(now + 1);
       futex(FUTEX_WAKE, std::numeric_limits<int>::max(), nullptr);
@@ -116,7 +121,19 @@ class WindowMemory final : public PeerMemory {
   struct alignas(64) Meeting {
     std::uint32_t here;
     std::uint32_t round;
+    std::uint64_t frame;  ///< in which the part's rank came to its last meeting
   };
+
+  /// For the last rank to come, while the others wait.
+  void check_frames() const {
+    for (std::size_t rank = 0; rank < parts_.size(); ++rank) {
+      if (parts_[rank].data() == nullptr) continue;
+      check_frame(rank_, *frame_, static_cast<int>(rank), std::atomic_ref(meeting_of(parts_[rank])->frame).load());
+    }
+  }
+  static Meeting* meeting_of(std::span<std::byte> part) {
+    return reinterpret_cast<Meeting*>(part.data() - sizeof(Meeting));
+  }
 
   void sleep_past(const std::atomic_ref<std::uint32_t>& round, std::uint32_t now) {
     const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
@@ -152,6 +169,7 @@ class WindowMemory final : public PeerMemory {
     check_mpi(MPI_Comm_group(host_, &here), "MPI_Comm_group");
     int ranks = 0;
     check_mpi(MPI_Comm_size(comm, &ranks), "MPI_Comm_size");
+    check_mpi(MPI_Comm_rank(comm, &rank_), "MPI_Comm_rank");
     for (int rank = 0; rank < ranks; ++rank) {
       int local = MPI_UNDEFINED;
       check_mpi(MPI_Group_translate_ranks(all, 1, &rank, here, &local), "MPI_Group_translate_ranks");
@@ -167,6 +185,7 @@ class WindowMemory final : public PeerMemory {
       if (!part.empty()) (void)::madvise(part.data() - sizeof(Meeting), part.size() + sizeof(Meeting), kPopulateWrite);
     }
     meeting_ = reinterpret_cast<Meeting*>(part_of(0));
+    own_ = meeting_of(mine_);
     MPI_Group_free(&here);
     MPI_Group_free(&all);
   }
@@ -178,6 +197,9 @@ class WindowMemory final : public PeerMemory {
   std::span<std::byte> mine_;
   std::vector<std::span<std::byte>> parts_;  ///< per rank
   Meeting* meeting_ = nullptr;
+  Meeting* own_ = nullptr;
+  int rank_ = 0;
+  std::shared_ptr<const std::uint64_t> frame_;
   int exceptions_at_birth_ = std::uncaught_exceptions();
 };
 
@@ -191,15 +213,28 @@ MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_
             check_mpi(MPI_Comm_dup(parent, &copy), "MPI_Comm_dup");
             return copy;
           }(),
-          hang_timeout, part_bytes) {}
+          hang_timeout, part_bytes, std::make_shared<std::uint64_t>(0)) {}
 
 MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout,
-                                 std::size_t part_bytes)
-    : comm_(comm), hang_timeout_(std::min(hang_timeout, kMaxWait)), part_bytes_(part_bytes) {
+                                 std::size_t part_bytes, std::shared_ptr<std::uint64_t> frame)
+    : comm_(comm), hang_timeout_(std::min(hang_timeout, kMaxWait)), part_bytes_(part_bytes), frame_(std::move(frame)) {
   HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kMaxPartBytes);
   check_mpi(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
   check_mpi(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
   check_mpi(MPI_Comm_size(comm_, &size_), "MPI_Comm_size");
+  int* most = nullptr;
+  int is_set = 0;
+  check_mpi(MPI_Comm_get_attr(MPI_COMM_WORLD, MPI_TAG_UB, static_cast<void*>(&most), &is_set), "MPI_Comm_get_attr");
+  tags_ = is_set != 0 ? static_cast<std::uint64_t>(*most) + 1 : kMinTags;
+}
+
+void MpiCommunicator::check_tag(int from, int tag) {
+  if (tag == this->tag()) return;
+  abandoned_ = true;
+  // Of the frames that have this tag, the one nearest to this rank's.
+  const std::uint64_t behind = (*frame_ % tags_ + tags_ - static_cast<std::uint64_t>(tag)) % tags_;
+  const bool is_ahead = behind > tags_ / 2 || behind > *frame_;
+  check_frame(rank_, *frame_, from, is_ahead ? *frame_ + (tags_ - behind) : *frame_ - behind);
 }
 
 MpiCommunicator::~MpiCommunicator() {
@@ -249,7 +284,7 @@ void MpiCommunicator::start_send(std::span<const std::byte> message, int to, std
     // The last part is the first one shorter than a full one; it may be empty.
     const auto part = message.first(std::min(message.size(), part_bytes_));
     requests.push_back(MPI_REQUEST_NULL);
-    check_mpi(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, kTag, comm_, &requests.back()),
+    check_mpi(MPI_Isend(part.data(), static_cast<int>(part.size()), MPI_BYTE, to, tag(), comm_, &requests.back()),
               "MPI_Isend");
     if (part.size() < part_bytes_) return;
     message = message.subspan(part_bytes_);
@@ -267,10 +302,11 @@ std::size_t MpiCommunicator::next_part(int from, MPI_Message& part) {
   poll(
       [&] {
         int found = 0;
-        check_mpi(MPI_Improbe(from, kTag, comm_, &found, &part, &status), "MPI_Improbe");
+        check_mpi(MPI_Improbe(from, MPI_ANY_TAG, comm_, &found, &part, &status), "MPI_Improbe");
         return found != 0;
       },
       "waiting for a message from", from);
+  check_tag(from, status.MPI_TAG);
   int count = 0;
   check_mpi(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
   return static_cast<std::size_t>(count);
@@ -314,8 +350,9 @@ bool MpiCommunicator::advance(Incoming& incoming) {
     if (incoming.request == MPI_REQUEST_NULL) {
       MPI_Message part = MPI_MESSAGE_NULL;
       MPI_Status status;
-      check_mpi(MPI_Improbe(incoming.from, kTag, comm_, &done, &part, &status), "MPI_Improbe");
+      check_mpi(MPI_Improbe(incoming.from, MPI_ANY_TAG, comm_, &done, &part, &status), "MPI_Improbe");
       if (done == 0) return false;
+      check_tag(incoming.from, status.MPI_TAG);
       int count = 0;
       check_mpi(MPI_Get_count(&status, MPI_BYTE, &count), "MPI_Get_count");
       incoming.last_part = static_cast<std::size_t>(count);
@@ -365,7 +402,22 @@ void MpiCommunicator::exchange(std::span<const Outgoing> out, std::span<const in
   if (!sends.empty()) wait(sends, "sending to", out.front().to);
 }
 
+void MpiCommunicator::check_frames(int root) {
+  const std::array<std::uint64_t, 2> mine{*frame_, ~*frame_};
+  std::array<std::uint64_t, 2> most{};
+  std::vector<MPI_Request> request{MPI_REQUEST_NULL};
+  check_mpi(MPI_Ireduce(mine.data(), most.data(), 2, MPI_UINT64_T, MPI_MAX, root, comm_, request.data()),
+            "MPI_Ireduce");
+  wait(request, "reducing to", root);
+  if (rank_ != root || (most[0] == *frame_ && ~most[1] == *frame_)) return;
+  throw Error(ExitCode::Internal,
+              fmt::format("rank {} is in frame {} and reduces with ranks in frames {} to {}", rank_, *frame_, ~most[1],
+                          most[0]),
+              "a rank left out a frame or did one twice: please report this with the command line");
+}
+
 void MpiCommunicator::reduce_max(std::span<std::uint64_t> values, int root) {
+  check_frames(root);
   const std::size_t most = part_bytes_ / sizeof(std::uint64_t);
   std::vector<std::uint64_t> result(rank_ == root ? std::min(values.size(), most) : 0);
   while (!values.empty()) {
@@ -389,7 +441,7 @@ std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> membe
   check_mpi(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
   MPI_Group_free(&some);
   MPI_Group_free(&all);
-  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_));
+  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_, frame_));
 }
 
 std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
@@ -404,7 +456,7 @@ std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {
                             kSharedMemoryFolder, least >> 20U),
                 "enlarge /dev/shm (docker run --shm-size), or choose another strategy than shared-memory");
   }
-  auto memory = std::make_shared<WindowMemory>(comm_, bytes, hang_timeout_);
+  auto memory = std::make_shared<WindowMemory>(comm_, bytes, hang_timeout_, frame_);
   barrier(*this);  // every part is zero before any rank writes to one
   return memory;
 }

@@ -32,6 +32,7 @@ class MpiCommunicator final : public Communicator {
   [[nodiscard]] int rank() const override { return rank_; }
   [[nodiscard]] int size() const override { return size_; }
   [[nodiscard]] std::string_view transport() const override { return "mpi"; }
+  void begin_frame(std::uint64_t frame) override { *frame_ = frame; }
   void send(std::span<const std::byte> message, int to) override;
   void receive(std::span<std::byte> message, int from) override;
   [[nodiscard]] std::vector<std::byte> receive(int from) override;
@@ -51,7 +52,15 @@ class MpiCommunicator final : public Communicator {
   /// Moves a message on as far as it goes without waiting; whether it is whole.
   bool advance(Incoming& incoming);
   struct Owned {};  ///< tag: `comm` becomes ours, no duplicate is made
-  MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes);
+  MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes,
+                  std::shared_ptr<std::uint64_t> frame);
+
+  /// What this rank's messages are tagged with: its frame, in as many numbers as MPI has.
+  [[nodiscard]] int tag() const { return static_cast<int>(*frame_ % tags_); }
+  /// Throws as check_frame() does when a message with another tag has come.
+  void check_tag(int from, int tag);
+  /// Collective. Throws on `root` unless all ranks are in one frame.
+  void check_frames(int root);
 
   void start_send(std::span<const std::byte> message, int to, std::vector<MPI_Request>& requests);
   /// Waits for all of `requests`; `doing` stands in the error when the time limit passes.
@@ -67,6 +76,8 @@ class MpiCommunicator final : public Communicator {
   std::chrono::nanoseconds hang_timeout_;
   int exceptions_at_birth_ = std::uncaught_exceptions();
   std::size_t part_bytes_;
+  std::uint64_t tags_ = 1;                       ///< that MPI has
+  std::shared_ptr<std::uint64_t> frame_;         ///< one for all communicators of this rank
   bool abandoned_ = false;                       ///< a wait was given up with requests under way
   std::vector<std::unique_ptr<Incoming>> idle_;  ///< memory of messages that have come, for the next ones
 };

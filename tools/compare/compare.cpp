@@ -164,7 +164,9 @@ void run_contest(Communicator& comm, const CompareInput& input, const CompareSet
   const std::vector<std::size_t> tiles = all_tiles(pristine.layout());
   WorkingLayers<Pixel> layers(comm, pristine.layout(), std::ranges::any_of(contestants, &Contestant<Pixel>::in_place));
   Assembler assembler;
+  std::uint64_t frame = 0;
   measure_in_turns(contestants.size(), settings.frames, [&](std::size_t index, bool counts) {
+    comm.begin_frame(++frame);
     Contestant<Pixel>& contestant = contestants[index];
     TileLayer<Pixel>& layer = layers.of(contestant.in_place);
     copy_tiles(contestant.own_layer.tiles() > 0 ? contestant.own_layer : pristine, layer, tiles);
