@@ -1,6 +1,7 @@
 #include "engine/frame.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "compositing/compositor.h"
 #include "core/timing.h"
@@ -9,6 +10,7 @@
 #include "engine/verification.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
+#include "rt/show/show.h"
 #include "rt/trace/primary_rays.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
@@ -157,6 +159,19 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
   }
 }
 
+/// What Show::Rank stands for; the shader does not know it.
+void show_ranks(const Session& session, const FramePlan& plan, Frame& frame) {
+  if (!plan.drawn_by || !plan.lit) return;
+  for (const std::size_t tile : frame.owned) {
+    const std::span<const Key> keys = std::as_const(*frame.keys).tile(tile);
+    const std::span<Rgb> colors = frame.radiance.tile(tile);
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const int rank = keys[i] == kNoKey ? session.rank() : plan.drawn_by->rank_of(tile, key_surface(keys[i]));
+      colors[i] = distinct_color(static_cast<std::uint32_t>(rank));
+    }
+  }
+}
+
 }  // namespace
 
 VerifyCounts& VerifyCounts::operator+=(const VerifyCounts& other) {
@@ -217,6 +232,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
     const JitteredViews drawn{{views.begin(), views.end()}, sample};
     spent.verified = verify(session, plan, std::span(&drawn, 1), std::span(&frame, 1));
   }
+  show_ranks(session, plan, frame);
   spent.samples = 1;
   if (times != nullptr) *times = spent;
   return frame;
@@ -259,6 +275,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
   shader.shade(samples, frames.front().owned);
   add_light(shader, times);
   if (plan.verify_percent > 0.0) times.verified = verify(session, plan, jittered, frames);
+  for (Frame& frame : frames) show_ranks(session, plan, frame);
   times.samples = static_cast<int>(jittered.size());
   return frames;
 }
