@@ -439,7 +439,8 @@ void DeferredShader::shade(std::span<const View> views, const TileLayer<Key>& ke
   shade(std::span(&only, 1), tiles);
 }
 
-void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles) {
+void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles,
+                           const std::function<bool()>& is_overtaken) {
   HPR_CHECK(samples.size() == 1 || (!samples.empty() && !shades_one_by_one()));
   check_sizes(samples);
   const ShadedSample& first = samples.front();
@@ -456,6 +457,7 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   if (state.settings.denoise) state.fragments.prepare(layout, first.views, state.settings);
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
+    if (is_overtaken && is_overtaken()) return;
     const std::size_t tile = order[i];
     const TilePlace location = layout.place(tile);
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <iterator>
 #include <sstream>
+#include <utility>
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/communicator.h"
@@ -17,6 +18,7 @@
 #include "compositing/compositor.h"
 #include "core/bytes.h"
 #include "core/file.h"
+#include "core/interrupt.h"
 #include "core/job_board.h"
 #include "core/log.h"
 #include "core/signals.h"
@@ -249,15 +251,17 @@ std::string WallDriver::status() const {
 
 WallDriver::~WallDriver() = default;
 
-void WallDriver::draw(std::uint64_t number, Progress& progress) {
+bool WallDriver::draw(std::uint64_t number, Progress& progress) {
   const trace::Span span("frame", "number", number);
   report_frame(number);
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   const std::vector<View> views = screens_in(number, heads_.at(number));
   verified_ = {};
+  bool is_new = true;
   const std::optional<Error> failure = draw_with_retry(session_.comm(), fmt::format("frame {}", number),
-                                                       [&] { make_pictures(views, number, progress); });
+                                                       [&] { is_new = make_pictures(views, number, progress); });
+  if (!failure && !is_new) return false;
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   if (failure) {
     failed_.add_failed(number);
@@ -269,11 +273,22 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   agree_on_failure(session_.comm(), [&] { show(number); });
   shown_ms_ = watch.ms();
   record(number, failure);
+  return true;
 }
 
-void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress) {
+/// Takes what came on this rank and adds it to what waits for follow_viewers(); whether anything did, a command too.
+bool WallDriver::take_news() {
+  if (display_) news_.input += display_->take_input();
+  news_.interrupt = news_.interrupt || take_request() == Request::Stop;
+  return news_.interrupt || news_.input != DisplayInput{} || control_.any_waiting();
+}
+
+bool WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress) {
   try {
-    Frame& frame = frames_->make(curved_->drawn(views), number, progress);
+    Interrupt interrupt([this] { return take_news(); });
+    Frame* const made = frames_->make(curved_->drawn(views), number, progress, &interrupt);
+    if (made == nullptr) return false;
+    Frame& frame = *made;
     verified_ += frames_->verified();
     if (const std::uint64_t unmended = frames_->verified().unmended; unmended > 0) {
       throw AgreedError(ExitCode::CheckFailed,
@@ -292,6 +307,7 @@ void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
     pictures_ = std::move(pictures);
     monitor_pictures_ = std::move(monitor_pictures);
     exposure_ = exposure;
+    return true;
   } catch (...) {
     frames_->discard();
     throw;
@@ -299,14 +315,11 @@ void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
 }
 
 bool WallDriver::follow_viewers() {
-  struct ViewerInput {
-    DisplayInput input;
-    bool interrupt = false;
-  };
-  const ViewerInput mine{display_ ? display_->take_input() : DisplayInput{}, take_request() == Request::Stop};
+  (void)take_news();
+  const News mine = std::exchange(news_, {});
   OrbitInput motion;
   bool stop = false;
-  for (const ViewerInput& viewer : all_gather_value(session_.comm(), mine)) {
+  for (const News& viewer : all_gather_value(session_.comm(), mine)) {
     motion += viewer.input.orbit;
     stop = stop || viewer.input.stop;
     interrupted_ = interrupted_ || viewer.interrupt;

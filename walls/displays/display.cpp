@@ -18,6 +18,12 @@ OrbitInput& OrbitInput::operator+=(const OrbitInput& other) {
   return *this;
 }
 
+DisplayInput& DisplayInput::operator+=(const DisplayInput& other) {
+  orbit += other.orbit;
+  stop = stop || other.stop;
+  return *this;
+}
+
 const std::vector<DisplayKind>& display_kinds() {
 #define HPR_LIST_DISPLAY(name) name##_display(),
   static const std::vector<DisplayKind> kinds{HPR_DISPLAYS(HPR_LIST_DISPLAY)};

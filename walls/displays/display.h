@@ -57,8 +57,11 @@ struct OrbitInput {
 
 /// What the viewer asked for.
 struct DisplayInput {
-  OrbitInput orbit;
+  OrbitInput orbit = {};
   bool stop = false;  ///< end the run after this frame, orderly
+
+  DisplayInput& operator+=(const DisplayInput& other);
+  bool operator==(const DisplayInput&) const = default;
 };
 
 /// Shows pictures on the screens of a wall.
