@@ -166,5 +166,35 @@ TEST(Resting, ADragBeforeTheFirstSampleLeavesTheLastMovingPicture) {
   });
 }
 
+TEST(Resting, KeysChangeExposureToneAndWireframe) {
+  drive_view([](WallDriver& driver) {
+    EXPECT_TRUE(draw(driver, 0));
+    EXPECT_TRUE(draw(driver, 1));
+    EXPECT_TRUE(draw(driver, 2));
+    EXPECT_TRUE(driver.settled());
+    const Tone tone = driver.transform().tone;
+    next_input().keys = {.half_stops = 3, .tones = 1};
+    EXPECT_TRUE(driver.follow_viewers());
+    EXPECT_FALSE(driver.settled()) << "the same light is shown otherwise";
+    EXPECT_TRUE(draw(driver, 3));
+    EXPECT_EQ(driver.transform().exposure_stops, 1.5);
+    EXPECT_EQ(static_cast<std::size_t>(driver.transform().tone),
+              (static_cast<std::size_t>(tone) + 1) % kToneNames.size());
+    EXPECT_TRUE(driver.frames().report()->resting) << "no sample is lost";
+    EXPECT_TRUE(driver.settled());
+
+    next_input().keys = {.wireframes = 1};
+    EXPECT_TRUE(driver.follow_viewers());
+    EXPECT_TRUE(draw(driver, 4));
+    EXPECT_EQ(driver.plan().rays.show, Show::Wireframe);
+    EXPECT_EQ(driver.transform().shows, "wireframe");
+    next_input().keys = {.wireframes = 1};
+    EXPECT_TRUE(driver.follow_viewers());
+    EXPECT_TRUE(draw(driver, 5));
+    EXPECT_EQ(driver.plan().rays.show, Show::Shaded);
+    EXPECT_EQ(driver.transform().exposure_stops, 1.5);
+  });
+}
+
 }  // namespace
 }  // namespace hpr

@@ -25,6 +25,7 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "engine/output.h"
+#include "engine/settings_table.h"
 #include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_status.h"
 #include "raster/gl_context.h"
@@ -296,6 +297,7 @@ bool WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
                         "memory, a GPU or a link of these ranks flips bits: replace it");
     }
     showing_.transform = transform_for(session_, frame, display_settings_);
+    shows_again_ = false;
     SmoothExposure exposure = exposure_;
     if (!display_settings_.exposure_stops) {
       showing_.transform.exposure_stops = exposure.next(showing_.transform.exposure_stops);
@@ -317,20 +319,46 @@ bool WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
 bool WallDriver::follow_viewers() {
   (void)take_news();
   const News mine = std::exchange(news_, {});
-  OrbitInput motion;
-  bool stop = false;
+  DisplayInput all;
   for (const News& viewer : all_gather_value(session_.comm(), mine)) {
-    motion += viewer.input.orbit;
-    stop = stop || viewer.input.stop;
+    all += viewer.input;
     interrupted_ = interrupted_ || viewer.interrupt;
   }
-  orbit_.move(motion);
-  return !stop && !interrupted_;
+  orbit_.move(all.orbit);
+  apply_keys(all.keys);
+  return !all.stop && !interrupted_;
+}
+
+/// As a command would, so that a job that is lost goes on with it.
+void WallDriver::change_setting(const std::string& name, const std::string& value) {
+  set_setting(settings_, name, value);
+  if (journal_) journal_->add_command(fmt::format("set {} {}", name, value));
+}
+
+void WallDriver::apply_keys(const ViewKeys& keys) {
+  if (keys.half_stops != 0) {
+    constexpr double kMaxStops = 30.0;
+    const double stops = showing_.transform.exposure_stops + 0.5 * keys.half_stops;
+    change_setting("exposure", fmt::format("{}", std::clamp(stops, -kMaxStops, kMaxStops)));
+  }
+  if (keys.tones != 0) {
+    const auto next = static_cast<std::size_t>(settings_.display.tone) + static_cast<std::size_t>(keys.tones);
+    change_setting("tone", std::string(kToneNames.at(next % kToneNames.size())));
+  }
+  if (keys.wireframes % 2 != 0) {
+    const Show now = settings_.frame.rays.show;
+    if (now != Show::Wireframe) show_before_wireframe_ = now;
+    change_setting("show", std::string(name_of(now == Show::Wireframe ? show_before_wireframe_ : Show::Wireframe)));
+    plan_frames();
+  } else if (keys.half_stops != 0 || keys.tones != 0) {
+    display_settings_ = resolve(settings_, job_.seed).display;
+    shows_again_ = true;
+  }
 }
 
 bool WallDriver::settled() {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
-  if (job_.path || heads_.plays_on(last)) return false;
+  if (shows_again_ || job_.path || heads_.plays_on(last)) return false;
   return frames_->refined(curved_->drawn(screens_in(0, heads_.at(last + 1))));
 }
 

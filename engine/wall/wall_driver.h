@@ -16,6 +16,7 @@
 #include "engine/wall/viewpoint.h"
 #include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_job.h"
+#include "rt/show/show.h"
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
 #include "walls/geometry/curved.h"
@@ -90,6 +91,8 @@ class WallDriver {
   void show(std::uint64_t number);
   [[nodiscard]] bool make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress);
   [[nodiscard]] bool take_news();
+  void apply_keys(const ViewKeys& keys);
+  void change_setting(const std::string& name, const std::string& value);
   void record(std::uint64_t number, const std::optional<Error>& failure);
   void warn_of_slow_ranks(std::span<const RankWork> works);
   [[nodiscard]] std::vector<ScreenRecord> record_screens();
@@ -133,6 +136,8 @@ class WallDriver {
     bool interrupt = false;
   };
   News news_;
+  bool shows_again_ = false;  ///< the last frame, whose exposure or tone was changed
+  Show show_before_wireframe_ = Show::Shaded;
 };
 
 /// Collective, after the last frame. Rank 0 writes the files; all ranks throw Error (Io) where it cannot.
