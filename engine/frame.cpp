@@ -1,14 +1,18 @@
 #include "engine/frame.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
+#include "core/interrupt.h"
 #include "core/timing.h"
 #include "engine/session.h"
 #include "engine/tile_ownership.h"
 #include "engine/verification.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
+#include "rt/show/show.h"
 #include "rt/trace/primary_rays.h"
 
 // The frame loop: the place to start reading. A frame flows one way,
@@ -138,6 +142,35 @@ void mark_rank(const Session& session, Frame& frame) {
   }
 }
 
+/// Shades the tiles of `frame`, a few at a time, between which all ranks agree on whether the sample has been
+/// overtaken. The frame says so.
+void shade_while_wanted(Session& session, DeferredShader& shader, const ShadedSample& lit, Interrupt& interrupt,
+                        Frame& frame, FrameTimes& spent) {
+  struct Progress {
+    bool overtaken = false;
+    bool done = false;
+  };
+  constexpr double kBetween_ms = 100.0;  // agreements: what other ranks shade in vain at most
+  const std::span<const std::size_t> tiles = frame.owned;
+  const std::size_t least = 4 * static_cast<std::size_t>(session.threads());
+  // One rank has nobody to agree with.
+  std::size_t count = session.comm().size() == 1 ? tiles.size() : least;
+  for (std::size_t first = 0;;) {
+    count = std::min(count, tiles.size() - first);
+    const Stopwatch watch;
+    shader.shade(std::span(&lit, 1), tiles.subspan(first, count), [&] { return interrupt.is_raised(); });
+    add_light(shader, spent);
+    const Progress mine{interrupt.is_raised(), first + count == tiles.size()};
+    const std::vector<Progress> all = all_gather_value(session.comm(), mine);
+    frame.overtaken = std::ranges::any_of(all, &Progress::overtaken);
+    if (frame.overtaken || std::ranges::all_of(all, &Progress::done)) return;
+    first += count;
+    if (count > 0)
+      count = std::clamp(static_cast<std::size_t>(static_cast<double>(count) * kBetween_ms / std::max(watch.ms(), 1.0)),
+                         least, 4 * count + least);
+  }
+}
+
 /// rt: gives the owned tiles of `frame` their radiance, from keys or from colors that keys carry.
 void shade(Session& session, const FramePlan& plan, std::span<const View> views, const FrameSample& sample,
            Frame& frame, FrameTimes& spent) {
@@ -151,9 +184,27 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
     const trace::Span light("light");
     DeferredShader& shader = session.shader(plan.rays);
     const ShadedSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
-    shader.shade(std::span(&lit, 1), frame.owned);
+    if (sample.interrupt != nullptr) {
+      shade_while_wanted(session, shader, lit, *sample.interrupt, frame, spent);
+      if (frame.overtaken) return;
+    } else {
+      shader.shade(std::span(&lit, 1), frame.owned);
+      add_light(shader, spent);
+    }
     mark_rank(session, frame);
-    add_light(shader, spent);
+  }
+}
+
+/// What Show::Rank stands for; the shader does not know it.
+void show_ranks(const Session& session, const FramePlan& plan, Frame& frame) {
+  if (!plan.drawn_by || !plan.lit) return;
+  for (const std::size_t tile : frame.owned) {
+    const std::span<const Key> keys = std::as_const(*frame.keys).tile(tile);
+    const std::span<Rgb> colors = frame.radiance.tile(tile);
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const int rank = keys[i] == kNoKey ? session.rank() : plan.drawn_by->rank_of(tile, key_surface(keys[i]));
+      colors[i] = distinct_color(static_cast<std::uint32_t>(rank));
+    }
   }
 }
 
@@ -213,10 +264,12 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   spent.composite_ms = watch.ms();
 
   shade(session, plan, views, sample, frame, spent);
+  if (frame.overtaken) return frame;
   if (plan.verify_percent > 0.0) {
     const JitteredViews drawn{{views.begin(), views.end()}, sample};
     spent.verified = verify(session, plan, std::span(&drawn, 1), std::span(&frame, 1));
   }
+  show_ranks(session, plan, frame);
   spent.samples = 1;
   if (times != nullptr) *times = spent;
   return frame;
@@ -259,6 +312,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
   shader.shade(samples, frames.front().owned);
   add_light(shader, times);
   if (plan.verify_percent > 0.0) times.verified = verify(session, plan, jittered, frames);
+  for (Frame& frame : frames) show_ranks(session, plan, frame);
   times.samples = static_cast<int>(jittered.size());
   return frames;
 }

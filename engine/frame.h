@@ -16,6 +16,7 @@
 
 namespace hpr {
 
+class Interrupt;
 class Session;
 class TileOwnership;
 
@@ -25,6 +26,7 @@ struct Frame {
   TileLayer<Rgb> radiance;         ///< of owned tiles
   std::vector<std::size_t> owned;  ///< tiles this rank lit, ascending
   AovLayers aovs;                  ///< of owned tiles
+  bool overtaken = false;          ///< by FrameSample::interrupt: of all this only the keys mean anything
 };
 
 /// What verifying some of a frame's tiles found; the same on all ranks.
@@ -60,6 +62,7 @@ struct FrameSample {
   std::optional<TileOwnership>* ownership = nullptr;  ///< made by the first sample; null: keys do not move
   const PixelMask* wanted = nullptr;  ///< pixels that are lit; null: all. Others' radiance means nothing
   const std::function<void()>* before_shading = nullptr;  ///< called once the owners of tiles have their keys
+  Interrupt* interrupt = nullptr;  ///< of this rank: raised on any, it ends shading within a tile; null: on none
 };
 
 /// One of several samples that are drawn together.

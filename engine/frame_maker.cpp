@@ -105,13 +105,13 @@ bool FrameMaker::refined(std::span<const View> screens) const {
   return refining_ && is_resting(screens) && reached(resting_, sampler_->sample_progress());
 }
 
-Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress) {
+Frame* FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress, Interrupt* interrupt) {
   session_.comm().begin_frame(number);
   if (!budget_) {
     plan_for({}, screens);
     make_anew(number, sampling_.goal.samples.value_or(0), progress);
   } else if (is_resting(screens)) {
-    refine(screens, number, progress);
+    if (!refine(screens, number, interrupt)) return nullptr;
   } else {
     refining_ = false;
     const Effort effort = all_gather_value(session_.comm(), budget_->effort()).front();
@@ -120,7 +120,7 @@ Frame& FrameMaker::make(std::span<const View> screens, std::uint64_t number, Pro
     write_report(effort, effort.samples);
   }
   last_screens_.assign(screens.begin(), screens.end());
-  return sampler_->frame();
+  return &sampler_->frame();
 }
 
 void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress) {
@@ -137,21 +137,22 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
   relmse_ = sampler_->sample_progress().relmse;
 }
 
-void FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Progress& progress) {
-  times_before_ = refining_ ? times_ : FrameTimes{};
+bool FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Interrupt* interrupt) {
   if (!refining_) {
     sampler_.reset();
     plan_for({}, screens);
     sampler_ = std::make_unique<FrameSampler>(session_, plan_, resting_, number, false);
-    // A single sample with nothing given up: there is nothing to add to it.
-    if (!resting_.sums()) (void)sampler_->draw(blocks_.views, {}, progress);
+    times_ = {};
   }
   refining_ = true;
-  if (resting_.sums()) sampler_->refine(blocks_.views);
+  const FrameTimes before = times_;
+  if (!sampler_->refine(blocks_.views, interrupt)) return false;
+  times_before_ = before;
   times_ = sampler_->times();
   relmse_ = sampler_->sample_progress().relmse;
   write_report({max_samples(), 0, 0}, sampler_->sample_progress().samples);
   report_->resting = true;
+  return true;
 }
 
 void FrameMaker::record_frame_time(double slowest_ms) {

@@ -15,6 +15,7 @@
 namespace hpr {
 
 class FrameSampler;
+class Interrupt;
 class Progress;
 class Session;
 
@@ -31,8 +32,11 @@ class FrameMaker {
   FrameMaker(const FrameMaker&) = delete;
   FrameMaker& operator=(const FrameMaker&) = delete;
 
-  /// Collective. Valid until the next one; made in blocks(). `progress` shows its samples.
-  [[nodiscard]] Frame& make(std::span<const View> screens, std::uint64_t number, Progress& progress);
+  /// Collective. Valid until the next one; made in blocks(). `progress` shows its samples. Null on all ranks where a
+  /// picture was to be refined and `interrupt` was raised on any first: then there is no new frame, and the screens
+  /// keep the last one.
+  [[nodiscard]] Frame* make(std::span<const View> screens, std::uint64_t number, Progress& progress,
+                            Interrupt* interrupt = nullptr);
   /// The last one.
   [[nodiscard]] Frame& frame();
   /// Collective. Records the time of the slowest rank for the last frame, equal on all ranks; the budget follows it.
@@ -59,7 +63,7 @@ class FrameMaker {
  private:
   void plan_for(const Effort& effort, std::span<const View> screens);
   void make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress);
-  void refine(std::span<const View> screens, std::uint64_t number, Progress& progress);
+  [[nodiscard]] bool refine(std::span<const View> screens, std::uint64_t number, Interrupt* interrupt);
   void write_report(const Effort& effort, std::uint32_t samples);
   [[nodiscard]] bool is_resting(std::span<const View> screens) const;
   [[nodiscard]] std::uint32_t max_samples() const;

@@ -150,10 +150,10 @@ void FrameSampler::choose_pixels() {
   if (ownership_ && scattered_ && film_.samples() >= film_.pilot()) film_.mark_due(ownership_->mine(), due_);
 }
 
-void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count) {
+bool FrameSampler::add_samples(std::span<const View> views, std::uint32_t count, Interrupt* interrupt) {
   if (adaptive_) {
     choose_pixels();
-    if (adaptive_->is_stage_done()) return;  // no pixel wants more
+    if (adaptive_->is_stage_done()) return true;  // no pixel wants more
     count = std::min(count, scattered_ ? adaptive_->max_batch() : 1);
   }
   const std::function<void()> before_shading = [this] { scatter(); };
@@ -162,6 +162,7 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   for (std::uint32_t i = 0; i < count; ++i) {
     jittered.push_back(jittered_views(views, film_.samples() + i, weights[i]));
     jittered.back().sample.before_shading = &before_shading;
+    jittered.back().sample.interrupt = interrupt;
   }
   FrameTimes round_times;
   std::vector<Frame> frames;
@@ -170,6 +171,7 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   } else {
     frames.push_back(make_frame(session_, plan_, jittered.front().views, &round_times, jittered.front().sample));
   }
+  if (frames.front().overtaken) return false;
   std::vector<SampleLight> lights;
   lights.reserve(count);
   for (const Frame& frame : frames) lights.push_back({frame.radiance, frame.aovs, *frame.keys});
@@ -177,6 +179,7 @@ void FrameSampler::add_samples(std::span<const View> views, std::uint32_t count)
   if (adaptive_) adaptive_->added(count, film_);
   times_ += round_times;
   frame_.keys = frames.back().keys;
+  return true;
 }
 
 void FrameSampler::report_progress(double seconds) {
@@ -230,7 +233,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   std::optional<Stopwatch> requested;
   Stopwatch written;
   while (!reached(sampling_, progress_)) {
-    add_samples(views, size_of_round());
+    (void)add_samples(views, size_of_round());
     // Without a checkpoint a request is for whoever draws frame after frame.
     Request request = checkpoint.path.empty() ? Request::None : take_request();
     // One signal reaches the ranks of a job one by one, maybe in different samples.
@@ -250,14 +253,23 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   return true;
 }
 
-void FrameSampler::refine(std::span<const View> views) {
+bool FrameSampler::refine(std::span<const View> views, Interrupt* interrupt) {
+  if (!sampling_.sums()) {
+    if (progress_.samples > 0) return true;
+    Frame frame = make_frame(session_, plan_, views, &times_, {.number = {number_, 0}, .interrupt = interrupt});
+    if (frame.overtaken) return false;
+    frame_ = std::move(frame);
+    progress_.samples = 1;
+    return true;
+  }
   if (!reached(sampling_, progress_)) {
     const Stopwatch watch;
-    add_samples(views, 1);
+    if (!add_samples(views, 1, interrupt)) return false;
     const double seconds = progress_.seconds + 1e-3 * watch.ms();
     report_progress(agree(session_.comm(), {Request::None, seconds, false}).seconds);
   }
   finish();
+  return true;
 }
 
 void FrameSampler::finish() {

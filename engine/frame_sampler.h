@@ -13,6 +13,7 @@
 
 namespace hpr {
 
+class Interrupt;
 class Progress;
 class Session;
 struct CheckpointSettings;
@@ -33,8 +34,10 @@ class FrameSampler {
   /// After draw(), on rank 0, once what became of its frame is written: removes checkpoints nobody asked for.
   void remove_unasked_checkpoints();
 
-  /// Collective. Draws one more sample unless the goal is reached; frame() is the means of those so far. Signals wait.
-  void refine(std::span<const View> views);
+  /// Collective. Draws one more sample unless the goal is reached; frame() is the means of those so far.
+  /// False on all ranks where `interrupt` was raised on any before the sample was whole: then all is as it was before,
+  /// and the same sample is the next one.
+  [[nodiscard]] bool refine(std::span<const View> views, Interrupt* interrupt = nullptr);
 
   /// The means, after draw() returned true. Valid as long as this object.
   [[nodiscard]] Frame& frame() { return frame_; }
@@ -47,8 +50,8 @@ class FrameSampler {
   void write(const CheckpointSettings& checkpoint, bool asked_for);
   /// Writes a checkpoint; false, with an error's lines, where it cannot.
   bool try_to_write(const CheckpointSettings& checkpoint, bool asked_for);
-  /// Draws `count` samples together, at most size_of_round().
-  void add_samples(std::span<const View> views, std::uint32_t count);
+  /// Draws `count` samples together, at most size_of_round(). False where a single one was overtaken, and is not added.
+  bool add_samples(std::span<const View> views, std::uint32_t count, Interrupt* interrupt = nullptr);
   /// How many samples to draw together.
   [[nodiscard]] std::uint32_t size_of_round();
   /// Once the first sample after a checkpoint was read has given tiles their owners: sends them the sums.

@@ -304,7 +304,8 @@ void CollectedPicture::write_picture(const std::string& scene_name) const {
     const Image<Rgba8> colors =
         enlarged() ? to_display(radiance(), threads_, *transform_) : join_blocks(display_, blocks_, 0);
     write_png(files_.picture, colors, texts_of(*transform_));
-    if (const std::string advice = advice_on(colors); !advice.empty()) log::warning("{}", advice);
+    const std::string advice = transform_->shows.empty() ? advice_on(colors) : std::string();
+    if (!advice.empty()) log::warning("{}", advice);
   }
   if (files_.is_png() && files_.aovs.empty()) return;
   const std::string exr = files_.is_png() ? files_.aov_file() : files_.picture;

@@ -122,6 +122,10 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
     lines.push_back(
         fmt::format("resolution: {} of the pixels a side (as asked), enlarged by a filter", settings.resolution_scale));
   }
+  if (plan.rays.show != Show::Shaded) {
+    lines.push_back(fmt::format("show: {} (as asked, in place of light)", name_of(plan.rays.show)));
+  }
+  if (!needs_light(plan.rays.show)) return;
   if (const std::string& note = session.scene().environment_note; !note.empty()) lines.push_back("light: " + note);
   if (!gives_light(session.scene())) {
     lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
@@ -210,8 +214,9 @@ PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, 
   for (const View& view : views) work.pixels += view.size().area();
   work.rounds_depth = settings.depth_format != DepthFormat::Float32;
   work.software_gl = work.rounds_depth || session.draws_by_software();
-  work.ray_scene_is_for_keys = std::ranges::none_of(plan_passes(session.requirements(), plan.rays),
-                                                    [](const PassPlan& pass) { return pass.runs; });
+  work.ray_scene_is_for_keys =
+      !traces_own_rays(plan.rays.show) && std::ranges::none_of(plan_passes(session.requirements(), plan.rays),
+                                                               [](const PassPlan& pass) { return pass.runs; });
   return choose_primary(work);
 }
 
@@ -220,7 +225,8 @@ void choose_indirect(Session& session, const FrameSettings& settings, FramePlan&
   if (settings.indirect_is_chosen || !plan.rays.passes.empty()) return;
   RaySettings wanted = plan.rays;
   wanted.gather = true;
-  if (wanted.reference || !session.requirements().indirect.needed || !gathers_by_rays(session.requirements(), wanted)) {
+  if (wanted.reference || !needs_light(wanted.show) || !session.requirements().indirect.needed ||
+      !gathers_by_rays(session.requirements(), wanted)) {
     return;
   }
   // Processors that round otherwise may count otherwise.
@@ -281,8 +287,9 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   if (settings.photons_fit_frame) plan.rays.photons = photons_for(plan.rays.photons, views);
   plan.aovs = settings.aovs;
   plan.verify_percent = settings.verify_percent;
-  plan.mine = std::move(assign(plan.distribution, session.scene(), plan.layout, ranks,
-                               plan.groups)[static_cast<std::size_t>(session.comm().rank())]);
+  std::vector<Assignment> assigned = assign(plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
+  if (plan.rays.show == Show::Rank) plan.drawn_by.emplace(assigned, plan.layout);
+  plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
   if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {

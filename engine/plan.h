@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "cluster/distribution/assignment.h"
 #include "engine/aov.h"
+#include "engine/display/drawn_by.h"
 #include "engine/frame_settings.h"
 #include "image/tiles.h"
 #include "rt/ray_settings.h"
@@ -31,6 +33,7 @@ struct FramePlan {
   bool lit = true;              ///< false: only the keys are wanted, no light is spent on them
   FrameLayout layout;
   Assignment mine;                     ///< this rank's part
+  std::optional<DrawnBy> drawn_by;     ///< where ranks are shown
   std::vector<std::size_t> tiles;      ///< of this rank's group, ascending
   std::vector<std::string> explained;  ///< one line per decision, with its reason
 };

@@ -13,6 +13,7 @@
 #include "engine/settings_table.h"
 #include "image/filter.h"
 #include "rt/passes/pass_list.h"
+#include "rt/show/show.h"
 #include "scene/load_scene.h"
 #include "scene/view.h"
 
@@ -105,6 +106,22 @@ void check_verify(const FrameSettings& frame) {
   }
 }
 
+/// What stands in the place of all shaders is no light that settings could be about.
+void resolve_show(RenderSettings& settings) {
+  RaySettings& rays = settings.frame.rays;
+  if (rays.show == Show::Shaded) return;
+  rays.reference = false;
+  settings.frame.shading = Shading::Deferred;
+  settings.display = {.exposure_stops = 0.0, .tone = Tone::None, .shows = name_of(rays.show)};
+  if (needs_light(rays.show)) return;
+  rays.denoise = false;
+  rays.half_resolution.clear();
+  if (std::ranges::none_of(settings.frame.aovs, is_part)) return;
+  throw Error(ExitCode::Usage,
+              fmt::format("--show {} leaves no light of which --aov could show parts", name_of(rays.show)),
+              "with it, use of --aov only depth, id, normal, albedo, rank and cost");
+}
+
 /// What of the settings excludes each other.
 void check_combination(const RenderSettings& settings) {
   const FrameSettings& frame = settings.frame;
@@ -164,6 +181,7 @@ RenderSettings resolve(RenderSettings settings, std::uint64_t seed) {
   }
   RaySettings& rays = settings.frame.rays;
   rays.seed = seed;
+  resolve_show(settings);
   if (rays.reference && !settings.is_given("max-depth")) rays.max_depth = kReferenceDepth;
   resolve_photons(settings);
   if (rays.denoise && settings.sampling.filter) rays.filter = *settings.sampling.filter;

@@ -16,6 +16,7 @@
 #include "engine/aov.h"
 #include "image/filter.h"
 #include "rt/passes/pass_list.h"
+#include "rt/show/show.h"
 
 namespace hpr {
 namespace {
@@ -234,6 +235,15 @@ bool traces_passes(const Settings& settings) {
   return !settings.frame.rays.reference;
 }
 
+bool shows_light(const Settings& settings) {
+  return settings.frame.rays.show == Show::Shaded;
+}
+
+/// Whether the passes and what they are set to matter.
+bool computes_light(const Settings& settings) {
+  return needs_light(settings.frame.rays.show);
+}
+
 bool forms_groups(const Settings& settings) {
   return settings.frame.distribution.value_or(Distribution::Hybrid) == Distribution::Hybrid;
 }
@@ -241,7 +251,8 @@ bool forms_groups(const Settings& settings) {
 std::vector<Setting> make_table() {
   std::vector<std::string_view> filters;
   for (const PixelFilter filter : all_pixel_filters()) filters.push_back(name_of(filter));
-  const std::vector<Dependency> on_photons{{"reference", traces_passes}, {"passes", sends_photons}};
+  const std::vector<Dependency> on_photons{
+      {"show", computes_light}, {"reference", traces_passes}, {"passes", sends_photons}};
   return {
       // What is seen.
       {.name = "scene",
@@ -324,7 +335,8 @@ std::vector<Setting> make_table() {
        .costs = "a sixth to one and a quarter times as much again of a frame's first 16 samples",
        .loses = "false: noise, and steps at edges; true: detail of light finer than a pixel or two, less with more "
                 "samples",
-       .limits_reference = true},
+       .limits_reference = true,
+       .used_with = {{"show", computes_light}}},
       {.name = "passes",
        .help = "ray passes: auto, what the scene requires; all, those it does not too; none; or a list",
        .value = passes(),
@@ -333,7 +345,7 @@ std::vector<Setting> make_table() {
        .loses = "the light a pass carries is missing, or there where it is blocked",
        .decides_bits = false,
        .limits_reference = true,
-       .used_with = {{"reference", traces_passes}}},
+       .used_with = {{"show", computes_light}, {"reference", traces_passes}}},
       {.name = "indirect",
        .help = "all indirect light, not caustics alone: by photons, or under an even sky by rays (default: with "
                "--quality best, or where --passes names photon)",
@@ -381,7 +393,8 @@ std::vector<Setting> make_table() {
            [](const std::vector<PassId>& passes) { return fmt::format("{}", fmt::join(names_of(passes), ",")); }),
        .costs = "four times the points of those passes",
        .loses = "detail of that light where neighbors see similar surfaces",
-       .limits_reference = true},
+       .limits_reference = true,
+       .used_with = {{"show", computes_light}}},
       {.name = "max-depth",
        .help = "reflections and refractions in a row; of the reference: segments of a path, the first from the eye",
        .value = number(1, 64, [](Settings& s) -> int& { return s.frame.rays.max_depth; }),
@@ -405,7 +418,7 @@ std::vector<Setting> make_table() {
        .costs = "shadow rays in proportion",
        .loses = "noise in soft shadows",
        .limits_reference = true,
-       .used_with = {{"reference", traces_passes}}},
+       .used_with = {{"show", computes_light}, {"reference", traces_passes}}},
       {.name = "depth-format",
        .help = "bits of a depth where layers are composited",
        .value = choice(kDepthFormatNames, [](Settings& s) -> DepthFormat& { return s.frame.depth_format; }),
@@ -457,7 +470,8 @@ std::vector<Setting> make_table() {
        .costs = "rays for what later turns out to be hidden",
        .loses =
            "local: colors of 8 bits are composited, and coplanar surfaces of different ranks show the brighter one",
-       .limits_reference = true},
+       .limits_reference = true,
+       .used_with = {{"show", shows_light}}},
       {.name = "data",
        .help = "what rays meet on a rank: replicated, all of the scene, or partitioned, what the rank draws itself, "
                "while the rays of the others come to it",
@@ -478,7 +492,8 @@ std::vector<Setting> make_table() {
        .costs = "path tracing in place of the passes: many more samples for the same noise",
        .loses = "false: what the passes leave out, caught by photons of some width",
        .limits_reference = true,
-       .scope = SettingScope::Single},
+       .scope = SettingScope::Single,
+       .used_with = {{"show", shows_light}}},
 
       // Who does what.
       {.name = "distribute",
@@ -511,18 +526,25 @@ std::vector<Setting> make_table() {
        .scope = SettingScope::Single},
 
       // What is made of the picture.
+      {.name = "show",
+       .help = "in place of light: shading normals, texture coordinates, edges of triangles, a color for each object "
+               "(ids) or rank, rays a pixel (cost), surfaces behind each other (overdraw), ambient occlusion (ao)",
+       .value = choice(kShowNames, [](Settings& s) -> Show& { return s.frame.rays.show; }),
+       .initial = "shaded"},
       {.name = "tone",
        .help = "how bright light fits a display: neutral keeps the colors of lit surfaces, aces and filmic have more "
                "contrast, agx less, none clips; EXR files stay as lit",
        .value = choice(kToneNames, [](Settings& s) -> Tone& { return s.display.tone; }),
        .initial = "none",
-       .decides_bits = false},
+       .decides_bits = false,
+       .used_with = {{"show", shows_light}}},
       {.name = "exposure",
        .help = "brightens (or darkens) display colors by so many stops; auto: as the light of all that is seen asks "
                "for, alike on all screens; EXR files stay as lit",
        .value = exposure(),
        .initial = "0",
-       .decides_bits = false},
+       .decides_bits = false,
+       .used_with = {{"show", shows_light}}},
       {.name = "aov",
        .help =
            fmt::format("layers of the .exr, of FILE.aov.exr beside a .png, or of a wall (SCREEN.aov.exr): a list of {}",

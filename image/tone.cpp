@@ -99,6 +99,14 @@ Rgb filmic(const Rgb& color) {
   return each(color, [&](float value) { return curve(kLift * value) * scale; });
 }
 
+/// Display values from 0 to 1.
+Rgba8 as_levels(const Rgb& values) {
+  const auto level = [](float value) {
+    return static_cast<std::uint8_t>(255.0F * std::min(usable(value), 1.0F) + 0.5F);
+  };
+  return {level(values.r), level(values.g), level(values.b), 255};
+}
+
 }  // namespace
 
 Rgb tone_map(Tone tone, Rgb radiance) {
@@ -122,11 +130,17 @@ Rgb tone_map(Tone tone, Rgb radiance) {
 }
 
 PngTexts texts_of(const DisplayTransform& transform) {
-  return {{kExposureText, fmt::format("{:.4g}", transform.exposure_stops)},
-          {kToneText, std::string(name_of(transform.tone))}};
+  PngTexts texts{{kExposureText, fmt::format("{:.4g}", transform.exposure_stops)},
+                 {kToneText, std::string(name_of(transform.tone))}};
+  if (!transform.shows.empty()) texts.emplace(kShowText, transform.shows);
+  return texts;
 }
 
 void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, const DisplayTransform& transform) {
+  if (!transform.shows.empty()) {
+    std::ranges::transform(radiance, display.begin(), as_levels);
+    return;
+  }
   const auto gain = static_cast<float>(std::exp2(transform.exposure_stops));
   const auto exposed = [gain](const Rgb& color) { return Rgb{color.r * gain, color.g * gain, color.b * gain}; };
   if (transform.tone == Tone::None) {

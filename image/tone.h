@@ -31,13 +31,17 @@ inline constexpr std::array<std::string_view, 5> kToneNames{"neutral", "aces", "
 struct DisplayTransform {
   double exposure_stops = 0.0;  ///< radiance is multiplied by 2 to the power of it first
   Tone tone = Tone::None;
+  /// The name of what the pixels hold in place of radiance: display values, which are shown as they are.
+  std::string_view shows = {};
 
   bool operator==(const DisplayTransform&) const = default;
 };
 
-/// The keywords by which a PNG says how its colours were made: a name of kToneNames, and stops.
+/// The keywords by which a PNG says how its colours were made: a name of kToneNames, stops, and what it shows where
+/// that is not light.
 inline constexpr const char* kToneText = "hpr:tone";
 inline constexpr const char* kExposureText = "hpr:exposure";
+inline constexpr const char* kShowText = "hpr:show";
 [[nodiscard]] PngTexts texts_of(const DisplayTransform& transform);
 
 /// radiance[i] becomes display[i], with alpha 255.

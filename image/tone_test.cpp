@@ -104,5 +104,16 @@ TEST(Tone, WithoutOneDisplayColorsAreThoseOfSrgb) {
   }
 }
 
+TEST(Tone, ValuesThatAreNoLightAreShownAsTheyAre) {
+  const std::vector<Rgb> values{{0.5F, 0.25F, 1.0F}, {-1.0F, 2.0F, std::numeric_limits<float>::quiet_NaN()}};
+  std::vector<Rgba8> shown(values.size());
+  const DisplayTransform transform{.exposure_stops = 3.0, .tone = Tone::Aces, .shows = "normal"};
+  to_display(values, shown, transform);
+  EXPECT_EQ(shown[0], (Rgba8{128, 64, 255, 255}));
+  EXPECT_EQ(shown[1], (Rgba8{0, 255, 0, 255}));
+  EXPECT_EQ(texts_of(transform).at(kShowText), "normal");
+  EXPECT_FALSE(texts_of({}).contains(kShowText));
+}
+
 }  // namespace
 }  // namespace hpr

@@ -19,6 +19,7 @@
 #include "rt/passes/pixel_sums.h"
 #include "rt/photons/photon_tracer.h"
 #include "rt/reference/path_tracer.h"
+#include "rt/show/show_pixels.h"
 #include "rt/trace/ray_scene.h"
 
 namespace hpr {
@@ -44,6 +45,15 @@ struct RunningPass {
 
 bool gathers_all_lobes(std::span<const PassPlan> plan) {
   return runs_pass(plan, [](const PassInfo& pass) { return pass.gathers_all_lobes; });
+}
+
+/// What is shown in place of light leaves no light to work on.
+RaySettings settings_of(RaySettings chosen) {
+  if (chosen.show != Show::Shaded) chosen.reference = false;
+  if (needs_light(chosen.show)) return chosen;
+  chosen.denoise = false;
+  chosen.half_resolution.clear();
+  return chosen;
 }
 
 /// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
@@ -126,6 +136,8 @@ struct DeferredShader::State {
   const PhotonMaps* trace_photons(const SampleNumber& number, Communicator* comm);
   void warn_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
+  void show_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+                 std::span<const ShadedSample> samples) const;
   void shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                   std::span<const ShadedSample> samples);
   void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
@@ -137,10 +149,10 @@ struct DeferredShader::State {
 DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
                              const RaySource& source, RayForwarding* others)
     : scene(lit),
-      settings(std::move(chosen)),
+      settings(settings_of(std::move(chosen))),
       plan(plan_passes(requirements, settings)),
       space(lit.bounds),
-      surfaces(lit, space, lifts_origins(plan, settings)),
+      surfaces(lit, space, settings.show == Show::Ao || lifts_origins(plan, settings)),
       lights(lit, gathers_all_lobes(plan) ? ConstantEnvironment::LeftToRays : ConstantEnvironment::Sampled),
       media(lit),
       shared(shared_components(settings)),
@@ -152,7 +164,8 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
     if (info.lobe) followed_lobes.at(static_cast<std::size_t>(*info.lobe)) = true;
     passes.push_back({info, info.make()});
   }
-  if (!passes.empty() || settings.reference || settings.denoise || !covering_surfaces(lit, true).empty()) {
+  if (!passes.empty() || settings.reference || settings.denoise || traces_own_rays(settings.show) ||
+      !covering_surfaces(lit, true).empty()) {
     build_rays(source);
   }
   if (runs_pass(plan, [](const PassInfo& pass) { return pass.needs_photons; })) build_photons();
@@ -311,6 +324,31 @@ void DeferredShader::State::denoise(const LightContext& context, Scratch& scratc
   scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
 }
 
+/// Shows something in place of light.
+void DeferredShader::State::show_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                      std::size_t index, std::span<const ShadedSample> samples) const {
+  const trace::Span span("show tile", "tile", index);
+  const DenormalsAsZero mode;
+  const Stopwatch watch;
+  scratch.sums.clear(index, samples, {});
+  if (scratch.waiting.empty()) scratch.waiting.resize(1);
+  const int height = jobs.front().rect.height();
+  for (RowRange rows; rows.first < height; rows.first = rows.end) {
+    rows.end = end_of_wavefront(jobs.front(), rows.first);
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      std::vector<PathVertex>& points = scratch.waiting[0];
+      find_primary_vertices(context, jobs[i], rows, scratch.buffers, scratch.sums, points);
+      add_first_surfaces(points, index, samples[i].output);
+      show_pixels(context, jobs[i], rows, scratch.buffers, scratch.sums, points);
+      points.clear();
+    }
+  }
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    scratch.sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);
+  }
+  scratch.ms[kSurfaceStep] += watch.ms();
+}
+
 /// Shades some rows of one sample after those of another: what one sample has read the next one finds in the cache.
 void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
                                        std::size_t index, std::span<const ShadedSample> samples) {
@@ -318,7 +356,11 @@ void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scr
   const DenormalsAsZero mode;
   PixelSums& sums = scratch.sums;
   const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
-  sums.clear(index, samples, shared != 0 || (denoises && Denoiser::keeps_direct(scene)), denoises);
+  const bool shows_cost = settings.show == Show::Cost;
+  sums.clear(index, samples,
+             {.all_components = shared != 0 || (denoises && Denoiser::keeps_direct(scene)),
+              .diffuse = denoises,
+              .cost = shows_cost});
   if (denoises) scratch.denoiser.start(jobs.size(), sums.wants_components);
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
   if (shared != 0) scratch.shared.start(shared, context, jobs.front());
@@ -338,6 +380,7 @@ void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scr
   if (shared != 0) scratch.shared.upsample(sums);
   if (denoises) denoise(context, scratch, jobs, index);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
+    if (shows_cost) show_cost(jobs[i], sums);
     sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);
   }
 }
@@ -396,7 +439,8 @@ void DeferredShader::shade(std::span<const View> views, const TileLayer<Key>& ke
   shade(std::span(&only, 1), tiles);
 }
 
-void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles) {
+void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles,
+                           const std::function<bool()>& is_overtaken) {
   HPR_CHECK(samples.size() == 1 || (!samples.empty() && !shades_one_by_one()));
   check_sizes(samples);
   const ShadedSample& first = samples.front();
@@ -413,6 +457,7 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   if (state.settings.denoise) state.fragments.prepare(layout, first.views, state.settings);
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
+    if (is_overtaken && is_overtaken()) return;
     const std::size_t tile = order[i];
     const TilePlace location = layout.place(tile);
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
@@ -434,7 +479,11 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
                                .photons = photons,
                                .view = &first.views[location.screen],
                                .eye_media = eyes[location.screen]};
-    state.shade_tile(context, *scratch, jobs, tile, samples);
+    if (needs_light(state.settings.show)) {
+      state.shade_tile(context, *scratch, jobs, tile, samples);
+    } else {
+      state.show_tile(context, *scratch, jobs, tile, samples);
+    }
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(scratch));
   });

@@ -83,7 +83,9 @@ class DeferredShader {
 
   /// Shades several samples of one frame together; in less time than one by one where what they share stays in the
   /// cache, and with the same bits. Not where shades_one_by_one().
-  void shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles);
+  /// `is_overtaken`: asked before each tile, by any thread; once it is true the tiles that are left mean nothing.
+  void shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles,
+             const std::function<bool()>& is_overtaken = {});
   /// Whether samples must be shaded one by one: with photons, the reference, or half-resolution passes.
   [[nodiscard]] bool shades_one_by_one() const;
 

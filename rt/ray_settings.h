@@ -6,6 +6,7 @@
 
 #include "image/filter.h"
 #include "rt/passes/pass_id.h"
+#include "rt/show/show.h"
 #include "rt/trace/ray_build.h"
 #include "scene/scene.h"
 
@@ -13,6 +14,7 @@ namespace hpr {
 
 /// How light is computed. Equal settings give equal pictures on any number of ranks and threads.
 struct RaySettings {
+  Show show = Show::Shaded;         ///< past Shaded there is neither reference nor denoiser, nor half resolution
   std::vector<PassId> passes = {};  ///< those that are named; empty: as `auto_passes` says
   bool auto_passes = true;          ///< where none is named: what the scene requires; false: none
   bool all_passes = false;          ///< all that run by default, also where the scene does not require them

@@ -93,5 +93,18 @@ TEST(ShadedSamples, OnlyPixelsThatAreWanted) {
   }
 }
 
+TEST(ShadedSamples, OnceOvertakenNoFurtherTileIsShaded) {
+  const Scene scene = test::white_floor();
+  const View view = test::view_from({0, 5, 0.1}, {0, 0, 0}, {256, 64}, scene);
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  TileLayer<Rgb> radiance(keys.layout());
+  const ShadedSample sample{std::span(&view, 1), &keys, {.radiance = &radiance}, {}};
+  DeferredShader shader(scene, {.threads = 1});
+  int asked = 0;
+  shader.shade(std::span(&sample, 1), all_tiles(keys.layout()), [&] { return ++asked > 2; });
+  const std::vector<std::size_t> tiles = all_tiles(keys.layout());
+  EXPECT_EQ(std::ranges::count_if(tiles, [&](std::size_t tile) { return radiance.active(tile); }), 2);
+}
+
 }  // namespace
 }  // namespace hpr

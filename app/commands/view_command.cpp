@@ -1,6 +1,10 @@
+#include <fmt/format.h>
+
 #include "app/command.h"
 #include "app/commands/wall_run.h"
+#include "core/error.h"
 #include "core/job_environment.h"
+#include "core/text.h"
 #include "walls/displays/display.h"
 
 namespace hpr {
@@ -16,7 +20,8 @@ class ViewCommand final : public Command {
 
   void declare(const OptionSet& options) override {
     options.option("scene", run_.scene, "a .gltf or .glb file, or gen:NAME?key=value").required();
-    options.option("--wall", run_.wall, "a wall file, or CxR, or CxR@WxH").show_default();
+    const Option wall = options.option("--wall", run_.wall, "a wall file, or CxR, or CxR@WxH").show_default();
+    options.option("--size", size_, "pixels of a single window").type("WxH").excludes(wall);
     options.flag("--web", address_, "=ADDR:PORT: in a browser instead of windows; by default on loopback, a free port");
     options.option("--frames", run_.frames, "end after so many frames (default: when it is closed)")
         .range(1, 1'000'000);
@@ -28,6 +33,12 @@ class ViewCommand final : public Command {
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     run_.display.display = display();
+    if (!size_.empty()) {
+      if (!parse_extent(size_)) {
+        throw Error(ExitCode::Usage, fmt::format("--size: '{}' is no size", printable(size_)), "write e.g. 1280x720");
+      }
+      run_.wall = "1x1@" + size_;
+    }
     return run_wall(make_wall_job(run_, globals), globals);
   }
 
@@ -40,6 +51,7 @@ class ViewCommand final : public Command {
 
   WallRun run_ = first_view();
   std::string address_;
+  std::string size_;
 
   [[nodiscard]] static WallRun first_view() {
     WallRun run;

@@ -123,13 +123,15 @@ bool draw_frames(const WallJob& job, WallDriver& driver, const std::string& mode
   // A terminal has room for one bar: that of the samples, where there are several.
   const bool shows_samples = sampling.sums() && (mode != "auto" || stderr_is_terminal());
   WallStatus status(shows_samples ? "none" : mode, driver.first_frame(), static_cast<std::size_t>(frames));
-  for (int frame = static_cast<int>(driver.first_frame()); frame < frames || job.open_ended(); ++frame) {
+  for (int frame = static_cast<int>(driver.first_frame()); frame < frames || job.open_ended();) {
     Progress samples(sampling.sums() ? mode : "none", fmt::format("frame {}: sample", frame + 1),
                      sampling.goal.samples.value_or(0));
     const Stopwatch watch;
-    driver.draw(static_cast<std::uint64_t>(frame), samples);
-    status.add(watch.ms(), driver.manifest().frames.back(), [&] { return driver.states(); });
-    const bool last = !job.open_ended() && frame + 1 >= frames;
+    if (driver.draw(static_cast<std::uint64_t>(frame), samples)) {
+      status.add(watch.ms(), driver.manifest().frames.back(), [&] { return driver.states(); });
+      ++frame;
+    }
+    const bool last = !job.open_ended() && frame >= frames;
     if (!last && !wait_for_work(job, driver)) return !job.open_ended();
   }
   return false;

@@ -96,7 +96,7 @@ LuminanceHistogram measure_luminance(Session& session, const Frame& frame) {
 }
 
 DisplayTransform transform_for(Session& session, const Frame& frame, const DisplaySettings& settings) {
-  if (settings.exposure_stops) return {*settings.exposure_stops, settings.tone};
+  if (settings.exposure_stops) return fixed_transform(settings);
   return {automatic_exposure(measure_luminance(session, frame)), settings.tone};
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "image/color.h"
 #include "image/tone.h"
@@ -46,11 +47,12 @@ inline constexpr double kBrightStops = 1.0;
 struct DisplaySettings {
   std::optional<double> exposure_stops = 0.0;  ///< none: automatic_exposure of what is shown
   Tone tone = Tone::None;
+  std::string_view shows = {};  ///< see DisplayTransform
 };
 
 /// What a benchmark shows frames with, which measures no light: 0 stops where the exposure is automatic.
 [[nodiscard]] inline DisplayTransform fixed_transform(const DisplaySettings& settings) {
-  return {settings.exposure_stops.value_or(0.0), settings.tone};
+  return {settings.exposure_stops.value_or(0.0), settings.tone, settings.shows};
 }
 
 /// Collective. The histogram of all screens' pixels, the same on all ranks.

@@ -12,7 +12,7 @@
 
 namespace hpr {
 CommandTable::CommandTable() {
-  add({"help", "[COMMAND]", "what can be said here", [this](Arguments arguments) { return help(arguments); }});
+  add({"help", "[COMMAND]", "what can be said here", [this](Arguments arguments) { return help(arguments); }, true});
 }
 
 std::string CommandTable::run(const std::string& line) const {
@@ -31,6 +31,13 @@ std::string CommandTable::run(const std::string& line) const {
   for (const SessionCommand& command : commands_) names.push_back(command.name);
   throw Error(ExitCode::Usage, fmt::format("there is no command '{}'", printable(arguments.front())),
               unknown_name_hint(arguments.front(), names));
+}
+
+bool CommandTable::only_tells(const std::string& line) const {
+  const auto words = split_line(line);
+  if (!words || words->empty()) return true;
+  const auto found = std::ranges::find(commands_, words->front(), &SessionCommand::name);
+  return found == commands_.end() || found->only_tells;
 }
 
 std::string CommandTable::help(Arguments arguments) const {

@@ -19,6 +19,7 @@ struct SessionCommand {
   std::string summary;
   /// Collective; `arguments` without the name. Returns the output, lines without a final newline. Throws Error.
   std::function<std::string(Arguments arguments)> run;
+  bool only_tells = false;  ///< it changes nothing
 };
 
 /// The commands a session knows, `help` among them.
@@ -34,6 +35,8 @@ class CommandTable {
   /// Runs one line: arguments separated by blanks, "quoted" where they hold some; what follows # is a comment. Throws
   /// Error (Usage) for unknown commands, and what the command throws.
   [[nodiscard]] std::string run(const std::string& line) const;
+  /// Whether a line is there to be told something: what is being drawn stays as it is.
+  [[nodiscard]] bool only_tells(const std::string& line) const;
 
  private:
   [[nodiscard]] std::string help(Arguments arguments) const;

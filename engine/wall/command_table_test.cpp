@@ -48,5 +48,16 @@ TEST(PointOf, TakesThreeFiniteNumbers) {
   }
 }
 
+TEST(CommandTable, KnowsWhichLinesChangeNothing) {
+  CommandTable table;
+  table.add({"look", "", "around", [](Arguments) { return std::string(); }, true});
+  table.add({"move", "", "somewhere", [](Arguments) { return std::string(); }});
+  for (const char* const line : {"look", "help move", "", "# move", "nonsense", "an \"open quote"}) {
+    EXPECT_TRUE(table.only_tells(line)) << line;
+  }
+  EXPECT_FALSE(table.only_tells("move"));
+  EXPECT_FALSE(table.only_tells("  move by 1 # now"));
+}
+
 }  // namespace
 }  // namespace hpr

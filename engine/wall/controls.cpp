@@ -54,7 +54,7 @@ Controls::Controls(Session& session, RenderSettings& settings, std::uint64_t see
 void Controls::add_scene_commands(CommandTable& table) {
   table.add(
       {"load", "SCENE", "another scene in this one's place", [this](Arguments arguments) { return load(arguments); }});
-  table.add({"nodes", "", "the scene's nodes and where they are", [this](Arguments) { return list_nodes(); }});
+  table.add({"nodes", "", "the scene's nodes and where they are", [this](Arguments) { return list_nodes(); }, true});
   table.add(
       {"move", "NODE by|to X,Y,Z", "metres, world space", [this](Arguments arguments) { return move(arguments); }});
   table.add({"turn", "NODE X,Y,Z DEGREES", "about that axis through its position", [this](Arguments arguments) {
@@ -73,13 +73,13 @@ void Controls::add_scene_commands(CommandTable& table) {
 }
 
 void Controls::add_light_commands(CommandTable& table) {
-  table.add({"lights", "", "the scene's lights", [this](Arguments) { return list_lights(); }});
+  table.add({"lights", "", "the scene's lights", [this](Arguments) { return list_lights(); }, true});
   table.add({"light", "NAME on|off | intensity R,G,B | position X,Y,Z | direction X,Y,Z", "change a light",
              [this](Arguments arguments) { return change_light(arguments); }});
 }
 
 void Controls::add_drawing_commands(CommandTable& table) {
-  table.add({"cameras", "", "the scene's cameras", [this](Arguments) { return list_cameras(); }});
+  table.add({"cameras", "", "the scene's cameras", [this](Arguments) { return list_cameras(); }, true});
   table.add({"camera", "NAME|INDEX | X,Y,Z at X,Y,Z [up X,Y,Z] [fov DEGREES]", "where the picture is seen from",
              [this](Arguments arguments) { return set_camera(arguments); }});
   for (const char* option : {"passes", "quality", "strategy", "spp"}) {

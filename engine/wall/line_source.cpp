@@ -109,6 +109,21 @@ std::optional<InputLine> LineSource::next(std::chrono::milliseconds timeout) {
   return std::nullopt;
 }
 
+bool LineSource::any_waiting(const std::function<bool(const std::string& line)>& wanted) {
+  for (int turn = 0; turn < kMaxTurns && watch(0); ++turn) {
+  }
+  return std::ranges::any_of(clients_, [&](const auto& client) {
+    const std::string& received = client.second.received;
+    if (!client.second.trusted) return false;
+    std::size_t begin = 0;
+    for (std::size_t end = received.find('\n'); end != std::string::npos; end = received.find('\n', begin)) {
+      if (wanted(received.substr(begin, end - begin))) return true;
+      begin = end + 1;
+    }
+    return false;
+  });
+}
+
 bool LineSource::watch(int timeout_ms) {
   drop_unauthenticated();
   std::vector<pollfd> watched;

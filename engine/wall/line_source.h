@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -33,6 +34,8 @@ class LineSource {
 
   /// The next line; waits at most `timeout` for it.
   [[nodiscard]] std::optional<InputLine> next(std::chrono::milliseconds timeout);
+  /// Whether `wanted` is true of any line that next() would return now; never waits.
+  [[nodiscard]] bool any_waiting(const std::function<bool(const std::string& line)>& wanted);
   /// True once no line can come any more: standard input ended and nobody listens.
   [[nodiscard]] bool ended() const { return !standard_input_ && !listener_ && clients_.empty(); }
   /// Sends `text`, whole lines, where the line came from. A client that does not take it within a second is dropped.

@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "core/error.h"
@@ -90,6 +91,28 @@ TEST_F(LineSourceTest, LinesOfAUnixSocketAreAnsweredWhereTheyCameFrom) {
   EXPECT_EQ(line->text, "three");
   EXPECT_FALSE(source.next(milliseconds(1)));
   EXPECT_FALSE(source.ended());
+}
+
+TEST_F(LineSourceTest, LinesThatWaitCanBeSeenAndStay) {
+  LineSource source({.listen = path()});
+  const auto is_stop = [](const std::string& line) { return line == "stop"; };
+  const auto comes = [&] {
+    for (int turn = 0; turn < 200; ++turn) {
+      if (source.any_waiting(is_stop)) return true;
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+    return false;
+  };
+  const Client client(path());
+  client.send("status\nsto");
+  EXPECT_TRUE(next_line(source));
+  EXPECT_FALSE(source.any_waiting(is_stop));
+  client.send("p\n");
+  EXPECT_TRUE(comes());
+  const auto line = next_line(source);
+  ASSERT_TRUE(line);
+  EXPECT_EQ(line->text, "stop");
+  EXPECT_FALSE(source.any_waiting(is_stop));
 }
 
 TEST_F(LineSourceTest, AClientOfTcpSaysTheTokenFirst) {

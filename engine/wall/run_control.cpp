@@ -87,10 +87,10 @@ RunControl::RunControl(Session& session, RenderSettings& settings, std::uint64_t
       settings_(settings),
       apply_(std::move(apply)),
       record_(std::move(record)) {
-  table_.add({"status", "", "what the wall shows and how long it takes, as JSON",
-              [this, status = std::move(status)](Arguments) {
-                return session_.comm().rank() == 0 ? status() : std::string();
-              }});
+  table_.add(
+      {"status", "", "what the wall shows and how long it takes, as JSON",
+       [this, status = std::move(status)](Arguments) { return session_.comm().rank() == 0 ? status() : std::string(); },
+       true});
   table_.add({"stop", "", "end the run after this frame", [this](Arguments) {
                 stops_ = true;
                 return std::string();
@@ -155,6 +155,10 @@ void RunControl::poll() {
     }
     if (from) source_->answer(*from, answer);
   }
+}
+
+bool RunControl::any_waiting() {
+  return source_ && source_->any_waiting([this](const std::string& line) { return !table_.only_tells(line); });
 }
 
 std::vector<RunningWall> running_walls() {

@@ -31,6 +31,8 @@ class RunControl {
 
   /// Collective. Carries out the commands that have arrived; never waits.
   void poll();
+  /// On rank 0: whether a command has arrived that may change something; never waits.
+  [[nodiscard]] bool any_waiting();
   [[nodiscard]] bool stops() const { return stops_; }
 
  private:

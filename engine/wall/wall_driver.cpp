@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <iterator>
 #include <sstream>
+#include <utility>
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/communicator.h"
@@ -17,12 +18,14 @@
 #include "compositing/compositor.h"
 #include "core/bytes.h"
 #include "core/file.h"
+#include "core/interrupt.h"
 #include "core/job_board.h"
 #include "core/log.h"
 #include "core/signals.h"
 #include "core/text.h"
 #include "core/timing.h"
 #include "engine/output.h"
+#include "engine/settings_table.h"
 #include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_status.h"
 #include "raster/gl_context.h"
@@ -249,15 +252,17 @@ std::string WallDriver::status() const {
 
 WallDriver::~WallDriver() = default;
 
-void WallDriver::draw(std::uint64_t number, Progress& progress) {
+bool WallDriver::draw(std::uint64_t number, Progress& progress) {
   const trace::Span span("frame", "number", number);
   report_frame(number);
   const Stopwatch watch;
   const std::size_t sent_before = session_.comm().bytes_sent();
   const std::vector<View> views = screens_in(number, heads_.at(number));
   verified_ = {};
+  bool is_new = true;
   const std::optional<Error> failure = draw_with_retry(session_.comm(), fmt::format("frame {}", number),
-                                                       [&] { make_pictures(views, number, progress); });
+                                                       [&] { is_new = make_pictures(views, number, progress); });
+  if (!failure && !is_new) return false;
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   if (failure) {
     failed_.add_failed(number);
@@ -269,11 +274,22 @@ void WallDriver::draw(std::uint64_t number, Progress& progress) {
   agree_on_failure(session_.comm(), [&] { show(number); });
   shown_ms_ = watch.ms();
   record(number, failure);
+  return true;
 }
 
-void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress) {
+/// Takes what came on this rank and adds it to what waits for follow_viewers(); whether anything did, a command too.
+bool WallDriver::take_news() {
+  if (display_) news_.input += display_->take_input();
+  news_.interrupt = news_.interrupt || take_request() == Request::Stop;
+  return news_.interrupt || news_.input != DisplayInput{} || control_.any_waiting();
+}
+
+bool WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress) {
   try {
-    Frame& frame = frames_->make(curved_->drawn(views), number, progress);
+    Interrupt interrupt([this] { return take_news(); });
+    Frame* const made = frames_->make(curved_->drawn(views), number, progress, &interrupt);
+    if (made == nullptr) return false;
+    Frame& frame = *made;
     verified_ += frames_->verified();
     if (const std::uint64_t unmended = frames_->verified().unmended; unmended > 0) {
       throw AgreedError(ExitCode::CheckFailed,
@@ -281,6 +297,7 @@ void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
                         "memory, a GPU or a link of these ranks flips bits: replace it");
     }
     showing_.transform = transform_for(session_, frame, display_settings_);
+    shows_again_ = false;
     SmoothExposure exposure = exposure_;
     if (!display_settings_.exposure_stops) {
       showing_.transform.exposure_stops = exposure.next(showing_.transform.exposure_stops);
@@ -292,6 +309,7 @@ void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
     pictures_ = std::move(pictures);
     monitor_pictures_ = std::move(monitor_pictures);
     exposure_ = exposure;
+    return true;
   } catch (...) {
     frames_->discard();
     throw;
@@ -299,25 +317,48 @@ void WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
 }
 
 bool WallDriver::follow_viewers() {
-  struct ViewerInput {
-    DisplayInput input;
-    bool interrupt = false;
-  };
-  const ViewerInput mine{display_ ? display_->take_input() : DisplayInput{}, take_request() == Request::Stop};
-  OrbitInput motion;
-  bool stop = false;
-  for (const ViewerInput& viewer : all_gather_value(session_.comm(), mine)) {
-    motion += viewer.input.orbit;
-    stop = stop || viewer.input.stop;
+  (void)take_news();
+  const News mine = std::exchange(news_, {});
+  DisplayInput all;
+  for (const News& viewer : all_gather_value(session_.comm(), mine)) {
+    all += viewer.input;
     interrupted_ = interrupted_ || viewer.interrupt;
   }
-  orbit_.move(motion);
-  return !stop && !interrupted_;
+  orbit_.move(all.orbit);
+  apply_keys(all.keys);
+  return !all.stop && !interrupted_;
+}
+
+/// As a command would, so that a job that is lost goes on with it.
+void WallDriver::change_setting(const std::string& name, const std::string& value) {
+  set_setting(settings_, name, value);
+  if (journal_) journal_->add_command(fmt::format("set {} {}", name, value));
+}
+
+void WallDriver::apply_keys(const ViewKeys& keys) {
+  if (keys.half_stops != 0) {
+    constexpr double kMaxStops = 30.0;
+    const double stops = showing_.transform.exposure_stops + 0.5 * keys.half_stops;
+    change_setting("exposure", fmt::format("{}", std::clamp(stops, -kMaxStops, kMaxStops)));
+  }
+  if (keys.tones != 0) {
+    const auto next = static_cast<std::size_t>(settings_.display.tone) + static_cast<std::size_t>(keys.tones);
+    change_setting("tone", std::string(kToneNames.at(next % kToneNames.size())));
+  }
+  if (keys.wireframes % 2 != 0) {
+    const Show now = settings_.frame.rays.show;
+    if (now != Show::Wireframe) show_before_wireframe_ = now;
+    change_setting("show", std::string(name_of(now == Show::Wireframe ? show_before_wireframe_ : Show::Wireframe)));
+    plan_frames();
+  } else if (keys.half_stops != 0 || keys.tones != 0) {
+    display_settings_ = resolve(settings_, job_.seed).display;
+    shows_again_ = true;
+  }
 }
 
 bool WallDriver::settled() {
   const std::uint64_t last = manifest_.frames.empty() ? 0 : manifest_.frames.back().frame;
-  if (job_.path || heads_.plays_on(last)) return false;
+  if (shows_again_ || job_.path || heads_.plays_on(last)) return false;
   return frames_->refined(curved_->drawn(screens_in(0, heads_.at(last + 1))));
 }
 

@@ -16,6 +16,7 @@
 #include "engine/wall/viewpoint.h"
 #include "engine/wall/wall_displays.h"
 #include "engine/wall/wall_job.h"
+#include "rt/show/show.h"
 #include "walls/config/wall.h"
 #include "walls/displays/display.h"
 #include "walls/geometry/curved.h"
@@ -57,7 +58,8 @@ class WallDriver {
   /// Collective. Draws one frame and shows each screen on the rank it belongs to. `progress` shows its samples. A frame
   /// that fails is drawn once more (draw_with_retry); where that fails too, the screens show their last pictures again
   /// and the frame counts as failed. Throws its error where this is the job's first frame, or kMaxFailedInARow failed.
-  void draw(std::uint64_t number, Progress& progress);
+  /// False where a sample of a resting picture was dropped, as a viewer, a command or a signal came: there is no frame.
+  [[nodiscard]] bool draw(std::uint64_t number, Progress& progress);
   static constexpr int kMaxFailedInARow = 10;
   /// Of the run: earlier jobs' too.
   [[nodiscard]] const FailedFrames& failed() const { return failed_; }
@@ -87,7 +89,10 @@ class WallDriver {
   void resume(std::vector<std::string>& frames);
   [[nodiscard]] std::string status() const;
   void show(std::uint64_t number);
-  void make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress);
+  [[nodiscard]] bool make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress);
+  [[nodiscard]] bool take_news();
+  void apply_keys(const ViewKeys& keys);
+  void change_setting(const std::string& name, const std::string& value);
   void record(std::uint64_t number, const std::optional<Error>& failure);
   void warn_of_slow_ranks(std::span<const RankWork> works);
   [[nodiscard]] std::vector<ScreenRecord> record_screens();
@@ -125,6 +130,14 @@ class WallDriver {
   std::optional<RunJournal> journal_;  ///< on rank 0 of a job that is started again when it is lost
   std::uint64_t first_frame_ = 0;
   bool interrupted_ = false;
+  /// What came on this rank since the ranks last looked.
+  struct News {
+    DisplayInput input;
+    bool interrupt = false;
+  };
+  News news_;
+  bool shows_again_ = false;  ///< the last frame, whose exposure or tone was changed
+  Show show_before_wireframe_ = Show::Shaded;
 };
 
 /// Collective, after the last frame. Rank 0 writes the files; all ranks throw Error (Io) where it cannot.

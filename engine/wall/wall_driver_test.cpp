@@ -54,7 +54,7 @@ void drive_wall(const std::function<void(WallDriver&, FailingCommunicator&)>& bo
 
 void draw(WallDriver& driver, std::uint64_t frame) {
   Progress progress("none", "sample", 1);
-  driver.draw(frame, progress);
+  EXPECT_TRUE(driver.draw(frame, progress));
 }
 
 TEST(WallDriver, AFrameThatFailsOnceIsDrawnAgain) {

@@ -6,9 +6,6 @@
 namespace hpr {
 namespace {
 
-/// How far, in radii of the scene, something counts as near.
-constexpr double kReach = 0.25;
-
 /// A stand-in for indirect light, cheap and not physical: an even light from all sides that surfaces near by keep out
 /// (Zhukov, Iones, Kronin 1998). Runs only where it is asked for; photons do it right.
 class AmbientOcclusionPass final : public Pass {
@@ -25,7 +22,7 @@ class AmbientOcclusionPass final : public Pass {
     const int count = context.settings.occlusion_rays;
     std::vector<glm::dvec3> light;
     buffers.requests.clear();
-    const double reach = kReach * glm::length(context.scene.bounds.high - context.scene.bounds.low) / 2.0;
+    const double reach = occlusion_reach(context.scene);
     for (std::uint32_t i = 0; i < wave.vertices.size(); ++i) {
       const PathVertex& point = wave.vertices[i];
       if (point.is_upsampled(Component::AmbientOcclusion)) continue;

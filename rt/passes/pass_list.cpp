@@ -210,6 +210,10 @@ std::vector<PassPlan> plan_passes(const Requirements& scene, const RaySettings& 
     const bool by_default = pass->runs_by_default(scene, settings);
     const bool wanted =
         names_pass(settings, info.id) || (settings.passes.empty() && settings.auto_passes && by_default);
+    if (!needs_light(settings.show)) {
+      plan.push_back({info.id, false, fmt::format("the picture shows {} in place of light", name_of(settings.show))});
+      continue;
+    }
     if (settings.reference) {
       plan.push_back({info.id, false, "the reference traces whole paths instead"});
       continue;

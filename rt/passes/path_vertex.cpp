@@ -304,6 +304,11 @@ bool LightContext::follows_for_itself(const Bsdf& bsdf, Lobe lobe) const {
   return followed_lobes[static_cast<std::size_t>(lobe)] && is_followed(bsdf, lobe, settings.glossy_cutoff);
 }
 
+double occlusion_reach(const Scene& scene) {
+  constexpr double kRadii = 0.25;
+  return kRadii * glm::length(scene.bounds.high - scene.bounds.low) / 2.0;
+}
+
 Component component_after(const PathVertex& point, Component first) {
   return point.depth == 0 ? first : point.component;
 }

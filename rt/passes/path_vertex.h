@@ -68,6 +68,10 @@ inline constexpr double kMinThroughput = 1.0 / 65536.0;
   return chance > 0.0 && sampler.one() < chance ? 1.0 / chance : 0.0;
 }
 
+/// Metres within which something that stops a ray counts as near, for ambient occlusion: a quarter of the scene's
+/// radius.
+[[nodiscard]] double occlusion_reach(const Scene& scene);
+
 /// The component that light from a followed lobe of `point` counts in.
 [[nodiscard]] Component component_after(const PathVertex& point, Component first);
 

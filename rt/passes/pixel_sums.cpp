@@ -54,14 +54,14 @@ void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::span<con
 
 }  // namespace
 
-void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, bool all_components, bool with_diffuse) {
+void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, const WantedSums& wants) {
   const LightOutput& output = samples.front().output;  // all want the same
-  wants_components =
-      all_components || std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
-  wants_diffuse = with_diffuse;
-  wants_cost = output.cost != nullptr;
+  wants_components = wants.all_components ||
+                     std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
+  wants_diffuse = wants.diffuse;
+  wants_cost = wants.cost || output.cost != nullptr;
   const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, tile);
-  const std::size_t pixels = (samples.size() + (with_diffuse ? 1 : 0)) * kTilePixels;
+  const std::size_t pixels = (samples.size() + (wants.diffuse ? 1 : 0)) * kTilePixels;
   clear_sums(radiance, pixels, wanted);
   if (wants_diffuse) clear_sums(diffuse, pixels, wanted);
   for (std::size_t i = 0; wants_components && i < kComponents; ++i) {

@@ -14,13 +14,19 @@ namespace hpr {
 
 struct TileJob;
 
+/// What is summed beside what the samples want.
+struct WantedSums {
+  bool all_components = false;  ///< those that no sample wants too
+  /// The diffuse part of each, and room for one more sample behind those given (a denoiser's).
+  bool diffuse = false;
+  bool cost = false;  ///< the rays of each pixel
+};
+
 /// Light summed per pixel of one tile, sample after sample, in an order that no thread changes: what passes add to.
 class PixelSums {
  public:
   /// Sets all sums of tile `tile` to 0 where `samples` want them, and what the samples store directly (normal, albedo).
-  /// `all_components`: also those that no sample wants. `with_diffuse`: also the diffuse part of each, and
-  /// there is room for one more sample behind those given (a denoiser's).
-  void clear(std::size_t tile, std::span<const ShadedSample> samples, bool all_components, bool with_diffuse);
+  void clear(std::size_t tile, std::span<const ShadedSample> samples, const WantedSums& wants);
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {

@@ -176,4 +176,39 @@ std::uint64_t CoverageTraversal::passed(std::span<const RayRequest> rays, std::s
   return invalid;
 }
 
+/// Counts those that one of the two scenes holds.
+std::uint64_t CoverageTraversal::add_surfaces(const RayScene& scene, std::span<const RayRequest> rays,
+                                              std::span<std::uint32_t> counts, TraversalScratch& scratch) const {
+  scratch.waiting.resize(rays.size());
+  std::iota(scratch.waiting.begin(), scratch.waiting.end(), 0U);
+  scratch.met.assign(rays.size(), Passed{});
+  std::uint64_t invalid = 0;
+  for (bool is_first = true; !scratch.waiting.empty(); is_first = false) {
+    scratch.batch.clear();
+    for (const std::uint32_t ray : scratch.waiting) push(rays[ray], scratch.batch);
+    scratch.surfaces.resize(scratch.waiting.size());
+    const std::uint64_t refused = scene.closest(scratch.batch, scratch.met, scratch.surfaces);
+    if (is_first) invalid = refused;
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < scratch.waiting.size(); ++i) {
+      if (scratch.surfaces[i] == kNoSurface) continue;
+      ++counts[scratch.waiting[i]];
+      scratch.waiting[left] = scratch.waiting[i];
+      scratch.met[left++] = scratch.met[i];
+    }
+    scratch.waiting.resize(left);
+    scratch.met.resize(left);
+  }
+  return invalid;
+}
+
+std::uint64_t CoverageTraversal::count_surfaces(std::span<const RayRequest> rays, std::span<std::uint32_t> counts,
+                                                TraversalScratch& scratch) const {
+  HPR_CHECK(counts.size() == rays.size());
+  std::ranges::fill(counts, 0U);
+  const std::uint64_t invalid = add_surfaces(opaque_, rays, counts, scratch);
+  if (alpha_tested_ != nullptr) (void)add_surfaces(*alpha_tested_, rays, counts, scratch);
+  return invalid;
+}
+
 }  // namespace hpr

@@ -83,6 +83,11 @@ class CoverageTraversal {
   /// rays were invalid.
   std::uint64_t passed(std::span<const RayRequest> rays, std::span<float> passed, TraversalScratch& scratch) const;
 
+  /// counts[i] is how many surfaces ray i meets on its whole way, however little they cover. Returns how many rays were
+  /// invalid.
+  std::uint64_t count_surfaces(std::span<const RayRequest> rays, std::span<std::uint32_t> counts,
+                               TraversalScratch& scratch) const;
+
   /// The callback of visit_alpha_tested: ray i meets a surface that covers so much; returns whether the ray goes on.
   using Visit = std::function<bool(std::size_t ray, const SurfacePoint& point, double coverage)>;
   /// Calls `visit` for every surface of partial coverage along each ray, nearest first and by id where they lie in one
@@ -99,6 +104,8 @@ class CoverageTraversal {
   [[nodiscard]] bool has_alpha_tested() const { return alpha_tested_ != nullptr; }
 
  private:
+  std::uint64_t add_surfaces(const RayScene& scene, std::span<const RayRequest> rays, std::span<std::uint32_t> counts,
+                             TraversalScratch& scratch) const;
   struct LayeredRays {
     std::span<const RayRequest> requests;
     std::span<const SurfacePlane> ends;  ///< per ray, or none at all

@@ -176,7 +176,7 @@ CodecFrames draw_codec_frames(const std::string& scene, Size size, int count, co
     Progress progress(globals.progress, scene + ": frame", static_cast<std::size_t>(2 * count));
     Progress silent("none", "sample", 0);
     const auto draw = [&](const View& view, std::uint64_t number) {
-      Frame& frame = maker.make(std::span(&view, 1), number, silent);
+      Frame& frame = *maker.make(std::span(&view, 1), number, silent);
       std::vector<Image<Rgba8>> pictures =
           bring_to_screens(session, frame, maker.blocks(), {{size}, {0}, fixed_transform(settings.display)});
       progress.step("");

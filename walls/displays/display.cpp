@@ -18,6 +18,36 @@ OrbitInput& OrbitInput::operator+=(const OrbitInput& other) {
   return *this;
 }
 
+ViewKeys& ViewKeys::operator+=(const ViewKeys& other) {
+  half_stops += other.half_stops;
+  tones += other.tones;
+  wireframes += other.wireframes;
+  return *this;
+}
+
+std::optional<ViewKeys> parse_view_key(char key) {
+  switch (key) {
+    case '+':
+    case '=':  // the same key without shift on many keyboards
+      return ViewKeys{.half_stops = 1};
+    case '-':
+      return ViewKeys{.half_stops = -1};
+    case 't':
+      return ViewKeys{.tones = 1};
+    case 'w':
+      return ViewKeys{.wireframes = 1};
+    default:
+      return std::nullopt;
+  }
+}
+
+DisplayInput& DisplayInput::operator+=(const DisplayInput& other) {
+  orbit += other.orbit;
+  keys += other.keys;
+  stop = stop || other.stop;
+  return *this;
+}
+
 const std::vector<DisplayKind>& display_kinds() {
 #define HPR_LIST_DISPLAY(name) name##_display(),
   static const std::vector<DisplayKind> kinds{HPR_DISPLAYS(HPR_LIST_DISPLAY)};

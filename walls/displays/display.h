@@ -55,10 +55,27 @@ struct OrbitInput {
   bool operator==(const OrbitInput&) const = default;
 };
 
+/// How the viewer changed what is shown, summed over a while.
+struct ViewKeys {
+  int half_stops = 0;  ///< of exposure
+  int tones = 0;       ///< how often the next tone was asked for
+  int wireframes = 0;  ///< how often the wireframe was turned on or off
+
+  ViewKeys& operator+=(const ViewKeys& other);
+  bool operator==(const ViewKeys&) const = default;
+};
+
+/// What pressing a key means: + or = and - are half a stop each, t is the next tone, w the wireframe. None: nothing.
+[[nodiscard]] std::optional<ViewKeys> parse_view_key(char key);
+
 /// What the viewer asked for.
 struct DisplayInput {
-  OrbitInput orbit;
+  OrbitInput orbit = {};
+  ViewKeys keys = {};
   bool stop = false;  ///< end the run after this frame, orderly
+
+  DisplayInput& operator+=(const DisplayInput& other);
+  bool operator==(const DisplayInput&) const = default;
 };
 
 /// Shows pictures on the screens of a wall.

@@ -79,9 +79,9 @@ DisplayInput WebHub::take_input() {
   return std::exchange(input_, {});
 }
 
-void WebHub::add(const OrbitInput& motion) {
+void WebHub::add(const DisplayInput& input) {
   const std::lock_guard lock(mutex_);
-  input_.orbit += motion;
+  input_ += input;
 }
 
 std::string WebHub::status() {

@@ -41,7 +41,7 @@ class WebHub {
   [[nodiscard]] std::shared_ptr<const WebPicture> picture(std::size_t stream);
   /// The stream of a screen's id; none where there is no such screen.
   [[nodiscard]] std::optional<std::size_t> stream_of(std::string_view screen) const;
-  void add(const OrbitInput& motion);
+  void add(const DisplayInput& input);
   /// {"frame", "fps"}, the latter over the last two seconds.
   [[nodiscard]] std::string status();
   [[nodiscard]] const Wall& wall() const { return wall_; }

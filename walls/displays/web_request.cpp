@@ -55,7 +55,7 @@ constexpr std::string_view kPage = R"html(<!doctype html>
 <header>
   <b>{title}</b>
   <nav><a href="/">wall</a>{links}</nav>
-  <span>drag: turn &middot; shift-drag: pan &middot; wheel: nearer</span>
+  <span>drag: turn &middot; shift-drag: pan &middot; wheel: nearer &middot; + -: exposure &middot; t: tone &middot; w: wireframe</span>
   <output id="status"></output>
 </header>
 <main><img id="view" src="{stream}" alt="{title}" draggable="false" data-heights="{heights}"></main>
@@ -66,10 +66,11 @@ constexpr std::string_view kPage = R"html(<!doctype html>
   let motion = null;   // not yet sent
   let sending = false;
 
-  function add(turn, pan, dolly) {
-    motion = motion || { turn: [0, 0], pan: [0, 0], dolly: 0 };
+  function add(turn, pan, dolly, keys = "") {
+    motion = motion || { turn: [0, 0], pan: [0, 0], dolly: 0, keys: "" };
     for (const i of [0, 1]) { motion.turn[i] += turn[i]; motion.pan[i] += pan[i]; }
     motion.dolly += dolly;
+    motion.keys = (motion.keys + keys).slice(-32);
     send();
   }
 
@@ -99,6 +100,11 @@ constexpr std::string_view kPage = R"html(<!doctype html>
     event.preventDefault();
     add([0, 0], [0, 0], -0.15 * Math.sign(event.deltaY));
   }, { passive: false });
+
+  document.addEventListener("keydown", (event) => {
+    const plain = !event.ctrlKey && !event.altKey && !event.metaKey;
+    if (plain && event.key.length === 1 && "+=-tw".includes(event.key)) add([0, 0], [0, 0], 0, event.key);
+  });
 
   async function refresh() {
     try {
@@ -182,11 +188,13 @@ std::string_view cookie_in(std::string_view header, std::string_view name) {
   return {};
 }
 
-std::optional<OrbitInput> parse_motion(std::string_view body) {
+std::optional<DisplayInput> parse_motion(std::string_view body) {
   constexpr double kMaxMotion = 100.0;
+  constexpr std::size_t kMaxKeys = 32;
   const auto document = Json::try_parse(body);
   if (!document || !document->is_object()) return std::nullopt;
-  OrbitInput motion;
+  DisplayInput input;
+  OrbitInput& motion = input.orbit;
   if (!read_pair(*document, "turn", motion.turn_right, motion.turn_up)) return std::nullopt;
   if (!read_pair(*document, "pan", motion.pan_right, motion.pan_up)) return std::nullopt;
   if (const Json* const dolly = document->find("dolly")) {
@@ -196,7 +204,17 @@ std::optional<OrbitInput> parse_motion(std::string_view body) {
   for (const double value : {motion.turn_right, motion.turn_up, motion.pan_right, motion.pan_up, motion.dolly}) {
     if (!(std::abs(value) <= kMaxMotion)) return std::nullopt;
   }
-  return motion;
+  if (const Json* const pressed = document->find("keys")) {
+    if (!pressed->is_string()) return std::nullopt;
+    const auto keys = pressed->get<std::string>();
+    if (keys.size() > kMaxKeys) return std::nullopt;
+    for (const char key : keys) {
+      const auto meaning = parse_view_key(key);
+      if (!meaning) return std::nullopt;
+      input.keys += *meaning;
+    }
+  }
+  return input;
 }
 
 std::string to_html(const WebPage& page) {

@@ -31,7 +31,7 @@ struct WebAddress {
 
 /// {"turn": [right, up], "pan": [right, up], "dolly": d}, each as OrbitInput has it, none needed; none where it is
 /// anything else, or a number is not within 100.
-[[nodiscard]] std::optional<OrbitInput> parse_motion(std::string_view body);
+[[nodiscard]] std::optional<DisplayInput> parse_motion(std::string_view body);
 
 /// The one page of the web display.
 struct WebPage {

@@ -46,8 +46,10 @@ TEST(WebRequest, CookiesAreFoundByTheirWholeName) {
 TEST(WebRequest, AMotionIsReadAndAnythingElseIsNone) {
   const auto motion = parse_motion(R"({"turn": [0.5, -1], "pan": [2, 3], "dolly": -0.25})");
   ASSERT_TRUE(motion.has_value());
-  EXPECT_EQ(*motion, (OrbitInput{0.5, -1.0, 2.0, 3.0, -0.25}));
-  EXPECT_EQ(parse_motion("{}"), OrbitInput{});
+  EXPECT_EQ(motion->orbit, (OrbitInput{0.5, -1.0, 2.0, 3.0, -0.25}));
+  EXPECT_EQ(motion->keys, ViewKeys{});
+  EXPECT_EQ(parse_motion(R"({"keys": "++=-wtt"})")->keys, (ViewKeys{.half_stops = 2, .tones = 2, .wireframes = 1}));
+  EXPECT_EQ(parse_motion("{}"), DisplayInput{});
   for (const std::string_view bad :
        {"", "1", "[]", "{", R"({"turn": 1})", R"({"turn": [1]})", R"({"turn": ["a", 1]})", R"({"dolly": "x"})",
         R"({"dolly": 1e300})", R"({"pan": [1e999, 0]})", R"({"turn": [null, 0]})"}) {

@@ -319,6 +319,7 @@ class WindowThread::State::Mouse {
     glfwSetKeyCallback(handle, [](GLFWwindow* at, int key, int /*code*/, int action, int /*modifiers*/) {
       if (key == GLFW_KEY_ESCAPE && action == GLFW_PRESS) of(at).state_.ask_to_stop();
     });
+    glfwSetCharCallback(handle, [](GLFWwindow* at, unsigned int character) { of(at).press(character); });
     glfwSetWindowCloseCallback(handle, [](GLFWwindow* at) { of(at).state_.ask_to_stop(); });
     glfwSetWindowRefreshCallback(handle, [](GLFWwindow* at) { of(at).state_.set(&State::redraw); });
     glfwSetFramebufferSizeCallback(handle, [](GLFWwindow* at, int, int) { of(at).state_.set(&State::redraw); });
@@ -352,6 +353,13 @@ class WindowThread::State::Mouse {
     } else {
       state_.add({.turn_right = std::numbers::pi * drag.x, .turn_up = -std::numbers::pi * drag.y});
     }
+  }
+
+  void press(unsigned int character) {
+    const auto keys = character < 128 ? parse_view_key(static_cast<char>(character)) : std::nullopt;
+    if (!keys) return;
+    const std::lock_guard lock(state_.mutex);
+    state_.input.keys += *keys;
   }
 
   void scroll(double notches) {
