@@ -44,6 +44,8 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   // Whatever the size of a frame, it has as many photons and takes its keys the same way: the shader stays.
   settings_.photons_fit_frame = false;
   settings_.rays.photons = plan_.rays.photons;
+  settings_.rays.photon_footprint = plan_.rays.photon_footprint;
+  settings_.rays.fits_photons = plan_.rays.fits_photons;
   settings_.primary = plan_.primary;
   settings_.rays.gather = plan_.rays.gather;
   settings_.indirect_is_chosen = true;

@@ -40,7 +40,7 @@ struct FrameSettings {
   bool partitioned = false;         ///< each rank's ray scene holds its share of the objects only, and rays travel
   bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
   bool single_picture = false;      ///< whether nothing but one sample of one picture is drawn
-  bool photons_fit_frame = false;   ///< no more photons a sample than the frame has pixels
+  bool photons_fit_frame = false;   ///< no more photons a sample than the frame's pixels show
   double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged
   double verify_percent = 0.0;      ///< of the tiles that are drawn again and compared; see engine/verification.h
   std::vector<Aov> aovs;            ///< with deferred shading only

@@ -164,36 +164,97 @@ std::vector<Ray> camera_rays(std::span<const View> views) {
   return rays_from_eye;
 }
 
+/// What one of the camera rays meets.
+struct SeenPoint {
+  std::size_t ray = 0;
+  SurfacePoint surface;
+};
+
+/// Where the camera rays of some views end, of those that meet something. The same on all ranks, however the scene is
+/// shared out. Inside RayScene::for_each.
+std::vector<SeenPoint> find_seen(const RayScene& scene, const Surfaces& surfaces, std::span<const Ray> camera_rays) {
+  RayBatch rays;
+  for (const Ray& ray : camera_rays) {
+    rays.push(scene.space().from_world(ray.origin), ray.direction, kInfinity, Faces::Front);
+  }
+  std::vector<std::uint32_t> hits(camera_rays.size());
+  (void)scene.closest(rays, hits);
+  std::vector<SeenPoint> seen;
+  WorldTriangle triangle;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (hits[i] == kNoSurface) continue;
+    surfaces.load(hits[i], triangle);
+    seen.push_back({i, surfaces.meet(triangle, camera_rays[i].origin, camera_rays[i].direction)});
+  }
+  return seen;
+}
+
 /// Collective. How much of the sky's light reaches the surfaces that some views see, as about a thousand rays find out:
-/// of what would without anything in its way. None where the views see no surface. The same on all ranks, however the
-/// scene is shared out.
+/// of what would without anything in its way. None where the views see no surface.
 std::optional<double> open_sky(Session& session, const RaySettings& settings, std::span<const View> views) {
   session.partition_rays(settings);
   const RayScene& scene = session.ray_scene(settings.build);
-  const RaySpace& space = scene.space();
-  const Surfaces surfaces(session.scene(), space);
+  const Surfaces surfaces(session.scene(), scene.space());
   const std::vector<Ray> rays_from_eye = camera_rays(views);
-  RayBatch rays;
-  for (const Ray& ray : rays_from_eye) rays.push(space.from_world(ray.origin), ray.direction, kInfinity, Faces::Front);
-  std::vector<std::uint32_t> seen(rays_from_eye.size());
   std::vector<std::uint8_t> blocked;
   scene.for_each(1, 1, [&](std::size_t) {
-    (void)scene.closest(rays, seen);
-    rays.clear();
-    WorldTriangle triangle;
-    for (std::size_t i = 0; i < rays_from_eye.size(); ++i) {
-      if (seen[i] == kNoSurface) continue;
-      surfaces.load(seen[i], triangle);
-      const SurfacePoint point = surfaces.meet(triangle, rays_from_eye[i].origin, rays_from_eye[i].direction);
-      Sampler sampler(photon_stream({settings.seed, 0}), static_cast<std::uint32_t>(i));
-      const glm::dvec3 up = warp::cosine_lobe(point.geometric_normal, sampler.two());
-      rays.push(space.from_world(ray_origin(point, up)), up, kInfinity);
+    RayBatch rays;
+    for (const SeenPoint& point : find_seen(scene, surfaces, rays_from_eye)) {
+      Sampler sampler(photon_stream({settings.seed, 0}), static_cast<std::uint32_t>(point.ray));
+      const glm::dvec3 up = warp::cosine_lobe(point.surface.geometric_normal, sampler.two());
+      rays.push(scene.space().from_world(ray_origin(point.surface, up)), up, kInfinity);
     }
     blocked.resize(rays.size());
     (void)scene.occluded(rays, blocked);
   });
   if (blocked.empty()) return std::nullopt;
   return static_cast<double>(std::ranges::count(blocked, 0)) / static_cast<double>(blocked.size());
+}
+
+/// Metres, rounded so that no processor's last bits count, and views that are almost the same have one.
+double rounded_footprint(double metres) {
+  constexpr double kStepsPerDoubling = 4.0;
+  return std::exp2(std::round(kStepsPerDoubling * std::log2(metres)) / kStepsPerDoubling);
+}
+
+/// Collective. Metres across that a pixel covers of what some views see, in the median over camera rays; 0 where they
+/// see no surface.
+double pixel_footprint(Session& session, const RaySettings& settings, std::span<const View> views) {
+  session.partition_rays(settings);
+  const RayScene& scene = session.ray_scene(settings.build);
+  const Surfaces surfaces(session.scene(), scene.space());
+  const std::vector<Ray> rays_from_eye = camera_rays(views);
+  const std::size_t rays_of_view = rays_from_eye.size() / views.size();
+  std::vector<double> footprints;
+  scene.for_each(1, 1, [&](std::size_t) {
+    for (const SeenPoint& point : find_seen(scene, surfaces, rays_from_eye)) {
+      const View& view = views[point.ray / rays_of_view];
+      const glm::dvec2 center(0.5 * view.size().width, 0.5 * view.size().height);
+      const Ray one = view_ray(view, center.x, center.y);
+      const Ray beside = view_ray(view, center.x + 1.0, center.y);
+      const double apart = glm::distance(glm::normalize(one.direction), glm::normalize(beside.direction));
+      footprints.push_back(glm::distance(one.origin, beside.origin) +
+                           apart * glm::distance(view.eye, point.surface.position));
+    }
+  });
+  if (footprints.empty()) return 0.0;
+  const auto median = footprints.begin() + static_cast<std::ptrdiff_t>(footprints.size() / 2);
+  std::ranges::nth_element(footprints, median);
+  return *median > 0.0 ? rounded_footprint(*median) : 0.0;
+}
+
+/// How many photons are sent, and how far they are gathered from, where the settings leave that to what is seen.
+void fit_photons(Session& session, const FrameSettings& settings, FramePlan& plan, std::span<const View> views) {
+  const bool sends = runs_pass(plan_passes(session.requirements(), plan.rays), PassId::Photon);
+  if (sends && plan.rays.global_photons && plan.rays.photon_footprint == 0.0) {
+    plan.rays.photon_footprint = all_gather_value(session.comm(), pixel_footprint(session, plan.rays, views)).front();
+  }
+  if (!settings.photons_fit_frame) return;
+  if (plan.rays.photon_footprint > 0.0) {
+    plan.rays.fits_photons = true;
+  } else {
+    plan.rays.photons = photons_for(plan.rays.photons, views);
+  }
 }
 
 // Processor time in ns on an Intel Xeon, as bench/primary_bench.cpp measures it. Only their ratios decide.
@@ -241,11 +302,19 @@ void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan
   auto& lines = plan.explained;
   lines.push_back(fmt::format("pass {}: {} ({})", name_of(pass.pass), pass.runs ? "on" : "off", pass.why));
   if (!pass.runs || !info_of(pass.pass).needs_photons) return;
-  lines.push_back(
-      fmt::format("photons: {} a sample ({})", plan.rays.photons > 0 ? plan.rays.photons : kPhotons,
-                  settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));
+  const std::uint32_t photons = plan.rays.photons > 0 ? plan.rays.photons : kPhotons;
+  if (plan.rays.fits_photons) {
+    lines.push_back(fmt::format("photons: up to {} a sample (as many as fill what they are gathered from)", photons));
+  } else {
+    lines.push_back(
+        fmt::format("photons: {} a sample ({})", photons,
+                    settings.photons_fit_frame ? "of the quality, but no more than pixels, past 1000" : "as asked"));
+  }
   if (plan.rays.photon_radius > 0.0) {
     lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
+  } else if (plan.rays.photon_footprint > 0.0) {
+    lines.push_back(fmt::format("photon radius: two pixels at first, of {:.3g} m (the median of what is seen)",
+                                plan.rays.photon_footprint));
   }
 }
 
@@ -284,7 +353,6 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.depth_format = settings.depth_format;
   plan.shading = settings.shading;
   plan.rays = settings.rays;
-  if (settings.photons_fit_frame) plan.rays.photons = photons_for(plan.rays.photons, views);
   plan.aovs = settings.aovs;
   plan.verify_percent = settings.verify_percent;
   std::vector<Assignment> assigned = assign(plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
@@ -310,6 +378,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   if (plan.primary == Primary::Raster) session.start_gl();
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
+  fit_photons(session, settings, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   if (plan.verify_percent > 0.0) {
     plan.explained.push_back(fmt::format("verify: {} % of the tiles, drawn again by {} (as asked)", plan.verify_percent,

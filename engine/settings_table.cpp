@@ -364,15 +364,17 @@ std::vector<Setting> make_table() {
            std::uint32_t{0}, std::uint32_t{1'000'000'000},
            [](Settings& s) -> std::uint32_t& { return s.frame.rays.photons; }, "0 to 1000000000 a sample"),
        .by_quality = {"0", "100000", "200000"},
-       .costs = "time in proportion, past the frame's pixels without use",
-       .loses = "fewer photons gather from further away: caustics and indirect light blur; 0 leaves them out",
+       .costs = "time in proportion; left to the quality, no more are sent than the frame's pixels show",
+       .loses = "fewer photons are noise, and in large scenes gather from further away: caustics and indirect light "
+                "blur; 0 leaves them out",
        .limits_reference = true,
        .used_with = on_photons},
       {.name = "photon-radius",
-       .help = "metres about a point in which photons count, in a frame's first sample (default: from their density)",
+       .help = "metres about a point in which photons count, in a frame's first sample (default: with --indirect "
+               "two pixels where photons lie dense enough, else from their density)",
        .value = number(
            0.0, 1e30, [](Settings& s) -> double& { return s.frame.rays.photon_radius; },
-           "0 (from the photons' density) or metres"),
+           "0 (from pixels and density) or metres"),
        .costs = "nothing, but for gathers that meet more photons",
        .loses = "wide: caustics blur, corners darken; narrow: noise. It shrinks from sample to sample",
        .limits_reference = true,

@@ -24,9 +24,12 @@ struct RaySettings {
   std::uint32_t photons = 0;        ///< sent per sample; 0: kPhotons, and only where the pass is named
   bool global_photons = false;      ///< also those that were scattered by rough surfaces only: all indirect light
   bool gather = false;              ///< under a constant environment rays bring all indirect light, in place of photons
-  double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density
-  int occlusion_rays = 4;           ///< of the ambient-occlusion pass, per point and sample
-  double ambient = 0.2;             ///< radiance that pass lets in where nothing is near
+  double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density and the footprint
+  /// Metres that a pixel covers of what is seen: photons are gathered from about so far. 0: as their density has it.
+  double photon_footprint = 0.0;
+  bool fits_photons = false;   ///< no more of `photons` are sent than fill the footprint
+  int occlusion_rays = 4;      ///< of the ambient-occlusion pass, per point and sample
+  double ambient = 0.2;        ///< radiance that pass lets in where nothing is near
   bool terminator_fix = true;  ///< lifts the origins of shadow rays onto the smooth surface that the normals describe
   RayBuild build = {};         ///< of Embree's scenes
   /// Passes whose light of the first surface is computed for one pixel in four and upsampled to its neighbors

@@ -30,8 +30,8 @@ class Quads:
         self.gltf["materials"].append(made | fields)
         return len(self.gltf["materials"]) - 1
 
-    def mesh(self, material, corners=((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)), indices=FRONT):
-        """`corners`: any number, wound by `indices`."""
+    def mesh(self, material, corners=((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)), indices=FRONT, normals=None):
+        """`corners`: any number, wound by `indices`; flat without normals."""
         points = struct.pack(f"<{3 * len(corners)}f", *itertools.chain(*corners))
         rounded = list(struct.iter_unpack("<3f", points))
         bounds = {"min": [min(axis) for axis in zip(*rounded)], "max": [max(axis) for axis in zip(*rounded)]}
@@ -39,6 +39,9 @@ class Quads:
         triangles = self._accessor(struct.pack(f"<{len(indices)}I", *indices), componentType=5125, count=len(indices),
                                    type="SCALAR")
         primitive = {"attributes": {"POSITION": positions}, "indices": triangles}
+        if normals is not None:
+            packed = struct.pack(f"<{3 * len(normals)}f", *itertools.chain(*normals))
+            primitive["attributes"]["NORMAL"] = self._accessor(packed, componentType=5126, count=len(normals), type="VEC3")
         if material is not None:
             primitive["material"] = material
         self.gltf["meshes"].append({"primitives": [primitive]})

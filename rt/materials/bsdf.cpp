@@ -1,6 +1,7 @@
 #include "rt/materials/bsdf.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/exponential.hpp>
@@ -15,6 +16,9 @@ namespace {
 
 /// Lobes that are present but give nothing in the viewer's own mirror or refracted direction keep this chance.
 constexpr double kMinWeight = 1e-3;
+/// And facets as rough as this or more this one: so many of them may lie outside the directions that are looked at.
+constexpr double kMinFacetWeight = 0.1;
+constexpr double kWideAlpha = 0.05;
 /// Cosines below it are edge-on: nothing is seen or lit there, and no quotient of cosines overflows.
 constexpr double kEdgeOn = 1e-9;
 
@@ -35,12 +39,14 @@ double mirrored_bound(double normal_view, double alpha2) {
 
 /// A normal of GGX facets of roughness `alpha` that `view` sees, both around z: Dupuy and Benyoub, "Sampling Visible
 /// GGX Normals with Spherical Caps", 2023. The view, stretched with the facets, is half of the normal and a direction
-/// of the sphere's cap, of which `bound` is the depth in its own cosines.
-glm::dvec3 visible_normal(const glm::dvec3& view, double alpha, double bound, const glm::dvec2& u) {
+/// of the sphere's cap, of which `bound` is the depth in its own cosines: `fraction` of it down, `around` on its
+/// circle.
+glm::dvec3 visible_normal(const glm::dvec3& view, double alpha, double bound, double fraction,
+                          const glm::dvec2& around) {
   const glm::dvec3 stretched = glm::normalize(glm::dvec3(alpha * view.x, alpha * view.y, view.z));
   const double depth = bound * stretched.z;
-  const double z = 1.0 - u.x * (1.0 + depth);
-  const glm::dvec2 across = std::sqrt(std::max(0.0, 1.0 - z * z)) * warp::on_circle(u.y);
+  const double z = 1.0 - fraction * (1.0 + depth);
+  const glm::dvec2 across = std::sqrt(std::max(0.0, 1.0 - z * z)) * around;
   const glm::dvec3 sum(across.x + stretched.x, across.y + stretched.y, z + stretched.z);
   const glm::dvec3 normal(alpha * sum.x, alpha * sum.y, std::max(0.0, sum.z));
   const double length = glm::length(normal);
@@ -291,19 +297,40 @@ bool Bsdf::present(Lobe lobe) const {
   return !all_mirror_ && diffuse_ * largest(base_color_) > 0.0 && (!exact_ || view_enters_ > 0.0);
 }
 
+/// The root mean square of what the facets that the viewer sees reflect, or let through: chances in proportion to it
+/// make samples vary least. At grazing angles and about the critical one the shares of facets are far from that of the
+/// surface's own normal.
+double Bsdf::facet_share(Lobe lobe) const {
+  constexpr std::array<double, 4> kFractions{0.125, 0.375, 0.625, 0.875};
+  constexpr double kDiagonal = 0.5 * std::numbers::sqrt2;
+  constexpr std::array<glm::dvec2, 2> kAround{glm::dvec2{kDiagonal, kDiagonal}, glm::dvec2{-kDiagonal, kDiagonal}};
+  const double alpha = square(roughness_);
+  const glm::dvec3 view(std::sqrt(std::max(0.0, 1.0 - square(normal_view_))), 0.0, normal_view_);
+  double sum = 0.0;
+  for (const double fraction : kFractions) {
+    for (const glm::dvec2& around : kAround) {
+      const double reflected = dielectric_fresnel(glm::dot(view, visible_normal(view, alpha, 1.0, fraction, around)));
+      sum += square(lobe == Lobe::Reflection ? reflected : 1.0 - reflected);
+    }
+  }
+  const double least = std::max(kMinFacetWeight * std::min(alpha / kWideAlpha, 1.0), kMinWeight);
+  return std::max(std::sqrt(sum / (kFractions.size() * kAround.size())), least);
+}
+
 glm::dvec3 Bsdf::weight(Lobe lobe) const {
   if (!present(lobe)) return glm::dvec3(0.0);
   const bool single = is_delta(lobe);
   if (lobe == Lobe::Reflection) {
+    if (exact_ && !single) return fresnel(normal_view_, facet_share(lobe));
     const glm::dvec3 straight = fresnel(normal_view_, dielectric_fresnel(normal_view_));
     return single ? straight : glm::max(straight, kMinWeight);
   }
   if (lobe == Lobe::Diffuse) {
     if (exact_) return (diffuse_ * view_enters_) * base_color_;
-    return (diffuse_ * std::max(1.0 - dielectric_fresnel(normal_view_), kMinWeight)) * base_color_;
+    // Most light comes from where facets half-way to the viewer reflect as if looked at straight, however he looks.
+    return (diffuse_ * std::max(1.0 - f0_, kMinWeight)) * base_color_;
   }
-  const double through = 1.0 - dielectric_fresnel(normal_view_);
-  return (single ? through * squeeze_ : std::max(through, kMinWeight)) * tint_;
+  return (single ? (1.0 - dielectric_fresnel(normal_view_)) * squeeze_ : facet_share(lobe)) * tint_;
 }
 
 bool Bsdf::is_delta(Lobe lobe) const {
@@ -334,7 +361,7 @@ std::optional<BsdfSample> Bsdf::sample_diffuse(const glm::dvec2& u) const {
 std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) const {
   const glm::dmat3 frame = warp::basis_about(normal_);
   const double bound = lobe == Lobe::Reflection ? bounded_view_ / normal_view_ : 1.0;
-  const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), bound, u);
+  const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), bound, u.x, warp::on_circle(u.y));
   const double view_half = glm::dot(view_, half);
   const glm::dvec3 reflected = 2.0 * view_half * half - view_;
   BsdfSample sample;

@@ -102,7 +102,8 @@ class Bsdf {
   /// The normal that lights are chosen by: zero where they may shine through.
   [[nodiscard]] glm::dvec3 light_normal() const { return present(Lobe::Transmission) ? glm::dvec3(0.0) : normal_; }
   /// About the share of light that the lobe scatters towards the viewer: for choosing among lobes. Exact for lobes of
-  /// one direction. Zero exactly where the lobe is absent.
+  /// one direction; for others never so low that a sample's weight, refraction's squeeze apart, is over 50 times as
+  /// much. Zero exactly where the lobe is absent.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
   /// Whether the lobe has a single direction: a perfect mirror, clear glass, rough glass of an index of almost 1.
   [[nodiscard]] bool is_delta(Lobe lobe) const;
@@ -133,6 +134,7 @@ class Bsdf {
   [[nodiscard]] std::optional<Facet> facet(Lobe lobe, const glm::dvec3& to_light) const;
   [[nodiscard]] double sampled_normals(Lobe lobe) const;
   [[nodiscard]] double facet_pdf(Lobe lobe, const Facet& facet) const;
+  [[nodiscard]] double facet_share(Lobe lobe) const;
   [[nodiscard]] std::optional<glm::dvec3> refracted(const glm::dvec3& normal) const;
   [[nodiscard]] std::optional<BsdfSample> sample_diffuse(const glm::dvec2& u) const;
   [[nodiscard]] std::optional<BsdfSample> sample_facet(Lobe lobe, const glm::dvec2& u) const;

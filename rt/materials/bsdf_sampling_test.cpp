@@ -215,5 +215,42 @@ TEST(BsdfSampling, DensitiesHoldUnderATiltedShadingNormal) {
   }
 }
 
+/// A lobe that is chosen with a chance in proportion to its weight and then brings many times as much is a firefly.
+TEST(BsdfSampling, NoSampleOutweighsTheChanceOfItsLobe) {
+  std::vector<MaterialPoint> materials;
+  for (const double roughness : {0.05, 0.1, 0.2, 0.4, 1.0}) {
+    for (const double ior : {1.05, 1.33, 1.5, 2.4}) {
+      materials.push_back(test::glass(roughness, ior));
+      materials.push_back(test::sheet(roughness, ior));
+      materials.push_back(test::dielectric(roughness, 0.8, ior));
+      materials.push_back(test::glass(roughness, ior));
+      materials.back().transmission = 0.5;
+      materials.back().metallic = 0.2;
+    }
+    materials.push_back(test::metal(roughness, 0.9));
+  }
+  double worst = 0.0;
+  for (const MaterialPoint& material : materials) {
+    for (double polar = 0.0; polar < 1.57; polar += polar < 1.5 ? 0.06 : 0.01) {
+      for (const bool inside : {false, true}) {
+        const Bsdf bsdf = bsdf_of(material, direction(polar, 0.4), inside, Carried::Flux);
+        for (const Lobe lobe : kLobes) {
+          const glm::dvec3 expected = bsdf.weight(lobe);
+          for (std::uint32_t i = 0; i < 200; ++i) {
+            Sampler random(0x9E3779B97F4A7C15U * (i + 1), 0);
+            const auto sample = bsdf.sample(lobe, random.two());
+            if (!sample) continue;
+            const double ratio = sample->weight.x / expected.x;
+            worst = std::max(worst, ratio);
+            ASSERT_LT(ratio, 50.0) << "lobe " << static_cast<int>(lobe) << ", roughness " << material.roughness
+                                   << ", index " << material.ior << ", angle " << polar << (inside ? ", inside" : "");
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(worst, 1.0);
+}
+
 }  // namespace
 }  // namespace hpr

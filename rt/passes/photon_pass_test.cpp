@@ -2,6 +2,8 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 #include "cluster/transport/local_communicator.h"
@@ -110,6 +112,35 @@ TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
                  Error)
         << ranks;
   }
+}
+
+TEST(PhotonPass, RadiiAndNumbersFollowWhatAPixelCovers) {
+  const Scene scene = furnace(0.5F, 1.0F);  // every photon is kept twice in the mean, on 24 square metres
+  const RaySpace space(scene.bounds);
+  const Surfaces surfaces(scene, space);
+  const RayScene rays(scene, space, 1);
+  const LightSampler lights(scene);
+  const auto map_of = [&](double footprint, bool fits, Communicator* comm = nullptr) {
+    const RaySettings settings{
+        .photons = 100'000, .global_photons = true, .photon_footprint = footprint, .fits_photons = fits};
+    PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings);
+    const PhotonMap& map = builder.build({}, comm).global;
+    return std::pair(map.radius(), static_cast<double>(map.size()));
+  };
+  const auto expected = [](double radius) { return 4.0 * 24.0 / (std::numbers::pi * radius * radius); };
+  for (const double footprint : {0.02, 0.04}) {
+    const auto [radius, photons] = map_of(footprint, true);
+    EXPECT_NEAR(radius, 2.0 * footprint, 1e-9);
+    EXPECT_NEAR(photons, expected(radius), 0.2 * expected(radius));
+    EXPECT_NEAR(map_of(footprint, false).second, 200'000, 5'000);
+    run_local_ranks(3, [&](Communicator& comm) {
+      EXPECT_EQ(map_of(footprint, true, &comm), std::pair(radius, photons)) << "ranks";
+    });
+  }
+  const double wide = map_of(0.0, false).first;
+  EXPECT_NEAR(wide, std::sqrt(50.0 * 24.0 / (std::numbers::pi * 200'000)), 0.1 * wide);
+  EXPECT_EQ(map_of(1.0, false).first, wide) << "far off fifty photons are enough";
+  EXPECT_NEAR(map_of(1e-6, true).first, std::sqrt(4.0 / 50.0) * wide, 1e-9) << "at the least four photons";
 }
 
 TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {

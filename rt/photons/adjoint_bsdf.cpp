@@ -64,6 +64,14 @@ glm::dvec3 AdjointBsdf::weight(Lobe lobe) const {
   return 0.5 * (at_.bsdf.weight(lobe) + plain_.weight(lobe));
 }
 
+double AdjointBsdf::gain() const {
+  if (flat_) return 1.0;
+  const glm::dvec3& light = at_.surface.to_viewer;
+  const double falls = glm::dot(light, at_.surface.geometric_normal);
+  const double caught = std::max(glm::dot(light, at_.material.normal), glm::dot(light, at_.surface.shading_normal));
+  return falls > 0.0 && caught > falls ? caught / falls : 1.0;
+}
+
 std::optional<BsdfSample> AdjointBsdf::sample(Lobe lobe, Sampler& sampler) const {
   if (is_plain(lobe)) return at_.bsdf.sample(lobe, sampler.two());
   return at_.bsdf.is_delta(lobe) ? sample_direction(directions(lobe), sampler) : sample_wide(lobe, sampler);

@@ -43,6 +43,9 @@ class AdjointBsdf {
 
   /// About the share of the flux that the lobe sends on: for choosing among lobes. Zero only where it sends none.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
+  /// How many times as much a surface of the normals that eyes shade with would catch of this light as the true one
+  /// does: so much of the weight of sample() is none of a lobe's. At least 1.
+  [[nodiscard]] double gain() const;
   /// A direction, and what of the flux goes there over the chance to choose it. None where the flux ends.
   [[nodiscard]] std::optional<BsdfSample> sample(Lobe lobe, Sampler& sampler) const;
 

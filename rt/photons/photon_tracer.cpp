@@ -226,7 +226,7 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
   block.kept.push_back({flight.photon, flight.followed, photon});
 }
 
-/// Keeps the photon if it is wanted here and sends it on; false when it ends.
+/// Keeps the photon if it is wanted here, and scatters it into the block's next ones; true where it passes instead.
 bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const {
   const MaterialPoint material = evaluate_material(scene_, surface);
   const double metres = glm::distance(surface.position, flight.position);
@@ -249,16 +249,32 @@ bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Pas
   }
   flight.flux = flux;
   if (!carries_light(flight.flux)) return false;
-  if (flight.bounces < settings_.max_bounces) return scatter(flight, {surface, material, bsdf, block.triangle});
-  ++block.traced.counts.lost;
+  if (flight.bounces < settings_.max_bounces) {
+    scatter(flight, {surface, material, bsdf, block.triangle}, block);
+  } else {
+    ++block.traced.counts.lost;
+  }
   return false;
+}
+
+/// A surface whose shading normal leans towards the light sends on many times what falls on it. It does so by as many
+/// photons: bright ones among others would leave the mean of any number of them to chance.
+void PhotonTracer::scatter(const Flight& flight, const FluxArrival& at, Block& block) const {
+  constexpr double kMaxCopies = 64.0;
+  const AdjointBsdf scatters(scene_, surfaces_, at);
+  const auto copies = static_cast<std::uint32_t>(std::clamp(scatters.gain(), 1.0, kMaxCopies));
+  for (std::uint32_t i = 0; i < copies; ++i) {
+    Flight copy = flight;
+    copy.flux /= copies;
+    if (i > 0) copy.sampler = flight.sampler.branch(i);
+    if (send_on(copy, at, scatters)) block.next.push_back(copy);
+  }
 }
 
 /// Chooses a lobe by what it makes of the photon's flux, then a direction. After the first bounces the photon ends with
 /// the chance that its light is absorbed.
-bool PhotonTracer::scatter(Flight& flight, const FluxArrival& at) const {
+bool PhotonTracer::send_on(Flight& flight, const FluxArrival& at, const AdjointBsdf& scatters) const {
   const SurfacePoint& surface = at.surface;
-  const AdjointBsdf scatters(scene_, surfaces_, at);
   std::array<double, kLobes.size()> chances{};
   double total = 0.0;
   for (std::size_t i = 0; i < kLobes.size(); ++i) {
@@ -323,6 +339,20 @@ PhotonSettings tracer_settings(const RaySettings& settings, const LightSampler& 
 
 }  // namespace
 
+namespace {
+
+// Photons that a first radius takes in, where they lie about as dense as most of them do.
+constexpr double kDense = 50.0;    ///< where one sample is to show no noise
+constexpr double kFilled = 4.0;    ///< where many samples do that
+constexpr double kMinDense = 4.0;  ///< fewer of them would show one by one in the sum of samples
+/// Pixels that it spans.
+constexpr double kFootprints = 2.0;
+
+constexpr std::uint32_t kPilotPhotons = 16'384;
+constexpr std::uint32_t kMinPhotons = 1000;
+
+}  // namespace
+
 PhotonMapBuilder::PhotonMapBuilder(const Scene& scene, const Surfaces& surfaces, const RaySpace& space,
                                    const RayScene& rays, const LightSampler& lights, const RaySettings& settings)
     : space_(space),
@@ -356,18 +386,36 @@ TracedPhotons PhotonMapBuilder::trace(const SampleNumber& number, Communicator* 
   return traced;
 }
 
+/// Sends as many photons as fill the radii that the footprint wants, by what a few of them show of where light goes.
+void PhotonMapBuilder::fit_count(Communicator* comm) {
+  if (!std::exchange(settings_.fits_photons, false) || !(settings_.photon_footprint > 0.0)) return;
+  const std::uint32_t most = settings_.photons;
+  settings_.photons = std::min(most, kPilotPhotons);
+  const TracedPhotons pilot = trace({}, comm);
+  if (pilot.global.empty()) return;
+  const double wide = first_radius(pilot.global, space_, kDense) / (kFootprints * settings_.photon_footprint);
+  const double wanted = settings_.photons * (kFilled / kDense) * wide * wide;
+  settings_.photons = static_cast<std::uint32_t>(
+      std::clamp(wanted, static_cast<double>(std::min(kMinPhotons, most)), static_cast<double>(most)));
+}
+
+double PhotonMapBuilder::choose_radius(std::span<const Photon> first) const {
+  if (settings_.photon_radius > 0.0) return settings_.photon_radius;
+  const double dense = first_radius(first, space_, kDense);
+  if (!(settings_.photon_footprint > 0.0)) return dense;
+  return std::min(dense, std::max(kFootprints * settings_.photon_footprint, dense * std::sqrt(kMinDense / kDense)));
+}
+
 void PhotonMapBuilder::choose_radii(const TracedPhotons& first) {
-  caustic_radius_ = settings_.photon_radius;
-  global_radius_ = settings_.photon_radius;
-  if (settings_.photon_radius > 0.0) return;
-  caustic_radius_ = first_radius(first.caustic, space_);
-  global_radius_ = first_radius(first.global, space_);
+  caustic_radius_ = choose_radius(first.caustic);
+  global_radius_ = choose_radius(first.global);
 }
 
 const PhotonMaps& PhotonMapBuilder::build(const SampleNumber& number, Communicator* comm) {
   if (built_ == number) return maps_;
   // Whatever sample comes first, radii are those of the very first one: a run that is resumed gives the same bits.
   const bool chooses = caustic_radius_ == 0.0;
+  fit_count(comm);
   TracedPhotons traced;
   if (chooses && number != SampleNumber{}) choose_radii(trace({}, comm));
   traced = trace(number, comm);

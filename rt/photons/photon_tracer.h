@@ -5,6 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "cluster/transport/communicator.h"
@@ -101,7 +102,8 @@ class PhotonTracer {
   void move(Block& block) const;
   [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const;
   void keep(const Flight& flight, const glm::dvec3& flux, const SurfacePoint& surface, Block& block) const;
-  [[nodiscard]] bool scatter(Flight& flight, const FluxArrival& at) const;
+  void scatter(const Flight& flight, const FluxArrival& at, Block& block) const;
+  [[nodiscard]] bool send_on(Flight& flight, const FluxArrival& at, const AdjointBsdf& scatters) const;
 
   const Scene& scene_;
   const Surfaces& surfaces_;
@@ -118,6 +120,10 @@ void share_photons(Communicator& comm, TracedPhotons& photons);
 /// Makes the photon maps of one sample after the other: every sample traces photons of its own, and their radius
 /// shrinks from sample to sample, so that the mean of many has neither noise nor blur (Knaus and Zwicker, "Progressive
 /// Photon Mapping: A Probabilistic Approach", 2011).
+///
+/// Where the settings know what a pixel covers, radii begin at two pixels: within them light that things keep off a
+/// surface, or that ends at its edge, is missing, and wide ones show as dark rims. As many photons are sent as that
+/// takes. Where they are too few, wider radii take in at least four of them.
 class PhotonMapBuilder {
  public:
   /// All that is referred to must outlive this. `rays` holds the whole scene.
@@ -137,6 +143,8 @@ class PhotonMapBuilder {
  private:
   void settle(Communicator& comm);
   [[nodiscard]] TracedPhotons trace(const SampleNumber& number, Communicator* comm);
+  void fit_count(Communicator* comm);
+  [[nodiscard]] double choose_radius(std::span<const Photon> first) const;
   void choose_radii(const TracedPhotons& first);
 
   RaySpace space_;

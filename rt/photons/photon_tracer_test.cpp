@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <mutex>
 #include <optional>
 
@@ -96,6 +98,22 @@ TEST(PhotonTracerTest, PassesAndSeedsHavePhotonsOfTheirOwn) {
   EXPECT_FALSE(same(tracer.trace({}, {100, 100}, 100), first));
   EXPECT_FALSE(same(tracer.trace({}, {std::uint64_t{1} << 32U, 100}, 100), first));
   EXPECT_FALSE(same(tracer.trace({.seed = 2}, {0, 100}, 100), first));
+}
+
+/// A floor whose normals lean towards a grazing light sends on seventeen times what falls on it.
+TEST(PhotonTracerTest, LeaningNormalsMakeMorePhotonsAndNoneMuchBrighter) {
+  constexpr std::uint64_t kPhotons = 2000;
+  Scene scene;
+  test::add_room(scene, test::add_material(scene, test::diffuse(glm::vec3(0.8F))));
+  for (glm::vec3& normal : scene.meshes[test::kFloor].normals) normal = glm::vec3(std::sqrt(0.75F), 0.5F, 0.0F);
+  const PhotonRoom room(std::move(scene));
+  const TracedPhotons traced = room.trace(test::beam({0.8, -0.96, 0.0}, kZ, {-0.05, 1.0, 0.0}, 0.01), kPhotons);
+  float brightest = 0.0F;
+  for (const Photon& photon : traced.global) brightest = std::max(brightest, photon.flux[1]);
+  EXPECT_LT(brightest, 4.0F / kPhotons);
+  EXPECT_GT(flux_of(traced.global).y, 10.0) << "watts of one";
+  EXPECT_TRUE(
+      same(room.trace(test::beam({0.8, -0.96, 0.0}, kZ, {-0.05, 1.0, 0.0}, 0.01), kPhotons, {.threads = 2}), traced));
 }
 
 TEST(PhotonTracerTest, ALightsRangeEndsTheFirstLegOfItsPhotons) {
