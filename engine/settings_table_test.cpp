@@ -42,8 +42,9 @@ TEST(SettingsTable, EachSettingTouchesItsOwnValueAlone) {
   const RenderSettings untouched;
   for (const Setting& setting : all_settings()) {
     RenderSettings settings;
-    for (const char* const value : {"true", "7", "0.5", "1,2,3", "shadow", "local", "rays", "hybrid", "16", "8", "low",
-                                    "off", "gaussian", "best", "depth", "tree", "partitioned", "aces", "x"}) {
+    for (const char* const value :
+         {"true", "7",   "0.5",      "1,2,3", "shadow", "local", "rays",        "hybrid", "16",   "8",
+          "low",  "off", "gaussian", "best",  "depth",  "tree",  "partitioned", "aces",   "none", "x"}) {
       try {
         setting.value.parse(settings, value);
       } catch (const Error&) {
