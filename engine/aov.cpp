@@ -34,7 +34,7 @@ std::string_view name_of(Aov aov) {
     return name_of(static_cast<Component>(static_cast<std::size_t>(aov) - static_cast<std::size_t>(Aov::Direct)));
   }
   constexpr std::array<std::string_view, 4> kFirst{"depth", "id", "normal", "albedo"};
-  constexpr std::array<std::string_view, 2> kLast{"rank", "cost"};
+  constexpr std::array<std::string_view, 3> kLast{"rank", "cost", "coverage"};
   if (aov < Aov::Direct) return kFirst.at(static_cast<std::size_t>(aov));
   return kLast.at(static_cast<std::size_t>(aov) - static_cast<std::size_t>(Aov::Rank));
 }
@@ -72,6 +72,11 @@ AovLayers::AovLayers(const FrameLayout& layout, std::span<const Aov> wanted) {
   }
 }
 
+const TileLayer<float>* AovLayers::coverage() const {
+  const auto found = single.find(Aov::Coverage);
+  return found == single.end() ? nullptr : &found->second;
+}
+
 LightOutput AovLayers::output(TileLayer<Rgb>& radiance) {
   LightOutput out;
   out.radiance = &radiance;
@@ -84,8 +89,12 @@ LightOutput AovLayers::output(TileLayer<Rgb>& radiance) {
   }
   out.normal = find(Aov::Normal);
   out.albedo = find(Aov::Albedo);
-  const auto cost = single.find(Aov::Cost);
-  out.cost = cost == single.end() ? nullptr : &cost->second;
+  const auto find_single = [&](Aov aov) {
+    const auto found = single.find(aov);
+    return found == single.end() ? nullptr : &found->second;
+  };
+  out.cost = find_single(Aov::Cost);
+  out.coverage = find_single(Aov::Coverage);
   return out;
 }
 

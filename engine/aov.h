@@ -20,8 +20,8 @@ struct ExrLayer;
 struct LightOutput;
 struct View;
 
-/// Values of a pixel beside its color (arbitrary output variables). The parts of the light and the cost are means
-/// over the samples; the others are those of the first sample, as their mean would be neither surface's.
+/// Values of a pixel beside its color (arbitrary output variables). The parts of the light, the cost and the coverage
+/// are means over the samples; the others are those of the first sample, as their mean would be neither surface's.
 enum class Aov : std::uint8_t {
   Depth,   ///< depth.Z: metres along the view axis; infinite where nothing is seen
   Id,      ///< id.X: the surface id, an unsigned integer; 2^32 - 1 where nothing is seen
@@ -30,9 +30,10 @@ enum class Aov : std::uint8_t {
   Direct,  ///< the first of kComponents parts of the radiance (Component), which add up to it but for rounding
   Rank = Direct + kComponents,  ///< rank.X: which rank lit the pixel
   Cost,                         ///< cost.X: rays traced for the pixel
+  Coverage,                     ///< coverage.X: the fraction of the pixel that surfaces cover
 };
 
-inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Cost) + 1;
+inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Coverage) + 1;
 
 [[nodiscard]] std::string_view name_of(Aov aov);
 /// Every name, in the order of the enumeration.
@@ -56,10 +57,13 @@ inline constexpr std::size_t kAovs = static_cast<std::size_t>(Aov::Cost) + 1;
 /// The layers of a frame beside its radiance, those that are wanted.
 struct AovLayers {
   std::map<Aov, TileLayer<Rgb>> rgb;
-  std::map<Aov, TileLayer<float>> single;  ///< Rank, Cost
+  std::map<Aov, TileLayer<float>> single;  ///< Rank, Cost, Coverage
 
   AovLayers() = default;
   AovLayers(const FrameLayout& layout, std::span<const Aov> wanted);
+
+  /// Null where coverage is not wanted.
+  [[nodiscard]] const TileLayer<float>* coverage() const;
 
   /// Where the shader is to put them, beside `radiance`.
   [[nodiscard]] LightOutput output(TileLayer<Rgb>& radiance);

@@ -54,6 +54,8 @@ Film::Film(const FrameLayout& layout, const FilmContent& content)
       means_.emplace(aov, layout);
     } else if (aov == Aov::Cost) {
       cost_ = TileLayer<double>(layout);
+    } else if (aov == Aov::Coverage) {
+      coverage_ = TileLayer<double>(layout);
     } else if (needs_keys(aov)) {
       keeps_keys_ = true;
     } else {
@@ -88,13 +90,16 @@ void Film::add_tile(const SampleLight& light, double weight, std::uint32_t numbe
   };
   sum_up(halves_[number % 2], light.radiance);
   for (auto& [aov, sums] : means_) sum_up(sums, light.aovs.rgb.at(aov));
-  if (cost_.tiles() > 0) {
-    const std::span<const float> from = light.aovs.single.at(Aov::Cost).tile(tile);
-    const std::span<double> to = cost_.tile(tile);
-    cost_.touch(tile);
-    each_due([&](std::size_t i) { to[i] += static_cast<double>(from[i]); });
-    cost_.set_active(tile);
-  }
+  const auto sum_single = [&](TileLayer<double>& sums, Aov aov, double factor) {
+    if (sums.tiles() == 0) return;
+    const std::span<const float> from = light.aovs.single.at(aov).tile(tile);
+    const std::span<double> to = sums.tile(tile);
+    sums.touch(tile);
+    each_due([&](std::size_t i) { to[i] += factor * static_cast<double>(from[i]); });
+    sums.set_active(tile);
+  };
+  sum_single(cost_, Aov::Cost, 1.0);
+  sum_single(coverage_, Aov::Coverage, weight);
   if (is_adaptive()) {
     const std::span<const Rgb> from = light.radiance.tile(tile);
     const std::span<PixelSamples> pixels = pixel_samples_.tile(tile);
@@ -155,6 +160,13 @@ void Film::resolve(std::span<const std::size_t> tiles, int threads, TileLayer<Rg
       each(aovs.single.at(Aov::Cost), [&](std::size_t pixel) {
         const std::uint32_t samples = is_adaptive() ? pixel_samples_.tile(tile)[pixel].sample_count : samples_;
         return to_float(cost_.tile(tile)[pixel] / static_cast<double>(samples));
+      });
+    }
+    if (coverage_.tiles() > 0) {
+      each(aovs.single.at(Aov::Coverage), [&](std::size_t pixel) {
+        const std::array<double, 2>& halves = weights_at(tile, pixel);
+        // Filters with negative weights overshoot.
+        return to_float(std::clamp(coverage_.tile(tile)[pixel] / (halves[0] + halves[1]), 0.0, 1.0));
       });
     }
     for (const auto& [aov, layer] : first_.rgb) copy_tiles(layer, aovs.rgb.at(aov), {&tile, 1});

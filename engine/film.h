@@ -94,6 +94,7 @@ class Film {
     for (auto& [aov, layer] : first_.rgb) visit(layer);
     for (auto& [aov, layer] : first_.single) visit(layer);
     visit(cost_);
+    visit(coverage_);
     visit(keys_);
     visit(pixel_samples_);
   }
@@ -121,6 +122,7 @@ class Film {
   std::array<TileLayer<ColorSum>, 2> halves_;
   std::map<Aov, TileLayer<ColorSum>> means_;
   TileLayer<double> cost_;
+  TileLayer<double> coverage_;  ///< sums by weight
   AovLayers first_;
   TileLayer<Key> keys_;
   bool keeps_keys_ = false;

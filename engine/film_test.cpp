@@ -53,6 +53,30 @@ TEST(Film, OneSampleComesBackBitByBit) {
   for (const Rgb& pixel : mean.pixels()) EXPECT_EQ(pixel, color);
 }
 
+TEST(Film, CoverageIsTheMeanByWeightFromNothingToAll) {
+  const FrameLayout layout({{2, 1}});
+  Film film(layout, {.aovs = {Aov::Coverage}});
+  Light light(layout, {Aov::Coverage});
+  TileLayer<float>& coverage = light.aovs.single.at(Aov::Coverage);
+  coverage.set_active(0);
+  const auto add = [&](float first, float second, double weight) {
+    coverage.at(0, 0, 0) = first;
+    coverage.at(0, 1, 0) = second;
+    add_to(film, light, weight);
+  };
+  add(1.0F, 1.0F, 3.0);
+  add(0.5F, 0.0F, 2.0);
+  add(0.0F, 1.0F, -1.0);
+  TileLayer<Rgb> radiance(layout);
+  AovLayers resolved(layout, std::vector<Aov>{Aov::Coverage});
+  film.resolve(all_tiles(layout), 1, radiance, resolved);
+  EXPECT_EQ(resolved.coverage()->at(0, 0, 0), 1.0F) << "4 / 4";
+  EXPECT_EQ(resolved.coverage()->at(0, 1, 0), 0.5F) << "2 / 4";
+  add(1.0F, -20.0F, 1.0);
+  film.resolve(all_tiles(layout), 1, radiance, resolved);
+  EXPECT_EQ(resolved.coverage()->at(0, 1, 0), 0.0F) << "clamped";
+}
+
 /// The last 20 000 of a million samples, added to what the others sum to in integers: where a sum of floats, at 5e5,
 /// would move in steps of 1 / 32.
 TEST(Film, AMillionSamplesLoseNothing) {

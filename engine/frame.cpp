@@ -104,8 +104,9 @@ std::vector<std::size_t> composite(Session& session, const FramePlan& plan, Tile
   return compositor.composite(session.group(plan.mine.group), keys, plan.tiles).tiles;
 }
 
-/// The colours of keys that already carry them; none where there is no key.
-void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance) {
+/// The colours of keys that already carry them, which cover their pixels; none where there is no key.
+void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance,
+                   TileLayer<float>* coverage) {
   for (const std::size_t tile : tiles) {
     const auto from = keys.tile(tile);
     const auto to = radiance.tile(tile);
@@ -114,6 +115,9 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
       if (from[i] != kNoKey) to[i] = {srgb_to_linear(color.r), srgb_to_linear(color.g), srgb_to_linear(color.b)};
     }
     radiance.set_active(tile);
+    if (coverage == nullptr) continue;
+    std::ranges::transform(from, coverage->tile(tile).begin(), [](Key key) { return key != kNoKey ? 1.0F : 0.0F; });
+    coverage->set_active(tile);
   }
 }
 
@@ -177,8 +181,9 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
   if (plan.shading == Shading::Local) {
     const trace::Span light("light");
     DeferredShader& shader = session.shader(plan.rays);
-    unpack_colors(*frame.keys, frame.owned, frame.radiance);
-    shade_empty(shader, views, *frame.keys, frame.owned, frame.radiance, sample.number);
+    const LightOutput output = frame.aovs.output(frame.radiance);
+    unpack_colors(*frame.keys, frame.owned, frame.radiance, output.coverage);
+    shade_empty(shader, views, *frame.keys, frame.owned, output, sample.number);
     add_light(shader, spent);
   } else if (plan.lit) {
     const trace::Span light("light");
@@ -258,7 +263,8 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   FrameTimes spent = draw_layer(session, plan, views, keys, sample);
 
   const Stopwatch watch;
-  Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.aovs)};
+  Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.layers),
+              plan.is_transparent()};
   if (sample.ownership != nullptr) move_to_owners(session, plan, *sample.ownership, frame);
   if (sample.before_shading != nullptr) (*sample.before_shading)();
   spent.composite_ms = watch.ms();
@@ -298,14 +304,16 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
   std::vector<Frame> frames;
   std::vector<ShadedSample> samples;
   for (std::size_t i = 0; i < jittered.size(); ++i) {
-    frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, {}});
+    frames.push_back({&keys[i], TileLayer<Rgb>(plan.layout), plan.tiles, AovLayers(plan.layout, plan.layers),
+                      plan.is_transparent()});
     if (jittered[i].sample.ownership != nullptr)
       move_to_owners(session, plan, *jittered[i].sample.ownership, frames.back());
   }
   if (jittered.front().sample.before_shading != nullptr) (*jittered.front().sample.before_shading)();
   for (std::size_t i = 0; i < jittered.size(); ++i) {
     const FrameSample& sample = jittered[i].sample;
-    samples.push_back({jittered[i].views, &keys[i], {.radiance = &frames[i].radiance}, sample.number, sample.wanted});
+    samples.push_back(
+        {jittered[i].views, &keys[i], frames[i].aovs.output(frames[i].radiance), sample.number, sample.wanted});
   }
   const trace::Span light("light");
   DeferredShader& shader = session.shader(plan.rays);

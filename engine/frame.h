@@ -26,7 +26,11 @@ struct Frame {
   TileLayer<Rgb> radiance;         ///< of owned tiles
   std::vector<std::size_t> owned;  ///< tiles this rank lit, ascending
   AovLayers aovs;                  ///< of owned tiles
+  bool is_transparent = false;     ///< there is no background: the radiance is multiplied by the coverage
   bool overtaken = false;          ///< by FrameSample::interrupt: of all this only the keys mean anything
+
+  /// The picture's alpha, of owned tiles; null where it is 1 everywhere.
+  [[nodiscard]] const TileLayer<float>* alpha() const { return is_transparent ? aovs.coverage() : nullptr; }
 };
 
 /// What verifying some of a frame's tiles found; the same on all ranks.

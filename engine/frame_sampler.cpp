@@ -57,7 +57,7 @@ FrameSampler::FrameSampler(Session& session, const FramePlan& plan, const Sampli
       sampling_(sampling),
       number_(frame),
       film_(sampling.sums() ? plan.layout : FrameLayout(),
-            {plan.aovs, keeps_keys, sampling.adaptive && sampling.sums() ? AdaptiveSampling::pilot_of(sampling) : 0}),
+            {plan.layers, keeps_keys, sampling.adaptive && sampling.sums() ? AdaptiveSampling::pilot_of(sampling) : 0}),
       keeps_keys_(sampling.sums() && film_.keys().tiles() > 0) {
   if (!film_.is_adaptive()) return;
   adaptive_.emplace(sampling);
@@ -283,7 +283,8 @@ void FrameSampler::finish() {
   }
   frame_.owned = ownership_->mine();
   frame_.radiance = TileLayer<Rgb>(plan_.layout);
-  frame_.aovs = AovLayers(plan_.layout, plan_.aovs);
+  frame_.aovs = AovLayers(plan_.layout, plan_.layers);
+  frame_.is_transparent = plan_.is_transparent();
   film_.resolve(frame_.owned, session_.threads(), frame_.radiance, frame_.aovs);
   if (keeps_keys_) frame_.keys = &film_.keys();
 }

@@ -60,24 +60,51 @@ std::vector<int> block_owners(const Blocks& blocks, std::span<const int> shown_b
   return owners;
 }
 
-/// Converts a picture to display colours.
-Image<Rgba8> to_display(const Image<Rgb>& radiance, int threads, const DisplayTransform& transform) {
+void to_display(std::span<const Rgb> radiance, std::span<const float> alpha, std::span<Rgba8> display,
+                const DisplayTransform& transform, AlphaUse use) {
+  std::ranges::transform(radiance, alpha, display.begin(),
+                         [&](const Rgb& color, float covered) { return to_display(color, covered, transform, use); });
+}
+
+/// Converts a picture to display colours. `alpha`: of a transparent one.
+Image<Rgba8> to_display(const Image<Rgb>& radiance, const std::optional<Image<float>>& alpha, int threads,
+                        const DisplayTransform& transform, AlphaUse use) {
   Image<Rgba8> display(radiance.size());
   parallel_for(threads, static_cast<std::size_t>(radiance.height()), [&](std::size_t row) {
     const int y = static_cast<int>(row);
-    to_display(radiance.row(y), display.row(y), transform);
+    if (alpha) {
+      to_display(radiance.row(y), alpha->row(y), display.row(y), transform, use);
+    } else {
+      to_display(radiance.row(y), display.row(y), transform);
+    }
   });
   return display;
 }
 
 /// Converts a frame's tiles to display colours.
-TileLayer<Rgba8> to_display(const Frame& frame, int threads, const DisplayTransform& transform) {
+TileLayer<Rgba8> to_display(const Frame& frame, int threads, const DisplayTransform& transform, AlphaUse use) {
+  const TileLayer<float>* const alpha = frame.alpha();
   TileLayer<Rgba8> display(frame.radiance.layout());
   for (const std::size_t tile : frame.owned) display.set_active(tile);
   parallel_for(threads, frame.owned.size(), [&](std::size_t i) {
-    to_display(frame.radiance.tile(frame.owned[i]), display.tile(frame.owned[i]), transform);
+    const std::size_t tile = frame.owned[i];
+    if (alpha != nullptr) {
+      to_display(frame.radiance.tile(tile), alpha->tile(tile), display.tile(tile), transform, use);
+    } else {
+      to_display(frame.radiance.tile(tile), display.tile(tile), transform);
+    }
   });
   return display;
+}
+
+/// One value a pixel on `size` pixels, by the filter of colours.
+Image<float> enlarge(const Image<float>& values, Size size, int threads) {
+  Image<Rgb> grey(values.size());
+  std::ranges::transform(values.pixels(), grey.pixels().begin(), [](float value) { return Rgb{value, value, value}; });
+  const Image<Rgb> large = enlarge(grey, size, threads);
+  Image<float> result(size);
+  std::ranges::transform(large.pixels(), result.pixels().begin(), &Rgb::r);
+  return result;
 }
 
 }  // namespace
@@ -152,10 +179,13 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
   const std::vector<int> owners = block_owners(blocks, showing.shown_by);
   TileLayer<Rgba8> display;  // a third of the bytes of the radiance, but no light to filter
   if (as_made) {
-    display = to_display(frame, session.threads(), showing.transform);
+    display = to_display(frame, session.threads(), showing.transform, showing.alpha);
     session.assembler().assemble(session.comm(), display, frame.owned, owners);
   } else {
     session.assembler().assemble(session.comm(), frame.radiance, frame.owned, owners);
+    if (frame.is_transparent) {
+      session.assembler().assemble(session.comm(), frame.aovs.single.at(Aov::Coverage), frame.owned, owners);
+    }
   }
   std::vector<Image<Rgba8>> pictures(screens);
   for (std::size_t screen = 0; screen < screens; ++screen) {
@@ -163,9 +193,11 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
     if (as_made) {
       pictures[screen] = join_blocks(display, blocks, screen);
     } else {
-      const Image<Rgb> small = join_blocks(frame.radiance, blocks, screen);
-      pictures[screen] =
-          to_display(enlarge(small, showing.sizes[screen], session.threads()), session.threads(), showing.transform);
+      const Size size = showing.sizes[screen];
+      const Image<Rgb> radiance = enlarge(join_blocks(frame.radiance, blocks, screen), size, session.threads());
+      std::optional<Image<float>> alpha;
+      if (frame.is_transparent) alpha = enlarge(join_blocks(*frame.alpha(), blocks, screen), size, session.threads());
+      pictures[screen] = to_display(radiance, alpha, session.threads(), showing.transform, showing.alpha);
     }
   }
   return pictures;
@@ -173,9 +205,12 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
 
 std::string advice_on(const Image<Rgba8>& picture) {
   constexpr double kTooMuch = 0.9;
+  const auto covered = std::ranges::count_if(picture.pixels(), [](const Rgba8& color) { return color.a > 0; });
   const auto share_of = [&](const auto& is) {
-    return static_cast<double>(std::ranges::count_if(picture.pixels(), is)) /
-           static_cast<double>(picture.size().area());
+    const auto count = std::ranges::count_if(
+        picture.pixels(), [&](const Rgba8& color) { return (covered == 0 || color.a > 0) && is(color); });
+    return static_cast<double>(count) /
+           (covered == 0 ? static_cast<double>(picture.size().area()) : static_cast<double>(covered));
   };
   const auto brightest = [](const Rgba8& color) { return std::max({color.r, color.g, color.b}); };
   const double black = share_of([&](const Rgba8& color) { return brightest(color) <= 1; });
@@ -216,7 +251,7 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
   const bool display_colors = files_.is_png() && !enlarged();
   if (files_.is_png()) transform_ = transform_for(session, frame, files_.display);
   if (display_colors) {
-    display_ = to_display(frame, session.threads(), *transform_);
+    display_ = to_display(frame, session.threads(), *transform_, AlphaUse::Straight);
     collect(display_);
   }
   // What is shown at another size than it was made in is enlarged on rank 0 before it is rounded to display colours.
@@ -227,11 +262,20 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
   }
   if (!files_.raw.empty() || std::ranges::any_of(files_.aovs, needs_keys)) collect(*frame.keys);
   for (auto& [aov, layer] : frame.aovs.rgb) collect(layer);
-  for (auto& [aov, layer] : frame.aovs.single) collect(layer);
+  const bool only_display = files_.picture.empty() || (display_colors && files_.aovs.empty());
+  for (auto& [aov, layer] : frame.aovs.single) {
+    if (!only_display) collect(layer);
+  }
 }
 
 Image<Rgb> CollectedPicture::radiance() const {
   Image<Rgb> made = join_blocks(frame_.radiance, blocks_, 0);
+  return enlarged() ? enlarge(made, size_, threads_) : made;
+}
+
+std::optional<Image<float>> CollectedPicture::alpha() const {
+  if (!frame_.is_transparent) return std::nullopt;
+  Image<float> made = join_blocks(*frame_.alpha(), blocks_, 0);
   return enlarged() ? enlarge(made, size_, threads_) : made;
 }
 
@@ -274,10 +318,20 @@ void CollectedPicture::collect_radiance(Session& session, Frame& frame) const {
   }
 }
 
+namespace {
+
+/// OpenEXR's alpha: the colours are multiplied by it.
+ExrLayer alpha_layer(const Image<float>& alpha) {
+  return {{"A"}, {alpha.pixels().begin(), alpha.pixels().end()}, {}};
+}
+
+}  // namespace
+
 std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,
                                  std::span<const Aov> aovs) {
   const View& view = first_block(blocks, screen);
   std::vector<ExrLayer> layers;
+  if (frame.is_transparent) layers.push_back(alpha_layer(join_blocks(*frame.alpha(), blocks, screen)));
   for (const Aov aov : aovs) {
     if (needs_keys(aov)) {
       layers.push_back(to_exr(aov, join_blocks(*frame.keys, blocks, screen), view));
@@ -301,15 +355,20 @@ void CollectedPicture::write(const std::string& scene_name) const {
 
 void CollectedPicture::write_picture(const std::string& scene_name) const {
   if (files_.is_png()) {
-    const Image<Rgba8> colors =
-        enlarged() ? to_display(radiance(), threads_, *transform_) : join_blocks(display_, blocks_, 0);
+    const Image<Rgba8> colors = enlarged() ? to_display(radiance(), alpha(), threads_, *transform_, AlphaUse::Straight)
+                                           : join_blocks(display_, blocks_, 0);
     write_png(files_.picture, colors, texts_of(*transform_));
     const std::string advice = transform_->shows.empty() ? advice_on(colors) : std::string();
     if (!advice.empty()) log::warning("{}", advice);
   }
   if (files_.is_png() && files_.aovs.empty()) return;
   const std::string exr = files_.is_png() ? files_.aov_file() : files_.picture;
-  const std::vector<ExrLayer> layers = exr_layers(frame_, blocks_, 0, files_.aovs);
+  std::vector<ExrLayer> layers;
+  if (!enlarged()) {
+    layers = exr_layers(frame_, blocks_, 0, files_.aovs);
+  } else if (frame_.is_transparent) {
+    layers.push_back(alpha_layer(*alpha()));
+  }
   write_file_atomically(exr, encode_exr(radiance(), {{"hpr:scene", scene_name}}, layers));
 }
 

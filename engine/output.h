@@ -99,6 +99,7 @@ struct Showing {
   std::vector<Size> sizes;    ///< per screen, pixels; a frame made of fewer or more is enlarged by a filter
   std::vector<int> shown_by;  ///< per screen the rank
   DisplayTransform transform;
+  AlphaUse alpha = AlphaUse::OverBlack;
 };
 
 /// Collective. Brings the frame, which was made in `blocks`, to the ranks that show it. Per screen its display colours,
@@ -107,7 +108,7 @@ struct Showing {
                                                          const Showing& showing);
 
 /// What is wrong with a picture of which more than nine tenths are black or clipped (a channel at 255), and what to do:
-/// one line; empty where nothing is.
+/// one line; empty where nothing is. Pixels of alpha 0 count only where there are no others.
 [[nodiscard]] std::string advice_on(const Image<Rgba8>& picture);
 
 /// The files one picture may become; empty names are not written.
@@ -125,7 +126,7 @@ struct PictureFiles {
   [[nodiscard]] std::string explain_colors() const;
 };
 
-/// On the rank that has all of `frame`: the layers of the pixels of `screen`.
+/// On the rank that has all of `frame`: the layers of the pixels of `screen`, the alpha of a transparent one first.
 [[nodiscard]] std::vector<ExrLayer> exr_layers(const Frame& frame, const Blocks& blocks, std::size_t screen,
                                                std::span<const Aov> aovs);
 
@@ -145,6 +146,8 @@ class CollectedPicture {
 
  private:
   void write_picture(const std::string& scene_name) const;
+  /// Of a transparent picture: its alpha.
+  [[nodiscard]] std::optional<Image<float>> alpha() const;
   void collect_radiance(Session& session, Frame& frame) const;
   [[nodiscard]] bool enlarged() const { return blocks_.views.front().screen != size_; }
 

@@ -56,6 +56,8 @@ TEST(Advice, IsGivenOnPicturesThatShowNextToNothing) {
   EXPECT_EQ(advice_on(with(100, {2, 0, 0, 255})), "");
   EXPECT_EQ(advice_on(with(90, {255, 255, 255, 255})), "");
   EXPECT_TRUE(advice_on(with(95, {255, 10, 0, 255})).starts_with("95 % of the picture is clipped: "));
+  EXPECT_EQ(advice_on(with(95, {0, 0, 0, 0})), "") << "nothing is there";
+  EXPECT_TRUE(advice_on(with(100, {0, 0, 0, 0})).starts_with("100 % of the picture is black: "));
 }
 
 }  // namespace

@@ -4,14 +4,18 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
+#include "engine/display/background.h"
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
 #include "rt/sampling/sampler.h"
@@ -106,6 +110,35 @@ void explain_distribution(FramePlan& plan, const FrameSettings& settings, const 
   if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
 }
 
+std::string counted(std::size_t count, std::string_view what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// What the scene has of each kind of light: "1 point light", "2 triangles that emit", "the environment studio".
+std::vector<std::string> describe_lights(const Scene& scene) {
+  constexpr std::array<std::string_view, 4> kLightNames{"point light", "directional light", "spotlight", "headlight"};
+  std::array<std::size_t, kLightNames.size()> lights{};
+  for (const Light& light : scene.lights) ++lights.at(static_cast<std::size_t>(light.type));
+  std::vector<std::string> parts;
+  for (std::size_t type = 0; type < lights.size(); ++type) {
+    if (lights[type] > 0) parts.push_back(counted(lights[type], kLightNames[type]));
+  }
+  std::vector<bool> emitting;
+  for (const Material& material : scene.materials) emitting.push_back(emits(scene, material));
+  std::size_t triangles = 0;
+  for (const Instance& instance : scene.instances) {
+    const Mesh& mesh = scene.mesh_of(instance);
+    if (emitting[mesh.material]) triangles += mesh.triangles.size();
+  }
+  if (triangles > 0) parts.push_back(counted(triangles, "triangle") + (triangles == 1 ? " that emits" : " that emit"));
+  if (!scene.environment_note.empty()) {
+    parts.push_back(scene.environment_note);
+  } else if (scene.environment) {
+    parts.emplace_back("the scene's environment");
+  }
+  return parts;
+}
+
 /// What lights the pixels, and how many of them.
 void explain_light(Session& session, const FrameSettings& settings, FramePlan& plan) {
   auto& lines = plan.explained;
@@ -126,7 +159,12 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
     lines.push_back(fmt::format("show: {} (as asked, in place of light)", name_of(plan.rays.show)));
   }
   if (!needs_light(plan.rays.show)) return;
-  if (const std::string& note = session.scene().environment_note; !note.empty()) lines.push_back("light: " + note);
+  const std::vector<std::string> lights = describe_lights(session.scene());
+  if (!lights.empty()) lines.push_back(fmt::format("light: {}", fmt::join(lights, ", ")));
+  if (plan.rays.background.kind != Background::Kind::Environment) {
+    lines.push_back(fmt::format("background: {} (as asked{})", to_text(plan.rays.background),
+                                plan.is_transparent() ? ": alpha is what surfaces cover" : ""));
+  }
   if (!gives_light(session.scene())) {
     lines.emplace_back("light: a headlight at the eye (the scene has no lights)");
   } else if (session.scene().triangles > 0 && !session.requirements().indirect.needed &&
@@ -354,6 +392,10 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.shading = settings.shading;
   plan.rays = settings.rays;
   plan.aovs = settings.aovs;
+  plan.layers = settings.aovs;
+  if (plan.is_transparent() && std::ranges::find(plan.layers, Aov::Coverage) == plan.layers.end()) {
+    plan.layers.push_back(Aov::Coverage);
+  }
   plan.verify_percent = settings.verify_percent;
   std::vector<Assignment> assigned = assign(plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
   if (plan.rays.show == Show::Rank) plan.drawn_by.emplace(assigned, plan.layout);

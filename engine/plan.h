@@ -28,7 +28,8 @@ struct FramePlan {
   DepthFormat depth_format = DepthFormat::Float32;
   Shading shading = Shading::Deferred;
   RaySettings rays;
-  std::vector<Aov> aovs;
+  std::vector<Aov> aovs;        ///< that are asked for
+  std::vector<Aov> layers;      ///< that are made: those, and what the picture itself has beside its radiance
   double verify_percent = 0.0;  ///< of the tiles; see engine/verification.h
   bool lit = true;              ///< false: only the keys are wanted, no light is spent on them
   FrameLayout layout;
@@ -36,6 +37,9 @@ struct FramePlan {
   std::optional<DrawnBy> drawn_by;     ///< where ranks are shown
   std::vector<std::size_t> tiles;      ///< of this rank's group, ascending
   std::vector<std::string> explained;  ///< one line per decision, with its reason
+
+  /// Whether the picture has an alpha other than 1.
+  [[nodiscard]] bool is_transparent() const { return rays.background.kind == Background::Kind::Transparent; }
 };
 
 /// Collective. Starts OpenGL where the frame is drawn by it, or that is left to whether it has a GPU.

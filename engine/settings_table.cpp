@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "engine/aov.h"
+#include "engine/display/background.h"
 #include "image/filter.h"
 #include "rt/passes/pass_list.h"
 #include "rt/show/show.h"
@@ -296,6 +297,14 @@ std::vector<Setting> make_table() {
                            [](Settings& s) -> std::string& { return s.environment; }),
        .decides_bits = false,
        .fixed_in_session = true},
+      {.name = "background",
+       .help = "what is seen past all surfaces, while mirrors and glass see the environment: the environment too, one "
+               "radiance R,G,B, or transparent, nothing: the picture's alpha is what surfaces cover",
+       .value = text(
+           "R,G,B|environment|transparent", "environment, transparent or a radiance",
+           [](Settings& s) -> Background& { return s.frame.rays.background; }, parse_background,
+           [](const Background& value) { return to_text(value); }),
+       .initial = "environment"},
       {.name = "cull",
        .help = "gltf: who looks at a single-sided material from behind looks through; none: all have two sides",
        .value = choice(kCullNames, [](Settings& s) -> Cull& { return s.cull; }),

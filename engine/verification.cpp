@@ -47,17 +47,22 @@ struct VerifiedTile {
 struct TileSample {
   const TileLayer<Key>* keys;
   const TileLayer<Rgb>* radiance;  ///< null where it is not compared
+  const TileLayer<float>* alpha;   ///< null where it is not compared, or there is none
 };
 
 std::vector<TileSample> samples_of(std::span<const Frame> frames, bool lit) {
   std::vector<TileSample> samples;
-  for (const Frame& frame : frames) samples.push_back({frame.keys, lit ? &frame.radiance : nullptr});
+  for (const Frame& frame : frames)
+    samples.push_back({frame.keys, lit ? &frame.radiance : nullptr, lit ? frame.alpha() : nullptr});
   return samples;
 }
 
 std::vector<TileSample> samples_of(std::span<const TileDrawing> drawings, bool lit) {
   std::vector<TileSample> samples;
-  for (const TileDrawing& drawing : drawings) samples.push_back({&drawing.keys, lit ? &drawing.radiance : nullptr});
+  for (const TileDrawing& drawing : drawings) {
+    const bool has_alpha = lit && drawing.alpha.tiles() > 0;
+    samples.push_back({&drawing.keys, lit ? &drawing.radiance : nullptr, has_alpha ? &drawing.alpha : nullptr});
+  }
   return samples;
 }
 
@@ -78,16 +83,20 @@ std::uint64_t hash_of(std::span<const TileSample> samples, std::size_t tile, con
   ContentHash hash;
   std::vector<Key> keys;
   std::vector<Rgb> colors;
+  std::vector<float> alphas;
   for (const TileSample& sample : samples) {
     keys.clear();
     colors.clear();
+    alphas.clear();
     each_pixel(sample.keys->layout().place(tile).pixels, mask_of(wanted, tile), [&](std::size_t index, int, int) {
       keys.push_back(sample.keys->tile(tile)[index]);
       if (sample.radiance != nullptr) colors.push_back(sample.radiance->tile(tile)[index]);
+      if (sample.alpha != nullptr) alphas.push_back(sample.alpha->tile(tile)[index]);
       return true;
     });
     hash.add(std::as_bytes(std::span(keys)));
     hash.add(std::as_bytes(std::span(colors)));
+    if (sample.alpha != nullptr) hash.add(std::as_bytes(std::span(alphas)));
   }
   return hash.value();
 }
@@ -183,7 +192,10 @@ Difference find_difference(std::span<const TileSample> one, std::span<const Tile
   for (std::size_t i = 0; i < one.size() && found.pixel == kNoPixel; ++i) {
     found.sample = samples.first_sample + static_cast<std::uint32_t>(i);
     each_pixel(location.pixels, mask_of(samples.wanted, tile), [&](std::size_t index, int x, int y) {
-      if (!differ(one[i].keys, other[i].keys, index) && !differ(one[i].radiance, other[i].radiance, index)) return true;
+      if (!differ(one[i].keys, other[i].keys, index) && !differ(one[i].radiance, other[i].radiance, index) &&
+          !differ(one[i].alpha, other[i].alpha, index)) {
+        return true;
+      }
       found.pixel = {static_cast<std::uint32_t>(location.screen), y, x};
       return false;
     });
@@ -244,10 +256,14 @@ VerifyCounts verify_tiles(Communicator& comm, const std::string& host, const Ver
   std::vector<TileDrawing> received;
   TileReader reader;
   for (const TileDrawing& drawing : second) {
-    received.push_back({TileLayer<Key>(drawing.keys.layout()), TileLayer<Rgb>(drawing.keys.layout())});
+    received.push_back({TileLayer<Key>(drawing.keys.layout()), TileLayer<Rgb>(drawing.keys.layout()),
+                        TileLayer<float>(drawing.alpha.layout())});
     received.back().keys.set_depth_format(drawing.keys.depth_format());
     move_tiles(comm, moves, drawing.keys, received.back().keys, reader);
     if (samples.lit) move_tiles(comm, moves, drawing.radiance, received.back().radiance, reader);
+    if (samples.lit && drawing.alpha.tiles() > 0) {
+      move_tiles(comm, moves, drawing.alpha, received.back().alpha, reader);
+    }
   }
   std::vector<Difference> mine;
   for (const VerifiedTile& each : tiles) {
@@ -259,6 +275,9 @@ VerifyCounts verify_tiles(Communicator& comm, const std::string& host, const Ver
     for (std::size_t i = 0; i < frames.size(); ++i) {
       copy_tiles(received[i].keys, *frames[i].keys, {&each.tile, 1});
       if (samples.lit) copy_tiles(received[i].radiance, frames[i].radiance, {&each.tile, 1});
+      if (samples.lit && frames[i].is_transparent) {
+        copy_tiles(received[i].alpha, frames[i].aovs.single.at(Aov::Coverage), {&each.tile, 1});
+      }
     }
   }
   std::vector<Difference> differences;
@@ -308,7 +327,8 @@ std::vector<TileDrawing> draw_tiles(Session& session, const FramePlan& plan, std
                                     std::span<const std::size_t> tiles, const PixelMask* wanted) {
   std::vector<TileDrawing> drawings;
   for (std::size_t i = 0; i < jittered.size(); ++i) {
-    drawings.push_back({TileLayer<Key>(plan.layout), TileLayer<Rgb>(plan.layout)});
+    drawings.push_back({TileLayer<Key>(plan.layout), TileLayer<Rgb>(plan.layout),
+                        TileLayer<float>(plan.is_transparent() ? plan.layout : FrameLayout())});
     drawings.back().keys.set_depth_format(plan.depth_format);
   }
   if (tiles.empty()) return drawings;
@@ -319,8 +339,9 @@ std::vector<TileDrawing> draw_tiles(Session& session, const FramePlan& plan, std
   if (!plan.lit) return drawings;
   std::vector<ShadedSample> samples;
   for (std::size_t i = 0; i < jittered.size(); ++i) {
-    samples.push_back(
-        {jittered[i].views, &drawings[i].keys, {.radiance = &drawings[i].radiance}, jittered[i].sample.number, wanted});
+    const LightOutput output{.radiance = &drawings[i].radiance,
+                             .coverage = plan.is_transparent() ? &drawings[i].alpha : nullptr};
+    samples.push_back({jittered[i].views, &drawings[i].keys, output, jittered[i].sample.number, wanted});
   }
   session.shader(plan.rays).shade(samples, tiles);
   return drawings;

@@ -29,7 +29,7 @@ struct VerifiedSamples {
   double percent = 0.0;  ///< of the frame's tiles
   RandomKey random;
   std::uint32_t first_sample = 0;
-  bool lit = true;                    ///< whether their radiance is compared, beside their keys
+  bool lit = true;                    ///< whether their radiance and alpha are compared, beside their keys
   const PixelMask* wanted = nullptr;  ///< pixels of this rank's tiles that mean something; null, on all ranks: all
 };
 
@@ -37,6 +37,7 @@ struct VerifiedSamples {
 struct TileDrawing {
   TileLayer<Key> keys;
   TileLayer<Rgb> radiance;
+  TileLayer<float> alpha = {};  ///< without tiles where frames have none
 };
 
 /// Draws tiles of all samples afresh on this rank, alone; the pixels that `wanted` leaves out mean nothing.

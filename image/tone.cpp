@@ -136,6 +136,22 @@ PngTexts texts_of(const DisplayTransform& transform) {
   return texts;
 }
 
+Rgb unassociated(const Rgb& radiance, float alpha) {
+  if (!(alpha > 0.0F)) return {};
+  return {radiance.r / alpha, radiance.g / alpha, radiance.b / alpha};
+}
+
+Rgba8 to_display(const Rgb& radiance, float alpha, const DisplayTransform& transform, AlphaUse use) {
+  const auto gain = static_cast<float>(std::exp2(transform.exposure_stops));
+  const Rgb color = unassociated(radiance, alpha);
+  const Rgb shown = tone_map(transform.tone, {color.r * gain, color.g * gain, color.b * gain});
+  const float covered = std::clamp(alpha, 0.0F, 1.0F);
+  if (use == AlphaUse::OverBlack) return to_srgb({shown.r * covered, shown.g * covered, shown.b * covered});
+  Rgba8 display = to_srgb(shown);
+  display.a = static_cast<std::uint8_t>(std::lround(255.0F * covered));
+  return display;
+}
+
 void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, const DisplayTransform& transform) {
   if (!transform.shows.empty()) {
     std::ranges::transform(radiance, display.begin(), as_levels);

@@ -47,4 +47,16 @@ inline constexpr const char* kShowText = "hpr:show";
 /// radiance[i] becomes display[i], with alpha 255.
 void to_display(std::span<const Rgb> radiance, std::span<Rgba8> display, const DisplayTransform& transform);
 
+/// What a display gets of a picture with alpha.
+enum class AlphaUse : std::uint8_t {
+  OverBlack,  ///< the picture in front of black, with alpha 255
+  Straight,   ///< colours not multiplied by their alpha, and that, rounded to the nearest of 256 levels
+};
+
+/// Of a pixel that covers `alpha` (0 to 1) of what is behind it, and whose radiance is multiplied by it: the tone is
+/// that of the surfaces, however little they cover.
+[[nodiscard]] Rgba8 to_display(const Rgb& radiance, float alpha, const DisplayTransform& transform, AlphaUse use);
+/// The radiance of what covers the pixel; black where nothing does.
+[[nodiscard]] Rgb unassociated(const Rgb& radiance, float alpha);
+
 }  // namespace hpr

@@ -90,6 +90,26 @@ TEST(Tone, LightThatIsNoLightIsBlackAndEndlessLightIsWhite) {
   }
 }
 
+TEST(Tone, AlphaChangesHowMuchIsSeenNotInWhichTone) {
+  for (const Tone tone : {Tone::Neutral, Tone::Agx, Tone::None}) {
+    const DisplayTransform transform{1.0, tone};
+    const Rgb whole{0.9F, 0.3F, 0.05F};
+    const Rgba8 opaque = to_display(whole, 1.0F, transform, AlphaUse::Straight);
+    const Rgb half{0.5F * whole.r, 0.5F * whole.g, 0.5F * whole.b};
+    Rgba8 expected = opaque;
+    expected.a = 128;
+    EXPECT_EQ(to_display(half, 0.5F, transform, AlphaUse::Straight), expected);
+    Rgba8 plain;
+    to_display(std::span(&whole, 1), std::span(&plain, 1), transform);
+    EXPECT_EQ(opaque, plain);
+    const Rgba8 before_black = to_display(half, 0.5F, transform, AlphaUse::OverBlack);
+    EXPECT_EQ(before_black.a, 255);
+    EXPECT_NEAR(srgb_to_linear(before_black.g), 0.5F * srgb_to_linear(opaque.g), 0.01F);
+  }
+  EXPECT_EQ(to_display({}, 0.0F, {}, AlphaUse::Straight), Rgba8{});
+  EXPECT_EQ(to_display({}, 0.0F, {}, AlphaUse::OverBlack), (Rgba8{0, 0, 0, 255}));
+}
+
 TEST(Tone, WithoutOneDisplayColorsAreThoseOfSrgb) {
   std::vector<Rgb> radiance;
   for (int i = -4; i < 300; ++i) radiance.push_back({static_cast<float>(i) / 255.0F, 0.2F, 2.0F});

@@ -209,6 +209,7 @@ void DeferredShader::State::build_reference() {
   own.seed = settings.seed;
   own.max_depth = settings.max_depth;
   own.glossy_cutoff = settings.glossy_cutoff;
+  own.background = settings.background;
   own.terminator_fix = settings.terminator_fix;
   own.spread_in_pixel = false;  // views are jittered
   own.threads = settings.threads;
@@ -222,7 +223,7 @@ const RayScene& DeferredShader::State::whole_scene() {
 
 void DeferredShader::State::trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles) {
   const Stopwatch watch;
-  reference->trace(sample.views, tiles, sample.number, *sample.output.radiance, sample.wanted);
+  reference->trace(sample.views, tiles, sample.number, {sample.output.radiance, sample.output.coverage}, sample.wanted);
   const PathCounts& traced = reference->counts();
   counts = {};
   counts.primary = traced.primary;
@@ -512,21 +513,25 @@ void shade_local(DeferredShader& shader, std::span<const View> views, TileLayer<
 }
 
 void shade_empty(DeferredShader& shader, std::span<const View> views, const TileLayer<Key>& keys,
-                 std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number) {
+                 std::span<const std::size_t> tiles, const LightOutput& output, const SampleNumber& number) {
   std::vector<std::size_t> open;
   std::ranges::copy_if(tiles, std::back_inserter(open),
                        [&](std::size_t tile) { return std::ranges::count(keys.tile(tile), kNoKey) > 0; });
   // Keys that carry colours name no surfaces: pixels that have one are lit as if they were empty, and left out.
   const TileLayer<Key> empty(keys.layout());
   TileLayer<Rgb> behind(keys.layout());
-  shader.shade(views, empty, open, {.radiance = &behind}, number);
+  TileLayer<float> covered(output.coverage != nullptr ? keys.layout() : FrameLayout());
+  shader.shade(views, empty, open, {.radiance = &behind, .coverage = output.coverage != nullptr ? &covered : nullptr},
+               number);
   for (const std::size_t tile : open) {
     const std::span<const Key> words = keys.tile(tile);
-    const std::span<const Rgb> from = behind.tile(tile);
-    const std::span<Rgb> to = radiance.tile(tile);
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      if (words[i] == kNoKey) to[i] = from[i];
-    }
+    const auto fill = [&](const auto& from, auto& to) {
+      for (std::size_t i = 0; i < words.size(); ++i) {
+        if (words[i] == kNoKey) to.tile(tile)[i] = from.tile(tile)[i];
+      }
+    };
+    fill(std::as_const(behind), *output.radiance);
+    if (output.coverage != nullptr) fill(std::as_const(covered), *output.coverage);
   }
 }
 

@@ -30,9 +30,10 @@ class RayForwarding;
 struct LightOutput {
   TileLayer<Rgb>* radiance = nullptr;
   std::array<TileLayer<Rgb>*, kComponents> components{};
-  TileLayer<Rgb>* normal = nullptr;  ///< unit length, world, on the viewer's side; 0 where nothing is seen
-  TileLayer<Rgb>* albedo = nullptr;  ///< base colour of the first surface
-  TileLayer<float>* cost = nullptr;  ///< rays traced for the pixel
+  TileLayer<Rgb>* normal = nullptr;      ///< unit length, world, on the viewer's side; 0 where nothing is seen
+  TileLayer<Rgb>* albedo = nullptr;      ///< base colour of the first surface
+  TileLayer<float>* cost = nullptr;      ///< rays traced for the pixel
+  TileLayer<float>* coverage = nullptr;  ///< fraction of the pixel that surfaces cover
 };
 
 /// One of several samples of a frame that are shaded together.
@@ -105,9 +106,9 @@ void shade_local(DeferredShader& shader, std::span<const View> views, TileLayer<
                  std::span<const std::size_t> tiles, const SampleNumber& number = {});
 
 /// The pixels that shade_local leaves without a colour, once no rank has a key for them: of `tiles`, those of `keys`
-/// without one get the radiance that is there in `radiance` (background, environment, surfaces that cover in part); the
-/// others keep theirs. Collective where shade() is.
+/// without one get in `output`, its radiance and its coverage, what is there (background, environment, surfaces that
+/// cover in part); the others keep theirs. Collective where shade() is.
 void shade_empty(DeferredShader& shader, std::span<const View> views, const TileLayer<Key>& keys,
-                 std::span<const std::size_t> tiles, TileLayer<Rgb>& radiance, const SampleNumber& number = {});
+                 std::span<const std::size_t> tiles, const LightOutput& output, const SampleNumber& number = {});
 
 }  // namespace hpr

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "image/color.h"
 #include "image/filter.h"
 #include "rt/passes/pass_id.h"
 #include "rt/show/show.h"
@@ -11,6 +12,20 @@
 #include "scene/scene.h"
 
 namespace hpr {
+
+/// What the eye sees past all surfaces, also through the holes of those that cover in part. Mirrors, glass and light
+/// meet the scene's environment whatever it is.
+struct Background {
+  enum class Kind : std::uint8_t {
+    Environment,  ///< the scene's; its own background where it has none
+    Color,
+    Transparent,  ///< nothing: the picture's alpha says what surfaces cover
+  };
+  Kind kind = Kind::Environment;
+  Rgb color;  ///< of Color: radiance
+
+  bool operator==(const Background&) const = default;
+};
 
 /// How light is computed. Equal settings give equal pictures on any number of ranks and threads.
 struct RaySettings {
@@ -37,6 +52,7 @@ struct RaySettings {
   std::vector<PassId> half_resolution = {};
   /// Surfaces that this rank's ray scenes hold, where rays are forwarded between ranks; none: all of them.
   std::optional<std::vector<SurfaceRange>> part = {};
+  Background background = {};
   bool denoise = false;  ///< see Denoiser
   PixelFilter filter =
       PixelFilter::Box;    ///< of the pixels, which denoising samples at more places; none of its weights < 0

@@ -33,7 +33,7 @@ TEST(ShadeLocal, WhatItLeavesEmptyIsLitLikeAllElse) {
   constexpr Rgb kUntouched{7.0F, 7.0F, 7.0F};
   TileLayer<Rgb> radiance(keys.layout());
   std::ranges::fill(radiance.tile(0), kUntouched);
-  shade_empty(shader, std::span(&view, 1), keys, tiles, radiance);
+  shade_empty(shader, std::span(&view, 1), keys, tiles, {.radiance = &radiance});
   std::size_t empty = 0;
   for (std::size_t i = 0; i < kTilePixels; ++i) {
     empty += keys.tile(0)[i] == kNoKey ? 1U : 0U;

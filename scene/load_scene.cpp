@@ -124,15 +124,19 @@ std::vector<std::filesystem::path> files_of_scene(const std::string& source, con
   return files;
 }
 
-Environment load_environment(const std::string& text, const ImageLimits& limits) {
-  if (const auto numbers = three_numbers(text)) {
-    for (const float radiance : *numbers) {
-      if (radiance >= 0.0F && radiance <= kMaxRadiance) continue;
-      throw Error(ExitCode::Usage, fmt::format("an environment of radiance {}", printable(text)),
-                  "give three numbers from 0 to 1e12");
-    }
-    return {Image<Rgb>({1, 1}, {(*numbers)[0], (*numbers)[1], (*numbers)[2]})};
+std::optional<Rgb> parse_radiance(const std::string& text) {
+  const auto numbers = three_numbers(text);
+  if (!numbers) return std::nullopt;
+  for (const float radiance : *numbers) {
+    if (radiance >= 0.0F && radiance <= kMaxRadiance) continue;
+    throw Error(ExitCode::Usage, fmt::format("'{}' is no radiance", printable(text)),
+                "give three numbers from 0 to 1e12");
   }
+  return Rgb{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+}
+
+Environment load_environment(const std::string& text, const ImageLimits& limits) {
+  if (const auto radiance = parse_radiance(text)) return {Image<Rgb>({1, 1}, *radiance)};
   if (text == kStudioName) return make_studio();
   const std::string extension = extension_of(text);
   if (extension != ".hdr" && extension != ".exr" && extension != ".png" && extension != ".jpg" &&

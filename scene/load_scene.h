@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,6 +54,9 @@ HPR_SCENE_IMPORTERS(HPR_DECLARE_IMPORTER)
 /// of a generated scene; of a file that load_scene would refuse just that file.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_scene(const std::string& source,
                                                                 const SceneLimits& limits = {});
+
+/// "R,G,B": a radiance; none where it is not three numbers. Throws Error (Usage) where one is below 0 or above 1e12.
+[[nodiscard]] std::optional<Rgb> parse_radiance(const std::string& text);
 
 /// What the command line calls an environment: `studio` (make_studio), `R,G,B`, the same radiance from everywhere, or a
 /// latitude-longitude picture (.hdr, .exr, .png, .jpg; see Environment for its orientation). PNG and JPEG are read as

@@ -17,7 +17,7 @@ namespace hpr {
 namespace {
 
 const RunIdentity kIdentity{{"scene", "0123"}, {"seed", "1"}, {"filter", "box"}};
-const FilmContent kContent{{Aov::Id, Aov::Direct, Aov::Rank, Aov::Cost}, true, 8};
+const FilmContent kContent{{Aov::Id, Aov::Direct, Aov::Rank, Aov::Cost, Aov::Coverage}, true, 8};
 const FrameLayout kLayout({{100, 70}, {10, 10}});
 
 /// A film with something in every layer, and an empty tile.

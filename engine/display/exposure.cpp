@@ -78,13 +78,16 @@ double automatic_exposure(const LuminanceHistogram& histogram) {
 LuminanceHistogram measure_luminance(Session& session, const Frame& frame) {
   const trace::Span span("measure luminance");
   const FrameLayout& layout = frame.radiance.layout();
+  const TileLayer<float>* const alpha = frame.alpha();
   std::vector<LuminanceHistogram> of_tiles(frame.owned.size());
   parallel_for(session.threads(), frame.owned.size(), [&](std::size_t i) {
     const Rect rect = layout.place(frame.owned[i]).pixels;
     const std::span<const Rgb> pixels = frame.radiance.tile(frame.owned[i]);
     for (int y = 0; y < rect.height(); ++y) {
       for (int x = 0; x < rect.width(); ++x) {
-        of_tiles[i].add(pixels[static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x)]);
+        const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+        of_tiles[i].add(alpha == nullptr ? pixels[pixel]
+                                         : unassociated(pixels[pixel], alpha->tile(frame.owned[i])[pixel]));
       }
     }
   });

@@ -55,7 +55,8 @@ struct DisplaySettings {
   return {settings.exposure_stops.value_or(0.0), settings.tone, settings.shows};
 }
 
-/// Collective. The histogram of all screens' pixels, the same on all ranks.
+/// Collective. The histogram of all screens' pixels, the same on all ranks; of a transparent frame what surfaces show,
+/// however little they cover.
 [[nodiscard]] LuminanceHistogram measure_luminance(Session& session, const Frame& frame);
 
 /// Collective. How to show a frame, the same on all ranks and for all screens.

@@ -80,6 +80,14 @@ std::optional<SampleGoal> resting_of(const WallJob& job, const RenderSettings& s
   return SampleGoal{.samples = kSamplesWhileResting, .seconds = {}, .relmse = {}};
 }
 
+/// Pictures that are bent or shown through colored glasses, or that codecs carry, come before black.
+AlphaUse alpha_use_of(const WallJob& job) {
+  const bool is_kept = job.display->keeps_alpha != nullptr && job.display->keeps_alpha(job.display_options);
+  const bool is_mixed =
+      job.wall.stereo == StereoMode::Anaglyph || std::ranges::any_of(job.wall.screens, has_position_map);
+  return is_kept && !is_mixed && !job.link ? AlphaUse::Straight : AlphaUse::OverBlack;
+}
+
 }  // namespace
 
 WallDriver::WallDriver(const WallJob& job, Session& session)
@@ -127,7 +135,7 @@ void WallDriver::start_frames() {
   const FrameSettings used = settings_for(wall_, settings.frame);
   curved_.emplace(views, used.primary == Primary::Rays);
   for (const Size& size : curved_->sizes()) check_size(size, job_.picture_limits);
-  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), {}};
+  showing_ = {curved_->sizes(), picture_owners(wall_, owners_), {}, alpha_use_of(job_)};
   display_settings_ = settings.display;
   frames_.emplace(session_, used, sampling_of(job_, settings), curved_->drawn(views), target_of(job_),
                   resting_of(job_, settings), !job_.outputs.layers.raw.empty());

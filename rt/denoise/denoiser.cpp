@@ -167,7 +167,8 @@ void Denoiser::set_light(const LightContext& context, const TileJob& job, const 
 }
 
 void Denoiser::add_background(const LightContext& context, const SubpixelSample& sample, const glm::dvec3& direction) {
-  const glm::dvec3 light = sample.fraction * context.lights.environment(direction);
+  const glm::dvec3 light = sample.fraction * context.background(direction);
+  if (!uncovered_.empty()) uncovered_[sample.pixel] += sample.fraction;
   filtered_[0][sample.pixel] += light;
   if (sums_ > 1) filtered_[1 + static_cast<std::size_t>(Component::Direct)][sample.pixel] += light;
 }
@@ -259,6 +260,7 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, c
     filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
     std::fill_n(sum_of(sums, i).begin() + spare_, kTilePixels, glm::dvec3(0.0));
   });
+  uncovered_.assign(sums.wants_coverage ? kTilePixels : 0, 0.0);
   narrowed_ = 1.0F / std::sqrt(std::sqrt(1.0F + static_cast<float>(job.number.sample)));
   set_unexpected_apart(job, fragments.fragments);
   set_taps(job);
@@ -344,6 +346,7 @@ void Denoiser::resolve(const LightContext& context, const TileJob& job, const Ti
       const bool is_crossed = fragments.crossed[pixel] != 0 && states_[own] != State::Apart;
       if (is_crossed) {
         each_sum([&](std::size_t i) { filtered_.at(i)[pixel] += sum_of(sums, i)[spare_ + pixel]; });
+        if (sums.wants_coverage) sums.uncovered[own] = uncovered_[pixel];
       } else if (states_[own] == State::Tap) {
         filter(context, job, pixel);
       } else {

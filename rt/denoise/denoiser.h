@@ -123,6 +123,8 @@ class Denoiser {
   /// The filtered sums of the current sample, per pixel: radiance, then the components that are wanted.
   std::array<std::vector<glm::dvec3>, 1 + kComponents> filtered_;
   std::size_t sums_ = 1;  ///< how many of filtered_ are wanted
+  std::vector<double>
+      uncovered_;  ///< of the current sample, per pixel, where coverage is wanted: its samples of the background
 };
 
 }  // namespace hpr

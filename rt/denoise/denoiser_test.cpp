@@ -67,6 +67,32 @@ TEST(Denoiser, ResamplesEdges) {
   }
 }
 
+/// The alpha of a pixel on an edge is what its resampled parts cover, and its color is that of the same parts.
+TEST(Denoiser, ResamplesTheAlphaOfEdges) {
+  Scene scene;
+  Material sheet = test::diffuse();
+  sheet.unlit = true;
+  add_material(scene, sheet);
+  place_mesh(scene, add_mesh(scene, quad({-4, -4, 0}, {4, 0, 0}, {0, 8, 0}, 0)));
+  finish_scene(scene);
+  const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {65, 65}, scene);  // the edge goes through column 32
+  const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
+  TileLayer<Rgb> radiance(keys.layout());
+  TileLayer<float> coverage(keys.layout());
+  RaySettings settings = denoised({});
+  settings.background.kind = Background::Kind::Transparent;
+  DeferredShader shader(scene, settings);
+  shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance, .coverage = &coverage});
+  const Image<float> alpha = to_image(coverage, 0);
+  const Image<Rgb> color = to_image(radiance, 0);
+  for (int y = 0; y < 64; ++y) {
+    EXPECT_NEAR(alpha.at(32, y), 0.5, 0.04) << y;
+    EXPECT_NEAR(alpha.at(32, y), color.at(32, y).g, 1e-6) << y;
+    EXPECT_EQ(alpha.at(30, y), 1.0F);
+    EXPECT_EQ(alpha.at(34, y), 0.0F);
+  }
+}
+
 /// What is thinner than a pixel is met by some samples only: looking more closely when it is must not weigh it less.
 TEST(Denoiser, ThinThingsKeepTheirLight) {
   Scene scene;

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -87,6 +88,11 @@ struct LightContext {
   const PhotonMaps* photons = nullptr;               ///< null when none were traced
   const View* view = nullptr;                        ///< the tile's view in any sample: the eye's position
   Media eye_media = {};                              ///< the media that the eye of that view lies in
+
+  /// The radiance that the eye sees along `direction` past all surfaces.
+  [[nodiscard]] glm::dvec3 background(const glm::dvec3& direction) const;
+  /// That radiance where no direction changes it.
+  [[nodiscard]] std::optional<glm::dvec3> even_background() const;
 
   /// Whether a pass of its own follows the lobe, and not the one that gathers all others.
   [[nodiscard]] bool follows_for_itself(const Bsdf& bsdf, Lobe lobe) const;

@@ -39,7 +39,7 @@ class PrimaryVertices {
  private:
   void find_surfaces() {
     if (context_.rays != nullptr && context_.rays->has_alpha_tested()) trace_alpha_tested();
-    const std::optional<glm::dvec3> even = context_.lights.constant_environment();
+    const std::optional<glm::dvec3> even = context_.even_background();
     prefetch(rows_.first);
     for (int y = rows_.first; y < rows_.end; ++y) {
       if (y + 1 < rows_.end) prefetch(y + 1);
@@ -52,7 +52,7 @@ class PrimaryVertices {
           continue;
         }
         const glm::dvec3 light = even ? *even : context_.lights.environment(glm::normalize(ray_of(x, y).direction));
-        sums_.add(job_.first_pixel + static_cast<std::uint32_t>(pixel), Component::Direct, fraction * light);
+        sums_.add_background(job_.first_pixel + static_cast<std::uint32_t>(pixel), fraction, light);
       }
     }
   }
@@ -299,6 +299,25 @@ void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i
 }
 
 }  // namespace
+
+glm::dvec3 LightContext::background(const glm::dvec3& direction) const {
+  if (settings.background.kind == Background::Kind::Environment) return lights.environment(direction);
+  return even_background().value_or(glm::dvec3(0.0));
+}
+
+std::optional<glm::dvec3> LightContext::even_background() const {
+  switch (settings.background.kind) {
+    case Background::Kind::Environment:
+      return lights.constant_environment();
+    case Background::Kind::Color: {
+      const Rgb& color = settings.background.color;
+      return glm::dvec3(color.r, color.g, color.b);
+    }
+    case Background::Kind::Transparent:
+      return glm::dvec3(0.0);
+  }
+  return std::nullopt;
+}
 
 bool LightContext::follows_for_itself(const Bsdf& bsdf, Lobe lobe) const {
   return followed_lobes[static_cast<std::size_t>(lobe)] && is_followed(bsdf, lobe, settings.glossy_cutoff);

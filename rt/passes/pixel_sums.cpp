@@ -41,14 +41,15 @@ void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) 
 }
 
 /// Sets the sums of so many pixels, tile after tile, to 0 where they are wanted: everywhere when the mask is empty.
-void clear_sums(std::vector<glm::dvec3>& sums, std::size_t pixels, std::span<const std::uint8_t> wanted) {
+template <typename Sum>
+void clear_sums(std::vector<Sum>& sums, std::size_t pixels, std::span<const std::uint8_t> wanted) {
   if (wanted.empty()) {
-    sums.assign(pixels, glm::dvec3(0.0));
+    sums.assign(pixels, Sum(0.0));
     return;
   }
   sums.resize(pixels);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    if (wanted[pixel % kTilePixels] != 0) sums[pixel] = glm::dvec3(0.0);
+    if (wanted[pixel % kTilePixels] != 0) sums[pixel] = Sum(0.0);
   }
 }
 
@@ -60,6 +61,7 @@ void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, c
                      std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
   wants_diffuse = wants.diffuse;
   wants_cost = wants.cost || output.cost != nullptr;
+  wants_coverage = output.coverage != nullptr;
   const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, tile);
   const std::size_t pixels = (samples.size() + (wants.diffuse ? 1 : 0)) * kTilePixels;
   clear_sums(radiance, pixels, wanted);
@@ -69,6 +71,7 @@ void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, c
     if (wants_diffuse) clear_sums(diffuse_components.at(i), pixels, wanted);
   }
   if (wants_cost) cost.assign(pixels, 0.0F);
+  if (wants_coverage) clear_sums(uncovered, pixels, wanted);
   for (const ShadedSample& sample : samples) {
     for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
       if (layer != nullptr) std::ranges::fill(layer->tile(tile), Rgb{});
@@ -105,6 +108,10 @@ void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& o
     const auto pixels = start(output.cost);
     each_lit(job, [&](std::size_t i) { pixels[i] = cost[first + i]; });
   }
+  if (output.coverage != nullptr) {
+    const auto pixels = start(output.coverage);
+    each_lit(job, [&](std::size_t i) { pixels[i] = static_cast<float>(1.0 - uncovered[first + i]); });
+  }
 }
 
 void add_first_surfaces(const std::vector<PathVertex>& points, std::size_t tile, const LightOutput& output) {
@@ -129,6 +136,7 @@ void set_active(const LightOutput& output, std::size_t tile) {
   activate(output.normal);
   activate(output.albedo);
   activate(output.cost);
+  activate(output.coverage);
 }
 
 }  // namespace hpr

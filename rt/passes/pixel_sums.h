@@ -37,6 +37,11 @@ class PixelSums {
     if (is_diffuse && wants_diffuse) diffuse[pixel] += light;
     if (wants_components) add_to_component(pixel, component, light, is_diffuse);
   }
+  /// Adds what the eye sees of the background in a fraction of the pixel.
+  void add_background(std::uint32_t pixel, double fraction, const glm::dvec3& light) {
+    add(pixel, Component::Direct, fraction * light);
+    if (wants_coverage) uncovered[pixel] += fraction;
+  }
   /// Adds diffuse light that something hides, to components that are wanted: as direct light and its shadow.
   void add_shadowed(std::uint32_t pixel, const glm::dvec3& light) {
     add_to_component(pixel, Component::Direct, light, true);
@@ -54,6 +59,7 @@ class PixelSums {
   bool wants_components = false;
   bool wants_diffuse = false;
   bool wants_cost = false;
+  bool wants_coverage = false;
 
   // Per pixel of the tile, sample after sample; all but the radiance only when wanted.
   std::vector<glm::dvec3> radiance;
@@ -62,7 +68,8 @@ class PixelSums {
   /// without the light of sampled lights; then the diffuse part of each component.
   std::vector<glm::dvec3> diffuse;
   std::array<std::vector<glm::dvec3>, kComponents> diffuse_components;
-  std::vector<float> cost;  ///< rays traced
+  std::vector<float> cost;        ///< rays traced
+  std::vector<double> uncovered;  ///< fraction of the pixel that shows the background
 
  private:
   void add_to_component(std::uint32_t pixel, Component component, const glm::dvec3& light, bool is_diffuse) {

@@ -75,6 +75,8 @@ class PathWavefront {
   void run();
 
   [[nodiscard]] const glm::dvec3& radiance(std::size_t pixel) const { return radiance_[pixel]; }
+  /// Whether a path met a surface.
+  [[nodiscard]] bool is_covered(std::size_t pixel) const { return covered_[pixel] != 0; }
   [[nodiscard]] PathCounts& counts() { return counts_; }
 
  private:
@@ -98,6 +100,7 @@ class PathWavefront {
   std::array<std::vector<Path>, kKinds> next_;
   std::vector<ShadowRay> shadows_;
   std::vector<glm::dvec3> radiance_;
+  std::vector<std::uint8_t> covered_;
   PathCounts counts_;
   std::vector<RayRequest> requests_;
   std::vector<std::uint32_t> hits_;
@@ -197,6 +200,7 @@ std::size_t choose_lobe(const std::array<double, kLobes.size()>& chances, double
 void PathWavefront::start(const View& view, std::size_t pixels) {
   view_ = &view;
   radiance_.assign(pixels, glm::dvec3(0.0));
+  covered_.assign(pixels, 0);
   for (auto& paths : paths_) paths.clear();
 }
 
@@ -244,6 +248,12 @@ void PathWavefront::trace_paths() {
 }
 
 void PathWavefront::miss(const Path& path) {
+  const Background& background = shared_.settings.background;
+  if (path.segments == 1 && background.kind != Background::Kind::Environment) {
+    const bool shows = background.kind == Background::Kind::Color;
+    if (shows) radiance_[path.pixel] += glm::dvec3(background.color.r, background.color.g, background.color.b);
+    return;
+  }
   // A background is a backdrop, to be looked at as unlit surfaces are: no light.
   const glm::dvec3 light = shared_.lights.environment(path.direction);
   if (!shared_.scene.environment) {
@@ -261,6 +271,7 @@ void PathWavefront::miss(const Path& path) {
 }
 
 void PathWavefront::arrive(Path& path, std::uint32_t surface) {
+  covered_[path.pixel] = 1;
   shared_.surfaces.load(surface, triangle_);
   const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
   const MaterialPoint material = evaluate_material(shared_.scene, point);
@@ -449,7 +460,8 @@ struct PathTracer::State {
 
   std::unique_ptr<PathWavefront> take_wave();
   void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& location,
-                  const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels) const;
+                  const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels,
+                  std::span<float> coverage) const;
 };
 
 std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
@@ -466,9 +478,10 @@ std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
 
 void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& location,
                                    const SampleNumber& number, std::span<const std::uint8_t> wanted,
-                                   std::span<Rgb> pixels) const {
+                                   std::span<Rgb> pixels, std::span<float> coverage) const {
   const DenormalsAsZero mode;
   std::ranges::fill(pixels, Rgb{});
+  std::ranges::fill(coverage, 0.0F);
   const Rect& rect = location.pixels;
   for (int top = rect.y0; top < rect.y1; top += kRowsAtOnce) {
     const int bottom = std::min(top + kRowsAtOnce, rect.y1);
@@ -489,6 +502,7 @@ void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const 
         const auto to = static_cast<std::size_t>(y - rect.y0) * kTileSide + static_cast<std::size_t>(x);
         const ScreenPixel pixel{view.screen_number, view.block.y0 + y, view.block.x0 + rect.x0 + x};
         pixels[to] = to_pixel(wave.radiance(from), pixel, wave.counts());
+        if (!coverage.empty() && wave.is_covered(from)) coverage[to] = 1.0F;
       }
     }
   }
@@ -513,8 +527,8 @@ const PathCounts& PathTracer::counts() const {
 }
 
 void PathTracer::trace(std::span<const View> views, std::span<const std::size_t> tiles, const SampleNumber& number,
-                       TileLayer<Rgb>& radiance, const PixelMask* wanted) {
-  const FrameLayout& layout = radiance.layout();
+                       const PathOutput& output, const PixelMask* wanted) {
+  const FrameLayout& layout = output.radiance->layout();
   HPR_CHECK(views.size() == layout.screens());
   for (std::size_t i = 0; i < views.size(); ++i) HPR_CHECK(views[i].size() == layout.size(i));
 
@@ -524,10 +538,12 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
     const std::size_t tile = tiles[i];
     const trace::Span span("path trace tile", "tile", tile);
     const TilePlace location = layout.place(tile);
-    radiance.set_active(tile);
+    output.radiance->set_active(tile);
+    if (output.coverage != nullptr) output.coverage->set_active(tile);
     std::unique_ptr<PathWavefront> wave = state.take_wave();
     state.trace_tile(*wave, views[location.screen], eyes[location.screen], location, number, mask_of(wanted, tile),
-                     radiance.tile(tile));
+                     output.radiance->tile(tile),
+                     output.coverage != nullptr ? output.coverage->tile(tile) : std::span<float>());
     const std::lock_guard lock(state.mutex);
     state.idle.push_back(std::move(wave));
   });

@@ -8,6 +8,7 @@
 #include "image/color.h"
 #include "image/tiles.h"
 #include "rt/lights/light_sampler.h"
+#include "rt/ray_settings.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/coverage_traversal.h"
 #include "scene/scene.h"
@@ -28,6 +29,7 @@ struct PathSettings {
       64;  ///< ray segments of the longest path: 1 shows what emits, 2 adds its light on surfaces, and so on
   int roulette_from = 4;  ///< bounces every path is let make; past max_depth: no roulette
   Technique technique = Technique::Both;
+  Background background = {};  ///< what paths meet that leave the scene from the eye
   double glossy_cutoff = 0.3;  ///< lobes that the passes follow (photon_query.h) show unlit surfaces, others do not
   /// Lifts the origins of shadow rays off coarse meshes with smooth normals (see SurfacePoint::lift), as the passes do.
   /// It changes the integral: what is compared with others does without.
@@ -56,6 +58,12 @@ struct PathCounts {
   bool operator==(const PathCounts&) const = default;
 };
 
+/// Layers that the path tracer writes, of one layout.
+struct PathOutput {
+  TileLayer<Rgb>* radiance = nullptr;
+  TileLayer<float>* coverage = nullptr;  ///< fraction of the pixel that surfaces cover; null where not wanted
+};
+
 /// The reference: Kajiya's rendering equation by unidirectional path tracing with next-event estimation, multiple
 /// importance sampling and Russian roulette (Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition,
 /// sections 13.2 to 13.4). Shares materials, lights and what rays meet with the passes, and nothing else. Unbiased up
@@ -72,12 +80,12 @@ class PathTracer {
   PathTracer(PathTracer&&) noexcept;
   PathTracer& operator=(PathTracer&&) noexcept;
 
-  /// Sets every pixel of `tiles` (screen i of the layer is seen by views[i], of equal size) to the radiance of one
+  /// Sets every pixel of `tiles` (screen i of the layers is seen by views[i], of equal size) to the radiance of one
   /// sample, and makes the tiles active; other tiles stay as they are. Where pixels are not `wanted`, which is all of
   /// them when null, they are black. Values are finite and never negative. Memory: below 1 MB a thread, whatever the
   /// depth.
   void trace(std::span<const View> views, std::span<const std::size_t> tiles, const SampleNumber& number,
-             TileLayer<Rgb>& radiance, const PixelMask* wanted = nullptr);
+             const PathOutput& output, const PixelMask* wanted = nullptr);
 
   /// Counts of the last trace().
   [[nodiscard]] const PathCounts& counts() const;

@@ -337,12 +337,12 @@ TEST(PathTracer, ThreadsTileListsAndBlocksChangeNoBit) {
   TileLayer<Rgb> radiance{FrameLayout({view.size()})};
   PathTracer tracer(scene, bench.rays, bench.lights, {});
   for (const std::size_t tile : {4U, 0U, 5U, 2U, 1U, 3U})
-    tracer.trace(std::span(&view, 1), std::vector<std::size_t>{tile}, {}, radiance);
+    tracer.trace(std::span(&view, 1), std::vector<std::size_t>{tile}, {}, {.radiance = &radiance});
   EXPECT_TRUE(whole == to_image(radiance, 0));
 
   for (const View& block : split_into_blocks(view, 64)) {
     TileLayer<Rgb> part{FrameLayout({block.size()})};
-    tracer.trace(std::span(&block, 1), all_tiles(part.layout()), {}, part);
+    tracer.trace(std::span(&block, 1), all_tiles(part.layout()), {}, {.radiance = &part});
     for (int y = 0; y < block.size().height; ++y) {
       for (int x = 0; x < block.size().width; ++x) {
         EXPECT_EQ(part.at(0, x, y), whole.at(block.block.x0 + x, block.block.y0 + y));

@@ -37,7 +37,7 @@ inline Image<Rgb> trace(const PathBench& bench, const View& view, const PathSett
                         PathCounts* counts = nullptr) {
   TileLayer<Rgb> radiance{FrameLayout({view.size()})};
   PathTracer tracer(bench.scene, bench.rays, bench.lights, settings);
-  tracer.trace(std::span(&view, 1), all_tiles(radiance.layout()), {}, radiance);
+  tracer.trace(std::span(&view, 1), all_tiles(radiance.layout()), {}, {.radiance = &radiance});
   if (counts != nullptr) *counts = tracer.counts();
   return to_image(radiance, 0);
 }
@@ -62,7 +62,7 @@ Estimate estimate(const PathBench& bench, const View& view, PathSettings setting
     PathTracer tracer(bench.scene, bench.rays, bench.lights, settings);
     double of_run = 0.0;
     for (std::uint32_t sample = 0; sample < samples; ++sample) {
-      tracer.trace(std::span(&view, 1), tiles, {.sample = sample}, radiance);
+      tracer.trace(std::span(&view, 1), tiles, {.sample = sample}, {.radiance = &radiance});
       for (int y = 0; y < view.size().height; ++y) {
         for (int x = 0; x < view.size().width; ++x) of_run += radiance.at(0, x, y).g / expected(x, y);
       }

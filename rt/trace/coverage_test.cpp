@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "rt/deferred_shader.h"
 #include "rt/test_scene.h"
@@ -67,6 +69,46 @@ TEST(Coverage, VeilsAreMixedByTheirAlphaNearestFirst) {
   add_wall(scene, 1, veil(0.5F, 4.0F));
   finish_scene(scene);
   EXPECT_NEAR(seen(scene).g, 0.5 * 4.0 + 0.5 * (0.25 * 2.0 + 0.75 * 8.0), 1e-5);
+}
+
+/// Radiance and the fraction of the pixel that is covered.
+std::pair<float, float> seen_before(const Background& background, const Scene& scene, RaySettings settings = {}) {
+  settings.background = background;
+  const View view = test::view_from({0, 0, 5}, {0, 0, 0}, {1, 1}, scene, 1e-4);
+  const TileLayer<Key> keys = opaque_keys(scene, view);
+  TileLayer<Rgb> color(keys.layout());
+  TileLayer<float> coverage(keys.layout());
+  DeferredShader shader(scene, settings);
+  shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color, .coverage = &coverage});
+  return {color.at(0, 0, 0).g, coverage.at(0, 0, 0)};
+}
+
+TEST(Coverage, VeilsCoverByTheirAlphaWhateverIsBehind) {
+  Scene scene;
+  add_wall(scene, 0, veil(0.25F, 2.0F));
+  add_wall(scene, 1, veil(0.5F, 4.0F));
+  scene.environment = test::even_light({7.0F, 7.0F, 7.0F});
+  finish_scene(scene);
+  const double front = 0.5 * 4.0 + 0.5 * 0.25 * 2.0;
+  const std::vector<std::pair<Background, double>> backgrounds{
+      {{}, 7.0}, {{Background::Kind::Color, {1.0F, 3.0F, 5.0F}}, 3.0}, {{Background::Kind::Transparent, {}}, 0.0}};
+  for (const auto& [background, behind] : backgrounds) {
+    const auto [color, covered] = seen_before(background, scene);
+    EXPECT_NEAR(color, front + 0.5 * 0.75 * behind, 1e-5);
+    EXPECT_NEAR(covered, 1.0 - 0.5 * 0.75, 1e-6);
+  }
+}
+
+TEST(Coverage, AWallCoversAllAndNothingNothing) {
+  Scene wall;
+  add_wall(wall, 0, test::glowing(glm::vec3(8.0F)));
+  finish_scene(wall);
+  EXPECT_EQ(seen_before({Background::Kind::Transparent, {}}, wall), std::pair(8.0F, 1.0F));
+  Scene empty;
+  empty.environment = test::even_light({7.0F, 7.0F, 7.0F});
+  finish_scene(empty);
+  EXPECT_EQ(seen_before({Background::Kind::Transparent, {}}, empty), std::pair(0.0F, 0.0F));
+  EXPECT_EQ(seen_before({}, empty), std::pair(7.0F, 0.0F));
 }
 
 TEST(Coverage, AVeilBeforeNothingLetsTheBackgroundThrough) {

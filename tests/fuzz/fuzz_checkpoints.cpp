@@ -29,7 +29,7 @@ Film make_film(Kind kind) {
   const FrameLayout layout({{9, 70}});  // two tiles
   if (kind == Kind::Plain) return {layout, {}};
   if (kind == Kind::Adaptive) return {layout, {{}, false, kPilot}};
-  return {layout, {{Aov::Id, Aov::Direct, Aov::Rank, Aov::Cost}, true, 0}};
+  return {layout, {{Aov::Id, Aov::Direct, Aov::Rank, Aov::Cost, Aov::Coverage}, true, 0}};
 }
 
 Sampling sampling_of(Kind kind) {
@@ -56,7 +56,7 @@ void go_on(Kind kind, Film& film, const SampleProgress& progress) {
   const auto [even, odd] = film.counters().weights;
   if (!reached(sampling_of(kind), progress) || even + odd == 0.0) return;  // refused by FrameSampler
   TileLayer<Rgb> radiance(film.layout());
-  const std::vector<Aov> aovs{Aov::Direct, Aov::Rank, Aov::Cost};
+  const std::vector<Aov> aovs{Aov::Direct, Aov::Rank, Aov::Cost, Aov::Coverage};
   AovLayers layers(film.layout(), kind == Kind::Layers ? std::span<const Aov>(aovs) : std::span<const Aov>());
   film.resolve(tiles, 1, radiance, layers);
 }

@@ -17,7 +17,8 @@
 
 namespace hpr {
 
-/// A screen's finished picture, upright; sRGB. A display sends its panel what PanelTransform makes of it.
+/// A screen's finished picture, upright; sRGB, with alpha where the display keeps it. A display sends its panel what
+/// PanelTransform makes of it.
 struct ScreenPicture {
   std::size_t screen = 0;  ///< index into Wall::screens
   const Image<Rgba8>& image;
@@ -134,6 +135,8 @@ struct DisplayKind {
   bool interactive = false;  ///< has a viewer who moves the camera, and who ends the run
   bool monitors = false;     ///< shows the operator's monitors too
   bool stream = false;       ///< what it was given cannot be taken back: a job that is lost does not go on
+  /// Whether it takes pictures with alpha, colours not multiplied by it; null, or false: they come before black.
+  bool (*keeps_alpha)(const DisplayOptions& options) = nullptr;
   /// Throws Error: Usage for options that do not fit, Io when what is to be written to cannot be or holds what may not
   /// be overwritten, NoDevice without a desktop for windows. `wall` must outlive the display.
   std::unique_ptr<Display> (*make)(const Wall& wall, const DisplayOptions& options) = nullptr;

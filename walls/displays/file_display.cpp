@@ -10,6 +10,7 @@
 #include "core/timing.h"
 #include "image/image_io.h"
 #include "walls/displays/display.h"
+#include "walls/drawing/assemble.h"
 #include "walls/drawing/panel_transform.h"
 
 namespace hpr {
@@ -45,8 +46,8 @@ std::string panel_file_of(const WallScreen& screen) {
   return screen.id + ".panel.png";
 }
 
-/// PNG files: folder/<screen id>.png is the latest frame. With keep_frames, folder/frame-000042/<screen id>.png is
-/// frame 42, too. Each file is complete or untouched.
+/// PNG files: folder/<screen id>.png is the latest frame, with its alpha. With keep_frames, folder/frame-000042/<screen
+/// id>.png is frame 42, too. Each file is complete or untouched.
 class FileDisplay final : public Display {
  public:
   FileDisplay(const Wall& wall, const DisplayOptions& options)
@@ -79,7 +80,8 @@ class FileDisplay final : public Display {
           panel_transforms_.try_emplace(picture.screen, wall_, picture.screen).first->second;
       const WallScreen& screen = wall_.screens[picture.screen];
       write(file_of(screen), picture.image);
-      if (!panel_transform.is_identity()) write(panel_file_of(screen), panel_transform.apply(picture.image));
+      if (!panel_transform.is_identity())
+        write(panel_file_of(screen), panel_transform.apply(over_black(picture.image)));
       costs_.push_back({picture.screen, watch.ms(), bytes});
     }
     for (const MonitorPicture& picture : frame.monitors) {
@@ -123,7 +125,11 @@ std::vector<std::filesystem::path> files_of_display(const Wall& wall, const std:
 }
 
 DisplayKind file_display() {
-  return {.name = "file", .monitors = true, .make = make_file_display, .check = check_file_display};
+  return {.name = "file",
+          .monitors = true,
+          .keeps_alpha = [](const DisplayOptions&) { return true; },
+          .make = make_file_display,
+          .check = check_file_display};
 }
 
 }  // namespace hpr

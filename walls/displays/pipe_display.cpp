@@ -114,7 +114,12 @@ PipeFormat parse_pipe_format(const std::string& name) {
 }
 
 DisplayKind pipe_display() {
-  return {.name = "pipe", .whole_wall = true, .stream = true, .make = make_pipe_display, .check = check_pipe_display};
+  return {.name = "pipe",
+          .whole_wall = true,
+          .stream = true,
+          .keeps_alpha = [](const DisplayOptions& options) { return options.pipe.format == PipeFormat::Rgba; },
+          .make = make_pipe_display,
+          .check = check_pipe_display};
 }
 
 }  // namespace hpr

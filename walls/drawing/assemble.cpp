@@ -69,9 +69,13 @@ Image<Rgba8> resample(const Image<Rgba8>& image, Size size) {
   const std::vector<Taps> across = make_taps(image.width(), size.width);
   const std::vector<Taps> down = make_taps(image.height(), size.height);
   Image<Rgba8> result(size);
-  std::vector<Rgb> sums(static_cast<std::size_t>(size.width));
+  struct Sum {
+    Rgb color;               // multiplied by alpha
+    float uncovered = 0.0F;  // exactly 0 of opaque pixels, whatever rounding makes of the weights' sum
+  };
+  std::vector<Sum> sums(static_cast<std::size_t>(size.width));
   for (int y = 0; y < size.height; ++y) {
-    std::ranges::fill(sums, Rgb{});
+    std::ranges::fill(sums, Sum{});
     const Taps& rows = down[static_cast<std::size_t>(y)];
     for (std::size_t j = 0; j < rows.weights.size(); ++j) {
       const auto source = image.row(rows.first + static_cast<int>(j));
@@ -80,15 +84,33 @@ Image<Rgba8> resample(const Image<Rgba8>& image, Size size) {
         for (std::size_t i = 0; i < columns.weights.size(); ++i) {
           const Rgba8 pixel = source[static_cast<std::size_t>(columns.first) + i];
           const float weight = rows.weights[j] * columns.weights[i];
-          sums[x].r += weight * linear[pixel.r];
-          sums[x].g += weight * linear[pixel.g];
-          sums[x].b += weight * linear[pixel.b];
+          const float alpha = static_cast<float>(pixel.a) / 255.0F;
+          sums[x].color.r += alpha * weight * linear[pixel.r];
+          sums[x].color.g += alpha * weight * linear[pixel.g];
+          sums[x].color.b += alpha * weight * linear[pixel.b];
+          sums[x].uncovered += weight * (1.0F - alpha);
         }
       }
     }
-    std::ranges::transform(sums, result.row(y).begin(), to_srgb);
+    std::ranges::transform(sums, result.row(y).begin(), [](const Sum& sum) {
+      const float alpha = std::clamp(1.0F - sum.uncovered, 0.0F, 1.0F);
+      if (alpha == 0.0F) return Rgba8{};
+      Rgba8 color = to_srgb({sum.color.r / alpha, sum.color.g / alpha, sum.color.b / alpha});
+      color.a = static_cast<std::uint8_t>(std::lround(255.0F * alpha));
+      return color;
+    });
   }
   return result;
+}
+
+Image<Rgba8> over_black(Image<Rgba8> image) {
+  for (Rgba8& pixel : image.pixels()) {
+    if (pixel.a == 255) continue;
+    const Rgb color = from_srgb(pixel);
+    const float alpha = static_cast<float>(pixel.a) / 255.0F;
+    pixel = to_srgb({alpha * color.r, alpha * color.g, alpha * color.b});
+  }
+  return image;
 }
 
 Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture, std::span<const Image<Rgba8>> screens) {
@@ -165,7 +187,7 @@ Image<Rgba8> draw_monitor(const Wall& wall, const WallMonitor& monitor, const Mo
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     const Rect& rect = layout.rects[i];
     if (pictures[i].size().area() == 0) continue;
-    paste(resample(pictures[i], {rect.width(), rect.height()}), rect.x0, rect.y0, result);
+    paste(over_black(resample(pictures[i], {rect.width(), rect.height()})), rect.x0, rect.y0, result);
   }
   return result;
 }

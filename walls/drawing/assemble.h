@@ -19,8 +19,12 @@ namespace hpr {
 [[nodiscard]] Image<Rgba8> draw_wall(const Wall& wall, const WallPicture& picture,
                                      std::span<const Image<Rgba8>* const> screens);
 
-/// `image` on `size` pixels: each the mean, in linear light, of the area it covers.
+/// `image` on `size` pixels: each the mean, in linear light, of the area it covers; where alpha differs, of the colours
+/// as far as they cover.
 [[nodiscard]] Image<Rgba8> resample(const Image<Rgba8>& image, Size size);
+
+/// What is seen of `image` in front of black, in linear light: with alpha 255.
+[[nodiscard]] Image<Rgba8> over_black(Image<Rgba8> image);
 
 /// `image` turned clockwise by 0, 90, 180 or 270 degrees: what is sent to a panel that is mounted turned.
 [[nodiscard]] Image<Rgba8> turn_clockwise(const Image<Rgba8>& image, int degrees);
@@ -35,7 +39,7 @@ struct MonitorLayout {
 [[nodiscard]] MonitorLayout monitor_layout(const Wall& wall, const WallMonitor& monitor);
 
 /// The monitor's picture: `pictures`, one per screen of the layout, each resampled to its place where it has not that
-/// size; gaps in the wall's gap colour, black around the surface.
+/// size, before black; gaps in the wall's gap colour, black around the surface.
 [[nodiscard]] Image<Rgba8> draw_monitor(const Wall& wall, const WallMonitor& monitor, const MonitorLayout& layout,
                                         std::span<const Image<Rgba8>> pictures);
 

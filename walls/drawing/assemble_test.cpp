@@ -70,6 +70,23 @@ TEST(Resample, KeepsAConstantAtAnyRatio) {
   }
 }
 
+TEST(Resample, WeighsColorsByTheirAlpha) {
+  Image<Rgba8> image({2, 1});
+  image.at(0, 0) = {200, 100, 50, 255};
+  EXPECT_EQ(resample(image, {1, 1}).at(0, 0), (Rgba8{200, 100, 50, 128}));
+  EXPECT_EQ(resample(Image<Rgba8>({2, 1}), {1, 1}).at(0, 0), Rgba8{});
+}
+
+TEST(OverBlack, TakesLightByAlpha) {
+  Image<Rgba8> image({3, 1}, {200, 100, 50, 255});
+  image.at(1, 0).a = 0;
+  image.at(2, 0) = {255, 255, 255, 128};
+  const Image<Rgba8> shown = over_black(image);
+  EXPECT_EQ(shown.at(0, 0), image.at(0, 0));
+  EXPECT_EQ(shown.at(1, 0), (Rgba8{0, 0, 0, 255}));
+  EXPECT_EQ(shown.at(2, 0), (Rgba8{188, 188, 188, 255})) << "half the light";
+}
+
 TEST(TurnClockwise, MovesTheUpperLeftCornerRound) {
   const Image<Rgba8> image = marked(0, {3, 2});
   EXPECT_EQ(turn_clockwise(image, 0), image);
