@@ -161,7 +161,10 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
   for (const PassPlan& planned : plan) {
     if (!planned.runs) continue;
     const PassInfo& info = info_of(planned.pass);
-    if (info.lobe) followed_lobes.at(static_cast<std::size_t>(*info.lobe)) = true;
+    if (info.lobe) {
+      followed_lobes.at(static_cast<std::size_t>(*info.lobe)) = true;
+      followed_lobes.at(static_cast<std::size_t>(extension_of(*info.lobe))) = true;
+    }
     passes.push_back({info, info.make()});
   }
   if (!passes.empty() || settings.reference || settings.denoise || traces_own_rays(settings.show) ||

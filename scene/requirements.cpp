@@ -38,22 +38,37 @@ std::vector<const Material*> visible_materials(const Scene& scene) {
   return materials;
 }
 
-/// The least texel of one channel of the texture of roughness and metalness, 1 without: filtering never goes below it.
-float least_texel(const Scene& scene, const Material& material, std::uint8_t Rgba8::*channel) {
-  if (!material.metallic_roughness_texture.present()) return 1.0F;
-  const auto texture = static_cast<std::size_t>(material.metallic_roughness_texture.texture);
-  const auto pixels = scene.textures[texture].image.pixels();
+const MaterialExtensions& extensions_of(const Material& material) {
+  static const MaterialExtensions kNone;
+  return material.extensions ? *material.extensions : kNone;
+}
+
+/// The least texel of one channel of a texture, 1 without: filtering never goes below it.
+float least_texel(const Scene& scene, const TextureRef& reference, std::uint8_t Rgba8::*channel) {
+  if (!reference.present()) return 1.0F;
+  const auto pixels = scene.textures[static_cast<std::size_t>(reference.texture)].image.pixels();
   if (pixels.empty()) return 1.0F;
   return static_cast<float>((*std::ranges::min_element(pixels, {}, channel)).*channel) / 255.0F;
 }
 
-/// The least a material can reach anywhere.
+/// The least a material can reach anywhere, its coat included.
 float min_roughness(const Scene& scene, const Material& material) {
-  return material.roughness * least_texel(scene, material, &Rgba8::g);
+  const float base = material.roughness * least_texel(scene, material.metallic_roughness_texture, &Rgba8::g);
+  const MaterialExtensions& extensions = extensions_of(material);
+  if (!(extensions.clearcoat > 0.0F)) return base;
+  return std::min(
+      base, extensions.clearcoat_roughness * least_texel(scene, extensions.clearcoat_roughness_texture, &Rgba8::g));
+}
+
+/// The most it can reach.
+float max_roughness(const Material& material) {
+  const MaterialExtensions& extensions = extensions_of(material);
+  return extensions.clearcoat > 0.0F ? std::max(material.roughness, extensions.clearcoat_roughness)
+                                     : material.roughness;
 }
 
 float min_metallic(const Scene& scene, const Material& material) {
-  return material.metallic * least_texel(scene, material, &Rgba8::b);
+  return material.metallic * least_texel(scene, material.metallic_roughness_texture, &Rgba8::b);
 }
 
 bool transmits_somewhere(const Scene& scene, const Material& material) {
@@ -83,8 +98,13 @@ bool takes_in(const Scene& scene, const Material& material) {
   return !material.unlit && !is_black(material) && min_metallic(scene, material) < 1.0F;
 }
 
+bool has_sheen(const Material& material) {
+  return !material.unlit && extensions_of(material).sheen_color != glm::vec3(0.0F);
+}
+
 /// Whether it has a diffuse part.
 bool is_diffuse(const Scene& scene, const Material& material) {
+  if (has_sheen(material)) return true;
   return takes_in(scene, material) && (material.transmission < 1.0F || material.transmission_texture.present());
 }
 
@@ -92,12 +112,14 @@ bool is_diffuse(const Scene& scene, const Material& material) {
 /// its index alone.
 bool reflects(const Scene& scene, const Material& material) {
   if (material.unlit) return false;
-  return material.metallic > 0.0F || (min_metallic(scene, material) < 1.0F && material.ior != 1.0F);
+  const MaterialExtensions& extensions = extensions_of(material);
+  if (material.metallic > 0.0F || extensions.clearcoat > 0.0F || extensions.iridescence > 0.0F) return true;
+  return min_metallic(scene, material) < 1.0F && material.ior != 1.0F && extensions.specular > 0.0F;
 }
 
 /// Whether it is diffuse, or has a specular part too rough to be followed.
 bool scatters(const Scene& scene, const Material& material) {
-  return is_diffuse(scene, material) || (reflects(scene, material) && material.roughness >= kMirrorRoughness);
+  return is_diffuse(scene, material) || (reflects(scene, material) && max_roughness(material) >= kMirrorRoughness);
 }
 
 bool mirrors(const Scene& scene, const Material& material) {
@@ -106,6 +128,11 @@ bool mirrors(const Scene& scene, const Material& material) {
 
 /// An index of 0 stands for a wall that reflects all.
 bool transmits(const Scene& scene, const Material& material) {
+  const MaterialExtensions& extensions = extensions_of(material);
+  if (!material.unlit && extensions.diffuse_transmission > 0.0F &&
+      extensions.diffuse_transmission_color != glm::vec3(0.0F) && min_metallic(scene, material) < 1.0F) {
+    return true;
+  }
   return takes_in(scene, material) && transmits_somewhere(scene, material) && material.ior > 0.0F;
 }
 
@@ -176,7 +203,7 @@ Requirements requirements_of(const Scene& scene) {
   for (const Material* material : materials) {
     if (!reflects(scene, *material)) continue;
     needs.min_roughness = std::min(needs.min_roughness, min_roughness(scene, *material));
-    needs.max_roughness = std::max(needs.max_roughness, material->roughness);
+    needs.max_roughness = std::max(needs.max_roughness, max_roughness(*material));
   }
   needs.constant_environment = lights == 1 && shines(scene.environment) && scene.environment->is_constant();
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}

@@ -94,6 +94,27 @@ TEST(Requirements, ReflectionsNeedAMaterialBelowTheMirrorRoughness) {
   EXPECT_FALSE(requirements_of(scene_of(rough(kMirrorRoughness))).reflection.needed);
 }
 
+TEST(Requirements, ExtensionsCount) {
+  const auto with = [](Material material, const auto& set) {
+    MaterialExtensions extensions;
+    set(extensions);
+    material.extensions = std::make_shared<const MaterialExtensions>(extensions);
+    return requirements_of(scene_of(material));
+  };
+  const auto coat = [](MaterialExtensions& e) { e.clearcoat = 1.0F; };
+  EXPECT_TRUE(with(rough(1.0F), coat).reflection.needed) << "a smooth coat mirrors";
+  EXPECT_EQ(with(rough(1.0F), coat).min_roughness, 0.0F);
+  Material lambert = rough(1.0F);
+  lambert.metallic = 0.0F;
+  lambert.ior = 1.0F;
+  EXPECT_FALSE(with(lambert, [](MaterialExtensions& e) { e.sheen_color = glm::vec3(1.0F); }).refraction.needed);
+  EXPECT_TRUE(with(lambert, [](MaterialExtensions& e) { e.diffuse_transmission = 0.5F; }).refraction.needed);
+  Material plastic = rough(0.1F);
+  plastic.metallic = 0.0F;
+  EXPECT_TRUE(with(plastic, [](MaterialExtensions& e) { e.dispersion = 0.5F; }).reflection.needed);
+  EXPECT_FALSE(with(plastic, [](MaterialExtensions& e) { e.specular = 0.0F; }).reflection.needed);
+}
+
 TEST(Requirements, ASmoothTexelMakesARoughMaterialMirror) {
   Scene scene = scene_of(rough(1.0F));
   scene.textures.emplace_back();

@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -37,9 +38,61 @@ struct TextureRef {
   std::array<float, 6> transform{1, 0, 0, 1, 0, 0};
 
   [[nodiscard]] bool present() const { return texture >= 0; }
+  bool operator==(const TextureRef&) const = default;
 };
 
 enum class AlphaMode : std::uint8_t { Opaque, Mask, Blend };
+
+/// What few materials have: KHR_materials_specular, _clearcoat, _sheen, _anisotropy, _iridescence, _dispersion and
+/// _diffuse_transmission. The defaults change nothing.
+struct MaterialExtensions {
+  float specular = 1.0F;              ///< factor of the dielectric's reflection at every angle
+  TextureRef specular_texture;        ///< linear, in A
+  glm::vec3 specular_color{1.0F};     ///< factor of its reflection looked at straight; may exceed 1
+  TextureRef specular_color_texture;  ///< sRGB
+  float clearcoat = 0.0F;
+  TextureRef clearcoat_texture;  ///< linear, in R
+  float clearcoat_roughness = 0.0F;
+  TextureRef clearcoat_roughness_texture;  ///< linear, in G
+  TextureRef clearcoat_normal_texture;     ///< linear, as Material::normal_texture; without one the coat is smooth
+  float clearcoat_normal_scale = 1.0F;
+  glm::vec3 sheen_color{0.0F};
+  TextureRef sheen_color_texture;  ///< sRGB
+  float sheen_roughness = 0.0F;
+  TextureRef sheen_roughness_texture;        ///< linear, in A
+  float anisotropy = 0.0F;                   ///< strength: how much rougher the surface is along its direction
+  float anisotropy_rotation_radians = 0.0F;  ///< of that direction, counterclockwise from the tangent
+  TextureRef anisotropy_texture;             ///< linear: direction in R and G, strength in B
+  float iridescence = 0.0F;
+  TextureRef iridescence_texture;  ///< linear, in R
+  float iridescence_ior = 1.3F;
+  float iridescence_min_nm = 100.0F;         ///< thickness of the film where its texture is 0
+  float iridescence_max_nm = 400.0F;         ///< and where it is 1, or there is none
+  TextureRef iridescence_thickness_texture;  ///< linear, in G
+  float dispersion = 0.0F;                   ///< 20 over the Abbe number
+  float diffuse_transmission = 0.0F;         ///< share of the diffuse light that is let through
+  TextureRef diffuse_transmission_texture;   ///< linear, in A
+  glm::vec3 diffuse_transmission_color{1.0F};
+  TextureRef diffuse_transmission_color_texture;  ///< sRGB
+
+  bool operator==(const MaterialExtensions&) const = default;
+
+  /// All textures, present or not.
+  [[nodiscard]] std::array<const TextureRef*, 12> textures() const {
+    return {&specular_texture,
+            &specular_color_texture,
+            &clearcoat_texture,
+            &clearcoat_roughness_texture,
+            &clearcoat_normal_texture,
+            &sheen_color_texture,
+            &sheen_roughness_texture,
+            &anisotropy_texture,
+            &iridescence_texture,
+            &iridescence_thickness_texture,
+            &diffuse_transmission_texture,
+            &diffuse_transmission_color_texture};
+  }
+};
 
 /// glTF 2.0 metallic-roughness (specification, appendix B), with KHR_materials_transmission, _volume, _ior, _unlit,
 /// _emissive_strength.
@@ -68,7 +121,8 @@ struct Material {
   float alpha_cutoff = 0.5F;
   /// Where false, who looks from behind looks through (see shows_both_sides). glTF's own default is false.
   bool double_sided = true;
-  bool unlit = false;  ///< shows its base colour, whatever the light
+  bool unlit = false;                                    ///< shows its base colour, whatever the light
+  std::shared_ptr<const MaterialExtensions> extensions;  ///< null: none; copies share it
 };
 
 /// Whether a material is seen from behind its faces too. The wall of a volume always is: KHR_materials_volume gives

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cereal/archives/binary.hpp>
 #include <cereal/types/array.hpp>
 #include <cereal/types/optional.hpp>
@@ -60,6 +61,16 @@ void serialize(Archive& archive, Texture& t) {
 template <typename Archive>
 void serialize(Archive& archive, TextureRef& t) {
   archive(t.texture, t.uv_set, t.transform);
+}
+template <typename Archive>
+void serialize(Archive& archive, MaterialExtensions& e) {
+  archive(e.specular, e.specular_texture, e.specular_color, e.specular_color_texture, e.clearcoat, e.clearcoat_texture,
+          e.clearcoat_roughness, e.clearcoat_roughness_texture, e.clearcoat_normal_texture, e.clearcoat_normal_scale,
+          e.sheen_color, e.sheen_color_texture, e.sheen_roughness, e.sheen_roughness_texture, e.anisotropy,
+          e.anisotropy_rotation_radians, e.anisotropy_texture, e.iridescence, e.iridescence_texture, e.iridescence_ior,
+          e.iridescence_min_nm, e.iridescence_max_nm, e.iridescence_thickness_texture, e.dispersion,
+          e.diffuse_transmission, e.diffuse_transmission_texture, e.diffuse_transmission_color,
+          e.diffuse_transmission_color_texture);
 }
 template <typename Archive>
 void serialize(Archive& archive, Material& m) {
@@ -151,12 +162,37 @@ class SpanSource final : public std::streambuf {
   }
 };
 
-/// One serialize() both reads and writes; an output archive only reads.
-void save(const Scene& scene, std::streambuf& sink, bool with_names) {
+/// The material of each of its extensions stands before them: scenes without any add nothing to their hash.
+void save_extensions(const Scene& scene, cereal::BinaryOutputArchive& archive) {
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    if (!scene.materials[i].extensions) continue;
+    MaterialExtensions values = *scene.materials[i].extensions;
+    archive(static_cast<std::uint64_t>(i), values);
+  }
+}
+
+void load_extensions(Scene& scene, cereal::BinaryInputArchive& archive) {
+  std::uint64_t count = 0;
+  archive(count);
+  for (; count > 0; --count) {
+    std::uint64_t material = 0;
+    MaterialExtensions values;
+    archive(material, values);
+    scene.materials[material].extensions = std::make_shared<const MaterialExtensions>(values);
+  }
+}
+
+/// One serialize() both reads and writes; an output archive only reads. To be loaded again, or to be hashed.
+void save(const Scene& scene, std::streambuf& sink, bool to_load) {
   std::ostream stream(&sink);
   cereal::BinaryOutputArchive archive(stream);
-  if (with_names) archive(scene.node_names, scene.environment_note);
+  if (to_load) archive(scene.node_names, scene.environment_note);
   archive(const_cast<Scene&>(scene));
+  if (to_load) {
+    const auto extended = [](const Material& material) { return material.extensions != nullptr; };
+    archive(static_cast<std::uint64_t>(std::ranges::count_if(scene.materials, extended)));
+  }
+  save_extensions(scene, archive);
 }
 
 }  // namespace
@@ -173,6 +209,7 @@ Scene scene_from_bytes(std::span<const std::byte> bytes) {
   cereal::BinaryInputArchive archive(stream);
   Scene scene;
   archive(scene.node_names, scene.environment_note, scene);
+  load_extensions(scene, archive);
   return scene;
 }
 

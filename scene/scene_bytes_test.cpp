@@ -5,6 +5,7 @@
 #include <string>
 
 #include "scene/scene.h"
+#include "scene/scene_test_tools.h"
 
 namespace hpr {
 namespace {
@@ -47,6 +48,7 @@ Scene full_scene() {
   material.alpha_cutoff = 0.4F;
   material.double_sided = true;
   material.unlit = true;
+  material.extensions = std::make_shared<const MaterialExtensions>(test::full_extensions());
   scene.materials = {Material{}, material};
   Texture texture{.name = "texture", .image = Image<Rgba8>({2, 3}, {1, 2, 3, 4})};
   texture.wrap_s = Wrap::ClampToEdge;
@@ -76,6 +78,13 @@ Scene full_scene() {
   return scene;
 }
 
+template <typename Value>
+void extend(Scene& scene, Value MaterialExtensions::*member, const Value& value) {
+  MaterialExtensions extensions = *scene.materials[1].extensions;
+  extensions.*member = value;
+  scene.materials[1].extensions = std::make_shared<const MaterialExtensions>(extensions);
+}
+
 TEST(SceneBytes, ComeBackAsTheSameScene) {
   const Scene scene = full_scene();
   const auto bytes = to_bytes(scene);
@@ -94,6 +103,9 @@ TEST(SceneBytes, ComeBackAsTheSameScene) {
   ASSERT_TRUE(copy.environment.has_value());
   EXPECT_EQ(copy.environment->image, scene.environment->image);
   EXPECT_EQ(copy.lights[0].radius, 0.3);
+  EXPECT_FALSE(copy.materials[0].extensions);
+  ASSERT_TRUE(copy.materials[1].extensions);
+  EXPECT_EQ(*copy.materials[1].extensions, *scene.materials[1].extensions);
   EXPECT_EQ(copy.warnings, scene.warnings);
   EXPECT_EQ(copy.node_names, scene.node_names);
 }
@@ -144,6 +156,27 @@ TEST(ContentHash, ChangesWithEveryField) {
       {"alpha cutoff", [](Scene& s) { s.materials[1].alpha_cutoff = 0.9F; }},
       {"double sided", [](Scene& s) { s.materials[1].double_sided = false; }},
       {"unlit", [](Scene& s) { s.materials[1].unlit = false; }},
+      {"no extensions", [](Scene& s) { s.materials[1].extensions.reset(); }},
+      {"extensions of another", [](Scene& s) { s.materials[0].extensions.swap(s.materials[1].extensions); }},
+      {"specular", [](Scene& s) { extend(s, &MaterialExtensions::specular, 0.01F); }},
+      {"specular color", [](Scene& s) { extend(s, &MaterialExtensions::specular_color, glm::vec3(0.01F)); }},
+      {"clearcoat", [](Scene& s) { extend(s, &MaterialExtensions::clearcoat, 0.01F); }},
+      {"clearcoat roughness", [](Scene& s) { extend(s, &MaterialExtensions::clearcoat_roughness, 0.01F); }},
+      {"clearcoat scale", [](Scene& s) { extend(s, &MaterialExtensions::clearcoat_normal_scale, 0.01F); }},
+      {"sheen color", [](Scene& s) { extend(s, &MaterialExtensions::sheen_color, glm::vec3(0.01F)); }},
+      {"sheen roughness", [](Scene& s) { extend(s, &MaterialExtensions::sheen_roughness, 0.01F); }},
+      {"anisotropy", [](Scene& s) { extend(s, &MaterialExtensions::anisotropy, 0.01F); }},
+      {"anisotropy rotation", [](Scene& s) { extend(s, &MaterialExtensions::anisotropy_rotation_radians, 0.01F); }},
+      {"iridescence", [](Scene& s) { extend(s, &MaterialExtensions::iridescence, 0.01F); }},
+      {"iridescence index", [](Scene& s) { extend(s, &MaterialExtensions::iridescence_ior, 1.01F); }},
+      {"iridescence minimum", [](Scene& s) { extend(s, &MaterialExtensions::iridescence_min_nm, 0.01F); }},
+      {"iridescence maximum", [](Scene& s) { extend(s, &MaterialExtensions::iridescence_max_nm, 0.01F); }},
+      {"dispersion", [](Scene& s) { extend(s, &MaterialExtensions::dispersion, 0.01F); }},
+      {"diffuse transmission", [](Scene& s) { extend(s, &MaterialExtensions::diffuse_transmission, 0.01F); }},
+      {"diffuse transmission color",
+       [](Scene& s) { extend(s, &MaterialExtensions::diffuse_transmission_color, glm::vec3(0.01F)); }},
+      {"sheen texture", [](Scene& s) { extend(s, &MaterialExtensions::sheen_color_texture, TextureRef{}); }},
+      {"film texture", [](Scene& s) { extend(s, &MaterialExtensions::iridescence_thickness_texture, TextureRef{}); }},
       {"texture name", [](Scene& s) { s.textures[0].name += "x"; }},
       {"texel", [](Scene& s) { s.textures[0].image.at(1, 2).a = 5; }},
       {"texture shape",

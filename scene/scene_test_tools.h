@@ -37,4 +37,33 @@ namespace hpr::test {
   return {};
 }
 
+/// Extensions of which no value is the default.
+inline MaterialExtensions full_extensions() {
+  MaterialExtensions extensions;
+  extensions.specular = 0.9F;
+  extensions.specular_color = {0.1F, 2.0F, 0.3F};
+  extensions.clearcoat = 0.8F;
+  extensions.clearcoat_roughness = 0.7F;
+  extensions.clearcoat_normal_scale = -0.5F;
+  extensions.sheen_color = {0.2F, 0.3F, 0.4F};
+  extensions.sheen_roughness = 0.6F;
+  extensions.anisotropy = 0.5F;
+  extensions.anisotropy_rotation_radians = 1.5F;
+  extensions.iridescence = 0.4F;
+  extensions.iridescence_ior = 1.6F;
+  extensions.iridescence_min_nm = 50.0F;
+  extensions.iridescence_max_nm = 700.0F;
+  extensions.dispersion = 0.3F;
+  extensions.diffuse_transmission = 0.2F;
+  extensions.diffuse_transmission_color = {0.5F, 0.6F, 0.7F};
+  // Each with coordinates of its own.
+  std::uint32_t number = 0;
+  for (const TextureRef* texture : extensions.textures()) {
+    ++number;
+    const_cast<TextureRef&>(*texture) = {
+        0, number % 2, {1.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.25F * static_cast<float>(number)}};
+  }
+  return extensions;
+}
+
 }  // namespace hpr::test

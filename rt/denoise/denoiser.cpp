@@ -91,11 +91,13 @@ void Denoiser::add_vertices(const LightContext& context, std::span<const PathVer
     state = is_tap ? State::Tap : State::Alone;
     if (!is_tap) continue;
     seen.shading_normal = point.material.normal;
-    seen.width = std::clamp(static_cast<float>(point.material.roughness) / kSmooth, kMinWidth, 1.0F);
+    double roughness = point.material.roughness;
+    if (point.bsdf.present(Lobe::Coat)) roughness = std::min(roughness, point.bsdf.roughness(Lobe::Coat));
+    seen.width = std::clamp(static_cast<float>(roughness) / kSmooth, kMinWidth, 1.0F);
     seen.diffuse = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
     seen.specular = glm::vec3(0.0F);
     seen.separate_diffuse = seen.width < 1.0F && seen.diffuse != glm::vec3(0.0F) && knows_diffuse(context);
-    for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
+    for (const Lobe lobe : point.bsdf.lobes().subspan(1)) {
       seen.specular += glm::vec3(point.bsdf.weight(lobe));
       if (point.bsdf.present(lobe) && !context.follows_for_itself(point.bsdf, lobe)) seen.separate_diffuse = false;
     }

@@ -70,7 +70,7 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
   const PathVertex& point = wave_.vertices[index];
   glm::dvec3 scattered(0.0);
   if (!(light.pdf > 0.0)) {
-    scattered = point.bsdf.reflected(light.to_light) + point.bsdf.value(Lobe::Transmission, light.to_light);
+    scattered = point.bsdf.total(light.to_light);
   } else {
     scattered = shared_scattering(point, light);
   }
@@ -88,7 +88,7 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
 glm::dvec3 DirectLight::shared_scattering(const PathVertex& point, const LightSample& light) const {
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
-  for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
+  for (std::size_t lobe = 0; lobe < point.bsdf.lobes().size(); ++lobe) {
     const double weight = point.may_follow[lobe] ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
     scattered += weight * all.value[lobe];
   }

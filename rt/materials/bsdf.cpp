@@ -9,6 +9,8 @@
 #include <glm/mat3x3.hpp>
 #include <numbers>
 
+#include "rt/materials/extended_bsdf.h"
+#include "rt/materials/microfacets.h"
 #include "rt/sampling/sampling.h"
 
 namespace hpr {
@@ -23,60 +25,11 @@ constexpr double kWideAlpha = 0.05;
 constexpr double kEdgeOn = 1e-9;
 
 constexpr double square(double x) {
-  return x * x;
+  return squared(x);
 }
 
 double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
-}
-
-/// The share of a view's cosine that the sphere of directions is cut below, so that few facets that it shows mirror it
-/// into the surface: Eto and Tokuyoshi, "Bounded VNDF Sampling for Smith-GGX Reflections", 2023, equation 5.
-double mirrored_bound(double normal_view, double alpha2) {
-  const double reach2 = square(1.0 + std::sqrt(std::max(0.0, 1.0 - square(normal_view))));
-  return (1.0 - alpha2) * reach2 / (reach2 + alpha2 * square(normal_view));
-}
-
-/// A normal of GGX facets of roughness `alpha` that `view` sees, both around z: Dupuy and Benyoub, "Sampling Visible
-/// GGX Normals with Spherical Caps", 2023. The view, stretched with the facets, is half of the normal and a direction
-/// of the sphere's cap, of which `bound` is the depth in its own cosines: `fraction` of it down, `around` on its
-/// circle.
-glm::dvec3 visible_normal(const glm::dvec3& view, double alpha, double bound, double fraction,
-                          const glm::dvec2& around) {
-  const glm::dvec3 stretched = glm::normalize(glm::dvec3(alpha * view.x, alpha * view.y, view.z));
-  const double depth = bound * stretched.z;
-  const double z = 1.0 - fraction * (1.0 + depth);
-  const glm::dvec2 across = std::sqrt(std::max(0.0, 1.0 - z * z)) * around;
-  const glm::dvec3 sum(across.x + stretched.x, across.y + stretched.y, z + stretched.z);
-  const glm::dvec3 normal(alpha * sum.x, alpha * sum.y, std::max(0.0, sum.z));
-  const double length = glm::length(normal);
-  return length > 0.0 ? normal / length : glm::dvec3(0.0, 0.0, 1.0);
-}
-
-/// Fresnel's equations for unpolarised light that comes in `cosine` off the normal from a medium of index 1 to one of
-/// index `eta` (Born and Wolf, Principles of Optics, section 1.5). 1 where nothing gets through.
-double fresnel_exact(double cosine, double eta) {
-  const double sine2 = (1.0 - cosine * cosine) / (eta * eta);
-  if (!(sine2 < 1.0)) return 1.0;
-  const double refracted = std::sqrt(1.0 - sine2);
-  const double parallel = (eta * cosine - refracted) / (eta * cosine + refracted);
-  const double perpendicular = (cosine - eta * refracted) / (cosine + eta * refracted);
-  return 0.5 * (square(parallel) + square(perpendicular));
-}
-
-/// The share of even light from all sides that enters a medium of a higher index, relative to its own: 1 less the mean
-/// of fresnel_exact over the projected hemisphere (Egan and Hilgeman, "Optical Properties of Inhomogeneous Materials",
-/// 1979, appendix). Below 1.01, where the closed form loses its digits, less than 0.0032 is reflected: none is.
-double entering(double index) {
-  if (!(index > 1.01)) return 1.0;
-  const double n = std::min(index, 1e4);
-  const double n2 = square(n);
-  const double n4 = square(n2);
-  const double reflected = 0.5 + (n - 1.0) * (3.0 * n + 1.0) / (6.0 * square(n + 1.0)) +
-                           n2 * square((n2 - 1.0) / (n2 + 1.0)) / (n2 + 1.0) * std::log((n - 1.0) / (n + 1.0)) -
-                           2.0 * n * n2 * (n2 + 2.0 * n - 1.0) / ((n2 + 1.0) * (n4 - 1.0)) +
-                           8.0 * n4 * (n4 + 1.0) / ((n2 + 1.0) * square(n4 - 1.0)) * std::log(n);
-  return 1.0 - reflected;
 }
 
 }  // namespace
@@ -98,8 +51,14 @@ Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried c
     tint_ = (1.0 - metallic_) * material.transmission * (solid_ ? glm::sqrt(base_color_) : base_color_);
     eta_ = solid_ && surface.inside ? 1.0 / material.ior : material.ior;
     if (solid_ && carried == Carried::Radiance) squeeze_ = 1.0 / square(eta_);
+    if (material.channel != MaterialPoint::kAllChannels) {
+      glm::dvec3 chosen(0.0);
+      chosen[material.channel] = static_cast<double>(material.channel_scale) * tint_[material.channel];
+      tint_ = chosen;
+    }
   }
   look(surface.to_viewer, material.normal);
+  if (material.extensions) extended_ = std::make_shared<const ExtendedBsdf>(material, surface, carried);
 }
 
 /// Sets all that depends on the viewer.
@@ -118,6 +77,7 @@ void Bsdf::look(const glm::dvec3& to_viewer, const glm::dvec3& normal) {
 Bsdf Bsdf::seen_from(const glm::dvec3& to_viewer, const glm::dvec3& normal) const {
   Bsdf other = *this;
   other.look(to_viewer, normal);
+  if (extended_) other.extended_ = std::make_shared<const ExtendedBsdf>(extended_->seen_from(to_viewer, normal));
   return other;
 }
 
@@ -196,6 +156,11 @@ double Bsdf::below(const glm::dvec3& to_light, double dielectric) const {
 
 glm::dvec3 Bsdf::reflected(const glm::dvec3& to_light, bool diffuse, bool specular) const {
   glm::dvec3 result(0.0);
+  if (extended_) {
+    if (diffuse) result += extended_->value(Lobe::Diffuse, to_light);
+    if (specular) result += extended_->value(Lobe::Reflection, to_light) + extended_->value(Lobe::Coat, to_light);
+    return result;
+  }
   if (!scatters_ || !same_side(to_light)) return result;
   // Both directions lie on the normal's side, so their sum cannot vanish.
   const glm::dvec3 sum = view_ + to_light;
@@ -230,6 +195,8 @@ ReflectionTerms Bsdf::reflection_terms(bool diffuse, bool specular) const {
 }
 
 glm::dvec3 Bsdf::value(Lobe lobe, const glm::dvec3& to_light) const {
+  if (extended_) return extended_->value(lobe, to_light);
+  if (is_extension(lobe)) return glm::dvec3(0.0);
   if (lobe != Lobe::Transmission) return reflected(to_light, lobe == Lobe::Diffuse, lobe == Lobe::Reflection);
   if (is_delta(lobe)) return glm::dvec3(0.0);
   const auto at = facet(lobe, to_light);
@@ -254,6 +221,7 @@ double Bsdf::facet_pdf(Lobe lobe, const Facet& facet) const {
 }
 
 double Bsdf::pdf(Lobe lobe, const glm::dvec3& to_light) const {
+  if (extended_) return extended_->pdf(lobe, to_light);
   if (!present(lobe)) return 0.0;
   if (lobe == Lobe::Diffuse) {
     return same_side(to_light) ? glm::dot(normal_, to_light) / std::numbers::pi : 0.0;
@@ -271,6 +239,13 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
   constexpr auto kReflection = static_cast<std::size_t>(Lobe::Reflection);
   constexpr auto kTransmission = static_cast<std::size_t>(Lobe::Transmission);
   Scattering all;
+  if (extended_) {
+    for (const Lobe lobe : kLobes) {
+      all.value[static_cast<std::size_t>(lobe)] = extended_->value(lobe, to_light);
+      all.pdf[static_cast<std::size_t>(lobe)] = extended_->pdf(lobe, to_light);
+    }
+    return all;
+  }
   if (!scatters_) return all;
   if (!same_side(to_light)) {
     all.value[kTransmission] = value(Lobe::Transmission, to_light);
@@ -291,7 +266,8 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
 }
 
 bool Bsdf::present(Lobe lobe) const {
-  if (!scatters_) return false;
+  if (extended_) return extended_->present(lobe);
+  if (!scatters_ || is_extension(lobe)) return false;
   if (lobe == Lobe::Reflection) return reflects_ || metallic_ > 0.0;
   if (lobe == Lobe::Transmission) return largest(tint_) > 0.0;
   return !all_mirror_ && diffuse_ * largest(base_color_) > 0.0 && (!exact_ || view_enters_ > 0.0);
@@ -309,7 +285,8 @@ double Bsdf::facet_share(Lobe lobe) const {
   double sum = 0.0;
   for (const double fraction : kFractions) {
     for (const glm::dvec2& around : kAround) {
-      const double reflected = dielectric_fresnel(glm::dot(view, visible_normal(view, alpha, 1.0, fraction, around)));
+      const double reflected =
+          dielectric_fresnel(glm::dot(view, visible_normal(view, glm::dvec2(alpha), 1.0, fraction, around)));
       sum += square(lobe == Lobe::Reflection ? reflected : 1.0 - reflected);
     }
   }
@@ -318,6 +295,7 @@ double Bsdf::facet_share(Lobe lobe) const {
 }
 
 glm::dvec3 Bsdf::weight(Lobe lobe) const {
+  if (extended_) return extended_->weight(lobe);
   if (!present(lobe)) return glm::dvec3(0.0);
   const bool single = is_delta(lobe);
   if (lobe == Lobe::Reflection) {
@@ -334,6 +312,7 @@ glm::dvec3 Bsdf::weight(Lobe lobe) const {
 }
 
 bool Bsdf::is_delta(Lobe lobe) const {
+  if (extended_) return extended_->is_delta(lobe);
   if (lobe == Lobe::Diffuse) return false;
   if (roughness_ < kDeltaRoughness) return true;
   // Facets of almost the same index on both sides bend light by less than their own slope.
@@ -361,7 +340,8 @@ std::optional<BsdfSample> Bsdf::sample_diffuse(const glm::dvec2& u) const {
 std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) const {
   const glm::dmat3 frame = warp::basis_about(normal_);
   const double bound = lobe == Lobe::Reflection ? bounded_view_ / normal_view_ : 1.0;
-  const glm::dvec3 half = frame * visible_normal(view_ * frame, square(roughness_), bound, u.x, warp::on_circle(u.y));
+  const glm::dvec3 half =
+      frame * visible_normal(view_ * frame, glm::dvec2(square(roughness_)), bound, u.x, warp::on_circle(u.y));
   const double view_half = glm::dot(view_, half);
   const glm::dvec3 reflected = 2.0 * view_half * half - view_;
   BsdfSample sample;
@@ -408,7 +388,12 @@ std::optional<BsdfSample> Bsdf::sample_single(Lobe lobe) const {
   return sample;
 }
 
+double Bsdf::roughness(Lobe lobe) const {
+  return extended_ ? extended_->roughness(lobe) : roughness_;
+}
+
 std::optional<BsdfSample> Bsdf::sample(Lobe lobe, const glm::dvec2& u) const {
+  if (extended_) return extended_->sample(lobe, u);
   if (!present(lobe)) return std::nullopt;
   if (lobe == Lobe::Diffuse) return sample_diffuse(u);
   return is_delta(lobe) ? sample_single(lobe) : sample_facet(lobe, u);

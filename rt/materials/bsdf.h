@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
+#include <span>
 
 #include "rt/materials/material_point.h"
 #include "rt/trace/surfaces.h"
@@ -13,11 +15,26 @@ namespace hpr {
 
 /// The ways light leaves a surface. Each pass has its own.
 enum class Lobe : std::uint8_t {
-  Diffuse,       ///< Lambert's
-  Reflection,    ///< of the specular layer or metal: a mirror below Bsdf::kDeltaRoughness, else GGX
-  Transmission,  ///< through the surface: refracted when solid, straight on when thin; GGX when rough
+  Diffuse,              ///< Lambert's
+  Reflection,           ///< of the specular layer or metal: a mirror below Bsdf::kDeltaRoughness, else GGX
+  Transmission,         ///< through the surface: refracted when solid, straight on when thin; GGX when rough
+  Coat,                 ///< reflection of KHR_materials_clearcoat, by a normal and a roughness of its own
+  DiffuseTransmission,  ///< KHR_materials_diffuse_transmission: Lambert's law on the other side
 };
-inline constexpr std::array<Lobe, 3> kLobes{Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission};
+inline constexpr std::array<Lobe, 5> kLobes{Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat,
+                                            Lobe::DiffuseTransmission};
+
+/// Whether only surfaces with extensions have the lobe.
+[[nodiscard]] constexpr bool is_extension(Lobe lobe) {
+  return lobe == Lobe::Coat || lobe == Lobe::DiffuseTransmission;
+}
+
+/// The lobe that the passes treat as they do `lobe`, which only surfaces with extensions have.
+[[nodiscard]] constexpr Lobe extension_of(Lobe lobe) {
+  return lobe == Lobe::Transmission ? Lobe::DiffuseTransmission : Lobe::Coat;
+}
+
+class ExtendedBsdf;
 
 /// Whether radiance (towards the eye) or flux (photons, away from lights) is carried: refraction squeezes radiance by
 /// the square of the relative index (Veach 1997, section 5.2).
@@ -100,14 +117,29 @@ class Bsdf {
   /// Whether the surface has the lobe at all.
   [[nodiscard]] bool present(Lobe lobe) const;
   /// The normal that lights are chosen by: zero where they may shine through.
-  [[nodiscard]] glm::dvec3 light_normal() const { return present(Lobe::Transmission) ? glm::dvec3(0.0) : normal_; }
+  [[nodiscard]] glm::dvec3 light_normal() const {
+    if (extended_ && present(Lobe::DiffuseTransmission)) return glm::dvec3(0.0);
+    return present(Lobe::Transmission) ? glm::dvec3(0.0) : normal_;
+  }
   /// About the share of light that the lobe scatters towards the viewer: for choosing among lobes. Exact for lobes of
   /// one direction; for others never so low that a sample's weight, refraction's squeeze apart, is over 50 times as
   /// much. Zero exactly where the lobe is absent.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
   /// Whether the lobe has a single direction: a perfect mirror, clear glass, rough glass of an index of almost 1.
   [[nodiscard]] bool is_delta(Lobe lobe) const;
-  [[nodiscard]] double roughness() const { return roughness_; }
+  /// Of the facets of a specular lobe.
+  [[nodiscard]] double roughness(Lobe lobe = Lobe::Reflection) const;
+  /// Whether the material has extensions that change it (see ExtendedBsdf).
+  [[nodiscard]] bool is_extended() const { return extended_ != nullptr; }
+  /// All lobes that the surface may have.
+  [[nodiscard]] std::span<const Lobe> lobes() const { return std::span(kLobes).first(extended_ ? kLobes.size() : 3); }
+  /// f of all lobes: 1/sr.
+  [[nodiscard]] glm::dvec3 total(const glm::dvec3& to_light) const {
+    const glm::dvec3 base = reflected(to_light) + value(Lobe::Transmission, to_light);
+    return extended_ ? base + value(Lobe::DiffuseTransmission, to_light) : base;
+  }
+  /// Fresnel's term of the dielectric without its extensions, `cosine` off the normal.
+  [[nodiscard]] double dielectric_fresnel(double cosine) const;
 
   /// Below it a specular lobe is narrower than 1e-6 rad and has one direction.
   static constexpr double kDeltaRoughness = 1e-3;
@@ -126,7 +158,6 @@ class Bsdf {
   [[nodiscard]] bool same_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool other_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }
-  [[nodiscard]] double dielectric_fresnel(double cosine) const;
   [[nodiscard]] glm::dvec3 fresnel(double cosine, double dielectric) const;
   [[nodiscard]] double below(const glm::dvec3& to_light, double dielectric) const;
   [[nodiscard]] double distribution(const glm::dvec3& half) const;
@@ -161,7 +192,8 @@ class Bsdf {
   bool reflects_ = true;     ///< has a specular layer at all
   bool all_mirror_ = false;  ///< an index of 0
   bool unlit_ = false;
-  bool scatters_ = true;  ///< neither unlit nor seen edge-on
+  bool scatters_ = true;                          ///< neither unlit nor seen edge-on
+  std::shared_ptr<const ExtendedBsdf> extended_;  ///< stands for all of this where the material has extensions
 };
 
 }  // namespace hpr

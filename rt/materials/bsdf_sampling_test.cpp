@@ -191,6 +191,68 @@ TEST(BsdfSampling, DirectionsOutOfGlassFollowTheirDensity) {
   expect_all(test::glass(0.7, 3.0), Lobe::Transmission, true, "out of dense glass");
 }
 
+TEST(BsdfSampling, DirectionsOfExtensionsFollowTheirDensity) {
+  ExtensionPoint coat;
+  coat.clearcoat = 0.7;
+  coat.clearcoat_normal = direction(0.1, 2.5);
+  ExtensionPoint leaf;
+  leaf.diffuse_transmission = 0.4;
+  leaf.sheen_color = glm::dvec3(0.3);
+  ExtensionPoint brushed;
+  brushed.anisotropy = 0.8;
+  brushed.anisotropy_direction = {0.6, 0.8, 0.0};
+  ExtensionPoint film;
+  film.iridescence = 1.0;
+  film.iridescence_nm = 300.0;
+  film.specular = 0.6;
+  for (const double roughness : {0.2, 0.7}) {
+    coat.clearcoat_roughness = roughness;
+    expect_all(test::extended(test::dielectric(roughness, 0.6), coat), Lobe::Coat, false, "coat");
+    expect_all(test::extended(test::metal(roughness, 0.9), brushed), Lobe::Reflection, false, "brushed metal");
+  }
+  expect_all(test::extended(test::dielectric(0.5, 0.6), leaf), Lobe::DiffuseTransmission, false, "leaf");
+  expect_all(test::extended(test::dielectric(0.3, 0.6), film), Lobe::Reflection, false, "film");
+  expect_all(test::extended(test::glass(0.4), film), Lobe::Transmission, false, "glass under a film");
+}
+
+/// A part of whose directions comes from all over the hemisphere, up to its edge: in bins of equal area.
+TEST(BsdfSampling, DirectionsOfSheenFollowTheirDensity) {
+  constexpr int kRings = 16;
+  constexpr int kSteps = 16;
+  ExtensionPoint sheen;
+  sheen.sheen_color = {0.9, 0.4, 0.1};
+  sheen.sheen_roughness = 0.6;
+  for (const double polar : kAngles) {
+    const Bsdf bsdf = bsdf_of(test::extended(test::dielectric(0.5, 0.6), sheen), direction(polar, 0.4));
+    std::vector<double> expected;
+    for (int ring = 0; ring < kRings; ++ring) {
+      double sum = 0.0;
+      for (int step = 0; step < kSteps; ++step) {
+        sum += bsdf.pdf(Lobe::Diffuse, direction(std::acos((ring + (step + 0.5) / kSteps) / kRings), 1.0));
+      }
+      expected.insert(expected.end(), kSectors, sum / kSteps * 2.0 * std::numbers::pi / (kRings * kSectors));
+    }
+    expected.push_back(0.0);
+    std::vector<int> counted(expected.size(), 0);
+    double estimate = 0.0;
+    for (std::uint32_t i = 0; i < kSamples; ++i) {
+      Sampler random(0x9E3779B97F4A7C15U * (i + 1), 0);
+      const auto sample = bsdf.sample(Lobe::Diffuse, random.two());
+      ASSERT_TRUE(sample);
+      const glm::dvec3& d = sample->direction;
+      const double around = std::atan2(d.y, d.x) / (2.0 * std::numbers::pi) + 0.5;
+      const int sector = std::min(static_cast<int>(around * kSectors), kSectors - 1);
+      ++counted[static_cast<std::size_t>(std::min(static_cast<int>(d.z * kRings), kRings - 1) * kSectors + sector)];
+      ASSERT_NEAR(sample->weight.r, bsdf.value(Lobe::Diffuse, d).r * d.z / sample->pdf, 1e-9);
+      ASSERT_LT(sample->weight.r, 16.0);
+      estimate += sample->weight.r / kSamples;
+    }
+    SCOPED_TRACE(polar);
+    expect_plausible(expected, counted);
+    EXPECT_LT(estimate, 1.0);
+  }
+}
+
 TEST(BsdfSampling, DensitiesHoldUnderATiltedShadingNormal) {
   for (const Lobe lobe : {Lobe::Diffuse, Lobe::Reflection}) {
     SurfacePoint surface = test::seen_from(direction(0.6, 0.4));

@@ -104,11 +104,10 @@ glm::dvec4 texel_of(const Scene& scene, const TextureRef& reference, Encoding en
 
 /// What a normal map of tangent space makes of the normal; the unmapped one where the result turns away from the viewer
 /// or has no direction.
-glm::dvec3 mapped_normal(const Scene& scene, const Material& material, const SurfacePoint& surface) {
+glm::dvec3 mapped_normal(const Scene& scene, const TextureRef& map, double scale, const SurfacePoint& surface) {
   const glm::dvec3& plain = surface.facing_normal();
   if (surface.tangent == glm::dvec3(0.0)) return plain;
-  const glm::dvec3 texel(texel_of(scene, material.normal_texture, Encoding::Linear, surface.uv));
-  const double scale = material.normal_scale;
+  const glm::dvec3 texel(texel_of(scene, map, Encoding::Linear, surface.uv));
   const glm::dvec3 local = (2.0 * texel - 1.0) * glm::dvec3(scale, scale, 1.0);
   const glm::dvec3 mapped = local.x * surface.tangent + local.y * surface.bitangent + local.z * surface.shading_normal;
   const double length = glm::length(mapped);
@@ -133,7 +132,28 @@ glm::dvec3 absorption_of(const Material& material) {
 
 glm::dvec3 normal_to_shade_with(const Scene& scene, const SurfacePoint& surface) {
   const Material& material = scene.materials[surface.material];
-  return material.normal_texture.present() ? mapped_normal(scene, material, surface) : surface.facing_normal();
+  return material.normal_texture.present()
+             ? mapped_normal(scene, material.normal_texture, material.normal_scale, surface)
+             : surface.facing_normal();
+}
+
+glm::dvec3 coat_normal_to_shade_with(const Scene& scene, const SurfacePoint& surface) {
+  const Material& material = scene.materials[surface.material];
+  if (!material.extensions || !material.extensions->clearcoat_normal_texture.present()) return surface.facing_normal();
+  return mapped_normal(scene, material.extensions->clearcoat_normal_texture,
+                       material.extensions->clearcoat_normal_scale, surface);
+}
+
+void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, double u) {
+  const double sum = throughput.r + throughput.g + throughput.b;
+  if (!(sum > 0.0) || !std::isfinite(sum)) return;
+  int channel = 0;
+  double left = u * sum;
+  while (channel < 2 && left >= throughput[channel]) left -= throughput[channel++];
+  while (!(throughput[channel] > 0.0)) --channel;  // where rounding led past the last one with a share
+  material.channel = static_cast<std::uint8_t>(channel);
+  material.channel_scale = static_cast<float>(sum / throughput[channel]);
+  material.ior = std::max(material.ior + (channel - 1) * material.ior_spread, 1.0);
 }
 
 void prefetch_material(const Scene& scene, const SurfacePoint& surface) {
@@ -146,6 +166,110 @@ void prefetch_material(const Scene& scene, const SurfacePoint& surface) {
     prefetch_texture(scene.textures[static_cast<std::size_t>(reference->texture)], transformed_uv(*reference, set));
   }
 }
+
+namespace {
+
+/// Of unit length, tangent to the surface, rotated and textured as KHR_materials_anisotropy has it.
+glm::dvec3 anisotropy_direction(const MaterialExtensions& from, const SurfacePoint& surface, const glm::dvec3& normal,
+                                const glm::dvec2& texel) {
+  const double angle = from.anisotropy_rotation_radians;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  const glm::dvec2 rotated(c * texel.x - s * texel.y, s * texel.x + c * texel.y);
+  glm::dvec3 direction = rotated.x * surface.tangent + rotated.y * surface.bitangent;
+  direction -= glm::dot(direction, normal) * normal;
+  const double length = glm::length(direction);
+  if (length > 1e-6) return direction / length;
+  const glm::dvec3 axis = std::abs(normal.x) < 0.9 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
+  return glm::normalize(glm::cross(normal, axis));
+}
+
+/// Reads a surface's extensions: those of what lies on the material, and of the material itself.
+class ExtensionReader {
+ public:
+  ExtensionReader(const Scene& scene, const SurfacePoint& surface, const MaterialExtensions& from)
+      : scene_(scene), surface_(surface), from_(from) {}
+
+  [[nodiscard]] ExtensionPoint read(const glm::dvec3& normal) const {
+    ExtensionPoint point;
+    point.specular = share(from_.specular, from_.specular_texture, 3);
+    point.specular_color = color(from_.specular_color, from_.specular_color_texture);
+    point.clearcoat = share(from_.clearcoat, from_.clearcoat_texture, 0);
+    if (point.clearcoat > 0.0) {
+      point.clearcoat_roughness = share(from_.clearcoat_roughness, from_.clearcoat_roughness_texture, 1);
+      point.clearcoat_normal = coat_normal_to_shade_with(scene_, surface_);
+    }
+    point.sheen_color = glm::min(color(from_.sheen_color, from_.sheen_color_texture), 1.0);
+    if (point.sheen_color != glm::dvec3(0.0)) {
+      point.sheen_roughness = share(from_.sheen_roughness, from_.sheen_roughness_texture, 3);
+    }
+    point.iridescence = share(from_.iridescence, from_.iridescence_texture, 0);
+    if (point.iridescence > 0.0) read_film(point);
+    if (from_.anisotropy > 0.0F) read_anisotropy(normal, point);
+    point.diffuse_transmission = share(from_.diffuse_transmission, from_.diffuse_transmission_texture, 3);
+    if (point.diffuse_transmission > 0.0) {
+      point.diffuse_transmission_color =
+          glm::min(color(from_.diffuse_transmission_color, from_.diffuse_transmission_color_texture), 1.0);
+    }
+    return point;
+  }
+
+ private:
+  [[nodiscard]] double share(float factor, const TextureRef& reference, int channel) const {
+    double value = factor;
+    if (reference.present() && value > 0.0) {
+      value *= texel_of(scene_, reference, Encoding::Linear, surface_.uv)[channel];
+    }
+    return std::clamp(value, 0.0, 1.0);
+  }
+  [[nodiscard]] glm::dvec3 color(const glm::vec3& factor, const TextureRef& reference) const {
+    const glm::dvec3 value(factor);
+    if (!reference.present() || value == glm::dvec3(0.0)) return value;
+    return value * glm::dvec3(texel_of(scene_, reference, Encoding::Srgb, surface_.uv));
+  }
+  void read_film(ExtensionPoint& point) const {
+    const TextureRef& texture = from_.iridescence_thickness_texture;
+    const double between = texture.present() ? texel_of(scene_, texture, Encoding::Linear, surface_.uv).g : 1.0;
+    point.iridescence_ior = from_.iridescence_ior;
+    point.iridescence_nm = from_.iridescence_min_nm * (1.0 - between) + from_.iridescence_max_nm * between;
+  }
+  void read_anisotropy(const glm::dvec3& normal, ExtensionPoint& point) const {
+    glm::dvec4 texel(1.0, 0.5, 1.0, 1.0);
+    if (from_.anisotropy_texture.present()) {
+      texel = texel_of(scene_, from_.anisotropy_texture, Encoding::Linear, surface_.uv);
+    }
+    point.anisotropy = std::clamp(from_.anisotropy * texel.b, 0.0, 1.0);
+    point.anisotropy_direction =
+        anisotropy_direction(from_, surface_, normal, 2.0 * glm::dvec2(texel.r, texel.g) - 1.0);
+  }
+
+  const Scene& scene_;
+  const SurfacePoint& surface_;
+  const MaterialExtensions& from_;
+};
+
+bool has_effect(const ExtensionPoint& point) {
+  return point.specular != 1.0 || point.specular_color != glm::dvec3(1.0) || point.clearcoat > 0.0 ||
+         point.sheen_color != glm::dvec3(0.0) || point.anisotropy > 0.0 || point.iridescence > 0.0 ||
+         point.diffuse_transmission > 0.0;
+}
+
+/// Dispersion as the extension has it: indices of the lines C, d and F for red, green and blue.
+void add_extensions(const Scene& scene, const SurfacePoint& surface, const Material& material, MaterialPoint& point) {
+  const MaterialExtensions& from = *material.extensions;
+  constexpr double kHalfOfTwentieth = 0.025;
+  if (material.thickness > 0.0F && point.ior > 1.0) {
+    point.ior_spread = kHalfOfTwentieth * static_cast<double>(from.dispersion) * (point.ior - 1.0);
+  }
+  const ExtensionPoint read = ExtensionReader(scene, surface, from).read(point.normal);
+  if (!has_effect(read)) return;
+  point.extensions = std::make_shared<const ExtensionPoint>(read);
+  if (!(read.diffuse_transmission > 0.0) || !(material.thickness > 0.0F)) return;
+  point.solid = true;
+  point.absorption = absorption_of(material);
+}
+
+}  // namespace
 
 MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface) {
   const Material& material = scene.materials[surface.material];
@@ -183,6 +307,7 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   }
   // What is not there for who looks from behind sends no light there either.
   if (surface.inside && !shows_both_sides(material)) point.emission = glm::dvec3(0.0);
+  if (material.extensions) add_extensions(scene, surface, material, point);
   if (!(material.transmission > 0.0F)) return point;
   double transmission = material.transmission;
   if (material.transmission_texture.present()) {

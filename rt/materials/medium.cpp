@@ -17,7 +17,8 @@ namespace {
 constexpr glm::dvec3 kLine{0.31830988618, 0.91596559417, 0.24404084512};
 
 bool is_solid(const Material& material) {
-  return material.transmission > 0.0F && material.thickness > 0.0F && !material.unlit;
+  const bool diffuse = material.extensions && material.extensions->diffuse_transmission > 0.0F;
+  return (material.transmission > 0.0F || diffuse) && material.thickness > 0.0F && !material.unlit;
 }
 
 bool is_absorber(const Material& material) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <string>
 
 #include "rt/materials/bsdf.h"
@@ -56,6 +57,11 @@ inline MaterialPoint glass(double roughness, double ior = 1.5) {
 inline MaterialPoint sheet(double roughness, double ior = 1.5) {
   MaterialPoint material = glass(roughness, ior);
   material.solid = false;
+  return material;
+}
+
+inline MaterialPoint extended(MaterialPoint material, const ExtensionPoint& extensions) {
+  material.extensions = std::make_shared<const ExtensionPoint>(extensions);
   return material;
 }
 

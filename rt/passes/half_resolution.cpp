@@ -117,7 +117,9 @@ void HalfResShading::choose(std::vector<PathVertex>& points, int first_row) {
     upsampled_.push_back(feature);
     point.upsampled = shared_;
     for (const PassInfo* const pass : passes_) {
-      if (pass->lobe) point.lobe_weights.at(static_cast<std::size_t>(*pass->lobe)) = 0.0F;
+      if (!pass->lobe) continue;
+      point.lobe_weights.at(static_cast<std::size_t>(*pass->lobe)) = 0.0F;
+      point.lobe_weights.at(static_cast<std::size_t>(extension_of(*pass->lobe))) = 0.0F;
     }
   }
 }

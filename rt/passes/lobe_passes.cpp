@@ -22,7 +22,9 @@ class ReflectionPass final : public Pass {
   void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
                std::vector<PathVertex>& next) const override {
     const PassInfo& pass = info_of(PassId::Reflection);
-    follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
+    for (const Lobe lobe : {*pass.lobe, extension_of(*pass.lobe)}) {
+      follow_lobe(context, wave, pass, lobe, buffers, sums, next);
+    }
   }
 };
 
@@ -36,7 +38,9 @@ class RefractionPass final : public Pass {
   void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
                std::vector<PathVertex>& next) const override {
     const PassInfo& pass = info_of(PassId::Refraction);
-    follow_lobe(context, wave, pass, *pass.lobe, buffers, sums, next);
+    for (const Lobe lobe : {*pass.lobe, extension_of(*pass.lobe)}) {
+      follow_lobe(context, wave, pass, lobe, buffers, sums, next);
+    }
   }
 };
 

@@ -14,8 +14,14 @@
 namespace hpr {
 namespace {
 
+/// Of a lobe and the one that extensions add to it.
+glm::dvec3 weight_of(const PathVertex& point, Lobe lobe) {
+  const glm::dvec3 weight = point.bsdf.weight(lobe);
+  return point.bsdf.is_extended() ? weight + point.bsdf.weight(extension_of(lobe)) : weight;
+}
+
 glm::dvec3 diffuse_and_specular(const PathVertex& point) {
-  return point.bsdf.weight(Lobe::Diffuse) + point.bsdf.weight(Lobe::Reflection);
+  return point.bsdf.weight(Lobe::Diffuse) + weight_of(point, Lobe::Reflection);
 }
 
 constexpr std::array<PassInfo, kPasses> kAllPasses{
@@ -40,7 +46,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .lobe = Lobe::Reflection,
         .half_resolution = {set_of(Component::Reflection),
                             [](const PathVertex& point, double /*glossy_cutoff*/) {
-                              return point.bsdf.weight(Lobe::Reflection);
+                              return weight_of(point, Lobe::Reflection);
                             }},
         .required_by = &Requirements::reflection,
         .make = make_reflection_pass,
@@ -53,7 +59,7 @@ constexpr std::array<PassInfo, kPasses> kAllPasses{
         .lobe = Lobe::Transmission,
         .half_resolution = {set_of(Component::Refraction),
                             [](const PathVertex& point, double /*glossy_cutoff*/) {
-                              return point.bsdf.weight(Lobe::Transmission);
+                              return weight_of(point, Lobe::Transmission);
                             }},
         .required_by = &Requirements::refraction,
         .make = make_refraction_pass,

@@ -200,7 +200,8 @@ constexpr int kMaxGathered = 256;
 void choose_lobes(const LightContext& context, PathVertex& point) {
   std::array<double, kLobes.size()> sums{};
   double sum = 0.0;
-  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+  const auto lobes = point.bsdf.lobes();
+  for (std::size_t i = 0; i < lobes.size(); ++i) {
     const bool ends = point.followed >= context.settings.max_depth && context.follows_for_itself(point.bsdf, kLobes[i]);
     if (point.depth == 0) {
       point.may_follow[i] = !ends && point.bsdf.present(kLobes[i]);
@@ -215,8 +216,34 @@ void choose_lobes(const LightContext& context, PathVertex& point) {
   const double chance = point.depth < kRouletteDepth ? 1.0 : std::min(sum, 1.0);
   const double u = point.sampler.one() / chance;
   if (!(u < 1.0)) return;
-  const DiscreteSample picked = sample_discrete(sums, u);
+  const DiscreteSample picked = sample_discrete(std::span(sums).first(lobes.size()), u);
   point.lobe_weights[picked.index] = static_cast<float>(1.0 / (picked.probability * chance));
+}
+
+/// Which lobes of a surface with extensions passes of their own follow: all of those they can, and where a plain one
+/// would choose, one by chance, in proportion to its light, but none seldom.
+void choose_followed(const LightContext& context, PathVertex& point) {
+  std::array<double, kLobes.size()> bright{};
+  double sum = 0.0;
+  for (const Lobe lobe : point.bsdf.lobes()) {
+    const auto i = static_cast<std::size_t>(lobe);
+    if (!context.follows_for_itself(point.bsdf, lobe)) continue;
+    bright[i] = brightness(point.throughput * point.bsdf.weight(lobe));
+    point.may_follow[i] = bright[i] > 0.0;
+    point.lobe_weights[i] = static_cast<float>(russian_roulette_weight(bright[i], point.sampler));
+    sum += bright[i];
+  }
+  if (point.depth < kChoosingDepth || std::ranges::count(point.may_follow, true) < 2) return;
+  constexpr double kMinFraction = 0.1;
+  std::array<double, kLobes.size()> sums{};
+  double total = 0.0;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    sums[i] = total += point.may_follow[i] ? bright[i] + kMinFraction * sum : 0.0;
+  }
+  const DiscreteSample picked = sample_discrete(sums, point.sampler.one());
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    point.lobe_weights[i] *= i == picked.index ? static_cast<float>(1.0 / picked.probability) : 0.0F;
+  }
 }
 
 /// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
@@ -335,12 +362,14 @@ Component component_after(const PathVertex& point, Component first) {
 void finish_vertex(const LightContext& context, PathVertex& point, double metres) {
   point.material = evaluate_material(context.scene, point.surface);
   if (metres > 0.0) point.throughput *= transmittance_to(point.media, point.surface, point.material, metres);
+  if (disperses(point.material)) choose_channel(point.material, point.throughput, point.sampler.one());
   point.bsdf = Bsdf(point.material, point.surface);
   if (context.gathers) {
     if (point.depth < kMaxGathered) choose_lobes(context, point);
     return;
   }
   if (point.depth >= context.settings.max_depth) return;
+  if (point.bsdf.is_extended()) return choose_followed(context, point);
   std::array<double, kLobes.size()> bright{};
   for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
     const auto i = static_cast<std::size_t>(lobe);

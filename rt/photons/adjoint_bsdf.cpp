@@ -20,6 +20,7 @@ double chance_of_plain(const SurfacePoint& surface, const glm::dvec3& shading_no
   // About the true surface a diffuse lobe is as wide as all that is ever seen of it.
   if (lobe == Lobe::Diffuse) return 1.0;
   if (lobe == Lobe::Transmission) return 0.25;
+  if (lobe == Lobe::DiffuseTransmission) return 1.0;
   const glm::dvec3& geometric = surface.geometric_normal;
   const glm::dvec3 reflected = 2.0 * glm::dot(surface.to_viewer, geometric) * geometric - surface.to_viewer;
   if (!(glm::dot(reflected, shading_normal) > 0.0)) return 0.5;
@@ -49,6 +50,10 @@ AdjointBsdf::AdjointBsdf(const Scene& scene, const Surfaces& surfaces, const Flu
     if (at.bsdf.present(lobe) && at.bsdf.is_delta(lobe) && !is_plain(lobe)) {
       directions_[lobe == Lobe::Transmission ? 1 : 0] = find_directions(lobe);
     }
+  }
+  if (at.bsdf.is_extended() && at.bsdf.is_delta(Lobe::Coat)) {
+    coat_directions_ =
+        std::make_unique<const Directions>(at.bsdf.present(Lobe::Coat) ? find_directions(Lobe::Coat) : Directions{});
   }
 }
 
@@ -87,6 +92,20 @@ SurfacePoint AdjointBsdf::seen_from(const glm::dvec3& direction) const {
   return seen;
 }
 
+/// The material as an eye sees it, of the channel of light that was chosen here.
+MaterialPoint AdjointBsdf::material_at(const SurfacePoint& seen) const {
+  MaterialPoint material = evaluate_material(scene_, seen);
+  material.channel = at_.material.channel;
+  material.channel_scale = at_.material.channel_scale;
+  material.ior = at_.material.ior;
+  return material;
+}
+
+/// The normal that an eye shades a lobe with.
+glm::dvec3 AdjointBsdf::normal_of(Lobe lobe, const SurfacePoint& seen) const {
+  return lobe == Lobe::Coat ? coat_normal_to_shade_with(scene_, seen) : normal_to_shade_with(scene_, seen);
+}
+
 /// f times its cosine, as an eye in `direction` has it for light from `surface.to_viewer`, brought to flux: 1/sr.
 glm::dvec3 AdjointBsdf::scattered(Lobe lobe, const glm::dvec3& direction) const {
   const glm::dvec3& light = at_.surface.to_viewer;
@@ -95,8 +114,8 @@ glm::dvec3 AdjointBsdf::scattered(Lobe lobe, const glm::dvec3& direction) const 
   if (!(falls > 0.0)) return glm::dvec3(0.0);
   const double leaves = std::abs(glm::dot(direction, geometric)) / falls;
   const SurfacePoint seen = seen_from(direction);
-  if (lobe == Lobe::Transmission) {
-    const MaterialPoint material = evaluate_material(scene_, seen);
+  if (lobe == Lobe::Transmission || at_.bsdf.is_extended()) {
+    const MaterialPoint material = material_at(seen);
     return Bsdf(material, seen).value(lobe, light) * (std::abs(glm::dot(light, material.normal)) * leaves);
   }
   const glm::dvec3 normal = normal_to_shade_with(scene_, seen);
@@ -116,7 +135,7 @@ std::optional<BsdfSample> AdjointBsdf::sample_wide(Lobe lobe, Sampler& sampler) 
 }
 
 /// The way by one normal, for light that arrives as it is, or as it was before an eye's ray was put back on its side.
-FluxDirection AdjointBsdf::direction_by(const glm::dvec3& arrived, const glm::dvec3& normal,
+FluxDirection AdjointBsdf::direction_by(Lobe lobe, const glm::dvec3& arrived, const glm::dvec3& normal,
                                         std::optional<double> eta) const {
   const glm::dvec3& geometric = at_.surface.geometric_normal;
   const double falls = glm::dot(at_.surface.to_viewer, geometric);
@@ -126,10 +145,9 @@ FluxDirection AdjointBsdf::direction_by(const glm::dvec3& arrived, const glm::dv
   if (eta ? !(leaves < 0.0) : !(leaves > 0.0)) return {};
   const SurfacePoint seen = seen_from(*direction);
   const glm::dvec3 facing = eta ? -normal : normal;
-  if (glm::distance(normal_to_shade_with(scene_, seen), facing) > kSame) return {};
-  const Bsdf bsdf(evaluate_material(scene_, seen), seen, Carried::Flux);
+  if (glm::distance(normal_of(lobe, seen), facing) > kSame) return {};
+  const Bsdf bsdf(material_at(seen), seen, Carried::Flux);
   const double squeezed = glm::dot(arrived, normal) / std::abs(glm::dot(*direction, normal));
-  const Lobe lobe = eta ? Lobe::Transmission : Lobe::Reflection;
   return {*direction, bsdf.weight(lobe) * (squeezed * std::abs(leaves) / falls)};
 }
 
@@ -140,15 +158,16 @@ AdjointBsdf::Directions AdjointBsdf::find_directions(Lobe lobe) const {
   std::optional<double> eta;
   if (lobe == Lobe::Transmission) eta = surface.inside ? 1.0 / at_.material.ior : at_.material.ior;
   // Those an eye may shade with: by the map, by the corners, by the triangle.
-  const std::array<glm::dvec3, 4> normals{at_.material.normal, normal_to_shade_with(scene_, seen_from(geometric)),
-                                          surface.shading_normal, geometric};
+  const glm::dvec3& own = lobe == Lobe::Coat ? at_.material.extensions->clearcoat_normal : at_.material.normal;
+  const std::array<glm::dvec3, 4> normals{own, normal_of(lobe, seen_from(geometric)), surface.shading_normal,
+                                          geometric};
   const std::array<glm::dvec3, 2> arrived{light, light - 2.0 * glm::dot(light, geometric) * geometric};
   Directions directions;
   for (auto normal = normals.begin(); normal != normals.end(); ++normal) {
     const auto same = [&](const glm::dvec3& other) { return glm::distance(other, *normal) < 4.0 * kSame; };
     if (std::any_of(normals.begin(), normal, same)) continue;
     for (const glm::dvec3& before : arrived) {
-      const FluxDirection direction = direction_by(before, *normal, eta);
+      const FluxDirection direction = direction_by(lobe, before, *normal, eta);
       if (!(sum_of(direction.weight) > 0.0) || !std::isfinite(sum_of(direction.weight))) continue;
       directions.sum += direction.weight;
       directions.all.at(directions.count++) = direction;

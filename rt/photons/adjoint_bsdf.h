@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 
 #include "rt/materials/bsdf.h"
@@ -59,11 +60,13 @@ class AdjointBsdf {
 
   [[nodiscard]] bool is_plain(Lobe lobe) const;
   [[nodiscard]] const Directions& directions(Lobe lobe) const {
-    return directions_[lobe == Lobe::Transmission ? 1 : 0];
+    return lobe == Lobe::Coat ? *coat_directions_ : directions_[lobe == Lobe::Transmission ? 1 : 0];
   }
   [[nodiscard]] Directions find_directions(Lobe lobe) const;
-  [[nodiscard]] FluxDirection direction_by(const glm::dvec3& arrived, const glm::dvec3& normal,
+  [[nodiscard]] FluxDirection direction_by(Lobe lobe, const glm::dvec3& arrived, const glm::dvec3& normal,
                                            std::optional<double> eta) const;
+  [[nodiscard]] MaterialPoint material_at(const SurfacePoint& seen) const;
+  [[nodiscard]] glm::dvec3 normal_of(Lobe lobe, const SurfacePoint& seen) const;
   [[nodiscard]] SurfacePoint seen_from(const glm::dvec3& direction) const;
   [[nodiscard]] glm::dvec3 scattered(Lobe lobe, const glm::dvec3& direction) const;
   [[nodiscard]] std::optional<BsdfSample> sample_wide(Lobe lobe, Sampler& sampler) const;
@@ -75,6 +78,7 @@ class AdjointBsdf {
   bool flat_;   ///< every eye shades by the true surface's normal
   Bsdf plain_;  ///< by that normal; only where it is not flat
   std::array<Directions, 2> directions_;
+  std::unique_ptr<const Directions> coat_directions_;  ///< null without a clear coat
 };
 
 }  // namespace hpr

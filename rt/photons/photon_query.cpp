@@ -287,8 +287,8 @@ glm::dvec3 reflect_photons(const ReflectionTerms& terms, bool leans, const Photo
 }
 
 bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
-  if (lobe == Lobe::Transmission) return true;
-  return lobe == Lobe::Reflection && (bsdf.roughness() < glossy_cutoff || bsdf.is_delta(lobe));
+  if (lobe == Lobe::Transmission || lobe == Lobe::DiffuseTransmission) return true;
+  return lobe != Lobe::Diffuse && (bsdf.roughness(lobe) < glossy_cutoff || bsdf.is_delta(lobe));
 }
 
 bool follows_reflections(const Requirements& scene, double glossy_cutoff) {
@@ -300,9 +300,33 @@ bool may_take_photons(const Requirements& scene, double glossy_cutoff) {
 }
 
 bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {
-  return std::ranges::any_of(kLobes,
+  return std::ranges::any_of(bsdf.lobes(),
                              [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); });
 }
+
+namespace {
+
+/// As reflect_photons, in double precision and one by one, by the lobes of a surface with extensions.
+glm::dvec3 reflect_photons_by_lobes(std::span<const Lobe> lobes, const Bsdf& bsdf, const SurfacePoint& surface,
+                                    const glm::dvec3& shading_normal, const PhotonLight* lights,
+                                    const FoundPhotons& found) {
+  constexpr double kGrazing = 1e-3;
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < found.count; ++i) {
+    const PhotonLight& light = lights[found.index[i]];
+    const glm::dvec3 direction = unpack_direction(light.direction);
+    const double falls = glm::dot(direction, surface.geometric_normal);
+    if (!(falls > 0.0)) continue;
+    const double cosine = glm::dot(direction, shading_normal) / std::max(falls, kGrazing);
+    glm::dvec3 value(0.0);
+    for (const Lobe lobe : lobes) value += bsdf.value(lobe, direction);
+    sum += (static_cast<double>(found.weight[i]) * cosine) * value *
+           glm::dvec3(light.flux[0], light.flux[1], light.flux[2]);
+  }
+  return sum;
+}
+
+}  // namespace
 
 glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, const Bsdf& bsdf,
                           const glm::dvec3& shading_normal, double glossy_cutoff, FoundPhotons& found) {
@@ -311,12 +335,21 @@ glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, con
   const auto gathers = [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); };
   const bool diffuse = gathers(Lobe::Diffuse);
   const bool specular = gathers(Lobe::Reflection);
-  if (!diffuse && !specular) return glm::dvec3(0.0);
+  const bool coat = gathers(Lobe::Coat);
+  if (!diffuse && !specular && !coat) return glm::dvec3(0.0);
   map.find(surface.position, surface.geometric_normal, surface.layer, found);
   if (found.count == 0) return glm::dvec3(0.0);
   const bool leans = shading_normal != surface.geometric_normal;
-  const ReflectionTerms terms = bsdf.reflection_terms(diffuse, specular);
-  const glm::dvec3 light = map.density() * reflect_photons(terms, leans, map.lights(), found);
+  glm::dvec3 reflected(0.0);
+  if (bsdf.is_extended()) {
+    std::array<Lobe, kLobes.size()> lobes{};
+    const auto end = std::ranges::copy_if(kLobes, lobes.begin(), gathers).out;
+    reflected =
+        reflect_photons_by_lobes(std::span(lobes.begin(), end), bsdf, surface, shading_normal, map.lights(), found);
+  } else {
+    reflected = reflect_photons(bsdf.reflection_terms(diffuse, specular), leans, map.lights(), found);
+  }
+  const glm::dvec3 light = map.density() * reflected;
   const double sum = light.r + light.g + light.b;
   return std::isfinite(sum) ? light : glm::dvec3(0.0);
 }

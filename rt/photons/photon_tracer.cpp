@@ -228,12 +228,13 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
 
 /// Keeps the photon if it is wanted here, and scatters it into the block's next ones; true where it passes instead.
 bool PhotonTracer::arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const {
-  const MaterialPoint material = evaluate_material(scene_, surface);
+  MaterialPoint material = evaluate_material(scene_, surface);
   const double metres = glm::distance(surface.position, flight.position);
   // As to lights: nothing is taken from endless ways.
   glm::dvec3 flux =
       flight.endless ? flight.flux : flight.flux * transmittance_to(flight.media, surface, material, metres);
   if (flight.bounces == 0) flux *= range_window(glm::distance(surface.position, flight.center), flight.range);
+  if (disperses(material)) choose_channel(material, flux, flight.sampler.one());
   const Bsdf bsdf(material, surface, Carried::Flux);
   // Whoever gathers counts as much of the surface as there is: all that falls on it is kept, passing or not.
   if (flight.bounces > 0 && material.alpha > 0.0 && carries_light(flux) &&
@@ -277,7 +278,8 @@ bool PhotonTracer::send_on(Flight& flight, const FluxArrival& at, const AdjointB
   const SurfacePoint& surface = at.surface;
   std::array<double, kLobes.size()> chances{};
   double total = 0.0;
-  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+  const std::size_t lobes = at.bsdf.lobes().size();
+  for (std::size_t i = 0; i < lobes; ++i) {
     chances[i] = sum_of(flight.flux * scatters.weight(kLobes[i])) / sum_of(flight.flux);
     total += chances[i];
   }
@@ -285,8 +287,8 @@ bool PhotonTracer::send_on(Flight& flight, const FluxArrival& at, const AdjointB
   const double whole = flight.bounces < kFirstBounces ? total : std::max(total, 1.0);
   double left = flight.sampler.one() * whole;
   std::size_t chosen = 0;
-  while (chosen < kLobes.size() && left >= chances[chosen]) left -= chances[chosen++];
-  if (chosen == kLobes.size()) return false;
+  while (chosen < lobes && left >= chances[chosen]) left -= chances[chosen++];
+  if (chosen == lobes) return false;
   const bool follows = is_followed(at.bsdf, kLobes[chosen], settings_.glossy_cutoff);
   if (settings_.caustics_only && !follows) return false;
   const std::optional<BsdfSample> sample = scatters.sample(kLobes[chosen], flight.sampler);

@@ -136,7 +136,7 @@ double radiance_scale_of(const MaterialPoint& material, const SurfacePoint& poin
 bool choose_chances(const Bsdf& bsdf, const glm::dvec3& throughput, double radiance_scale,
                     std::array<double, kLobes.size()>& chances) {
   double sum = 0.0;
-  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+  for (std::size_t i = 0; i < bsdf.lobes().size(); ++i) {
     const glm::dvec3 part = throughput * bsdf.weight(kLobes[i]);
     chances[i] = part.x + part.y + part.z;
     if (kLobes[i] == Lobe::Transmission && bsdf.is_delta(kLobes[i])) chances[i] /= radiance_scale;
@@ -155,7 +155,7 @@ struct Scattered {
 
 Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances, const glm::dvec3& direction) {
   Scattered scattered{.lobes = bsdf.scattering(direction)};
-  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+  for (std::size_t i = 0; i < bsdf.lobes().size(); ++i) {
     if (!(chances[i] > 0.0)) continue;
     scattered.value += scattered.lobes.value[i];
     scattered.pdf += chances[i] * scattered.lobes.pdf[i];
@@ -167,7 +167,7 @@ Scattered evaluate(const Bsdf& bsdf, const std::array<double, kLobes.size()>& ch
 glm::dvec3 followed_share(const Bsdf& bsdf, const std::array<double, kLobes.size()>& chances,
                           const Scattered& scattered, double glossy_cutoff) {
   glm::dvec3 followed(0.0);
-  for (std::size_t i = 0; i < kLobes.size(); ++i) {
+  for (std::size_t i = 0; i < bsdf.lobes().size(); ++i) {
     if (chances[i] > 0.0 && is_followed(bsdf, kLobes[i], glossy_cutoff)) followed += scattered.lobes.value[i];
   }
   glm::dvec3 fraction(0.0);
@@ -232,8 +232,9 @@ void PathWavefront::trace_paths() {
   counts_.invalid += shared_.rays.closest(requests_, hits_, scratch_);
   counts_.primary += paths_[0].size();
   counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
-  counts_.reflection += paths_[kind_of(Lobe::Reflection)].size();
-  counts_.transmission += paths_[kind_of(Lobe::Transmission)].size();
+  counts_.reflection += paths_[kind_of(Lobe::Reflection)].size() + paths_[kind_of(Lobe::Coat)].size();
+  counts_.transmission +=
+      paths_[kind_of(Lobe::Transmission)].size() + paths_[kind_of(Lobe::DiffuseTransmission)].size();
   std::size_t ray = 0;
   for (auto& paths : paths_) {
     for (Path& path : paths) {
@@ -274,7 +275,7 @@ void PathWavefront::arrive(Path& path, std::uint32_t surface) {
   covered_[path.pixel] = 1;
   shared_.surfaces.load(surface, triangle_);
   const SurfacePoint point = shared_.surfaces.meet(triangle_, path.origin, path.direction);
-  const MaterialPoint material = evaluate_material(shared_.scene, point);
+  MaterialPoint material = evaluate_material(shared_.scene, point);
   const double metres = path.travelled + glm::distance(path.origin, point.position);
   path.throughput *= path.segments == 1 ? transmittance(path.media.here, metres)
                                         : transmittance_to(path.media, point, material, metres);
@@ -288,6 +289,7 @@ void PathWavefront::arrive(Path& path, std::uint32_t surface) {
     ++counts_.too_long;
     return;
   }
+  if (disperses(material)) choose_channel(material, path.throughput, path.sampler.one());
   scatter(path, point, material);
 }
 

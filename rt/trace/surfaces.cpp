@@ -255,6 +255,24 @@ std::uint8_t Surfaces::layer_of(const WorldTriangle& triangle, bool inside) cons
   return static_cast<std::uint8_t>(2 * (1 + number % 127) + (inside ? 1 : 0));
 }
 
+namespace {
+
+bool needs_tangents(const Material& material) {
+  if (material.normal_texture.present()) return true;
+  if (!material.extensions) return false;
+  return material.extensions->clearcoat_normal_texture.present() || material.extensions->anisotropy > 0.0F;
+}
+
+/// The texture by whose coordinates tangents go.
+const TextureRef& map_of_tangents(const Material& material) {
+  if (material.normal_texture.present() || !material.extensions) return material.normal_texture;
+  const MaterialExtensions& extensions = *material.extensions;
+  return extensions.clearcoat_normal_texture.present() ? extensions.clearcoat_normal_texture
+                                                       : extensions.anisotropy_texture;
+}
+
+}  // namespace
+
 SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,
                             const glm::dvec3& direction) const {
   // Moeller and Trumbore 1997, relative to the ray's origin.
@@ -295,7 +313,7 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   point.surface = triangle.surface;
   point.material = mesh.material;
   point.layer = layer_of(triangle, point.inside);
-  if (scene_.materials[mesh.material].normal_texture.present()) add_tangents(triangle, weight, point);
+  if (needs_tangents(scene_.materials[mesh.material])) add_tangents(triangle, weight, point);
   return point;
 }
 
@@ -337,7 +355,7 @@ void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weight
       return;
     }
   }
-  const TextureRef& map = scene_.materials[mesh.material].normal_texture;
+  const TextureRef& map = map_of_tangents(scene_.materials[mesh.material]);
   const auto& uvs = mesh.uvs[std::min<std::size_t>(map.uv_set, mesh.uvs.size() - 1)];
   if (uvs.empty()) return;
   const glm::dvec2 uv0 = transformed_uv(map, uvs[corners.x]);

@@ -47,6 +47,7 @@ struct Generator {
 /// tetra_generator().
 #define HPR_GENERATORS(X) \
   X(gallery)              \
+  X(extensions)           \
   X(sphereflake)          \
   X(tetra)                \
   X(cornell)              \

@@ -435,13 +435,17 @@ class SceneBuilder {
   void check_texture_coordinates(const Mesh& mesh, const std::string& where) const {
     if (mesh.material >= scene_.materials.size()) return;
     const Material& material = scene_.materials[mesh.material];
+    const auto check = [&](const TextureRef& ref) {
+      if (!ref.present() || !mesh.uvs[ref.uv_set].empty()) return;
+      context().warn(where, fmt::format("has no TEXCOORD_{} for the texture of its material", ref.uv_set));
+    };
     for (const TextureRef* ref :
          {&material.base_color_texture, &material.metallic_roughness_texture, &material.emissive_texture,
           &material.normal_texture, &material.occlusion_texture, &material.transmission_texture}) {
-      if (ref->present() && mesh.uvs[ref->uv_set].empty()) {
-        context().warn(where, fmt::format("has no TEXCOORD_{} for the texture of its material", ref->uv_set));
-      }
+      check(*ref);
     }
+    if (!material.extensions) return;
+    for (const TextureRef* ref : material.extensions->textures()) check(*ref);
   }
 
   const GltfData& data_;

@@ -52,6 +52,68 @@ test::Document with_floats(const char* name, const char* type, const std::vector
   return document;
 }
 
+TEST(GltfMaterial, ExtensionsHaveTheirFactorsAndTextures) {
+  const Material material = material_of(R"({"extensions": {
+    "KHR_materials_specular": {"specularFactor": 0.9, "specularTexture": {"index": 0, "texCoord": 1},
+        "specularColorFactor": [0.5, 2, 1], "specularColorTexture": {"index": 0}},
+    "KHR_materials_clearcoat": {"clearcoatFactor": 0.8, "clearcoatTexture": {"index": 0},
+        "clearcoatRoughnessFactor": 0.7, "clearcoatRoughnessTexture": {"index": 0},
+        "clearcoatNormalTexture": {"index": 0, "scale": 0.5}},
+    "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenColorTexture": {"index": 0},
+        "sheenRoughnessFactor": 0.6, "sheenRoughnessTexture": {"index": 0}},
+    "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1.5,
+        "anisotropyTexture": {"index": 0}},
+    "KHR_materials_iridescence": {"iridescenceFactor": 0.4, "iridescenceTexture": {"index": 0},
+        "iridescenceIor": 1.6, "iridescenceThicknessMinimum": 50, "iridescenceThicknessMaximum": 700,
+        "iridescenceThicknessTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 3]}}}},
+    "KHR_materials_dispersion": {"dispersion": 0.3},
+    "KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.2,
+        "diffuseTransmissionTexture": {"index": 0}, "diffuseTransmissionColorFactor": [1, 0.5, 0],
+        "diffuseTransmissionColorTexture": {"index": 0}}}})");
+  ASSERT_TRUE(material.extensions);
+  const MaterialExtensions& read = *material.extensions;
+  for (const TextureRef* texture : read.textures()) EXPECT_TRUE(texture->present());
+  EXPECT_EQ(read.specular, 0.9F);
+  EXPECT_EQ(read.specular_texture.uv_set, 1U);
+  EXPECT_EQ(read.specular_color, glm::vec3(0.5F, 2.0F, 1.0F));
+  EXPECT_EQ(read.clearcoat, 0.8F);
+  EXPECT_EQ(read.clearcoat_roughness, 0.7F);
+  EXPECT_EQ(read.clearcoat_normal_scale, 0.5F);
+  EXPECT_EQ(read.sheen_color, glm::vec3(0.1F, 0.2F, 0.3F));
+  EXPECT_EQ(read.sheen_roughness, 0.6F);
+  EXPECT_EQ(read.anisotropy, 0.5F);
+  EXPECT_EQ(read.anisotropy_rotation_radians, 1.5F);
+  EXPECT_EQ(read.iridescence, 0.4F);
+  EXPECT_EQ(read.iridescence_ior, 1.6F);
+  EXPECT_EQ(read.iridescence_min_nm, 50.0F);
+  EXPECT_EQ(read.iridescence_max_nm, 700.0F);
+  EXPECT_EQ(read.iridescence_thickness_texture.transform[3], 3.0F);
+  EXPECT_EQ(read.dispersion, 0.3F);
+  EXPECT_EQ(read.diffuse_transmission, 0.2F);
+  EXPECT_EQ(read.diffuse_transmission_color, glm::vec3(1.0F, 0.5F, 0.0F));
+}
+
+TEST(GltfMaterial, ExtensionsOfNoEffectAreNone) {
+  for (
+      const char* text :
+      {R"({"extensions": {"KHR_materials_clearcoat": {"clearcoatRoughnessFactor": 0.4, "clearcoatTexture": {"index": 0}},
+            "KHR_materials_specular": {"specularFactor": 1}, "KHR_materials_sheen": {"sheenRoughnessFactor": 0.5}}})",
+       R"({"extensions": {"KHR_materials_unlit": {}, "KHR_materials_clearcoat": {"clearcoatFactor": 1}}})"}) {
+    EXPECT_FALSE(material_of(text).extensions) << text;
+  }
+}
+
+TEST(GltfMaterial, RequiredExtensionsOfMaterialsAreAccepted) {
+  for (const char* name :
+       {"specular", "clearcoat", "sheen", "anisotropy", "iridescence", "dispersion", "diffuse_transmission"}) {
+    const std::string extension = std::string("KHR_materials_") + name;
+    test::Document document = dressed(Json{{"extensions", {{extension, Json::object()}}}});
+    document.json["extensionsUsed"] = Json::array({extension});
+    document.json["extensionsRequired"] = Json::array({extension});
+    EXPECT_EQ(load(document.json).warnings, std::vector<std::string>{}) << name;
+  }
+}
+
 TEST(GltfMaterial, MapsOfDetailKeepTheirStrengthAndPosition) {
   const Material material = material_of(R"({
     "normalTexture": {"index": 0, "texCoord": 1, "scale": -0.5,
@@ -109,6 +171,10 @@ TEST(GltfMaterial, WrongTypesAreRefusedByName) {
       {R"({"extensions": {"KHR_materials_volume": {"attenuationDistance": null}}})", "attenuationDistance"},
       {R"({"extensions": {"KHR_materials_volume": {"attenuationColor": [1, 1]}}})", "attenuationColor"},
       {R"({"extensions": {"KHR_materials_volume": {"attenuationColor": "red"}}})", "attenuationColor"},
+      {R"({"extensions": {"KHR_materials_clearcoat": {"clearcoatNormalTexture": {"index": 3}}}})",
+       "clearcoatNormalTexture"},
+      {R"({"extensions": {"KHR_materials_sheen": {"sheenColorFactor": [1]}}})", "sheenColorFactor"},
+      {R"({"extensions": {"KHR_materials_dispersion": {"dispersion": "much"}}})", "dispersion"},
       {R"({"extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 1}}}})",
        "transmissionTexture.index"},
   };

@@ -20,6 +20,27 @@ double number_in(const tinygltf::Value& object, const char* key, double fallback
   return object.Has(key) ? object.Get(key).GetNumberAsDouble() : fallback;
 }
 
+float float_in(const tinygltf::Value& object, const char* key, float fallback) {
+  return static_cast<float>(number_in(object, key, static_cast<double>(fallback)));
+}
+
+glm::vec3 color_in(const tinygltf::Value& object, const char* key, const glm::vec3& fallback) {
+  if (!object.Has(key)) return fallback;
+  glm::vec3 color;
+  for (int c = 0; c < 3; ++c) color[c] = static_cast<float>(object.Get(key).Get(c).GetNumberAsDouble());
+  return color;
+}
+
+/// Whether a surface with these extensions differs from one without anywhere.
+bool has_effect(const MaterialExtensions& extensions) {
+  const bool reflects_less = extensions.specular != 1.0F || extensions.specular_texture.present() ||
+                             extensions.specular_color != glm::vec3(1.0F) ||
+                             extensions.specular_color_texture.present();
+  return reflects_less || extensions.clearcoat > 0.0F || extensions.sheen_color != glm::vec3(0.0F) ||
+         extensions.anisotropy > 0.0F || extensions.iridescence > 0.0F || extensions.dispersion > 0.0F ||
+         extensions.diffuse_transmission > 0.0F;
+}
+
 std::array<double, 2> pair_in(const tinygltf::Value& object, const char* key, double fallback) {
   if (!object.Has(key)) return {fallback, fallback};
   const tinygltf::Value& pair = object.Get(key);
@@ -114,14 +135,7 @@ void GltfMaterials::add_extensions(const tinygltf::Material& from, const std::st
   }
   if (const auto* transmission = extension(from.extensions, "KHR_materials_transmission")) {
     to.transmission = static_cast<float>(number_in(*transmission, "transmissionFactor", 0.0));
-    if (transmission->Has("transmissionTexture")) {
-      const tinygltf::Value& info = transmission->Get("transmissionTexture");
-      tinygltf::ExtensionMap extensions;
-      if (info.Has("extensions")) extensions = info.Get("extensions").Get<tinygltf::Value::Object>();
-      to.transmission_texture =
-          texture_ref(info.Get("index").GetNumberAsInt(), static_cast<int>(number_in(info, "texCoord", 0.0)),
-                      extensions, where + ".KHR_materials_transmission.transmissionTexture", scene);
-    }
+    to.transmission_texture = texture_in(*transmission, "transmissionTexture", where, scene);
   }
   if (const auto* ior = extension(from.extensions, "KHR_materials_ior")) {
     to.ior = static_cast<float>(number_in(*ior, "ior", 1.5));
@@ -131,13 +145,79 @@ void GltfMaterials::add_extensions(const tinygltf::Material& from, const std::st
     to.thickness = static_cast<float>(number_in(*volume, "thicknessFactor", 0.0));
     to.attenuation_distance = static_cast<float>(
         number_in(*volume, "attenuationDistance", static_cast<double>(Material{}.attenuation_distance)));
-    if (volume->Has("attenuationColor")) {
-      for (int c = 0; c < 3; ++c) {
-        to.attenuation_color[c] = static_cast<float>(volume->Get("attenuationColor").Get(c).GetNumberAsDouble());
-      }
-    }
+    to.attenuation_color = color_in(*volume, "attenuationColor", glm::vec3(1.0F));
   }
   to.unlit = extension(from.extensions, "KHR_materials_unlit") != nullptr;
+  if (to.unlit) return;
+  MaterialExtensions extensions;
+  add_coats(from, where, scene, extensions);
+  add_specular_extensions(from, where, scene, extensions);
+  if (has_effect(extensions)) to.extensions = std::make_shared<const MaterialExtensions>(extensions);
+}
+
+/// What lies on the material.
+void GltfMaterials::add_coats(const tinygltf::Material& from, const std::string& where, Scene& scene,
+                              MaterialExtensions& to) {
+  if (const auto* coat = extension(from.extensions, "KHR_materials_clearcoat")) {
+    to.clearcoat = float_in(*coat, "clearcoatFactor", to.clearcoat);
+    to.clearcoat_texture = texture_in(*coat, "clearcoatTexture", where, scene);
+    to.clearcoat_roughness = float_in(*coat, "clearcoatRoughnessFactor", to.clearcoat_roughness);
+    to.clearcoat_roughness_texture = texture_in(*coat, "clearcoatRoughnessTexture", where, scene);
+    to.clearcoat_normal_texture = texture_in(*coat, "clearcoatNormalTexture", where, scene);
+    if (coat->Has("clearcoatNormalTexture")) {
+      to.clearcoat_normal_scale = float_in(coat->Get("clearcoatNormalTexture"), "scale", to.clearcoat_normal_scale);
+    }
+  }
+  if (const auto* sheen = extension(from.extensions, "KHR_materials_sheen")) {
+    to.sheen_color = color_in(*sheen, "sheenColorFactor", to.sheen_color);
+    to.sheen_color_texture = texture_in(*sheen, "sheenColorTexture", where, scene);
+    to.sheen_roughness = float_in(*sheen, "sheenRoughnessFactor", to.sheen_roughness);
+    to.sheen_roughness_texture = texture_in(*sheen, "sheenRoughnessTexture", where, scene);
+  }
+  if (const auto* film = extension(from.extensions, "KHR_materials_iridescence")) {
+    to.iridescence = float_in(*film, "iridescenceFactor", to.iridescence);
+    to.iridescence_texture = texture_in(*film, "iridescenceTexture", where, scene);
+    to.iridescence_ior = float_in(*film, "iridescenceIor", to.iridescence_ior);
+    to.iridescence_min_nm = float_in(*film, "iridescenceThicknessMinimum", to.iridescence_min_nm);
+    to.iridescence_max_nm = float_in(*film, "iridescenceThicknessMaximum", to.iridescence_max_nm);
+    to.iridescence_thickness_texture = texture_in(*film, "iridescenceThicknessTexture", where, scene);
+  }
+}
+
+/// How the material itself scatters.
+void GltfMaterials::add_specular_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene,
+                                            MaterialExtensions& to) {
+  if (const auto* specular = extension(from.extensions, "KHR_materials_specular")) {
+    to.specular = float_in(*specular, "specularFactor", to.specular);
+    to.specular_texture = texture_in(*specular, "specularTexture", where, scene);
+    to.specular_color = color_in(*specular, "specularColorFactor", to.specular_color);
+    to.specular_color_texture = texture_in(*specular, "specularColorTexture", where, scene);
+  }
+  if (const auto* anisotropy = extension(from.extensions, "KHR_materials_anisotropy")) {
+    to.anisotropy = float_in(*anisotropy, "anisotropyStrength", to.anisotropy);
+    to.anisotropy_rotation_radians = float_in(*anisotropy, "anisotropyRotation", to.anisotropy_rotation_radians);
+    to.anisotropy_texture = texture_in(*anisotropy, "anisotropyTexture", where, scene);
+  }
+  if (const auto* dispersion = extension(from.extensions, "KHR_materials_dispersion")) {
+    to.dispersion = float_in(*dispersion, "dispersion", to.dispersion);
+  }
+  if (const auto* diffuse = extension(from.extensions, "KHR_materials_diffuse_transmission")) {
+    to.diffuse_transmission = float_in(*diffuse, "diffuseTransmissionFactor", to.diffuse_transmission);
+    to.diffuse_transmission_texture = texture_in(*diffuse, "diffuseTransmissionTexture", where, scene);
+    to.diffuse_transmission_color = color_in(*diffuse, "diffuseTransmissionColorFactor", to.diffuse_transmission_color);
+    to.diffuse_transmission_color_texture = texture_in(*diffuse, "diffuseTransmissionColorTexture", where, scene);
+  }
+}
+
+/// The texture that an extension's object names by `key`.
+TextureRef GltfMaterials::texture_in(const tinygltf::Value& object, const char* key, const std::string& where,
+                                     Scene& scene) {
+  if (!object.Has(key)) return {};
+  const tinygltf::Value& info = object.Get(key);
+  tinygltf::ExtensionMap extensions;
+  if (info.Has("extensions")) extensions = info.Get("extensions").Get<tinygltf::Value::Object>();
+  return texture_ref(info.Get("index").GetNumberAsInt(), static_cast<int>(number_in(info, "texCoord", 0.0)), extensions,
+                     fmt::format("{}.{}", where, key), scene);
 }
 
 TextureRef GltfMaterials::texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,

@@ -30,6 +30,11 @@ class GltfMaterials {
   [[nodiscard]] Material material(const tinygltf::Material& from, const std::string& where, Scene& scene);
   void add_detail(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to);
   void add_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene, Material& to);
+  void add_coats(const tinygltf::Material& from, const std::string& where, Scene& scene, MaterialExtensions& to);
+  void add_specular_extensions(const tinygltf::Material& from, const std::string& where, Scene& scene,
+                               MaterialExtensions& to);
+  [[nodiscard]] TextureRef texture_in(const tinygltf::Value& object, const char* key, const std::string& where,
+                                      Scene& scene);
   /// The three kinds of texture info differ in what they say beside these.
   [[nodiscard]] TextureRef texture_ref(int index, int uv_set, const tinygltf::ExtensionMap& extensions,
                                        const std::string& where, Scene& scene);

@@ -8,6 +8,7 @@
 #include "scene/generators/generators.h"
 #include "scene/gltf/gltf.h"
 #include "scene/gltf/test_tools.h"
+#include "scene/scene_test_tools.h"
 
 namespace hpr {
 namespace {
@@ -53,6 +54,9 @@ void expect_same(const Material& a, const Material& b) {
   expect_same(a.normal_texture, b.normal_texture);
   expect_same(a.occlusion_texture, b.occlusion_texture);
   expect_same(a.transmission_texture, b.transmission_texture);
+  ASSERT_EQ(a.extensions != nullptr, b.extensions != nullptr);
+  if (!a.extensions) return;
+  EXPECT_EQ(*a.extensions, *b.extensions);
 }
 
 void expect_same(const Light& a, const Light& b) {
@@ -158,6 +162,10 @@ TEST(GltfRoundTrip, WhatNoGeneratorMakesComesBackToo) {
   material.attenuation_color = {0.1F, 0.9F, 1.0F};
   material.attenuation_distance = 0.3F;
   material.unlit = true;
+  Material& extended = scene.materials.emplace_back();
+  extended.name = "extended";
+  extended.double_sided = false;
+  extended.extensions = std::make_shared<const MaterialExtensions>(test::full_extensions());
   for (Mesh& mesh : scene.meshes) {
     mesh.uvs[0].assign(mesh.positions.size(), {0.5F, 0.25F});
     mesh.colors.assign(mesh.positions.size(), {0.1F, 0.2F, 0.3F, 0.4F});

@@ -271,6 +271,50 @@ void check_textures(const GltfItem& root) {
   });
 }
 
+/// Factors that are shares, and textures.
+void check_shares(const GltfItem& object, std::initializer_list<const char*> factors,
+                  std::initializer_list<const char*> textures) {
+  for (const char* key : factors) object.clamped(key, 0.0, 1.0);
+  for (const char* key : textures) check_texture_info(object, key);
+}
+
+void check_coats(const GltfItem& extensions) {
+  if (const auto coat = extensions.object("KHR_materials_clearcoat")) {
+    check_shares(*coat, {"clearcoatFactor", "clearcoatRoughnessFactor"},
+                 {"clearcoatTexture", "clearcoatRoughnessTexture"});
+    if (const auto normal = check_texture_info(*coat, "clearcoatNormalTexture")) normal->clamped("scale", -1e6, 1e6);
+  }
+  if (const auto sheen = extensions.object("KHR_materials_sheen")) {
+    sheen->numbers("sheenColorFactor", 3, 0.0, 1.0);
+    check_shares(*sheen, {"sheenRoughnessFactor"}, {"sheenColorTexture", "sheenRoughnessTexture"});
+  }
+  if (const auto film = extensions.object("KHR_materials_iridescence")) {
+    check_shares(*film, {"iridescenceFactor"}, {"iridescenceTexture", "iridescenceThicknessTexture"});
+    film->clamped("iridescenceIor", 1.0, 1000.0);
+    film->clamped("iridescenceThicknessMinimum", 0.0, 1e6);
+    film->clamped("iridescenceThicknessMaximum", 0.0, 1e6);
+  }
+}
+
+void check_specular_extensions(const GltfItem& extensions) {
+  if (const auto specular = extensions.object("KHR_materials_specular")) {
+    specular->numbers("specularColorFactor", 3, 0.0, GltfItem::kMaxNumber);
+    check_shares(*specular, {"specularFactor"}, {"specularTexture", "specularColorTexture"});
+  }
+  if (const auto anisotropy = extensions.object("KHR_materials_anisotropy")) {
+    check_shares(*anisotropy, {"anisotropyStrength"}, {"anisotropyTexture"});
+    anisotropy->number("anisotropyRotation");
+  }
+  if (const auto dispersion = extensions.object("KHR_materials_dispersion")) {
+    dispersion->clamped("dispersion", 0.0, 1000.0);
+  }
+  if (const auto diffuse = extensions.object("KHR_materials_diffuse_transmission")) {
+    diffuse->numbers("diffuseTransmissionColorFactor", 3, 0.0, 1.0);
+    check_shares(*diffuse, {"diffuseTransmissionFactor"},
+                 {"diffuseTransmissionTexture", "diffuseTransmissionColorTexture"});
+  }
+}
+
 void check_material_extensions(const GltfItem& extensions) {
   if (const auto emissive = extensions.object("KHR_materials_emissive_strength")) {
     emissive->clamped("emissiveStrength", 0.0, kMaxIntensity);
@@ -291,6 +335,8 @@ void check_material_extensions(const GltfItem& extensions) {
     volume->numbers("attenuationColor", 3, 0.0, 1.0);
   }
   (void)extensions.object("KHR_materials_unlit");
+  check_coats(extensions);
+  check_specular_extensions(extensions);
 }
 
 /// A material of specular colour and glossiness alone is taken as a dielectric of its diffuse colour and glossiness.
@@ -434,23 +480,25 @@ void check_shape(Json& document, GltfContext& context) {
 
 namespace {
 
-constexpr std::array<std::string_view, 14> kSupported{
-    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression",    "EXT_texture_webp",
-    "KHR_draco_mesh_compression", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
-    "KHR_materials_ior",          "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_variants",     "KHR_materials_volume",       "KHR_mesh_quantization",
-    "KHR_node_visibility",        "KHR_texture_transform"};
+constexpr std::array<std::string_view, 21> kSupported{
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression",
+    "EXT_texture_webp",           "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",        "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",   "KHR_materials_emissive_strength",
+    "KHR_materials_ior",          "KHR_materials_iridescence",
+    "KHR_materials_sheen",        "KHR_materials_specular",
+    "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_materials_variants",     "KHR_materials_volume",
+    "KHR_mesh_quantization",      "KHR_node_visibility",
+    "KHR_texture_transform"};
 
 /// Drawn approximately where it stands alone; check_shape warns of it.
 constexpr std::string_view kStandsIn = "KHR_materials_pbrSpecularGlossiness";
 
 /// Extensions that change how a surface looks and nothing else: such a scene is drawn without them, even when it
 /// requires them.
-constexpr std::array<std::string_view, 10> kAppearanceOnly{
-    "KHR_materials_anisotropy", "KHR_materials_clearcoat",   "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion", "KHR_materials_iridescence", kStandsIn,
-    "KHR_materials_sheen",      "KHR_materials_specular",    "KHR_texture_basisu",
-    "KHR_xmp_json_ld"};
+constexpr std::array<std::string_view, 3> kAppearanceOnly{kStandsIn, "KHR_texture_basisu", "KHR_xmp_json_ld"};
 
 bool contains(const auto& names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();

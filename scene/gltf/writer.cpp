@@ -166,6 +166,86 @@ void write_glass(const Material& material, Json& element, Document& document) {
   if (!volume.empty()) extend("KHR_materials_volume", std::move(volume));
 }
 
+/// An extension's object, of which only what differs from the defaults is written.
+class ExtensionWriter {
+ public:
+  explicit ExtensionWriter(Document& document) : document_(document) {}
+
+  void number(const char* key, float value, float plain) {
+    if (value != plain) object_[key] = value;
+  }
+  void color(const char* key, const glm::vec3& value, const glm::vec3& plain) {
+    if (value != plain) object_[key] = numbers(value);
+  }
+  void texture(const char* key, const TextureRef& reference) {
+    if (reference.present()) object_[key] = texture_info(reference, document_);
+  }
+  void scale(const char* key, float value) {
+    if (object_.contains(key) && value != 1.0F) object_[key]["scale"] = value;
+  }
+  /// Adds it to the material, unless it is empty.
+  void write(const char* name, Json& element) {
+    if (object_.empty()) return;
+    element["extensions"][name] = std::move(object_);
+    document_.extensions.insert(name);
+    object_ = Json::object();
+  }
+
+ private:
+  Document& document_;
+  Json object_ = Json::object();
+};
+
+void write_coats(const MaterialExtensions& from, ExtensionWriter& writer, Json& element) {
+  const MaterialExtensions plain;
+  writer.number("clearcoatFactor", from.clearcoat, plain.clearcoat);
+  writer.texture("clearcoatTexture", from.clearcoat_texture);
+  writer.number("clearcoatRoughnessFactor", from.clearcoat_roughness, plain.clearcoat_roughness);
+  writer.texture("clearcoatRoughnessTexture", from.clearcoat_roughness_texture);
+  writer.texture("clearcoatNormalTexture", from.clearcoat_normal_texture);
+  writer.scale("clearcoatNormalTexture", from.clearcoat_normal_scale);
+  writer.write("KHR_materials_clearcoat", element);
+  writer.color("sheenColorFactor", from.sheen_color, plain.sheen_color);
+  writer.texture("sheenColorTexture", from.sheen_color_texture);
+  writer.number("sheenRoughnessFactor", from.sheen_roughness, plain.sheen_roughness);
+  writer.texture("sheenRoughnessTexture", from.sheen_roughness_texture);
+  writer.write("KHR_materials_sheen", element);
+  writer.number("iridescenceFactor", from.iridescence, plain.iridescence);
+  writer.texture("iridescenceTexture", from.iridescence_texture);
+  writer.number("iridescenceIor", from.iridescence_ior, plain.iridescence_ior);
+  writer.number("iridescenceThicknessMinimum", from.iridescence_min_nm, plain.iridescence_min_nm);
+  writer.number("iridescenceThicknessMaximum", from.iridescence_max_nm, plain.iridescence_max_nm);
+  writer.texture("iridescenceThicknessTexture", from.iridescence_thickness_texture);
+  writer.write("KHR_materials_iridescence", element);
+}
+
+void write_specular_extensions(const MaterialExtensions& from, ExtensionWriter& writer, Json& element) {
+  const MaterialExtensions plain;
+  writer.number("specularFactor", from.specular, plain.specular);
+  writer.texture("specularTexture", from.specular_texture);
+  writer.color("specularColorFactor", from.specular_color, plain.specular_color);
+  writer.texture("specularColorTexture", from.specular_color_texture);
+  writer.write("KHR_materials_specular", element);
+  writer.number("anisotropyStrength", from.anisotropy, plain.anisotropy);
+  writer.number("anisotropyRotation", from.anisotropy_rotation_radians, plain.anisotropy_rotation_radians);
+  writer.texture("anisotropyTexture", from.anisotropy_texture);
+  writer.write("KHR_materials_anisotropy", element);
+  writer.number("dispersion", from.dispersion, plain.dispersion);
+  writer.write("KHR_materials_dispersion", element);
+  writer.number("diffuseTransmissionFactor", from.diffuse_transmission, plain.diffuse_transmission);
+  writer.texture("diffuseTransmissionTexture", from.diffuse_transmission_texture);
+  writer.color("diffuseTransmissionColorFactor", from.diffuse_transmission_color, plain.diffuse_transmission_color);
+  writer.texture("diffuseTransmissionColorTexture", from.diffuse_transmission_color_texture);
+  writer.write("KHR_materials_diffuse_transmission", element);
+}
+
+void write_extensions(const Material& material, Json& element, Document& document) {
+  if (!material.extensions) return;
+  ExtensionWriter writer(document);
+  write_coats(*material.extensions, writer, element);
+  write_specular_extensions(*material.extensions, writer, element);
+}
+
 void write_materials(const Scene& scene, Document& document) {
   for (const Material& material : scene.materials) {
     Json surface{{"baseColorFactor", numbers(material.base_color)},
@@ -193,6 +273,7 @@ void write_materials(const Scene& scene, Document& document) {
     }
     write_detail(material, element, document);
     write_glass(material, element, document);
+    write_extensions(material, element, document);
     if (material.unlit) extend("KHR_materials_unlit", Json::object());
     if (material.alpha_mode == AlphaMode::Blend) element["alphaMode"] = "BLEND";
     if (material.alpha_mode == AlphaMode::Mask) {
