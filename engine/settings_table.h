@@ -42,6 +42,7 @@ struct Setting {
   SettingValue value;
   std::string_view initial = {};                    ///< as help shows it; empty: nothing is shown
   std::array<std::string_view, 3> by_quality = {};  ///< its value under draft, good and best; empty: always the same
+  std::string_view finished = {};                   ///< its value in a finished picture, see RenderSettings::finishes
   std::string_view costs = {};                      ///< what a better value takes; empty: it trades nothing
   std::string_view loses = {};                      ///< what a worse value gives away
   bool decides_bits = true;                         ///< of a picture's radiance, keys or layers
