@@ -15,11 +15,11 @@
 #include "app/command.h"
 #include "app/launch/launcher.h"
 #include "app/launch/run_ranks.h"
+#include "app/options/settings_text.h"
 #include "app/results.h"
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/signals.h"
-#include "engine/settings_table.h"
 #include "raster/gl_context.h"
 
 namespace hpr {

@@ -44,7 +44,7 @@ double median(std::vector<double> values) {
 
 void measure(const std::string& source, GlContext& context) {
   const Scene scene = load_scene(source, {});
-  const Camera camera = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
+  const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
   std::unique_ptr<Rasterizer> rasterizer;
   std::unique_ptr<RayScene> rays;
   const double upload_ms = cost_ms([&] {

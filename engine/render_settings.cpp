@@ -1,6 +1,7 @@
 #include "engine/render_settings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -9,12 +10,14 @@
 #include <variant>
 
 #include "core/error.h"
+#include "core/log.h"
 #include "core/text.h"
 #include "engine/settings_table.h"
 #include "image/filter.h"
 #include "rt/passes/pass_list.h"
 #include "rt/show/show.h"
 #include "scene/load_scene.h"
+#include "scene/studio.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -51,7 +54,13 @@ void note_not_finite(const std::string& name, Scene& scene) {
 
 /// Gives a scene the environment that was asked for.
 void set_environment(const std::string& wanted, const ImageLimits& pictures, Scene& scene) {
-  if (wanted.empty() || wanted == kNoEnvironment) return;
+  if (wanted == kNoEnvironment) return;
+  if (wanted.empty()) {
+    if (!needs_studio(scene)) return;
+    scene.environment = make_studio();
+    scene.environment_note = "the environment studio (the scene brings too little light; --environment none: no other)";
+    return;
+  }
   scene.environment = load_environment(wanted, pictures);
   scene.environment_note = fmt::format("the environment {} (as asked)", printable(wanted));
   note_not_finite(printable(wanted), scene);
@@ -61,6 +70,20 @@ void set_environment(const std::string& wanted, const ImageLimits& pictures, Sce
 std::optional<PassId> named_photon_pass(const RaySettings& rays) {
   const auto found = std::ranges::find_if(rays.passes, [](PassId pass) { return info_of(pass).needs_photons; });
   return found == rays.passes.end() ? std::nullopt : std::optional(*found);
+}
+
+/// Whether a finished picture takes its value of a setting, which excludes some of what users may have asked for.
+bool can_finish(const Setting& setting, const RenderSettings& settings) {
+  const FrameSettings& frame = settings.frame;
+  if (setting.finished.empty() || settings.is_given(setting.name)) return false;
+  if (setting.name == "denoise") {
+    const bool weighs_negatively = settings.sampling.filter && min_samples(*settings.sampling.filter) > 1;
+    return frame.shading == Shading::Deferred && frame.rays.half_resolution.empty() && !weighs_negatively;
+  }
+  if (setting.name == "indirect") {
+    return !settings.is_given("passes") && !(settings.is_given("photons") && frame.rays.photons == 0);
+  }
+  return true;
 }
 
 /// What of the settings of photons depends on others.
@@ -179,6 +202,12 @@ RenderSettings resolve(RenderSettings settings, std::uint64_t seed) {
     const std::string_view value = setting.by_quality.at(static_cast<std::size_t>(settings.quality));
     if (!value.empty() && !settings.is_given(setting.name)) setting.value.parse(settings, std::string(value));
   }
+  if (settings.finishes && settings.quality == Quality::Good && !settings.is_given("spp") &&
+      !settings.frame.rays.reference) {
+    for (const Setting& setting : all_settings()) {
+      if (can_finish(setting, settings)) setting.value.parse(settings, std::string(setting.finished));
+    }
+  }
   RaySettings& rays = settings.frame.rays;
   rays.seed = seed;
   resolve_show(settings);
@@ -201,7 +230,7 @@ Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
   if (!choice.name.empty()) {
     chosen = find_camera(scene, choice.name);
   } else {
-    chosen = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
+    chosen = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
   }
   auto* const lens = std::get_if<PerspectiveLens>(&chosen.lens);
   if (choice.fov_degrees > 0.0 && lens != nullptr) lens->vertical_fov_radians = glm::radians(choice.fov_degrees);
@@ -237,6 +266,26 @@ void check_raw(const RenderSettings& settings) {
     throw Error(ExitCode::Usage, "--raw has a key for every pixel, of which --resolution-scale makes fewer",
                 "draw a smaller picture with --size");
   }
+}
+
+std::string what_is_left_out(const RenderSettings& settings) {
+  const FrameSettings& frame = settings.frame;
+  if (frame.rays.reference) return {};
+  std::vector<std::string_view> parts;
+  const auto note = [&](bool is_left_out, std::string_view setting, std::string_view part) {
+    if (is_left_out && !settings.is_given(setting)) parts.push_back(part);
+  };
+  note(!settings.sampling.sums(), "spp", "antialiasing (--spp 8)");
+  if (!settings.is_given("passes")) {
+    note(!frame.rays.global_photons, "indirect", "indirect light (--indirect)");
+    note(frame.rays.photons == 0, "photons", "caustics (--photons 100000)");
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+void note_what_is_left_out(const RenderSettings& settings) {
+  const std::string parts = what_is_left_out(settings);
+  if (!parts.empty()) log::info("left out: {}", parts);
 }
 
 std::vector<std::string> unused_settings(const RenderSettings& settings) {

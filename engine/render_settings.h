@@ -60,12 +60,15 @@ struct RenderSettings {
   Quality quality = Quality::Good;
   Sampling sampling;
   FrameSettings frame;
-  std::string environment;  ///< see load_environment; empty or kNoEnvironment: the scene's own
+  std::string environment;  ///< see load_environment; kNoEnvironment: the scene's own; empty: one where it needs_studio
   Cull cull = Cull::Gltf;
   DisplaySettings display;
   ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;
   bool strict = false;  ///< values that are not finite are errors, not replaced
+  /// Pictures are for looking at, not for measuring: under quality good, where the samples are not given, settings that
+  /// are not given make them free of noise, with indirect light (Setting::finished). Commands choose, not users.
+  bool finishes = false;
 
   std::set<std::string_view> specified = {};  ///< names of the settings that have a value of their own
 
@@ -86,6 +89,12 @@ struct RenderSettings {
 
 /// Throws Error (Usage) where the settings leave no surface for every pixel of a file of keys.
 void check_raw(const RenderSettings& settings);
+
+/// What finished pictures have and these settings leave out, without having been asked to, with what brings it:
+/// "indirect light (--indirect), ..."; empty: nothing.
+[[nodiscard]] std::string what_is_left_out(const RenderSettings& settings);
+/// Says it in the log, if it is anything.
+void note_what_is_left_out(const RenderSettings& settings);
 
 /// Settings that were given and change nothing beside the others, each as a sentence: "--reference has no use for
 /// --photons".

@@ -292,7 +292,8 @@ std::vector<Setting> make_table() {
        .decides_bits = false},
       {.name = "environment",
        .help = "light from all around, in place of the scene's own: a latitude-longitude picture, one radiance R,G,B, "
-               "or studio, a neutral one; none: what the scene brings alone",
+               "or studio, a neutral one; none: what the scene brings alone (default: that, and studio where it is too "
+               "little)",
        .value = plain_text("studio|none|FILE|R,G,B", "studio, none, a picture or a radiance",
                            [](Settings& s) -> std::string& { return s.environment; }),
        .decides_bits = false,
@@ -327,6 +328,7 @@ std::vector<Setting> make_table() {
            "N", "1, 2, 3 ...; until:60s; until:relmse=1e-3", [](Settings& s) -> SampleGoal& { return s.sampling.goal; },
            parse_sample_goal, write_samples),
        .by_quality = {"1", "1", "64"},
+       .finished = "8",
        .costs = "time in proportion",
        .loses = "noise: its squared error falls as 1 / spp, faster where it is only edges",
        .decides_bits = false,
@@ -341,6 +343,7 @@ std::vector<Setting> make_table() {
       {.name = "denoise",
        .help = "pixels that see similar surfaces share light, and pixels on edges are resampled, in the first samples",
        .value = flag([](Settings& s) -> bool& { return s.frame.rays.denoise; }),
+       .finished = "true",
        .costs = "a sixth to one and a quarter times as much again of a frame's first 16 samples",
        .loses = "false: noise, and steps at edges; true: detail of light finer than a pixel or two, less with more "
                 "samples",
@@ -360,6 +363,7 @@ std::vector<Setting> make_table() {
                "--quality best, or where --passes names photon)",
        .value = flag([](Settings& s) -> bool& { return s.frame.rays.global_photons; }),
        .by_quality = {"false", "false", "true"},
+       .finished = "true",
        .costs =
            "photons wherever light meets rough surfaces, and a gather at every point; in the open under an even sky "
            "a ray at every point instead",
@@ -546,14 +550,14 @@ std::vector<Setting> make_table() {
        .help = "how bright light fits a display: neutral keeps the colors of lit surfaces, aces and filmic have more "
                "contrast, agx less, none clips; EXR files stay as lit",
        .value = choice(kToneNames, [](Settings& s) -> Tone& { return s.display.tone; }),
-       .initial = "none",
+       .initial = "neutral",
        .decides_bits = false,
        .used_with = {{"show", shows_light}}},
       {.name = "exposure",
        .help = "brightens (or darkens) display colors by so many stops; auto: as the light of all that is seen asks "
                "for, alike on all screens; EXR files stay as lit",
        .value = exposure(),
-       .initial = "0",
+       .initial = "auto",
        .decides_bits = false,
        .used_with = {{"show", shows_light}}},
       {.name = "aov",
@@ -656,55 +660,6 @@ const Setting& find_tradeoff_setting(const std::string& name) {
     if (other.is_tradeoff() && other.scope != SettingScope::Wall) choices.emplace_back(other.name);
   }
   throw Error(ExitCode::Usage, fmt::format("there is no knob '{}'", printable(name)), unknown_name_hint(name, choices));
-}
-
-std::string tradeoff_settings_text() {
-  std::string text =
-      "Settings that trade speed for accuracy, options of `hpr render` and `hpr wall run` alike.\n"
-      "`hpr tradeoff SCENE --vary KNOB=V,V,...` measures what they cost and lose for a scene;\n"
-      "for those of pictures on their way to displays (`hpr wall run`) `hpr bench codec SCENE` does.\n";
-  for (const Setting& setting : all_settings()) {
-    if (!setting.is_tradeoff()) continue;
-    text += fmt::format("\n--{}\n  takes  {}\n  costs  {}\n  loses  {}\n", setting.name, setting.value.takes,
-                        setting.costs, setting.loses);
-  }
-  return text;
-}
-
-std::string tradeoff_settings_markdown() {
-  std::string text = "| Option | takes | costs | loses |\n|---|---|---|---|\n";
-  for (const Setting& setting : all_settings()) {
-    if (!setting.is_tradeoff()) continue;
-    text += fmt::format("| `--{}` | {} | {} | {} |\n", setting.name, setting.value.takes, setting.costs, setting.loses);
-  }
-  return text;
-}
-
-std::string settings_markdown() {
-  const auto cell = [](std::string text) {
-    for (std::size_t at = text.find('|'); at != std::string::npos; at = text.find('|', at + 2)) {
-      text.insert(at, 1, '\\');
-    }
-    return text;
-  };
-  std::string text = "| Setting | Value | Default | Meaning |\n|---|---|---|---|\n";
-  for (const Setting& setting : all_settings()) {
-    std::string initial(setting.initial);
-    if (!setting.by_quality.front().empty()) initial = fmt::format("{}", fmt::join(setting.by_quality, ", "));
-    const std::string names = setting.negated.empty() ? fmt::format("--{}", setting.name)
-                                                      : fmt::format("--{}, --{}", setting.name, setting.negated);
-    text += fmt::format("| `{}` | {} | {} | {} |\n", names, cell(setting.value.type), initial, cell(setting.help));
-  }
-  return text;
-}
-
-std::string qualities_markdown() {
-  std::string text = fmt::format("| Option | {} |\n|---|---|---|---|\n", fmt::join(kQualityNames, " | "));
-  for (const Setting& setting : all_settings()) {
-    if (setting.by_quality.front().empty()) continue;
-    text += fmt::format("| `--{}` | {} |\n", setting.name, fmt::join(setting.by_quality, " | "));
-  }
-  return text;
 }
 
 }  // namespace hpr

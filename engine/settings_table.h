@@ -42,6 +42,7 @@ struct Setting {
   SettingValue value;
   std::string_view initial = {};                    ///< as help shows it; empty: nothing is shown
   std::array<std::string_view, 3> by_quality = {};  ///< its value under draft, good and best; empty: always the same
+  std::string_view finished = {};                   ///< its value in a finished picture, see RenderSettings::finishes
   std::string_view costs = {};                      ///< what a better value takes; empty: it trades nothing
   std::string_view loses = {};                      ///< what a worse value gives away
   bool decides_bits = true;                         ///< of a picture's radiance, keys or layers
@@ -69,13 +70,5 @@ void reset_setting(RenderSettings& settings, std::string_view name);
 /// The setting of this name, one that trades speed for accuracy and that a sweep can vary. Throws Error (Usage) with
 /// the choices and the nearest one.
 [[nodiscard]] const Setting& find_tradeoff_setting(const std::string& name);
-
-/// What `hpr help knobs` prints; with --markdown the table of docs/knobs.md.
-[[nodiscard]] std::string tradeoff_settings_text();
-[[nodiscard]] std::string tradeoff_settings_markdown();
-/// The table of docs/cli.md: every setting, and its values under each quality where those differ.
-[[nodiscard]] std::string settings_markdown();
-/// The table of docs/quality.md: what each quality stands for.
-[[nodiscard]] std::string qualities_markdown();
 
 }  // namespace hpr

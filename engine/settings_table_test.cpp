@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <initializer_list>
+#include <optional>
 #include <set>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "core/error.h"
 
@@ -43,8 +47,8 @@ TEST(SettingsTable, EachSettingTouchesItsOwnValueAlone) {
   for (const Setting& setting : all_settings()) {
     RenderSettings settings;
     for (const char* const value :
-         {"true", "7",   "0.5",      "1,2,3", "shadow", "local", "rays",        "hybrid", "16",   "8",
-          "low",  "off", "gaussian", "best",  "depth",  "tree",  "partitioned", "aces",   "none", "uv", "x"}) {
+         {"true", "7",        "0.5",  "1,2,3", "shadow", "local",       "rays", "hybrid", "16", "8", "low",
+          "off",  "gaussian", "best", "depth", "tree",   "partitioned", "aces", "none",   "uv", "x"}) {
       try {
         setting.value.parse(settings, value);
       } catch (const Error&) {
@@ -120,6 +124,52 @@ TEST(RenderSettings, WhatIsNotGivenComesFromTheQuality) {
   set_setting(settings, "reference", "true");
   EXPECT_EQ(resolve(settings, 7).frame.rays.max_depth, 64);
   EXPECT_EQ(resolve(settings, 7).frame.rays.seed, 7U);
+}
+
+/// Samples, denoiser and indirect light of a picture for looking at.
+std::tuple<std::optional<std::uint32_t>, bool, bool> finished(
+    std::initializer_list<std::pair<const char*, const char*>> asked_for) {
+  RenderSettings settings;
+  settings.finishes = true;
+  for (const auto& [name, value] : asked_for) set_setting(settings, name, value);
+  const RenderSettings resolved = resolve(settings, 1);
+  return {resolved.sampling.goal.samples, resolved.frame.rays.denoise, resolved.frame.rays.global_photons};
+}
+
+TEST(RenderSettings, APictureForLookingAtIsFinishedUnlessItsSamplesAreGiven) {
+  EXPECT_EQ(finished({}), std::tuple(8U, true, true));
+  EXPECT_EQ(finished({{"spp", "1"}}), std::tuple(1U, false, false));
+  EXPECT_EQ(finished({{"spp", "16"}}), std::tuple(16U, false, false));
+  EXPECT_EQ(finished({{"quality", "draft"}}), std::tuple(1U, false, false));
+  EXPECT_EQ(finished({{"quality", "best"}}), std::tuple(64U, false, true));
+  EXPECT_EQ(finished({{"denoise", "false"}}), std::tuple(8U, false, true));
+  EXPECT_EQ(finished({{"indirect", "false"}}), std::tuple(8U, true, false));
+  const RenderSettings measured = resolve(RenderSettings(), 1);
+  EXPECT_EQ(measured.sampling.goal.samples, 1U);
+  EXPECT_FALSE(measured.frame.rays.denoise || measured.frame.rays.global_photons);
+}
+
+TEST(RenderSettings, WhatIsLeftOutIsNamedUnlessItWasAskedFor) {
+  RenderSettings settings;
+  EXPECT_EQ(what_is_left_out(resolve(settings, 1)), "antialiasing (--spp 8), indirect light (--indirect)");
+  set_setting(settings, "quality", "draft");
+  EXPECT_EQ(what_is_left_out(resolve(settings, 1)),
+            "antialiasing (--spp 8), indirect light (--indirect), caustics (--photons 100000)");
+  set_setting(settings, "spp", "1");
+  set_setting(settings, "passes", "shadow");
+  EXPECT_EQ(what_is_left_out(resolve(settings, 1)), "");
+  RenderSettings finished_ones;
+  finished_ones.finishes = true;
+  EXPECT_EQ(what_is_left_out(resolve(finished_ones, 1)), "");
+}
+
+TEST(RenderSettings, WhatIsAskedForKeepsOutWhatItExcludes) {
+  EXPECT_EQ(finished({{"reference", "true"}}), std::tuple(1U, false, false));
+  EXPECT_EQ(finished({{"shading", "local"}}), std::tuple(8U, false, true));
+  EXPECT_EQ(finished({{"half-resolution", "shadow"}}), std::tuple(8U, false, true));
+  EXPECT_EQ(finished({{"filter", "mitchell"}}), std::tuple(8U, false, true));
+  EXPECT_EQ(finished({{"passes", "shadow"}}), std::tuple(8U, true, false));
+  EXPECT_EQ(finished({{"photons", "0"}}), std::tuple(8U, true, false));
 }
 
 TEST(RenderSettings, AQualityWithoutPhotonsSendsThoseOfTheNextWhereItMust) {

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <vector>
+
+#include "scene/requirements.h"
 
 namespace hpr {
 namespace {
@@ -45,6 +49,38 @@ double radiance_towards(const glm::dvec3& direction) {
   return radiance;
 }
 
+/// What a material emits on average: of a texture a regular choice of texels.
+double mean_emission(const Scene& scene, const Material& material) {
+  const auto luminance = [](const glm::dvec3& color) { return glm::dot(color, glm::dvec3(0.2126, 0.7152, 0.0722)); };
+  if (!emits(scene, material)) return 0.0;
+  if (!material.emissive_texture.present()) return luminance(material.emissive);
+  constexpr std::size_t kTexels = 65'536;
+  const auto texels = scene.textures[static_cast<std::size_t>(material.emissive_texture.texture)].image.pixels();
+  if (texels.empty()) return 0.0;
+  // An odd step meets all columns of pictures whose sides are powers of two.
+  const std::size_t step = std::max<std::size_t>(texels.size() / kTexels, 1) | 1U;
+  glm::dvec3 sum(0.0);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < texels.size(); i += step, ++count) {
+    const Rgb color = from_srgb(texels[i]);
+    sum += glm::dvec3(color.r, color.g, color.b);
+  }
+  return luminance(glm::dvec3(material.emissive) * sum / static_cast<double>(count));
+}
+
+double area_of(const Scene& scene, const Instance& instance) {
+  const Mesh& mesh = scene.mesh_of(instance);
+  const glm::dmat3 linear(instance.to_world);
+  double area = 0.0;
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    const glm::dvec3 a(mesh.positions[triangle.x]);
+    const glm::dvec3 ab = linear * (glm::dvec3(mesh.positions[triangle.y]) - a);
+    const glm::dvec3 ac = linear * (glm::dvec3(mesh.positions[triangle.z]) - a);
+    area += 0.5 * glm::length(glm::cross(ab, ac));
+  }
+  return area;
+}
+
 }  // namespace
 
 Environment make_studio() {
@@ -61,6 +97,23 @@ Environment make_studio() {
     }
   }
   return studio;
+}
+
+double emitted_radiance(const Scene& scene) {
+  std::vector<double> emission;
+  for (const Material& material : scene.materials) emission.push_back(mean_emission(scene, material));
+  double power = 0.0;  // W, if all of them shine to one side
+  for (const Instance& instance : scene.instances) {
+    const double radiance = emission[scene.mesh_of(instance).material];
+    if (radiance > 0.0) power += std::numbers::pi * radiance * area_of(scene, instance);
+  }
+  const double radius = 0.5 * glm::length(scene.bounds.high - scene.bounds.low);
+  const double sphere = 4.0 * std::numbers::pi * radius * radius;
+  return sphere > 0.0 ? power / (std::numbers::pi * sphere) : 0.0;
+}
+
+bool needs_studio(const Scene& scene) {
+  return scene.lights.empty() && !scene.environment && emitted_radiance(scene) < kLitRadiance;
 }
 
 }  // namespace hpr

@@ -17,4 +17,15 @@ namespace hpr {
 [[nodiscard]] Environment make_studio();
 inline constexpr std::string_view kStudioName = "studio";
 
+/// Whether a scene brings too little light: it has no lights and no environment, and what its surfaces emit is too
+/// little for its size; see emitted_radiance and kLitRadiance.
+[[nodiscard]] bool needs_studio(const Scene& scene);
+
+/// The radiance of a white matte surface on which all that the scene's surfaces emit falls evenly: their power, over pi
+/// times the area of the sphere about the scene.
+[[nodiscard]] double emitted_radiance(const Scene& scene);
+
+/// From so much emitted_radiance on emitters are the scene's lamps: about five stops below white.
+inline constexpr double kLitRadiance = 0.03;
+
 }  // namespace hpr

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <utility>
+
+#include "scene/load_scene.h"
 
 namespace hpr {
 namespace {
@@ -51,6 +54,53 @@ TEST(Studio, IsGreyAndCalmAtTheHorizon) {
     EXPECT_NEAR(studio.image.at(x, 0).g, 1.0, 0.01);
     EXPECT_NEAR(studio.image.at(x, size.height - 1).g, 0.2, 0.01);
   }
+}
+
+void add_square(Scene& scene, double side, double height, float radiance) {
+  const auto s = static_cast<float>(0.5 * side);
+  const auto y = static_cast<float>(height);
+  Mesh mesh;
+  mesh.positions = {{-s, y, -s}, {s, y, -s}, {s, y, s}, {-s, y, s}};
+  mesh.normals.assign(4, {0.0F, 1.0F, 0.0F});
+  mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+  mesh.material = static_cast<std::uint32_t>(scene.materials.size());
+  scene.materials.emplace_back().emissive = glm::vec3(radiance);
+  scene.instances.push_back({.mesh = static_cast<std::uint32_t>(scene.meshes.size())});
+  scene.meshes.push_back(std::move(mesh));
+}
+
+/// Floor and ceiling of a matte cube of `side` metres, and a square of `lamp_side` between that emits `radiance`.
+Scene lamp_in_cube(double side, double lamp_side, float radiance) {
+  Scene scene;
+  add_square(scene, side, 0.0, 0.0F);
+  add_square(scene, side, side, 0.0F);
+  add_square(scene, lamp_side, 0.5 * side, radiance);
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Studio, ATinyEmitterChangesNothingAndALampIsEnough) {
+  EXPECT_TRUE(needs_studio(lamp_in_cube(1.0, 0.001, 10.0F)));
+  EXPECT_FALSE(needs_studio(lamp_in_cube(1.0, 0.5, 10.0F)));
+  EXPECT_FALSE(needs_studio(lamp_in_cube(1.0, 0.001, 1e7F))) << "small and bright is a lamp";
+  EXPECT_FALSE(needs_studio(load_scene("gen:cornell")));
+}
+
+TEST(Studio, SizesOfScenesDoNotMatter) {
+  for (const double scale : {1e-3, 1.0, 1e4}) {
+    const Scene scene = lamp_in_cube(scale, 0.5 * scale, 10.0F);
+    EXPECT_NEAR(emitted_radiance(scene), emitted_radiance(lamp_in_cube(1.0, 0.5, 10.0F)), 1e-6) << scale;
+  }
+}
+
+TEST(Studio, LightsAndEnvironmentsKeepItOut) {
+  Scene scene = lamp_in_cube(1.0, 0.001, 0.0F);
+  EXPECT_TRUE(needs_studio(scene));
+  scene.lights.emplace_back();
+  EXPECT_FALSE(needs_studio(scene));
+  scene.lights.clear();
+  scene.environment = Environment{Image<Rgb>({1, 1})};
+  EXPECT_FALSE(needs_studio(scene)) << "a black one asks for darkness";
 }
 
 }  // namespace

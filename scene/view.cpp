@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/mat4x3.hpp>
+#include <limits>
 #include <numbers>
 
 #include "core/error.h"
@@ -141,28 +143,85 @@ Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up
   return camera;
 }
 
-Camera framing_camera(const Bounds& bounds) {
-  constexpr double kFov = 40.0 * std::numbers::pi / 180.0;
-  constexpr double kNarrowest = 1.0;  // width to height of the screens it is made for; wider ones show more
-  constexpr double kMargin = 1.05;
-  const double slope = std::tan(0.5 * kFov) / kMargin;
-  const glm::dvec3 center = 0.5 * (bounds.low + bounds.high);
-  const glm::dvec3 half = 0.5 * (bounds.high - bounds.low);
-  const bool finite = std::isfinite(glm::length(half));
-  const glm::dvec3 from = glm::normalize(glm::dvec3(0.35, 0.25, 1.0));
-  Camera camera = look_at(from, glm::dvec3(0.0), {0.0, 1.0, 0.0}, kFov);
-  // As far back as the box corner that is nearest to the edge of the picture demands.
-  double distance = 0.0;
-  for (int corner = 0; corner < 8 && finite; ++corner) {
-    const glm::dvec3 sign((corner & 1) != 0 ? 1.0 : -1.0, (corner & 2) != 0 ? 1.0 : -1.0,
-                          (corner & 4) != 0 ? 1.0 : -1.0);
-    const glm::dvec3 at = glm::transpose(camera.axes) * (sign * half);  // right, up, back of the centre
-    distance = std::max({distance, at.z + std::abs(at.y) / slope, at.z + std::abs(at.x) / (slope * kNarrowest)});
+namespace {
+
+/// Where a camera stands whose picture points fill up to a margin, and which looks along -z of `axes`: at each point's
+/// distance from the eye both x and y are at most `slope` times that from the middle. Each point bounds four planes
+/// through the eye, and the furthest of each kind settle its place.
+class Framing {
+ public:
+  Framing(const glm::dmat3& axes, double slope) : to_camera_(glm::transpose(axes)), slope_(slope) {}
+
+  void add(const glm::dvec3& point) {
+    const glm::dvec3 at = to_camera_ * point;
+    const glm::dvec2 beside(at);
+    above_ = glm::max(above_, beside + slope_ * at.z);
+    below_ = glm::max(below_, slope_ * at.z - beside);
   }
-  camera.eye = center + from * (distance > 0.0 ? distance : 1.0);
+
+  [[nodiscard]] glm::dvec3 eye() const {
+    const glm::dvec2 middle = 0.5 * (above_ - below_);
+    const glm::dvec2 back = 0.5 / slope_ * (above_ + below_);
+    return glm::transpose(to_camera_) * glm::dvec3(middle, std::max(back.x, back.y));
+  }
+
+ private:
+  glm::dmat3 to_camera_;
+  double slope_;
+  glm::dvec2 above_{-std::numeric_limits<double>::infinity()};
+  glm::dvec2 below_{-std::numeric_limits<double>::infinity()};
+};
+
+/// From where a box is seen best; any length.
+glm::dvec3 side_to_see(const glm::dvec3& extent) {
+  constexpr double kFlat = 0.1;
+  if (extent.y < kFlat * std::min(extent.x, extent.z)) return {0.35, 0.9, 1.0};
+  if (extent.x < kFlat * std::min(extent.y, extent.z)) return {1.0, 0.25, 0.35};
+  return {0.35, 0.25, 1.0};
+}
+
+/// `add_points` gives the framing every point to be seen.
+template <typename AddPoints>
+Camera frame_points(const Bounds& bounds, AddPoints add_points) {
+  constexpr double kFov = 40.0 * std::numbers::pi / 180.0;
+  constexpr double kMargin = 1.05;
+  const glm::dvec3 extent = bounds.high - bounds.low;
+  const bool finite = std::isfinite(glm::length(extent));
+  const glm::dvec3 from = glm::normalize(side_to_see(finite ? extent : glm::dvec3(1.0)));
+  Camera camera = look_at(from, glm::dvec3(0.0), {0.0, 1.0, 0.0}, kFov);
+  Framing framing(camera.axes, std::tan(0.5 * kFov) / kMargin);
+  const glm::dvec3 center = 0.5 * (bounds.low + bounds.high);
+  if (finite) add_points(framing);
+  const glm::dvec3 eye = framing.eye();
+  // Else all is one point, or nothing.
+  const double size = glm::length(extent);
+  const bool stands_off = size > 0.0 && std::isfinite(glm::length(eye)) && glm::dot(eye - center, from) > 0.1 * size;
+  camera.eye = stands_off ? eye : center + from;
   std::get<PerspectiveLens>(camera.lens).at_distance = 0.0;  // the whole scene, which is in the bounds
   camera.name = "framing";
   return camera;
+}
+
+}  // namespace
+
+Camera framing_camera(const Bounds& bounds) {
+  return frame_points(bounds, [&](Framing& framing) {
+    for (int corner = 0; corner < 8; ++corner) {
+      framing.add({(corner & 1) != 0 ? bounds.high.x : bounds.low.x, (corner & 2) != 0 ? bounds.high.y : bounds.low.y,
+                   (corner & 4) != 0 ? bounds.high.z : bounds.low.z});
+    }
+  });
+}
+
+Camera framing_camera(const Scene& scene) {
+  return frame_points(scene.bounds, [&](Framing& framing) {
+    for (const Instance& instance : scene.instances) {
+      const glm::dmat4x3 to_world(instance.to_world);
+      for (const glm::vec3& position : scene.mesh_of(instance).positions) {
+        framing.add(to_world * glm::dvec4(position, 1.0));
+      }
+    }
+  });
 }
 
 std::vector<View> split_into_blocks(const View& view, int limit) {

@@ -70,8 +70,11 @@ struct Ray {
 void tighten(View& view, const Bounds& bounds);
 
 /// A camera that sees all of `bounds` from the front, a little above and to the right, on screens at least as wide as
-/// high: for scenes that have none.
+/// high: for scenes that have none. What is flat is seen from its larger side: ground from well above, a wall that
+/// faces x along x. It is as near as it can be.
 [[nodiscard]] Camera framing_camera(const Bounds& bounds);
+/// A camera as framing_camera of the bounds, but as near as the surfaces themselves allow.
+[[nodiscard]] Camera framing_camera(const Scene& scene);
 
 /// A perspective camera at `eye` that looks at `at`. Throws Error (Usage) when they coincide or `up` is parallel.
 [[nodiscard]] Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up,

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -205,6 +208,60 @@ TEST(FramingCamera, SeesAllOfTheBounds) {
       EXPECT_LT(seen.z, 1.0);
     }
   }
+}
+
+/// Where in a picture of 100 x 100 a scene's surfaces end: left, top, right, bottom.
+std::array<double, 4> framed(const Scene& scene) {
+  const View view = make_view(framing_camera(scene), {100, 100}, scene.bounds);
+  std::array<double, 4> edges{100.0, 100.0, 0.0, 0.0};
+  for (const Instance& instance : scene.instances) {
+    for (const glm::vec3& position : scene.mesh_of(instance).positions) {
+      const glm::dvec3 seen = project(view, glm::dvec3(instance.to_world * glm::dvec4(position, 1.0)), view.eye);
+      edges = {std::min(edges[0], seen.x), std::min(edges[1], seen.y), std::max(edges[2], seen.x),
+               std::max(edges[3], seen.y)};
+    }
+  }
+  return edges;
+}
+
+/// Points along a coil of radius 1 about y, as triangles of no interest.
+Scene coil_of(const glm::dvec3& scale, const glm::dvec3& offset) {
+  Scene scene;
+  scene.materials.emplace_back();
+  Mesh mesh;
+  for (int i = 0; i < 300; ++i) {
+    mesh.positions.emplace_back(std::cos(0.1 * i), 0.01 * i - 1.5, std::sin(0.1 * i));
+    mesh.normals.emplace_back(0.0F, 1.0F, 0.0F);
+  }
+  for (unsigned i = 0; i + 2 < 300; ++i) mesh.triangles.emplace_back(i, i + 1, i + 2);
+  scene.meshes.push_back(std::move(mesh));
+  Instance instance;
+  instance.to_world = glm::scale(glm::translate(glm::dmat4(1.0), offset), scale);
+  scene.instances.push_back(instance);
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(FramingCamera, IsAsNearAsWhatIsThereAllows) {
+  for (const glm::dvec3& scale : {glm::dvec3(1.0), glm::dvec3(1e-6), glm::dvec3(5.0, 1.0, 1.0),
+                                  glm::dvec3(1.0, 4.0, 2.0), glm::dvec3(3.0, 0.01, 3.0), glm::dvec3(1e-3, 1.0, 1.0)}) {
+    const std::array<double, 4> edges = framed(coil_of(scale, {7.0, -3.0, 1e3}));
+    // A margin of a twentieth, alike on the two sides that the picture is filled to.
+    const double beside = std::min(edges[0], 100.0 - edges[2]);
+    const double above = std::min(edges[1], 100.0 - edges[3]);
+    EXPECT_NEAR(std::min(beside, above), 50.0 - 50.0 / 1.05, 0.1);
+    const bool fills_width = beside < above;
+    EXPECT_NEAR(fills_width ? edges[0] : edges[1], 100.0 - (fills_width ? edges[2] : edges[3]), 0.1);
+  }
+}
+
+TEST(FramingCamera, SeesWhatIsFlatFromItsLargerSide) {
+  const auto back = [](const glm::dvec3& extent) { return framing_camera({-0.5 * extent, 0.5 * extent}).axes[2]; };
+  EXPECT_GT(back({10.0, 0.1, 10.0}).y, 0.6);
+  EXPECT_LT(back({10.0, 2.0, 10.0}).y, 0.3);
+  EXPECT_LT(back({10.0, 0.1, 0.1}).y, 0.3) << "a beam";
+  EXPECT_GT(back({0.1, 10.0, 10.0}).x, 0.9);
+  EXPECT_GT(back({10.0, 10.0, 0.1}).z, 0.9);
 }
 
 TEST(MakeView, AnOrthographicCameraShowsItsBoxInPicturesOfAnyShape) {

@@ -120,7 +120,7 @@ double time_of(TileLayer<Key>& layer, Draw&& draw) {
 /// Draws both ways, in turn, so that a machine that slows down slows down both; prints what `tries` > 1 tries took.
 Agreement agreement_on(const std::string& source, Size size, int tries) {
   const Scene scene = load_scene(source, {});
-  const Camera camera = scene.cameras.empty() ? framing_camera(scene.bounds) : scene.cameras.front();
+  const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
   const View view = make_view(camera, size, scene.bounds);
   const int threads = 2;
   const std::array all{view.block};

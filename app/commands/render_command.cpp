@@ -56,6 +56,7 @@ class RenderCommand final : public Command {
         .show_default();
     options.flag("--resume", resume_, "go on with the samples of the checkpoint");
     declare_settings(options, settings_);
+    settings_.finishes = true;
     report_.declare(options);
   }
 
@@ -74,6 +75,7 @@ class RenderCommand final : public Command {
     if (!inside_mpi_job()) {
       check_outputs(settings, globals);
       for (const std::string& sentence : unused_settings(settings)) log::warning("{}", sentence);
+      if (settings.quality == Quality::Draft) note_what_is_left_out(settings);
       const int ranks = std::max(1, globals.ranks);
       if (settings.frame.groups > ranks) {
         log::warning("--groups {}: there are no more than {}, of one rank each", settings.frame.groups, ranks);

@@ -27,6 +27,7 @@ class ViewCommand final : public Command {
         .range(1, 1'000'000);
     declare_target_ms(options, run_.target_ms, "what a frame may take while the camera moves (default: 50)");
     declare_settings(options, run_.settings);
+    run_.settings.finishes = true;
     run_.report.declare(options);
     options.declared("--aov").hidden();  // it writes no files, and refuses layers
   }

@@ -360,7 +360,10 @@ ExitCode run_wall(WallJob job, Globals globals) {
     check_outputs(job, globals);
     claim_folder(job, lock);
   };
-  if (!inside_mpi_job()) claim_outputs();
+  if (!inside_mpi_job()) {
+    claim_outputs();
+    if (!job.settings.finishes) note_what_is_left_out(resolve(job.settings, job.seed));
+  }
   const auto body = [&](Communicator& comm) {
     const EmptyFolders tidy_in_job(folder_of(job));  // a rank that fails leaves run_ranks only to end the job
     // Where the display was chosen by what there is, hosts may differ: all ranks take rank 0's.

@@ -202,6 +202,7 @@ class ConsoleCommand final : public Command {
     options.flag("--keep-going", keeps_going_, "a command that fails in a script does not end it");
     options.option("--size", size_, "pixels of the picture").show_default().type("WxH");
     declare_settings(options, settings_);
+    settings_.finishes = true;
     report_.declare(options);
   }
 

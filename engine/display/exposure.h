@@ -45,8 +45,8 @@ inline constexpr double kBrightStops = 1.0;
 
 /// What a user may choose about display colours.
 struct DisplaySettings {
-  std::optional<double> exposure_stops = 0.0;  ///< none: automatic_exposure of what is shown
-  Tone tone = Tone::None;
+  std::optional<double> exposure_stops = {};  ///< none: automatic_exposure of what is shown
+  Tone tone = Tone::Neutral;
   std::string_view shows = {};  ///< see DisplayTransform
 };
 

@@ -76,7 +76,7 @@ std::chrono::nanoseconds stall_limit_of(const WallJob& job, double slowest_ms) {
 /// While nobody moves the camera, the picture of an open-ended run gets better.
 std::optional<SampleGoal> resting_of(const WallJob& job, const RenderSettings& settings) {
   constexpr std::uint32_t kSamplesWhileResting = 64;
-  if (!job.open_ended() || !sampling_of(job, settings).goal.one() || settings.is_given("spp")) return std::nullopt;
+  if (!job.open_ended() || job.target_relmse || settings.is_given("spp")) return std::nullopt;
   return SampleGoal{.samples = kSamplesWhileResting, .seconds = {}, .relmse = {}};
 }
 
