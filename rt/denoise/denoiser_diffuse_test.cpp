@@ -24,7 +24,9 @@ TEST(Denoiser, DiffuseLightOfSmoothSurfacesIsSharedAsWidely) {
     const Image<Rgb> plain = mean_picture(scene, view, settings, 1);
     const Image<Rgb> smooth = mean_picture(scene, view, denoised(settings), 1);
     EXPECT_LT(squared_error(smooth, truth), 0.15 * squared_error(plain, truth)) << has_lamp;
-    EXPECT_NEAR(mean(smooth) / mean(truth), 1.0, 0.01) << has_lamp;
+    // The mean of a single sample is off by a percent by chance.
+    const Image<Rgb> smoother = mean_picture(scene, view, denoised(settings), 8);
+    EXPECT_NEAR(mean(smoother) / mean(truth), 1.0, 0.005) << has_lamp;
   }
 }
 
