@@ -160,9 +160,9 @@ class Framing {
   }
 
   [[nodiscard]] glm::dvec3 eye() const {
-    const glm::dvec2 middle = 0.5 * (above_ - below_);
+    const glm::dvec2 midpoint = 0.5 * (above_ - below_);
     const glm::dvec2 back = 0.5 / slope_ * (above_ + below_);
-    return glm::transpose(to_camera_) * glm::dvec3(middle, std::max(back.x, back.y));
+    return glm::transpose(to_camera_) * glm::dvec3(midpoint, std::max(back.x, back.y));
   }
 
  private:
