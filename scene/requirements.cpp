@@ -39,8 +39,8 @@ std::vector<const Material*> visible_materials(const Scene& scene) {
 }
 
 const MaterialExtensions& extensions_of(const Material& material) {
-  static const MaterialExtensions kNone;
-  return material.extensions ? *material.extensions : kNone;
+  static const MaterialExtensions none;
+  return material.extensions ? *material.extensions : none;
 }
 
 /// The least texel of one channel of a texture, 1 without: filtering never goes below it.

@@ -80,7 +80,7 @@ AlbedoTable make_table() {
 }  // namespace
 
 double sheen_albedo(double roughness, double normal_view) {
-  static const AlbedoTable kTable = make_table();
+  static const AlbedoTable table = make_table();
   const auto index_of = [](double value) { return std::clamp(value, 0.0, 1.0) * (kSteps - 1); };
   const double y = index_of(roughness);
   const double x = index_of(std::sqrt(std::max(normal_view, 0.0)));
@@ -88,7 +88,7 @@ double sheen_albedo(double roughness, double normal_view) {
   const auto column = std::min(static_cast<std::size_t>(x), kSteps - 2);
   const double fy = y - static_cast<double>(row);
   const double fx = x - static_cast<double>(column);
-  const auto along = [&](std::size_t r) { return kTable[r][column] * (1.0 - fx) + kTable[r][column + 1] * fx; };
+  const auto along = [&](std::size_t r) { return table[r][column] * (1.0 - fx) + table[r][column + 1] * fx; };
   return along(row) * (1.0 - fy) + along(row + 1) * fy;
 }
 
