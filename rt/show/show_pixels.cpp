@@ -87,15 +87,16 @@ class ShownRows {
   }
 
   [[nodiscard]] glm::dvec3 value_of(const PathVertex& point) {
-    const auto pixel = static_cast<int>(point.pixel - job_.first_pixel);
+    const std::uint32_t pixel = point.pixel - job_.first_pixel;
+    const std::uint32_t x = pixel % kTileSide;
+    const std::uint32_t y = pixel / kTileSide;
     switch (context_.settings.show) {
       case Show::Normal:
         return 0.5 * point.material.normal + 0.5;
       case Show::Uv:
         return uv_color(point.surface);
       case Show::Wireframe:
-        return glm::dvec3(
-            std::min(pixels_to_edge(triangle_of(point), job_, pixel % kTileSide + 0.5, pixel / kTileSide + 0.5), 1.0));
+        return glm::dvec3(std::min(pixels_to_edge(triangle_of(point), job_, x + 0.5, y + 0.5), 1.0));
       case Show::Ids:
         return to_vector(distinct_color(triangle_of(point).instance));
       default:
