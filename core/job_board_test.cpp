@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/job_environment.h"
+#include "core/parallel.h"
 #include "core/timing.h"
 
 namespace hpr {
@@ -49,6 +50,15 @@ TEST(JobBoardTest, TellsWhatRanksReport) {
   EXPECT_EQ(report->stall_limit, std::chrono::seconds(10));
   EXPECT_GT(report->steps, 0U);
   EXPECT_EQ(describe(1, *report), "rank 1 on " + host_name() + ": composite of frame 57, waiting for rank 0");
+}
+
+TEST(JobBoardTest, EachPartOfWorkThatManyThreadsShareIsAStep) {
+  const JobBoard board(1);
+  in_rank(board, board.address(), 0, [] {
+    parallel_for(3, 100, [](std::size_t /*part*/) {});
+    ::_exit(0);
+  });
+  EXPECT_GE(board.read(0)->steps, 100U);
 }
 
 TEST(JobBoardTest, AnEndedSpanGivesWayToTheOneAround) {

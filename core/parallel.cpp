@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/job_board.h"
 #include "core/timing.h"
 
 namespace hpr {
@@ -26,7 +27,10 @@ void parallel_for(int threads, std::size_t count, const std::function<void(std::
   std::exception_ptr first_failure;
   const auto work = [&] {
     try {
-      for (std::size_t i = next++; i < count; i = next++) body(i);
+      for (std::size_t i = next++; i < count; i = next++) {
+        body(i);
+        report_step();  // a pass over a large frame is no standstill
+      }
     } catch (...) {
       next = count;
       const std::lock_guard lock(mutex);

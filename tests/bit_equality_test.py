@@ -18,6 +18,8 @@ import subprocess
 import sys
 import tempfile
 
+from program import PLAIN
+
 HPR = os.path.abspath(sys.argv[1])
 FULL = sys.argv[2:] == ["--full"]
 SCENE = "gen:gallery"
@@ -78,7 +80,7 @@ def digests(way, run, folder):
     """The hashes of one run's keys and picture, or what went wrong."""
     ranks, distribution, strategy, threads, backend = run
     result = hpr(["render", SCENE, "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", *distribution.split(),
-                  "--strategy", strategy, "--threads", threads, "--backend", backend, *WAYS[way], "--raw", "a.keys",
+                  "--strategy", strategy, "--threads", threads, "--backend", backend, *PLAIN, *WAYS[way], "--raw", "a.keys",
                   "-o", "a.exr", "--force"], folder)
     if result.returncode != 0:
         return f"left with {result.returncode}: {result.stderr[-2000:]}"

@@ -5,6 +5,8 @@ import subprocess
 import sys
 
 HPR = str(pathlib.Path(sys.argv[1]).resolve())
+# The picture of one sample, level by level: for tests that look at values, or at what a sample takes.
+PLAIN = ("--tone", "none", "--exposure", "0", "--environment", "none", "--spp", "1")
 failures = []
 
 

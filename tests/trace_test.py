@@ -102,7 +102,7 @@ def other_commands(folder):
 
 def refusals(folder):
     (folder / "there.json").write_text("kept")
-    base = ("render", "gen:cornell", "--size", "32x32", "-o", "b.png", "--force")
+    base = ("render", "gen:cornell", "--size", "32x32", "--spp", "1", "-o", "b.png", "--force")
     hpr(folder, *base[:-1], "--trace", "there.json", code=4)
     expect((folder / "there.json").read_text() == "kept" and not (folder / "b.png").exists(), "a refused trace leaves something")
     hpr(folder, *base, "--trace", "nowhere/trace.json", code=4)
