@@ -13,7 +13,7 @@ import sys
 import tempfile
 
 import exr
-from program import HPR, PLAIN, expect, failures
+from program import HPR, expect, failures, plain
 
 SCENE = "gen:gallery"
 
@@ -23,8 +23,8 @@ def hpr(folder, *arguments):
 
 
 def render(folder, *arguments, scene=SCENE):
-    result = hpr(folder, "render", scene, "--size", "168x104", "-o", "a.exr", "--stats", "a.json", "--explain", *PLAIN,
-                 "--force", *arguments)
+    result = hpr(folder, "render", scene, "--size", "168x104", "-o", "a.exr", "--stats", "a.json", "--explain",
+                 "--force", *plain(*arguments))
     expect(result.returncode == 0, f"{' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     return (folder / "a.exr").read_bytes(), result.stdout
 
@@ -71,9 +71,9 @@ def depths(folder):
     expect(sent[0] > sent[1] > sent[2], f"bytes sent do not shrink: {sent}")
     for how, said in ((("--depth-format", "24"), "raster (OpenGL alone rounds depths)"), (("--primary", "rays"), "rays (as asked)"),
                       (("--primary", "raster"), "raster (as asked)")):
-        result = hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *PLAIN, *how)
+        result = hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *plain(*how))
         expect(f"primary: {said}\n" in result.stdout, f"{how}: {result.stdout} {result.stderr}")
-    chosen = {hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *PLAIN, *how).stdout.split("primary: ")[1].split("\n")[0]
+    chosen = {hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *plain(*how)).stdout.split("primary: ")[1].split("\n")[0]
               for how in ((), ("--ranks", "2", "--distribute", "sort-last"), ("--primary", "auto", "--threads", "1"))}
     expect(len(chosen) == 1 and "(" in chosen.copy().pop(), f"the same picture's keys are made by {chosen}")
     result = hpr(folder, "render", SCENE, "--explain", "--depth-format", "24", "--primary", "rays")

@@ -14,7 +14,7 @@ import sys
 import tempfile
 
 import exr
-from program import HPR, PLAIN, expect, failures
+from program import HPR, expect, failures, plain
 
 SIZE = (160, 96)
 PARTS = ("direct", "shadow", "reflection", "refraction", "ambient-occlusion", "photon")
@@ -24,7 +24,7 @@ CHANNELS = {"R", "G", "B", "depth.Z", "id.X", "normal.X", "normal.Y", "normal.Z"
 
 
 def render(folder, *arguments):
-    result = subprocess.run([HPR, "render", "gen:gallery", "--size", f"{SIZE[0]}x{SIZE[1]}", "--force", *PLAIN, *arguments],
+    result = subprocess.run([HPR, "render", "gen:gallery", "--size", f"{SIZE[0]}x{SIZE[1]}", "--force", *plain(*arguments)],
                             cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     expect(result.returncode == 0, f"{' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     return result

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 
-from program import PLAIN
+from program import plain
 
 HPR = os.path.abspath(sys.argv[1])
 FULL = sys.argv[2:] == ["--full"]
@@ -80,7 +80,7 @@ def digests(way, run, folder):
     """The hashes of one run's keys and picture, or what went wrong."""
     ranks, distribution, strategy, threads, backend = run
     result = hpr(["render", SCENE, "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", *distribution.split(),
-                  "--strategy", strategy, "--threads", threads, "--backend", backend, *PLAIN, *WAYS[way], "--raw", "a.keys",
+                  "--strategy", strategy, "--threads", threads, "--backend", backend, *plain(*WAYS[way]), "--raw", "a.keys",
                   "-o", "a.exr", "--force"], folder)
     if result.returncode != 0:
         return f"left with {result.returncode}: {result.stderr[-2000:]}"

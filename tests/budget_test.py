@@ -14,7 +14,7 @@ import sys
 import tempfile
 
 import exr
-from program import HPR, PLAIN, expect, failures
+from program import HPR, expect, failures, plain
 
 
 def hpr(folder, *arguments, code=0):
@@ -25,7 +25,7 @@ def hpr(folder, *arguments, code=0):
 
 
 def render(folder, *arguments, scene="gen:gallery", picture="a.png"):
-    hpr(folder, "render", scene, "--size", "171x105", "-o", picture, "--stats", "a.json", "--force", *PLAIN, *arguments)
+    hpr(folder, "render", scene, "--size", "171x105", "-o", picture, "--stats", "a.json", "--force", *plain(*arguments))
     return (folder / picture).read_bytes()
 
 

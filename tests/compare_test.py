@@ -13,7 +13,7 @@ import shlex
 import sys
 import tempfile
 
-from program import PLAIN, expect, failures, run
+from program import expect, failures, plain, run
 
 SYNTHETIC = ["compare", "--synthetic", "dense", "--frames", "1", "--warmup", "0", "--transport", "threads"]
 SCENE = ["compare", "gen:cornell", "--frames", "1", "--warmup", "0"]
@@ -101,7 +101,7 @@ def local_shading(folder):
     expect({row["frame_xxh64"] for row in made["runs"]} == {made["runs"][0]["frame_xxh64"]}, "frames differ")
     expect("sort-first" in [row["strategy"] for row in made["runs"]], "sort-first is missing")
     expect("--shading local" in made["command"], made["command"])
-    drawn = run(folder, "render", "gen:cornell", *PLAIN, *given, "-o", "rendered.png")
+    drawn = run(folder, "render", "gen:cornell", *plain(*given), "-o", "rendered.png")
     expect(drawn.returncode == 0, f"left with {drawn.returncode}: {drawn.stderr}")
     diff = run(folder, "diff", "rendered.png", picture.name, "--json")
     expect(json.loads(diff.stdout)["rmse"] == 0, f"render makes other colours: {diff.stdout}")

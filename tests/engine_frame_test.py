@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 
-from program import PLAIN, expect, failures, run
+from program import expect, failures, plain, run
 
 
 def main():
@@ -20,7 +20,7 @@ def main():
                                     check=False)
             if not expect(result.returncode == 0, f"{scene}: left with {result.returncode}: {result.stderr}"):
                 continue
-            run(folder, "render", scene, "--size", "320x240", *PLAIN, "-o", "whole.exr", "--force")
+            run(folder, "render", scene, "--size", "320x240", *plain(), "-o", "whole.exr", "--force")
             difference = run(folder, "diff", "whole.exr", "own.exr")
             expect(difference.returncode == 0, f"{scene}: another picture: {difference.stdout}{difference.stderr}")
     return 1 if failures else 0

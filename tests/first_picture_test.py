@@ -13,7 +13,7 @@ import tempfile
 
 import exr
 import png
-from program import PLAIN, expect, failures, run_to
+from program import expect, failures, plain, run_to
 from quads import Quads
 
 SIZE = ("--size", "96x64")
@@ -31,7 +31,7 @@ def is_finished(folder):
         expect(first == picture(folder, scene, *FINISHED), f"{scene}: the first picture is not the finished one")
         expect(first == picture(folder, scene, "--ranks", "3", "--distribute", "sort-last"), f"{scene}: 3 ranks, other bits")
         plain = picture(folder, scene, "--spp", "1")
-        expect(plain == picture(folder, scene, *PLAIN, "--no-indirect", "--denoise=false"), f"{scene}: --spp 1 is not plain")
+        expect(plain == picture(folder, scene, *plain("--no-indirect", "--denoise=false")), f"{scene}: --spp 1 is not plain")
         expect(plain != first, f"{scene}: one plain sample is the finished picture")
         shown = picture(folder, scene, name="a.png")
         expect(shown == picture(folder, scene, "--tone", "neutral", "--exposure", "auto", name="b.png"), f"{scene}: another tone")

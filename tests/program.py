@@ -5,9 +5,15 @@ import subprocess
 import sys
 
 HPR = str(pathlib.Path(sys.argv[1]).resolve())
-# The picture of one sample, level by level: for tests that look at values, or at what a sample takes.
-PLAIN = ("--tone", "none", "--exposure", "0", "--environment", "none", "--spp", "1")
 failures = []
+
+
+def plain(*arguments):
+    """Arguments that draw one sample, level by level, but for what they say themselves: for tests that look at values, or
+    at what a sample takes."""
+    options = {"--tone": "none", "--exposure": "0", "--environment": "none", "--spp": "1"}
+    stated = {argument.split("=")[0] for argument in map(str, arguments)}
+    return [*arguments, *(word for option in options.items() if option[0] not in stated for word in option)]
 
 
 def expect(condition, message):

@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 import exr
-from program import HPR, PLAIN, expect, failures
+from program import HPR, expect, failures, plain
 
 MATTE = "gen:cornell"
 
@@ -28,7 +28,7 @@ def hpr(folder, *arguments):
 
 
 def render(folder, *arguments, scene="gen:gallery"):
-    hpr(folder, "render", scene, "--size", "136x60", "-o", "a.exr", "--stats", "a.json", "--force", *PLAIN, *arguments)
+    hpr(folder, "render", scene, "--size", "136x60", "-o", "a.exr", "--stats", "a.json", "--force", *plain(*arguments))
     return (folder / "a.exr").read_bytes()
 
 

@@ -19,7 +19,7 @@ import png
 from program import HPR, Failure, check, run, run_to
 
 COLORS = {"": [1, 0, 0, 1], "grass": [0, 1, 0, 1], "sea": [0, 0, 1, 1]}
-VIEW = ["--eye", "0,0,3", "--at", "0,0,0", "--size", "16x8", "--force"]
+VIEW = ["--eye", "0,0,3", "--at", "0,0,0", "--size", "16x8", "--force", "--environment", "none"]
 
 
 def model():
@@ -73,7 +73,7 @@ def draws_what_was_chosen(folder):
         run_to(folder, ["render", "a.gltf", "-o", "a.png", *VIEW, *options])
         check_shown(folder / "a.png", {expected}, f"render {' '.join(options)}")
     run_to(folder, ["wall", "run", "1x1@16x8", "a.gltf", "--display", "file", "-o", "wall", "--scene", "1", "--variant",
-                    "sea", "--eye", "0,0,3", "--at", "0,0,0", "--ranks", "2", "--force"])
+                    "sea", "--eye", "0,0,3", "--at", "0,0,0", "--ranks", "2", "--force", "--environment", "none"])
     check_shown(folder / "wall" / "wall.png", {("east", "b")}, "wall run")
     script = "render\nsave c.png\nset scene 0\nquit\n"
     job = subprocess.run([HPR, "console", "a.gltf", "--scene", "1", "--variant", "grass", *VIEW], cwd=folder, input=script,

@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-from program import PLAIN
+from program import plain
 
 HPR = os.path.abspath(sys.argv[1])
 NAN = float("nan")
@@ -30,7 +30,7 @@ def check(condition, what):
 
 
 def hpr(folder, *arguments):
-    return subprocess.run([HPR, "render", *PLAIN, *arguments, "--size", "100x70", "--force"], cwd=folder, capture_output=True,
+    return subprocess.run([HPR, "render", *plain(*arguments), "--size", "100x70", "--force"], cwd=folder, capture_output=True,
                           text=True, timeout=120, check=False)
 
 

@@ -93,17 +93,19 @@ class Display {
 
 /// Whether a motion is taken; one that is says the same when it is written anew.
 bool reads_motion(std::string_view text) {
-  const auto motion = parse_motion(text);
-  if (!motion) return false;
-  const auto write = [](const OrbitInput& of) {
-    return Json{{"turn", Json::array({of.turn_right, of.turn_up})},
-                {"pan", Json::array({of.pan_right, of.pan_up})},
-                {"dolly", of.dolly}}
-        .dump();
-  };
-  const auto again = parse_motion(write(*motion));
-  HPR_CHECK(again && write(*again) == write(*motion));
-  for (const double value : {motion->turn_right, motion->turn_up, motion->pan_right, motion->pan_up, motion->dolly}) {
+  const auto input = parse_motion(text);
+  if (!input) return false;
+  const OrbitInput& motion = input->orbit;
+  const ViewKeys& keys = input->keys;
+  std::string pressed(static_cast<std::size_t>(std::abs(keys.half_stops)), keys.half_stops < 0 ? '-' : '+');
+  pressed.append(static_cast<std::size_t>(keys.tones), 't').append(static_cast<std::size_t>(keys.wireframes), 'w');
+  const Json written{{"turn", Json::array({motion.turn_right, motion.turn_up})},
+                     {"pan", Json::array({motion.pan_right, motion.pan_up})},
+                     {"dolly", motion.dolly},
+                     {"keys", pressed}};
+  const auto again = parse_motion(written.dump());
+  HPR_CHECK(again && *again == *input);
+  for (const double value : {motion.turn_right, motion.turn_up, motion.pan_right, motion.pan_up, motion.dolly}) {
     HPR_CHECK(std::abs(value) <= 100.0);
   }
   return true;
