@@ -351,8 +351,9 @@ void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan
   if (plan.rays.photon_radius > 0.0) {
     lines.push_back(fmt::format("photon radius: {} m at first (as asked)", plan.rays.photon_radius));
   } else if (plan.rays.photon_footprint > 0.0) {
-    lines.push_back(fmt::format("photon radius: two pixels at first, of {:.3g} m (the median of what is seen)",
-                                plan.rays.photon_footprint));
+    lines.push_back(fmt::format(
+        "photon radius: two pixels at first, of {:.3g} m (the median of what is seen), or more where photons are few",
+        plan.rays.photon_footprint));
   }
 }
 

@@ -105,6 +105,10 @@ void resolve_photons(RenderSettings& settings) {
     photons.value.parse(settings, std::string(photons.by_quality.at(static_cast<std::size_t>(Quality::Good))));
   }
   settings.frame.photons_fit_frame = !settings.is_given("photons");
+  // All samples together are to gather so many; with fewer than four in one they show one by one.
+  constexpr double kGathered = 256.0;
+  constexpr std::uint32_t kManySamples = 64;
+  rays.photons_gathered = std::clamp(kGathered / settings.sampling.goal.samples.value_or(kManySamples), 4.0, 50.0);
 }
 
 void check_camera(const CameraChoice& camera) {

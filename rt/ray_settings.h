@@ -42,11 +42,12 @@ struct RaySettings {
   double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density and the footprint
   /// Metres that a pixel covers of what is seen: photons are gathered from about so far. 0: as their density has it.
   double photon_footprint = 0.0;
-  bool fits_photons = false;   ///< no more of `photons` are sent than fill the footprint
-  int occlusion_rays = 4;      ///< of the ambient-occlusion pass, per point and sample
-  double ambient = 0.2;        ///< radiance that pass lets in where nothing is near
-  bool terminator_fix = true;  ///< lifts the origins of shadow rays onto the smooth surface that the normals describe
-  RayBuild build = {};         ///< of Embree's scenes
+  bool fits_photons = false;    ///< no more of `photons` are sent than fill the footprint
+  double photons_gathered = 4;  ///< that a first radius takes in, at least: few are enough where samples are many
+  int occlusion_rays = 4;       ///< of the ambient-occlusion pass, per point and sample
+  double ambient = 0.2;         ///< radiance that pass lets in where nothing is near
+  bool terminator_fix = true;   ///< lifts the origins of shadow rays onto the smooth surface that the normals describe
+  RayBuild build = {};          ///< of Embree's scenes
   /// Passes whose light of the first surface is computed for one pixel in four and upsampled to its neighbors
   /// (HalfResShading); PassId::Shadow stands for direct light.
   std::vector<PassId> half_resolution = {};

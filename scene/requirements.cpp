@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
+#include <numbers>
+
+#include "scene/studio.h"
 
 namespace hpr {
 namespace {
@@ -83,6 +87,29 @@ bool shines(const std::optional<Environment>& environment) {
   return environment && environment->scale > 0.0 &&
          std::ranges::any_of(environment->image.pixels(),
                              [](const Rgb& color) { return color.r > 0.0F || color.g > 0.0F || color.b > 0.0F; });
+}
+
+double luminance(const Rgb& color) {
+  return 0.2126 * color.r + 0.7152 * color.g + 0.0722 * color.b;
+}
+
+/// Whether no direction is much brighter than the mean of all: rays in any direction then find its light.
+bool is_even(const Environment& environment) {
+  constexpr double kMaxOverMean = 8.0;
+  const Size size = environment.image.size();
+  double sum = 0.0;
+  double weights = 0.0;
+  double brightest = 0.0;
+  for (int y = 0; y < size.height; ++y) {
+    const double weight = std::sin(std::numbers::pi * (y + 0.5) / size.height);
+    for (int x = 0; x < size.width; ++x) {
+      const double value = luminance(environment.image.at(x, y));
+      sum += weight * value;
+      brightest = std::max(brightest, value);
+    }
+    weights += weight * size.width;
+  }
+  return brightest * weights <= kMaxOverMean * sum;
 }
 
 std::string counted(std::size_t count, const char* one, const char* many) {
@@ -206,6 +233,9 @@ Requirements requirements_of(const Scene& scene) {
     needs.max_roughness = std::max(needs.max_roughness, max_roughness(*material));
   }
   needs.constant_environment = lights == 1 && shines(scene.environment) && scene.environment->is_constant();
+  needs.even_environment =
+      needs.constant_environment || (scene.lights.empty() && shines(scene.environment) && is_even(*scene.environment) &&
+                                     (lights == 1 || emitted_radiance(scene) < kLitRadiance));
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};

@@ -22,6 +22,7 @@ struct Requirements {
   float min_roughness = 1.0F;         ///< of any visible lit material that reflects, anywhere
   float max_roughness = 0.0F;         ///< of the same materials
   bool constant_environment = false;  ///< whether all light comes from an environment of one radiance
+  bool even_environment = false;      ///< or from one that has no small bright lights, but for faint emitters
 };
 
 [[nodiscard]] Requirements requirements_of(const Scene& scene);

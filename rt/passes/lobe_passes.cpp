@@ -76,7 +76,7 @@ std::unique_ptr<Pass> make_refraction_pass() {
 bool gathers_by_rays(const Requirements& scene, const RaySettings& settings) {
   if (std::ranges::find(settings.passes, PassId::Gather) != settings.passes.end()) return true;
   return settings.photons > 0 && settings.passes.empty() && (settings.auto_passes || settings.all_passes) &&
-         settings.global_photons && settings.gather && scene.constant_environment && settings.half_resolution.empty();
+         settings.global_photons && settings.gather && scene.even_environment && settings.half_resolution.empty();
 }
 
 std::unique_ptr<Pass> make_gather_pass() {

@@ -344,9 +344,7 @@ PhotonSettings tracer_settings(const RaySettings& settings, const LightSampler& 
 namespace {
 
 // Photons that a first radius takes in, where they lie about as dense as most of them do.
-constexpr double kDense = 50.0;    ///< where one sample is to show no noise
-constexpr double kFilled = 4.0;    ///< where many samples do that
-constexpr double kMinDense = 4.0;  ///< fewer of them would show one by one in the sum of samples
+constexpr double kDense = 50.0;  ///< where one sample is to show no noise
 /// Pixels that it spans.
 constexpr double kFootprints = 2.0;
 
@@ -396,7 +394,7 @@ void PhotonMapBuilder::fit_count(Communicator* comm) {
   const TracedPhotons pilot = trace({}, comm);
   if (pilot.global.empty()) return;
   const double wide = first_radius(pilot.global, space_, kDense) / (kFootprints * settings_.photon_footprint);
-  const double wanted = settings_.photons * (kFilled / kDense) * wide * wide;
+  const double wanted = settings_.photons * (settings_.photons_gathered / kDense) * wide * wide;
   settings_.photons = static_cast<std::uint32_t>(
       std::clamp(wanted, static_cast<double>(std::min(kMinPhotons, most)), static_cast<double>(most)));
 }
@@ -405,7 +403,8 @@ double PhotonMapBuilder::choose_radius(std::span<const Photon> first) const {
   if (settings_.photon_radius > 0.0) return settings_.photon_radius;
   const double dense = first_radius(first, space_, kDense);
   if (!(settings_.photon_footprint > 0.0)) return dense;
-  return std::min(dense, std::max(kFootprints * settings_.photon_footprint, dense * std::sqrt(kMinDense / kDense)));
+  return std::min(dense, std::max(kFootprints * settings_.photon_footprint,
+                                  dense * std::sqrt(settings_.photons_gathered / kDense)));
 }
 
 void PhotonMapBuilder::choose_radii(const TracedPhotons& first) {
