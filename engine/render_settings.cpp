@@ -211,6 +211,8 @@ RenderSettings resolve(RenderSettings settings, std::uint64_t seed) {
     for (const Setting& setting : all_settings()) {
       if (can_finish(setting, settings)) setting.value.parse(settings, std::string(setting.finished));
     }
+    Sampling& sampling = settings.sampling;
+    if (sampling.filter) sampling.goal.samples = std::max(*sampling.goal.samples, min_samples(sampling));
   }
   RaySettings& rays = settings.frame.rays;
   rays.seed = seed;

@@ -167,7 +167,7 @@ TEST(RenderSettings, WhatIsAskedForKeepsOutWhatItExcludes) {
   EXPECT_EQ(finished({{"reference", "true"}}), std::tuple(1U, false, false));
   EXPECT_EQ(finished({{"shading", "local"}}), std::tuple(8U, false, true));
   EXPECT_EQ(finished({{"half-resolution", "shadow"}}), std::tuple(8U, false, true));
-  EXPECT_EQ(finished({{"filter", "mitchell"}}), std::tuple(8U, false, true));
+  EXPECT_EQ(finished({{"filter", "mitchell"}}), std::tuple(16U, false, true));
   EXPECT_EQ(finished({{"passes", "shadow"}}), std::tuple(8U, true, false));
   EXPECT_EQ(finished({{"photons", "0"}}), std::tuple(8U, true, false));
 }

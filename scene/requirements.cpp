@@ -94,7 +94,7 @@ double luminance(const Rgb& color) {
 }
 
 /// Whether no direction is much brighter than the mean of all: rays in any direction then find its light.
-bool is_even(const Environment& environment) {
+bool has_no_bright_spots(const Environment& environment) {
   constexpr double kMaxOverMean = 8.0;
   const Size size = environment.image.size();
   double sum = 0.0;
@@ -233,9 +233,9 @@ Requirements requirements_of(const Scene& scene) {
     needs.max_roughness = std::max(needs.max_roughness, max_roughness(*material));
   }
   needs.constant_environment = lights == 1 && shines(scene.environment) && scene.environment->is_constant();
-  needs.even_environment =
-      needs.constant_environment || (scene.lights.empty() && shines(scene.environment) && is_even(*scene.environment) &&
-                                     (lights == 1 || emitted_radiance(scene) < kLitRadiance));
+  needs.even_environment = needs.constant_environment || (scene.lights.empty() && shines(scene.environment) &&
+                                                          has_no_bright_spots(*scene.environment) &&
+                                                          (lights == 1 || emitted_radiance(scene) < kLitRadiance));
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};

@@ -187,7 +187,7 @@ def display_colors(folder):
     exposures = []
     for eye in ("0,0,5", "0,0,20"):
         render(folder, "quad.gltf", "--background", "transparent", "--eye", eye, "--exposure", "auto", picture="a.png")
-        exposures.append(pixels_of(folder / "a.png")[4][4])
+        exposures.append(pixels_of(folder / "a.png")[4][4][:3])
     expect(exposures[0] == exposures[1], f"the exposure of a small thing is another one: {exposures}")
 
 

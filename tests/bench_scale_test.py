@@ -43,7 +43,7 @@ def sizes(folder):
     expect([row["ranks"] for row in json.loads(again.stdout)["runs"]] == [2], "--ranks before the command")
     expect(len(json.loads((folder / "t.json").read_text())["traceEvents"]) > 10, "an empty trace")
 
-    drawn = run(folder, "wall", "run", "1x1@128x128", "gen:cornell", "--spp", "1", "-o", "wall")
+    drawn = run(folder, "wall", "run", "1x1@128x128", "gen:cornell", "--spp", "1", "--exposure", "0", "-o", "wall")
     expect(drawn.returncode == 0, drawn.stderr)
     manifest = json.loads((folder / "wall" / "manifest.json").read_text())
     expect(manifest["frames"][0]["screens"][0]["xxh64"] == found["runs"][0]["frame_xxh64"], "another frame than a wall's")

@@ -30,9 +30,9 @@ def is_finished(folder):
         first = picture(folder, scene)
         expect(first == picture(folder, scene, *FINISHED), f"{scene}: the first picture is not the finished one")
         expect(first == picture(folder, scene, "--ranks", "3", "--distribute", "sort-last"), f"{scene}: 3 ranks, other bits")
-        plain = picture(folder, scene, "--spp", "1")
-        expect(plain == picture(folder, scene, *plain("--no-indirect", "--denoise=false")), f"{scene}: --spp 1 is not plain")
-        expect(plain != first, f"{scene}: one plain sample is the finished picture")
+        one_sample = picture(folder, scene, "--spp", "1")
+        expect(one_sample == picture(folder, scene, *plain("--no-indirect", "--denoise=false")), f"{scene}: --spp 1 is not plain")
+        expect(one_sample != first, f"{scene}: one plain sample is the finished picture")
         shown = picture(folder, scene, name="a.png")
         expect(shown == picture(folder, scene, "--tone", "neutral", "--exposure", "auto", name="b.png"), f"{scene}: another tone")
         expect(shown == picture(folder, scene, "--ranks", "3", "--distribute", "sort-last", name="b.png"),

@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <exception>
+#include <new>
 #include <optional>
+#include <utility>
 
 #include "cluster/transport/collectives.h"
 #include "core/bytes.h"
@@ -19,8 +23,15 @@ Scene distribute_scene(Communicator& comm, const std::function<Scene()>& load) {
   if (comm.size() == 1) return std::move(*loaded);
   loaded.reset();
   // Rank 0 too goes on with what was sent, not with what it loaded.
-  Scene scene = scene_from_bytes(bytes);
-  const auto hashes = all_gather_value(comm, content_hash(scene));
+  std::optional<Scene> scene;
+  try {
+    scene = scene_from_bytes(bytes);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    // What came is no scene at all: its hash, of none, says so on every rank.
+  }
+  const auto hashes = all_gather_value(comm, scene ? content_hash(*scene) : std::uint64_t{0});
   for (std::size_t rank = 1; rank < hashes.size(); ++rank) {
     if (hashes[rank] != hashes[0]) {
       throw Error(
@@ -29,7 +40,7 @@ Scene distribute_scene(Communicator& comm, const std::function<Scene()>& load) {
           "run the same build of hpr on every host");
     }
   }
-  return scene;
+  return std::move(*scene);
 }
 
 }  // namespace hpr

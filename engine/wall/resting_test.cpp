@@ -111,6 +111,7 @@ void drive_view(const std::function<void(WallDriver&)>& body) {
         job.wall = load_wall("1x1@64x48");
         set_setting(job.settings, "quality", "draft");
         set_setting(job.settings, "spp", "2");
+        set_setting(job.settings, "exposure", "0");
         job.display = &kind;
         job.until_stopped = true;
         Session session(comm, {.threads = 1}, [] { return load_scene("gen:cornell"); });

@@ -140,6 +140,8 @@ class Bsdf {
   }
   /// Fresnel's term of the dielectric without its extensions, `cosine` off the normal.
   [[nodiscard]] double dielectric_fresnel(double cosine) const;
+  /// Of a rough dielectric by Fresnel's equations: what weight() has of its lobes before tints and metal.
+  [[nodiscard]] double facet_share(Lobe lobe) const;
 
   /// Below it a specular lobe is narrower than 1e-6 rad and has one direction.
   static constexpr double kDeltaRoughness = 1e-3;
@@ -165,7 +167,6 @@ class Bsdf {
   [[nodiscard]] std::optional<Facet> facet(Lobe lobe, const glm::dvec3& to_light) const;
   [[nodiscard]] double sampled_normals(Lobe lobe) const;
   [[nodiscard]] double facet_pdf(Lobe lobe, const Facet& facet) const;
-  [[nodiscard]] double facet_share(Lobe lobe) const;
   [[nodiscard]] std::optional<glm::dvec3> refracted(const glm::dvec3& normal) const;
   [[nodiscard]] std::optional<BsdfSample> sample_diffuse(const glm::dvec2& u) const;
   [[nodiscard]] std::optional<BsdfSample> sample_facet(Lobe lobe, const glm::dvec2& u) const;

@@ -151,9 +151,9 @@ glm::dvec3 ExtendedBsdf::dielectric(double cosine) const {
   return dielectric(cosine, plain_.dielectric_fresnel(cosine), eta());
 }
 
-/// Of the dielectric and the metal by their shares.
-glm::dvec3 ExtendedBsdf::fresnel(double cosine) const {
-  glm::dvec3 term = (1.0 - material_.metallic) * dielectric(cosine);
+/// Of the dielectric and the metal by their shares; `plain`: what the dielectric reflects without extensions.
+glm::dvec3 ExtendedBsdf::fresnel(double cosine, double plain) const {
+  glm::dvec3 term = (1.0 - material_.metallic) * dielectric(cosine, plain, eta());
   if (!(material_.metallic > 0.0)) return term;
   const glm::dvec3& color = material_.base_color;
   glm::dvec3 metal = color + (1.0 - color) * schlick_rise(cosine);
@@ -162,6 +162,10 @@ glm::dvec3 ExtendedBsdf::fresnel(double cosine) const {
                      extensions_.iridescence);
   }
   return term + material_.metallic * metal;
+}
+
+glm::dvec3 ExtendedBsdf::fresnel(double cosine) const {
+  return fresnel(cosine, plain_.dielectric_fresnel(cosine));
 }
 
 /// What the dielectric's reflection leaves to its base, in every channel.
@@ -180,7 +184,7 @@ double ExtendedBsdf::mean_entering() const {
 
 /// About the share of light that the base is reached by towards the viewer, for choosing among lobes.
 double ExtendedBsdf::base_enters() const {
-  return is_exact() ? view_enters_ / mean_entering() : std::max(view_enters_, kMinWeight);
+  return is_exact() ? view_enters_ / mean_entering() : std::max(enters(1.0), kMinWeight);
 }
 
 double ExtendedBsdf::below_coat(const glm::dvec3& direction) const {
@@ -415,8 +419,11 @@ glm::dvec3 ExtendedBsdf::weight(Lobe lobe) const {
           sheen_chance_ > 0.0 ? std::max(sheen_albedo(extensions_.sheen_roughness, normal_view_), kMinWeight) : 0.0;
       return (under_coat * sheen) * extensions_.sheen_color + (under * diffuse_ * base_enters()) * material_.base_color;
     }
-    case Lobe::Reflection:
-      return glm::max(under * fresnel(normal_view_), kMinWeight);
+    case Lobe::Reflection: {
+      const double dielectric =
+          is_exact() ? plain_.facet_share(Lobe::Reflection) : plain_.dielectric_fresnel(normal_view_);
+      return glm::max(under * fresnel(normal_view_, dielectric), kMinWeight);
+    }
     case Lobe::Transmission: {
       const double plain = plain_.dielectric_fresnel(normal_view_);
       const double kept = plain < 1.0 ? view_enters_ / (1.0 - plain) : 1.0;

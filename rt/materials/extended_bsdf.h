@@ -53,6 +53,7 @@ class ExtendedBsdf {
   [[nodiscard]] double eta() const;
   [[nodiscard]] glm::dvec3 dielectric(double cosine, double plain, double eta) const;
   [[nodiscard]] glm::dvec3 dielectric(double cosine) const;
+  [[nodiscard]] glm::dvec3 fresnel(double cosine, double plain) const;
   [[nodiscard]] glm::dvec3 fresnel(double cosine) const;
   [[nodiscard]] double enters(double cosine) const;
   [[nodiscard]] double mean_entering() const;

@@ -391,7 +391,9 @@ void PhotonMapBuilder::fit_count(Communicator* comm) {
   if (!std::exchange(settings_.fits_photons, false) || !(settings_.photon_footprint > 0.0)) return;
   const std::uint32_t most = settings_.photons;
   settings_.photons = std::min(most, kPilotPhotons);
+  const PhotonCounts counted = counts_;  // a sample's rays are those of every sample
   const TracedPhotons pilot = trace({}, comm);
+  counts_ = counted;
   if (pilot.global.empty()) return;
   const double wide = first_radius(pilot.global, space_, kDense) / (kFootprints * settings_.photon_footprint);
   const double wanted = settings_.photons * (settings_.photons_gathered / kDense) * wide * wide;

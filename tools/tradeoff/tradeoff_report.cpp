@@ -424,6 +424,11 @@ std::string command_for(const TradeoffReport& report, const TradeoffPoint& point
     std::ranges::replace(value, '+', ',');
     arguments.push_back(fmt::format("--{}={}", knob, value));
   }
+  // A sweep measures plain samples, which `render` draws where their number is given.
+  const auto states = [&](std::string_view start) {
+    return std::ranges::any_of(arguments, [&](const std::string& argument) { return argument.starts_with(start); });
+  };
+  if (!states("--spp=") && !states("--quality=best")) arguments.emplace_back("--spp=1");
   return shell_line(arguments);
 }
 
