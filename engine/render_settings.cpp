@@ -187,15 +187,20 @@ void check_combination(const RenderSettings& settings) {
     refuse("--half-resolution is about passes over what is seen in the end",
            "use it without --reference and with --shading deferred");
   }
+}
+
+void check_denoise(const RenderSettings& settings) {
+  const FrameSettings& frame = settings.frame;
   if (!frame.rays.denoise) return;
-  if (frame.rays.reference || is_local || shares_light) {
-    refuse("--denoise is about the light of passes at all that is seen in the end",
-           "use it without --reference and --half-resolution, and with --shading deferred");
+  if (frame.rays.reference || frame.shading == Shading::Local || !frame.rays.half_resolution.empty()) {
+    throw Error(ExitCode::Usage, "--denoise is about the light of passes at all that is seen in the end",
+                "use it without --reference and --half-resolution, and with --shading deferred");
   }
   if (settings.sampling.filter && min_samples(*settings.sampling.filter) > 1) {
-    refuse(fmt::format("--denoise looks at more places, whose weights --filter {} makes negative",
-                       name_of(*settings.sampling.filter)),
-           "use another filter, e.g. b-spline");
+    throw Error(ExitCode::Usage,
+                fmt::format("--denoise looks at more places, whose weights --filter {} makes negative",
+                            name_of(*settings.sampling.filter)),
+                "use another filter, e.g. b-spline");
   }
 }
 
@@ -222,6 +227,7 @@ RenderSettings resolve(RenderSettings settings, std::uint64_t seed) {
   if (rays.denoise && settings.sampling.filter) rays.filter = *settings.sampling.filter;
   check_camera(settings.camera);
   check_combination(settings);
+  check_denoise(settings);
   check_verify(settings.frame);
   check_sampling(settings.sampling);
   return settings;

@@ -112,6 +112,12 @@ bool has_no_bright_spots(const Environment& environment) {
   return brightest * weights <= kMaxOverMean * sum;
 }
 
+/// Of a scene with so many lights, emitting materials and environments.
+bool is_lit_evenly(const Scene& scene, std::size_t lights) {
+  return scene.lights.empty() && shines(scene.environment) && has_no_bright_spots(*scene.environment) &&
+         (lights == 1 || emitted_radiance(scene) < kLitRadiance);
+}
+
 std::string counted(std::size_t count, const char* one, const char* many) {
   return count == 1 ? fmt::format("1 {}", one) : fmt::format("{} {}", count, many);
 }
@@ -233,9 +239,7 @@ Requirements requirements_of(const Scene& scene) {
     needs.max_roughness = std::max(needs.max_roughness, max_roughness(*material));
   }
   needs.constant_environment = lights == 1 && shines(scene.environment) && scene.environment->is_constant();
-  needs.even_environment = needs.constant_environment || (scene.lights.empty() && shines(scene.environment) &&
-                                                          has_no_bright_spots(*scene.environment) &&
-                                                          (lights == 1 || emitted_radiance(scene) < kLitRadiance));
+  needs.even_environment = needs.constant_environment || is_lit_evenly(scene, lights);
   needs.indirect = lights > 0 && rough > 0 ? Requirement{true, "surfaces scatter light on to others"}
                    : lights > 0            ? Requirement{false, "no material scatters light"}
                                            : Requirement{false, "no light that surfaces could scatter"};

@@ -227,6 +227,7 @@ std::string axis_name(const std::string& metric) {
 
 void draw_line(SvgCanvas& canvas, const std::vector<Dot>& dots, const Stroke& stroke) {
   std::vector<Point> points;
+  points.reserve(dots.size());
   for (const Dot& dot : dots) points.push_back(dot.at);
   if (dots.size() > 1) canvas.polyline(points, stroke);
 }
