@@ -1,6 +1,7 @@
 #include "rt/deferred_shader.h"
 
 #include <algorithm>
+#include <iterator>
 #include <mutex>
 #include <numeric>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "rt/passes/pass.h"
 #include "rt/passes/path_vertex.h"
 #include "rt/passes/pixel_sums.h"
+#include "rt/passes/tile_margin.h"
 #include "rt/photons/photon_tracer.h"
 #include "rt/reference/path_tracer.h"
 #include "rt/show/show_pixels.h"
@@ -65,6 +67,7 @@ struct Scratch {
   HalfResShading shared;
   Denoiser denoiser;
   FragmentFinder finder;
+  std::vector<TileMargin> margins;               ///< per sample, where filters read any
   std::vector<std::vector<PathVertex>> waiting;  ///< by depth
   Wavefront wave;
   std::vector<double> ms;  ///< spent on each step
@@ -140,6 +143,10 @@ struct DeferredShader::State {
                  std::span<const ShadedSample> samples) const;
   void shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                   std::span<const ShadedSample> samples);
+  [[nodiscard]] std::size_t count_margins(const LightContext& context, const TileJob& job, bool denoises) const;
+  void start_filters(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, bool denoises,
+                     std::size_t margins);
+  void shade_margins(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, bool denoises);
   void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
   void gather_counts(double spent_ms);
   void shade_waiting(const LightContext& context, Scratch& scratch) const;
@@ -312,6 +319,43 @@ void DeferredShader::State::shade_waiting(const LightContext& context, Scratch& 
   }
 }
 
+/// The strips that filters of a tile read beyond the edges of its block.
+std::size_t DeferredShader::State::count_margins(const LightContext& context, const TileJob& job, bool denoises) const {
+  return (denoises || shared != 0) && context.rays != nullptr ? TileMargin::count(job) : 0;
+}
+
+void DeferredShader::State::start_filters(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                          bool denoises, std::size_t margins) {
+  if (denoises) scratch.denoiser.start(jobs.size(), margins, scratch.sums.wants_components);
+  if (shared != 0) scratch.shared.start(shared, context, jobs.front());
+  scratch.margins.clear();
+  if (margins > 0) shade_margins(context, scratch, jobs, denoises);
+}
+
+/// What lies in those strips.
+void DeferredShader::State::shade_margins(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+                                          bool denoises) {
+  std::size_t first_tile = jobs.size() + (denoises ? 1 : 0);
+  scratch.margins.resize(jobs.size());
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const Stopwatch watch;
+    TileMargin& margin = scratch.margins[i];
+    margin.find(context, jobs[i], denoises ? Denoiser::reach(jobs[i].number.sample) : HalfResShading::kReach,
+                static_cast<std::uint32_t>(first_tile * kTilePixels), scratch.buffers);
+    first_tile += margin.strips().size();
+    std::vector<PathVertex> points;
+    for (const TileJob& strip : margin.strips()) {
+      points.clear();
+      find_primary_vertices(context, strip, {0, strip.rect.height()}, scratch.buffers, scratch.sums, points);
+      if (shared != 0) scratch.shared.add_margin(strip, points);
+      if (denoises) scratch.denoiser.add_vertices(context, points);
+      std::ranges::move(points, std::back_inserter(scratch.waiting[0]));
+    }
+    scratch.ms[kSurfaceStep] += watch.ms();
+    shade_waiting(context, scratch);
+  }
+}
+
 /// Light of neighbours in place of a sample's own, once that is known.
 void DeferredShader::State::denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
                                     std::size_t index) {
@@ -319,9 +363,12 @@ void DeferredShader::State::denoise(const LightContext& context, Scratch& scratc
   const double before = spent_ms(scratch);
   const TileFragments& tile_fragments =
       fragments.of_tile(context, scratch.buffers, jobs.front(), index, scratch.finder);
-  for (const TileJob& job : jobs) {
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const TileJob& job = jobs[i];
     if (job.number.sample >= kDenoisedSamples) break;
-    scratch.denoiser.resample_edges(context, job, tile_fragments, scratch.buffers, scratch.sums, scratch.waiting[0]);
+    const auto margin = scratch.margins.empty() ? std::span<const TileJob>() : scratch.margins[i].strips();
+    scratch.denoiser.resample_edges(context, job, margin, tile_fragments, scratch.buffers, scratch.sums,
+                                    scratch.waiting[0]);
     shade_waiting(context, scratch);
     scratch.denoiser.resolve(context, job, tile_fragments, scratch.sums);
   }
@@ -361,13 +408,14 @@ void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scr
   PixelSums& sums = scratch.sums;
   const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
   const bool shows_cost = settings.show == Show::Cost;
+  const std::size_t margins = jobs.size() * count_margins(context, jobs.front(), denoises);
   sums.clear(index, samples,
              {.all_components = shared != 0 || (denoises && Denoiser::keeps_direct(scene)),
               .diffuse = denoises,
-              .cost = shows_cost});
-  if (denoises) scratch.denoiser.start(jobs.size(), sums.wants_components);
+              .cost = shows_cost,
+              .margins = margins});
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
-  if (shared != 0) scratch.shared.start(shared, context, jobs.front());
+  start_filters(context, scratch, jobs, denoises, margins);
   const int height = jobs.front().rect.height();
   for (RowRange rows; rows.first < height; rows.first = rows.end) {
     rows.end = end_of_wavefront(jobs.front(), rows.first);

@@ -63,16 +63,20 @@ const std::vector<glm::dvec3>& diffuse_of(const PixelSums& sums, std::size_t i) 
 
 }  // namespace
 
-void Denoiser::start(std::size_t samples, bool with_components) {
+int Denoiser::reach(std::uint32_t sample) {
+  return sample == 0 ? TapPlanes::kMaxRadius + 1 : TapPlanes::kMaxRadius;
+}
+
+void Denoiser::start(std::size_t samples, std::size_t margins, bool with_components) {
   sums_ = with_components ? 1 + kComponents : 1;
-  states_.assign(samples * kTilePixels, State::Unlit);
+  spare_ = static_cast<std::uint32_t>(samples * kTilePixels);
+  states_.assign((samples + (margins > 0 ? 1 : 0) + margins) * kTilePixels, State::Unlit);
   pixel_features_.resize(states_.size());
   some_separate_ = false;
   if (!taps_) {
     taps_ = std::make_unique<NeighborFeatures<float>>();
     taps_->scattering.resize(kLobePlanes);
   }
-  spare_ = static_cast<std::uint32_t>(states_.size());
 }
 
 /// Sampled lights bring light by all lobes together: where it does not stay with its pixel, the diffuse part is not
@@ -127,13 +131,24 @@ bool Denoiser::keeps(const LightContext& context, std::size_t sum) {
   return keeps_direct(context.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
 }
 
-void Denoiser::set_taps(const TileJob& job) {
+template <typename Body>
+void Denoiser::each_pixel(const TileJob& job, std::span<const TileJob> margin, const Body& body) {
+  for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) body(job.first_pixel + pixel, plane_index(pixel));
+  for (const TileJob& strip : margin) {
+    for (int y = 0; y < strip.rect.height(); ++y) {
+      for (int x = 0; x < strip.rect.width(); ++x) {
+        body(strip.first_pixel + static_cast<std::uint32_t>(index_of(x, y)),
+             TapPlanes::index(strip.rect.x0 - job.rect.x0 + x, strip.rect.y0 - job.rect.y0 + y));
+      }
+    }
+  }
+}
+
+void Denoiser::set_taps(const TileJob& job, std::span<const TileJob> margin) {
   NeighborFeatures<float>& taps = *taps_;
-  for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
-    const std::uint32_t own = job.first_pixel + pixel;
-    const std::size_t at = plane_index(pixel);
-    taps.kinds.at(at) = NeighborFeatures<float>::kNoTap;
-    if (states_[own] != State::Tap) continue;
+  taps.kinds.fill(NeighborFeatures<float>::kNoTap);
+  each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
+    if (states_[own] != State::Tap) return;
     const PixelFeature& seen = pixel_features_[own];
     taps.kinds.at(at) = tap_kind(seen.feature.material, seen.separate_diffuse);
     taps.position.set(at, seen.feature.position);
@@ -143,15 +158,15 @@ void Denoiser::set_taps(const TileJob& job) {
       taps.scattering[static_cast<std::size_t>(lobe)].set(at, scattering_of(seen, lobe));
     }
     taps.sharpness.at(at) = 1.0F / square(seen.width);
-  }
+  });
 }
 
-void Denoiser::set_light(const LightContext& context, const TileJob& job, const PixelSums& sums) {
+void Denoiser::set_light(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
+                         const PixelSums& sums) {
   const auto set = [&](TapVectors<double>& lent, const auto& light_of) {
-    for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
-      const std::uint32_t own = job.first_pixel + pixel;
-      lent.set(plane_index(pixel), states_[own] == State::Tap ? light_of(own) : glm::dvec3(0.0));
-    }
+    each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
+      lent.set(at, states_[own] == State::Tap ? light_of(own) : glm::dvec3(0.0));
+    });
   };
   const auto kept = [&](std::size_t fragment, std::uint32_t pixel) {
     return sums.components.at(fragment)[pixel] - sums.diffuse_components.at(fragment)[pixel];
@@ -210,34 +225,24 @@ void Denoiser::add_sample(const LightContext& context, const TileJob& job, RayBu
   point.pixel = spare_ + sample.pixel;
 }
 
-/// The brightest of the pixels about one that are lit.
-double Denoiser::brightest_about(const PixelSums& sums, const TileJob& job, int column, int row) {
-  const Rect about{column - 1, row - 1, column + 2, row + 2};
-  const Rect pixels = intersection(about, {0, 0, job.rect.width(), job.rect.height()});
-  double found = 0.0;
-  for (int y = pixels.y0; y < pixels.y1; ++y) {
-    for (int x = pixels.x0; x < pixels.x1; ++x) {
-      const std::size_t pixel = index_of(x, y);
-      if ((x == column && y == row) || !job.wants(pixel)) continue;
-      found = std::max(found, brightness(sums.radiance[job.first_pixel + pixel]));
+void Denoiser::set_apart(const PixelSums& sums, const TileJob& job, std::span<const TileJob> margin) {
+  brightness_.fill(0.0);
+  each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
+    const bool is_lit = own >= spare_ || job.wants(own - job.first_pixel);
+    if (is_lit) brightness_.at(at) = brightness(sums.radiance[own]);
+  });
+  each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
+    if (states_[own] == State::Unlit) return;
+    const glm::dvec3& light = sums.radiance[own];
+    double brightest = 0.0;  // of the pixels about
+    for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
+      for (const std::size_t about : {row - 1, row, row + 1}) {
+        if (about != at) brightest = std::max(brightest, brightness_.at(about));
+      }
     }
-  }
-  return found;
-}
-
-void Denoiser::set_apart(const PixelSums& sums, const TileJob& job) {
-  std::vector<std::size_t> apart;
-  for (int y = 0; y < job.rect.height(); ++y) {
-    for (int x = 0; x < job.rect.width(); ++x) {
-      const std::size_t own = job.first_pixel + index_of(x, y);
-      if (states_[own] == State::Unlit) continue;
-      const glm::dvec3& light = sums.radiance[own];
-      const bool is_far_brighter =
-          states_[own] == State::Tap && brightness(light) > kFarBrighter * brightest_about(sums, job, x, y);
-      if (!fits_floats(light) || is_far_brighter) apart.push_back(own);
-    }
-  }
-  for (const std::size_t pixel : apart) states_[pixel] = State::Apart;
+    const bool is_far_brighter = states_[own] == State::Tap && brightness(light) > kFarBrighter * brightest;
+    if (!fits_floats(light) || is_far_brighter) states_[own] = State::Apart;
+  });
 }
 
 void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const CoverageFragment> fragments) {
@@ -255,9 +260,10 @@ void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const Coverage
   }
 }
 
-void Denoiser::resample_edges(const LightContext& context, const TileJob& job, const TileFragments& fragments,
-                              RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& unfiltered) {
-  set_apart(sums, job);
+void Denoiser::resample_edges(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
+                              const TileFragments& fragments, RayBuffers& buffers, PixelSums& sums,
+                              std::vector<PathVertex>& unfiltered) {
+  set_apart(sums, job, margin);
   each_sum([&](std::size_t i) {
     filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
     std::fill_n(sum_of(sums, i).begin() + spare_, kTilePixels, glm::dvec3(0.0));
@@ -265,8 +271,8 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, c
   uncovered_.assign(sums.wants_coverage ? kTilePixels : 0, 0.0);
   narrowed_ = 1.0F / std::sqrt(std::sqrt(1.0F + static_cast<float>(job.number.sample)));
   set_unexpected_apart(job, fragments.fragments);
-  set_taps(job);
-  set_light(context, job, sums);
+  set_taps(job, margin);
+  set_light(context, job, margin, sums);
   View view = unjittered(job);
   buffers.requests.clear();
   samples_.clear();

@@ -23,22 +23,28 @@ namespace hpr {
 /// medium or that lie behind surfaces of partial coverage are left as they are. Only a frame's first kDenoisedSamples
 /// are filtered.
 ///
-/// Light stays in its tile, and a sample in itself: neither ranks nor threads change a bit.
+/// Light comes from the tile and from what its margin sees (see TileMargin), and a sample stays in itself: neither
+/// ranks nor threads change a bit.
 class Denoiser {
  public:
   /// Whether direct light stays with its pixel, which components of the light are needed for.
   [[nodiscard]] static bool keeps_direct(const Scene& scene) { return !scene.lights.empty(); }
 
-  /// Starts a tile of so many samples, whose components are filtered too where they are summed.
-  void start(std::size_t samples, bool with_components);
+  /// How wide the margin has to be in a sample: what the filter reads, and what decides whether that is a tap.
+  [[nodiscard]] static int reach(std::uint32_t sample);
+
+  /// Starts a tile of so many samples, whose components are filtered too where they are summed, with so many strips of
+  /// margins in all.
+  void start(std::size_t samples, std::size_t margins, bool with_components);
 
   /// Reads the features of primary vertices, which are finished but not shaded.
   void add_vertices(const LightContext& context, std::span<const PathVertex> points);
 
-  /// Once all is shaded: samples the fragments of pixels that edges cross. Appends the vertices that no tap can stand
-  /// in for to `unfiltered`: they are to be shaded.
-  void resample_edges(const LightContext& context, const TileJob& job, const TileFragments& fragments,
-                      RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& unfiltered);
+  /// Once all is shaded: samples the fragments of pixels that edges cross. `margin`: the strips of the sample. Appends
+  /// the vertices that no tap can stand in for to `unfiltered`: they are to be shaded.
+  void resample_edges(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
+                      const TileFragments& fragments, RayBuffers& buffers, PixelSums& sums,
+                      std::vector<PathVertex>& unfiltered);
 
   /// Once those are shaded too: replaces the sample's sums.
   void resolve(const LightContext& context, const TileJob& job, const TileFragments& fragments, PixelSums& sums);
@@ -77,14 +83,17 @@ class Denoiser {
   };
 
   [[nodiscard]] static bool knows_diffuse(const LightContext& context);
-  [[nodiscard]] static double brightest_about(const PixelSums& sums, const TileJob& job, int column, int row);
+  /// Calls `body` with each pixel of the tile and then of its margin: its index into PixelSums, and that of its planes.
+  template <typename Body>
+  static void each_pixel(const TileJob& job, std::span<const TileJob> margin, const Body& body);
   /// Finds pixels that stay apart.
-  void set_apart(const PixelSums& sums, const TileJob& job);
+  void set_apart(const PixelSums& sums, const TileJob& job, std::span<const TileJob> margin);
   /// Whether there is light in a sum that stays with its pixel.
   [[nodiscard]] static bool keeps(const LightContext& context, std::size_t sum);
   /// Sets the features of the taps, then their light.
-  void set_taps(const TileJob& job);
-  void set_light(const LightContext& context, const TileJob& job, const PixelSums& sums);
+  void set_taps(const TileJob& job, std::span<const TileJob> margin);
+  void set_light(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
+                 const PixelSums& sums);
   /// What the centers of pixels and of subpixel samples have in common.
   [[nodiscard]] static FilterCenter<float> center_of(const View& view, const SurfaceFeature& feature,
                                                      std::uint32_t pixel);
@@ -113,7 +122,8 @@ class Denoiser {
   std::vector<TapVectors<double>> light_;
   std::vector<TapVectors<double>>
       diffuse_light_;  ///< the diffuse part of light_; when some pixel of the tile separates it
-  std::vector<TapVectors<double>> kept_light_;  ///< the part of light_ that stays with its pixel: direct light
+  std::vector<TapVectors<double>> kept_light_;         ///< the part of light_ that stays with its pixel: direct light
+  std::array<double, TapPlanes::kSize> brightness_{};  ///< of the current sample's pixels; 0 where there is none
   bool some_separate_ = false;
   TapWeights<float> weights_;
   TapWeights<float> diffuse_weights_;

@@ -9,7 +9,6 @@ namespace hpr {
 namespace {
 
 constexpr int kBlockSide = 2;
-constexpr int kBlocksPerRow = kTileSide / kBlockSide;
 
 /// The tap's place in its block, sample after sample: diagonals first.
 constexpr std::array<int, 4> kTapX{0, 1, 1, 0};
@@ -27,9 +26,29 @@ constexpr double kMaxRatio = 4.0;
 
 static_assert(kPasses <= FilterCenter<double>::kMaxTerms);
 
-glm::ivec2 block_of(std::uint32_t pixel) {
-  return {static_cast<int>(pixel % kTileSide) / kBlockSide, static_cast<int>(pixel / kTileSide) / kBlockSide};
+/// `position`: no more than a pixel before the first block.
+glm::ivec2 block_of(const glm::ivec2& position) {
+  return (position + kBlockSide) / kBlockSide - 1;
 }
+
+/// The pixels of which a primary vertex is all that is seen.
+class SingleSurfaces {
+ public:
+  SingleSurfaces(const std::vector<PathVertex>& points, std::uint32_t first_pixel) : first_pixel_(first_pixel) {
+    for (const PathVertex& point : points) {
+      std::uint8_t& count = counts_.at(point.pixel - first_pixel_);
+      count = count == 0 ? 1 : 2;
+    }
+  }
+
+  [[nodiscard]] bool has(const PathVertex& point) const {
+    return counts_.at(point.pixel - first_pixel_) == 1 && point.throughput == glm::dvec3(1.0);
+  }
+
+ private:
+  std::uint32_t first_pixel_;
+  std::array<std::uint8_t, kTilePixels> counts_{};
+};
 
 }  // namespace
 
@@ -41,8 +60,9 @@ void HalfResShading::start(ComponentSet shared, const LightContext& context, con
   }
   glossy_cutoff_ = context.settings.glossy_cutoff;
   const std::size_t turn = job.number.sample % kTapX.size();
-  tap_x_ = kTapX.at(turn);
-  tap_y_ = kTapY.at(turn);
+  tap_ = {kTapX.at(turn), kTapY.at(turn)};
+  rect_ = job.rect;
+  before_ = job.origin() % kBlockSide;
   eye_ = context.view->eye;
   if (!taps_) taps_ = std::make_unique<NeighborFeatures<double>>();
   taps_->kinds.fill(NeighborFeatures<double>::kNoTap);
@@ -62,9 +82,9 @@ HalfResShading::Feature HalfResShading::feature_of(const PathVertex& point) cons
   return feature;
 }
 
-void HalfResShading::set_tap(const Feature& feature) {
-  const glm::ivec2 block = block_of(feature.pixel);
+void HalfResShading::set_tap(const glm::ivec2& block, const Feature& feature) {
   const std::size_t at = TapPlanes::index(block.x, block.y);
+  tap_pixels_.at(at) = feature.pixel;
   taps_->kinds.at(at) = tap_kind(feature.material, false);
   taps_->position.set(at, feature.position);
   taps_->normal.set(at, feature.normal);
@@ -88,27 +108,41 @@ FilterCenter<double> HalfResShading::center_of(const Feature& feature) const {
   return center;
 }
 
-bool HalfResShading::is_tap(const PathVertex& point) const {
-  return static_cast<int>(point.pixel % kTileSide) % kBlockSide == tap_x_ &&
-         static_cast<int>(point.pixel / kTileSide) % kBlockSide == tap_y_;
+glm::ivec2 HalfResShading::position_of(std::uint32_t pixel) const {
+  return before_ + glm::ivec2(pixel % kTileSide, pixel / kTileSide);
+}
+
+bool HalfResShading::is_tap(const glm::ivec2& position) const {
+  return (position + kBlockSide) % kBlockSide == tap_;
+}
+
+void HalfResShading::add_margin(const TileJob& strip, std::vector<PathVertex>& points) {
+  const SingleSurfaces seen(points, strip.first_pixel);
+  const glm::ivec2 offset = glm::ivec2(strip.rect.x0, strip.rect.y0) - glm::ivec2(rect_.x0, rect_.y0);
+  std::erase_if(points, [&](const PathVertex& point) {
+    const glm::ivec2 position = position_of(point.pixel - strip.first_pixel) + offset;
+    const bool lends = is_tap(position) && seen.has(point) && point.material.emission == glm::dvec3(0.0);
+    if (lends) set_tap(block_of(position), feature_of(point));
+    return !lends;
+  });
 }
 
 void HalfResShading::choose(std::vector<PathVertex>& points, int first_row) {
   // A pixel that shows several surfaces, each in part, keeps to itself.
-  std::array<std::uint8_t, kTilePixels> surfaces{};
-  for (const PathVertex& point : points) surfaces.at(point.pixel) = surfaces.at(point.pixel) == 0 ? 1 : 2;
-  const auto shows_one = [&](const PathVertex& point) {
-    return surfaces.at(point.pixel) == 1 && point.throughput == glm::dvec3(1.0);
-  };
-  HPR_CHECK(first_row % kBlockSide == 0);
+  const SingleSurfaces seen(points, 0);
+  HPR_CHECK(first_row == 0 || (before_.y + first_row) % kBlockSide == 0);
   for (const PathVertex& point : points) {
+    const glm::ivec2 position = position_of(point.pixel);
     // What glows is no light that falls on it.
-    if (is_tap(point) && shows_one(point) && point.material.emission == glm::dvec3(0.0)) set_tap(feature_of(point));
+    if (is_tap(position) && seen.has(point) && point.material.emission == glm::dvec3(0.0)) {
+      set_tap(block_of(position), feature_of(point));
+    }
   }
   for (PathVertex& point : points) {
-    const glm::ivec2 block = block_of(point.pixel);
+    const glm::ivec2 position = position_of(point.pixel);
+    const glm::ivec2 block = block_of(position);
     const bool has_tap = taps_->kinds.at(TapPlanes::index(block.x, block.y)) != NeighborFeatures<double>::kNoTap;
-    if (!has_tap || is_tap(point) || !shows_one(point)) continue;
+    if (!has_tap || is_tap(position) || !seen.has(point)) continue;
     const Feature feature = feature_of(point);
     FilterCenter<double> center = center_of(feature);
     center.window.first = block;
@@ -126,7 +160,7 @@ void HalfResShading::choose(std::vector<PathVertex>& points, int first_row) {
 
 /// Taps stand on a lattice two pixels wide: a pixel lies on one of its lines, or half way between two.
 FilterWindow HalfResShading::taps_about(std::uint32_t pixel) const {
-  const glm::ivec2 position(static_cast<int>(pixel % kTileSide) - tap_x_, static_cast<int>(pixel / kTileSide) - tap_y_);
+  const glm::ivec2 position = position_of(pixel) - tap_;
   const glm::ivec2 first(position.x >= 0 ? position.x / kBlockSide : -1,
                          position.y >= 0 ? position.y / kBlockSide : -1);
   return {first, 1 + position.x - first.x * kBlockSide, 1 + position.y - first.y * kBlockSide};
@@ -144,12 +178,9 @@ void HalfResShading::upsample(PixelSums& sums) {
           passes_, [&](const PassInfo* each) { return contains(each->half_resolution.components, component); });
       const auto term = static_cast<std::size_t>(pass - passes_.begin());
       const auto light = [&](std::size_t i) {
-        const auto x = static_cast<int>(i % TapPlanes::kStride) - TapPlanes::kMargin;
-        const auto y = static_cast<int>(i / TapPlanes::kStride) - TapPlanes::kMargin;
-        const int tap = (kBlockSide * y + tap_y_) * kTileSide + kBlockSide * x + tap_x_;
         // A surface that scatters nothing of such light has none to be scaled.
         const glm::dvec3 scatters = glm::sign(taps_->scattering[term].at(i));
-        return scatters * sums.components.at(part)[static_cast<std::size_t>(tap)];
+        return scatters * sums.components.at(part)[tap_pixels_.at(i)];
       };
       sums.add(feature.pixel, component, filtered_mean(weights_, term, light));
     }

@@ -17,9 +17,8 @@ namespace hpr {
 namespace {
 
 Sampler sampler_of(const LightContext& context, const TileJob& job, int x, int y) {
-  const View& view = *job.view;
-  return {pixel_stream({context.settings.seed, job.number.frame}, view.screen_number, view.block.x0 + job.rect.x0 + x,
-                       view.block.y0 + job.rect.y0 + y),
+  const glm::ivec2 pixel = job.origin() + glm::ivec2(x, y);
+  return {pixel_stream({context.settings.seed, job.number.frame}, job.view->screen_number, pixel.x, pixel.y),
           job.number.sample};
 }
 
@@ -169,7 +168,10 @@ std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const
 }
 
 int end_of_wavefront(const TileJob& job, int first) {
-  if (job.wanted.empty()) return std::min(first + static_cast<int>(kWavefrontVertices) / kTileSide, job.rect.height());
+  if (job.wanted.empty()) {
+    const int end = first + static_cast<int>(kWavefrontVertices) / kTileSide;
+    return std::min(end - (job.origin().y + end) % 2, job.rect.height());
+  }
   std::size_t points = 0;
   int row = first;
   do {

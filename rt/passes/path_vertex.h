@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,8 @@ struct TileJob {
   std::span<const std::uint8_t> wanted = {};  ///< 1 at the pixels that are shaded; empty: all
 
   [[nodiscard]] bool wants(std::size_t pixel) const { return wanted.empty() || wanted[pixel] != 0; }
+  /// Its upper left pixel, of the whole screen.
+  [[nodiscard]] glm::ivec2 origin() const { return {view->block.x0 + rect.x0, view->block.y0 + rect.y0}; }
 };
 
 /// Orders `tiles` so that threads end at about the same time: those that show most surfaces first. Leaves them as they
@@ -42,7 +45,8 @@ inline constexpr std::size_t kWavefrontVertices = 512;
 /// `view`: the job's, at any jitter.
 [[nodiscard]] RayRequest eye_ray(const View& view, const TileJob& job, double x, double y);
 
-/// Past the last of the rows, `first` and on, whose pixels make a wavefront.
+/// Past the last of the rows, `first` and on, whose pixels make a wavefront: before an even row of the screen, where
+/// all pixels are shaded.
 [[nodiscard]] int end_of_wavefront(const TileJob& job, int first);
 
 /// Initializes a vertex whose surface is set, shown at pixel (x, y) of the tile, of which it covers `coverage`.

@@ -40,14 +40,16 @@ void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) 
                ScreenPixel{job.view->screen_number, block.y0 + job.rect.y0 + y, block.x0 + job.rect.x0 + x});
 }
 
-/// Sets the sums of so many pixels, tile after tile, to 0 where they are wanted: everywhere when the mask is empty.
+/// Sets the sums of so many pixels, tile after tile, to 0 where they are wanted, everywhere when the mask is empty, and
+/// those of the pixels of margins that follow.
 template <typename Sum>
-void clear_sums(std::vector<Sum>& sums, std::size_t pixels, std::span<const std::uint8_t> wanted) {
+void clear_sums(std::vector<Sum>& sums, std::size_t pixels, std::size_t margins, std::span<const std::uint8_t> wanted) {
   if (wanted.empty()) {
-    sums.assign(pixels, Sum(0.0));
+    sums.assign(pixels + margins, Sum(0.0));
     return;
   }
-  sums.resize(pixels);
+  sums.resize(pixels + margins);
+  std::fill(sums.begin() + static_cast<std::ptrdiff_t>(pixels), sums.end(), Sum(0.0));
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     if (wanted[pixel % kTilePixels] != 0) sums[pixel] = Sum(0.0);
   }
@@ -64,14 +66,15 @@ void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, c
   wants_coverage = output.coverage != nullptr;
   const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, tile);
   const std::size_t pixels = (samples.size() + (wants.diffuse ? 1 : 0)) * kTilePixels;
-  clear_sums(radiance, pixels, wanted);
-  if (wants_diffuse) clear_sums(diffuse, pixels, wanted);
+  const std::size_t margins = wants.margins * kTilePixels;
+  clear_sums(radiance, pixels, margins, wanted);
+  if (wants_diffuse) clear_sums(diffuse, pixels, margins, wanted);
   for (std::size_t i = 0; wants_components && i < kComponents; ++i) {
-    clear_sums(components.at(i), pixels, wanted);
-    if (wants_diffuse) clear_sums(diffuse_components.at(i), pixels, wanted);
+    clear_sums(components.at(i), pixels, margins, wanted);
+    if (wants_diffuse) clear_sums(diffuse_components.at(i), pixels, margins, wanted);
   }
-  if (wants_cost) cost.assign(pixels, 0.0F);
-  if (wants_coverage) clear_sums(uncovered, pixels, wanted);
+  if (wants_cost) cost.assign(pixels + margins, 0.0F);
+  if (wants_coverage) clear_sums(uncovered, pixels, margins, wanted);
   for (const ShadedSample& sample : samples) {
     for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
       if (layer != nullptr) std::ranges::fill(layer->tile(tile), Rgb{});

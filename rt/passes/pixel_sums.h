@@ -19,7 +19,8 @@ struct WantedSums {
   bool all_components = false;  ///< those that no sample wants too
   /// The diffuse part of each, and room for one more sample behind those given (a denoiser's).
   bool diffuse = false;
-  bool cost = false;  ///< the rays of each pixel
+  bool cost = false;        ///< the rays of each pixel
+  std::size_t margins = 0;  ///< strips, which have the sums of a tile each, behind all others
 };
 
 /// Light summed per pixel of one tile, sample after sample, in an order that no thread changes: what passes add to.

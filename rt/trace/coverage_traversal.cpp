@@ -132,12 +132,17 @@ void CoverageTraversal::visit_alpha_tested(std::span<const RayRequest> rays, Tra
   }
 }
 
-std::uint64_t CoverageTraversal::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
-                                         TraversalScratch& scratch, Coherence coherence) const {
+std::uint64_t CoverageTraversal::closest_opaque(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
+                                                TraversalScratch& scratch, Coherence coherence) const {
   HPR_CHECK(hits.size() == rays.size());
   scratch.batch.clear();
   for (const RayRequest& ray : rays) push(ray, scratch.batch);
-  const std::uint64_t invalid = opaque_.closest(scratch.batch, hits, coherence);
+  return opaque_.closest(scratch.batch, hits, coherence);
+}
+
+std::uint64_t CoverageTraversal::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
+                                         TraversalScratch& scratch, Coherence coherence) const {
+  const std::uint64_t invalid = closest_opaque(rays, hits, scratch, coherence);
   surfaces_.prefetch(hits);
   if (alpha_tested_ == nullptr) return invalid;
   WorldTriangle triangle;

@@ -79,6 +79,10 @@ class CoverageTraversal {
   std::uint64_t closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits, TraversalScratch& scratch,
                         Coherence coherence = Coherence::Low) const;
 
+  /// hits[i] is the surface ray i meets first of those that cover all behind them. Returns how many rays were invalid.
+  std::uint64_t closest_opaque(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
+                               TraversalScratch& scratch, Coherence coherence = Coherence::Low) const;
+
   /// passed[i] is the share of light that gets through to the end of ray i: 0 behind anything opaque. Returns how many
   /// rays were invalid.
   std::uint64_t passed(std::span<const RayRequest> rays, std::span<float> passed, TraversalScratch& scratch) const;
