@@ -81,7 +81,7 @@ void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
   const bool same_plan = plan_.layout.tiles() > 0 && effort.degradations == effort_.degradations &&
                          effort.scale_step == effort_.scale_step;
   const double scale = settings_.resolution_scale * scale_of_step(effort.scale_step);
-  blocks_ = cut_blocks(at_resolution(screens, scale));
+  blocks_ = cut_blocks(screens, scale);
   if (same_plan) return;
   sampler_.reset();  // it holds on to the plan
   const auto count = static_cast<std::size_t>(effort.degradations);

@@ -40,10 +40,13 @@ double slowest(Communicator& comm, double ms) {
 
 }  // namespace
 
-Blocks cut_blocks(std::span<const View> screens) {
+Blocks cut_blocks(std::span<const View> screens, double scale) {
   Blocks blocks;
+  const std::vector<View> made = at_resolution(screens, scale);
   for (std::size_t screen = 0; screen < screens.size(); ++screen) {
-    for (const View& block : split_into_blocks(screens[screen], kRasterLimit)) {
+    blocks.made.push_back({made[screen].screen, made[screen].block});
+    blocks.shown.push_back({screens[screen].screen, screens[screen].block});
+    for (const View& block : split_into_blocks(made[screen], kRasterLimit)) {
       blocks.views.push_back(block);
       blocks.screen_of.push_back(screen);
     }
@@ -97,12 +100,12 @@ TileLayer<Rgba8> to_display(const Frame& frame, int threads, const DisplayTransf
   return display;
 }
 
-/// One value a pixel on `size` pixels, by the filter of colours.
-Image<float> enlarge(const Image<float>& values, Size size, int threads) {
+/// One value a pixel, by the filter of colours.
+Image<float> enlarge(const Image<float>& values, const PicturePart& made, const PicturePart& shown, int threads) {
   Image<Rgb> grey(values.size());
   std::ranges::transform(values.pixels(), grey.pixels().begin(), [](float value) { return Rgb{value, value, value}; });
-  const Image<Rgb> large = enlarge(grey, size, threads);
-  Image<float> result(size);
+  const Image<Rgb> large = enlarge(grey, made, shown, threads);
+  Image<float> result(large.size());
   std::ranges::transform(large.pixels(), result.pixels().begin(), &Rgb::r);
   return result;
 }
@@ -146,14 +149,24 @@ int scaled(int side, double scale) {
   return std::max(static_cast<int>(std::lround(side * scale)), 1);
 }
 
+/// The first and one past the last of `made` pixels of a side that show some of `shown` ones, and what enlarging takes
+/// of those before and after.
+std::pair<int, int> scaled_part(int first, int end, int shown, int made) {
+  if (made == shown) return {first, end};
+  const auto at = [&](int edge) { return static_cast<int>(std::lround(static_cast<double>(edge) * made / shown)); };
+  return {std::max(at(first) - 1, 0), std::min(at(end) + 1, made)};
+}
+
 }  // namespace
 
 std::vector<View> at_resolution(std::span<const View> screens, double scale) {
   std::vector<View> made(screens.begin(), screens.end());
   for (View& view : made) {
-    HPR_CHECK(view.size() == view.screen);
-    view.screen = {scaled(view.screen.width, scale), scaled(view.screen.height, scale)};
-    view.block = {0, 0, view.screen.width, view.screen.height};
+    const Size shown = view.screen;
+    view.screen = {scaled(shown.width, scale), scaled(shown.height, scale)};
+    const auto [x0, x1] = scaled_part(view.block.x0, view.block.x1, shown.width, view.screen.width);
+    const auto [y0, y1] = scaled_part(view.block.y0, view.block.y1, shown.height, view.screen.height);
+    view.block = {x0, y0, x1, y1};
   }
   return made;
 }
@@ -174,7 +187,9 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
   const std::size_t screens = showing.sizes.size();
   bool as_made = true;
   for (std::size_t screen = 0; screen < screens; ++screen) {
-    as_made = as_made && first_block(blocks, screen).screen == showing.sizes[screen];
+    const Rect& pixels = blocks.shown[screen].pixels;
+    HPR_CHECK((showing.sizes[screen] == Size{pixels.width(), pixels.height()}));
+    as_made = as_made && blocks.made[screen].whole == blocks.shown[screen].whole;
   }
   const std::vector<int> owners = block_owners(blocks, showing.shown_by);
   TileLayer<Rgba8> display;  // a third of the bytes of the radiance, but no light to filter
@@ -193,10 +208,12 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
     if (as_made) {
       pictures[screen] = join_blocks(display, blocks, screen);
     } else {
-      const Size size = showing.sizes[screen];
-      const Image<Rgb> radiance = enlarge(join_blocks(frame.radiance, blocks, screen), size, session.threads());
+      const PicturePart& made = blocks.made[screen];
+      const PicturePart& shown = blocks.shown[screen];
+      const int threads = session.threads();
+      const Image<Rgb> radiance = enlarge(join_blocks(frame.radiance, blocks, screen), made, shown, threads);
       std::optional<Image<float>> alpha;
-      if (frame.is_transparent) alpha = enlarge(join_blocks(*frame.alpha(), blocks, screen), size, session.threads());
+      if (frame.is_transparent) alpha = enlarge(join_blocks(*frame.alpha(), blocks, screen), made, shown, threads);
       pictures[screen] = to_display(radiance, alpha, session.threads(), showing.transform, showing.alpha);
     }
   }
@@ -276,7 +293,7 @@ Image<Rgb> CollectedPicture::radiance() const {
 std::optional<Image<float>> CollectedPicture::alpha() const {
   if (!frame_.is_transparent) return std::nullopt;
   Image<float> made = join_blocks(*frame_.alpha(), blocks_, 0);
-  return enlarged() ? enlarge(made, size_, threads_) : made;
+  return enlarged() ? enlarge(made, blocks_.made[0], blocks_.shown[0], threads_) : made;
 }
 
 namespace {

@@ -13,6 +13,7 @@
 #include "engine/display/exposure.h"
 #include "engine/frame.h"
 #include "image/color.h"
+#include "image/filter.h"
 #include "image/image.h"
 #include "image/tiles.h"
 #include "image/tone.h"
@@ -30,9 +31,12 @@ struct FramePlan;
 struct Blocks {
   std::vector<View> views;             ///< one per block: the screens of the frame's layout
   std::vector<std::size_t> screen_of;  ///< per block
+  std::vector<PicturePart> made;       ///< per screen, of the picture that it is a part of
+  std::vector<PicturePart> shown;      ///< per screen: the same where it is shown
 };
 
-[[nodiscard]] Blocks cut_blocks(std::span<const View> screens);
+/// `screens` may be blocks of larger ones (join_screens). `scale`: see at_resolution.
+[[nodiscard]] Blocks cut_blocks(std::span<const View> screens, double scale = 1.0);
 
 /// One screen's pixels, put together from its blocks.
 template <typename Pixel>
@@ -40,10 +44,11 @@ template <typename Pixel>
   Image<Pixel> image;
   for (std::size_t block = 0; block < blocks.views.size(); ++block) {
     if (blocks.screen_of[block] != screen) continue;
-    const View& view = blocks.views[block];
-    if (view.size() == view.screen) return to_image(layer, block);
-    if (image.size() != view.screen) image = Image<Pixel>(view.screen);
-    paste(to_image(layer, block), view.block.x0, view.block.y0, image);
+    const Rect& part = blocks.views[block].block;
+    const Rect& all = blocks.made[screen].pixels;
+    if (part == all) return to_image(layer, block);
+    if (image.pixels().empty()) image = Image<Pixel>({all.width(), all.height()});
+    paste(to_image(layer, block), part.x0 - all.x0, part.y0 - all.y0, image);
   }
   return image;
 }
@@ -91,7 +96,7 @@ struct FrameCost {
 }
 
 /// The views of `screens` with round(`scale` times) their pixels, at least one a side: for frames that are made smaller
-/// than they are shown.
+/// than they are shown. Blocks of larger screens get the pixels that enlarging takes of their neighbors as well.
 [[nodiscard]] std::vector<View> at_resolution(std::span<const View> screens, double scale);
 
 /// Where a frame is shown.

@@ -44,6 +44,29 @@ TEST(AtResolution, MakesAScreenOfSeveralBlocksOfFewer) {
   EXPECT_EQ(blocks[1].block, (Rect{kRasterLimit, 0, 20000, 5}));
 }
 
+/// Blocks of one screen together have all of its pixels, and each those that enlarging reads.
+TEST(AtResolution, BlocksHaveWhatEnlargingReads) {
+  for (const double scale : {0.1, 0.37, 0.5, 0.7, 0.99}) {
+    View left = screen({171, 105});
+    View right = left;
+    left.block = {0, 0, 64, 105};
+    right.block = {64, 0, 171, 105};
+    const Blocks blocks = cut_blocks(std::vector{left, right}, scale);
+    const Rect& first = blocks.made[0].pixels;
+    const Rect& second = blocks.made[1].pixels;
+    EXPECT_EQ(blocks.made[0].whole, at_resolution(std::vector{screen({171, 105})}, scale).front().screen);
+    EXPECT_EQ(first.x0, 0);
+    EXPECT_EQ(second.x1, blocks.made[1].whole.width);
+    EXPECT_EQ(first.x1, second.x0 + 2) << scale;
+    EXPECT_EQ(first.height(), blocks.made[0].whole.height);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Rect& pixels = blocks.made[i].pixels;
+      const Image<Rgb> made({pixels.width(), pixels.height()});
+      EXPECT_EQ(enlarge(made, blocks.made[i], blocks.shown[i], 1).width(), i == 0 ? 64 : 107);
+    }
+  }
+}
+
 Image<Rgba8> with(int of_hundred, Rgba8 color) {
   Image<Rgba8> picture({10, 10}, {90, 90, 90, 255});
   std::ranges::fill(picture.pixels().first(static_cast<std::size_t>(of_hundred)), color);

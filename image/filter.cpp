@@ -44,16 +44,25 @@ struct Between {
   float fraction = 0.0F;
 };
 
-/// The positions of the centres of `to` pixels among those of `from`, on a side of equal length.
-std::vector<Between> sample_positions(int from, int to) {
+/// Some of the pixels of a side.
+struct SidePart {
+  int whole = 0;
+  int first = 0;
+  int end = 0;
+};
+
+/// The positions of the centres of the pixels `to` among those `from`, on a side of equal length.
+std::vector<Between> sample_positions(const SidePart& from, const SidePart& to) {
   std::vector<Between> all;
-  all.reserve(static_cast<std::size_t>(to));
-  for (int i = 0; i < to; ++i) {
-    const double position = std::clamp((i + 0.5) * from / to - 0.5, 0.0, from - 1.0);
+  all.reserve(static_cast<std::size_t>(to.end - to.first));
+  for (int i = to.first; i < to.end; ++i) {
+    const double position = std::clamp((i + 0.5) * from.whole / to.whole - 0.5, 0.0, from.whole - 1.0);
     const double below = std::floor(position);
-    const auto first = static_cast<std::size_t>(below);
-    all.push_back(
-        {first, std::min(first + 1, static_cast<std::size_t>(from) - 1), static_cast<float>(position - below)});
+    const int first = static_cast<int>(below);
+    const int second = std::min(first + 1, from.whole - 1);
+    HPR_CHECK(first >= from.first && second < from.end);
+    all.push_back({static_cast<std::size_t>(first - from.first), static_cast<std::size_t>(second - from.first),
+                   static_cast<float>(position - below)});
   }
   return all;
 }
@@ -172,10 +181,19 @@ template Image<double> filter_rows(const Image<double>&, std::span<const double>
 template Image<double> filter_columns(const Image<double>&, std::span<const double>);
 
 Image<Rgb> enlarge(const Image<Rgb>& image, Size size, int threads) {
+  const auto all_of = [](Size whole) { return PicturePart{whole, {0, 0, whole.width, whole.height}}; };
+  return enlarge(image, all_of(image.size()), all_of(size), threads);
+}
+
+Image<Rgb> enlarge(const Image<Rgb>& image, const PicturePart& made, const PicturePart& shown, int threads) {
+  const Size size{shown.pixels.width(), shown.pixels.height()};
   HPR_CHECK(image.width() > 0 && image.height() > 0 && size.width > 0 && size.height > 0);
+  HPR_CHECK(image.width() == made.pixels.width() && image.height() == made.pixels.height());
   constexpr int kRowsAtOnce = 16;
-  const std::vector<Between> columns = sample_positions(image.width(), size.width);
-  const std::vector<Between> rows = sample_positions(image.height(), size.height);
+  const auto columns = sample_positions({made.whole.width, made.pixels.x0, made.pixels.x1},
+                                        {shown.whole.width, shown.pixels.x0, shown.pixels.x1});
+  const auto rows = sample_positions({made.whole.height, made.pixels.y0, made.pixels.y1},
+                                     {shown.whole.height, shown.pixels.y0, shown.pixels.y1});
   Image<Rgb> large(size);
   const auto bands = static_cast<std::size_t>((size.height + kRowsAtOnce - 1) / kRowsAtOnce);
   parallel_for(threads, bands, [&](std::size_t band) {

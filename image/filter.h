@@ -36,6 +36,17 @@ inline constexpr int kBandRows = 64;
 /// stays as it is, nothing gets brighter than the brightest pixel. The bits depend on the picture and the size alone.
 [[nodiscard]] Image<Rgb> enlarge(const Image<Rgb>& image, Size size, int threads);
 
+/// A rectangle of a larger picture.
+struct PicturePart {
+  Size whole;  ///< pixels of the picture
+  Rect pixels;
+};
+
+/// The part `shown` of a picture, as enlarge() would make it of the whole one. `image`: its part `made`, before it is
+/// enlarged, which has what that takes (a pixel to each side of what shows there).
+[[nodiscard]] Image<Rgb> enlarge(const Image<Rgb>& image, const PicturePart& made, const PicturePart& shown,
+                                 int threads);
+
 /// How the samples of a pixel and its surroundings make up the pixel. Separable; widths in pixels.
 enum class PixelFilter : std::uint8_t {
   Box,       ///< radius 0.5: the mean over the pixel

@@ -116,14 +116,38 @@ TEST(Enlarge, MixesInLinearLight) {
   EXPECT_EQ(large.at(3, 0), (Rgb{8.0F, 4.0F, 0.0F}));
 }
 
-TEST(Enlarge, HasTheSameBitsForAnyNumberOfThreads) {
-  Image<Rgb> image({37, 23});
+/// A picture of which no two pixels are alike.
+Image<Rgb> uneven(Size size) {
+  Image<Rgb> image(size);
   for (std::size_t i = 0; i < image.pixels().size(); ++i) {
     const auto value = static_cast<float>(std::sin(static_cast<double>(i) * 12.9898) * 43758.5453);
     image.pixels()[i] = {value, -value, value * value};
   }
+  return image;
+}
+
+TEST(Enlarge, HasTheSameBitsForAnyNumberOfThreads) {
+  const Image<Rgb> image = uneven({37, 23});
   const Image<Rgb> alone = enlarge(image, {111, 70}, 1);
   for (const int threads : {2, 5}) EXPECT_EQ(enlarge(image, {111, 70}, threads), alone);
+}
+
+Image<Rgb> crop(const Image<Rgb>& image, const Rect& rect) {
+  Image<Rgb> part({rect.width(), rect.height()});
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    std::ranges::copy(image.row(y).subspan(static_cast<std::size_t>(rect.x0), static_cast<std::size_t>(rect.width())),
+                      part.row(y - rect.y0).begin());
+  }
+  return part;
+}
+
+TEST(Enlarge, PartsAreThoseOfTheWhole) {
+  const Image<Rgb> small = uneven({37, 23});
+  const Size size{111, 70};
+  const Image<Rgb> large = enlarge(small, size, 1);
+  const PicturePart made{small.size(), {9, 0, 26, 16}};
+  const PicturePart shown{size, {30, 0, 76, 45}};
+  EXPECT_EQ(enlarge(crop(small, made.pixels), made, shown, 2), crop(large, shown.pixels));
 }
 
 TEST(Enlarge, ADotGrowsFromOnePixel) {

@@ -178,7 +178,7 @@ class RenderCommand final : public Command {
   ExitCode draw(Session& session, const Globals& globals, const RenderSettings& settings, Size size) {
     const Sampling& sampling = settings.sampling;
     const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
-    const Blocks blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.frame.resolution_scale));
+    const Blocks blocks = cut_blocks(std::span(&view, 1), settings.frame.resolution_scale);
     FrameSettings chosen = settings.frame;
     chosen.single_picture = sampling.goal.one();
     if (resume_ && chosen.primary == Primary::Auto) chosen.primary = primary_before(session.comm());

@@ -120,7 +120,7 @@ std::string Console::render() {
   picture->display = settings.display;
   picture->colors = settings.color_format;
   picture->scene_name = session_.scene().name;
-  picture->blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.frame.resolution_scale));
+  picture->blocks = cut_blocks(std::span(&seen, 1), settings.frame.resolution_scale);
   picture->plan = plan_frame(session_, settings.frame, picture->blocks.views);
   picture_.reset();  // frees its memory before the next one takes some
 
@@ -178,7 +178,7 @@ std::string Console::write_stats_of(Arguments arguments) const {
 std::string Console::explain() {
   const RenderSettings settings = resolve(settings_, globals_.seed);
   const View seen = view();
-  const Blocks blocks = cut_blocks(at_resolution(std::span(&seen, 1), settings.frame.resolution_scale));
+  const Blocks blocks = cut_blocks(std::span(&seen, 1), settings.frame.resolution_scale);
   return fmt::format("{}", fmt::join(plan_frame(session_, settings.frame, blocks.views).explained, "\n"));
 }
 

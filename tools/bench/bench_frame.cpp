@@ -96,7 +96,7 @@ class Bench {
     const Scene& scene = session.scene();
     camera_ = choose_camera(settings.camera, scene);
     view_ = make_view(camera_, size, scene.bounds);
-    blocks_ = cut_blocks(at_resolution(std::span(&view_, 1), settings.frame.resolution_scale));
+    blocks_ = cut_blocks(std::span(&view_, 1), settings.frame.resolution_scale);
     HPR_CHECK(blocks_.views.size() == 1);
     plan_ = plan_frame(session, settings.frame, blocks_.views);
     prepare(session, plan_);

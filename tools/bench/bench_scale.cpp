@@ -39,7 +39,7 @@ class WallBench {
     const Scene& scene = session.scene();
     const std::vector<View> screens = wall_views(wall, choose_camera(input.settings.camera, scene), scene.bounds);
     const FrameSettings& settings = input.settings.frame;
-    blocks_ = cut_blocks(at_resolution(screens, settings.resolution_scale));
+    blocks_ = cut_blocks(screens, settings.resolution_scale);
     showing_.transform = fixed_transform(input.settings.display);
     showing_.shown_by = owners_of(wall, hosts, false);
     for (const View& screen : screens) showing_.sizes.push_back(screen.screen);

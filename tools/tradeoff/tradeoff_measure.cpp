@@ -46,7 +46,7 @@ Setup set_up(Session& session, const RenderSettings& unresolved, Size size, std:
   setup.settings = resolve(unresolved, seed);
   const RenderSettings& settings = setup.settings;
   const View view = make_view(choose_camera(settings.camera, session.scene()), size, session.scene().bounds);
-  setup.blocks = cut_blocks(at_resolution(std::span(&view, 1), settings.frame.resolution_scale));
+  setup.blocks = cut_blocks(std::span(&view, 1), settings.frame.resolution_scale);
   setup.plan = plan_frame(session, settings.frame, setup.blocks.views);
   return setup;
 }
