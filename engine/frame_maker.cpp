@@ -14,6 +14,7 @@
 #include "engine/output.h"
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
+#include "scene/joined_screens.h"
 
 namespace hpr {
 namespace {
@@ -25,6 +26,11 @@ constexpr std::uint32_t kMaxSamples = 64;
 bool same_projection(const View& a, const View& b) {
   return a.eye == b.eye && a.axes == b.axes && a.left == b.left && a.right == b.right && a.top == b.top &&
          a.bottom == b.bottom;
+}
+
+/// Whether pixels are filtered, so that screens that touch must go on into each other.
+bool filters(const RaySettings& rays, double scale) {
+  return rays.denoise || !rays.half_resolution.empty() || scale != 1.0;
 }
 
 }  // namespace
@@ -78,14 +84,15 @@ std::uint32_t FrameMaker::max_samples() const {
 }
 
 void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
-  const bool same_plan = plan_.layout.tiles() > 0 && effort.degradations == effort_.degradations &&
-                         effort.scale_step == effort_.scale_step;
   const double scale = settings_.resolution_scale * scale_of_step(effort.scale_step);
-  blocks_ = cut_blocks(screens, scale);
+  const auto count = static_cast<std::size_t>(effort.degradations);
+  const FrameSettings settings = apply_degradations(settings_, std::span(degradations_).first(count));
+  blocks_ = filters(settings.rays, scale) ? cut_blocks(join_screens(screens), scale) : cut_blocks(screens, scale);
+  const bool same_plan = plan_.layout.tiles() > 0 && effort.degradations == effort_.degradations &&
+                         effort.scale_step == effort_.scale_step && plan_.layout == layout_of(blocks_.views);
   if (same_plan) return;
   sampler_.reset();  // it holds on to the plan
-  const auto count = static_cast<std::size_t>(effort.degradations);
-  plan_ = plan_frame(session_, apply_degradations(settings_, std::span(degradations_).first(count)), blocks_.views);
+  plan_ = plan_frame(session_, settings, blocks_.views);
   effort_ = effort;
 }
 

@@ -377,13 +377,17 @@ PrimaryChoice choose_primary(const KeyWork& work) {
                                            work.pixels, work.triangles)};
 }
 
-FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
-  const int ranks = session.comm().size();
-  FramePlan plan;
+FrameLayout layout_of(std::span<const View> views) {
   std::vector<Size> sizes;
   sizes.reserve(views.size());
   for (const View& view : views) sizes.push_back(view.size());
-  plan.layout = FrameLayout(sizes);
+  return FrameLayout(std::move(sizes));
+}
+
+FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
+  const int ranks = session.comm().size();
+  FramePlan plan;
+  plan.layout = layout_of(views);
 
   const Choice choice = choose_distribution(settings, session.scene(), ranks);
   plan.distribution = choice.distribution;

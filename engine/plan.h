@@ -42,6 +42,9 @@ struct FramePlan {
   [[nodiscard]] bool is_transparent() const { return rays.background.kind == Background::Kind::Transparent; }
 };
 
+/// A screen for each view.
+[[nodiscard]] FrameLayout layout_of(std::span<const View> views);
+
 /// Collective. Starts OpenGL where the frame is drawn by it, or that is left to whether it has a GPU.
 [[nodiscard]] FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views);
 
