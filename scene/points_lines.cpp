@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -128,21 +129,29 @@ glm::dmat3 rounded(const glm::dmat3& matrix) {
   return {glm::mat3(matrix)};
 }
 
-bool is_usable(const glm::dmat3& matrix) {
+/// The largest magnitude among the elements; infinite where one is no number.
+double largest_of(const glm::dmat3& matrix) {
+  double largest = 0.0;
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) {
-      if (!(std::abs(matrix[column][row]) < 1e30)) return false;
+      const double magnitude = std::abs(matrix[column][row]);
+      largest = std::isnan(magnitude) ? std::numeric_limits<double>::infinity() : std::max(largest, magnitude);
     }
   }
-  return true;
+  return largest;
+}
+
+bool is_usable(const glm::dmat3& matrix) {
+  return largest_of(matrix) < 1e30;
 }
 
 Frame frame_of(const Instance& instance) {
   const glm::dmat3 linear(instance.to_world);
   const glm::dvec3 lengths(glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2]));
-  const double scale = static_cast<double>(static_cast<float>(std::max({lengths.x, lengths.y, lengths.z})));
+  const double longest = std::max({lengths.x, lengths.y, lengths.z});
   Frame frame;
-  if (!(scale > 1e-30)) return frame;
+  if (!(longest > 1e-30)) return frame;
+  const double scale = longest < 1e30 ? static_cast<double>(static_cast<float>(longest)) : longest;
   const glm::dmat3 unit = linear / scale;
   const glm::dmat3 gram = glm::transpose(unit) * unit;
   double skew = 0.0;
@@ -154,7 +163,7 @@ Frame frame_of(const Instance& instance) {
   const double determinant = glm::determinant(unit);
   const glm::dmat3 inverse = rounded(glm::inverse(linear) * (determinant < 0.0 ? -1.0 : 1.0));
   // A flat instance has no inverse: its spheres are as flat as all else.
-  if (skew < 1e-6 || std::abs(determinant) < 1e-12 || !is_usable(inverse)) {
+  if (skew < 1e-6 || std::abs(determinant) < 1e-12 || !is_usable(inverse) || !is_usable(glm::inverse(inverse))) {
     frame.from_world = glm::dmat3(1.0 / scale);
     frame.to_world = glm::dmat3(scale);
     return frame;
@@ -174,6 +183,9 @@ class Shaper {
         frame_(frame_of(instance)),
         width_(mesh.kind == MeshKind::Points ? widths.points : widths.lines),
         footprint_(footprint) {
+    // Squares of coordinates must stay finite in single precision.
+    constexpr double kMaxReach = 1e17;
+    max_radius_ = kMaxReach / std::max(1.0, largest_of(frame_.from_world));
     if (width_.value == 0.0) return;
     if (mesh_.kind == MeshKind::Lines) find_joints();
     count();
@@ -230,7 +242,8 @@ class Shaper {
   };
 
   [[nodiscard]] double radius_at(const glm::dvec3& point) const {
-    return 0.5 * width_.value * (width_.in_pixels ? footprint_.at(point) : 1.0);
+    const double radius = 0.5 * width_.value * (width_.in_pixels ? footprint_.at(point) : 1.0);
+    return radius < max_radius_ ? radius : max_radius_;  // of views without a size too
   }
   [[nodiscard]] double pixels_at(const glm::dvec3& point) const {
     return width_.in_pixels ? width_.value : width_.value / footprint_.at(point);
@@ -397,6 +410,7 @@ class Shaper {
   Frame frame_;
   DrawnWidth width_;
   const PixelFootprint& footprint_;
+  double max_radius_ = 0.0;
   std::vector<bool> is_end_;  ///< of each vertex: whether a segment ends there
   std::vector<Ring> rings_;   ///< of the segment at hand
   // How many there are, by level.
@@ -530,6 +544,12 @@ void shape_points_and_lines(Scene& scene, const PointLineWidths& widths, const V
                             printable(scene.name), shapes.parts, bytes, cost_of(shapes, level).triangles, memory_bytes),
                 "draw fewer of them, let instances share meshes by widths in metres (--point-size 0.01m), or raise "
                 "--limit-mem");
+  }
+  if (cost_of(shapes, level).triangles > std::numeric_limits<std::uint32_t>::max()) {  // meshes count in 32 bits
+    throw Error(ExitCode::Limit,
+                fmt::format("{}: {} points and lines are {} triangles, more than 32 bits count", printable(scene.name),
+                            shapes.parts, cost_of(shapes, level).triangles),
+                "draw fewer of them");
   }
   std::vector<Mesh> shaped;
   shaped.reserve(shapes.shapers.size());

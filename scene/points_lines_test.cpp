@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <string>
@@ -305,6 +306,35 @@ TEST(PointsAndLines, FlatInstancesAndMeshesThatNobodySeesDoNoHarm) {
   scene.meshes[0] = unseen;
   shape_points_and_lines(scene, pixels(2.0), view_of_pixels(), kNoLimit);
   EXPECT_EQ(test::first_flaw(scene.meshes[0]), "");
+}
+
+TEST(PointsAndLines, NoScaleOrViewMakesThemInfinite) {
+  View nowhere = view_of_pixels();
+  nowhere.right = std::numeric_limits<double>::quiet_NaN();
+  View huge = orthographic_view();
+  huge.right = 3e38;
+  huge.top = 3e38;
+  for (const double scale : {1e-300, 1e-31, 1e-20, 1e20, 1e31, 1e200}) {
+    for (const double stretch : {1.0, 3.0}) {
+      for (const View& view : {view_of_pixels(), nowhere, huge}) {
+        for (const PointLineWidths& widths : {pixels(1000.0), metres(1e9), metres(0.01)}) {
+          for (const bool is_line : {false, true}) {
+            Scene scene = is_line ? line({{0, 0, 0}, {1e-3F, 0, 0}}) : points({{0, 0, 0}});
+            scene.instances[0].to_world = glm::dmat4(glm::dmat3(scale));
+            scene.instances[0].to_world[1][1] *= stretch;
+            shape_points_and_lines(scene, widths, view, kNoLimit);
+            for (const Mesh& mesh : scene.meshes) {
+              for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+                EXPECT_LT(glm::length(glm::dvec3(mesh.positions[i])), 1e18) << scale;
+                EXPECT_NEAR(glm::length(glm::dvec3(mesh.normals[i])), 1.0, 1e-6) << scale;
+              }
+            }
+            EXPECT_LT(glm::length(scene.bounds.high), is_line && scale > 1e20 ? 1e300 : 1e18) << scale;
+          }
+        }
+      }
+    }
+  }
 }
 
 }  // namespace
