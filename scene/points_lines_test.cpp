@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -266,6 +267,13 @@ TEST(PointsAndLines, AreAsWideHoweverTheirInstanceScales) {
       EXPECT_NEAR(low, expected, 0.005);
       EXPECT_NEAR(high, expected, 0.005);
       EXPECT_EQ(test::first_flaw(scene.mesh_of(instance)), "");
+      const glm::dmat3 normals_to_world = glm::transpose(glm::inverse(glm::dmat3(instance.to_world)));
+      for (std::size_t i = 0; !is_line && i < scene.mesh_of(instance).positions.size(); ++i) {
+        const glm::dvec3 out = world_position(instance, scene.mesh_of(instance).positions[i]) -
+                               world_position(instance, {1.0F, 2.0F, 3.0F});
+        const glm::dvec3 normal = normals_to_world * glm::dvec3(scene.mesh_of(instance).normals[i]);
+        EXPECT_NEAR(glm::dot(glm::normalize(normal), glm::normalize(out)), 1.0, 1e-6) << "a sphere's normals";
+      }
       // In the world, fronts face away from the center.
       const Mesh& mesh = scene.mesh_of(instance);
       const glm::uvec3& t = mesh.triangles[0];
