@@ -249,9 +249,16 @@ Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
   return chosen;
 }
 
+FirstView first_view(const RenderSettings& settings, Size size) {
+  return [camera = settings.camera, size](const Scene& scene) {
+    return make_view(choose_camera(camera, scene), size, scene.bounds);
+  };
+}
+
 Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
-                 const ImageLimits& pictures) {
-  Scene scene = load_scene(source, limits, settings.scene);
+                 const ImageLimits& pictures, const FirstView& view) {
+  Scene scene = load_unshaped_scene(source, limits, settings.scene);
+  if (has_points_or_lines(scene)) shape_points_and_lines(scene, settings.widths, view(scene), limits.memory_bytes);
   set_environment(settings.environment, pictures, scene);
   if (settings.cull == Cull::None) {
     for (Material& material : scene.materials) material.double_sided = true;

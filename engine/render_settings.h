@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <set>
@@ -14,6 +15,7 @@
 #include "engine/samples.h"
 #include "image/color.h"
 #include "scene/load_scene.h"
+#include "scene/points_lines.h"
 
 namespace hpr {
 
@@ -62,6 +64,7 @@ struct RenderSettings {
   FrameSettings frame;
   std::string environment;  ///< see load_environment; kNoEnvironment: the scene's own; empty: one where it needs_studio
   Cull cull = Cull::Gltf;
+  PointLineWidths widths;
   DisplaySettings display;
   ColorFormat color_format = ColorFormat::Float32;  ///< of radiance sent to the rank that writes it
   LinkCodec codec;
@@ -82,10 +85,16 @@ struct RenderSettings {
 /// The camera that the settings choose in a scene. Throws Error (Usage) with the choices for a camera there is not.
 [[nodiscard]] Camera choose_camera(const CameraChoice& choice, const Scene& scene);
 
-/// Loads a scene and lights it as the settings say. `pictures`: how large an environment may be. Throws Error as
-/// load_scene and load_environment do, and BadInput for values that are not finite where the settings are strict.
+/// The view of a scene in which widths of points and lines count their pixels: the first one that is drawn.
+using FirstView = std::function<View(const Scene&)>;
+/// That of a picture by the camera that the settings choose.
+[[nodiscard]] FirstView first_view(const RenderSettings& settings, Size size = kDefaultPictureSize);
+
+/// Loads a scene, lights it and shapes its points and lines as the settings say. `pictures`: how large an environment
+/// may be. Throws Error as load_scene, choose_camera and load_environment do, and BadInput for values that are not
+/// finite where the settings are strict.
 [[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
-                               const ImageLimits& pictures);
+                               const ImageLimits& pictures, const FirstView& view);
 
 /// Throws Error (Usage) where the settings leave no surface for every pixel of a file of keys.
 void check_raw(const RenderSettings& settings);

@@ -185,6 +185,13 @@ SettingValue passes() {
               }};
 }
 
+SettingValue drawn_width(DrawnWidth PointLineWidths::*which) {
+  return text(
+      "N|Npx|Nm", "pixels or metres: 2, 2px, 0.01m",
+      [which](Settings& settings) -> DrawnWidth& { return settings.widths.*which; }, parse_drawn_width,
+      [](const DrawnWidth& width) { return to_text(width); });
+}
+
 std::vector<PassId> parse_half_resolution(const std::string& list) {
   std::vector<PassId> passes;
   if (list == "none") return passes;
@@ -310,6 +317,18 @@ std::vector<Setting> make_table() {
        .help = "gltf: who looks at a single-sided material from behind looks through; none: all have two sides",
        .value = choice(kCullNames, [](Settings& s) -> Cull& { return s.cull; }),
        .initial = "gltf",
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "point-size",
+       .help = "diameter of the scene's points: pixels where they stand in the first view, or metres; 0: none",
+       .value = drawn_width(&PointLineWidths::points),
+       .initial = "3px",
+       .decides_bits = false,
+       .fixed_in_session = true},
+      {.name = "line-width",
+       .help = "width of the scene's lines, as of --point-size",
+       .value = drawn_width(&PointLineWidths::lines),
+       .initial = "2px",
        .decides_bits = false,
        .fixed_in_session = true},
 

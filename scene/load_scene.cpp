@@ -13,22 +13,12 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "scene/generators/generators.h"
+#include "scene/points_lines.h"
 #include "scene/studio.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {
-
-/// What a scene's arrays take.
-std::uint64_t memory_of(const Scene& scene) {
-  std::uint64_t bytes = scene.instances.size() * sizeof(Instance);
-  for (const Mesh& mesh : scene.meshes) {
-    bytes += mesh.positions.size() * sizeof(glm::vec3) + mesh.normals.size() * sizeof(glm::vec3);
-    bytes += (mesh.colors.size() + mesh.tangents.size()) * sizeof(glm::vec4);
-    bytes += (mesh.uvs[0].size() + mesh.uvs[1].size()) * sizeof(glm::vec2) + mesh.triangles.size() * sizeof(glm::uvec3);
-  }
-  for (const Texture& texture : scene.textures) bytes += texture.image.pixels().size_bytes();
-  return bytes;
-}
 
 constexpr std::string_view kGenerated = "gen:";
 
@@ -104,7 +94,7 @@ std::array<std::size_t, 3> color_channels(const FloatImage& picture, const std::
 
 }  // namespace
 
-Scene load_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice) {
+Scene load_unshaped_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice) {
   if (!source.starts_with(kGenerated)) return importer_for(source).load(source, limits, choice);
   check_generated(source, choice);
   Scene scene = generate_scene(std::string_view(source).substr(kGenerated.size()));
@@ -113,6 +103,14 @@ Scene load_scene(const std::string& source, const SceneLimits& limits, const Sce
                 fmt::format("{}: needs {} bytes, more than the limit of {}", source, bytes, limits.memory_bytes),
                 "choose a smaller scene, or raise --limit-mem");
   }
+  return scene;
+}
+
+Scene load_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice) {
+  Scene scene = load_unshaped_scene(source, limits, choice);
+  if (!has_points_or_lines(scene)) return scene;
+  const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
+  shape_points_and_lines(scene, {}, make_view(camera, kDefaultPictureSize, scene.bounds), limits.memory_bytes);
   return scene;
 }
 

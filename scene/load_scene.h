@@ -19,6 +19,9 @@ struct SceneLimits {
   ImageLimits image;
 };
 
+/// Of pictures whose size nobody gives.
+inline constexpr Size kDefaultPictureSize{1280, 720};
+
 /// Which of the scenes and variants that a file holds is loaded.
 struct SceneChoice {
   std::string scene = {};    ///< its name or index; empty: the one that the file names, else the first
@@ -30,7 +33,8 @@ struct SceneChoice {
 /// A format of scene files.
 struct SceneImporter {
   std::vector<std::string_view> extensions;  ///< in small letters, with their dots
-  /// Loads a file into a finished scene. Throws Error (Io, BadInput, Limit; Usage for a choice that it lacks).
+  /// Loads a file into a finished scene, in which points and lines have no shapes yet. Throws Error (Io, BadInput,
+  /// Limit; Usage for a choice that it lacks).
   Scene (*load)(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice);
   /// The files that `load` reads beside the scene's own; none of one it would refuse.
   std::vector<std::filesystem::path> (*files_beside)(const std::filesystem::path& path, const SceneLimits& limits);
@@ -45,10 +49,14 @@ HPR_SCENE_IMPORTERS(HPR_DECLARE_IMPORTER)
 #undef HPR_DECLARE_IMPORTER
 
 /// Loads what the command line calls SCENE: a file that an importer reads (.gltf, .glb), or
-/// `gen:NAME?key=value&key=value`. The result is finished (finish_scene) and may be drawn as it is. Throws Error (Io,
+/// `gen:NAME?key=value&key=value`. The result is finished (finish_scene) and may be drawn as it is; points and lines
+/// have their default widths, in a picture of kDefaultPictureSize by the scene's first camera. Throws Error (Io,
 /// BadInput, Limit, Usage). Generated scenes are the one scene of their source, 0, without variants.
 [[nodiscard]] Scene load_scene(const std::string& source, const SceneLimits& limits = {},
                                const SceneChoice& choice = {});
+/// Loads a scene as load_scene does, but for the shapes of points and lines: see shape_points_and_lines.
+[[nodiscard]] Scene load_unshaped_scene(const std::string& source, const SceneLimits& limits,
+                                        const SceneChoice& choice);
 
 /// The files load_scene(source, limits) may read: the scene's own, and the buffers and pictures that a glTF names. None
 /// of a generated scene; of a file that load_scene would refuse just that file.

@@ -38,6 +38,17 @@ void finish_scene(Scene& scene) {
   scene.bounds = triangles > 0 ? bounds : Bounds{};
 }
 
+std::uint64_t memory_of(const Scene& scene) {
+  std::uint64_t bytes = scene.instances.size() * sizeof(Instance);
+  for (const Mesh& mesh : scene.meshes) {
+    bytes += mesh.positions.size() * sizeof(glm::vec3) + mesh.normals.size() * sizeof(glm::vec3);
+    bytes += (mesh.colors.size() + mesh.tangents.size()) * sizeof(glm::vec4);
+    bytes += (mesh.uvs[0].size() + mesh.uvs[1].size()) * sizeof(glm::vec2) + mesh.triangles.size() * sizeof(glm::uvec3);
+  }
+  for (const Texture& texture : scene.textures) bytes += texture.image.pixels().size_bytes();
+  return bytes;
+}
+
 SurfaceLocation locate_surface(const Scene& scene, std::uint32_t surface) {
   HPR_CHECK(surface < scene.triangles);
   // The last instance that starts at or before the id; empty instances before it start there too and are skipped.

@@ -131,9 +131,17 @@ struct Material {
   return material.double_sided || material.thickness > 0.0F;
 }
 
+/// What the triangles of a mesh stand for.
+enum class MeshKind : std::uint8_t {
+  Triangles,
+  Points,  ///< triangle {i, i, i} is point i; no normals; not seen before shape_points_and_lines
+  Lines,   ///< triangle {i, j, j} is the segment from i to j; no normals; not seen before that either
+};
+
 /// Triangles of one material in their own coordinates. All vertex data are finite, all indices in range.
 struct Mesh {
   std::string name;
+  MeshKind kind = MeshKind::Triangles;
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;             ///< unit length, one per position
   std::array<std::vector<glm::vec2>, 2> uvs;  ///< per set: one per position, or none at all
@@ -269,6 +277,9 @@ struct SurfaceLocation {
 /// Completes a scene whose meshes, materials and instances are set: adds a default material if there is none, numbers
 /// the surfaces, computes `triangles` and `bounds`. Throws Error (Limit) past 2^32 - 2 triangles.
 void finish_scene(Scene& scene);
+
+/// What a scene's arrays take, in bytes.
+[[nodiscard]] std::uint64_t memory_of(const Scene& scene);
 
 /// The instance and triangle of a surface id below scene.triangles.
 [[nodiscard]] SurfaceLocation locate_surface(const Scene& scene, std::uint32_t surface);

@@ -4,7 +4,7 @@
 usage: bit_equality_test.py HPR [--full]
 
 Renders gen:gallery, its visible surfaces found by OpenGL, by rays, with indirect light along rays, and with every pass and
-four samples, and compares the hashes of the visibility keys (--raw) and of the EXR file's bytes. Without --full, so few
+four samples, and the points and lines of gen:cloud, and compares the hashes of the visibility keys (--raw) and of the EXR file's bytes. Without --full, so few
 small pictures that every two values of different options meet in one of them, and the first once more; with it, every
 combination at 1280x1024. Prints the hashes, the number of runs and what differs, and leaves with 1 if anything does.
 """
@@ -30,7 +30,10 @@ WAYS = {
     "rays": ["--primary", "rays", *FEW],
     "gathered": ["--passes", "shadow,reflection,refraction,gather", "--spp", "3"],
     "all passes": ["--passes", "shadow,reflection,refraction,ambient-occlusion,photon", "--spp", "4", *FEW],
+    "points": ["--primary", "raster", "--indirect", *FEW],
+    "points by rays": ["--primary", "rays", "--indirect", *FEW],
 }
+SCENES = {"points": "gen:cloud?count=2000", "points by rays": "gen:cloud?count=2000"}
 
 
 def hpr(arguments, folder):
@@ -79,7 +82,7 @@ def covering(runs):
 def digests(way, run, folder):
     """The hashes of one run's keys and picture, or what went wrong."""
     ranks, distribution, strategy, threads, backend = run
-    result = hpr(["render", SCENE, "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", *distribution.split(),
+    result = hpr(["render", SCENES.get(way, SCENE), "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", *distribution.split(),
                   "--strategy", strategy, "--threads", threads, "--backend", backend, *plain(*WAYS[way]), "--raw", "a.keys",
                   "-o", "a.exr", "--force"], folder)
     if result.returncode != 0:

@@ -164,7 +164,7 @@ void expect_agreement(const Agreement& result) {
 }
 
 TEST(PrimaryAgreement, RaysAndOpenGlSeeTheSameButAtEdges) {
-  for (const char* const source : {"gen:gallery", "gen:asteroids?count=300", "gen:cornell"}) {
+  for (const char* const source : {"gen:gallery", "gen:asteroids?count=300", "gen:cornell", "gen:cloud"}) {
     SCOPED_TRACE(source);
     expect_agreement(agreement_on(source, {640, 360}, 1));
   }

@@ -84,7 +84,7 @@ class RenderCommand final : public Command {
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
       if (inside_mpi_job()) check_on_root(comm, [&] { check_outputs(settings, globals); });
-      Session session(comm, globals.session(), [&] { return load_scene(source_, settings, globals); });
+      Session session(comm, globals.session(), [&] { return load_scene(source_, settings, globals, size); });
       return draw(session, globals, settings, size);
     });
   }

@@ -323,9 +323,6 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
   if (run.scale != 1.0) job.wall = scale_wall(std::move(job.wall), run.scale);
   for (const WallScreen& screen : job.wall.screens) check_size(screen.pixels, job.picture_limits);
   for (const WallMonitor& monitor : job.wall.monitors) check_size(monitor.pixels, job.picture_limits);
-  job.load = [globals](const std::string& source, const RenderSettings& settings) {
-    return load_scene(source, settings, globals);
-  };
   job.display = &run.display.kind();
   job.display_options = run.display.options(globals);
   job.frames = run.frames;
@@ -335,6 +332,14 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
   job.target_ms = run.target_ms;
   job.target_relmse = run.target_error;
   if (!run.path.empty()) job.path = load_path(run, job);
+  job.load = [globals, wall = job.wall, path = job.path, frames = job.frame_count()](const std::string& source,
+                                                                                     const RenderSettings& settings) {
+    return load_scene(source, settings, globals, [&](const Scene& scene) {
+      const Camera camera =
+          path ? camera_of(path->at_frame(0, static_cast<std::size_t>(frames))) : choose_camera(settings.camera, scene);
+      return wall_views(wall, camera, scene.bounds).front();
+    });
+  };
   if (run.display.remote()) {
     job.link = run.link.settings(job.wall, run.settings.codec);
   } else {

@@ -85,7 +85,9 @@ Console::Console(Session& session, const Globals& globals, RenderSettings settin
       size_(size),
       controls_(
           session, settings_, globals.seed,
-          [this](const std::string& source, const RenderSettings& its) { return load_scene(source, its, globals_); },
+          [this](const std::string& source, const RenderSettings& its) {
+            return load_scene(source, its, globals_, size_);
+          },
           table_) {
   table_.add({"size", "WxH", "pixels of the picture", [this](Arguments arguments) { return set_size(arguments); }});
   table_.add({"render", "", "draw the picture", [this](Arguments) { return render(); }});
@@ -216,9 +218,10 @@ class ConsoleCommand final : public Command {
     (void)resolve(settings_, globals.seed);
     return run_ranks(globals,
                      [&](Communicator& comm) {
+                       const Size size{extent->first, extent->second};
                        Session session(comm, globals.session(),
-                                       [&] { return load_scene(source_, settings_, globals); });
-                       Console console(session, globals, settings_, {extent->first, extent->second});
+                                       [&] { return load_scene(source_, settings_, globals, size); });
+                       Console console(session, globals, settings_, size);
                        return run_lines(session.comm(), console);
                      },
                      {.input = StandardInput::OfRank0});

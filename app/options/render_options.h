@@ -25,7 +25,11 @@ struct ReportOptions {
   void declare(const OptionSet& options);
 };
 
-/// Loads a scene lit as the settings say, within the limits of the program's options. Throws Error as load_scene does.
-[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals);
+/// Loads a scene lit as the settings say, within the limits of the program's options, to be seen first in a picture of
+/// this size or in this view. Throws Error as load_scene does.
+[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
+                               Size size = kDefaultPictureSize);
+[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
+                               const FirstView& view);
 
 }  // namespace hpr

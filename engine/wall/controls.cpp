@@ -100,9 +100,11 @@ std::string Controls::scene_changed() {
 
 std::string Controls::load(Arguments arguments) {
   expect(arguments, 1, 1, "load FILE.glb");
-  session_.load([&] { return load_(arguments[0], settings_); });
-  edits_ = SceneEdits(session_.scene());
   // What names a camera of the old scene names none of this one.
+  RenderSettings settings = settings_;
+  reset_setting(settings, "camera");
+  session_.load([&] { return load_(arguments[0], settings); });
+  edits_ = SceneEdits(session_.scene());
   reset_setting(settings_, "camera");
   ++changes_;
   const Scene& scene = session_.scene();

@@ -23,7 +23,8 @@ struct Generator {
   std::string name;
   std::string summary;                         ///< one line for `hpr scene list`
   std::map<std::string, std::string> options;  ///< key -> what it does, with its default
-  /// The finished scene. Throws Error (Usage) for an option it does not know or a value out of range.
+  /// The finished scene; points and lines have no shapes yet, see shape_points_and_lines. Throws Error (Usage) for an
+  /// option it does not know or a value out of range.
   std::function<Scene(const GeneratorOptions&)> make;
   /// The size options whose triangle count is nearest to the given one; empty where the scene has only one size.
   std::function<GeneratorOptions(std::uint64_t)> sized;
@@ -35,8 +36,8 @@ struct Generator {
 /// Throws Error (Usage) for an unknown name, with the nearest one.
 [[nodiscard]] const Generator& find_generator(std::string_view name);
 
-/// `text` is what follows "gen:", e.g. "gallery?s=2&k=4". The scene is finished. Throws Error (Usage) for an unknown
-/// name or option, or a value out of range.
+/// `text` is what follows "gen:", e.g. "gallery?s=2&k=4". The scene is finished, but for the shapes of points
+/// and lines (shape_points_and_lines). Throws Error (Usage) for an unknown name or option, or a value out of range.
 [[nodiscard]] Scene generate_scene(std::string_view text);
 
 /// Options that make the generator's scene about `triangles` triangles large, instances counted: the nearest size it
@@ -51,7 +52,8 @@ struct Generator {
   X(sphereflake)          \
   X(tetra)                \
   X(cornell)              \
-  X(asteroids)
+  X(asteroids)            \
+  X(cloud)
 
 #define HPR_DECLARE_GENERATOR(name) [[nodiscard]] Generator name##_generator();
 HPR_GENERATORS(HPR_DECLARE_GENERATOR)

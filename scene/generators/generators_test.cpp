@@ -8,6 +8,8 @@
 #include <set>
 
 #include "core/error.h"
+#include "scene/load_scene.h"
+#include "scene/points_lines.h"
 #include "scene/requirements.h"
 #include "scene/scene_test_tools.h"
 
@@ -28,7 +30,10 @@ TEST(Generated, EverySceneIsFiniteNamedAndTheSameTwice) {
   for (const Generator& generator : all_generators()) {
     SCOPED_TRACE(generator.name);
     const GeneratorOptions options = options_for_triangles(generator, 20'000);
-    const Scene scene = generator.make(options);
+    Scene scene = generator.make(options);
+    const std::uint64_t hash = content_hash(scene);
+    shape_points_and_lines(scene, {}, make_view(scene.cameras.at(0), {640, 360}, scene.bounds),
+                           SceneLimits().memory_bytes);
     EXPECT_EQ(scene.name, generator.name);
     EXPECT_GT(scene.triangles, 0U);
     EXPECT_TRUE(gives_light(scene));
@@ -41,7 +46,7 @@ TEST(Generated, EverySceneIsFiniteNamedAndTheSameTwice) {
       EXPECT_LT(mesh.material, scene.materials.size());
       EXPECT_FALSE(mesh.name.empty());
     }
-    EXPECT_EQ(content_hash(generator.make(options)), content_hash(scene));
+    EXPECT_EQ(content_hash(generator.make(options)), hash);
   }
 }
 
@@ -49,7 +54,8 @@ TEST(Generated, ScenesDoNotChangeSilently) {
   // Whoever changes a scene on purpose changes its hash here, and every picture that was made of it before.
   const std::map<std::string, std::uint64_t> hashes{
       {"gallery", 0x1503f8b966689369}, {"extensions", 0x4a045db9567e7654}, {"sphereflake", 0x1caf9d147f58cd66},
-      {"tetra", 0x409996e2fc2ef69e},   {"cornell", 0xa6df153e2ef22d65},    {"asteroids", 0x7ac647078a9290c6}};
+      {"tetra", 0x409996e2fc2ef69e},   {"cornell", 0xa6df153e2ef22d65},    {"asteroids", 0x7ac647078a9290c6},
+      {"cloud", 0xdb4f2cb2a75291c9}};
   EXPECT_EQ(hashes.size(), all_generators().size());
   for (const Generator& generator : all_generators()) {
     ASSERT_TRUE(hashes.contains(generator.name)) << generator.name;
@@ -253,6 +259,27 @@ TEST(Asteroids, DifferFromRockToRockAndSeedToSeed) {
   const Scene one = generate_scene("asteroids?k=2&count=16");
   EXPECT_NE(one.meshes[0].positions, one.meshes[1].positions);
   EXPECT_NE(content_hash(one), content_hash(generate_scene("asteroids?k=2&count=16&seed=2")));
+}
+
+TEST(Cloud, HasItsPointsAboutTheKnotAndItsLines) {
+  const Scene scene = generate_scene("cloud?count=500");
+  std::map<std::string, const Mesh*> meshes;
+  for (const Mesh& mesh : scene.meshes) meshes[mesh.name] = &mesh;
+  const Mesh& cloud = *meshes.at("cloud");
+  EXPECT_EQ(cloud.kind, MeshKind::Points);
+  EXPECT_EQ(cloud.triangles.size(), 500U);
+  EXPECT_EQ(cloud.colors.size(), 500U);
+  for (const glm::vec3& p : cloud.positions) {
+    double nearest = 1e9;
+    const std::vector<glm::vec3>& center = meshes.at("center line")->positions;
+    for (const glm::vec3& c : center) nearest = std::min<double>(nearest, glm::distance(p, c));
+    EXPECT_NEAR(nearest, 0.16, 0.02);
+  }
+  EXPECT_EQ(meshes.at("box")->triangles.size(), 12U);
+  EXPECT_EQ(meshes.at("grid")->triangles.size(), 34U);
+  EXPECT_EQ(meshes.at("center line")->triangles.size(), 240U);
+  EXPECT_NE(content_hash(scene), content_hash(generate_scene("cloud?count=500&seed=2")));
+  EXPECT_EQ(options_for_triangles(find_generator("cloud"), 89'000).at("count"), "10000");
 }
 
 }  // namespace

@@ -48,6 +48,26 @@ TEST(GltfMeshopt, AttributesAndIndicesWithoutFiltersKeepEveryBit) {
   expect_same_models([](const auto& model) { return write_meshopt(model, {.index_mode = "INDICES"}); }, {});
 }
 
+TEST(GltfMeshopt, PointsAndLinesAreReadAsTrianglesAre) {
+  const test::RandomModel model = random_model(3);
+  for (const int mode : {0, 1}) {
+    const auto drawn_as = [&](test::ModelWriter writer) {
+      for (std::size_t p = 0; p < model.primitives.size(); ++p) writer.primitive(p)["mode"] = mode;
+      return load(writer.gltf());
+    };
+    const Scene plain = drawn_as(write_plain(model));
+    const Scene packed = drawn_as(write_meshopt(model, {.index_mode = "INDICES"}));
+    ASSERT_EQ(packed.meshes.size(), plain.meshes.size());
+    for (std::size_t i = 0; i < plain.meshes.size(); ++i) {
+      EXPECT_EQ(packed.meshes[i].kind, mode == 0 ? MeshKind::Points : MeshKind::Lines);
+      EXPECT_FALSE(packed.meshes[i].triangles.empty());
+      EXPECT_EQ(packed.meshes[i].positions, plain.meshes[i].positions);
+      EXPECT_EQ(packed.meshes[i].colors, plain.meshes[i].colors);
+      EXPECT_EQ(packed.meshes[i].triangles, plain.meshes[i].triangles);
+    }
+  }
+}
+
 TEST(GltfMeshopt, FiltersKeepWhatTheyRoundTo) {
   // Octahedral vectors of n bits: two steps of 2 / 2^n and what normalising makes of them.
   expect_same_models([](const auto& model) { return write_meshopt(model, {.direction_bytes = 1}); }, {.normal = 0.03F});

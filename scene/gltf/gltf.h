@@ -12,12 +12,14 @@ namespace hpr {
 /// A glTF 2.0 file (text or binary, known by its first bytes). Trusts nothing in it: every index, range, stride and
 /// count is checked in 64 bits, URIs may only name files below the file's own folder, JSON deeper than 64 levels is
 /// refused. What is wrong but harmless becomes a warning in Scene::warnings, as does what is wrong with things that the
-/// chosen scene does not use. Throws Error (Io, BadInput, Limit; Usage for a scene or variant that the file lacks).
+/// chosen scene does not use. Points and lines have no shapes yet, see shape_points_and_lines. Throws Error (Io,
+/// BadInput, Limit; Usage for a scene or variant that the file lacks).
 [[nodiscard]] Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits,
                               const SceneChoice& choice = {});
 
 /// The scene as a binary glTF 2.0 file: meshes, materials, textures (PNG), instances, punctual lights, cameras. Loading
-/// it again gives the same triangles, bit by bit. The background and headlights have no place in glTF and are left out.
+/// it again gives the same triangles, points and lines, bit by bit. The background and headlights have no place in glTF
+/// and are left out.
 [[nodiscard]] std::vector<std::byte> encode_glb(const Scene& scene);
 
 }  // namespace hpr

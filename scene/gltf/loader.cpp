@@ -332,6 +332,7 @@ class SceneBuilder {
       material.name = "default";
       material.double_sided = false;
     }
+    show_without_light();
     if (singular_ > 0) context().warn("", fmt::format("{} nodes have a singular matrix", singular_));
     if (scene_.instances.empty()) context().warn("", "the scene has nothing to draw");
   }
@@ -406,9 +407,37 @@ class SceneBuilder {
       mesh->name = from.primitives.size() > 1 ? fmt::format("{}.{}", from.name, p) : from.name;
       made.push_back(static_cast<std::uint32_t>(scene_.meshes.size()));
       max_abs_.push_back(max_abs_coordinates(*mesh));
+      if (mesh->kind != MeshKind::Triangles && !from.primitives[p].attributes.contains("NORMAL")) {
+        unlit_.push_back(made.back());
+      }
       scene_.meshes.push_back(*std::move(mesh));
     }
     return meshes_.emplace(std::move(key), std::move(made)).first->second;
+  }
+
+  /// Points and lines without normals show the sum of base color and emission (glTF 2.0, section 3.9.6): by a copy of
+  /// their material that takes no light. The sum is that of the material's factors, where nothing else has a part in
+  /// it.
+  void show_without_light() {
+    std::map<std::pair<std::uint32_t, bool>, std::uint32_t> copies;  // by material and whether vertices have colors
+    for (const std::uint32_t mesh : unlit_) {
+      const std::uint32_t lit = scene_.meshes[mesh].material;
+      if (scene_.materials[lit].unlit) continue;
+      const bool has_colors = !scene_.meshes[mesh].colors.empty();
+      const auto [copy, added] =
+          copies.try_emplace({lit, has_colors}, static_cast<std::uint32_t>(scene_.materials.size()));
+      scene_.meshes[mesh].material = copy->second;
+      if (!added) continue;
+      Material material = scene_.materials[lit];
+      if (!has_colors && !material.base_color_texture.present() && !material.emissive_texture.present()) {
+        const glm::vec3 sum = glm::vec3(material.base_color) + material.emissive;
+        material.base_color = glm::vec4(glm::min(sum, glm::vec3(1.0F)), material.base_color.a);
+      }
+      material.unlit = true;
+      material.emissive = glm::vec3(0.0F);
+      material.extensions = nullptr;
+      scene_.materials.push_back(std::move(material));
+    }
   }
 
   void check_weights(const tinygltf::Node& node, const tinygltf::Mesh& mesh) const {
@@ -452,7 +481,8 @@ class SceneBuilder {
   Scene& scene_;
   GltfNodes nodes_;
   std::map<PoseKey, std::vector<std::uint32_t>> meshes_;
-  std::vector<glm::dvec3> max_abs_;  ///< per mesh of the scene
+  std::vector<glm::dvec3> max_abs_;   ///< per mesh of the scene
+  std::vector<std::uint32_t> unlit_;  ///< meshes of points and lines without normals
   std::uint32_t default_material_ = 0;
   std::size_t singular_ = 0;
 };

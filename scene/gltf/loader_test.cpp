@@ -56,16 +56,6 @@ TEST(GltfLoader, StripsAndFansBecomeTrianglesThatFaceTheSameWay) {
   for (const glm::vec3& normal : scene.meshes[0].normals) EXPECT_EQ(normal, glm::vec3(0, 0, 1));
 }
 
-TEST(GltfLoader, PointsAndLinesAreLeftOutWithAWarning) {
-  for (const int mode : {0, 1, 2, 3}) {
-    auto document = square();
-    document.primitive()["mode"] = mode;
-    const Scene scene = load(document.json);
-    EXPECT_EQ(scene.triangles, 0U);
-    EXPECT_TRUE(test::warns_of(scene, "points and lines"));
-  }
-}
-
 TEST(GltfLoader, StridesAndIntegerTextureCoordinatesAreRead) {
   auto document = triangle();
   // Four bytes per vertex, of which two are u and v.

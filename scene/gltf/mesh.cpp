@@ -198,6 +198,7 @@ class PrimitiveBuilder {
     mesh.positions = data_.vec3s(primitive_.attributes.at("POSITION"));
     check_positions(mesh.positions);
     if (pose.joints.empty() && pose.weights.empty()) compare_bounds(mesh.positions);
+    if (primitive_.mode < TINYGLTF_MODE_TRIANGLES) return build_points_or_lines(std::move(mesh), pose);
     if (const auto found = primitive_.attributes.find("NORMAL"); found != primitive_.attributes.end()) {
       mesh.normals = data_.vec3s(found->second);
       note_not_finite(mesh.normals, "NORMAL");
@@ -210,7 +211,8 @@ class PrimitiveBuilder {
       mesh.tangents = data_.vec4s(found->second);
       note_not_finite(mesh.tangents, "TANGENT");
     }
-    mesh.triangles = read_triangles(mesh.positions.size());
+    const std::vector<std::uint32_t> indices = read_indices(mesh.positions.size());
+    mesh.triangles = read_triangles(mesh.positions.size(), indices);
     morph(mesh, pose.weights);
     tame_uvs(mesh);
     tame_colors(mesh);
@@ -225,6 +227,26 @@ class PrimitiveBuilder {
   }
 
  private:
+  /// Their normals and tangents are those of the solids they become.
+  [[nodiscard]] Mesh build_points_or_lines(Mesh mesh, const GltfPose& pose) const {
+    mesh.kind = primitive_.mode == TINYGLTF_MODE_POINTS ? MeshKind::Points : MeshKind::Lines;
+    read_uvs(mesh);
+    read_colors(mesh);
+    const std::vector<std::uint32_t> indices = read_indices(mesh.positions.size());
+    const std::size_t count = primitive_.indices >= 0 ? indices.size() : mesh.positions.size();
+    const bool is_list = primitive_.mode == TINYGLTF_MODE_LINE;
+    if (mesh.kind == MeshKind::Lines && (count < 2 || (is_list && count % 2 != 0))) {
+      data_.context().warn(where_, fmt::format("{} vertices make no whole number of lines", count));
+    }
+    data_.context().charge(count / (is_list ? 2 : 1) * sizeof(glm::uvec3), "points and lines");
+    mesh.triangles = points_or_lines_of(primitive_.mode, mesh.positions.size(), indices);
+    morph(mesh, pose.weights);
+    tame_uvs(mesh);
+    tame_colors(mesh);
+    if (!pose.joints.empty()) skin(mesh, pose.joints);
+    return mesh;
+  }
+
   /// What is no number is replaced wherever the attribute's values are looked at; here it is counted.
   template <typename Vector>
   void note_not_finite(const std::vector<Vector>& values, std::string_view attribute) const {
@@ -324,18 +346,23 @@ class PrimitiveBuilder {
     if (odd) data_.context().warn(where_ + ".attributes.COLOR_0", "some values lie outside of 0 to 1; brought into it");
   }
 
-  [[nodiscard]] std::vector<glm::uvec3> read_triangles(std::size_t vertices) const {
-    std::vector<std::uint32_t> indices;
-    if (primitive_.indices >= 0) {
-      indices = data_.integers(primitive_.indices);
-      const auto bad = std::ranges::find_if(indices, [&](std::uint32_t index) { return index >= vertices; });
-      if (bad != indices.end()) {
-        data_.context().fail(where_ + ".indices", fmt::format("index {} is {}, but there are {} vertices",
-                                                              bad - indices.begin(), *bad, vertices));
-      }
-    }
-    const std::size_t count = primitive_.indices >= 0 ? indices.size() : vertices;
+  /// None for a primitive without indices.
+  [[nodiscard]] std::vector<std::uint32_t> read_indices(std::size_t vertices) const {
     check_vertex_count(vertices);
+    std::vector<std::uint32_t> indices;
+    if (primitive_.indices < 0) return indices;
+    indices = data_.integers(primitive_.indices);
+    const auto bad = std::ranges::find_if(indices, [&](std::uint32_t index) { return index >= vertices; });
+    if (bad != indices.end()) {
+      data_.context().fail(where_ + ".indices", fmt::format("index {} is {}, but there are {} vertices",
+                                                            bad - indices.begin(), *bad, vertices));
+    }
+    return indices;
+  }
+
+  [[nodiscard]] std::vector<glm::uvec3> read_triangles(std::size_t vertices,
+                                                       std::span<const std::uint32_t> indices) const {
+    const std::size_t count = primitive_.indices >= 0 ? indices.size() : vertices;
     const bool list = primitive_.mode == TINYGLTF_MODE_TRIANGLES;
     if (count < 3 || (list && count % 3 != 0)) {
       data_.context().warn(where_, fmt::format("{} vertices make no whole number of triangles", count));
@@ -568,14 +595,27 @@ std::vector<glm::uvec3> triangles_of(int mode, std::size_t count, std::span<cons
   return triangles;
 }
 
+std::vector<glm::uvec3> points_or_lines_of(int mode, std::size_t count, std::span<const std::uint32_t> indices) {
+  const std::size_t corners = indices.empty() ? count : indices.size();
+  const auto at = [&](std::size_t i) { return indices.empty() ? static_cast<std::uint32_t>(i) : indices[i]; };
+  std::vector<glm::uvec3> parts;
+  if (mode == TINYGLTF_MODE_POINTS) {
+    parts.reserve(corners);
+    for (std::size_t i = 0; i < corners; ++i) parts.emplace_back(at(i));
+    return parts;
+  }
+  if (corners < 2) return parts;
+  const std::size_t step = mode == TINYGLTF_MODE_LINE ? 2 : 1;
+  parts.reserve(corners / step);
+  for (std::size_t i = 0; i + 1 < corners; i += step) parts.emplace_back(at(i), at(i + 1), at(i + 1));
+  if (mode == TINYGLTF_MODE_LINE_LOOP) parts.emplace_back(at(corners - 1), at(0), at(0));
+  return parts;
+}
+
 std::optional<Mesh> build_primitive(const GltfData& data, const tinygltf::Primitive& primitive,
                                     const std::string& where, const GltfPose& pose, std::uint32_t default_material) {
   if (!primitive.attributes.contains("POSITION")) {
     data.context().warn(where, "has no positions and is left out");
-    return std::nullopt;
-  }
-  if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
-    data.context().warn(where, "points and lines are not drawn");
     return std::nullopt;
   }
   Mesh mesh = PrimitiveBuilder(data, primitive, where).build(pose);

@@ -23,9 +23,9 @@ struct GltfPose {
 void check_meshes(const GltfData& data);
 
 /// One primitive as triangles: strips and fans taken apart, morphed and skinned as `pose` says, with flat normals on
-/// vertices of their own where the file has none (as glTF wants it). None, with a warning, for points, lines and
-/// primitives without positions. `default_material` stands in where the primitive names none. Throws Error (BadInput,
-/// Limit).
+/// vertices of their own where the file has none (as glTF wants it). Points and lines become a mesh of their kind.
+/// None, with a warning, for primitives without positions. `default_material` stands in where the primitive names none.
+/// Throws Error (BadInput, Limit).
 [[nodiscard]] std::optional<Mesh> build_primitive(const GltfData& data, const tinygltf::Primitive& primitive,
                                                   const std::string& where, const GltfPose& pose,
                                                   std::uint32_t default_material);
@@ -33,5 +33,10 @@ void check_meshes(const GltfData& data);
 /// The triangles of `count` vertices (or of `indices`, when there are any) in a TINYGLTF_MODE_*; left-over vertices of
 /// lists are dropped.
 [[nodiscard]] std::vector<glm::uvec3> triangles_of(int mode, std::size_t count, std::span<const std::uint32_t> indices);
+
+/// Points (i, i, i) or segments (i, j, j) of `count` vertices (or of `indices`, when there are any) in a
+/// TINYGLTF_MODE_*; a left-over vertex of a list of lines is dropped.
+[[nodiscard]] std::vector<glm::uvec3> points_or_lines_of(int mode, std::size_t count,
+                                                         std::span<const std::uint32_t> indices);
 
 }  // namespace hpr

@@ -108,6 +108,7 @@ void expect_same(const Scene& a, const Scene& b) {
     ASSERT_TRUE(read.positions == mesh.positions && read.normals == mesh.normals && read.uvs == mesh.uvs &&
                 read.colors == mesh.colors && read.tangents == mesh.tangents && read.triangles == mesh.triangles)
         << i;
+    ASSERT_EQ(read.kind, mesh.kind) << i;
     ASSERT_EQ(read.material, mesh.material) << i;
   }
   ASSERT_EQ(a.textures.size(), b.textures.size());
@@ -126,8 +127,9 @@ void expect_same(const Scene& a, const Scene& b) {
 }
 
 TEST(GltfRoundTrip, EveryGeneratedSceneComesBack) {
-  for (const char* name : {"gallery?s=1&k=1&n=2&cases=2", "sphereflake?s=2&n=2", "tetra?s=4", "tetra?s=9",
-                           "cornell?variant=glass", "cornell?variant=mirror&lamp=coplanar", "asteroids?k=1&count=60"}) {
+  for (const char* name :
+       {"gallery?s=1&k=1&n=2&cases=2", "sphereflake?s=2&n=2", "tetra?s=4", "tetra?s=9", "cornell?variant=glass",
+        "cornell?variant=mirror&lamp=coplanar", "asteroids?k=1&count=60", "cloud?count=50"}) {
     SCOPED_TRACE(name);
     const Scene scene = generate_scene(name);
     expect_same(written_and_loaded(scene), scene);

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -26,6 +27,8 @@ static_assert(sizeof(glm::vec2) == 8 && sizeof(glm::vec3) == 12 && sizeof(glm::v
 
 constexpr int kFloat = 5126;
 constexpr int kUnsignedInt = 5125;
+constexpr int kPoints = 0;
+constexpr int kLines = 1;
 constexpr int kVertexBuffer = 34962;
 constexpr int kIndexBuffer = 34963;
 
@@ -287,6 +290,41 @@ void write_materials(const Scene& scene, Document& document) {
 
 constexpr std::size_t kNotWritten = std::numeric_limits<std::size_t>::max();
 
+/// The corners of triangles or segments, or the points.
+std::size_t write_indices(const Mesh& mesh, Document& document) {
+  const int corners = mesh.kind == MeshKind::Points ? 1 : mesh.kind == MeshKind::Lines ? 2 : 3;
+  std::vector<std::uint32_t> indices;
+  indices.reserve(mesh.triangles.size() * static_cast<std::size_t>(corners));
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    for (int corner = 0; corner < corners; ++corner) indices.push_back(triangle[corner]);
+  }
+  const std::size_t view = document.add_view(std::as_bytes(std::span(indices)), kIndexBuffer);
+  return document.add(
+      "accessors",
+      {{"bufferView", view}, {"componentType", kUnsignedInt}, {"count", indices.size()}, {"type", "SCALAR"}});
+}
+
+/// The accessor of a mesh's positions, with their box.
+std::size_t write_positions(const Mesh& mesh, Document& document) {
+  glm::vec3 low = mesh.positions.front();
+  glm::vec3 high = low;
+  for (const glm::vec3& p : mesh.positions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  const std::size_t positions = document.add_accessor(mesh.positions, "VEC3");
+  document.json["accessors"][positions]["min"] = numbers(low);
+  document.json["accessors"][positions]["max"] = numbers(high);
+  return positions;
+}
+
+/// The accessor of a mesh's normals. Points and lines take light where they have any, whatever they are.
+std::optional<std::size_t> write_normals(const Scene& scene, const Mesh& mesh, Document& document) {
+  if (mesh.kind == MeshKind::Triangles) return document.add_accessor(mesh.normals, "VEC3");
+  if (scene.materials[mesh.material].unlit) return std::nullopt;
+  return document.add_accessor(std::vector(mesh.positions.size(), glm::vec3(0.0F, 0.0F, 1.0F)), "VEC3");
+}
+
 /// The index of each mesh in the file; meshes without triangles have no place in glTF.
 std::vector<std::size_t> write_meshes(const Scene& scene, Document& document) {
   std::vector<std::size_t> written;
@@ -295,16 +333,8 @@ std::vector<std::size_t> write_meshes(const Scene& scene, Document& document) {
       written.push_back(kNotWritten);
       continue;
     }
-    glm::vec3 low = mesh.positions.front();
-    glm::vec3 high = low;
-    for (const glm::vec3& p : mesh.positions) {
-      low = glm::min(low, p);
-      high = glm::max(high, p);
-    }
-    const std::size_t positions = document.add_accessor(mesh.positions, "VEC3");
-    document.json["accessors"][positions]["min"] = numbers(low);
-    document.json["accessors"][positions]["max"] = numbers(high);
-    Json attributes{{"POSITION", positions}, {"NORMAL", document.add_accessor(mesh.normals, "VEC3")}};
+    Json attributes{{"POSITION", write_positions(mesh, document)}};
+    if (const auto normals = write_normals(scene, mesh, document)) attributes["NORMAL"] = *normals;
     for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
       if (!mesh.uvs[set].empty()) {
         attributes[fmt::format("TEXCOORD_{}", set)] = document.add_accessor(mesh.uvs[set], "VEC2");
@@ -312,12 +342,9 @@ std::vector<std::size_t> write_meshes(const Scene& scene, Document& document) {
     }
     if (!mesh.colors.empty()) attributes["COLOR_0"] = document.add_accessor(mesh.colors, "VEC4");
     if (!mesh.tangents.empty()) attributes["TANGENT"] = document.add_accessor(mesh.tangents, "VEC4");
-    const std::size_t view = document.add_view(std::as_bytes(std::span(mesh.triangles)), kIndexBuffer);
-    const std::size_t indices = document.add("accessors", {{"bufferView", view},
-                                                           {"componentType", kUnsignedInt},
-                                                           {"count", 3 * mesh.triangles.size()},
-                                                           {"type", "SCALAR"}});
-    Json primitive{{"attributes", std::move(attributes)}, {"indices", indices}, {"material", mesh.material}};
+    Json primitive{
+        {"attributes", std::move(attributes)}, {"indices", write_indices(mesh, document)}, {"material", mesh.material}};
+    if (mesh.kind != MeshKind::Triangles) primitive["mode"] = mesh.kind == MeshKind::Points ? kPoints : kLines;
     written.push_back(document.add("meshes", {{"name", mesh.name}, {"primitives", Json::array({primitive})}}));
   }
   return written;

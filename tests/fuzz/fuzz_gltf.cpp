@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/log.h"
-#include "scene/gltf/gltf.h"
 #include "scene/gltf/random_models.h"
 #include "scene/gltf/test_tools.h"
 #include "scene/load_scene.h"
@@ -99,6 +98,10 @@ std::size_t second_chunk(std::span<const std::byte> file) {
 
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all{to_bytes(kText), to_glb(kText)};
+  for (const std::string_view mode : {"\"mode\":0", "\"mode\":2"}) {  // points, a line
+    std::string text(kText);
+    all.push_back(to_bytes(text.replace(text.find("\"mode\":4"), mode.size(), mode)));
+  }
   for (std::uint32_t seed = 0; seed < 4; ++seed) {
     const test::RandomModel model = small_model(seed);
     all.push_back(write_draco(model, {.lossless = seed % 2 == 0, .speed = static_cast<int>(seed) * 3}).glb());
@@ -118,7 +121,7 @@ bool run(std::span<const std::byte> input) {
   limits.image = {.side = 1024, .pixels = 1U << 20U};
   try {
     const std::string text(reinterpret_cast<const char*>(input.data()), input.size());
-    (void)load_gltf(folder.write(is_binary(input) ? "scene.glb" : "scene.gltf", text), limits);
+    (void)load_scene(folder.write(is_binary(input) ? "scene.glb" : "scene.gltf", text).string(), limits);
     return true;
   } catch (const Error& error) {
     if (error.code() == ExitCode::Internal) throw;  // a fault of the program's

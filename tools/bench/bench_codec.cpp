@@ -167,7 +167,7 @@ CodecFrames draw_codec_frames(const std::string& scene, Size size, int count, co
   frames.scene = scene;
   const RenderSettings settings = resolve({}, globals.seed);
   run_local_ranks(1, [&](Communicator& comm) {
-    Session session(comm, globals.session(), [&] { return load_scene(scene, settings, globals); });
+    Session session(comm, globals.session(), [&] { return load_scene(scene, settings, globals, size); });
     const Camera camera = choose_camera(settings.camera, session.scene());
     const auto view_after = [&](int steps) { return make_view(turned(camera, steps), size, session.scene().bounds); };
     const View first = view_after(0);

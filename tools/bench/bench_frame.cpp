@@ -220,7 +220,7 @@ class BenchFrameCommand final : public Command {
     }
     std::vector<BenchRow> rows;
     run_local_ranks(1, [&](Communicator& comm) {
-      Session session(comm, globals.session(), [&] { return load_scene(scene_, settings, globals); });
+      Session session(comm, globals.session(), [&] { return load_scene(scene_, settings, globals, size); });
       Bench bench(session, settings, size);
       bench.draw(frames_);
       const bool draws = !bench.by_rays() && session.scene().triangles <= kMaxBareTriangles;

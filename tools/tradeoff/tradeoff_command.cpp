@@ -94,7 +94,7 @@ class TradeoffCommand final : public Command {
     check_options(globals);
     watch_requests();
     return run_ranks(globals, [&](Communicator& comm) {
-      Session session(comm, globals.session(), [&] { return load_scene(scene_, settings_, globals); });
+      Session session(comm, globals.session(), [&] { return load_scene(scene_, settings_, globals, how_.size); });
       return sweep(session, globals);
     });
   }
