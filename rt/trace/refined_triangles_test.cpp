@@ -25,7 +25,7 @@ glm::dmat4 tilted() {
   return glm::rotate(about_z, glm::radians(20.0), glm::dvec3(1, 0, 0));
 }
 
-/// A square of so many metres from its middle to a side, and a small one a metre above the middle.
+/// A square of so many metres from its midpoint to a side, and a small one a metre above the midpoint.
 Scene ground(double half_size, const glm::dmat4& turned) {
   Scene scene;
   const auto size = static_cast<float>(half_size);
@@ -70,15 +70,15 @@ TEST(RefinedTriangles, AreShorterThanTheirDistanceAndClosed) {
   for (const double area : areas) EXPECT_NEAR(area, 2.0 * half * half, 1e-9);
   for (const auto& [edge, count] : uses) {
     const auto& [a, b] = edge;
-    const glm::dvec3 middle(0.5 * (std::get<0>(a) + std::get<0>(b)), 0.5 * (std::get<1>(a) + std::get<1>(b)),
-                            0.5 * (std::get<2>(a) + std::get<2>(b)));
-    const glm::dvec3 flat(glm::inverse(tilted()) * glm::dvec4(middle, 1.0));
+    const glm::dvec3 midpoint(0.5 * (std::get<0>(a) + std::get<0>(b)), 0.5 * (std::get<1>(a) + std::get<1>(b)),
+                              0.5 * (std::get<2>(a) + std::get<2>(b)));
+    const glm::dvec3 flat(glm::inverse(tilted()) * glm::dvec4(midpoint, 1.0));
     const bool on_rim = std::max(std::abs(flat.x), std::abs(flat.z)) > half * (1.0 - 1e-9);
     EXPECT_EQ(count, on_rim ? 1 : 2) << flat.x << ' ' << flat.z;
   }
 }
 
-/// Places on the ground from a centimetre to most of its size away from the middle.
+/// Places on the ground from a centimetre to most of its size away from the midpoint.
 glm::dvec3 location(Sampler& sampler, double half_size) {
   const double distance = 0.01 * std::pow(70.0 * half_size, sampler.one());
   const double angle = 6.283185307179586 * sampler.one();
