@@ -1,6 +1,7 @@
 #include "engine/frame.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "cluster/transport/collectives.h"
@@ -237,22 +238,24 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   return *this;
 }
 
-FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+DrawnLayer draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                       const FrameSample& sample) {
   const JitteredViews jittered{{views.begin(), views.end()}, sample};
   TileLayer<Key>* const layer = &keys;
-  FrameTimes spent = draw_keys(session, plan, std::span(&jittered, 1), std::span(&layer, 1));
+  DrawnLayer drawn{draw_keys(session, plan, std::span(&jittered, 1), std::span(&layer, 1))};
 
   if (spends_light(plan)) {
     const trace::Span photons("photons");
-    session.shader(plan.rays).trace_photons(session.comm(), sample.number);
+    std::function<bool()> is_overtaken;
+    if (sample.interrupt != nullptr) is_overtaken = [&] { return sample.interrupt->is_raised(); };
+    drawn.overtaken = !session.shader(plan.rays).trace_photons(session.comm(), sample.number, is_overtaken);
   }
-  if (plan.shading == Shading::Local) {
+  if (plan.shading == Shading::Local && !drawn.overtaken) {
     const trace::Span shading("light");
     shade_local(session.shader(plan.rays), views, keys, plan.tiles, sample.number);
-    add_light(session.shader(plan.rays), spent);
+    add_light(session.shader(plan.rays), drawn.spent);
   }
-  return spent;
+  return drawn;
 }
 
 Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> views, FrameTimes* times,
@@ -260,7 +263,8 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   const trace::Span span("sample", "number", sample.number.sample);
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
   keys.set_depth_format(plan.depth_format);
-  FrameTimes spent = draw_layer(session, plan, views, keys, sample);
+  const DrawnLayer layer = draw_layer(session, plan, views, keys, sample);
+  FrameTimes spent = layer.spent;
 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.layers),
@@ -269,7 +273,8 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   if (sample.before_shading != nullptr) (*sample.before_shading)();
   spent.composite_ms = watch.ms();
 
-  shade(session, plan, views, sample, frame, spent);
+  frame.overtaken = layer.overtaken;
+  if (!frame.overtaken) shade(session, plan, views, sample, frame, spent);
   if (frame.overtaken) return frame;
   if (plan.verify_percent > 0.0) {
     const JitteredViews drawn{{views.begin(), views.end()}, sample};

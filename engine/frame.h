@@ -66,7 +66,7 @@ struct FrameSample {
   std::optional<TileOwnership>* ownership = nullptr;  ///< made by the first sample; null: keys do not move
   const PixelMask* wanted = nullptr;  ///< pixels that are lit; null: all. Others' radiance means nothing
   const std::function<void()>* before_shading = nullptr;  ///< called once the owners of tiles have their keys
-  Interrupt* interrupt = nullptr;  ///< of this rank: raised on any, it ends shading within a tile; null: on none
+  Interrupt* interrupt = nullptr;  ///< of this rank: raised on any, it ends light within a tile; null: on none
 };
 
 /// One of several samples that are drawn together.
@@ -82,9 +82,15 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
                               std::span<TileLayer<Key>* const> keys);
 
+/// What a layer took.
+struct DrawnLayer {
+  FrameTimes spent;
+  bool overtaken = false;  ///< by FrameSample::interrupt, on all ranks alike: the layer has keys, and there is no light
+};
+
 /// Collective. A frame before compositing: this rank's layer, its objects drawn into its group's tiles of `keys`, and
-/// lit if shading is local. Returns times and counts.
-FrameTimes draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+/// lit if shading is local.
+DrawnLayer draw_layer(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                       const FrameSample& sample = {});
 
 /// How many samples of a plan may be drawn together: 1 where they are composited, or each needs photons or shared light

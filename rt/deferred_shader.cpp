@@ -136,7 +136,7 @@ struct DeferredShader::State {
   /// What rays meet that decide about coverage themselves.
   const RayScene& whole_scene();
   void trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles);
-  const PhotonMaps* trace_photons(const SampleNumber& number, Communicator* comm);
+  const PhotonMaps* photon_maps(const SampleNumber& number);
   void warn_of_cut_rays();
   std::unique_ptr<Scratch> take_scratch();
   void show_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
@@ -247,10 +247,10 @@ void DeferredShader::State::trace_reference(const ShadedSample& sample, std::spa
   times = {{"reference", watch.ms() * settings.threads}};
 }
 
-const PhotonMaps* DeferredShader::State::trace_photons(const SampleNumber& number, Communicator* comm) {
+const PhotonMaps* DeferredShader::State::photon_maps(const SampleNumber& number) {
   if (!photons) return nullptr;
   const Stopwatch watch;
-  const PhotonMaps& maps = photons->build(number, comm);
+  const PhotonMaps& maps = photons->build(number, nullptr);
   photon_ms += watch.ms();
   return &maps;
 }
@@ -503,7 +503,7 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
     state.warn_of_cut_rays();
     return;
   }
-  const PhotonMaps* const photons = state.trace_photons(first.number, nullptr);
+  const PhotonMaps* const photons = state.photon_maps(first.number);
   const std::vector<Media> eyes = state.media.of_eyes(first.views);
   const Stopwatch watch;
   if (state.settings.denoise) state.fragments.prepare(layout, first.views, state.settings);
@@ -542,8 +542,18 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   state.gather_counts(watch.ms() * state.settings.threads);
 }
 
-void DeferredShader::trace_photons(Communicator& comm, const SampleNumber& number) {
-  (void)state_->trace_photons(number, &comm);
+bool DeferredShader::trace_photons(Communicator& comm, const SampleNumber& number,
+                                   const std::function<bool()>& is_overtaken) {
+  if (!state_->photons) return true;
+  const Stopwatch watch;
+  bool is_wanted = true;
+  if (is_overtaken) {
+    is_wanted = state_->photons->build_while_wanted(number, comm, is_overtaken);
+  } else {
+    (void)state_->photons->build(number, &comm);
+  }
+  if (is_wanted) state_->photon_ms += watch.ms();
+  return is_wanted;
 }
 
 void DeferredShader::discard_photons() {

@@ -70,8 +70,10 @@ class DeferredShader {
 
   /// Collective over `comm`, whose ranks shade parts of one frame with equal settings: traces the photons of the sample
   /// that is shaded next, if a planned pass needs any, every rank its share. Without this call shade() traces all of
-  /// them itself; pictures are equal.
-  void trace_photons(Communicator& comm, const SampleNumber& number = {});
+  /// them itself; pictures are equal. False on all ranks where `is_overtaken`, which any thread asks, on any of them
+  /// before it was done: the sample is not to be shaded then.
+  bool trace_photons(Communicator& comm, const SampleNumber& number = {},
+                     const std::function<bool()>& is_overtaken = {});
 
   /// Discards the photon maps of the last sample, so that shading it once more takes as long as the first time.
   void discard_photons();

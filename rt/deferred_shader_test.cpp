@@ -360,31 +360,40 @@ TEST(DeferredShader, TheReferenceLiftsShadowRaysAsSettingsSay) {
   EXPECT_GT(sum(true), 1.1 * sum(false));
 }
 
-/// What the ground shows a centimetre under a roof that hides a lamp, or, without a roof, in its light.
-double seen_on_ground(double half_size, bool has_roof, const glm::dvec3& lamp, const RaySettings& settings) {
+/// What the ground shows a centimetre under a roof that hides a lamp, or, without a roof, in its light; all of it
+/// turned.
+double seen_on_ground(double half_size, bool has_roof, const glm::dvec3& lamp, const RaySettings& settings,
+                      const glm::dmat4& turned) {
   Scene scene;
   const auto size = static_cast<float>(half_size);
   test::add_material(scene, test::diffuse());
-  test::place_mesh(scene, test::add_mesh(scene, test::quad({-size, 0, -size}, {0, 0, 2 * size}, {2 * size, 0, 0}, 0)));
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-size, 0, -size}, {0, 0, 2 * size}, {2 * size, 0, 0}, 0)),
+                   turned);
   if (has_roof) {
-    test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, 0.01F, -1}, {0, 0, 2}, {2, 0, 0}, 0)));
+    test::place_mesh(scene, test::add_mesh(scene, test::quad({-1, 0.01F, -1}, {0, 0, 2}, {2, 0, 0}, 0)), turned);
   }
+  const auto in_world = [&](const glm::dvec3& at) { return glm::dvec3(turned * glm::dvec4(at, 1.0)); };
   Light light;
-  light.position = lamp;
+  light.position = in_world(lamp);
   scene.lights = {light};
   finish_scene(scene);
-  const View view = test::view_from({0.1, 0.006, 0.2}, {0.1, 0, 0.2}, {3, 3}, scene, 0.5, {1, 0, 0});
+  const View view =
+      test::view_from(in_world({0.1, 0.006, 0.2}), in_world({0.1, 0, 0.2}), {3, 3}, scene, 0.5, in_world({1, 0, 0}));
   return test::mean(test::shade(scene, view, settings).image);
 }
 
 TEST(DeferredShader, ContactShadowsStayHoweverWideTheGroundIs) {
+  const glm::dmat4 level(1.0);
+  const glm::dmat4 tilted = glm::rotate(glm::rotate(level, 0.5, glm::dvec3(0, 0, 1)), 0.35, glm::dvec3(1, 0, 0));
   for (const RaySettings& settings :
        {RaySettings{.passes = {PassId::Shadow}}, RaySettings{.max_depth = 2, .reference = true}}) {
     for (const double half_size : {10.0, 1e3, 1e6}) {
       // High above, and close above the roof: neither end of a shadow ray lies past it.
       for (const glm::dvec3& lamp : {glm::dvec3(2, 3, 1), glm::dvec3(0.1, 0.05, 0.2)}) {
-        EXPECT_EQ(seen_on_ground(half_size, true, lamp, settings), 0.0) << half_size << ' ' << lamp.y;
-        EXPECT_GT(seen_on_ground(half_size, false, lamp, settings), 0.01) << half_size << ' ' << lamp.y;
+        for (const glm::dmat4& turned : {level, tilted}) {
+          EXPECT_EQ(seen_on_ground(half_size, true, lamp, settings, turned), 0.0) << half_size << ' ' << lamp.y;
+          EXPECT_GT(seen_on_ground(half_size, false, lamp, settings, turned), 0.01) << half_size << ' ' << lamp.y;
+        }
       }
     }
   }

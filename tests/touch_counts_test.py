@@ -4,8 +4,8 @@
 usage: touch_counts_test.py [--build DIR CMAKE] ROOT
 
 Every patch applies to the tree as it stands and touches at most as many files as TOUCHES allows for its kind; every
-kind has a patch. With --build, a copy of the tree in DIR gets all patches, is built, and each patch's own check is run:
-the head of a patch has the lines
+kind has a patch. With --build, a copy of the tree in DIR gets all patches, is built, and each patch's own check is run
+in DIR/checks, which is empty then: what an earlier run left there is removed first. The head of a patch has the lines
 
     Check: hpr scene list | grep NAME
     Build: TARGET                         what the check needs beside hpr; may be left out
@@ -107,11 +107,14 @@ def build_all(root, patches, folder, cmake):
         if result.returncode != 0:
             sys.exit(f"{' '.join(map(str, step))} left with {result.returncode}\n{result.stdout[-6000:]}")
 
+    checks = folder / "checks"
+    shutil.rmtree(checks, ignore_errors=True)
+    checks.mkdir()
     programs = [build / name for name in ("app", *sorted(p.name for p in build.iterdir() if p.is_dir()))]
     environment = dict(os.environ, PATH=os.pathsep.join(map(str, [*programs, os.environ.get("PATH", "")])))
     for patch in patches.values():
         for check in head_lines(patch, "Check"):
-            result = subprocess.run(["bash", "-c", check], cwd=folder, env=environment, stdout=subprocess.PIPE,
+            result = subprocess.run(["bash", "-c", check], cwd=checks, env=environment, stdout=subprocess.PIPE,
                                     stderr=subprocess.STDOUT, text=True, errors="replace", timeout=600, check=False)
             print(f"{patch.name}: {check}: left with {result.returncode}")
             expect(result.returncode == 0, f"{patch.name}: the check failed:\n{result.stdout[-3000:]}")

@@ -19,6 +19,7 @@ import time
 import urllib.parse
 
 import png
+from processes import children_of, ranks_of
 
 HPR = os.path.abspath(sys.argv[1])
 WALL, SCENE = "2x1@160x120", ["gen:gallery", "--passes", "none"]
@@ -226,6 +227,25 @@ def serve(folder, ranks):
             print(process.communicate()[1][-2000:])
 
 
+def ends_while_photons_are_traced(folder, ranks):
+    """A resting picture of so many photons that one sample takes minutes: a signal does not wait for them."""
+    process = subprocess.Popen([HPR, "view", "gen:gallery", "--size", "160x120", "--web", "--quality", "best", "--photons", "100000000",
+                                "--ranks", ranks], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        process.stdout.readline()
+        time.sleep(1.0)  # the first picture, of a moving camera, has no photons
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=15)
+        check(f"SIGTERM among photons with {ranks} ranks", process.returncode, 0)
+    except subprocess.TimeoutExpired:
+        complain(f"{ranks} ranks trace all photons of a sample before they end")
+    finally:
+        if process.poll() is None:
+            for pid in [*ranks_of(process.pid), *children_of(process.pid), process.pid]:
+                os.kill(pid, signal.SIGKILL)
+        process.communicate()
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-web-") as scratch:
         folder = pathlib.Path(scratch)
@@ -233,6 +253,7 @@ def main():
                        capture_output=True, timeout=120)
         for ranks in ("1", "2"):
             serve(folder, ranks)
+            ends_while_photons_are_traced(folder, ranks)
         for display, code in (("web=example.org:1", 2), ("web=127.0.0.1:99999", 2), ("web=203.0.113.1:1", 4)):
             result = subprocess.run([HPR, "wall", "run", "1x1@32x32", *SCENE, "--display", display], cwd=folder,
                                     capture_output=True, timeout=60, check=False)

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -141,6 +142,42 @@ TEST(PhotonPass, RadiiAndNumbersFollowWhatAPixelCovers) {
   EXPECT_NEAR(wide, std::sqrt(50.0 * 24.0 / (std::numbers::pi * 200'000)), 0.1 * wide);
   EXPECT_EQ(map_of(1.0, false).first, wide) << "far off fifty photons are enough";
   EXPECT_NEAR(map_of(1e-6, true).first, std::sqrt(4.0 / 50.0) * wide, 1e-9) << "at the least four photons";
+}
+
+TEST(PhotonPass, PhotonsOvertakenOnAnyRankAreDroppedOnAllAndTracedAgainWithTheSameBits) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const RaySpace space(scene.bounds);
+  const Surfaces surfaces(scene, space);
+  const RayScene rays(scene, space, 1);
+  const LightSampler lights(scene);
+  const SampleNumber number{.frame = 0, .sample = 2};
+  const auto lights_of = [](const PhotonMap& map) {
+    std::vector<std::array<float, 3>> fluxes;
+    for (std::size_t i = 0; i < map.size(); ++i) fluxes.push_back(map.lights()[i].flux);
+    return std::pair(map.radius(), fluxes);
+  };
+  for (const bool fits : {false, true}) {
+    const RaySettings settings{
+        .photons = 60'000, .global_photons = true, .photon_footprint = fits ? 0.015 : 0.0, .fits_photons = fits};
+    PhotonMapBuilder undisturbed(scene, surfaces, space, rays, lights, settings);
+    const auto expected = lights_of(undisturbed.build(number, nullptr).global);
+    for (const int ranks : {1, 3}) {
+      const int raised_on = ranks - 1;
+      // In the pilot, if there is one, the photons that radii are chosen by, and the sample's own.
+      for (const int raised_at : {1, 6, 11}) {
+        run_local_ranks(ranks, [&](Communicator& comm) {
+          PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings);
+          int polls = 0;
+          EXPECT_FALSE(builder.build_while_wanted(number, comm,
+                                                  [&] { return ++polls >= raised_at && comm.rank() == raised_on; }));
+          EXPECT_TRUE(ranks == 1 || raised_at > 1 || polls <= 5) << "the other ranks trace one round in vain";
+          EXPECT_TRUE(builder.build_while_wanted(number, comm, [] { return false; }));
+          const PhotonMap& again = builder.build(number, &comm).global;
+          EXPECT_TRUE(lights_of(again) == expected) << ranks << ' ' << raised_at << ' ' << fits;
+        });
+      }
+    }
+  }
 }
 
 TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {

@@ -85,7 +85,7 @@ std::optional<BsdfSample> AdjointBsdf::sample(Lobe lobe, Sampler& sampler) const
 /// The place as an eye in `direction` meets it.
 SurfacePoint AdjointBsdf::seen_from(const glm::dvec3& direction) const {
   if (glm::dot(direction, at_.surface.geometric_normal) < 0.0) {
-    return surfaces_.meet(at_.triangle, at_.surface.position + direction, -direction);
+    return surfaces_.meet(at_.triangle, at_.surface.position, -direction);
   }
   SurfacePoint seen = at_.surface;
   seen.to_viewer = direction;

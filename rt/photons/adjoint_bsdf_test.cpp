@@ -2,13 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <glm/trigonometric.hpp>
 #include <optional>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "rt/materials/test_bsdf.h"
 #include "rt/sampling/sampling.h"
@@ -126,9 +129,43 @@ Material glass(float roughness, float thickness) {
   return material;
 }
 
-class AdjointBsdf : public testing::TestWithParam<Leaning> {};
+/// What becomes of light that falls from everywhere on smooth glass, as wide as that, whose normals spread.
+std::vector<glm::dvec3> sent_through_glass(double scale) {
+  Scene scene;
+  const std::uint32_t used = test::add_material(scene, glass(0.0F, 1.0F));
+  Mesh mesh = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, used);
+  for (const glm::vec3& corner : mesh.positions) {
+    mesh.normals.push_back(glm::normalize(glm::vec3(0.4F * corner.x, 0.3F * corner.y, 1.0F)));
+  }
+  test::place_mesh(scene, test::add_mesh(scene, std::move(mesh)), glm::scale(glm::dmat4(1.0), glm::dvec3(scale)));
+  finish_scene(scene);
+  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  WorldTriangle triangle;
+  surfaces.load(0, triangle);
+  std::vector<glm::dvec3> sent;
+  for (std::uint32_t i = 0; i < 4096; ++i) {
+    Sampler sampler(9, i);
+    const glm::dvec3 light = warp::on_sphere(sampler.two());
+    const glm::dvec2 u = sampler.two();
+    const SurfacePoint surface =
+        surfaces.meet(triangle, scale * (glm::dvec3(0.9 * u.x, -0.9 * u.y, 0.0) + light), -light);
+    const MaterialPoint material = evaluate_material(scene, surface);
+    const Bsdf bsdf(material, surface, Carried::Flux);
+    sent.push_back(AdjointBsdf(scene, surfaces, {surface, material, bsdf, triangle}).weight(Lobe::Transmission));
+  }
+  return sent;
+}
 
-TEST_P(AdjointBsdf, SendsOnWhatEyesSee) {
+// Every length is one of the scene's: none is a metre.
+TEST(AdjointBsdfScale, APowerOfTwoChangesNoBit) {
+  const std::vector<glm::dvec3> expected = sent_through_glass(1.0);
+  EXPECT_GT(std::ranges::count_if(expected, [](const glm::dvec3& weight) { return weight.r > 0.0; }), 1000);
+  for (const double scale : {0x1p-20, 0x1p20}) EXPECT_EQ(sent_through_glass(scale), expected) << scale;
+}
+
+class AdjointBsdfTest : public testing::TestWithParam<Leaning> {};
+
+TEST_P(AdjointBsdfTest, SendsOnWhatEyesSee) {
   const std::array cases{std::tuple("matte", Lobe::Diffuse, surface_of(0.0F, 0.6F)),
                          std::tuple("rough metal", Lobe::Reflection, surface_of(1.0F, 0.5F)),
                          std::tuple("rough varnish", Lobe::Reflection, surface_of(0.0F, 0.9F)),
@@ -154,7 +191,7 @@ std::string name_of(const testing::TestParamInfo<Leaning>& info) {
   return std::to_string(std::lround(info.param.degrees)) + (info.param.mapped ? "DegreesMapped" : "DegreesSmooth");
 }
 
-INSTANTIATE_TEST_SUITE_P(Normals, AdjointBsdf,
+INSTANTIATE_TEST_SUITE_P(Normals, AdjointBsdfTest,
                          testing::Values(Leaning{0, false}, Leaning{10, false}, Leaning{40, false}, Leaning{70, false},
                                          Leaning{25, true}, Leaning{58, true}),
                          name_of);

@@ -13,6 +13,7 @@
 #include "cluster/transport/collectives.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/timing.h"
 #include "rt/lights/punctual_light.h"
 #include "rt/photons/photon_query.h"
 #include "rt/trace/coverage_traversal.h"
@@ -134,12 +135,14 @@ class KeptPhotons {
 
 }  // namespace
 
-TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const {
+TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons,
+                                  const std::function<bool()>& is_overtaken) const {
   const std::uint64_t stream = photon_stream(key);
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
   KeptPhotons kept(settings_.max_kept);
   rays_.for_each(settings_.threads, count, [&](std::size_t i) {
+    if (is_overtaken && is_overtaken()) return;
     const DenormalsAsZero mode;
     Block block;
     const std::uint64_t before = i * kBlockPhotons;
@@ -373,32 +376,84 @@ void PhotonMapBuilder::settle(Communicator& comm) {
   tracer_.set_max_kept(std::max<std::uint64_t>(tracer_.settings().max_kept / ranks, 1));
 }
 
-TracedPhotons PhotonMapBuilder::trace(const SampleNumber& number, Communicator* comm) {
+namespace {
+
+/// Traces a rank's photons a few blocks at a time, between which all ranks agree on whether they are still wanted.
+/// Photons and their order are those of one go.
+std::optional<TracedPhotons> trace_while_wanted(const PhotonTracer& tracer, const RandomKey& key,
+                                                const PhotonRange& range, std::uint64_t pass_photons,
+                                                Communicator& comm, const std::function<bool()>& is_overtaken) {
+  struct Progress {
+    bool overtaken = false;
+    bool done = false;
+  };
+  constexpr double kBetween_ms = 100.0;  // agreements: what other ranks trace in vain at most
+  const std::uint64_t least = 4 * kBlockPhotons * static_cast<std::uint64_t>(std::max(tracer.settings().threads, 1));
+  // One rank has nobody to agree with.
+  std::uint64_t count = comm.size() == 1 ? range.count : least;
+  PhotonTracer some = tracer;
+  TracedPhotons traced;
+  for (std::uint64_t first = 0;;) {
+    count = std::min(count, range.count - first);
+    const Stopwatch watch;
+    const TracedPhotons part = some.trace(key, {range.first + first, count}, pass_photons, is_overtaken);
+    append(traced.caustic, part.caustic);
+    append(traced.global, part.global);
+    traced.counts += part.counts;
+    if (const std::uint64_t most = tracer.settings().max_kept; most > 0) {
+      some.set_max_kept(most - std::min(traced.caustic.size() + traced.global.size(), most - 1));
+    }
+    first += count;
+    const Progress mine{is_overtaken(), first == range.count};
+    const std::vector<Progress> all = all_gather_value(comm, mine);
+    if (std::ranges::any_of(all, &Progress::overtaken)) return std::nullopt;
+    if (std::ranges::all_of(all, &Progress::done)) return traced;
+    if (count > 0) {
+      const double wanted = static_cast<double>(count) * kBetween_ms / std::max(watch.ms(), 1.0);
+      count = std::clamp(static_cast<std::uint64_t>(wanted), least, 4 * count + least);
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<TracedPhotons> PhotonMapBuilder::trace(const SampleNumber& number, Communicator* comm,
+                                                     const std::function<bool()>& is_overtaken) {
   const std::uint64_t each = settings_.photons;
   PhotonRange range{each * number.sample, each};
+  const RandomKey key{settings_.seed, number.frame};
   if (comm != nullptr) {
     settle(*comm);
     range = share_of_rank(range, comm->rank(), comm->size());
   }
-  TracedPhotons traced = tracer_.trace({settings_.seed, number.frame}, range, each);
-  counts_ += traced.counts;
-  if (comm != nullptr) share_photons(*comm, traced);
+  std::optional<TracedPhotons> traced = comm != nullptr && is_overtaken
+                                            ? trace_while_wanted(tracer_, key, range, each, *comm, is_overtaken)
+                                            : tracer_.trace(key, range, each);
+  if (!traced) return traced;
+  counts_ += traced->counts;
+  if (comm != nullptr) share_photons(*comm, *traced);
   return traced;
 }
 
 /// Sends as many photons as fill the radii that the footprint wants, by what a few of them show of where light goes.
-void PhotonMapBuilder::fit_count(Communicator* comm) {
-  if (!std::exchange(settings_.fits_photons, false) || !(settings_.photon_footprint > 0.0)) return;
+bool PhotonMapBuilder::fit_count(Communicator* comm, const std::function<bool()>& is_overtaken) {
+  if (!std::exchange(settings_.fits_photons, false) || !(settings_.photon_footprint > 0.0)) return true;
   const std::uint32_t most = settings_.photons;
   settings_.photons = std::min(most, kPilotPhotons);
   const PhotonCounts counted = counts_;  // a sample's rays are those of every sample
-  const TracedPhotons pilot = trace({}, comm);
+  const std::optional<TracedPhotons> pilot = trace({}, comm, is_overtaken);
   counts_ = counted;
-  if (pilot.global.empty()) return;
-  const double wide = first_radius(pilot.global, space_, kDense) / (kFootprints * settings_.photon_footprint);
+  if (!pilot) {
+    settings_.photons = most;
+    settings_.fits_photons = true;
+    return false;
+  }
+  if (pilot->global.empty()) return true;
+  const double wide = first_radius(pilot->global, space_, kDense) / (kFootprints * settings_.photon_footprint);
   const double wanted = settings_.photons * (settings_.photons_gathered / kDense) * wide * wide;
   settings_.photons = static_cast<std::uint32_t>(
       std::clamp(wanted, static_cast<double>(std::min(kMinPhotons, most)), static_cast<double>(most)));
+  return true;
 }
 
 double PhotonMapBuilder::choose_radius(std::span<const Photon> first) const {
@@ -415,22 +470,37 @@ void PhotonMapBuilder::choose_radii(const TracedPhotons& first) {
 }
 
 const PhotonMaps& PhotonMapBuilder::build(const SampleNumber& number, Communicator* comm) {
-  if (built_ == number) return maps_;
+  HPR_CHECK(make(number, comm, {}));
+  return maps_;
+}
+
+bool PhotonMapBuilder::build_while_wanted(const SampleNumber& number, Communicator& comm,
+                                          const std::function<bool()>& is_overtaken) {
+  return make(number, &comm, is_overtaken);
+}
+
+bool PhotonMapBuilder::make(const SampleNumber& number, Communicator* comm, const std::function<bool()>& is_overtaken) {
+  if (built_ == number) return true;
   // Whatever sample comes first, radii are those of the very first one: a run that is resumed gives the same bits.
   const bool chooses = caustic_radius_ == 0.0;
-  fit_count(comm);
-  TracedPhotons traced;
-  if (chooses && number != SampleNumber{}) choose_radii(trace({}, comm));
-  traced = trace(number, comm);
-  if (chooses && number == SampleNumber{}) choose_radii(traced);
+  if (!fit_count(comm, is_overtaken)) return false;
+  if (chooses && number != SampleNumber{}) {
+    const std::optional<TracedPhotons> first = trace({}, comm, is_overtaken);
+    if (!first) return false;
+    choose_radii(*first);
+  }
+  const std::optional<TracedPhotons> traced = trace(number, comm, is_overtaken);
+  if (!traced) return false;
+  if (chooses && number == SampleNumber{}) choose_radii(*traced);
+  built_.reset();
   parallel_for(settings_.threads, 2, [&](std::size_t which) {
-    const std::vector<Photon>& photons = which == 0 ? traced.caustic : traced.global;
+    const std::vector<Photon>& photons = which == 0 ? traced->caustic : traced->global;
     PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;
     const double first = which == 0 ? caustic_radius_ : global_radius_;
     map = PhotonMap(photons, space_, progressive_radius(first, number.sample), tracer_.settings().flux_unit);
   });
   built_ = number;
-  return maps_;
+  return true;
 }
 
 PhotonCounts PhotonMapBuilder::take_counts() {

@@ -91,8 +91,9 @@ class PhotonTracer {
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
   /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are
-  /// kept than may be.
-  [[nodiscard]] TracedPhotons trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons) const;
+  /// kept than may be. Once `is_overtaken`, which several threads ask, most of the rest is left out.
+  [[nodiscard]] TracedPhotons trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons,
+                                    const std::function<bool()>& is_overtaken = {}) const;
 
  private:
   struct Flight;
@@ -134,6 +135,11 @@ class PhotonMapBuilder {
   /// ranks share the work, and each gets all photons.
   const PhotonMaps& build(const SampleNumber& number, Communicator* comm);
 
+  /// As build(), but false on all ranks where `is_overtaken` on any of them before its photons were traced: then the
+  /// maps are made anew when next asked for. Ranks agree every tenth of a second or so.
+  [[nodiscard]] bool build_while_wanted(const SampleNumber& number, Communicator& comm,
+                                        const std::function<bool()>& is_overtaken);
+
   /// The next maps are made anew, with the radii of before.
   void discard() { built_.reset(); }
 
@@ -142,8 +148,11 @@ class PhotonMapBuilder {
 
  private:
   void settle(Communicator& comm);
-  [[nodiscard]] TracedPhotons trace(const SampleNumber& number, Communicator* comm);
-  void fit_count(Communicator* comm);
+  /// Of these three, null functions and ranks without a communicator are never overtaken. Nothing where they are.
+  [[nodiscard]] std::optional<TracedPhotons> trace(const SampleNumber& number, Communicator* comm,
+                                                   const std::function<bool()>& is_overtaken);
+  [[nodiscard]] bool make(const SampleNumber& number, Communicator* comm, const std::function<bool()>& is_overtaken);
+  [[nodiscard]] bool fit_count(Communicator* comm, const std::function<bool()>& is_overtaken);
   [[nodiscard]] double choose_radius(std::span<const Photon> first) const;
   void choose_radii(const TracedPhotons& first);
 

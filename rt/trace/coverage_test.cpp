@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -125,6 +126,36 @@ TEST(Coverage, AVeilBehindAnOpaqueWallIsNotSeen) {
   add_wall(scene, -1, veil(0.5F, 2.0F));
   finish_scene(scene);
   EXPECT_EQ(seen(scene).g, 8.0F);
+}
+
+/// A wall that glows with 8 and two veils of 2 and 4 in its plane, each cut into triangles of its own, in this order.
+Scene decals(bool wall_first) {
+  Scene scene;
+  const glm::dmat4 turned = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(glm::dvec3(1.0, 2.0, 0.5)));
+  const auto add = [&](const glm::vec3& corner, const glm::vec3& a, const glm::vec3& b, const Material& material) {
+    place_mesh(scene, add_mesh(scene, quad(corner, a, b, add_material(scene, material))), turned);
+  };
+  const auto add_base = [&] { add({-50, -50, 0}, {100, 0, 0}, {0, 100, 0}, test::glowing(glm::vec3(8.0F))); };
+  if (wall_first) add_base();
+  add({-29, -41, 0}, {71, 13, 0}, {-11, 67, 0}, veil(0.5F, 2.0F));
+  add({-37, -31, 0}, {59, -17, 0}, {19, 83, 0}, veil(0.5F, 4.0F));
+  if (!wall_first) add_base();
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(Coverage, VeilsInThePlaneOfAWallLieBeforeItAndAreMixedInOrder) {
+  for (const bool wall_first : {true, false}) {
+    const Scene scene = decals(wall_first);
+    for (const glm::dvec3& eye : {glm::dvec3(3, 2, 9), glm::dvec3(8, -1, 2)}) {
+      const View view = test::view_from(eye, {0, 0, 0}, {32, 32}, scene, 0.3);
+      const TileLayer<Key> keys = opaque_keys(scene, view);
+      TileLayer<Rgb> color(keys.layout());
+      DeferredShader(scene, {}).shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &color});
+      const Image<Rgb> image = to_image(color, 0);
+      for (const Rgb& pixel : image.pixels()) ASSERT_NEAR(pixel.g, 4.0, 1e-5) << wall_first << eye.z;
+    }
+  }
 }
 
 TEST(Coverage, AMaskCoversAllOrNothingAtItsCutoff) {

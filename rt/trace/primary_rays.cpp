@@ -154,7 +154,7 @@ void keep_largest_key(const RTCFilterFunctionNArguments* arguments) {
       arguments->valid[i] = 0;
       continue;
     }
-    const std::uint32_t primitive = RTCHitN_primID(arguments->hit, arguments->N, i);
+    const std::uint32_t primitive = geometry.triangle_of(RTCHitN_primID(arguments->hit, arguments->N, i));
     float& limit = RTCRayN_tfar(arguments->ray, arguments->N, i);
     const float distance = limit;
     const float gap = search.found[lane] ? distance - search.distance[lane] : -std::numeric_limits<float>::infinity();

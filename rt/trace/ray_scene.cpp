@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <forward_list>
 #include <glm/matrix.hpp>
 #include <limits>
 #include <map>
@@ -18,6 +19,7 @@
 #include "core/parallel.h"
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/ray_forwarding.h"
+#include "rt/trace/refined_triangles.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -122,6 +124,7 @@ struct MeshPart {
     }
   }
 
+  [[nodiscard]] std::uint32_t triangle_count() const { return range.count(); }
   [[nodiscard]] std::size_t vertex_count() const { return vertices.empty() ? mesh.positions.size() : vertices.size(); }
   [[nodiscard]] const glm::vec3& position(std::size_t i) const {
     return mesh.positions[vertices.empty() ? i : vertices[i]];
@@ -132,22 +135,32 @@ struct MeshPart {
   }
 };
 
+/// The parts of refined triangles, whose corners are their own.
+struct RefinedPart {
+  const RefinedTriangles& refined;
+
+  [[nodiscard]] std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(refined.parts.size()); }
+  [[nodiscard]] std::size_t vertex_count() const { return 3 * refined.parts.size(); }
+  [[nodiscard]] const glm::dvec3& position(std::size_t i) const { return refined.parts[i / 3].at(i % 3); }
+  [[nodiscard]] static glm::uvec3 triangle(std::uint32_t i) { return glm::uvec3(3 * i) + glm::uvec3(0, 1, 2); }
+};
+
 /// Fills one geometry; where(position) gives ray-space coordinates. Triangles out of float's reach keep their number
 /// but lose their extent, so that primitive ids stay surface ids; `skipped` counts them.
-template <typename Where>
-OwnedGeometry make_triangles(RTCDevice device, const Failure& failure, const MeshPart& part, std::uint64_t& skipped,
+template <typename Part, typename Where>
+OwnedGeometry make_triangles(RTCDevice device, const Failure& failure, const Part& part, std::uint64_t& skipped,
                              Where&& where) {
   OwnedGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
   auto* const vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), part.vertex_count()));
   auto* const triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), part.range.count()));
+      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), part.triangle_count()));
   failure.check();
   for (std::size_t i = 0; i < part.vertex_count(); ++i) {
     const glm::dvec3 p = where(part.position(i));
     for (int axis = 0; axis < 3; ++axis) vertices[3 * i + static_cast<std::size_t>(axis)] = static_cast<float>(p[axis]);
   }
-  for (std::uint32_t i = 0; i < part.range.count(); ++i) {
+  for (std::uint32_t i = 0; i < part.triangle_count(); ++i) {
     const glm::uvec3 t = part.triangle(i);
     const bool usable = tracable(vertices + 3 * std::size_t{t.x}) && tracable(vertices + 3 * std::size_t{t.y}) &&
                         tracable(vertices + 3 * std::size_t{t.z});
@@ -182,6 +195,7 @@ struct RayScene::Embree {
   std::map<SharedPart, OwnedScene> shared;
   OwnedScene top;
   std::vector<RayGeometry> geometries;
+  std::forward_list<RefinedTriangles> refined;  ///< whose numbers geometries refer to
   std::uint64_t skipped = 0;
   RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
 
@@ -190,6 +204,7 @@ struct RayScene::Embree {
   RTCScene shared_part(const Scene& scene, const InstanceRange& part);
   void add_instance(const Instance& instance, unsigned int id, RTCScene shared_mesh, const RaySpace& space);
   void add_triangles(const Scene& scene, const InstanceRange& part, unsigned int id, const RaySpace& space);
+  void add_refined(const Scene& scene, const InstanceRange& part, unsigned int id, const RaySpace& space);
 };
 
 void RayScene::Embree::start(int threads, const RayBuild& build) {
@@ -251,6 +266,16 @@ void RayScene::Embree::add_triangles(const Scene& scene, const InstanceRange& pa
   rtcAttachGeometryByID(top.get(), geometry.get(), id);
 }
 
+void RayScene::Embree::add_refined(const Scene& scene, const InstanceRange& part, unsigned int id,
+                                   const RaySpace& space) {
+  RefinedTriangles& parts = refined.emplace_front(refine(scene, scene.instances[part.instance], part.range, space));
+  const OwnedGeometry geometry =
+      make_triangles(device.get(), failure, RefinedPart{parts}, skipped, [](const glm::dvec3& p) { return p; });
+  rtcAttachGeometryByID(top.get(), geometry.get(), id);
+  parts.parts = {};
+  geometries[id].triangles = parts.triangle_of.data();
+}
+
 namespace {
 
 /// See RayGeometry::behind. Instances are tested in their meshes' own coordinates, where nothing is mirrored.
@@ -271,15 +296,18 @@ RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::
   embree_->top = embree_->new_scene();
   // By the whole scene, whatever the share: an instance is traced by the same numbers on every rank.
   const std::vector<std::uint8_t> is_shared = shared_instances(scene);
+  const std::vector<std::uint8_t> is_refined = refined_instances(scene, space);
   for (const InstanceRange& part :
        split_by_instance(scene, merged_ranges({objects.begin(), objects.end()}, scene.triangles))) {
     const Instance& instance = scene.instances[part.instance];
     const auto id = static_cast<unsigned int>(embree_->geometries.size());
     const bool is_instanced = is_shared[part.instance] != 0;
-    embree_->geometries.push_back({part.instance, part.range.first, instance.first_surface + part.range.first,
+    embree_->geometries.push_back({part.instance, part.range.first, instance.first_surface + part.range.first, nullptr,
                                    behind(scene, instance, is_instanced)});
     if (is_instanced) {
       embree_->add_instance(instance, id, embree_->shared_part(scene, part), space);
+    } else if (is_refined[part.instance] != 0) {
+      embree_->add_refined(scene, part, id, space);
     } else {
       embree_->add_triangles(scene, part, id, space);
     }
@@ -386,7 +414,8 @@ void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
       arguments->valid[i] = 0;
       continue;
     }
-    const std::uint32_t surface = shown.first_surface + RTCHitN_primID(arguments->hit, arguments->N, i);
+    const std::uint32_t surface =
+        shown.first_surface + shown.triangle_of(RTCHitN_primID(arguments->hit, arguments->N, i));
     const float distance = RTCRayN_tfar(arguments->ray, arguments->N, i);
     const bool later = distance == closest.distance[lane] && surface >= closest.surface[lane];
     if (later || (closest.passed != nullptr && was_met(closest.passed[lane], surface, shown.instance, distance))) {

@@ -166,9 +166,16 @@ struct RayGeometry {
   std::uint32_t instance = 0;
   std::uint32_t first_triangle = 0;  ///< of the instance's mesh
   std::uint32_t first_surface = 0;
+  /// The triangle of each primitive, counted from the first one, where triangles are refined; null: they are
+  /// primitives.
+  const std::uint32_t* triangles = nullptr;
   /// 0 where both sides of its triangles are shown; else what a ray's direction times Embree's normal is to be
   /// multiplied by to be positive for a ray that meets a triangle from behind.
   float behind = 0.0F;
+
+  [[nodiscard]] std::uint32_t triangle_of(std::uint32_t primitive) const {
+    return triangles != nullptr ? triangles[primitive] : primitive;
+  }
 };
 
 class RayForwarding;

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "rt/materials/material_point.h"
 #include "rt/trace/ray_scene.h"
+#include "rt/trace/refined_triangles.h"
 
 namespace hpr {
 namespace {
@@ -141,6 +142,7 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
     for (const glm::vec3& p : mesh.positions) mesh_reach[i] = glm::max(mesh_reach[i], glm::abs(glm::dvec3(p)));
   }
   const std::vector<std::uint8_t> shared = shared_instances(scene);
+  const std::vector<std::uint8_t> refined = refined_instances(scene, space);
   placed_.resize(scene.instances.size());
   for (std::size_t i = 0; i < placed_.size(); ++i) {
     const glm::dmat4& to_world = scene.instances[i].to_world;
@@ -148,6 +150,7 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
     const glm::dmat3 scaled = linear / std::max(row_sum_norm(linear), 1e-300);
     placed_[i].normal_matrix = cofactors(scaled);
     placed_[i].swaps_handedness = is_mirrored(scene.instances[i]);
+    placed_[i].is_refined = refined[i] != 0;
     if (shared[i] == 0) continue;
     placed_[i].is_instanced = true;
     placed_[i].spread = magnitudes(linear) * magnitudes(glm::inverse(linear));
@@ -186,16 +189,11 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
   triangle.offset = offset_of(triangle);
 }
 
-/// What the rounding of corners, and of the products that make a normal of them, may move a ray's meeting with the
-/// triangle by along its normal: as Waechter and Binder ("A Fast and Robust Method for Avoiding Self-Intersection", Ray
-/// Tracing Gems, chapter 6) take it from a place's coordinates, but by axis. So a level ground keeps the shadows of
-/// what stands on it however wide it is.
+/// By axis, so that a level ground keeps the shadows of what stands on it however wide it is.
 double Surfaces::offset_of(const WorldTriangle& triangle) const {
   constexpr double kStep = kOriginSteps * kFloatStep;
   constexpr double kMinOffset = 0x1p-40;  // ray space: a ray that starts on a plane through its origin leaves it
-  const glm::dvec3 e1 = glm::abs(triangle.e1);
-  const glm::dvec3 e2 = glm::abs(triangle.e2);
-  const glm::dvec3 extent = glm::max(e1, e2);
+  const glm::dvec3 extent = glm::max(glm::abs(triangle.e1), glm::abs(triangle.e2));
   const glm::dvec3 from_origin = glm::abs(triangle.v0 - space_.origin);
   glm::dvec3 corners = from_origin + extent;
   // More is never needed: measured, see kOriginSteps.
@@ -204,9 +202,7 @@ double Surfaces::offset_of(const WorldTriangle& triangle) const {
     most = std::max(most, row_sum_norm(placed.spread) * most + largest(placed.reach));
     corners = glm::max(corners, placed.spread * corners + placed.reach);
   }
-  const glm::dvec3 products(e1.y * e2.z + e1.z * e2.y, e1.z * e2.x + e1.x * e2.z, e1.x * e2.y + e1.y * e2.x);
-  const double area2 = std::abs(glm::dot(triangle.normal, glm::cross(triangle.e1, triangle.e2)));
-  const double along = glm::dot(glm::abs(triangle.normal), corners) + glm::dot(extent, products) / area2;
+  const double along = plane_rounding(triangle.e1, triangle.e2, triangle.normal, corners);
   // Where that is no number, as of needles without an area, `most` stays.
   return std::max(kStep * (along < most ? along : most), kMinOffset / space_.scale);
 }
@@ -297,6 +293,8 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   const Weights weight{b0, at.x, at.y};
   if (lifts_) lift(triangle, weight, side, point);
   point.offset = std::max(triangle.offset, space_.rounding_at(point.position));
+  if (placed_[triangle.instance].is_refined)
+    point.offset = std::min(point.offset, refined_offset(space_, point.position));
 
   const Mesh& mesh = scene_.mesh_of(scene_.instances[triangle.instance]);
   const glm::uvec3& corners = mesh.triangles[triangle.index];

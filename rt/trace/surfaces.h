@@ -27,7 +27,8 @@ struct WorldTriangle {
   glm::dvec3 e2{0.0};
   glm::dvec3 normal{0.0};               ///< unit length, by the winding; zero when the triangle has no area
   std::array<glm::dvec3, 3> normals{};  ///< unit length, of the corners
-  /// Metres by which ray origins must leave it, wherever they lie on it. Where they do asks for RaySpace::rounding_at.
+  /// Metres by which ray origins must leave it, wherever they lie on it; of refined ones this is more than is needed,
+  /// see refined_offset. Where they do asks for RaySpace::rounding_at.
   double offset = 0.0;
 };
 
@@ -101,6 +102,7 @@ class Surfaces {
     glm::dmat3 normal_matrix{
         1.0};  ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
     bool swaps_handedness = false;  ///< turns windings round
+    bool is_refined = false;        ///< see refined_instances
     bool is_instanced = false;      ///< in the ray scene, whose rays are carried into its coordinates and back
     glm::dmat3 spread{0.0};         ///< |A| |A^-1| of the instanced mesh: how far the rounding of a coordinate reaches
     glm::dvec3 reach{0.0};          ///< metres: |A| |vertex| + spread |translation|

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <fstream>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 #include <random>
 #include <utility>
 #include <vector>
@@ -112,13 +114,19 @@ StabilityFinding lit(const Globals& globals) {
                    fraction_moved(std::max(edges(expected.keys), color_edges(expected.radiance)), 0.0),
                    "share of pixels off by more than 1 level of 255",
                    "Rays start from places relative to the scene's middle: as for surfaces, only edges can change.");
-  finding.curve.x = "D, m";
-  for (const double metres : {1e2, 1e4, 1e5, 1e6, 1e7, 1e9}) {
+  const auto fraction = [&](double metres) {
     Scene other = scene;
     move_placements(other, offset_by(metres));
     const Picture found = make_picture(globals, other, moved(exhibits_view(), metres), exhibits_light());
-    const double fraction = other_colors(expected.radiance, found.radiance);
-    add_point(finding, metres, fraction, metres <= kPromised);
+    return other_colors(expected.radiance, found.radiance);
+  };
+  finding.curve.x = "D, m";
+  for (const double metres : {1e2, 1e4, 1e5, 1e6, 1e7, 1e9}) {
+    add_point(finding, metres, fraction(metres), metres <= kPromised);
+  }
+  if (finding.holds()) {
+    finding.breaks_at =
+        breaking_point_if_any(kPromised, kMaxOffset, 0.05, [&](double d) { return fraction(d) <= finding.limit; });
   }
   return finding;
 }
@@ -179,16 +187,33 @@ std::size_t differing_bits(const Picture& a, const Picture& b) {
   return found;
 }
 
+/// The nearer one of the scales past `promised` and below its reciprocal at which the promise ends.
+std::optional<double> breaking_scale(double promised, double relative, const std::function<bool(double)>& holds) {
+  constexpr double kMaxScale = 0x1p100;
+  const std::optional<double> large = breaking_point_if_any(promised, kMaxScale, relative, holds);
+  const std::optional<double> small = breaking_point_if_any(1.0 / promised, 1.0 / kMaxScale, relative, holds);
+  if (!large || !small) return large ? large : small;
+  return *large * *small > 1.0 ? small : large;
+}
+
 StabilityFinding powers_of_two(const Globals& globals, const Picture& expected, ScaleScene scale, const char* name,
                                const char* what) {
   StabilityFinding finding = make_finding(
       name, std::string(what) + " scaled by 2^-20 .. 2^20", 0.0, "pixels of which a bit of key or colour differs",
       "Scaling by a power of two rounds nothing, so only an absolute length somewhere could show.");
   finding.curve.x = "scale";
+  const auto differing = [&](double factor) {
+    return static_cast<double>(differing_bits(expected, scaled_picture(globals, scale, factor)));
+  };
   for (const int power : {-20, -14, -7, -1, 1, 7, 14, 20}) {
     const double factor = std::ldexp(1.0, power);
-    const auto differing = static_cast<double>(differing_bits(expected, scaled_picture(globals, scale, factor)));
-    add_point(finding, factor, differing);
+    add_point(finding, factor, differing(factor));
+  }
+  if (finding.holds()) {
+    const auto nearest_power = [](double factor) { return std::exp2(std::round(std::log2(factor))); };
+    const std::optional<double> breaks =
+        breaking_scale(0x1p20, 1.0, [&](double factor) { return differing(nearest_power(factor)) <= finding.limit; });
+    if (breaks) finding.breaks_at = nearest_power(*breaks);
   }
   return finding;
 }
@@ -211,6 +236,16 @@ std::vector<StabilityFinding> powers_of_ten(const Globals& globals, const Pictur
     const Picture found = scaled_picture(globals, scale_placements, factor);
     add_point(surfaces, factor, other_surfaces(expected.keys, found.keys));
     add_point(colors, factor, other_colors(expected.radiance, found.radiance));
+  }
+  const auto scaled = [&](double factor) { return scaled_picture(globals, scale_placements, factor); };
+  if (surfaces.holds()) {
+    surfaces.breaks_at = breaking_scale(
+        1e6, 0.2, [&](double factor) { return other_surfaces(expected.keys, scaled(factor).keys) <= surfaces.limit; });
+  }
+  if (colors.holds()) {
+    colors.breaks_at = breaking_scale(1e6, 0.2, [&](double factor) {
+      return other_colors(expected.radiance, scaled(factor).radiance) <= colors.limit;
+    });
   }
   return {surfaces, colors};
 }

@@ -167,8 +167,7 @@ const std::vector<Column<StabilityFinding>>& finding_columns() {
       field<Row>("unit", &Row::unit, style("unit")),
       {"bound", [](const Row& row) { return Json(row.bound == Bound::AtMost ? "at-most" : "at-least"); }},
       {"verdict", [](const Row& row) { return Json(row.holds() ? "holds" : "breaks"); }, verdict},
-      {"breaks_at", [](const Row& row) { return row.breaks_at ? Json(finite(*row.breaks_at)) : Json(); },
-       style("breaks at", "{:.3g}")},
+      {"breaks_at", [](const Row& row) { return row.breaks_at ? Json(finite(*row.breaks_at)) : Json(); }},
       field<Row>("why", &Row::why),
       {"measured_value", [](const Row& row) { return Json(row.measured); }, for_people("measured", "{:.4g}")},
       {"limit_text",
@@ -181,6 +180,12 @@ const std::vector<Column<StabilityFinding>>& finding_columns() {
          return Json(fmt::format("{} {:.4g}", row.bound == Bound::AtMost ? "at most" : "at least", row.limit));
        },
        for_people("limit")},
+      {"breaks_at_text",
+       [](const Row& row) {
+         if (row.breaks_at) return Json(fmt::format("{:.3g}", *row.breaks_at));
+         return Json(row.holds() ? "none found" : "-");
+       },
+       for_people("breaks at")},
       {"verdict_text", [](const Row& row) { return Json(row.holds() ? "holds" : "BREAKS"); }, for_people("verdict")}};
   return columns;
 }
@@ -210,8 +215,27 @@ double breaking_point(double good, double bad, double relative, const std::funct
 
 std::optional<double> breaking_point_if_any(double good, double bad, double relative,
                                             const std::function<bool(double)>& holds) {
-  if (!holds(good) || holds(bad)) return std::nullopt;
-  return breaking_point(good, bad, relative, holds);
+  if (!holds(good)) return std::nullopt;
+  const double decade = std::abs(bad) > std::abs(good) ? 10.0 : 0.1;
+  for (double inside = good; inside != bad;) {
+    const bool is_last = std::abs(std::log10(bad / inside)) <= 1.0;
+    const double outside = is_last ? bad : inside * decade;
+    if (!holds(outside)) return breaking_point(inside, outside, relative, holds);
+    inside = outside;
+  }
+  return std::nullopt;
+}
+
+std::optional<double> breaking_point_of_curve(const StabilityFinding& finding) {
+  const auto& points = finding.curve.points;
+  const auto holds = [&](std::size_t i) { return finding.is_within(points[i].second); };
+  std::optional<double> first;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (holds(i)) continue;
+    if ((i > 0 && holds(i - 1)) || (i + 1 < points.size() && holds(i + 1))) return points[i].first;
+    if (!first) first = points[i].first;
+  }
+  return first;
 }
 
 std::string stability_json(std::span<const StabilityFinding> findings) {
@@ -221,7 +245,7 @@ std::string stability_json(std::span<const StabilityFinding> findings) {
 std::string stability_table(std::span<const StabilityFinding> findings) {
   const auto held = std::ranges::count_if(findings, &StabilityFinding::holds);
   return Table(finding_columns(), findings)
-             .text({"name", "measured_value", "limit_text", "unit", "verdict_text", "breaks_at", "parameter"}) +
+             .text({"name", "measured_value", "limit_text", "unit", "verdict_text", "breaks_at_text", "parameter"}) +
          fmt::format("{} of {} hold\n", held, findings.size());
 }
 
@@ -232,7 +256,7 @@ std::string stability_html(std::span<const StabilityFinding> findings) {
                    std::array{Fact{"Result", fmt::format("{} of {} hold", held, findings.size())},
                               Fact{"Machine", this_machine().cpu}, Fact{"Commit", std::string(kCommit)}});
   body += Table(finding_columns(), findings)
-              .html({"name", "measured_value", "limit_words", "unit", "verdict", "breaks_at", "parameter"},
+              .html({"name", "measured_value", "limit_words", "unit", "verdict", "breaks_at_text", "parameter"},
                     {.caption = "The worst number within what is promised, and where along the parameter the promise "
                                 "ends. docs/numerics.md derives the limits."});
   body += "<h2>Each number</h2>\n";

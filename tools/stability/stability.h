@@ -24,7 +24,8 @@ struct StabilityCurve {
 };
 
 /// One number about one extreme. `limit` is what HPR promises and docs/numerics.md derives; `breaks_at` where along the
-/// parameter the promise ends, found by bisection beyond the promised range, or nothing if it held as far as was tried.
+/// parameter the promise ends, found by bisection beyond the promised range or, where it is broken within, by
+/// breaking_point_of_curve(); nothing if it held as far as was tried.
 struct StabilityFinding {
   std::string name;       ///< "depth-order/reversed-z": the case, and which of its numbers
   std::string parameter;  ///< what was varied, and how far: "relative gap 1e-2 .. 1e-7 at 1e-3 .. 1e7 m"
@@ -36,7 +37,8 @@ struct StabilityFinding {
   std::string why = {};  ///< one sentence: where the limit comes from
   StabilityCurve curve = {};
 
-  [[nodiscard]] bool holds() const { return bound == Bound::AtMost ? measured <= limit : measured >= limit; }
+  [[nodiscard]] bool holds() const { return is_within(measured); }
+  [[nodiscard]] bool is_within(double value) const { return bound == Bound::AtMost ? value <= limit : value >= limit; }
 };
 
 /// One extreme. Its file in tools/stability/ defines stability::NAME_case(), and the list in stability.cpp names it.
@@ -55,9 +57,14 @@ struct StabilityCase {
 /// relative) times.
 [[nodiscard]] double breaking_point(double good, double bad, double relative, const std::function<bool(double)>& holds);
 
-/// breaking_point(), or nullopt unless `good` holds and `bad` does not.
+/// The first breaking point between `good` and `bad`, by decades and then by breaking_point(); nullopt where `good`
+/// does not hold, or all decades and `bad` do.
 [[nodiscard]] std::optional<double> breaking_point_if_any(double good, double bad, double relative,
                                                           const std::function<bool(double)>& holds);
+
+/// Where no breaking point was looked for beyond what is promised, or the promise is broken: the point of the curve
+/// that is past the limit beside one that is not, the first in the curve's order, or its first point where all are.
+[[nodiscard]] std::optional<double> breaking_point_of_curve(const StabilityFinding& finding);
 
 /// Schema hpr.stability/1.
 [[nodiscard]] std::string stability_json(std::span<const StabilityFinding> findings);

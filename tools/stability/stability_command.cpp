@@ -85,7 +85,11 @@ class StabilityCommand final : public Command {
                .why = "every case can be measured to its end"}};
     };
     try {
-      return one.measure(globals);
+      std::vector<StabilityFinding> findings = one.measure(globals);
+      for (StabilityFinding& finding : findings) {
+        if (!finding.breaks_at) finding.breaks_at = breaking_point_of_curve(finding);
+      }
+      return findings;
     } catch (const Error& error) {
       if (error.code() == ExitCode::NoDevice) throw;  // without graphics hardly a case can be measured
       return ended(error.hint().empty() ? error.what() : fmt::format("{} ({})", error.what(), error.hint()));

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "core/json.h"
@@ -46,6 +47,35 @@ TEST(BreakingPoint, AsksAboutAsOftenAsItSays) {
   EXPECT_LE(asked, 1 + std::ceil(std::log2(std::log(1e6) / 1e-3)));
 }
 
+TEST(BreakingPoint, IsTheFirstWhereSeveralRangesBreak) {
+  const auto holds_twice = [](double x) { return x < 200.0 || (x > 5e4 && x < 1e8); };
+  const std::optional<double> found = breaking_point_if_any(1.0, 1e9, 0.01, holds_twice);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found, 200.0, 2.0);
+  const auto holds_outside = [](double x) { return x < 200.0 || x > 5e4; };
+  EXPECT_NEAR(breaking_point_if_any(1.0, 1e9, 0.01, holds_outside).value_or(0.0), 200.0, 2.0);
+  const auto above = [](double x) { return x > 2e-5; };
+  EXPECT_NEAR(breaking_point_if_any(1.0, 3e-8, 0.01, above).value_or(0.0), 2e-5, 2e-7);
+  EXPECT_FALSE(breaking_point_if_any(1.0, 1e9, 0.01, [](double) { return true; }));
+  EXPECT_FALSE(breaking_point_if_any(1.0, 1e9, 0.01, [](double) { return false; }));
+  EXPECT_NEAR(breaking_point_if_any(1.0, 3e8, 0.01, [](double x) { return x < 2.9e8; }).value_or(0.0), 2.9e8, 3e6);
+}
+
+TEST(BreakingPoint, OfACurveIsBesideAPointThatHolds) {
+  StabilityFinding finding = finding_of(0.5, 6.0);
+  EXPECT_FALSE(breaking_point_of_curve(finding));
+  finding.curve.points = {{1e-6, 0.0}, {1.0, 0.25}};
+  EXPECT_FALSE(breaking_point_of_curve(finding));
+  finding.curve.points = {{1e-6, 6.0}, {1e-3, 1.0}, {1.0, 0.25}};
+  EXPECT_EQ(breaking_point_of_curve(finding), 1e-3);
+  finding.curve.points = {{1e-6, 0.0}, {1e-3, std::nan("")}, {1.0, 7.0}};
+  EXPECT_EQ(breaking_point_of_curve(finding), 1e-3);
+  finding.curve.points = {{1e-6, 6.0}, {1e-3, 1.0}};
+  EXPECT_EQ(breaking_point_of_curve(finding), 1e-6);
+  finding.bound = Bound::AtLeast;
+  EXPECT_FALSE(breaking_point_of_curve(finding));
+}
+
 TEST(StabilityFinding, HoldsOnItsSideOfTheLimitAndAtIt) {
   EXPECT_TRUE(finding_of(1.0, 1.0).holds());
   EXPECT_FALSE(finding_of(1.0, 1.5).holds());
@@ -82,6 +112,7 @@ TEST(StabilityTable, NamesWhatBreaks) {
   const std::string table = stability_table(findings);
   EXPECT_NE(table.find("BREAKS"), std::string::npos);
   EXPECT_NE(table.find("1 of 2 hold"), std::string::npos);
+  EXPECT_NE(table.find("none found"), std::string::npos);
 }
 
 TEST(StabilityHtml, IsMarkupOfItsOwnOnlyAndDrawsZerosAndInfinitiesToo) {

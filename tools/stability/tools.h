@@ -117,7 +117,7 @@ struct Coverage {
 /// The share of pixels with a neighbour, of four, that shows another surface: where rounding can matter.
 [[nodiscard]] double edges(const Image<Key>& keys);
 
-/// A frame as `hpr render` makes it on one rank.
+/// A frame as `hpr render --primary raster` makes it on one rank.
 struct Picture {
   Image<Key> keys;
   Image<Rgb> radiance;

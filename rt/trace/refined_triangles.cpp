@@ -1,0 +1,188 @@
+#include "rt/trace/refined_triangles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <tuple>
+
+namespace hpr {
+namespace {
+
+using Corners = std::array<glm::dvec3, 3>;
+
+/// Ray space: edges up to this length stay whole wherever they are.
+constexpr double kMinEdge = 0x1p-24;
+/// How often a triangle is divided at the most: halving the longest edges down to kMinEdge takes about half as often.
+constexpr int kMaxDivisions = 64;
+/// Triangles of an instance that are divided, each into some hundred parts.
+constexpr std::size_t kMaxDivided = 256;
+/// Float steps of the distance from ray space's origin. A part's edges are at most 7.5 times as long as a place of it
+/// is far away, as they are no longer than their own distance, which is at most that of the place and 0.87 of the
+/// longest edge. So its corners are at most 8.5 times as far, both together 16 times, and 28 by the largest coordinate.
+constexpr double kPlaneSteps = 32.0;
+/// How many times less refining must move a plane to be worth it.
+constexpr double kMinGain = 100.0;
+
+double largest(const glm::dvec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// Of the segment from ray space's origin.
+double distance_of(const glm::dvec3& a, const glm::dvec3& b) {
+  const glm::dvec3 edge = b - a;
+  const double length2 = glm::dot(edge, edge);
+  const double at = length2 > 0.0 ? std::clamp(-glm::dot(a, edge) / length2, 0.0, 1.0) : 0.0;
+  return glm::length(a + at * edge);
+}
+
+/// Whether an edge is halved; the same for both triangles that share it, whichever end each begins with.
+bool is_long(const glm::dvec3& a, const glm::dvec3& b) {
+  if (std::tuple(b.x, b.y, b.z) < std::tuple(a.x, a.y, a.z)) return is_long(b, a);
+  const double length = glm::length(b - a);
+  return length > kMinEdge && length > distance_of(a, b);
+}
+
+/// False too for what floats do not hold at all.
+bool is_divided(const Corners& c) {
+  const double farthest = std::max({largest(c[0]), largest(c[1]), largest(c[2])});
+  if (!(farthest < static_cast<double>(kMaxRayDistance))) return false;
+  return is_long(c[0], c[1]) || is_long(c[1], c[2]) || is_long(c[2], c[0]);
+}
+
+/// Calls visit(part) for every part. Turns corners round, and keeps the winding.
+template <typename Visit>
+void divide(const Corners& c, int divisions, Visit&& visit) {
+  const std::array<bool, 3> halved{is_long(c[0], c[1]), is_long(c[1], c[2]), is_long(c[2], c[0])};
+  const auto count = std::ranges::count(halved, true);
+  if (count == 0 || divisions == 0) {
+    visit(c);
+    return;
+  }
+  const auto divide_on = [&](const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& d) {
+    divide({a, b, d}, divisions - 1, visit);
+  };
+  const auto midpoint = [](const glm::dvec3& a, const glm::dvec3& b) { return 0.5 * (a + b); };
+  if (count == 3) {
+    const glm::dvec3 m0 = midpoint(c[0], c[1]);
+    const glm::dvec3 m1 = midpoint(c[1], c[2]);
+    const glm::dvec3 m2 = midpoint(c[2], c[0]);
+    divide_on(c[0], m0, m2);
+    divide_on(m0, c[1], m1);
+    divide_on(m2, m1, c[2]);
+    divide_on(m0, m1, m2);
+    return;
+  }
+  // From here on a b is halved; where two edges are, b d is the other one.
+  std::size_t first = 0;
+  while (!halved[first] || (count == 2 && !halved[(first + 1) % 3])) ++first;
+  const glm::dvec3& a = c[first];
+  const glm::dvec3& b = c[(first + 1) % 3];
+  const glm::dvec3& d = c[(first + 2) % 3];
+  const glm::dvec3 ab = midpoint(a, b);
+  if (count == 1) {
+    divide_on(a, ab, d);
+    divide_on(ab, b, d);
+    return;
+  }
+  const glm::dvec3 bd = midpoint(b, d);
+  divide_on(ab, b, bd);
+  if (glm::distance(a, bd) < glm::distance(ab, d)) {
+    divide_on(a, ab, bd);
+    divide_on(a, bd, d);
+  } else {
+    divide_on(a, ab, d);
+    divide_on(ab, bd, d);
+  }
+}
+
+Corners corners_of(const Mesh& mesh, const Instance& instance, std::uint32_t triangle, const RaySpace& space) {
+  const glm::uvec3& t = mesh.triangles[triangle];
+  Corners corners;
+  for (int i = 0; i < 3; ++i) {
+    corners[static_cast<std::size_t>(i)] = space.from_world(world_position(instance, mesh.positions[t[i]]));
+  }
+  return corners;
+}
+
+/// Whether refining is worth it for that triangle.
+bool is_coarse(const Corners& c) {
+  const glm::dvec3 e1 = c[1] - c[0];
+  const glm::dvec3 e2 = c[2] - c[0];
+  const glm::dvec3 cross = glm::cross(e1, e2);
+  const double area2 = glm::dot(cross, cross);
+  double distance = std::min({distance_of(c[0], c[1]), distance_of(c[1], c[2]), distance_of(c[2], c[0])});
+  if (area2 > 0.0) {
+    // Barycentric coordinates of the place that faces the origin.
+    const double u = glm::dot(glm::cross(-c[0], e2), cross) / area2;
+    const double v = glm::dot(glm::cross(e1, -c[0]), cross) / area2;
+    if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) distance = std::abs(glm::dot(c[0], cross)) / std::sqrt(area2);
+  }
+  const double rounding =
+      plane_rounding(e1, e2, cross / std::sqrt(area2), glm::abs(c[0]) + glm::max(glm::abs(e1), glm::abs(e2)));
+  return rounding > kMinGain * kPlaneSteps * std::max(distance, kMinEdge);
+}
+
+bool is_refined(const Scene& scene, const Instance& instance, const RaySpace& space) {
+  const Mesh& mesh = scene.mesh_of(instance);
+  const glm::dmat3 linear(instance.to_world);
+  const glm::dvec3 origin = glm::inverse(linear) * (space.origin - glm::dvec3(instance.to_world[3]));
+  // In the mesh's own coordinates, which shrink lengths by up to the distortion against each other: most triangles are
+  // far too small for their distance.
+  const double reach = 2.0 * distortion(linear);
+  if (!std::isfinite(reach * largest(origin))) return false;
+  bool worth = false;
+  std::size_t divided = 0;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const glm::uvec3& t = mesh.triangles[i];
+    const glm::dvec3 p0(mesh.positions[t.x]);
+    const double size =
+        std::max(largest(glm::dvec3(mesh.positions[t.y]) - p0), largest(glm::dvec3(mesh.positions[t.z]) - p0));
+    if (!(largest(p0 - origin) < reach * size)) continue;
+    const Corners corners = corners_of(mesh, instance, i, space);
+    if (!is_divided(corners)) continue;
+    if (++divided > kMaxDivided) return false;
+    worth = worth || is_coarse(corners);
+  }
+  return worth;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> refined_instances(const Scene& scene, const RaySpace& space) {
+  const std::vector<std::uint8_t> shared = shared_instances(scene);
+  std::vector<std::uint8_t> refined(shared.size(), 0);
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    refined[i] = shared[i] == 0 && is_refined(scene, scene.instances[i], space) ? 1 : 0;
+  }
+  return refined;
+}
+
+double refined_offset(const RaySpace& space, const glm::dvec3& position) {
+  constexpr double kStep = kOriginSteps * kFloatStep;
+  return kPlaneSteps * std::max(space.rounding_at(position), kStep * kMinEdge / space.scale);
+}
+
+double plane_rounding(const glm::dvec3& e1, const glm::dvec3& e2, const glm::dvec3& normal, const glm::dvec3& corners) {
+  const glm::dvec3 a = glm::abs(e1);
+  const glm::dvec3 b = glm::abs(e2);
+  const glm::dvec3 products(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
+  const double area2 = std::abs(glm::dot(normal, glm::cross(e1, e2)));
+  return glm::dot(glm::abs(normal), corners) + glm::dot(glm::max(a, b), products) / area2;
+}
+
+RefinedTriangles refine(const Scene& scene, const Instance& instance, SurfaceRange triangles, const RaySpace& space) {
+  const Mesh& mesh = scene.mesh_of(instance);
+  RefinedTriangles refined;
+  for (std::uint32_t i = triangles.first; i < triangles.last; ++i) {
+    const Corners whole = corners_of(mesh, instance, i, space);
+    divide(whole, is_divided(whole) ? kMaxDivisions : 0, [&](const Corners& part) {
+      refined.parts.push_back(part);
+      refined.triangle_of.push_back(i - triangles.first);
+    });
+  }
+  return refined;
+}
+
+}  // namespace hpr

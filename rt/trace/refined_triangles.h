@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "rt/trace/ray_scene.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// Of each instance, whether its triangles are refined on their way into Embree. Floats hold the corners of a tilted
+/// ground of 1000 km to a decimeter, and its plane is no better near ray space's origin, where all the other objects
+/// may be. So edges longer than their distance from that origin are halved in double, and their halves, until none is:
+/// the parts about a place have corners that are rounded about as finely as the place itself. Whether an edge is
+/// halved depends on its ends alone, so triangles that share it stay closed.
+///
+/// Those instances are refined that have a triangle of which that moves the plane a hundred times less or better. Level
+/// grounds and rooms have none. Depends on nothing but scene and space.
+[[nodiscard]] std::vector<std::uint8_t> refined_instances(const Scene& scene, const RaySpace& space);
+
+/// Metres by which ray origins must leave a refined triangle at a place of it.
+[[nodiscard]] double refined_offset(const RaySpace& space, const glm::dvec3& position);
+
+/// What the rounding of corners to floats, and of the products that make a normal of them, moves a ray's meeting with a
+/// triangle by along its normal, in float steps and in the unit of its coordinates: as Waechter and Binder ("A Fast and
+/// Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, chapter 6) take it from a place's coordinates, but
+/// by axis. `corners` is the largest coordinate of a corner, by axis.
+[[nodiscard]] double plane_rounding(const glm::dvec3& e1, const glm::dvec3& e2, const glm::dvec3& normal,
+                                    const glm::dvec3& corners);
+
+/// Triangles in parts.
+struct RefinedTriangles {
+  std::vector<std::array<glm::dvec3, 3>> parts;  ///< ray space
+  std::vector<std::uint32_t> triangle_of;        ///< of each part, counted from the first of the range
+};
+
+/// Those of an instance that is refined, `triangles` of its mesh.
+[[nodiscard]] RefinedTriangles refine(const Scene& scene, const Instance& instance, SurfaceRange triangles,
+                                      const RaySpace& space);
+
+}  // namespace hpr
