@@ -86,6 +86,14 @@ bool can_finish(const Setting& setting, const RenderSettings& settings) {
   return true;
 }
 
+constexpr std::uint32_t kManySamples = 64;
+
+/// In one of so many samples: all of them together are to gather enough. With fewer than four in one they show one by
+/// one; denoised pictures of few samples, whose filter takes each photon's disc for light of its own, need more.
+double photons_to_gather(bool denoise, std::uint32_t samples) {
+  return denoise ? std::clamp(1600.0 / samples, 4.0, 200.0) : std::clamp(256.0 / samples, 4.0, 50.0);
+}
+
 /// What of the settings of photons depends on others.
 void resolve_photons(RenderSettings& settings) {
   RaySettings& rays = settings.frame.rays;
@@ -105,10 +113,7 @@ void resolve_photons(RenderSettings& settings) {
     photons.value.parse(settings, std::string(photons.by_quality.at(static_cast<std::size_t>(Quality::Good))));
   }
   settings.frame.photons_fit_frame = !settings.is_given("photons");
-  // All samples together are to gather so many; with fewer than four in one they show one by one.
-  constexpr double kGathered = 256.0;
-  constexpr std::uint32_t kManySamples = 64;
-  rays.photons_gathered = std::clamp(kGathered / settings.sampling.goal.samples.value_or(kManySamples), 4.0, 50.0);
+  rays.photons_gathered = photons_to_gather(rays.denoise, settings.sampling.goal.samples.value_or(kManySamples));
 }
 
 void check_camera(const CameraChoice& camera) {

@@ -390,6 +390,17 @@ std::vector<Setting> make_table() {
        .limits_reference = true,
        .negated = "no-indirect",
        .used_with = on_photons},
+      {.name = "final-gather",
+       .help = "rays bring indirect light to what the eye sees, and photons to what those rays reach: no dark rims in "
+               "creases (default: with --quality best)",
+       .value = flag([](Settings& s) -> bool& { return s.frame.rays.final_gather; }),
+       .by_quality = {"false", "false", "true"},
+       .costs = "a ray at every point, and the light of what it meets",
+       .loses = "false: light in creases and at the feet of things, as far as photons blur; true: smoothness, where "
+                "samples are few",
+       .limits_reference = true,
+       .negated = "no-final-gather",
+       .used_with = on_photons},
       {.name = "photons",
        .help = "sent per sample, where the scene requires any",
        .value = number(

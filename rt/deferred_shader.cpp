@@ -49,13 +49,14 @@ bool gathers_all_lobes(std::span<const PassPlan> plan) {
   return runs_pass(plan, [](const PassInfo& pass) { return pass.gathers_all_lobes; });
 }
 
-/// What is shown in place of light leaves no light to work on.
-RaySettings settings_of(RaySettings chosen) {
-  if (chosen.show != Show::Shaded) chosen.reference = false;
-  if (needs_light(chosen.show)) return chosen;
-  chosen.denoise = false;
-  chosen.half_resolution.clear();
-  return chosen;
+bool needs_photons(std::span<const PassPlan> plan) {
+  return runs_pass(plan, [](const PassInfo& pass) { return pass.needs_photons; });
+}
+
+/// Rays find an even sky by themselves, unless photons bring what mirrors and glass make of it.
+ConstantEnvironment constant_environment_of(std::span<const PassPlan> plan) {
+  return gathers_all_lobes(plan) && !needs_photons(plan) ? ConstantEnvironment::LeftToRays
+                                                         : ConstantEnvironment::Sampled;
 }
 
 /// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
@@ -156,11 +157,11 @@ struct DeferredShader::State {
 DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
                              const RaySource& source, RayForwarding* others)
     : scene(lit),
-      settings(settings_of(std::move(chosen))),
+      settings(std::move(chosen)),
       plan(plan_passes(requirements, settings)),
       space(lit.bounds),
       surfaces(lit, space, settings.show == Show::Ao || lifts_origins(plan, settings)),
-      lights(lit, gathers_all_lobes(plan) ? ConstantEnvironment::LeftToRays : ConstantEnvironment::Sampled),
+      lights(lit, constant_environment_of(plan)),
       media(lit),
       shared(shared_components(settings)),
       gathers(gathers_all_lobes(plan)),
@@ -178,7 +179,7 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
       !covering_surfaces(lit, true).empty()) {
     build_rays(source);
   }
-  if (runs_pass(plan, [](const PassInfo& pass) { return pass.needs_photons; })) build_photons();
+  if (needs_photons(plan)) build_photons();
   if (settings.reference) build_reference();
 }
 
@@ -211,7 +212,8 @@ void DeferredShader::State::build_rays(const RaySource& source) {
 
 void DeferredShader::State::build_photons() {
   if (settings.photons == 0) settings.photons = kPhotons;
-  photons.emplace(scene, surfaces, space, whole_scene(), lights, settings);
+  photons.emplace(scene, surfaces, space, whole_scene(), lights, settings,
+                  gathers ? PhotonUse::Gathered : PhotonUse::Direct);
 }
 
 void DeferredShader::State::build_reference() {

@@ -22,14 +22,19 @@ void expect_the_same_light(const Scene& scene, double glossy_cutoff = 0.3, bool 
       mean_of(scene, view,
               {.max_depth = 64, .glossy_cutoff = glossy_cutoff, .terminator_fix = terminator_fix, .reference = true},
               512, covering);
-  const glm::dvec3 hybrid = mean_of(scene, view,
-                                    {.max_depth = 24,
-                                     .glossy_cutoff = glossy_cutoff,
-                                     .photons = 20'000,
-                                     .global_photons = true,
-                                     .terminator_fix = terminator_fix},
-                                    samples, covering);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c;
+  for (const bool final_gather : {false, true}) {
+    const glm::dvec3 hybrid = mean_of(scene, view,
+                                      {.max_depth = 24,
+                                       .glossy_cutoff = glossy_cutoff,
+                                       .photons = 20'000,
+                                       .global_photons = true,
+                                       .final_gather = final_gather,
+                                       .terminator_fix = terminator_fix},
+                                      samples, covering);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.025) << "channel " << c << (final_gather ? ", gathered" : "");
+    }
+  }
 }
 
 TEST(Hybrid, AHeadlightShowsWhatIsLookedAtAndIsScatteredNoFurther) {
@@ -42,6 +47,18 @@ TEST(Hybrid, AHeadlightShowsWhatIsLookedAtAndIsScatteredNoFurther) {
 
 TEST(Hybrid, AMatteBall) {
   expect_the_same_light(room(test::diffuse({0.3F, 0.4F, 0.6F}), false));
+}
+
+/// The lamp's back lights the ceiling it hangs under, where little of that comes out: wide discs of few photons would
+/// spread it.
+TEST(Hybrid, ALampCloseToTheCeilingWhereFewPhotonsAreGathered) {
+  const Scene scene = room(test::diffuse({0.3F, 0.4F, 0.6F}), false);
+  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {16, 16}, scene, 1.3);
+  const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 64, .terminator_fix = false, .reference = true}, 512);
+  const RaySettings best{
+      .max_depth = 24, .photons = 500, .global_photons = true, .final_gather = true, .terminator_fix = false};
+  const glm::dvec3 hybrid = mean_of(scene, view, best, 128);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.02) << "channel " << c;
 }
 
 /// All light comes from a spot of the floor that is not seen.
@@ -80,6 +97,25 @@ TEST(Hybrid, ARoughMetalBallThatRaysFollowAsSettingsSay) {
   Material metal = test::mirror(0.9F);
   metal.roughness = 0.5F;
   expect_the_same_light(room(metal, false), 1.0);
+}
+
+TEST(Hybrid, AMatteBallBetweenFacingMirrors) {
+  Scene scene = room(test::diffuse({0.3F, 0.4F, 0.6F}), false);
+  const std::uint32_t mirror = add_material(scene, test::mirror(0.95F));
+  for (const std::size_t wall : {std::size_t{2}, std::size_t{3}}) scene.meshes[wall].material = mirror;
+  finish_scene(scene);
+  expect_the_same_light(scene);
+}
+
+TEST(Hybrid, ALacqueredFloor) {
+  Scene scene = room(test::diffuse({0.3F, 0.4F, 0.6F}), false);
+  constexpr std::size_t kFloor = 4;
+  Material lacquer = test::diffuse(glm::vec3(0.6F));
+  lacquer.ior = 1.5F;
+  lacquer.roughness = 0.05F;
+  scene.meshes[kFloor].material = add_material(scene, lacquer);
+  finish_scene(scene);
+  expect_the_same_light(scene);
 }
 
 TEST(Hybrid, AGlassBall) {

@@ -39,7 +39,10 @@ struct RaySettings {
   std::uint32_t photons = 0;        ///< sent per sample; 0: kPhotons, and only where the pass is named
   bool global_photons = false;      ///< also those that were scattered by rough surfaces only: all indirect light
   bool gather = false;              ///< under a constant environment rays bring all indirect light, in place of photons
-  double photon_radius = 0.0;       ///< metres; 0: chosen from the photons' density and the footprint
+  /// Elsewhere rays look for the indirect light of what the eye sees, and photons tell that of the surfaces they reach
+  /// (final gathering, Jensen 1996).
+  bool final_gather = false;
+  double photon_radius = 0.0;  ///< metres; 0: chosen from the photons' density and the footprint
   /// Metres that a pixel covers of what is seen: photons are gathered from about so far. 0: as their density has it.
   double photon_footprint = 0.0;
   bool fits_photons = false;    ///< no more of `photons` are sent than fill the footprint

@@ -43,7 +43,8 @@ class DemoCommand final : public Command {
     run.display.output = std::filesystem::path(output_).replace_extension("").string() + "-screens";
     run.summary = true;
     // The quickest proof that a machine works is a finished picture of few samples.
-    for (const auto& [name, value] : {std::pair("spp", "4"), {"denoise", "true"}, {"indirect", "true"}}) {
+    for (const auto& [name, value] :
+         {std::pair("spp", "2"), {"denoise", "true"}, {"indirect", "true"}, {"photons", "50000"}}) {
       set_setting(run.settings, name, value);
     }
     // The demo's own picture may be made again and again; a name the user chose is guarded as everywhere.

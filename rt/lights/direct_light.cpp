@@ -14,7 +14,9 @@ double balance_heuristic(const LightContext& context, double pdf, double light_p
 
 void add_emission(const LightContext& context, const Wavefront& wave, PixelSums& sums) {
   for (const PathVertex& point : wave.vertices) {
-    if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered)) continue;
+    if (point.material.emission == glm::dvec3(0.0) || (point.material.unlit && point.gathered) || point.is_caustic) {
+      continue;
+    }
     double weight = 1.0;
     if (point.previous_pdf > 0.0) {
       weight = balance_heuristic(context, point.previous_pdf,
@@ -69,7 +71,7 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
   if (light.weight == glm::dvec3(0.0)) return;
   const PathVertex& point = wave_.vertices[index];
   glm::dvec3 scattered(0.0);
-  if (!(light.pdf > 0.0)) {
+  if (!(light.pdf > 0.0) && !(context_.final_gathers() && point.gathered)) {
     scattered = point.bsdf.total(light.to_light);
   } else {
     scattered = shared_scattering(point, light);
@@ -88,8 +90,13 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
 glm::dvec3 DirectLight::shared_scattering(const PathVertex& point, const LightSample& light) const {
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
+  const bool bundles = context_.final_gathers() && point.gathered;
   for (std::size_t lobe = 0; lobe < point.bsdf.lobes().size(); ++lobe) {
-    const double weight = point.may_follow[lobe] ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
+    // Caustic photons bring it to where light is gathered.
+    if (bundles && context_.follows_for_itself(point.bsdf, kLobes[lobe])) continue;
+    const bool is_weighed =
+        point.may_follow[lobe] && light.pdf > 0.0 && (!point.gathers_near() || light.distance < point.gather_reach);
+    const double weight = is_weighed ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
     scattered += weight * all.value[lobe];
   }
   return scattered;

@@ -51,10 +51,11 @@ class GatherPass final : public Pass {
  public:
   [[nodiscard]] Requirement requirement(const Requirements& scene, const RaySettings& settings) const override {
     if (!scene.indirect.needed || gathers_by_rays(scene, settings)) return scene.indirect;
+    if (final_gathers(scene, settings)) return {true, "surfaces scatter light on to others, where photons tell of it"};
     return {false, "photons are to bring what light surfaces scatter on, if anything is"};
   }
   [[nodiscard]] bool runs_by_default(const Requirements& scene, const RaySettings& settings) const override {
-    return gathers_by_rays(scene, settings);
+    return gathers_by_rays(scene, settings) || final_gathers(scene, settings);
   }
 
   void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
@@ -62,6 +63,12 @@ class GatherPass final : public Pass {
     for (const Lobe lobe : kLobes) follow_lobe(context, wave, info_of(PassId::Gather), lobe, buffers, sums, next);
   }
 };
+
+/// Whether all indirect light is wanted, and nobody says which pass is to bring it.
+bool leaves_indirect_open(const RaySettings& settings) {
+  return settings.photons > 0 && settings.passes.empty() && (settings.auto_passes || settings.all_passes) &&
+         settings.global_photons && settings.half_resolution.empty();
+}
 
 }  // namespace
 
@@ -75,8 +82,11 @@ std::unique_ptr<Pass> make_refraction_pass() {
 
 bool gathers_by_rays(const Requirements& scene, const RaySettings& settings) {
   if (std::ranges::find(settings.passes, PassId::Gather) != settings.passes.end()) return true;
-  return settings.photons > 0 && settings.passes.empty() && (settings.auto_passes || settings.all_passes) &&
-         settings.global_photons && settings.gather && scene.even_environment && settings.half_resolution.empty();
+  return leaves_indirect_open(settings) && settings.gather && scene.even_environment;
+}
+
+bool final_gathers(const Requirements& scene, const RaySettings& settings) {
+  return leaves_indirect_open(settings) && settings.final_gather && !gathers_by_rays(scene, settings);
 }
 
 std::unique_ptr<Pass> make_gather_pass() {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -40,6 +42,8 @@ struct PathVertex {
   std::array<float, kLobes.size()> lobe_weights{};
   std::array<bool, kLobes.size()> may_follow{};  ///< per lobe: whether one might have followed it
   Sampler sampler;
+  /// Metres from within which rays gather light, and photons bring what comes from further (PhotonMaps::near).
+  double gather_reach = std::numeric_limits<double>::infinity();
   double coverage = 1.0;                    ///< of the pixel that the first surface of the path covers
   std::uint32_t pixel = 0;                  ///< index into PixelSums
   std::uint16_t depth = 0;                  ///< bounces from the eye
@@ -48,8 +52,12 @@ struct PathVertex {
   ComponentSet upsampled = 0;               ///< components that HalfResShading brings from neighbor taps
   /// Reached by rays that gather: unlit surfaces and backgrounds are no light for the vertex.
   bool gathered = false;
+  /// Of final gathering: reached by lobes that passes follow for themselves, from where light was gathered: the light
+  /// that lamps send this way is what caustic photons bring there.
+  bool is_caustic = false;
 
   [[nodiscard]] bool is_upsampled(Component which) const { return contains(upsampled, which); }
+  [[nodiscard]] bool gathers_near() const { return std::isfinite(gather_reach); }
 };
 
 /// Light that would fall on a vertex if nothing stood between.
@@ -84,8 +92,8 @@ struct LightContext {
   const LightSampler& lights;
   const RaySettings& settings;
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
-  bool gathers = false;                              ///< whether one runs that follows all the others
-  const PhotonMaps* photons = nullptr;               ///< null when none were traced
+  bool gathers = false;                              ///< whether one runs that follows all the others,
+  const PhotonMaps* photons = nullptr;               ///< and with photons, gathers from afar; null: none were traced
   const View* view = nullptr;                        ///< the tile's view in any sample: the eye's position
   Media eye_media = {};                              ///< the media that the eye of that view lies in
 
@@ -94,6 +102,8 @@ struct LightContext {
   /// That radiance where no direction changes it.
   [[nodiscard]] std::optional<glm::dvec3> even_background() const;
 
+  /// Whether rays gather what photons tell (RaySettings::final_gather).
+  [[nodiscard]] bool final_gathers() const { return gathers && photons != nullptr; }
   /// Whether a pass of its own follows the lobe, and not the one that gathers all others.
   [[nodiscard]] bool follows_for_itself(const Bsdf& bsdf, Lobe lobe) const;
 };

@@ -104,4 +104,7 @@ struct PassInfo {
 /// is.
 [[nodiscard]] bool gathers_by_rays(const Requirements& scene, const RaySettings& settings);
 
+/// Whether both bring it: rays to what the eye sees, and photons to what those rays reach (RaySettings::final_gather).
+[[nodiscard]] bool final_gathers(const Requirements& scene, const RaySettings& settings);
+
 }  // namespace hpr

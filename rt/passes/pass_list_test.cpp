@@ -94,6 +94,25 @@ TEST(Passes, RaysGatherIndirectLightWhereAnEvenSkyIsAllThereIs) {
       Error);
 }
 
+TEST(Passes, RaysGatherWhatPhotonsTellWhereLampsAreSmall) {
+  Scene scene = scene_with(test::diffuse(), 1);
+  const RaySettings best{.photons = 1000, .global_photons = true, .final_gather = true};
+  for (const PassId pass : {PassId::Shadow, PassId::Gather, PassId::Photon}) EXPECT_TRUE(runs(scene, best, pass));
+  for (const RaySettings& other :
+       {RaySettings{.photons = 1000, .final_gather = true}, RaySettings{.photons = 1000, .global_photons = true},
+        RaySettings{.passes = {PassId::Photon}, .photons = 1000, .global_photons = true, .final_gather = true},
+        RaySettings{
+            .photons = 1000, .global_photons = true, .final_gather = true, .half_resolution = {PassId::Photon}}}) {
+    EXPECT_FALSE(runs(scene, other, PassId::Gather));
+  }
+  scene.lights.clear();
+  scene.environment = test::even_light({1.0F, 1.0F, 1.0F});
+  RaySettings even = best;
+  even.gather = true;
+  EXPECT_TRUE(runs(scene, even, PassId::Gather));
+  EXPECT_FALSE(runs(scene, even, PassId::Photon)) << "rays find an even sky by themselves";
+}
+
 TEST(Passes, SayWhy) {
   for (const PassPlan& plan : plan_passes(requirements_of(scene_with(test::diffuse(), 2)), {}))
     EXPECT_FALSE(plan.why.empty());

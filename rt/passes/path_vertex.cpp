@@ -248,12 +248,27 @@ void choose_followed(const LightContext& context, PathVertex& point) {
   }
 }
 
+/// Whether lamps and skies that a ray finds are what caustic photons bring to where light is gathered.
+bool leaves_to_caustics(const LightContext& context, const PathVertex& from, const PassInfo& pass) {
+  return context.final_gathers() && from.gathered && !pass.gathers_all_lobes;
+}
+
+/// See PathVertex::gather_reach. Photons are not asked where a ray that gathers ends near its start: both lie in one
+/// crease, into which their map reaches from beyond.
+double gather_reach(const LightContext& context, const PathVertex& from, const PathVertex& reached) {
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
+  if (!context.final_gathers() || !reached.gathered) return kEndless;
+  const double near = context.photons->near;
+  return glm::distance(reached.surface.position, from.surface.position) < near ? kEndless : near;
+}
+
 /// What reaches the pixel by a ray that leaves the scene, as far as sampling lights does not find it.
 glm::dvec3 sky_along(const LightContext& context, const LobeRay& ray, const glm::dvec3& direction,
                      const PassInfo& pass) {
   const PathVertex& from = *ray.from;
   if (!context.scene.environment && (pass.gathers_all_lobes || from.gathered))
     return glm::dvec3(0.0);  // a backdrop is no light
+  if (leaves_to_caustics(context, from, pass)) return glm::dvec3(0.0);
   const double light_pdf =
       ray.pdf > 0.0 ? context.lights.environment_pdf(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
   return balance_heuristic(context, ray.pdf, light_pdf) * ray.throughput * context.lights.environment(direction);
@@ -284,8 +299,8 @@ void make_lobe_rays(const LightContext& context, const Wavefront& wave, const Pa
     if (throughput == glm::dvec3(0.0)) continue;
     rays.push_back({&point, throughput, sample->pdf, sampler});
     buffers.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
-                                std::numeric_limits<double>::infinity(), nullptr, 0,
-                                faces_met(point, pass, sample->direction)});
+                                pass.gathers_all_lobes ? point.gather_reach : std::numeric_limits<double>::infinity(),
+                                nullptr, 0, faces_met(point, pass, sample->direction)});
     sums.count_ray(point.pixel);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) buffers.requests[i].sampler = &rays[i].sampler;
@@ -297,6 +312,7 @@ void add_sky(const LightContext& context, const RayBuffers& buffers, std::size_t
              PixelSums& sums) {
   const LobeRay& ray = buffers.lobe_rays[i];
   const PathVertex& from = *ray.from;
+  if (pass.gathers_all_lobes && from.gathers_near()) return;
   const bool leaves = buffers.hits[i] == kNoSurface;
   const bool shows_sky = pass.gathers_all_lobes && from.depth == 0;
   if (!leaves && !(shows_sky && sums.wants_components)) return;
@@ -324,6 +340,8 @@ void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i
   reached.depth = static_cast<std::uint16_t>(from.depth + 1);
   reached.followed = static_cast<std::uint16_t>(from.followed + (pass.gathers_all_lobes ? 0 : 1));
   reached.gathered = from.gathered || pass.gathers_all_lobes;
+  reached.gather_reach = gather_reach(context, from, reached);
+  reached.is_caustic = leaves_to_caustics(context, from, pass);
   reached.component = component_after(from, pass.component);
 }
 

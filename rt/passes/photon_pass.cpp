@@ -30,11 +30,12 @@ class PhotonPass final : public Pass {
     if (context.photons == nullptr) return;
     for (const PathVertex& point : wave.vertices) {
       if (point.is_upsampled(Component::Photon)) continue;
-      glm::dvec3 light(0.0);
-      for (const PhotonMap* map : {&context.photons->caustic, &context.photons->global}) {
-        light += gather_photons(*map, point.surface, point.bsdf, point.material.normal, context.settings.glossy_cutoff,
-                                buffers.found_photons);
-      }
+      const auto gather = [&](const PhotonMap& map) {
+        return gather_photons(map, point.surface, point.bsdf, point.material.normal, context.settings.glossy_cutoff,
+                              buffers.found_photons);
+      };
+      glm::dvec3 light = gather(context.photons->caustic);
+      if (!context.gathers || point.gathers_near()) light += gather(context.photons->global);
       if (light != glm::dvec3(0.0)) {
         sums.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
       }

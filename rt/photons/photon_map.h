@@ -40,10 +40,11 @@ struct Photon {
   std::uint32_t facing = 0;         ///< packed: the geometric normal on the side it arrived on, and SurfacePoint::layer
   std::uint32_t direction = 0;      ///< packed: towards where it came from
   std::array<float, 3> flux{};      ///< in PhotonSettings::flux_unit
+  float traveled = 0.0F;            ///< metres since it was scattered last
 
   bool operator==(const Photon&) const = default;
 };
-static_assert(sizeof(Photon) == 32);
+static_assert(sizeof(Photon) == 36);
 
 /// The light of a photon of a map.
 struct PhotonLight {
@@ -171,7 +172,8 @@ class PhotonMap {
 /// The photons of one sample, ready to be gathered.
 struct PhotonMaps {
   PhotonMap caustic;
-  PhotonMap global;
+  PhotonMap global;   ///< less the photons that come from nearer than that:
+  double near = 0.0;  ///< metres; 0: all photons are there
 };
 
 /// Radius of pass `pass` (from 0) of a progressive estimate: r_i^2 = r_0^2 prod_{k=1..i} (k + a) / (k + 1), a = 2/3

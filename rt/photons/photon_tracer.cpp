@@ -226,6 +226,7 @@ void PhotonTracer::keep(const Flight& flight, const glm::dvec3& flux, const Surf
   }
   photon.facing = pack_facing(surface.geometric_normal, surface.layer);
   photon.direction = pack_direction(surface.to_viewer);
+  photon.traveled = static_cast<float>(glm::distance(surface.position, flight.position));
   block.kept.push_back({flight.photon, flight.followed, photon});
 }
 
@@ -351,15 +352,23 @@ constexpr double kDense = 50.0;  ///< where one sample is to show no noise
 /// Pixels that it spans.
 constexpr double kFootprints = 2.0;
 
-constexpr std::uint32_t kPilotPhotons = 16'384;
+/// Light that comes to a surface from within so many radii is too uneven for photons that are gathered.
+constexpr double kNearRadii = 2.0;
+
+constexpr std::uint32_t kPilotPhotons = 4096;
+constexpr double kPilotDense = 12.0;
+/// No more are sent for than so many in the footprint; where more are to be gathered, radii are wider.
+constexpr double kMaxFilled = 16.0;
 constexpr std::uint32_t kMinPhotons = 1000;
 
 }  // namespace
 
 PhotonMapBuilder::PhotonMapBuilder(const Scene& scene, const Surfaces& surfaces, const RaySpace& space,
-                                   const RayScene& rays, const LightSampler& lights, const RaySettings& settings)
+                                   const RayScene& rays, const LightSampler& lights, const RaySettings& settings,
+                                   PhotonUse use)
     : space_(space),
       settings_(settings),
+      use_(use),
       tracer_(
           scene, surfaces, space, rays,
           [&lights](double choice, const glm::dvec2& position, const glm::dvec2& direction) {
@@ -449,24 +458,26 @@ bool PhotonMapBuilder::fit_count(Communicator* comm, const std::function<bool()>
     return false;
   }
   if (pilot->global.empty()) return true;
-  const double wide = first_radius(pilot->global, space_, kDense) / (kFootprints * settings_.photon_footprint);
-  const double wanted = settings_.photons * (settings_.photons_gathered / kDense) * wide * wide;
+  const double wide = first_radius(pilot->global, space_, kPilotDense) / (kFootprints * settings_.photon_footprint);
+  const double filled = std::min(settings_.photons_gathered, kMaxFilled);
+  const double wanted = settings_.photons * (filled / kPilotDense) * wide * wide;
   settings_.photons = static_cast<std::uint32_t>(
       std::clamp(wanted, static_cast<double>(std::min(kMinPhotons, most)), static_cast<double>(most)));
   return true;
 }
 
-double PhotonMapBuilder::choose_radius(std::span<const Photon> first) const {
+/// `footprint`: metres of a pixel; 0: of no concern.
+double PhotonMapBuilder::choose_radius(std::span<const Photon> first, double footprint) const {
   if (settings_.photon_radius > 0.0) return settings_.photon_radius;
   const double dense = first_radius(first, space_, kDense);
   if (!(settings_.photon_footprint > 0.0)) return dense;
-  return std::min(dense, std::max(kFootprints * settings_.photon_footprint,
-                                  dense * std::sqrt(settings_.photons_gathered / kDense)));
+  const double wanted = dense * std::sqrt(settings_.photons_gathered / kDense);
+  return std::min(std::max(dense, wanted), std::max(kFootprints * footprint, wanted));
 }
 
 void PhotonMapBuilder::choose_radii(const TracedPhotons& first) {
-  caustic_radius_ = choose_radius(first.caustic);
-  global_radius_ = choose_radius(first.global);
+  caustic_radius_ = choose_radius(first.caustic, settings_.photon_footprint);
+  global_radius_ = choose_radius(first.global, use_ == PhotonUse::Direct ? settings_.photon_footprint : 0.0);
 }
 
 const PhotonMaps& PhotonMapBuilder::build(const SampleNumber& number, Communicator* comm) {
@@ -489,15 +500,18 @@ bool PhotonMapBuilder::make(const SampleNumber& number, Communicator* comm, cons
     if (!first) return false;
     choose_radii(*first);
   }
-  const std::optional<TracedPhotons> traced = trace(number, comm, is_overtaken);
+  std::optional<TracedPhotons> traced = trace(number, comm, is_overtaken);
   if (!traced) return false;
   if (chooses && number == SampleNumber{}) choose_radii(*traced);
   built_.reset();
+  const double caustic = progressive_radius(caustic_radius_, number.sample);
+  const double global = progressive_radius(global_radius_, number.sample);
+  maps_.near = use_ == PhotonUse::Gathered ? kNearRadii * global : 0.0;
+  std::erase_if(traced->global, [&](const Photon& photon) { return photon.traveled < maps_.near; });
   parallel_for(settings_.threads, 2, [&](std::size_t which) {
     const std::vector<Photon>& photons = which == 0 ? traced->caustic : traced->global;
     PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;
-    const double first = which == 0 ? caustic_radius_ : global_radius_;
-    map = PhotonMap(photons, space_, progressive_radius(first, number.sample), tracer_.settings().flux_unit);
+    map = PhotonMap(photons, space_, which == 0 ? caustic : global, tracer_.settings().flux_unit);
   });
   built_ = number;
   return true;

@@ -118,18 +118,23 @@ class PhotonTracer {
 /// Collective: every rank's photons on every rank, in order of rank. The counts stay this rank's own.
 void share_photons(Communicator& comm, TracedPhotons& photons);
 
+/// Where photons of all indirect light are looked up: where the eye sees them, or where rays that gather light from
+/// there end; these blur over what their map blurs.
+enum class PhotonUse : std::uint8_t { Direct, Gathered };
+
 /// Makes the photon maps of one sample after the other: every sample traces photons of its own, and their radius
 /// shrinks from sample to sample, so that the mean of many has neither noise nor blur (Knaus and Zwicker, "Progressive
 /// Photon Mapping: A Probabilistic Approach", 2011).
 ///
 /// Where the settings know what a pixel covers, radii begin at two pixels: within them light that things keep off a
 /// surface, or that ends at its edge, is missing, and wide ones show as dark rims. As many photons are sent as that
-/// takes. Where they are too few, wider radii take in at least four of them.
+/// takes. Where they are too few, wider radii take in at least four of them, and so do those of photons that are
+/// gathered.
 class PhotonMapBuilder {
  public:
   /// All that is referred to must outlive this. `rays` holds the whole scene.
   PhotonMapBuilder(const Scene& scene, const Surfaces& surfaces, const RaySpace& space, const RayScene& rays,
-                   const LightSampler& lights, const RaySettings& settings);
+                   const LightSampler& lights, const RaySettings& settings, PhotonUse use = PhotonUse::Direct);
 
   /// The maps of a sample; kept until another sample is built, or discard(). With a communicator, collective: its
   /// ranks share the work, and each gets all photons.
@@ -153,11 +158,12 @@ class PhotonMapBuilder {
                                                    const std::function<bool()>& is_overtaken);
   [[nodiscard]] bool make(const SampleNumber& number, Communicator* comm, const std::function<bool()>& is_overtaken);
   [[nodiscard]] bool fit_count(Communicator* comm, const std::function<bool()>& is_overtaken);
-  [[nodiscard]] double choose_radius(std::span<const Photon> first) const;
+  [[nodiscard]] double choose_radius(std::span<const Photon> first, double footprint) const;
   void choose_radii(const TracedPhotons& first);
 
   RaySpace space_;
   RaySettings settings_;
+  PhotonUse use_;
   bool settled_ = false;  ///< what depends on the other ranks
   PhotonTracer tracer_;
   std::optional<SampleNumber> built_;
