@@ -288,7 +288,7 @@ void fit_photons(Session& session, const FrameSettings& settings, FramePlan& pla
     plan.rays.photon_footprint = all_gather_value(session.comm(), pixel_footprint(session, plan.rays, views)).front();
   }
   if (!settings.photons_fit_frame) return;
-  if (plan.rays.photon_footprint > 0.0 && !final_gathers(session.requirements(), plan.rays)) {
+  if (plan.rays.photon_footprint > 0.0) {
     plan.rays.fits_photons = true;
   } else {
     plan.rays.photons = photons_for(plan.rays.photons, views);

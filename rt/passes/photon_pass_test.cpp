@@ -158,7 +158,7 @@ TEST(PhotonPass, PhotonsOvertakenOnAnyRankAreDroppedOnAllAndTracedAgainWithTheSa
   };
   for (const bool fits : {false, true}) {
     const RaySettings settings{
-        .photons = 60'000, .global_photons = true, .photon_footprint = fits ? 0.015 : 0.0, .fits_photons = fits};
+        .photons = 60'000, .global_photons = true, .photon_footprint = fits ? 0.004 : 0.0, .fits_photons = fits};
     PhotonMapBuilder undisturbed(scene, surfaces, space, rays, lights, settings);
     const auto expected = lights_of(undisturbed.build(number, nullptr).global);
     for (const int ranks : {1, 3}) {

@@ -360,6 +360,7 @@ constexpr double kPilotDense = 12.0;
 /// No more are sent for than so many in the footprint; where more are to be gathered, radii are wider.
 constexpr double kMaxFilled = 16.0;
 constexpr std::uint32_t kMinPhotons = 1000;
+constexpr std::uint32_t kMinGathered = 16'384;
 
 }  // namespace
 
@@ -457,12 +458,19 @@ bool PhotonMapBuilder::fit_count(Communicator* comm, const std::function<bool()>
     settings_.fits_photons = true;
     return false;
   }
-  if (pilot->global.empty()) return true;
-  const double wide = first_radius(pilot->global, space_, kPilotDense) / (kFootprints * settings_.photon_footprint);
+  // What rays gather is blurred from afar; caustics are looked at.
+  const bool gathered = use_ == PhotonUse::Gathered;
+  const std::vector<Photon>& seen = gathered ? pilot->caustic : pilot->global;
+  const std::uint32_t fewest = std::min(gathered ? kMinGathered : kMinPhotons, most);
+  if (seen.empty()) {
+    if (gathered) settings_.photons = fewest;
+    return true;
+  }
+  const double wide = first_radius(seen, space_, kPilotDense) / (kFootprints * settings_.photon_footprint);
   const double filled = std::min(settings_.photons_gathered, kMaxFilled);
   const double wanted = settings_.photons * (filled / kPilotDense) * wide * wide;
-  settings_.photons = static_cast<std::uint32_t>(
-      std::clamp(wanted, static_cast<double>(std::min(kMinPhotons, most)), static_cast<double>(most)));
+  settings_.photons =
+      static_cast<std::uint32_t>(std::clamp(wanted, static_cast<double>(fewest), static_cast<double>(most)));
   return true;
 }
 
