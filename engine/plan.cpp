@@ -290,6 +290,11 @@ void fit_photons(Session& session, const FrameSettings& settings, FramePlan& pla
   if (!settings.photons_fit_frame) return;
   if (plan.rays.photon_footprint > 0.0) {
     plan.rays.fits_photons = true;
+    // Rays bring all but caustics, of which a small picture shows little.
+    constexpr std::uint32_t kPerPixel = 4;
+    if (final_gathers(session.requirements(), plan.rays)) {
+      plan.rays.photons = photons_for(plan.rays.photons / kPerPixel, views) * kPerPixel;
+    }
   } else {
     plan.rays.photons = photons_for(plan.rays.photons, views);
   }

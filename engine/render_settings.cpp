@@ -87,6 +87,8 @@ bool can_finish(const Setting& setting, const RenderSettings& settings) {
 }
 
 constexpr std::uint32_t kManySamples = 64;
+/// With fewer, what photons blur is less than the noise of rays that gather.
+constexpr std::uint32_t kGatheredSamples = 32;
 
 /// In one of so many samples: all of them together are to gather enough. With fewer than four in one they show one by
 /// one; denoised pictures of few samples, whose filter takes each photon's disc for light of its own, need more.
@@ -113,7 +115,9 @@ void resolve_photons(RenderSettings& settings) {
     photons.value.parse(settings, std::string(photons.by_quality.at(static_cast<std::size_t>(Quality::Good))));
   }
   settings.frame.photons_fit_frame = !settings.is_given("photons");
-  rays.photons_gathered = photons_to_gather(rays.denoise, settings.sampling.goal.samples.value_or(kManySamples));
+  const std::uint32_t samples = settings.sampling.goal.samples.value_or(kManySamples);
+  rays.photons_gathered = photons_to_gather(rays.denoise, samples);
+  if (samples < kGatheredSamples && !settings.is_given("final-gather")) rays.final_gather = false;
 }
 
 void check_camera(const CameraChoice& camera) {

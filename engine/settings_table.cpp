@@ -392,7 +392,7 @@ std::vector<Setting> make_table() {
        .used_with = on_photons},
       {.name = "final-gather",
        .help = "rays bring indirect light to what the eye sees, and photons to what those rays reach: no dark rims in "
-               "creases (default: with --quality best)",
+               "creases (default: with --quality best from 32 samples on)",
        .value = flag([](Settings& s) -> bool& { return s.frame.rays.final_gather; }),
        .by_quality = {"false", "false", "true"},
        .costs = "a ray at every point, and the light of what it meets",

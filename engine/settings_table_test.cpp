@@ -126,6 +126,20 @@ TEST(RenderSettings, WhatIsNotGivenComesFromTheQuality) {
   EXPECT_EQ(resolve(settings, 7).frame.rays.seed, 7U);
 }
 
+TEST(RenderSettings, RaysGatherWhereSamplesAreMany) {
+  const auto gathers = [](std::initializer_list<std::pair<const char*, const char*>> asked_for) {
+    RenderSettings settings;
+    for (const auto& [name, value] : asked_for) set_setting(settings, name, value);
+    return resolve(settings, 1).frame.rays.final_gather;
+  };
+  EXPECT_FALSE(gathers({}));
+  EXPECT_TRUE(gathers({{"quality", "best"}}));
+  EXPECT_FALSE(gathers({{"quality", "best"}, {"spp", "31"}}));
+  EXPECT_TRUE(gathers({{"quality", "best"}, {"spp", "32"}}));
+  EXPECT_TRUE(gathers({{"spp", "1"}, {"final-gather", "true"}}));
+  EXPECT_FALSE(gathers({{"quality", "best"}, {"final-gather", "false"}}));
+}
+
 /// Samples, denoiser and indirect light of a picture for looking at.
 std::tuple<std::optional<std::uint32_t>, bool, bool> finished(
     std::initializer_list<std::pair<const char*, const char*>> asked_for) {
