@@ -14,7 +14,7 @@
 #include "engine/output.h"
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
-#include "scene/joined_screens.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {

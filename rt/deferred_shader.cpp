@@ -548,12 +548,7 @@ bool DeferredShader::trace_photons(Communicator& comm, const SampleNumber& numbe
                                    const std::function<bool()>& is_overtaken) {
   if (!state_->photons) return true;
   const Stopwatch watch;
-  bool is_wanted = true;
-  if (is_overtaken) {
-    is_wanted = state_->photons->build_while_wanted(number, comm, is_overtaken);
-  } else {
-    (void)state_->photons->build(number, &comm);
-  }
+  const bool is_wanted = state_->photons->build_while_wanted(number, comm, is_overtaken);
   if (is_wanted) state_->photon_ms += watch.ms();
   return is_wanted;
 }

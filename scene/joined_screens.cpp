@@ -1,9 +1,9 @@
-#include "scene/joined_screens.h"
-
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <optional>
+
+#include "scene/view.h"
 
 namespace hpr {
 namespace {

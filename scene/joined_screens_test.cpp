@@ -1,9 +1,9 @@
-#include "scene/joined_screens.h"
-
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
 #include <initializer_list>
+
+#include "scene/view.h"
 
 namespace hpr {
 namespace {

@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "image/image.h"
@@ -82,6 +83,12 @@ void tighten(View& view, const Bounds& bounds);
 
 /// Cuts a view into blocks no larger than `limit` pixels a side (a multiple of 64); one block when it already fits.
 [[nodiscard]] std::vector<View> split_into_blocks(const View& view, int limit);
+
+/// Screens that one eye sees without a gap as parts of one picture: they lie in one plane, have one grid of pixels (to
+/// a sixteenth of a pixel) and touch or overlap. Each becomes a block of the one screen that such a group spans, so
+/// that filters go on from one to the other, on one grid and with one screen's noise. Its number is that of the group's
+/// first screen. All other screens stay as they are. The order stays.
+[[nodiscard]] std::vector<View> join_screens(std::span<const View> screens);
 
 /// The largest side GL draws at once, a multiple of a tile's: llvmpipe clamps larger viewports silently.
 inline constexpr int kRasterLimit = 16384;

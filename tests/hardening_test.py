@@ -9,7 +9,6 @@ to marked places. Then hpr runs in a folder with a false copy of each of its lib
 """
 
 import pathlib
-import platform
 import re
 import shutil
 import subprocess

@@ -71,7 +71,7 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
   if (light.weight == glm::dvec3(0.0)) return;
   const PathVertex& point = wave_.vertices[index];
   glm::dvec3 scattered(0.0);
-  if (!(light.pdf > 0.0) && !(context_.final_gathers() && point.gathered)) {
+  if (!(light.pdf > 0.0) && !context_.leaves_caustics(point)) {
     scattered = point.bsdf.total(light.to_light);
   } else {
     scattered = shared_scattering(point, light);
@@ -90,10 +90,9 @@ void DirectLight::add(std::uint32_t index, const LightSample& light) {
 glm::dvec3 DirectLight::shared_scattering(const PathVertex& point, const LightSample& light) const {
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
-  const bool bundles = context_.final_gathers() && point.gathered;
+  const bool leaves_caustics = context_.leaves_caustics(point);
   for (std::size_t lobe = 0; lobe < point.bsdf.lobes().size(); ++lobe) {
-    // Caustic photons bring it to where light is gathered.
-    if (bundles && context_.follows_for_itself(point.bsdf, kLobes[lobe])) continue;
+    if (leaves_caustics && context_.follows_for_itself(point.bsdf, kLobes[lobe])) continue;
     const bool is_weighed =
         point.may_follow[lobe] && light.pdf > 0.0 && (!point.gathers_near() || light.distance < point.gather_reach);
     const double weight = is_weighed ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;

@@ -92,8 +92,8 @@ struct LightContext {
   const LightSampler& lights;
   const RaySettings& settings;
   std::array<bool, kLobes.size()> followed_lobes{};  ///< whether a pass that follows the lobe runs
-  bool gathers = false;                              ///< whether one runs that follows all the others,
-  const PhotonMaps* photons = nullptr;               ///< and with photons, gathers from afar; null: none were traced
+  bool gathers = false;                              ///< whether one runs that follows all the others
+  const PhotonMaps* photons = nullptr;               ///< null when none were traced
   const View* view = nullptr;                        ///< the tile's view in any sample: the eye's position
   Media eye_media = {};                              ///< the media that the eye of that view lies in
 
@@ -104,6 +104,9 @@ struct LightContext {
 
   /// Whether rays gather what photons tell (RaySettings::final_gather).
   [[nodiscard]] bool final_gathers() const { return gathers && photons != nullptr; }
+  /// Whether that is how light is gathered at a vertex: what lobes that passes follow for themselves make there of
+  /// lamps and skies is then left to caustic photons, at the vertex that light is gathered for.
+  [[nodiscard]] bool leaves_caustics(const PathVertex& point) const { return final_gathers() && point.gathered; }
   /// Whether a pass of its own follows the lobe, and not the one that gathers all others.
   [[nodiscard]] bool follows_for_itself(const Bsdf& bsdf, Lobe lobe) const;
 };

@@ -248,9 +248,9 @@ void choose_followed(const LightContext& context, PathVertex& point) {
   }
 }
 
-/// Whether lamps and skies that a ray finds are what caustic photons bring to where light is gathered.
-bool leaves_to_caustics(const LightContext& context, const PathVertex& from, const PassInfo& pass) {
-  return context.final_gathers() && from.gathered && !pass.gathers_all_lobes;
+/// Whether lamps and skies that a ray finds are what caustic photons bring.
+bool is_caustic(const LightContext& context, const PathVertex& from, const PassInfo& pass) {
+  return context.leaves_caustics(from) && !pass.gathers_all_lobes;
 }
 
 /// See PathVertex::gather_reach. Photons are not asked where a ray that gathers ends near its start: both lie in one
@@ -268,7 +268,7 @@ glm::dvec3 sky_along(const LightContext& context, const LobeRay& ray, const glm:
   const PathVertex& from = *ray.from;
   if (!context.scene.environment && (pass.gathers_all_lobes || from.gathered))
     return glm::dvec3(0.0);  // a backdrop is no light
-  if (leaves_to_caustics(context, from, pass)) return glm::dvec3(0.0);
+  if (is_caustic(context, from, pass)) return glm::dvec3(0.0);
   const double light_pdf =
       ray.pdf > 0.0 ? context.lights.environment_pdf(from.surface.position, from.bsdf.light_normal(), direction) : 0.0;
   return balance_heuristic(context, ray.pdf, light_pdf) * ray.throughput * context.lights.environment(direction);
@@ -341,7 +341,7 @@ void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i
   reached.followed = static_cast<std::uint16_t>(from.followed + (pass.gathers_all_lobes ? 0 : 1));
   reached.gathered = from.gathered || pass.gathers_all_lobes;
   reached.gather_reach = gather_reach(context, from, reached);
-  reached.is_caustic = leaves_to_caustics(context, from, pass);
+  reached.is_caustic = is_caustic(context, from, pass);
   reached.component = component_after(from, pass.component);
 }
 

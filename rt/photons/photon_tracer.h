@@ -140,8 +140,8 @@ class PhotonMapBuilder {
   /// ranks share the work, and each gets all photons.
   const PhotonMaps& build(const SampleNumber& number, Communicator* comm);
 
-  /// As build(), but false on all ranks where `is_overtaken` on any of them before its photons were traced: then the
-  /// maps are made anew when next asked for. Ranks agree every tenth of a second or so.
+  /// As build(), but false on all ranks where `is_overtaken` (null: never) on any of them before its photons were
+  /// traced: then the maps are made anew when next asked for. Ranks agree every tenth of a second or so.
   [[nodiscard]] bool build_while_wanted(const SampleNumber& number, Communicator& comm,
                                         const std::function<bool()>& is_overtaken);
 

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <random>
 #include <utility>
 
 #include "scene/generators/generators.h"
@@ -13,17 +14,6 @@ namespace {
 
 constexpr int kMaxCount = 10'000'000;
 constexpr double kHeight = 1.2;  ///< of the knot's center
-
-/// A number in [0, 1) for each point and purpose.
-double random_number(std::uint32_t point, std::uint32_t purpose, std::uint32_t seed) {
-  std::uint32_t h = (point + 1) * 0x9e3779b9U ^ (purpose + 1) * 0x85ebca6bU ^ seed * 0xc2b2ae35U;
-  h ^= h >> 16U;
-  h *= 0x7feb352dU;
-  h ^= h >> 15U;
-  h *= 0x846ca68bU;
-  h ^= h >> 16U;
-  return h / 4294967296.0;
-}
 
 /// A point of the (2, 3) torus knot of outer radius 1.
 glm::dvec3 knot(double turns) {
@@ -50,10 +40,12 @@ Mesh scanned_knot(int count, std::uint32_t seed) {
   mesh.positions.reserve(points);
   mesh.colors.reserve(points);
   mesh.triangles.reserve(points);
+  std::mt19937 random(seed);  // the same numbers everywhere, which the library's distributions do not promise
+  const auto next = [&random] { return static_cast<double>(random()) / 4294967296.0; };
   for (std::uint32_t i = 0; i < points; ++i) {
-    const double t = random_number(i, 0, seed);
-    const double around = random_number(i, 1, seed);
-    const double off = random_number(i, 2, seed) - 0.5;
+    const double t = next();
+    const double around = next();
+    const double off = next() - 0.5;
     constexpr double kStep = 1e-4;
     const glm::dvec3 along = glm::normalize(knot(t + kStep) - knot(t - kStep));
     const glm::dvec3 u = glm::normalize(glm::cross(along, {0.0, 1.0, 0.0}));

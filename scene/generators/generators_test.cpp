@@ -55,7 +55,7 @@ TEST(Generated, ScenesDoNotChangeSilently) {
   const std::map<std::string, std::uint64_t> hashes{
       {"gallery", 0x1503f8b966689369}, {"extensions", 0x4a045db9567e7654}, {"sphereflake", 0x1caf9d147f58cd66},
       {"tetra", 0x409996e2fc2ef69e},   {"cornell", 0xa6df153e2ef22d65},    {"asteroids", 0x7ac647078a9290c6},
-      {"cloud", 0xdb4f2cb2a75291c9}};
+      {"cloud", 0xbdc18ab45b8df55c}};
   EXPECT_EQ(hashes.size(), all_generators().size());
   for (const Generator& generator : all_generators()) {
     ASSERT_TRUE(hashes.contains(generator.name)) << generator.name;
