@@ -140,6 +140,20 @@ TEST(RenderSettings, RaysGatherWhereSamplesAreMany) {
   EXPECT_FALSE(gathers({{"quality", "best"}, {"final-gather", "false"}}));
 }
 
+TEST(RenderSettings, FiltersCrossTilesFromFourSamplesOn) {
+  const auto crosses = [](std::initializer_list<std::pair<const char*, const char*>> asked_for, bool finishes = false) {
+    RenderSettings settings;
+    settings.finishes = finishes;
+    for (const auto& [name, value] : asked_for) set_setting(settings, name, value);
+    return resolve(settings, 1).frame.rays.filter_across_tiles;
+  };
+  EXPECT_TRUE(crosses({}, true));
+  EXPECT_FALSE(crosses({{"spp", "8"}}));
+  EXPECT_FALSE(crosses({{"spp", "3"}, {"denoise", "true"}}));
+  EXPECT_TRUE(crosses({{"spp", "4"}, {"denoise", "true"}}));
+  EXPECT_TRUE(crosses({{"spp", "4"}, {"half-resolution", "shadow"}}));
+}
+
 /// Samples, denoiser and indirect light of a picture for looking at.
 std::tuple<std::optional<std::uint32_t>, bool, bool> finished(
     std::initializer_list<std::pair<const char*, const char*>> asked_for) {

@@ -321,9 +321,10 @@ void DeferredShader::State::shade_waiting(const LightContext& context, Scratch& 
   }
 }
 
-/// The strips that filters of a tile read beyond the edges of its block.
+/// The strips that filters of a tile read beyond its edges.
 std::size_t DeferredShader::State::count_margins(const LightContext& context, const TileJob& job, bool denoises) const {
-  return (denoises || shared != 0) && context.rays != nullptr ? TileMargin::count(job) : 0;
+  return (denoises || shared != 0) && context.rays != nullptr ? TileMargin::count(job, settings.filter_across_tiles)
+                                                              : 0;
 }
 
 void DeferredShader::State::start_filters(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,

@@ -58,6 +58,9 @@ struct RaySettings {
   std::optional<std::vector<SurfaceRange>> part = {};
   Background background = {};
   bool denoise = false;  ///< see Denoiser
+  /// Filters of a tile (Denoiser, HalfResShading) read its neighbors' pixels too, not only those of other blocks:
+  /// its edges show no seams, and a seventh of the pixels is shaded twice.
+  bool filter_across_tiles = false;
   PixelFilter filter =
       PixelFilter::Box;    ///< of the pixels, which denoising samples at more places; none of its weights < 0
   bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments

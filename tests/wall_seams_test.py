@@ -116,8 +116,20 @@ def no_steps(folder):
                 expect(pixels == whole[filtered], f"{name}, {filtered}: other pixels than one screen has")
 
 
+def tiles_have_no_seams(folder):
+    """From 4 samples on filters go on from tile to tile of one screen too."""
+    width, height = 200, 120
+    write_wall(folder / "tiles.toml", [[0, 0, width, height]])
+    for more in (("--denoise",), ("--half-resolution", "shadow,photon")):
+        pixels = assembled([[0, 0, width, height]], draw(folder, "tiles", (*more, "--indirect", "--spp", "4")))
+        for axis, line, along in ((0, 64, range(height)), (0, 128, range(height)), (1, 64, range(width))):
+            step = step_at(pixels, line, along, axis)
+            about = statistics.median(step_at(pixels, line + off, along, axis) for off in (-8, -6, -5, -4, -3, 3, 4, 5, 6, 8))
+            expect(step <= MOST * about + 0.1, f"tiles, {more[0]}: a step of {step:.2f} at {'xy'[axis]} = {line}, {about:.2f} about it")
+
+
 def same_bits(folder):
-    for name, more in (("grid", FILTERS["denoised"]), ("mixed", FILTERS["scaled unevenly"]), ("columns", FILTERS["at half resolution"])):
+    for name, more in (("grid", FILTERS["denoised"]), ("rows", ("--denoise", "--spp", "4")), ("mixed", FILTERS["scaled unevenly"]), ("columns", FILTERS["at half resolution"])):
         expected = draw(folder, name, more)
         for ranks, spread in ((3, ()), (3, ("--distribute", "sort-last")), (2, ("--data", "partitioned")), (1, ("--threads", "1"))):
             expect(draw(folder, name, (*more, *spread), ranks) == expected, f"{name} {more}: other bits on {ranks} ranks {spread}")
@@ -140,6 +152,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
         no_steps(folder)
+        tiles_have_no_seams(folder)
         same_bits(folder)
         gaps_keep_screens_apart(folder)
     return 1 if failures else 0

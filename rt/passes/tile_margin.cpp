@@ -12,19 +12,23 @@ struct Span {
   int end = 0;
 };
 
-/// The spans before, along and after; empty where the screen does not go on.
-std::array<Span, 3> spans_of(int first, int end, int block_first, int block_end, int screen, int reach) {
+/// The spans before, along and after; empty where the screen does not go on, and where another tile of the block
+/// follows unless filters go on across tiles.
+std::array<Span, 3> spans_of(int first, int end, int block_first, int block_end, int screen, int reach,
+                             bool across_tiles) {
   std::array<Span, 3> spans{Span{}, {first, end}, Span{}};
-  if (first == 0) spans[0] = {std::max(-reach, -block_first), 0};
-  if (end == block_end - block_first) spans[2] = {end, std::min(end + reach, screen - block_first)};
+  if (across_tiles || first == 0) spans[0] = {std::max(first - reach, -block_first), first};
+  if (across_tiles || end == block_end - block_first) spans[2] = {end, std::min(end + reach, screen - block_first)};
   return spans;
 }
 
 /// The rectangles about a tile, row by row, relative to its block.
-std::vector<Rect> rects_about(const TileJob& job, int reach) {
+std::vector<Rect> rects_about(const TileJob& job, int reach, bool across_tiles) {
   const View& view = *job.view;
-  const auto columns = spans_of(job.rect.x0, job.rect.x1, view.block.x0, view.block.x1, view.screen.width, reach);
-  const auto rows = spans_of(job.rect.y0, job.rect.y1, view.block.y0, view.block.y1, view.screen.height, reach);
+  const auto columns =
+      spans_of(job.rect.x0, job.rect.x1, view.block.x0, view.block.x1, view.screen.width, reach, across_tiles);
+  const auto rows =
+      spans_of(job.rect.y0, job.rect.y1, view.block.y0, view.block.y1, view.screen.height, reach, across_tiles);
   std::vector<Rect> rects;
   for (const Span& row : rows) {
     for (const Span& column : columns) {
@@ -37,14 +41,14 @@ std::vector<Rect> rects_about(const TileJob& job, int reach) {
 
 }  // namespace
 
-std::size_t TileMargin::count(const TileJob& job) {
-  return rects_about(job, 1).size();
+std::size_t TileMargin::count(const TileJob& job, bool across_tiles) {
+  return rects_about(job, 1, across_tiles).size();
 }
 
 void TileMargin::find(const LightContext& context, const TileJob& job, int reach, std::uint32_t first_pixel,
                       RayBuffers& buffers) {
   strips_.clear();
-  const std::vector<Rect> rects = rects_about(job, reach);
+  const std::vector<Rect> rects = rects_about(job, reach, context.settings.filter_across_tiles);
   keys_.assign(rects.size() * kTilePixels, kNoKey);
   buffers.requests.clear();
   for (std::size_t i = 0; i < rects.size(); ++i) {

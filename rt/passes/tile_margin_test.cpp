@@ -89,14 +89,34 @@ TEST(TileMargin, BlocksAtHalfResolutionHaveNoSeams) {
                   5);
 }
 
+/// Pixels have the same bits wherever tiles end.
+TEST(TileMargin, TilesHaveNoSeamsWhereFiltersCrossThem) {
+  const Scene scene = room();
+  View view = test::view_from({0.5, 2, -1}, {0.4, 0, -1.4}, {128, 128}, scene);
+  for (const RaySettings& settings :
+       {RaySettings{.passes = {PassId::Gather}, .max_depth = 4, .denoise = true, .filter_across_tiles = true},
+        RaySettings{.passes = {PassId::Shadow, PassId::AmbientOcclusion},
+        .half_resolution = {PassId::Shadow, PassId::AmbientOcclusion},
+        .filter_across_tiles = true}}) {
+    for (std::uint32_t sample = 0; sample < 2; ++sample) {
+      const Image<Rgb> tiles = shade_in_blocks(scene, view, settings, {0, 128}, {0, 128}, sample);
+      const Image<Rgb> other_tiles = shade_in_blocks(scene, view, settings, {0, 32, 128}, {0, 16, 128}, sample);
+      EXPECT_EQ(count_other_pixels(tiles, other_tiles), 0U) << "sample " << sample;
+      RaySettings within = settings;
+      within.filter_across_tiles = false;
+      EXPECT_NE(count_other_pixels(shade_in_blocks(scene, view, within, {0, 128}, {0, 128}, sample), tiles), 0U);
+    }
+  }
+}
+
 TEST(TileMargin, ScreensThatEndHaveNone) {
   const Scene scene = room();
   View view = test::view_from({0.5, 2, 5}, {0, 1, 0}, {150, 100}, scene);
-  const auto strips = [&](const Rect& tile) {
+  const auto strips = [&](const Rect& tile, bool across_tiles = false) {
     TileJob job;
     job.rect = tile;
     job.view = &view;
-    return TileMargin::count(job);
+    return TileMargin::count(job, across_tiles);
   };
   EXPECT_EQ(strips({0, 0, 64, 64}), 0U);
   EXPECT_EQ(strips({128, 64, 150, 100}), 0U);
@@ -106,6 +126,10 @@ TEST(TileMargin, ScreensThatEndHaveNone) {
   view.block = {20, 0, 150, 90};
   EXPECT_EQ(strips({0, 64, 64, 90}), 3U);
   EXPECT_EQ(strips({64, 64, 128, 90}), 1U);
+  EXPECT_EQ(strips({64, 64, 128, 90}, true), 8U);
+  view.block = {0, 0, 150, 100};
+  EXPECT_EQ(strips({64, 0, 128, 64}, true), 5U);
+  EXPECT_EQ(strips({128, 64, 150, 100}, true), 3U);
 }
 
 }  // namespace
