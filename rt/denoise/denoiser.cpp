@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "rt/passes/pixel_sums.h"
@@ -225,7 +226,15 @@ void Denoiser::add_sample(const LightContext& context, const TileJob& job, RayBu
   point.pixel = spare_ + sample.pixel;
 }
 
-void Denoiser::set_apart(const PixelSums& sums, const TileJob& job, std::span<const TileJob> margin) {
+/// About the most that a surface scatters of the sky: a sample that sees it where its neighbors do not is no brighter.
+double Denoiser::sky_light(const LightContext& context, const PixelFeature& seen) {
+  const glm::dvec3 scattering(scattering_of(seen, FilterLobe::All));
+  return brightness(scattering) * context.lights.environment_irradiance(glm::dvec3(seen.shading_normal)) *
+         std::numbers::inv_pi;
+}
+
+void Denoiser::set_apart(const LightContext& context, const PixelSums& sums, const TileJob& job,
+                         std::span<const TileJob> margin) {
   brightness_.fill(0.0);
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
     const bool is_lit = own >= spare_ || job.wants(own - job.first_pixel);
@@ -240,7 +249,8 @@ void Denoiser::set_apart(const PixelSums& sums, const TileJob& job, std::span<co
         if (about != at) brightest = std::max(brightest, brightness_.at(about));
       }
     }
-    const bool is_far_brighter = states_[own] == State::Tap && brightness(light) > kFarBrighter * brightest;
+    const bool is_far_brighter = states_[own] == State::Tap && brightness(light) > kFarBrighter * brightest &&
+                                 brightness(light) > sky_light(context, pixel_features_[own]);
     if (!fits_floats(light) || is_far_brighter) states_[own] = State::Apart;
   });
 }
@@ -263,7 +273,7 @@ void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const Coverage
 void Denoiser::resample_edges(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
                               const TileFragments& fragments, RayBuffers& buffers, PixelSums& sums,
                               std::vector<PathVertex>& unfiltered) {
-  set_apart(sums, job, margin);
+  set_apart(context, sums, job, margin);
   each_sum([&](std::size_t i) {
     filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
     std::fill_n(sum_of(sums, i).begin() + spare_, kTilePixels, glm::dvec3(0.0));

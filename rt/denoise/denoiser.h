@@ -87,7 +87,9 @@ class Denoiser {
   template <typename Body>
   static void each_pixel(const TileJob& job, std::span<const TileJob> margin, const Body& body);
   /// Finds pixels that stay apart.
-  void set_apart(const PixelSums& sums, const TileJob& job, std::span<const TileJob> margin);
+  void set_apart(const LightContext& context, const PixelSums& sums, const TileJob& job,
+                 std::span<const TileJob> margin);
+  [[nodiscard]] static double sky_light(const LightContext& context, const PixelFeature& seen);
   /// Whether there is light in a sum that stays with its pixel.
   [[nodiscard]] static bool keeps(const LightContext& context, std::size_t sum);
   /// Sets the features of the taps, then their light.

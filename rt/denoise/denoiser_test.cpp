@@ -259,6 +259,24 @@ TEST(Denoiser, WhatIsFarBrighterThanAllAboutStaysApart) {
 }
 
 /// Stripes of light and of black on one surface, thinner than pixels: subpixel samples at its edges see both.
+/// A sample that sees the sky through a hole stands alone among dark ones, yet its neighbors are lit like it.
+TEST(Denoiser, SkyThroughAHoleIsShared) {
+  Scene scene;
+  add_material(scene, test::diffuse(glm::vec3(0.5F)));
+  place_mesh(scene, add_mesh(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 0, -8}, 0)));
+  for (const float x : {-16.0F, 0.15F}) {  // a ceiling with a slit
+    place_mesh(scene, add_mesh(scene, quad({x, 2, -20}, {15.85F, 0, 0}, {0, 0, 40}, 0)));
+  }
+  scene.environment = Environment{Image<Rgb>({16, 8}, {1.0F, 1.0F, 1.0F})};
+  finish_scene(scene);
+  const View view = test::view_from({0, 1, 1.5}, {0, 0, 0}, {64, 64}, scene);
+  const RaySettings settings{.passes = {PassId::Shadow}};
+  const Image<Rgb> truth = mean_picture(scene, view, settings, 128);
+  const double plain = squared_error(mean_picture(scene, view, settings, 1), truth);
+  const double smooth = squared_error(mean_picture(scene, view, denoised(settings), 1), truth);
+  EXPECT_LT(smooth, 0.1 * plain) << smooth / plain;
+}
+
 TEST(Denoiser, SubpixelSamplesSeeWhatGlowsInPart) {
   Scene scene;
   Material striped = test::glowing(glm::vec3(1.0F));

@@ -188,22 +188,15 @@ std::optional<LightSample> LightSampler::sample(const Choices& choices, const gl
   return sample;
 }
 
-/// By brightness or by the cosine, as suits the environment; the density is that of both together.
 void LightSampler::sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u,
                                       LightSample& sample) const {
-  const bool by_cosine = normal != glm::dvec3(0.0) && rest < environment_->cosine_fraction();
-  sample.to_light = by_cosine ? warp::cosine_lobe(normal, u) : environment_->sample(u);
+  const auto direction = environment_->sample(normal, rest, u);
+  if (!direction) return;
+  sample.to_light = *direction;
   sample.distance = std::numeric_limits<double>::infinity();
-  const EnvironmentMap::DirectionalRadiance seen = environment_->evaluate(sample.to_light);
-  sample.pdf = environment_density(seen.pdf, normal, sample.to_light);
+  const EnvironmentMap::DirectionalRadiance seen = environment_->evaluate(sample.to_light, normal);
+  sample.pdf = seen.pdf;
   if (sample.pdf > 0.0) sample.weight = seen.radiance / sample.pdf;
-}
-
-double LightSampler::environment_density(double by_brightness, const glm::dvec3& normal,
-                                         const glm::dvec3& direction) const {
-  if (normal == glm::dvec3(0.0)) return by_brightness;
-  const double fraction = environment_->cosine_fraction();
-  return (1.0 - fraction) * by_brightness + fraction * std::max(0.0, glm::dot(normal, direction)) / kPi;
 }
 
 double LightSampler::surface_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,
@@ -222,7 +215,7 @@ double LightSampler::environment_pdf(const Choices& choices, const glm::dvec3& p
   const double before = choices.outside.size() > 1 ? choices.outside_sums[choices.outside.size() - 2] : 0.0;
   const double sum = choices.outside_sums.back();
   const double probability = outside_share(choices, position, normal) * ((sum - before) / sum);
-  return environment_density(environment_->evaluate(direction).pdf, normal, direction) * probability;
+  return environment_->evaluate(direction, normal).pdf * probability;
 }
 
 std::optional<LightSample> LightSampler::sample(const glm::dvec3& position, const glm::dvec3& normal, const View& view,
@@ -246,7 +239,11 @@ double LightSampler::surface_pdf_any(const glm::dvec3& position, const glm::dvec
 }
 
 glm::dvec3 LightSampler::environment(const glm::dvec3& direction) const {
-  return environment_ ? environment_->evaluate(direction).radiance : background_;
+  return environment_ ? environment_->radiance(direction) : background_;
+}
+
+double LightSampler::environment_irradiance(const glm::dvec3& normal) const {
+  return environment_ ? environment_->irradiance(normal) : 0.0;
 }
 
 std::optional<glm::dvec3> LightSampler::constant_environment() const {
@@ -278,11 +275,13 @@ std::optional<PhotonStart> LightSampler::emit(double u_choice, const glm::dvec2&
   } else if (picked.index < environment_number()) {
     start = triangles_.emit(picked.index - punctual_.size(), picked.rest, u_place, u_direction);
   } else {
-    const glm::dvec3 from = environment_->sample(u_direction);
-    const EnvironmentMap::DirectionalRadiance seen = environment_->evaluate(from);
+    const glm::dvec3 all_sides(0.0);
+    const auto from = environment_->sample(all_sides, 0.0, u_direction);
+    if (!from) return std::nullopt;
+    const EnvironmentMap::DirectionalRadiance seen = environment_->evaluate(*from, all_sides);
     const double disc = kPi * lit_.radius * lit_.radius;
     start =
-        emit_from_outside(lit_, -from, seen.pdf > 0.0 ? seen.radiance * (disc / seen.pdf) : glm::dvec3(0.0), u_place);
+        emit_from_outside(lit_, -*from, seen.pdf > 0.0 ? seen.radiance * (disc / seen.pdf) : glm::dvec3(0.0), u_place);
   }
   start.flux /= picked.probability;
   if (picked.index < media_.size()) start.media = media_[picked.index];

@@ -65,6 +65,8 @@ class LightSampler {
   [[nodiscard]] glm::dvec3 environment(const glm::dvec3& direction) const;
   /// The radiance from outside the scene where no direction changes it.
   [[nodiscard]] std::optional<glm::dvec3> constant_environment() const;
+  /// An upper estimate of the irradiance of an environment that nothing hides, mean of the channels, in W/m^2.
+  [[nodiscard]] double environment_irradiance(const glm::dvec3& normal) const;
   [[nodiscard]] double environment_pdf(const glm::dvec3& position, const glm::dvec3& normal,
                                        const glm::dvec3& direction) const;
   [[nodiscard]] double environment_pdf_any(const glm::dvec3& position, const glm::dvec3& normal,
@@ -109,8 +111,6 @@ class LightSampler {
                                                   const glm::dvec3& normal, const View& view, double u_choice,
                                                   const glm::dvec2& u) const;
   void sample_environment(const glm::dvec3& normal, double rest, const glm::dvec2& u, LightSample& sample) const;
-  [[nodiscard]] double environment_density(double by_brightness, const glm::dvec3& normal,
-                                           const glm::dvec3& direction) const;
   [[nodiscard]] double surface_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,
                                    std::uint32_t surface, const SurfacePoint& hit) const;
   [[nodiscard]] double environment_pdf(const Choices& choices, const glm::dvec3& position, const glm::dvec3& normal,

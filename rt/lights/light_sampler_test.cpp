@@ -217,7 +217,7 @@ TEST(LightSampler, MatteSurfacesUnderAnEvenSkySeeNoNoise) {
   EXPECT_LT(spread_of_sky(clouds, normal), 0.4) << "by brightness alone it is 1.3";
   Environment sun{Image<Rgb>({64, 32}, {0.01F, 0.01F, 0.01F})};
   sun.image.at(20, 9) = {1e4F, 1e4F, 1e4F};
-  const glm::dvec3 to_sun = EnvironmentMap(sun).sample({0.5, 0.5});
+  const glm::dvec3 to_sun = EnvironmentMap(sun).sample(glm::dvec3(0.0), 0.0, {0.5, 0.5}).value();
   EXPECT_LT(spread_of_sky(sun, to_sun), 1.5) << "by the cosine alone it is above 10";
 }
 
