@@ -149,12 +149,17 @@ int scaled(int side, double scale) {
   return std::max(static_cast<int>(std::lround(side * scale)), 1);
 }
 
-/// The first and one past the last of `made` pixels of a side that show some of `shown` ones, and what enlarging takes
-/// of those before and after.
+/// Of `made` pixels of a side the first and one past the last that show some of `shown` ones.
 std::pair<int, int> scaled_part(int first, int end, int shown, int made) {
-  if (made == shown) return {first, end};
   const auto at = [&](int edge) { return static_cast<int>(std::lround(static_cast<double>(edge) * made / shown)); };
-  return {std::max(at(first) - 1, 0), std::min(at(end) + 1, made)};
+  return {at(first), at(end)};
+}
+
+/// Those, and what enlarging takes of those before and after.
+std::pair<int, int> enlarged_part(int first, int end, int shown, int made) {
+  if (made == shown) return {first, end};
+  const auto [made_first, made_end] = scaled_part(first, end, shown, made);
+  return {std::max(made_first - 1, 0), std::min(made_end + 1, made)};
 }
 
 }  // namespace
@@ -164,9 +169,13 @@ std::vector<View> at_resolution(std::span<const View> screens, double scale) {
   for (View& view : made) {
     const Size shown = view.screen;
     view.screen = {scaled(shown.width, scale), scaled(shown.height, scale)};
-    const auto [x0, x1] = scaled_part(view.block.x0, view.block.x1, shown.width, view.screen.width);
-    const auto [y0, y1] = scaled_part(view.block.y0, view.block.y1, shown.height, view.screen.height);
-    view.block = {x0, y0, x1, y1};
+    const auto scaled_rect = [&](const Rect& rect, auto& part) {
+      const auto [x0, x1] = part(rect.x0, rect.x1, shown.width, view.screen.width);
+      const auto [y0, y1] = part(rect.y0, rect.y1, shown.height, view.screen.height);
+      return Rect{x0, y0, x1, y1};
+    };
+    view.block = scaled_rect(view.block, enlarged_part);
+    if (view.joined_part) view.joined_part->pixels = scaled_rect(view.joined_part->pixels, scaled_part);
   }
   return made;
 }
@@ -266,7 +275,7 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
   const auto collect = [&](auto& layer) { session.assembler().assemble(session.comm(), layer, frame.owned, to_root); };
   // A PNG holds display colours, a third of the bytes of the radiance an EXR holds.
   const bool display_colors = files_.is_png() && !enlarged();
-  if (files_.is_png()) transform_ = transform_for(session, frame, files_.display);
+  if (files_.is_png()) transform_ = transform_for(session, frame, blocks.views, files_.display);
   if (display_colors) {
     display_ = to_display(frame, session.threads(), *transform_, AlphaUse::Straight);
     collect(display_);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -108,7 +109,7 @@ TEST(DeferredShader, NoSphereShadowsItselfAtAnyScale) {
       Light sun;
       sun.type = LightType::Directional;
       sun.direction = glm::normalize(glm::vec3(-0.8F, -0.5F, -0.2F));
-      scene.lights = {sun};
+      scene.lights.assign(8, sun);
       const View view = test::view_from(center + glm::dvec3(0, 0, 4.0 * scale), center, {64, 64}, scene, 0.6);
       const test::Shaded lit = test::shade(scene, view);
       const test::Shaded unshadowed = test::shade(scene, view, {.auto_passes = false});
@@ -267,6 +268,51 @@ TEST(DeferredShader, InfiniteRadianceIsBlackAndCounted) {
   const test::Shaded lit = test::shade(scene, view);
   for (const Rgb& pixel : lit.image.pixels()) EXPECT_TRUE(std::isfinite(pixel.r));
   EXPECT_GT(lit.counts.not_finite, 0U);
+}
+
+/// The counts of screens side by side that see an infinitely bright background from the right one's eleventh column on.
+RayCounts counts_of_too_bright(bool are_joined, bool by_paths) {
+  Scene scene;
+  test::place_mesh(scene, test::add_mesh(scene, test::quad({-3.79F, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0)));
+  Material unlit;
+  unlit.unlit = true;
+  test::add_material(scene, unlit);
+  constexpr float kInfinite = std::numeric_limits<float>::infinity();
+  scene.background = {kInfinite, kInfinite, kInfinite};
+  finish_scene(scene);
+  View left = test::view_from({0, 0, 3}, {0, 0, 0}, {70, 100}, scene);
+  left.right = 0.0;
+  left.left = -0.007 * left.screen.width;
+  View right = left;
+  left.screen_number = 5;
+  right.screen_number = 6;
+  right.left = 0.0;
+  right.right = -left.left;
+  std::vector<View> views{left, right};
+  if (are_joined) {
+    views = join_screens(views);
+    // What enlarging takes.
+    ++views[0].block.x1;
+    --views[1].block.x0;
+  }
+  const TileLayer<Key> keys = test::cast_keys(scene, views);
+  RaySettings settings;
+  settings.reference = by_paths;
+  DeferredShader shader(scene, settings);
+  TileLayer<Rgb> radiance(keys.layout());
+  shader.shade(views, keys, all_tiles(keys.layout()), {.radiance = &radiance});
+  return shader.counts();
+}
+
+TEST(DeferredShader, PixelsWithoutFiniteRadianceAreThoseOfTheirScreenThoughItIsJoined) {
+  for (const bool by_paths : {false, true}) {
+    const RayCounts alone = counts_of_too_bright(false, by_paths);
+    const RayCounts joined = counts_of_too_bright(true, by_paths);
+    EXPECT_GT(alone.not_finite, 100U);
+    EXPECT_EQ(alone.first_not_finite.screen, 6U);
+    EXPECT_EQ(joined.not_finite, alone.not_finite);
+    EXPECT_EQ(joined.first_not_finite, alone.first_not_finite);
+  }
 }
 
 TEST(DeferredShader, TheFirstPixelWithoutFiniteRadianceIsNamedWhoeverMeetsIt) {

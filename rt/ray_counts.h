@@ -8,6 +8,7 @@
 
 #include "rt/passes/pass_id.h"
 #include "rt/sampling/sampler.h"
+#include "scene/view.h"
 
 namespace hpr {
 
@@ -27,6 +28,17 @@ struct PrimaryRayStats {
   }
 };
 
+/// Pixel (x, y) of a view as its screen has it, whether that is joined to others or not; nothing where it is one of
+/// those others' pixels.
+[[nodiscard]] inline std::optional<ScreenPixel> own_pixel(const View& view, int x, int y) {
+  x += view.block.x0;
+  y += view.block.y0;
+  if (!view.joined_part) return ScreenPixel{view.screen_number, y, x};
+  const Rect& own = view.joined_part->pixels;
+  if (x < own.x0 || x >= own.x1 || y < own.y0 || y >= own.y1) return std::nullopt;
+  return ScreenPixel{view.joined_part->screen_number, y - own.y0, x - own.x0};
+}
+
 /// Rays traced, by kind, and what had to be left out.
 struct RayCounts {
   std::uint64_t primary = 0;                    ///< from the eye: no pass counts them
@@ -34,7 +46,7 @@ struct RayCounts {
   std::uint64_t invalid = 0;                    ///< rays above that Embree cannot trace (is_traceable): they missed
   std::uint64_t cut = 0;                        ///< rays that ended among surfaces of partial coverage, see kMaxPassed
   std::uint64_t not_finite = 0;                 ///< pixels whose radiance was no finite number: they are black
-  ScreenPixel first_not_finite;  ///< the first such pixel by screen and row, on any thread; else kNoPixel
+  ScreenPixel first_not_finite;  ///< the first such pixel by screen and row (own_pixel), on any thread; else kNoPixel
 
   [[nodiscard]] std::uint64_t& operator[](PassId pass) { return passes.at(static_cast<std::size_t>(pass)); }
   [[nodiscard]] std::uint64_t operator[](PassId pass) const { return passes.at(static_cast<std::size_t>(pass)); }

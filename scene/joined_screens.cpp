@@ -109,9 +109,11 @@ std::vector<View> join_screens(std::span<const View> screens) {
     const View spanned = spanned_screen(screens, group);
     for (const Part& part : group) {
       View& view = joined[part.screen];
+      const std::uint32_t screen_number = view.screen_number;
       view = spanned;
       view.block = {part.rect.x0 - spanned.block.x0, part.rect.y0 - spanned.block.y0, part.rect.x1 - spanned.block.x0,
                     part.rect.y1 - spanned.block.y0};
+      view.joined_part = {screen_number, view.block};
     }
   }
   return joined;

@@ -15,6 +15,12 @@
 
 namespace hpr {
 
+/// A screen of the wall as a part of the one that it was joined to (join_screens).
+struct JoinedPart {
+  std::uint32_t screen_number = 0;  ///< its own
+  Rect pixels;                      ///< its own, of the screen they all span
+};
+
 /// One screen as an eye sees it, all in double. The screen is the unit of rasterisation: its projection never changes
 /// with strategy or rank count, parts of it are drawn by scissor. Screens beyond the raster limit are cut into fixed
 /// blocks.
@@ -33,6 +39,7 @@ struct View {
   Size screen;  ///< pixels of the whole screen
   Rect block;   ///< the part of it this view draws; pixel (x, y) of the view is pixel (block.x0 + x, block.y0 + y)
   std::uint32_t screen_number = 0;  ///< which screen of the wall: its blocks have the same one, and so the same noise
+  std::optional<JoinedPart> joined_part;  ///< whose pixels `block` may reach beyond by what enlarging takes
   /// Pixels from its centre, to the right and down, at which every pixel is sampled.
   glm::dvec2 jitter{0.0};
   /// Rays go through these and no longer through the plane between the edges, which is all that rasterising knows.

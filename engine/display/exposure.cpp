@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cluster/transport/collectives.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "core/timing.h"
 #include "engine/frame.h"
@@ -23,6 +24,13 @@ constexpr int kExponentBias = 127;
 /// Of display primaries, IEC 61966-2-1.
 float luminance(const Rgb& color) {
   return 0.2126F * color.r + 0.7152F * color.g + 0.0722F * color.b;
+}
+
+/// Those of a view's pixels that none of the screens it is joined to has, by the view's corner.
+Rect own_pixels(const View& view) {
+  if (!view.joined_part) return {0, 0, view.block.width(), view.block.height()};
+  const Rect& own = view.joined_part->pixels;
+  return {own.x0 - view.block.x0, own.y0 - view.block.y0, own.x1 - view.block.x0, own.y1 - view.block.y0};
 }
 
 /// The logarithm of the middle of a bin.
@@ -75,16 +83,18 @@ double automatic_exposure(const LuminanceHistogram& histogram) {
   return std::clamp(*mean, grey - kDarkStops, grey + kBrightStops) - *mean;
 }
 
-LuminanceHistogram measure_luminance(Session& session, const Frame& frame) {
+LuminanceHistogram measure_luminance(Session& session, const Frame& frame, std::span<const View> views) {
   const trace::Span span("measure luminance");
   const FrameLayout& layout = frame.radiance.layout();
+  HPR_CHECK(views.size() == layout.screens());
   const TileLayer<float>* const alpha = frame.alpha();
   std::vector<LuminanceHistogram> of_tiles(frame.owned.size());
   parallel_for(session.threads(), frame.owned.size(), [&](std::size_t i) {
-    const Rect rect = layout.place(frame.owned[i]).pixels;
+    const TilePlace location = layout.place(frame.owned[i]);
+    const Rect counted = intersection(location.pixels, own_pixels(views[location.screen]));
     const std::span<const Rgb> pixels = frame.radiance.tile(frame.owned[i]);
-    for (int y = 0; y < rect.height(); ++y) {
-      for (int x = 0; x < rect.width(); ++x) {
+    for (int y = counted.y0 - location.pixels.y0; y < counted.y1 - location.pixels.y0; ++y) {
+      for (int x = counted.x0 - location.pixels.x0; x < counted.x1 - location.pixels.x0; ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
         of_tiles[i].add(alpha == nullptr ? pixels[pixel]
                                          : unassociated(pixels[pixel], alpha->tile(frame.owned[i])[pixel]));
@@ -98,9 +108,10 @@ LuminanceHistogram measure_luminance(Session& session, const Frame& frame) {
   return all;
 }
 
-DisplayTransform transform_for(Session& session, const Frame& frame, const DisplaySettings& settings) {
+DisplayTransform transform_for(Session& session, const Frame& frame, std::span<const View> views,
+                               const DisplaySettings& settings) {
   if (settings.exposure_stops) return fixed_transform(settings);
-  return {automatic_exposure(measure_luminance(session, frame)), settings.tone};
+  return {automatic_exposure(measure_luminance(session, frame, views)), settings.tone};
 }
 
 double SmoothExposure::next(double wanted_stops) {

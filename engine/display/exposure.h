@@ -9,6 +9,7 @@
 
 #include "image/color.h"
 #include "image/tone.h"
+#include "scene/view.h"
 
 namespace hpr {
 
@@ -56,11 +57,13 @@ struct DisplaySettings {
 }
 
 /// Collective. The histogram of all screens' pixels, the same on all ranks; of a transparent frame what surfaces show,
-/// however little they cover.
-[[nodiscard]] LuminanceHistogram measure_luminance(Session& session, const Frame& frame);
+/// however little they cover. `views` are the frame's; where screens are joined, what one draws of its neighbors'
+/// pixels counts as theirs alone.
+[[nodiscard]] LuminanceHistogram measure_luminance(Session& session, const Frame& frame, std::span<const View> views);
 
 /// Collective. How to show a frame, the same on all ranks and for all screens.
-[[nodiscard]] DisplayTransform transform_for(Session& session, const Frame& frame, const DisplaySettings& settings);
+[[nodiscard]] DisplayTransform transform_for(Session& session, const Frame& frame, std::span<const View> views,
+                                             const DisplaySettings& settings);
 
 /// The exposure of frame after frame: it follows what each one asks for by a tenth of the difference, as a camera does.
 class SmoothExposure {

@@ -10,6 +10,7 @@
 
 #include "cluster/transport/local_communicator.h"
 #include "engine/frame.h"
+#include "engine/output.h"
 #include "engine/session.h"
 #include "scene/load_scene.h"
 
@@ -73,6 +74,8 @@ TEST(Exposure, FollowsTheLightSlowlyAndArrives) {
 /// Pixels of two screens that are their own light, and garbage past the screens' edges.
 double exposure_of_screens(int ranks) {
   const FrameLayout layout({{130, 70}, {64, 100}});
+  std::vector<View> views(2);
+  for (std::size_t i = 0; i < 2; ++i) views[i].block = {0, 0, layout.size(i).width, layout.size(i).height};
   std::mutex mutex;
   std::vector<double> all_stops;
   run_local_ranks(
@@ -94,7 +97,8 @@ double exposure_of_screens(int ranks) {
           }
           frame.radiance.set_active(tile);
         }
-        const DisplayTransform transform = transform_for(session, frame, {.exposure_stops = {}, .tone = Tone::Agx});
+        const DisplayTransform transform =
+            transform_for(session, frame, views, {.exposure_stops = {}, .tone = Tone::Agx});
         EXPECT_EQ(transform.tone, Tone::Agx);
         const std::lock_guard lock(mutex);
         all_stops.push_back(transform.exposure_stops);
@@ -109,6 +113,55 @@ TEST(Exposure, IsOneForAllScreensAndTheSameForAnyNumberOfRanks) {
   // Lights from 8 to 16: about 6 stops over grey.
   EXPECT_NEAR(alone, kBrightStops - 6.0, 0.3);
   EXPECT_EQ(exposure_of_screens(3), alone);
+}
+
+/// Four screens that touch, made with fewer pixels: each also has what enlarging takes of its neighbors.
+TEST(Exposure, CountsEveryPixelOfJoinedScreensOnce) {
+  std::vector<View> screens(4);
+  for (std::size_t i = 0; i < screens.size(); ++i) {
+    View& view = screens[i];
+    view.screen_number = static_cast<std::uint32_t>(i);
+    view.screen = {171, 105};
+    view.block = {0, 0, 171, 105};
+    view.left = i % 2 == 0 ? -1.71 : 0.0;
+    view.right = view.left + 1.71;
+    view.bottom = i < 2 ? 0.0 : -1.05;
+    view.top = view.bottom + 1.05;
+  }
+  for (const double scale : {0.37, 0.5, 1.0}) {
+    const Blocks blocks = cut_blocks(join_screens(screens), scale);
+    const Size whole = blocks.made[0].whole;
+    // Light by the place in the picture, so that whichever screen has a pixel has the same.
+    const auto light_at = [&](int x, int y) { return grey(std::exp2((x + 7 * y) % 13)); };
+    LuminanceHistogram expected;
+    for (int y = 0; y < whole.height; ++y) {
+      for (int x = 0; x < whole.width; ++x) expected.add(light_at(x, y));
+    }
+    run_local_ranks(
+        2,
+        [&](Communicator& comm) {
+          Session session(comm, {.threads = 2}, [] { return load_scene("gen:cornell"); });
+          Frame frame;
+          frame.radiance = TileLayer<Rgb>(layout_of(blocks.views));
+          const FrameLayout& layout = frame.radiance.layout();
+          for (const std::size_t tile : all_tiles(layout)) {
+            if (static_cast<int>(tile) % 2 != comm.rank()) continue;
+            frame.owned.push_back(tile);
+            const TilePlace location = layout.place(tile);
+            const Rect& block = blocks.views[location.screen].block;
+            for (int y = 0; y < location.pixels.height(); ++y) {
+              for (int x = 0; x < location.pixels.width(); ++x) {
+                frame.radiance.tile(tile)[static_cast<std::size_t>(y * kTileSide + x)] =
+                    light_at(block.x0 + location.pixels.x0 + x, block.y0 + location.pixels.y0 + y);
+              }
+            }
+          }
+          const LuminanceHistogram measured = measure_luminance(session, frame, blocks.views);
+          EXPECT_EQ(measured.pixels(), expected.pixels()) << scale;
+          EXPECT_EQ(measured.mean_stops(), expected.mean_stops()) << scale;
+        },
+        std::chrono::seconds(20));
+  }
 }
 
 }  // namespace

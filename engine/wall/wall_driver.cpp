@@ -304,7 +304,7 @@ bool WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
                         fmt::format("of {} tile{} no two of three drawings agree", unmended, unmended == 1 ? "" : "s"),
                         "memory, a GPU or a link of these ranks flips bits: replace it");
     }
-    showing_.transform = transform_for(session_, frame, display_settings_);
+    showing_.transform = transform_for(session_, frame, frames_->blocks().views, display_settings_);
     shows_again_ = false;
     SmoothExposure exposure = exposure_;
     if (!display_settings_.exposure_stops) {

@@ -301,7 +301,9 @@ TEST(Denoiser, SubpixelSamplesSeeWhatGlowsInPart) {
 TEST(Denoiser, SubpixelSamplesEndAtTheFarPlane) {
   Scene scene;
   add_material(scene, test::diffuse());
-  place_mesh(scene, add_mesh(scene, quad({-0.5F, -0.5F, 0}, {1, 0, 0}, {0, 1, 0}, 0)));
+  place_mesh(scene, add_mesh(scene, quad({-0.49F, -0.49F, 0}, {0.98F, 0, 0}, {0, 0.98F, 0}, 0)));
+  // Out of sight: both scenes are of one size, and rounded alike.
+  place_mesh(scene, add_mesh(scene, quad({4, 4, -4}, {1, 0, 0}, {0, 1, 0}, 0)));
   place_mesh(scene, add_mesh(scene, quad({-0.8F, -0.8F, -4}, {1.1F, 0, 0}, {0, 1.1F, 0}, 0)));
   scene.background = {0.25F, 0.25F, 0.25F};
   Scene near = scene;

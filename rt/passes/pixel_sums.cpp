@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <type_traits>
 
 #include "rt/passes/path_vertex.h"
@@ -29,15 +30,14 @@ void each_lit(const TileJob& job, const Body& body) {
   }
 }
 
-/// Counts a pixel whose radiance is no finite number.
+/// Counts a pixel whose radiance is no finite number, unless a neighbor that the screen is joined to counts it.
 void count_not_finite(const TileJob& job, std::size_t pixel, RayCounts& counts) {
-  ++counts.not_finite;
-  const Rect& block = job.view->block;
   const auto x = static_cast<int>(pixel % kTileSide);
   const auto y = static_cast<int>(pixel / kTileSide);
-  counts.first_not_finite =
-      std::min(counts.first_not_finite,
-               ScreenPixel{job.view->screen_number, block.y0 + job.rect.y0 + y, block.x0 + job.rect.x0 + x});
+  const std::optional<ScreenPixel> own = own_pixel(*job.view, job.rect.x0 + x, job.rect.y0 + y);
+  if (!own) return;
+  ++counts.not_finite;
+  counts.first_not_finite = std::min(counts.first_not_finite, *own);
 }
 
 /// Sets the sums of so many pixels, tile after tile, to 0 where they are wanted, everywhere when the mask is empty, and

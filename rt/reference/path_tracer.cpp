@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/photons/photon_query.h"
+#include "rt/ray_counts.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 
@@ -426,11 +428,14 @@ Path path_from_eye(const View& view, const Media& media, const PathSettings& set
   return path;
 }
 
-Rgb to_pixel(const glm::dvec3& radiance, const ScreenPixel& pixel, PathCounts& counts) {
+/// `pixel`: none where a neighbor that the screen is joined to counts it.
+Rgb to_pixel(const glm::dvec3& radiance, const std::optional<ScreenPixel>& pixel, PathCounts& counts) {
   const Rgb color{static_cast<float>(radiance.r), static_cast<float>(radiance.g), static_cast<float>(radiance.b)};
   if (std::isfinite(color.r) && std::isfinite(color.g) && std::isfinite(color.b)) return color;
-  ++counts.not_finite;
-  counts.first_not_finite = std::min(counts.first_not_finite, pixel);
+  if (pixel) {
+    ++counts.not_finite;
+    counts.first_not_finite = std::min(counts.first_not_finite, *pixel);
+  }
   return {};
 }
 
@@ -502,8 +507,7 @@ void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const 
       for (int x = 0; x < rect.width(); ++x) {
         const auto from = static_cast<std::size_t>(y - top) * kTileSide + static_cast<std::size_t>(x);
         const auto to = static_cast<std::size_t>(y - rect.y0) * kTileSide + static_cast<std::size_t>(x);
-        const ScreenPixel pixel{view.screen_number, view.block.y0 + y, view.block.x0 + rect.x0 + x};
-        pixels[to] = to_pixel(wave.radiance(from), pixel, wave.counts());
+        pixels[to] = to_pixel(wave.radiance(from), own_pixel(view, rect.x0 + x, y), wave.counts());
         if (!coverage.empty() && wave.is_covered(from)) coverage[to] = 1.0F;
       }
     }

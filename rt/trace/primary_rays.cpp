@@ -16,6 +16,7 @@
 #include "rt/trace/embree_compat.h"
 #include "rt/trace/occupied_pixels.h"
 #include "rt/trace/ray_scene.h"
+#include "rt/trace/refined_triangles.h"
 #include "rt/trace/surfaces.h"
 
 namespace hpr {
@@ -29,8 +30,8 @@ struct PlacedKey {
 
 /// The key of triangle `primitive` of an Embree geometry, for a ray of `view` known to meet it: in double, from the
 /// triangle and the ray alone, so that every rank gets the same.
-PlacedKey key_along(const Scene& scene, const View& view, const Ray& ray, const RayGeometry& geometry,
-                    std::uint32_t primitive) {
+PlacedKey key_along(const Scene& scene, const RaySpace& space, const View& view, const Ray& ray,
+                    const RayGeometry& geometry, std::uint32_t primitive) {
   const Instance& instance = scene.instances[geometry.instance];
   const Mesh& mesh = scene.mesh_of(instance);
   const glm::uvec3& corners = mesh.triangles[geometry.first_triangle + primitive];
@@ -46,7 +47,12 @@ PlacedKey key_along(const Scene& scene, const View& view, const Ray& ray, const 
   const glm::dvec3 p = glm::cross(ray.direction, e2);
   const glm::dvec3 q = glm::cross(from_v0, e1);
   const double determinant = glm::dot(e1, p);
-  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(ray.direction, q) / determinant);
+  const glm::dvec2 met(glm::dot(from_v0, p) / determinant, glm::dot(ray.direction, q) / determinant);
+  const glm::dvec3 from_origin = view.eye - space.origin;
+  const bool is_refined = geometry.triangles != nullptr;
+  const glm::dvec2 at =
+      is_refined ? onto_refined(space, met, {v0 + from_origin, e1, e2, ray.origin - space.origin, ray.direction})
+                 : onto_triangle(met.x, met.y);
   const double along_axis = -glm::dot(v0 + at.x * e1 + at.y * e2, view.axes[2]);
 
   const auto depth = static_cast<float>(reversed_depth(view, along_axis));
@@ -75,6 +81,7 @@ constexpr double kAround = 4.0;
 struct Search {
   embree::Context context;
   const Scene* scene;
+  RaySpace space;
   std::span<const RayGeometry> geometries;
   const View* view;
   bool through = false;  ///< look at every surface along the rays: none hides another
@@ -115,7 +122,7 @@ const glm::uvec3& corners_of(const Search& search, std::size_t lane) {
 /// about `distance`.
 Key exact_key(const Search& search, std::size_t lane, const RayGeometry& geometry, std::uint32_t primitive,
               float distance) {
-  const PlacedKey met = key_along(*search.scene, *search.view, search.ray[lane], geometry, primitive);
+  const PlacedKey met = key_along(*search.scene, search.space, *search.view, search.ray[lane], geometry, primitive);
   const double expected = met.along_axis * search.scale[lane] - search.start[lane];
   const bool near = std::abs(static_cast<double>(distance) - expected) <= 0.5 * static_cast<double>(kSlack);
   return near ? met.key : kNoKey;
@@ -185,6 +192,7 @@ class TileTracer {
     const View& view = views.front();
     embree::start(search_.context, embree::Rays::Coherent);
     search_.scene = &scene;
+    search_.space = rays.space();
     search_.geometries = rays.geometries();
     search_.view = &view;
     stand_at(rays.space().from_world(view.eye));

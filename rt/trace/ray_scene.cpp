@@ -301,7 +301,7 @@ RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::
        split_by_instance(scene, merged_ranges({objects.begin(), objects.end()}, scene.triangles))) {
     const Instance& instance = scene.instances[part.instance];
     const auto id = static_cast<unsigned int>(embree_->geometries.size());
-    const bool is_instanced = is_shared[part.instance] != 0;
+    const bool is_instanced = is_shared[part.instance] != 0 && is_refined[part.instance] == 0;
     embree_->geometries.push_back({part.instance, part.range.first, instance.first_surface + part.range.first, nullptr,
                                    behind(scene, instance, is_instanced)});
     if (is_instanced) {

@@ -5,7 +5,10 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <optional>
 #include <tuple>
+
+#include "rt/trace/surfaces.h"
 
 namespace hpr {
 namespace {
@@ -16,14 +19,24 @@ using Corners = std::array<glm::dvec3, 3>;
 constexpr double kMinEdge = 0x1p-24;
 /// How often a triangle is divided at the most: halving the longest edges down to kMinEdge takes about half as often.
 constexpr int kMaxDivisions = 64;
-/// Triangles of an instance that are divided, each into some hundred parts.
-constexpr std::size_t kMaxDivided = 256;
+/// Parts of all refined instances together: some 20 MB in Embree.
+constexpr std::size_t kMaxParts = std::size_t{1} << 18;
+/// Triangles of a mesh up to which one of its instances has triangles of its own, so that these can be refined.
+constexpr std::size_t kMaxUnshared = 4096;
 /// Float steps of the distance from ray space's origin. A part's edges are at most 7.5 times as long as a place of it
 /// is far away, as they are no longer than their own distance, which is at most that of the place and 0.87 of the
 /// longest edge. So its corners are at most 8.5 times as far, both together 16 times, and 28 by the largest coordinate.
 constexpr double kPlaneSteps = 32.0;
 /// How many times less refining must move a plane to be worth it.
 constexpr double kMinGain = 100.0;
+/// How many times as long as its distance an edge must be for refining to be worth it: what is met beside an edge is
+/// off by the distance of the edge's ends.
+constexpr double kMinWideness = 1000.0;
+/// Ray space: triangles with edges below this are none that other things stand on.
+constexpr double kMinWide = 0x1p-4;
+/// What Embree's edge test is off by, in float steps of the distance between a ray's origin and the farthest corner:
+/// seven roundings of products of |D|, |e| and 2 |s|, against 2 |D| |e| for a metre (docs/numerics.md, Watertight).
+constexpr double kEdgeSteps = 5.0;
 
 double largest(const glm::dvec3& v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
@@ -106,55 +119,120 @@ Corners corners_of(const Mesh& mesh, const Instance& instance, std::uint32_t tri
   return corners;
 }
 
-/// Whether refining is worth it for that triangle.
-bool is_coarse(const Corners& c) {
+/// From ray space's origin.
+double distance_of(const Corners& c) {
   const glm::dvec3 e1 = c[1] - c[0];
   const glm::dvec3 e2 = c[2] - c[0];
   const glm::dvec3 cross = glm::cross(e1, e2);
   const double area2 = glm::dot(cross, cross);
-  double distance = std::min({distance_of(c[0], c[1]), distance_of(c[1], c[2]), distance_of(c[2], c[0])});
   if (area2 > 0.0) {
     // Barycentric coordinates of the place that faces the origin.
     const double u = glm::dot(glm::cross(-c[0], e2), cross) / area2;
     const double v = glm::dot(glm::cross(e1, -c[0]), cross) / area2;
-    if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) distance = std::abs(glm::dot(c[0], cross)) / std::sqrt(area2);
+    if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) return std::abs(glm::dot(c[0], cross)) / std::sqrt(area2);
   }
-  const double rounding =
-      plane_rounding(e1, e2, cross / std::sqrt(area2), glm::abs(c[0]) + glm::max(glm::abs(e1), glm::abs(e2)));
-  return rounding > kMinGain * kPlaneSteps * std::max(distance, kMinEdge);
+  return std::min({distance_of(c[0], c[1]), distance_of(c[1], c[2]), distance_of(c[2], c[0])});
 }
 
-bool is_refined(const Scene& scene, const Instance& instance, const RaySpace& space) {
-  const Mesh& mesh = scene.mesh_of(instance);
-  const glm::dmat3 linear(instance.to_world);
-  const glm::dvec3 origin = glm::inverse(linear) * (space.origin - glm::dvec3(instance.to_world[3]));
-  // In the mesh's own coordinates, which shrink lengths by up to the distortion against each other: most triangles are
-  // far too small for their distance.
-  const double reach = 2.0 * distortion(linear);
-  if (!std::isfinite(reach * largest(origin))) return false;
-  bool worth = false;
-  std::size_t divided = 0;
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    const glm::uvec3& t = mesh.triangles[i];
-    const glm::dvec3 p0(mesh.positions[t.x]);
-    const double size =
-        std::max(largest(glm::dvec3(mesh.positions[t.y]) - p0), largest(glm::dvec3(mesh.positions[t.z]) - p0));
-    if (!(largest(p0 - origin) < reach * size)) continue;
-    const Corners corners = corners_of(mesh, instance, i, space);
-    if (!is_divided(corners)) continue;
-    if (++divided > kMaxDivided) return false;
-    worth = worth || is_coarse(corners);
-  }
-  return worth;
+/// Whether refining is worth it for that triangle: for its plane, or for its edges.
+bool is_coarse(const Corners& c) {
+  const double distance = std::max(distance_of(c), kMinEdge);
+  const glm::dvec3 e1 = c[1] - c[0];
+  const glm::dvec3 e2 = c[2] - c[0];
+  const double longest = std::max({glm::length(e1), glm::length(e2), glm::distance(c[1], c[2])});
+  if (longest >= kMinWide && longest > kMinWideness * distance) return true;
+  const double rounding =
+      plane_rounding(e1, e2, glm::normalize(glm::cross(e1, e2)), glm::abs(c[0]) + glm::max(glm::abs(e1), glm::abs(e2)));
+  return rounding > kMinGain * kPlaneSteps * distance;
 }
+
+double longest_edge(const Mesh& mesh) {
+  double longest = 0.0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 a(mesh.positions[t.x]);
+    const glm::dvec3 b(mesh.positions[t.y]);
+    const glm::dvec3 c(mesh.positions[t.z]);
+    longest = std::max({longest, glm::length(b - a), glm::length(c - b), glm::length(a - c)});
+  }
+  return longest;
+}
+
+/// Which instances are refined, one after the other, while parts are left.
+class Refining {
+ public:
+  Refining(const Scene& scene, const RaySpace& space)
+      : scene_(scene), space_(space), longest_edges_(scene.meshes.size(), -1.0) {}
+
+  /// `is_shared`: Embree would hold it as an instance of a mesh.
+  bool refines(const Instance& instance, bool is_shared) {
+    if (is_shared && !may_be_unshared(instance)) return false;
+    const std::optional<std::size_t> parts = parts_of(instance);
+    if (!parts) return false;
+    parts_left_ -= *parts;
+    return true;
+  }
+
+ private:
+  /// So that many small instances cost no look at each of their triangles.
+  bool may_be_unshared(const Instance& instance) {
+    const Mesh& mesh = scene_.mesh_of(instance);
+    if (mesh.triangles.size() > kMaxUnshared) return false;
+    double& longest = longest_edges_[instance.mesh];
+    if (longest < 0.0) longest = longest_edge(mesh);
+    double stretch2 = 0.0;  // Frobenius
+    for (int column = 0; column < 3; ++column) {
+      const glm::dvec3 axis(instance.to_world[column]);
+      stretch2 += glm::dot(axis, axis);
+    }
+    return longest * std::sqrt(stretch2) * space_.scale >= kMinWide;
+  }
+
+  /// How many parts it has more than triangles; nothing where that is not worth it or too many.
+  [[nodiscard]] std::optional<std::size_t> parts_of(const Instance& instance) const {
+    const Mesh& mesh = scene_.mesh_of(instance);
+    const glm::dmat3 linear(instance.to_world);
+    const glm::dvec3 origin = glm::inverse(linear) * (space_.origin - glm::dvec3(instance.to_world[3]));
+    // In the mesh's own coordinates, which shrink lengths by up to the distortion against each other: most triangles
+    // are far too small for their distance.
+    const double reach = 2.0 * distortion(linear);
+    if (!std::isfinite(reach * largest(origin))) return std::nullopt;
+    std::vector<Corners> divided;
+    bool worth = false;
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+      const glm::uvec3& t = mesh.triangles[i];
+      const glm::dvec3 p0(mesh.positions[t.x]);
+      const double size =
+          std::max(largest(glm::dvec3(mesh.positions[t.y]) - p0), largest(glm::dvec3(mesh.positions[t.z]) - p0));
+      if (!(largest(p0 - origin) < reach * size)) continue;
+      const Corners corners = corners_of(mesh, instance, i, space_);
+      if (!is_divided(corners)) continue;
+      if (divided.size() >= parts_left_) return std::nullopt;
+      divided.push_back(corners);
+      worth = worth || is_coarse(corners);
+    }
+    if (!worth) return std::nullopt;
+    std::size_t parts = 0;
+    for (const Corners& corners : divided) {
+      divide(corners, kMaxDivisions, [&](const Corners& /*part*/) { ++parts; });
+      if (parts > parts_left_) return std::nullopt;
+    }
+    return parts;
+  }
+
+  const Scene& scene_;
+  const RaySpace& space_;
+  std::vector<double> longest_edges_;  ///< by mesh; below 0: not yet computed
+  std::size_t parts_left_ = kMaxParts;
+};
 
 }  // namespace
 
 std::vector<std::uint8_t> refined_instances(const Scene& scene, const RaySpace& space) {
   const std::vector<std::uint8_t> shared = shared_instances(scene);
   std::vector<std::uint8_t> refined(shared.size(), 0);
+  Refining refining(scene, space);
   for (std::size_t i = 0; i < refined.size(); ++i) {
-    refined[i] = shared[i] == 0 && is_refined(scene, scene.instances[i], space) ? 1 : 0;
+    refined[i] = refining.refines(scene.instances[i], shared[i] != 0) ? 1 : 0;
   }
   return refined;
 }
@@ -170,6 +248,30 @@ double plane_rounding(const glm::dvec3& e1, const glm::dvec3& e2, const glm::dve
   const glm::dvec3 products(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
   const double area2 = std::abs(glm::dot(normal, glm::cross(e1, e2)));
   return glm::dot(glm::abs(normal), corners) + glm::dot(glm::max(a, b), products) / area2;
+}
+
+glm::dvec2 onto_refined(const RaySpace& space, const glm::dvec2& at, const RayOnTriangle& from) {
+  if (at.x >= 0.0 && at.y >= 0.0 && at.x + at.y <= 1.0) return at;
+  constexpr double kMinCosine = 0x1p-12;
+  constexpr double kCorners = 8.5;  // times as far as a place of a part, see kPlaneSteps
+  const glm::dvec3 normal = glm::cross(from.e1, from.e2);
+  const double area = glm::length(normal);
+  const double distance = glm::length(from.v0 + at.x * from.e1 + at.y * from.e2);
+  const double start = std::min(glm::length(from.ray_origin), 8.0 / space.scale);
+  // Corners, the ray's origin and its direction.
+  const double steps = kEdgeSteps * (kCorners * distance + start) + start + (distance + start);
+  const double cosine = std::abs(glm::dot(normal, from.direction)) / (area * glm::length(from.direction));
+  const double margin = kFloatStep * steps / std::max(cosine, kMinCosine);
+  // Of each edge, as a share of the triangle's height over it.
+  const double below_v = margin * glm::length(from.e1) / area;
+  const double below_u = margin * glm::length(from.e2) / area;
+  const double past = margin * glm::distance(from.e1, from.e2) / area;
+  if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(below_u + below_v + past)) {
+    return onto_triangle(at.x, at.y);
+  }
+  const glm::dvec2 moved(std::max(at.x, -below_u), std::max(at.y, -below_v));
+  const double sum = moved.x + moved.y;
+  return sum > 1.0 + past ? moved * ((1.0 + past) / sum) : moved;
 }
 
 RefinedTriangles refine(const Scene& scene, const Instance& instance, SurfaceRange triangles, const RaySpace& space) {

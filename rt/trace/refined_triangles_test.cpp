@@ -42,9 +42,61 @@ std::vector<std::uint8_t> refined(const Scene& scene) {
   return refined_instances(scene, RaySpace(scene.bounds));
 }
 
-TEST(RefinedTriangles, AreThoseOfWideGroundsThatAreTilted) {
+TEST(RefinedTriangles, AreThoseOfWideGrounds) {
   EXPECT_EQ(refined(ground(1e6, tilted())), (std::vector<std::uint8_t>{1, 0}));
-  EXPECT_EQ(refined(ground(1e6, glm::dmat4(1.0))), (std::vector<std::uint8_t>{0, 0})) << "a level one is exact";
+  EXPECT_EQ(refined(ground(1e6, glm::dmat4(1.0))), (std::vector<std::uint8_t>{1, 0})) << "its edges round";
+  EXPECT_EQ(refined(ground(10.0, glm::dmat4(1.0))), (std::vector<std::uint8_t>{0, 0}));
+}
+
+TEST(RefinedTriangles, AreNoneOfFineMeshes) {
+  Scene scene;
+  const std::uint32_t used = test::add_material(scene, test::diffuse());
+  constexpr int kSide = 200;
+  Mesh grid;
+  for (int z = 0; z <= kSide; ++z) {
+    for (int x = 0; x <= kSide; ++x) grid.positions.emplace_back(x, 0, z);
+  }
+  for (std::uint32_t i = 0; i < kSide * kSide; ++i) {
+    const std::uint32_t corner = i / kSide * (kSide + 1) + i % kSide;
+    grid.triangles.emplace_back(corner, corner + kSide + 1, corner + 1);
+    grid.triangles.emplace_back(corner + 1, corner + kSide + 1, corner + kSide + 2);
+  }
+  grid.material = used;
+  test::place_mesh(scene, test::add_mesh(scene, grid));
+  finish_scene(scene);
+  EXPECT_EQ(refined(scene), (std::vector<std::uint8_t>{0})) << "though the origin lies in it";
+}
+
+TEST(RefinedTriangles, AreThoseOfSharedMeshesToo) {
+  Scene scene;
+  const std::uint32_t used = test::add_material(scene, test::diffuse());
+  const std::uint32_t mesh = test::add_mesh(scene, test::quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, used));
+  test::place_mesh(scene, mesh, glm::scale(glm::dmat4(1.0), glm::dvec3(1e6)));
+  test::place_mesh(scene, mesh, glm::translate(glm::dmat4(1.0), {0.0, 1.0, 0.0}));
+  test::place_mesh(scene, mesh, glm::translate(glm::dmat4(1.0), {2.0, 1.0, 0.0}));
+  finish_scene(scene);
+  EXPECT_EQ(refined(scene), (std::vector<std::uint8_t>{1, 0, 0}));
+  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  EXPECT_NE(rays.geometries()[0].triangles, nullptr);
+  EXPECT_EQ(rays.geometries()[1].triangles, nullptr);
+}
+
+TEST(RefinedTriangles, AreOfSoManyInstancesThatTheirPartsFitIntoMemory) {
+  Scene scene;
+  const std::uint32_t used = test::add_material(scene, test::diffuse());
+  const std::uint32_t mesh = test::add_mesh(scene, test::quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, used));
+  for (int i = 0; i < 1000; ++i) {
+    test::place_mesh(scene, mesh, glm::rotate(glm::dmat4(1.0), 0.001 * i, glm::dvec3(1, 0, 0)));
+  }
+  finish_scene(scene);
+  std::size_t parts = 0;
+  const std::vector<std::uint8_t> are_refined = refined(scene);
+  for (std::size_t i = 0; i < are_refined.size(); ++i) {
+    if (are_refined[i] == 0) continue;
+    parts += refine(scene, scene.instances[i], {0, 2}, RaySpace(scene.bounds)).parts.size();
+  }
+  EXPECT_GT(parts, 100000U);
+  EXPECT_LE(parts, std::size_t{1} << 18);
 }
 
 TEST(RefinedTriangles, AreShorterThanTheirDistanceAndClosed) {

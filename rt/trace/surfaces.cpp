@@ -151,7 +151,7 @@ Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
     placed_[i].normal_matrix = cofactors(scaled);
     placed_[i].swaps_handedness = is_mirrored(scene.instances[i]);
     placed_[i].is_refined = refined[i] != 0;
-    if (shared[i] == 0) continue;
+    if (shared[i] == 0 || placed_[i].is_refined) continue;
     placed_[i].is_instanced = true;
     placed_[i].spread = magnitudes(linear) * magnitudes(glm::inverse(linear));
     placed_[i].reach = magnitudes(linear) * mesh_reach[scene.instances[i].mesh] +
@@ -276,7 +276,14 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   const glm::dvec3 p = glm::cross(direction, triangle.e2);
   const glm::dvec3 q = glm::cross(from_v0, triangle.e1);
   const double determinant = glm::dot(triangle.e1, p);
-  const glm::dvec2 at = onto_triangle(glm::dot(from_v0, p) / determinant, glm::dot(direction, q) / determinant);
+  const glm::dvec2 met(glm::dot(from_v0, p) / determinant, glm::dot(direction, q) / determinant);
+  const glm::dvec2 on = onto_triangle(met.x, met.y);
+  // Where the ray meets the plane beside a refined triangle, textures and the place go on; all else stays the edge's.
+  const glm::dvec2 at =
+      placed_[triangle.instance].is_refined
+          ? onto_refined(space_, met,
+                         {triangle.v0 - space_.origin, triangle.e1, triangle.e2, origin - space_.origin, direction})
+          : on;
   const double b0 = 1.0 - at.x - at.y;
 
   SurfacePoint point;
@@ -286,11 +293,11 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   point.geometric_normal = against_winding ? -triangle.normal : triangle.normal;
   point.inside = against_winding != placed_[triangle.instance].swaps_handedness;
   const auto& corner = triangle.normals;
-  const glm::dvec3 smooth = unit(b0 * corner[0] + at.x * corner[1] + at.y * corner[2], triangle.normal);
+  const Weights weight{1.0 - on.x - on.y, on.x, on.y};
+  const glm::dvec3 smooth = unit(weight[0] * corner[0] + on.x * corner[1] + on.y * corner[2], triangle.normal);
   const double side = glm::dot(smooth, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
   point.shading_normal = side * smooth;
 
-  const Weights weight{b0, at.x, at.y};
   if (lifts_) lift(triangle, weight, side, point);
   point.offset = std::max(triangle.offset, space_.rounding_at(point.position));
   if (placed_[triangle.instance].is_refined)
@@ -305,8 +312,8 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
                               at.y * glm::dvec2(uvs[corners.z]));
   }
   if (!mesh.colors.empty()) {
-    point.color = b0 * glm::dvec4(mesh.colors[corners.x]) + at.x * glm::dvec4(mesh.colors[corners.y]) +
-                  at.y * glm::dvec4(mesh.colors[corners.z]);
+    point.color = weight[0] * glm::dvec4(mesh.colors[corners.x]) + on.x * glm::dvec4(mesh.colors[corners.y]) +
+                  on.y * glm::dvec4(mesh.colors[corners.z]);
   }
   point.surface = triangle.surface;
   point.material = mesh.material;

@@ -95,10 +95,23 @@ TEST(Surfaces, LeaveRoomByThePlaceOnALevelGroundHoweverWideItIs) {
 }
 
 TEST(Surfaces, KeepThePointOnTheTriangleWhenTheRayPassesBeside) {
-  EXPECT_EQ(meet(one_triangle(), 0, {-1.0, 2.0, 1.0}, {0.0, 0.0, -1.0}).position, glm::dvec3(0.0, 2.0, 0.0));
-  const SurfacePoint past = meet(one_triangle(), 0, {2.0, 4.0, 1.0}, {0.0, 0.0, -1.0});
+  Scene scene = one_triangle();
+  test::place_mesh(scene, 0, glm::translate(glm::dmat4(1.0), {0.0, 0.0, -4.0}));
+  finish_scene(scene);
+  EXPECT_EQ(meet(scene, 0, {-1.0, 2.0, 1.0}, {0.0, 0.0, -1.0}).position, glm::dvec3(0.0, 2.0, 0.0));
+  const SurfacePoint past = meet(scene, 0, {2.0, 4.0, 1.0}, {0.0, 0.0, -1.0});
   EXPECT_NEAR(past.position.x / 2.0 + past.position.y / 4.0, 1.0, 1e-15);
-  const SurfacePoint edge_on = meet(one_triangle(), 0, {-1.0, 1.0, 0.0}, {1.0, 0.0, 0.0});
+  const SurfacePoint edge_on = meet(scene, 0, {-1.0, 1.0, 0.0}, {1.0, 0.0, 0.0});
+  EXPECT_TRUE(std::isfinite(edge_on.position.x) && edge_on.position.z == 0.0);
+}
+
+TEST(Surfaces, KeepThePointOnAWideTriangleButForRounding) {
+  const Scene scene = one_triangle();  // alone, it is as wide as all of its scene
+  const glm::dvec3 aside = meet(scene, 0, {-1.0, 2.0, 1.0}, {0.0, 0.0, -1.0}).position;
+  EXPECT_LT(glm::distance(aside, glm::dvec3(0.0, 2.0, 0.0)), 3e-5);
+  const SurfacePoint past = meet(scene, 0, {2.0, 4.0, 1.0}, {0.0, 0.0, -1.0});
+  EXPECT_NEAR(past.position.x / 2.0 + past.position.y / 4.0, 1.0, 3e-5);
+  const SurfacePoint edge_on = meet(scene, 0, {-1.0, 1.0, 0.0}, {1.0, 0.0, 0.0});
   EXPECT_TRUE(std::isfinite(edge_on.position.x) && edge_on.position.z == 0.0);
 }
 
