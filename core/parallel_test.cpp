@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -60,6 +61,52 @@ TEST(ParallelFor, RethrowsAnExceptionAfterAllThreadsStopped) {
     }
     EXPECT_EQ(inside, 0);
     EXPECT_LT(calls, 100000) << "the rest is not done after a failure";
+  }
+}
+
+TEST(ParallelFor, KeepsItsThreadsFromLoopToLoop) {
+  std::mutex mutex;
+  std::set<std::thread::id> seen;
+  std::jthread([&] {  // which has no threads from before
+    for (int loop = 0; loop < 50; ++loop) {
+      parallel_for(1 + loop % 4, 40, [&](std::size_t) {
+        std::this_thread::sleep_for(std::chrono::microseconds(50));
+        const std::lock_guard lock(mutex);
+        seen.insert(std::this_thread::get_id());
+      });
+    }
+  })
+      .join();
+  EXPECT_GT(seen.size(), 1U);
+  EXPECT_LE(seen.size(), 4U);
+}
+
+TEST(ParallelFor, ServesManyCallersAtOnce) {
+  std::atomic<std::size_t> calls = 0;
+  {
+    std::vector<std::jthread> callers;
+    for (int i = 0; i < 6; ++i) {
+      callers.emplace_back([&] {
+        for (std::size_t loop = 0; loop < 300; ++loop) parallel_for(3, loop % 7, [&](std::size_t) { ++calls; });
+      });
+    }
+  }
+  std::size_t expected = 0;
+  for (std::size_t loop = 0; loop < 300; ++loop) expected += 6 * (loop % 7);
+  EXPECT_EQ(calls, expected);
+}
+
+/// A loop after one that failed starts anew.
+TEST(ParallelFor, GoesOnAfterAFailure) {
+  for (int loop = 0; loop < 20; ++loop) {
+    EXPECT_THROW(parallel_for(3, 50,
+                              [](std::size_t i) {
+                                if (i % 10 == 7) throw std::runtime_error("a seven");
+                              }),
+                 std::runtime_error);
+    std::atomic<int> calls = 0;
+    parallel_for(3, 50, [&](std::size_t) { ++calls; });
+    EXPECT_EQ(calls, 50);
   }
 }
 
