@@ -264,6 +264,9 @@ void add_extensions(const Scene& scene, const SurfacePoint& surface, const Mater
   const ExtensionPoint read = ExtensionReader(scene, surface, from).read(point.normal);
   if (!has_effect(read)) return;
   point.extensions = std::make_shared<const ExtensionPoint>(read);
+  const bool is_volume = material.thickness > 0.0F && (material.transmission > 0.0F || read.diffuse_transmission > 0.0);
+  // Within solids there is no coat.
+  if (!(is_volume && surface.inside)) point.emission *= coat_transmittance(read, surface.to_viewer);
   if (!(read.diffuse_transmission > 0.0) || !(material.thickness > 0.0F)) return;
   point.solid = true;
   point.absorption = absorption_of(material);
@@ -317,6 +320,14 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   point.solid = material.thickness > 0.0F;
   if (point.solid) point.absorption = absorption_of(material);
   return point;
+}
+
+double coat_transmittance(const ExtensionPoint& extensions, const glm::dvec3& direction) {
+  constexpr double kCoatF0 = 0.04;  // of an index of 1.5
+  if (!(extensions.clearcoat > 0.0)) return 1.0;
+  const double cosine = std::min(std::abs(glm::dot(extensions.clearcoat_normal, direction)), 1.0);
+  const double rise = (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine);
+  return 1.0 - extensions.clearcoat * (kCoatF0 + (1.0 - kCoatF0) * rise);
 }
 
 double coverage_of(const Material& material, double alpha) {
