@@ -144,6 +144,12 @@ glm::dvec3 coat_normal_to_shade_with(const Scene& scene, const SurfacePoint& sur
                        material.extensions->clearcoat_normal_scale, surface);
 }
 
+void set_channel(MaterialPoint& material, int channel, double scale) {
+  material.channel = static_cast<std::uint8_t>(channel);
+  material.channel_scale = static_cast<float>(scale);
+  material.ior = std::max(material.ior + (channel - 1) * material.ior_spread, 1.0);
+}
+
 void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, double u) {
   const double sum = throughput.r + throughput.g + throughput.b;
   if (!(sum > 0.0) || !std::isfinite(sum)) return;
@@ -151,9 +157,7 @@ void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, doubl
   double left = u * sum;
   while (channel < 2 && left >= throughput[channel]) left -= throughput[channel++];
   while (!(throughput[channel] > 0.0)) --channel;  // where rounding led past the last one with a share
-  material.channel = static_cast<std::uint8_t>(channel);
-  material.channel_scale = static_cast<float>(sum / throughput[channel]);
-  material.ior = std::max(material.ior + (channel - 1) * material.ior_spread, 1.0);
+  set_channel(material, channel, sum / throughput[channel]);
 }
 
 void prefetch_material(const Scene& scene, const SurfacePoint& surface) {

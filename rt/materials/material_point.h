@@ -77,6 +77,9 @@ struct MaterialPoint {
   return material.ior_spread > 0.0 && material.channel == MaterialPoint::kAllChannels;
 }
 
+/// Leaves the light of one channel to what goes through a surface that disperses, times `scale`.
+void set_channel(MaterialPoint& material, int channel, double scale);
+
 /// Chooses the channel of light that goes through a surface that disperses by what of `throughput` it carries, `u` in
 /// [0, 1): light of one channel stays what it is, other light becomes up to 3 times as bright in one.
 void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, double u);
