@@ -350,5 +350,38 @@ TEST(Dispersion, BendsByTheAbbeNumberAndKeepsTheLight) {
   EXPECT_EQ(red.channel_scale, 1.0F) << "light of one channel stays as bright";
 }
 
+/// All channels in one direction have each the light that they have alone, also about the critical angle from within.
+TEST(Dispersion, WideLobesServeAllChannels) {
+  MaterialPoint glass = test::glass(0.3, 1.5);
+  glass.ior_spread = 0.06;
+  ASSERT_TRUE(Bsdf::shares_directions(glass));
+  const auto albedo_of = [](const Bsdf& bsdf, Lobe lobe) {
+    constexpr std::uint32_t kSamples = 1U << 15U;
+    glm::dvec3 sum(0.0);
+    for (std::uint32_t i = 0; i < kSamples; ++i) {
+      Sampler random(5, i);
+      if (const auto sample = bsdf.sample(lobe, random.two())) sum += sample->weight;
+    }
+    return sum / static_cast<double>(kSamples);
+  };
+  for (const bool inside : {false, true}) {
+    for (const double polar : {0.1, 0.6, 0.73, 0.8, 1.2}) {
+      const glm::dvec3 viewer = direction(polar, 0.3);
+      const Bsdf all = bsdf_of(glass, viewer, inside);
+      for (const Lobe lobe : {Lobe::Reflection, Lobe::Transmission}) {
+        const glm::dvec3 together = albedo_of(all, lobe);
+        const glm::dvec3 turned = albedo_of(bsdf_of(glass, kUp, inside).seen_from(viewer, kUp), lobe);
+        for (int c = 0; c < 3; ++c) {
+          MaterialPoint only = glass;
+          set_channel(only, c, 1.0);
+          const double alone = albedo_of(bsdf_of(only, viewer, inside), lobe)[c];
+          EXPECT_NEAR(together[c], alone, 0.004) << inside << ' ' << polar << ' ' << static_cast<int>(lobe) << ' ' << c;
+          EXPECT_EQ(turned[c], together[c]);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hpr

@@ -77,6 +77,11 @@ struct MaterialPoint {
   return material.ior_spread > 0.0 && material.channel == MaterialPoint::kAllChannels;
 }
 
+/// Whether light is of more than one channel.
+[[nodiscard]] inline bool carries_channels(const glm::dvec3& light) {
+  return (light.r > 0.0 ? 1 : 0) + (light.g > 0.0 ? 1 : 0) + (light.b > 0.0 ? 1 : 0) > 1;
+}
+
 /// Leaves the light of one channel to what goes through a surface that disperses, times `scale`.
 void set_channel(MaterialPoint& material, int channel, double scale);
 

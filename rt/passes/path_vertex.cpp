@@ -282,11 +282,10 @@ Faces faces_met(const PathVertex& from, const PassInfo& pass, const glm::dvec3& 
 }
 
 /// Whether a ray for each channel goes through a surface that disperses: where the eye looks through it, and it bends
-/// light in one direction. Elsewhere one channel is chosen.
+/// light in one direction. Not from within, where one channel may be let through at an angle that reflects another.
 bool splits_channels(const PathVertex& point) {
-  const auto carried = [&](int channel) { return point.throughput[channel] > 0.0 ? 1 : 0; };
-  return point.depth < kChoosingDepth && !point.gathered && point.material.roughness < Bsdf::kDeltaRoughness &&
-         carried(0) + carried(1) + carried(2) > 1;
+  return !point.surface.inside && point.depth < kChoosingDepth && !point.gathered && disperses(point.material) &&
+         point.material.roughness < Bsdf::kDeltaRoughness && carries_channels(point.throughput);
 }
 
 /// The rays that follow a lobe of a wavefront: buffers.lobe_rays and buffers.requests.
@@ -302,7 +301,7 @@ class LobeRays {
     for (const PathVertex& point : wave.vertices) {
       if (point.lobe_weights[static_cast<std::size_t>(lobe_)] == 0.0F) continue;
       if (context_.gathers && context_.follows_for_itself(point.bsdf, lobe_) == pass_.gathers_all_lobes) continue;
-      if (lobe_ != Lobe::Transmission || !disperses(point.material)) {
+      if (lobe_ != Lobe::Transmission || !splits_channels(point)) {
         add(point, point.bsdf);
         continue;
       }
@@ -418,7 +417,8 @@ Component component_after(const PathVertex& point, Component first) {
 void finish_vertex(const LightContext& context, PathVertex& point, double metres) {
   point.material = evaluate_material(context.scene, point.surface);
   if (metres > 0.0) point.throughput *= transmittance_to(point.media, point.surface, point.material, metres);
-  if (disperses(point.material) && !splits_channels(point)) {
+  if (disperses(point.material) && !splits_channels(point) &&
+      !(Bsdf::shares_directions(point.material) && carries_channels(point.throughput))) {
     choose_channel(point.material, point.throughput, point.sampler.one());
   }
   point.bsdf = Bsdf(point.material, point.surface);
