@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "rt/materials/material_point.h"
@@ -169,6 +170,15 @@ double area_pdf(const TriangleLight& triangle, const glm::dvec3& to_point) {
   return cosine > 0.0 && std::isfinite(pdf) ? pdf : 0.0;
 }
 
+bool is_coated(const Material& material) {
+  return material.extensions && material.extensions->clearcoat > 0.0F;
+}
+
+std::unique_ptr<const Surfaces> kept_for_coats(std::unique_ptr<const Surfaces> surfaces,
+                                               std::span<const TriangleLight> triangles) {
+  return std::ranges::any_of(triangles, &TriangleLight::is_coated) ? std::move(surfaces) : nullptr;
+}
+
 }  // namespace
 
 TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
@@ -189,7 +199,7 @@ TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
       light.offset = world.offset;
       const Material& material = scene.materials[mesh.material];
       light.two_sided = shows_both_sides(material);
-      light.is_coated = material.extensions && material.extensions->clearcoat > 0.0F;
+      light.is_coated = is_coated(material);
       if (!light.two_sided && is_mirrored(scene.instances[i])) light.normal = -light.normal;
       light.surface = world.surface;
       light.instance = static_cast<std::uint32_t>(i);
@@ -198,7 +208,7 @@ TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
       if (light.brightness > 0.0) triangles_.push_back(light);
     }
   }
-  if (std::ranges::any_of(triangles_, &TriangleLight::is_coated)) coated_ = std::move(all);
+  coated_ = kept_for_coats(std::move(all), triangles_);
 }
 
 /// Sets the mean radiance, and what the triangle is chosen by; both 0 when it surely emits nothing.
