@@ -119,5 +119,21 @@ TEST(Extensions, GlassThatDispersesMakesColors) {
   EXPECT_GT(seen(5.0F), 0.05);
 }
 
+/// A ray for each channel: no sample of the eye's is of one color.
+TEST(Extensions, GlassThatDispersesIsOfAllChannelsInEverySample) {
+  Scene lens;
+  const std::uint32_t ball =
+      test::add_material(lens, with(test::clear_glass(1.5F, 1.0F), [](MaterialExtensions& e) { e.dispersion = 5.0F; }));
+  test::place_mesh(lens, test::add_mesh(lens, test::sphere(1.0, 48, ball)));
+  lens.environment = test::even_light({1.0F, 0.5F, 0.25F});
+  finish_scene(lens);
+  const View view = test::view_from({0, 0, 4}, {0, 0, 0}, {8, 1}, lens, 0.4);
+  for (int x = 0; x < 8; ++x) {
+    const glm::dvec3 color = test::mean_pixel(lens, view, x, 0, 1, {.max_depth = 16});
+    EXPECT_NEAR(color.g / color.r, 0.5, 0.05) << x;
+    EXPECT_NEAR(color.b / color.r, 0.25, 0.025) << x;
+  }
+}
+
 }  // namespace
 }  // namespace hpr

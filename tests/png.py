@@ -52,10 +52,14 @@ def decode(data, path="data"):
 
 
 def write(path, width, height, values, channels=4):
-    """8 bits a channel, RGB or RGBA row by row."""
+    path.write_bytes(encode(width, height, values, channels))
+
+
+def encode(width, height, values, channels=4):
+    """A file's bytes: 8 bits a channel, RGB or RGBA row by row."""
     def chunk(name, body):
         return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
     stride = channels * width
     rows = b"".join(b"\0" + values[stride * y:stride * (y + 1)] for y in range(height))
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, {3: 2, 4: 6}[channels], 0, 0, 0))
-                     + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b""))
+    header = struct.pack(">IIBBBBB", width, height, 8, {3: 2, 4: 6}[channels], 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b"")

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <memory>
 #include <numbers>
+#include <span>
+#include <utility>
 
 #include "rt/materials/material_point.h"
 #include "rt/sampling/sampling.h"
@@ -167,13 +170,23 @@ double area_pdf(const TriangleLight& triangle, const glm::dvec3& to_point) {
   return cosine > 0.0 && std::isfinite(pdf) ? pdf : 0.0;
 }
 
+bool is_coated(const Material& material) {
+  return material.extensions && material.extensions->clearcoat > 0.0F;
+}
+
+std::unique_ptr<const Surfaces> kept_for_coats(std::unique_ptr<const Surfaces> surfaces,
+                                               std::span<const TriangleLight> triangles) {
+  return std::ranges::any_of(triangles, &TriangleLight::is_coated) ? std::move(surfaces) : nullptr;
+}
+
 }  // namespace
 
 TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
   std::vector<std::uint8_t> emitting;
   for (const Material& material : scene.materials) emitting.push_back(emits(scene, material) ? 1 : 0);
   if (std::ranges::count(emitting, 1) == 0) return;  // Surfaces looks at every vertex
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  auto all = std::make_unique<const Surfaces>(scene, RaySpace(scene.bounds));
+  const Surfaces& surfaces = *all;
   WorldTriangle world;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Mesh& mesh = scene.mesh_of(scene.instances[i]);
@@ -184,7 +197,9 @@ TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
       light.area = 0.5 * glm::length(glm::cross(world.e1, world.e2));
       if (!(light.area > 0.0) || !std::isfinite(light.area) || world.normal == glm::dvec3(0.0)) continue;
       light.offset = world.offset;
-      light.two_sided = shows_both_sides(scene.materials[mesh.material]);
+      const Material& material = scene.materials[mesh.material];
+      light.two_sided = shows_both_sides(material);
+      light.is_coated = is_coated(material);
       if (!light.two_sided && is_mirrored(scene.instances[i])) light.normal = -light.normal;
       light.surface = world.surface;
       light.instance = static_cast<std::uint32_t>(i);
@@ -193,6 +208,7 @@ TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
       if (light.brightness > 0.0) triangles_.push_back(light);
     }
   }
+  coated_ = kept_for_coats(std::move(all), triangles_);
 }
 
 /// Sets the mean radiance, and what the triangle is chosen by; both 0 when it surely emits nothing.
@@ -244,6 +260,16 @@ glm::dvec3 TriangleLights::radiance(const TriangleLight& triangle, const glm::dv
   return radiance * coverage(*scene_, material, mesh, corners, at);
 }
 
+/// What leaves a place of the triangle along `direction`, of unit length: as for a ray that comes from there.
+glm::dvec3 TriangleLights::radiance_along(const TriangleLight& triangle, const glm::dvec2& at,
+                                          const glm::dvec3& position, const glm::dvec3& direction) const {
+  if (!triangle.is_coated) return radiance(triangle, at);
+  WorldTriangle world;
+  coated_->load(triangle.surface, world);
+  const MaterialPoint point = evaluate_material(*scene_, coated_->meet(world, position + direction, -direction));
+  return point.alpha * point.emission;
+}
+
 std::optional<std::size_t> TriangleLights::find(std::uint32_t surface) const {
   const auto found = std::ranges::lower_bound(triangles_, surface, {}, &TriangleLight::surface);
   if (found == triangles_.end() || found->surface != surface) return std::nullopt;
@@ -264,7 +290,7 @@ LightSample TriangleLights::sample(std::size_t index, const glm::dvec3& position
   sample.to_light = to_goal / sample.distance;
   sample.pdf = by_angle ? 1.0 / seen.solid_angle() : area_pdf(triangle, to_goal);
   sample.offset = triangle.offset;
-  if (sample.pdf > 0.0) sample.weight = radiance(triangle, at) / sample.pdf;
+  if (sample.pdf > 0.0) sample.weight = radiance_along(triangle, at, sample.goal, -sample.to_light) / sample.pdf;
   return sample;
 }
 
@@ -283,7 +309,8 @@ PhotonStart TriangleLights::emit(std::size_t index, double u_side, const glm::dv
   start.origin = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
   const bool is_front = !triangle.two_sided || u_side < 0.5;
   start.direction = warp::cosine_lobe(is_front ? triangle.normal : -triangle.normal, u_direction);
-  start.flux = triangle.sides() * std::numbers::pi * triangle.area * radiance(triangle, at);
+  start.flux =
+      triangle.sides() * std::numbers::pi * triangle.area * radiance_along(triangle, at, start.origin, start.direction);
   start.surface = triangle.surface;
   start.offset = triangle.offset;
   return start;

@@ -5,11 +5,13 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "rt/lights/light_tree.h"
 #include "rt/lights/punctual_light.h"
+#include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -51,6 +53,7 @@ struct TriangleLight {
   std::uint32_t instance = 0;
   std::uint32_t index = 0;  ///< in the instance's mesh
   bool two_sided = true;
+  bool is_coated = false;  ///< emits less the more it is looked at aslant
 
   /// Whether a place lies where it emits to.
   [[nodiscard]] bool shines_on(const glm::dvec3& position) const {
@@ -76,19 +79,22 @@ class TriangleLights {
   [[nodiscard]] double pdf(std::size_t triangle, const glm::dvec3& position, const glm::dvec3& point) const;
 
   /// A photon, uniform over area and with a cosine lobe; of two sides, from the front for `u_side` below a half. The
-  /// mean of its flux is the triangle's power.
+  /// mean of its flux is the triangle's power, where no coat dims it.
   [[nodiscard]] PhotonStart emit(std::size_t triangle, double u_side, const glm::dvec2& u_place,
                                  const glm::dvec2& u_direction) const;
-  /// Watts of all sides it emits from.
+  /// Watts of all sides it emits from, before a coat dims any.
   [[nodiscard]] glm::dvec3 power(std::size_t triangle) const;
   [[nodiscard]] LightBounds bounds(std::size_t triangle) const;
 
  private:
   [[nodiscard]] glm::dvec3 radiance(const TriangleLight& triangle, const glm::dvec2& at) const;
+  [[nodiscard]] glm::dvec3 radiance_along(const TriangleLight& triangle, const glm::dvec2& at,
+                                          const glm::dvec3& position, const glm::dvec3& direction) const;
   void estimate_brightness(TriangleLight& triangle) const;
 
   const Scene* scene_;
-  std::vector<TriangleLight> triangles_;  ///< by surface id
+  std::vector<TriangleLight> triangles_;    ///< by surface id
+  std::unique_ptr<const Surfaces> coated_;  ///< null where none is coated
 };
 
 }  // namespace hpr

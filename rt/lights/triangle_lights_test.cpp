@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <memory>
 #include <numbers>
 
 #include "rt/sampling/sampler.h"
@@ -120,6 +121,23 @@ TEST(TriangleLights, TexturesAreReadWhereTheSampleFalls) {
     flux += lights.emit(0, side, position, sampler.two()).flux.r / kSamples;
   }
   EXPECT_NEAR(flux, 2.0 * std::numbers::pi * 4.5 * 0.75, 0.05);
+}
+
+TEST(TriangleLights, ACoatDimsThemTheMoreTheyAreSeenAslant) {
+  Scene scene = lamp(1.0, 1.0);
+  MaterialExtensions extensions;
+  extensions.clearcoat = 0.75F;
+  scene.materials[0].extensions = std::make_shared<const MaterialExtensions>(extensions);
+  const TriangleLights lights(scene);
+  const auto left = [](double cosine) { return 1.0 - 0.75 * (0.04 + 0.96 * std::pow(1.0 - cosine, 5.0)); };
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    Sampler sampler(3, i);
+    const glm::dvec3 position(i % 8, i / 8, 0.05);
+    const LightSample sample = lights.sample(0, position, sampler.two());
+    EXPECT_NEAR(sample.weight.r * sample.pdf, 3.0 * left(sample.to_light.z), 1e-9);
+    const PhotonStart photon = lights.emit(0, 0.3, sampler.two(), sampler.two());
+    EXPECT_NEAR(photon.flux.r / lights.power(0).r, left(std::abs(photon.direction.z)), 1e-9);
+  }
 }
 
 TEST(TriangleLights, TrianglesATextureLeavesBlackAreNoLights) {

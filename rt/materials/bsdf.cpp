@@ -21,6 +21,8 @@ constexpr double kMinWeight = 1e-3;
 /// And facets as rough as this or more this one: so many of them may lie outside the directions that are looked at.
 constexpr double kMinFacetWeight = 0.1;
 constexpr double kWideAlpha = 0.05;
+/// Facets of almost the same index on both sides bend light by less than their own slope.
+constexpr double kNarrowest = squared(Bsdf::kDeltaRoughness);
 /// Cosines below it are edge-on: nothing is seen or lit there, and no quotient of cosines overflows.
 constexpr double kEdgeOn = 1e-9;
 
@@ -58,7 +60,22 @@ Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried c
     }
   }
   look(surface.to_viewer, material.normal);
-  if (material.extensions) extended_ = std::make_shared<const ExtendedBsdf>(material, surface, carried);
+  if (material.extensions) {
+    extended_ = std::make_shared<const ExtendedBsdf>(material, surface, carried);
+  } else if (disperses(material) && shares_directions(material)) {
+    std::array<Bsdf, 3> channels;
+    for (int channel = 0; channel < 3; ++channel) {
+      MaterialPoint only = material;
+      set_channel(only, channel, 1.0);
+      channels[static_cast<std::size_t>(channel)] = Bsdf(only, surface, carried);
+    }
+    channels_ = std::make_shared<const std::array<Bsdf, 3>>(channels);
+  }
+}
+
+bool Bsdf::shares_directions(const MaterialPoint& material) {
+  return material.roughness >= kDeltaRoughness &&
+         square(material.roughness) * (1.0 - 1.0 / std::max(material.ior - material.ior_spread, 1.0)) >= kNarrowest;
 }
 
 /// Sets all that depends on the viewer.
@@ -78,6 +95,11 @@ Bsdf Bsdf::seen_from(const glm::dvec3& to_viewer, const glm::dvec3& normal) cons
   Bsdf other = *this;
   other.look(to_viewer, normal);
   if (extended_) other.extended_ = std::make_shared<const ExtendedBsdf>(extended_->seen_from(to_viewer, normal));
+  if (channels_) {
+    std::array<Bsdf, 3> channels;
+    std::ranges::transform(*channels_, channels.begin(), [&](const Bsdf& b) { return b.seen_from(to_viewer, normal); });
+    other.channels_ = std::make_shared<const std::array<Bsdf, 3>>(channels);
+  }
   return other;
 }
 
@@ -104,6 +126,17 @@ glm::dvec3 Bsdf::fresnel(double cosine, double dielectric) const {
     const double m = 1.0 - std::clamp(cosine, 0.0, 1.0);
     const double weight = square(square(m)) * m;
     result += metallic_ * (base_color_ + (glm::dvec3(1.0) - base_color_) * weight);
+  }
+  return result;
+}
+
+/// Each channel by its own index where they differ: near the critical angle one is let through that another is not.
+glm::dvec3 Bsdf::fresnel_of_facets(double cosine, double dielectric) const {
+  glm::dvec3 result = fresnel(cosine, dielectric);
+  if (!channels_) return result;
+  for (int c = 0; c < 3; ++c) {
+    const double own = (*channels_)[static_cast<std::size_t>(c)].dielectric_fresnel(cosine);
+    result[c] += (1.0 - metallic_) * (own - dielectric);
   }
   return result;
 }
@@ -169,7 +202,7 @@ glm::dvec3 Bsdf::reflected(const glm::dvec3& to_light, bool diffuse, bool specul
   if (diffuse) result = (diffuse_ / std::numbers::pi * below(to_light, dielectric)) * base_color_;
   if (!specular || roughness_ < kDeltaRoughness) return result;
   const double common = distribution(sum / length) * shadowing(glm::dot(normal_, to_light));
-  return result + common * fresnel(0.5 * length, dielectric);
+  return result + common * fresnel_of_facets(0.5 * length, dielectric);
 }
 
 ReflectionTerms Bsdf::reflection_terms(bool diffuse, bool specular) const {
@@ -198,6 +231,11 @@ glm::dvec3 Bsdf::value(Lobe lobe, const glm::dvec3& to_light) const {
   if (extended_) return extended_->value(lobe, to_light);
   if (is_extension(lobe)) return glm::dvec3(0.0);
   if (lobe != Lobe::Transmission) return reflected(to_light, lobe == Lobe::Diffuse, lobe == Lobe::Reflection);
+  if (channels_) {
+    glm::dvec3 result(0.0);
+    for (int c = 0; c < 3; ++c) result[c] = (*channels_)[static_cast<std::size_t>(c)].value(lobe, to_light)[c];
+    return result;
+  }
   if (is_delta(lobe)) return glm::dvec3(0.0);
   const auto at = facet(lobe, to_light);
   if (!at) return glm::dvec3(0.0);
@@ -225,6 +263,11 @@ double Bsdf::pdf(Lobe lobe, const glm::dvec3& to_light) const {
   if (!present(lobe)) return 0.0;
   if (lobe == Lobe::Diffuse) {
     return same_side(to_light) ? glm::dot(normal_, to_light) / std::numbers::pi : 0.0;
+  }
+  if (lobe == Lobe::Transmission && channels_) {
+    double sum = 0.0;
+    for (const Bsdf& channel : *channels_) sum += channel.pdf(lobe, to_light);
+    return sum / 3.0;
   }
   if (is_delta(lobe)) return 0.0;
   const auto at = facet(lobe, to_light);
@@ -260,7 +303,7 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
   if (roughness_ < kDeltaRoughness) return all;
   const double facets = distribution(sum / length);
   const double common = facets * shadowing(glm::dot(normal_, to_light));
-  all.value[kReflection] = common * fresnel(0.5 * length, dielectric);
+  all.value[kReflection] = common * fresnel_of_facets(0.5 * length, dielectric);
   if (present(Lobe::Reflection)) all.pdf[kReflection] = facets / sampled_normals(Lobe::Reflection);
   return all;
 }
@@ -315,8 +358,6 @@ bool Bsdf::is_delta(Lobe lobe) const {
   if (extended_) return extended_->is_delta(lobe);
   if (lobe == Lobe::Diffuse) return false;
   if (roughness_ < kDeltaRoughness) return true;
-  // Facets of almost the same index on both sides bend light by less than their own slope.
-  constexpr double kNarrowest = square(kDeltaRoughness);
   return lobe == Lobe::Transmission && solid_ && square(roughness_) * std::abs(eta_ - 1.0) < kNarrowest;
 }
 
@@ -363,7 +404,7 @@ std::optional<BsdfSample> Bsdf::sample_facet(Lobe lobe, const glm::dvec2& u) con
   // f cos / pdf is Fresnel's term times G2 / G1, in a form that holds at grazing angles.
   const double kept = sampled_normals(lobe) * at->normal_light * shadowing(at->normal_light);
   sample.weight = lobe == Lobe::Reflection
-                      ? kept * fresnel(at->view_half, dielectric_fresnel(at->view_half))
+                      ? kept * fresnel_of_facets(at->view_half, dielectric_fresnel(at->view_half))
                       : (kept * (1.0 - dielectric_fresnel(at->view_half)) * (refracts() ? squeeze_ : 1.0)) * tint_;
   return sample;
 }
@@ -388,6 +429,18 @@ std::optional<BsdfSample> Bsdf::sample_single(Lobe lobe) const {
   return sample;
 }
 
+/// A direction by one channel's lobe, for all channels (Wilkie, Nawaz, Droske, Weidlich, Hanika, "Hero Wavelength
+/// Spectral Sampling", 2014).
+std::optional<BsdfSample> Bsdf::sample_channels(const glm::dvec2& u) const {
+  const double channel = std::min(std::floor(3.0 * u.x), 2.0);
+  auto sample = (*channels_)[static_cast<std::size_t>(channel)].sample(Lobe::Transmission, {3.0 * u.x - channel, u.y});
+  if (!sample) return sample;
+  sample->pdf = pdf(Lobe::Transmission, sample->direction);
+  const double cosine = std::abs(glm::dot(normal_, sample->direction));
+  sample->weight = (cosine / sample->pdf) * value(Lobe::Transmission, sample->direction);
+  return sample;
+}
+
 double Bsdf::roughness(Lobe lobe) const {
   return extended_ ? extended_->roughness(lobe) : roughness_;
 }
@@ -396,6 +449,7 @@ std::optional<BsdfSample> Bsdf::sample(Lobe lobe, const glm::dvec2& u) const {
   if (extended_) return extended_->sample(lobe, u);
   if (!present(lobe)) return std::nullopt;
   if (lobe == Lobe::Diffuse) return sample_diffuse(u);
+  if (lobe == Lobe::Transmission && channels_) return sample_channels(u);
   return is_delta(lobe) ? sample_single(lobe) : sample_facet(lobe, u);
 }
 

@@ -143,6 +143,10 @@ class Bsdf {
   /// Of a rough dielectric by Fresnel's equations: what weight() has of its lobes before tints and metal.
   [[nodiscard]] double facet_share(Lobe lobe) const;
 
+  /// Whether the channels that a surface bends otherwise go on in wide lobes, of which one direction serves all: with
+  /// kAllChannels they do, by the balance heuristic over the densities of each.
+  [[nodiscard]] static bool shares_directions(const MaterialPoint& material);
+
   /// Below it a specular lobe is narrower than 1e-6 rad and has one direction.
   static constexpr double kDeltaRoughness = 1e-3;
 
@@ -161,6 +165,7 @@ class Bsdf {
   [[nodiscard]] bool other_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }
   [[nodiscard]] glm::dvec3 fresnel(double cosine, double dielectric) const;
+  [[nodiscard]] glm::dvec3 fresnel_of_facets(double cosine, double dielectric) const;
   [[nodiscard]] double below(const glm::dvec3& to_light, double dielectric) const;
   [[nodiscard]] double distribution(const glm::dvec3& half) const;
   [[nodiscard]] double shadowing(double normal_light) const;
@@ -171,6 +176,7 @@ class Bsdf {
   [[nodiscard]] std::optional<BsdfSample> sample_diffuse(const glm::dvec2& u) const;
   [[nodiscard]] std::optional<BsdfSample> sample_facet(Lobe lobe, const glm::dvec2& u) const;
   [[nodiscard]] std::optional<BsdfSample> sample_single(Lobe lobe) const;
+  [[nodiscard]] std::optional<BsdfSample> sample_channels(const glm::dvec2& u) const;
 
   glm::dvec3 view_{0.0};
   glm::dvec3 normal_{0.0};
@@ -193,7 +199,9 @@ class Bsdf {
   bool reflects_ = true;     ///< has a specular layer at all
   bool all_mirror_ = false;  ///< an index of 0
   bool unlit_ = false;
-  bool scatters_ = true;                          ///< neither unlit nor seen edge-on
+  bool scatters_ = true;  ///< neither unlit nor seen edge-on
+  /// Each channel's alone, for its transmission, where they share directions; else null.
+  std::shared_ptr<const std::array<Bsdf, 3>> channels_;
   std::shared_ptr<const ExtendedBsdf> extended_;  ///< stands for all of this where the material has extensions
 };
 

@@ -20,7 +20,6 @@ constexpr double kEdgeOn = 1e-9;
 /// Of the narrow side of anisotropic facets.
 constexpr double kMinAlpha = 1e-4;
 constexpr double kCoatIor = 1.5;
-constexpr double kCoatF0 = 0.04;
 
 double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
@@ -188,9 +187,7 @@ double ExtendedBsdf::base_enters() const {
 }
 
 double ExtendedBsdf::below_coat(const glm::dvec3& direction) const {
-  if (!(extensions_.clearcoat > 0.0) || is_within(direction)) return 1.0;
-  const double cosine = std::abs(glm::dot(extensions_.clearcoat_normal, direction));
-  return 1.0 - extensions_.clearcoat * (kCoatF0 + (1.0 - kCoatF0) * schlick_rise(cosine));
+  return is_within(direction) ? 1.0 : coat_transmittance(extensions_, direction);
 }
 
 double ExtendedBsdf::below_sheen(const glm::dvec3& direction) const {

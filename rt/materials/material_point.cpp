@@ -144,6 +144,12 @@ glm::dvec3 coat_normal_to_shade_with(const Scene& scene, const SurfacePoint& sur
                        material.extensions->clearcoat_normal_scale, surface);
 }
 
+void set_channel(MaterialPoint& material, int channel, double scale) {
+  material.channel = static_cast<std::uint8_t>(channel);
+  material.channel_scale = static_cast<float>(scale);
+  material.ior = std::max(material.ior + (channel - 1) * material.ior_spread, 1.0);
+}
+
 void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, double u) {
   const double sum = throughput.r + throughput.g + throughput.b;
   if (!(sum > 0.0) || !std::isfinite(sum)) return;
@@ -151,9 +157,7 @@ void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, doubl
   double left = u * sum;
   while (channel < 2 && left >= throughput[channel]) left -= throughput[channel++];
   while (!(throughput[channel] > 0.0)) --channel;  // where rounding led past the last one with a share
-  material.channel = static_cast<std::uint8_t>(channel);
-  material.channel_scale = static_cast<float>(sum / throughput[channel]);
-  material.ior = std::max(material.ior + (channel - 1) * material.ior_spread, 1.0);
+  set_channel(material, channel, sum / throughput[channel]);
 }
 
 void prefetch_material(const Scene& scene, const SurfacePoint& surface) {
@@ -264,6 +268,9 @@ void add_extensions(const Scene& scene, const SurfacePoint& surface, const Mater
   const ExtensionPoint read = ExtensionReader(scene, surface, from).read(point.normal);
   if (!has_effect(read)) return;
   point.extensions = std::make_shared<const ExtensionPoint>(read);
+  const bool is_volume = material.thickness > 0.0F && (material.transmission > 0.0F || read.diffuse_transmission > 0.0);
+  // Within solids there is no coat.
+  if (!(is_volume && surface.inside)) point.emission *= coat_transmittance(read, surface.to_viewer);
   if (!(read.diffuse_transmission > 0.0) || !(material.thickness > 0.0F)) return;
   point.solid = true;
   point.absorption = absorption_of(material);
@@ -317,6 +324,14 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
   point.solid = material.thickness > 0.0F;
   if (point.solid) point.absorption = absorption_of(material);
   return point;
+}
+
+double coat_transmittance(const ExtensionPoint& extensions, const glm::dvec3& direction) {
+  constexpr double kCoatF0 = 0.04;  // of an index of 1.5
+  if (!(extensions.clearcoat > 0.0)) return 1.0;
+  const double cosine = std::min(std::abs(glm::dot(extensions.clearcoat_normal, direction)), 1.0);
+  const double rise = (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine);
+  return 1.0 - extensions.clearcoat * (kCoatF0 + (1.0 - kCoatF0) * rise);
 }
 
 double coverage_of(const Material& material, double alpha) {

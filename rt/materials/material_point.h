@@ -43,6 +43,9 @@ struct ExtensionPoint {
   glm::dvec3 diffuse_transmission_color{1.0};
 };
 
+/// The share of light that a clear coat leaves to what lies below it, by Schlick's term at the coat's own normal.
+[[nodiscard]] double coat_transmittance(const ExtensionPoint& extensions, const glm::dvec3& direction);
+
 /// A material where a surface was met: its textures read, its normal map applied.
 struct MaterialPoint {
   glm::dvec3 base_color{1.0};
@@ -50,7 +53,7 @@ struct MaterialPoint {
   double roughness = 1.0;
   double transmission = 0.0;  ///< share of the dielectric's diffuse light that is let through instead
   double ior = 1.5;           ///< 0: reflects everything
-  glm::dvec3 emission{0.0};   ///< radiance
+  glm::dvec3 emission{0.0};   ///< radiance towards the viewer: a coat dims it
   double alpha = 1.0;         ///< coverage: 1 for OPAQUE; 0 or 1 for MASK
   double occlusion = 1.0;     ///< of ambient light only
   bool unlit = false;         ///< shows `emission`, which then is the base colour, and scatters nothing
@@ -73,6 +76,14 @@ struct MaterialPoint {
 [[nodiscard]] inline bool disperses(const MaterialPoint& material) {
   return material.ior_spread > 0.0 && material.channel == MaterialPoint::kAllChannels;
 }
+
+/// Whether light is of more than one channel.
+[[nodiscard]] inline bool carries_channels(const glm::dvec3& light) {
+  return (light.r > 0.0 ? 1 : 0) + (light.g > 0.0 ? 1 : 0) + (light.b > 0.0 ? 1 : 0) > 1;
+}
+
+/// Leaves the light of one channel to what goes through a surface that disperses, times `scale`.
+void set_channel(MaterialPoint& material, int channel, double scale);
 
 /// Chooses the channel of light that goes through a surface that disperses by what of `throughput` it carries, `u` in
 /// [0, 1): light of one channel stays what it is, other light becomes up to 3 times as bright in one.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
+#include <memory>
 
 #include "rt/test_scene.h"
 
@@ -98,6 +99,26 @@ TEST(MaterialPoint, UnlitMaterialsEmitTheirBaseColor) {
   const MaterialPoint point = evaluate(material);
   EXPECT_TRUE(point.unlit);
   EXPECT_EQ(point.emission, glm::dvec3(0.25, 0.5, 1.0));
+}
+
+TEST(MaterialPoint, ACoatDimsWhatEmitsBelowIt) {
+  Material material;
+  material.emissive = {1.0F, 2.0F, 4.0F};
+  MaterialExtensions extensions;
+  extensions.clearcoat = 0.5F;
+  material.extensions = std::make_shared<const MaterialExtensions>(extensions);
+  EXPECT_NEAR(evaluate(material).emission.b, 4.0 * (1.0 - 0.5 * 0.04), 1e-12);
+  SurfacePoint aslant = plain_surface();
+  aslant.to_viewer = {std::sqrt(0.75), 0.0, 0.5};
+  const double reflected = 0.5 * (0.04 + 0.96 / 32.0);
+  EXPECT_NEAR(evaluate(material, {}, aslant).emission.b, 4.0 * (1.0 - reflected), 1e-12);
+  // Seen from within a solid there is no coat.
+  material.transmission = material.thickness = 1.0F;
+  material.double_sided = true;
+  aslant.inside = true;
+  EXPECT_EQ(evaluate(material, {}, aslant).emission.b, 4.0);
+  aslant.inside = false;
+  EXPECT_NEAR(evaluate(material, {}, aslant).emission.b, 4.0 * (1.0 - reflected), 1e-12);
 }
 
 TEST(MaterialPoint, GlassReadsItsTextureAndAbsorbsByItsVolume) {

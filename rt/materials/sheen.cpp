@@ -30,16 +30,19 @@ double Sheen::lambda(double cosine) const {
   return cosine < 0.5 ? std::exp(fit(cosine)) : std::exp(2.0 * fit(0.5) - fit(1.0 - std::min(cosine, 1.0)));
 }
 
-double Sheen::value(double normal_light, double normal_half) const {
+double Sheen::distribution(double normal_half) const {
   const double sine2 = std::max(0.0, 1.0 - squared(normal_half));
-  const double distribution = (2.0 + inverse_alpha_) * std::pow(sine2, 0.5 * inverse_alpha_) / (2.0 * std::numbers::pi);
-  return distribution / ((1.0 + lambda_view_ + lambda(normal_light)) * 4.0 * normal_view_ * normal_light);
+  return (2.0 + inverse_alpha_) * std::pow(sine2, 0.5 * inverse_alpha_) / (2.0 * std::numbers::pi);
+}
+
+double Sheen::visibility(double normal_light) const {
+  return 1.0 / ((1.0 + lambda_view_ + lambda(normal_light)) * 4.0 * normal_view_ * normal_light);
 }
 
 namespace {
 
-constexpr std::size_t kSteps = 16;
-/// [roughness][root of the cosine], both from 0 to 1.
+constexpr std::size_t kSteps = 32;
+/// [root of the roughness][root of the cosine], both from 0 to 1: dense where the albedo changes most.
 using AlbedoTable = std::array<std::array<double, kSteps>, kSteps>;
 
 /// By the midpoint rule over the light's cosine, dense where it grazes, and half of the circle.
@@ -57,9 +60,9 @@ double integrate(double roughness, double normal_view) {
     for (int j = 0; j < kSectors; ++j) {
       const double around = std::numbers::pi * (j + 0.5) / kSectors;
       const double dot = sine_view * sine_light * std::cos(around) + normal_view * normal_light;
-      ring += sheen.value(normal_light, (normal_view + normal_light) / std::sqrt(2.0 + 2.0 * dot));
+      ring += sheen.distribution((normal_view + normal_light) / std::sqrt(2.0 + 2.0 * dot));
     }
-    sum += ring * normal_light * 2.0 * u / kRings;
+    sum += ring * sheen.visibility(normal_light) * normal_light * 2.0 * u / kRings;
   }
   return sum * 2.0 * std::numbers::pi / kSectors;
 }
@@ -71,7 +74,8 @@ AlbedoTable make_table() {
     for (std::size_t column = 0; column < kSteps; ++column) {
       const double root = static_cast<double>(column) / (kSteps - 1);
       const double cosine = std::max(squared(root), kMinCosine);
-      table[row][column] = std::clamp(integrate(static_cast<double>(row) / (kSteps - 1), cosine), 0.0, 1.0);
+      // Smooth where grazing light would be more than arrives, so that what lies between is right.
+      table[row][column] = integrate(squared(static_cast<double>(row) / (kSteps - 1)), cosine);
     }
   }
   return table;
@@ -82,14 +86,14 @@ AlbedoTable make_table() {
 double sheen_albedo(double roughness, double normal_view) {
   static const AlbedoTable table = make_table();
   const auto index_of = [](double value) { return std::clamp(value, 0.0, 1.0) * (kSteps - 1); };
-  const double y = index_of(roughness);
+  const double y = index_of(std::sqrt(std::max(roughness, 0.0)));
   const double x = index_of(std::sqrt(std::max(normal_view, 0.0)));
   const auto row = std::min(static_cast<std::size_t>(y), kSteps - 2);
   const auto column = std::min(static_cast<std::size_t>(x), kSteps - 2);
   const double fy = y - static_cast<double>(row);
   const double fx = x - static_cast<double>(column);
   const auto along = [&](std::size_t r) { return table[r][column] * (1.0 - fx) + table[r][column + 1] * fx; };
-  return along(row) * (1.0 - fy) + along(row + 1) * fy;
+  return std::clamp(along(row) * (1.0 - fy) + along(row + 1) * fy, 0.0, 1.0);
 }
 
 }  // namespace hpr

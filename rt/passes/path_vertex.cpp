@@ -281,30 +281,65 @@ Faces faces_met(const PathVertex& from, const PassInfo& pass, const glm::dvec3& 
   return looks && !leads_into_solid(from.surface, from.material, direction) ? Faces::Front : Faces::Both;
 }
 
-/// Makes a ray per point of the wave that follows the lobe: buffers.following and buffers.requests.
-void make_lobe_rays(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
-                    RayBuffers& buffers, PixelSums& sums) {
-  std::vector<LobeRay>& rays = buffers.lobe_rays;
-  rays.clear();
-  buffers.requests.clear();
-  for (const PathVertex& point : wave.vertices) {
-    const double factor = point.lobe_weights[static_cast<std::size_t>(lobe)];
-    if (factor == 0.0) continue;
-    if (context.gathers && context.follows_for_itself(point.bsdf, lobe) == pass.gathers_all_lobes) continue;
-    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
-    const auto sample = point.bsdf.sample(lobe, next_two(sampler, point.depth));
-    if (!sample) continue;
+/// Whether a ray for each channel goes through a surface that disperses: where the eye looks through it, and it bends
+/// light in one direction. Not from within, where one channel may be let through at an angle that reflects another.
+bool splits_channels(const PathVertex& point) {
+  return !point.surface.inside && point.depth < kChoosingDepth && !point.gathered && disperses(point.material) &&
+         point.material.roughness < Bsdf::kDeltaRoughness && carries_channels(point.throughput);
+}
+
+/// The rays that follow a lobe of a wavefront: buffers.lobe_rays and buffers.requests.
+class LobeRays {
+ public:
+  LobeRays(const LightContext& context, const PassInfo& pass, Lobe lobe, RayBuffers& buffers, PixelSums& sums)
+      : context_(context), pass_(pass), lobe_(lobe), buffers_(buffers), sums_(sums) {}
+
+  /// One per point, or one per channel.
+  void make(const Wavefront& wave) {
+    buffers_.lobe_rays.clear();
+    buffers_.requests.clear();
+    for (const PathVertex& point : wave.vertices) {
+      if (point.lobe_weights[static_cast<std::size_t>(lobe_)] == 0.0F) continue;
+      if (context_.gathers && context_.follows_for_itself(point.bsdf, lobe_) == pass_.gathers_all_lobes) continue;
+      if (lobe_ != Lobe::Transmission || !splits_channels(point)) {
+        add(point, point.bsdf);
+        continue;
+      }
+      for (int channel = 0; channel < 3; ++channel) {
+        if (!(point.throughput[channel] > 0.0)) continue;
+        MaterialPoint material = point.material;
+        set_channel(material, channel, 1.0);
+        // All with the same numbers: what is noisy further on is so in grey.
+        add(point, Bsdf(material, point.surface));
+      }
+    }
+    for (std::size_t i = 0; i < buffers_.lobe_rays.size(); ++i) {
+      buffers_.requests[i].sampler = &buffers_.lobe_rays[i].sampler;
+    }
+  }
+
+ private:
+  void add(const PathVertex& point, const Bsdf& bsdf) {
+    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe_));
+    const auto sample = bsdf.sample(lobe_, next_two(sampler, point.depth));
+    if (!sample) return;
+    const double factor = point.lobe_weights[static_cast<std::size_t>(lobe_)];
     glm::dvec3 throughput = factor * point.throughput * sample->weight;
     throughput *= russian_roulette_weight(brightness(throughput), sampler);
-    if (throughput == glm::dvec3(0.0)) continue;
-    rays.push_back({&point, throughput, sample->pdf, sampler});
-    buffers.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
-                                pass.gathers_all_lobes ? point.gather_reach : std::numeric_limits<double>::infinity(),
-                                nullptr, 0, faces_met(point, pass, sample->direction)});
-    sums.count_ray(point.pixel);
+    if (throughput == glm::dvec3(0.0)) return;
+    buffers_.lobe_rays.push_back({&point, throughput, sample->pdf, sampler});
+    buffers_.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
+                                 pass_.gathers_all_lobes ? point.gather_reach : std::numeric_limits<double>::infinity(),
+                                 nullptr, 0, faces_met(point, pass_, sample->direction)});
+    sums_.count_ray(point.pixel);
   }
-  for (std::size_t i = 0; i < rays.size(); ++i) buffers.requests[i].sampler = &rays[i].sampler;
-}
+
+  const LightContext& context_;
+  const PassInfo& pass_;
+  Lobe lobe_;
+  RayBuffers& buffers_;
+  PixelSums& sums_;
+};
 
 /// What ray i finds of the sky; of rays that gather from the first surface also what it would have found, as direct
 /// light less its shadow.
@@ -382,7 +417,10 @@ Component component_after(const PathVertex& point, Component first) {
 void finish_vertex(const LightContext& context, PathVertex& point, double metres) {
   point.material = evaluate_material(context.scene, point.surface);
   if (metres > 0.0) point.throughput *= transmittance_to(point.media, point.surface, point.material, metres);
-  if (disperses(point.material)) choose_channel(point.material, point.throughput, point.sampler.one());
+  if (disperses(point.material) && !splits_channels(point) &&
+      !(Bsdf::shares_directions(point.material) && carries_channels(point.throughput))) {
+    choose_channel(point.material, point.throughput, point.sampler.one());
+  }
   point.bsdf = Bsdf(point.material, point.surface);
   if (context.gathers) {
     if (point.depth < kMaxGathered) choose_lobes(context, point);
@@ -409,7 +447,7 @@ void finish_vertex(const LightContext& context, PathVertex& point, double metres
 
 void follow_lobe(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
                  RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& next) {
-  make_lobe_rays(context, wave, pass, lobe, buffers, sums);
+  LobeRays(context, pass, lobe, buffers, sums).make(wave);
   buffers.hits.resize(buffers.lobe_rays.size());
   buffers.counts[pass.id] += buffers.lobe_rays.size();
   buffers.counts.invalid += context.rays->closest(buffers.requests, buffers.hits, buffers.scratch);

@@ -291,7 +291,9 @@ void PathWavefront::arrive(Path& path, std::uint32_t surface) {
     ++counts_.too_long;
     return;
   }
-  if (disperses(material)) choose_channel(material, path.throughput, path.sampler.one());
+  if (disperses(material) && !(Bsdf::shares_directions(material) && carries_channels(path.throughput))) {
+    choose_channel(material, path.throughput, path.sampler.one());
+  }
   scatter(path, point, material);
 }
 
