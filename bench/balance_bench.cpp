@@ -39,7 +39,7 @@ std::vector<View> off_center(const Scene& scene) {
   Camera camera = choose_camera({}, scene);
   const glm::dvec3 center = 0.5 * (scene.bounds.low + scene.bounds.high);
   const double distance = glm::length(center - camera.eye);
-  camera.eye += 0.3 * distance * camera.axes[0];
+  camera.eye += 0.42 * distance * camera.axes[0];
   return {make_view(camera, {1280, 720}, scene.bounds)};
 }
 
@@ -62,7 +62,7 @@ std::vector<View> one_tile(const Scene& scene) {
 
 /// What is costly in the middle lies in one tile.
 std::vector<View> costly_tile(const Scene& scene) {
-  return spanning(scene, 800.0);
+  return spanning(scene, 300.0);
 }
 
 std::vector<View> centered(const Scene& scene) {
@@ -120,8 +120,9 @@ std::vector<Row> draw(const Case& one, std::string_view balance) {
 
 void measure(const Case& one) {
   fmt::print(
-      "\n{}: {}, {} ranks\n\n| balance | frame | slowest / mean | speed-up | lent | work of each rank, ms |\n"
-      "|---|---|---|---|---|---|\n",
+      "\n{}: {}, {} ranks\n\n| balance | frame | slowest / mean | speed-up | lent | dearest tile / mean | work of each "
+      "rank, ms |\n"
+      "|---|---|---|---|---|---|---|\n",
       one.name, one.scene, one.ranks);
   for (const std::string_view balance : {"static", "measured", "demand"}) {
     int number = 0;
@@ -129,8 +130,8 @@ void measure(const Case& one) {
       const double ratio = slowest_over_mean(row.work_ms);
       std::string each;
       for (const double ms : row.work_ms) each += fmt::format("{}{:.0f}", each.empty() ? "" : " ", ms);
-      fmt::print("| {} | {} | {:.3f} | {:.2f} | {} | {} |\n", balance, number++, ratio, one.ranks / ratio, row.lent,
-                 each);
+      fmt::print("| {} | {} | {:.3f} | {:.2f} | {} | {:.1f} | {} |\n", balance, number++, ratio, one.ranks / ratio,
+                 row.lent, row.dearest, each);
     }
     std::fflush(stdout);
   }
@@ -143,7 +144,8 @@ int main(int argc, char** argv) {
   using namespace hpr;
   const std::vector<std::pair<std::string, std::string>> rays{{"primary", "rays"}, {"passes", "shadow,reflection"}};
   std::vector<std::pair<std::string, std::string>> many = rays;
-  many.emplace_back("light-samples", "16");
+  many.emplace_back("environment", "studio");
+  many.emplace_back("light-samples", "64");
   std::vector<std::string> scenes(argv + 1, argv + argc);
   if (scenes.empty()) scenes = {"gen:sphereflake?s=3"};
   for (const std::string& scene : scenes) measure({"off centre", scene, 2, off_center, rays});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <numeric>
+#include <optional>
 
 #include "core/error.h"
 
@@ -185,46 +186,78 @@ Areas next_areas(const Areas& current, const FrameLayout& layout, const std::vec
   return std::ranges::max(now) - std::ranges::max(then) > kMinGain * mean ? areas : current;
 }
 
+namespace {
+
+/// The tiles of each rank, dearest first, and what they cost together.
+class OwnedTiles {
+ public:
+  OwnedTiles(std::span<const int> owners, std::span<const double> costs, int ranks)
+      : costs_(costs), tiles_(static_cast<std::size_t>(ranks)), loads_(static_cast<std::size_t>(ranks), 0.0) {
+    for (std::size_t tile = 0; tile < owners.size(); ++tile) {
+      if (owners[tile] < 0) continue;
+      tiles_.at(static_cast<std::size_t>(owners[tile])).push_back(tile);
+      loads_[static_cast<std::size_t>(owners[tile])] += costs[tile];
+    }
+    mean_ = std::accumulate(loads_.begin(), loads_.end(), 0.0) / ranks;
+    for (auto& list : tiles_) {  // of equal ones the later tile, so that what stays is a run
+      std::ranges::sort(
+          list, [&](std::size_t a, std::size_t b) { return costs[a] != costs[b] ? costs[a] > costs[b] : a > b; });
+    }
+  }
+
+  [[nodiscard]] const std::vector<double>& loads() const { return loads_; }
+  [[nodiscard]] double mean() const { return mean_; }
+
+  /// The tile that is to go from one rank to another: the dearest that leaves neither on the other side of the mean,
+  /// else the cheapest, if that helps at all.
+  [[nodiscard]] std::optional<std::size_t> choose(std::size_t from, std::size_t to) const {
+    const double wanted = std::min(loads_[from] - mean_, mean_ - loads_[to]);
+    const auto& list = tiles_[from];
+    const auto fits = std::ranges::find_if(list, [&](std::size_t tile) { return costs_[tile] <= wanted; });
+    if (fits != list.end() && costs_[*fits] > 0.0) return *fits;
+    const auto costly =
+        std::ranges::find_if(list.rbegin(), list.rend(), [&](std::size_t tile) { return costs_[tile] > 0.0; });
+    const double room = loads_[from] - loads_[to] - kMinGain * mean_;
+    if (costly == list.rend() || costs_[*costly] >= room) return std::nullopt;
+    return *costly;
+  }
+
+  void move(std::size_t tile, std::size_t from, std::size_t to) {
+    std::erase(tiles_[from], tile);
+    auto& list = tiles_[to];
+    list.insert(
+        std::ranges::lower_bound(list, costs_[tile], std::greater<>(), [&](std::size_t each) { return costs_[each]; }),
+        tile);
+    loads_[from] -= costs_[tile];
+    loads_[to] += costs_[tile];
+  }
+
+ private:
+  std::span<const double> costs_;
+  std::vector<std::vector<std::size_t>> tiles_;
+  std::vector<double> loads_;
+  double mean_ = 0.0;
+};
+
+}  // namespace
+
 std::vector<int> balance_owners(std::vector<int> owners, std::span<const double> costs, int ranks) {
   HPR_CHECK(owners.size() == costs.size() && ranks > 0);
-  std::vector<std::vector<std::size_t>> tiles(static_cast<std::size_t>(ranks));
-  std::vector<double> loads(static_cast<std::size_t>(ranks), 0.0);
-  for (std::size_t tile = 0; tile < owners.size(); ++tile) {
-    if (owners[tile] < 0) continue;
-    tiles.at(static_cast<std::size_t>(owners[tile])).push_back(tile);
-    loads[static_cast<std::size_t>(owners[tile])] += costs[tile];
-  }
-  const double mean = std::accumulate(loads.begin(), loads.end(), 0.0) / ranks;
-  // Dearest first, so that few move; of equal ones the later tile, so that what stays is a run.
-  for (auto& list : tiles) {
-    std::ranges::sort(list,
-                      [&](std::size_t a, std::size_t b) { return costs[a] != costs[b] ? costs[a] > costs[b] : a > b; });
-  }
+  OwnedTiles owned(owners, costs, ranks);
+  std::vector<double> movable = owned.loads();  // 0 of ranks none of whose tiles can go
   while (true) {
-    const auto slowest = static_cast<std::size_t>(std::ranges::max_element(loads) - loads.begin());
-    const auto quickest = static_cast<std::size_t>(std::ranges::min_element(loads) - loads.begin());
-    if (loads[slowest] <= (1.0 + kMinGain) * mean) return owners;
-    // What leaves the slowest above the mean, or the quickest no longer the quickest, gains nothing.
-    const double room = loads[slowest] - loads[quickest];
-    const double wanted = std::min(loads[slowest] - mean, mean - loads[quickest]);
-    auto& list = tiles[slowest];
-    auto moved = std::ranges::find_if(list, [&](std::size_t tile) { return costs[tile] <= wanted; });
-    if (moved == list.end() || costs[*moved] <= 0.0) {
-      // All are dearer than what is wanted: the cheapest of them, if it helps at all.
-      const auto paid =
-          std::ranges::find_if(list.rbegin(), list.rend(), [&](std::size_t tile) { return costs[tile] > 0.0; });
-      if (paid == list.rend() || costs[*paid] >= room - kMinGain * mean) return owners;
-      moved = std::prev(paid.base());
+    const auto from = static_cast<std::size_t>(std::ranges::max_element(movable) - movable.begin());
+    const auto to = static_cast<std::size_t>(std::ranges::min_element(owned.loads()) - owned.loads().begin());
+    if (movable[from] <= (1.0 + kMinGain) * owned.mean()) return owners;
+    const std::optional<std::size_t> tile = owned.choose(from, to);
+    if (!tile) {
+      movable[from] = 0.0;
+      continue;
     }
-    const std::size_t tile = *moved;
-    list.erase(moved);
-    loads[slowest] -= costs[tile];
-    loads[quickest] += costs[tile];
-    owners[tile] = static_cast<int>(quickest);
-    auto& to = tiles[quickest];
-    to.insert(
-        std::ranges::lower_bound(to, costs[tile], std::greater<>(), [&](std::size_t each) { return costs[each]; }),
-        tile);
+    owned.move(*tile, from, to);
+    owners[*tile] = static_cast<int>(to);
+    movable[from] = owned.loads()[from];
+    movable[to] = owned.loads()[to];
   }
 }
 

@@ -115,11 +115,14 @@ TEST(BalancedAreas, StayWhereOtherOnesWouldGainLittle) {
   std::vector<double> costs = spot(layout);
   const Areas areas = next_areas({}, layout, weights, costs);
   std::mt19937 random(3);
-  for (int frame = 0; frame < 20; ++frame) {  // noise of three hundredths
+  int others = 0;
+  for (int frame = 0; frame < 20; ++frame) {  // each tile's cost is up to an eighth off
     std::vector<double> noisy = costs;
-    for (double& cost : noisy) cost *= 0.97 + 0.06 * static_cast<double>(random() % 1000) / 1000.0;
+    for (double& cost : noisy) cost *= 0.88 + 0.24 * static_cast<double>(random() % 1000) / 1000.0;
+    others += assign_tiles(layout, weights, noisy) != areas ? 1 : 0;
     EXPECT_EQ(next_areas(areas, layout, weights, noisy), areas) << frame;
   }
+  EXPECT_GT(others, 2);
   std::ranges::reverse(costs);  // the spot is elsewhere now
   EXPECT_NE(next_areas(areas, layout, weights, costs), areas);
 }
@@ -167,6 +170,13 @@ TEST(BalancedOwners, ATileThatIsTooDearToHelpStays) {
   EXPECT_EQ(balance_owners(owners, std::vector<double>{10.0, 1.0, 1.0}, 2), owners);
   // What lies beside it goes.
   EXPECT_EQ(balance_owners({0, 0, 1, 1}, std::vector<double>{10.0, 1.0, 1.0, 1.0}, 2), (std::vector<int>{0, 1, 1, 1}));
+}
+
+TEST(BalancedOwners, ARankWhoseTilesAreTooDearKeepsNoOtherFromGivingSomeAway) {
+  const std::vector<double> costs{5.0, 1.5, 1.5, 1.5};
+  const auto loads = loads_of(balance_owners({0, 1, 1, 1}, costs, 3), costs, 3);
+  EXPECT_EQ(loads[0], 5.0);
+  EXPECT_EQ(std::ranges::max(loads[1], loads[2]), 3.0);
 }
 
 TEST(BalancedOwners, ADearTileGoesWhereThatHelps) {

@@ -20,8 +20,10 @@
 namespace hpr {
 namespace {
 
-/// Of shared memory for each rank. Where the tiles of a frame need more, the dearest are offered.
-constexpr std::size_t kMaxBoardBytes = std::size_t{32} << 20U;
+/// Of shared memory for all ranks together, and the least for one. Where the tiles of a frame need more, the dearest
+/// are offered.
+constexpr std::size_t kBoardBytes = std::size_t{32} << 20U;
+constexpr std::size_t kMinBoardBytes = std::size_t{1} << 20U;
 /// So many parts a thread has to light are fine enough: ranks then end within a sixtieth of each other.
 constexpr double kPartsPerThread = 64.0;
 constexpr std::chrono::microseconds kNap{50};
@@ -180,8 +182,11 @@ std::size_t LightLending::slot_bytes() const {
 }
 
 std::size_t LightLending::slots() const {
-  const std::size_t fit = kMaxBoardBytes / (slot_bytes() + kTileSide * sizeof(Offer));
-  return std::clamp(round_.tiles, std::size_t{1}, std::max<std::size_t>(fit, 1));
+  const auto ranks = static_cast<std::size_t>(ranks_);
+  const std::size_t fit = std::max(kBoardBytes / ranks, kMinBoardBytes) / (slot_bytes() + kTileSide * sizeof(Offer));
+  // A rank seldom has much more than an even part of the tiles.
+  const std::size_t usual = round_.tiles / ranks + round_.tiles / (4 * ranks) + 4;
+  return std::max<std::size_t>(std::min({round_.tiles, usual, fit}), 1);
 }
 
 std::size_t LightLending::max_offers() const {
@@ -192,6 +197,7 @@ bool LightLending::start(Communicator& comm, const Round& round) {
   lent_.clear();
   if (is_impossible_) return false;
   round_ = round;
+  ranks_ = comm.size();
   const std::size_t needed = max_offers() * sizeof(Offer) + slots() * slot_bytes();
   if (!board_ || board_->bytes() < needed) {
     try {
@@ -200,7 +206,7 @@ bool LightLending::start(Communicator& comm, const Round& round) {
     } catch (const Error& error) {
       if (error.code() != ExitCode::Limit) throw;
       is_impossible_ = true;  // on all ranks alike
-      if (comm.rank() == 0) log::warning("light is not lent between ranks: {}; {}", error.what(), error.hint());
+      if (comm.rank() == 0) log::info("light is not lent between ranks: {}; {}", error.what(), error.hint());
       return false;
     }
   }
@@ -290,16 +296,16 @@ void LightLending::return_light(Communicator& comm, std::span<const ShadedSample
   const auto ranks = static_cast<std::size_t>(comm.size());
   std::vector<std::vector<std::byte>> messages(ranks);
   std::vector<std::vector<LentRows>> arriving(ranks);
+  const auto append = [&](const LentRows& rows) {
+    std::vector<std::byte>& message = messages[static_cast<std::size_t>(rows.owner)];
+    each_span(samples, rows,
+              [&](std::span<std::byte> bytes) { message.insert(message.end(), bytes.begin(), bytes.end()); });
+  };
   for (const LentRows& rows : all) {
-    if (rows.lit_by == comm.rank()) {
-      std::vector<std::byte>& message = messages[static_cast<std::size_t>(rows.owner)];
-      each_span(samples, rows,
-                [&](std::span<std::byte> bytes) { message.insert(message.end(), bytes.begin(), bytes.end()); });
-    }
-    if (rows.owner == comm.rank()) {
-      arriving[static_cast<std::size_t>(rows.lit_by)].push_back(rows);
-      lent_.push_back(rows);
-    }
+    if (rows.lit_by == comm.rank()) append(rows);
+    if (rows.owner != comm.rank()) continue;
+    arriving[static_cast<std::size_t>(rows.lit_by)].push_back(rows);
+    lent_.push_back(rows);
   }
   std::vector<Outgoing> out;
   std::vector<int> from;
@@ -309,14 +315,12 @@ void LightLending::return_light(Communicator& comm, std::span<const ShadedSample
     if (!arriving[peer].empty()) from.push_back(rank);
   }
   comm.exchange(out, from, [&](int peer, std::span<const std::byte> message) {
-    std::size_t read = 0;
-    for (const LentRows& rows : arriving[static_cast<std::size_t>(peer)]) {
-      each_span(samples, rows, [&](std::span<std::byte> bytes) {
-        HPR_CHECK(read + bytes.size() <= message.size());
-        std::memcpy(bytes.data(), message.data() + read, bytes.size());
-        read += bytes.size();
-      });
-    }
+    const auto copy = [&](std::span<std::byte> bytes) {
+      HPR_CHECK(bytes.size() <= message.size());
+      std::ranges::copy(message.first(bytes.size()), bytes.begin());
+      message = message.subspan(bytes.size());
+    };
+    for (const LentRows& rows : arriving[static_cast<std::size_t>(peer)]) each_span(samples, rows, copy);
   });
 }
 

@@ -87,6 +87,7 @@ class LightLending {
 
   std::optional<WorkBoard> board_;
   Round round_;
+  int ranks_ = 1;
   bool is_impossible_ = false;
   std::vector<LentRows> lent_;
 };

@@ -64,8 +64,10 @@ RayBatch rays_through(const View& view, const Rect& pixels, const RaySpace& spac
   constexpr int kSide = 4;
   RayBatch rays;
   for (int i = 0; i < kSide * kSide; ++i) {
-    const double x = pixels.x0 + (i % kSide + 0.5) * pixels.width() / kSide;
-    const double y = pixels.y0 + (i / kSide + 0.5) * pixels.height() / kSide;
+    const int column = i % kSide;
+    const int row = i / kSide;
+    const double x = pixels.x0 + (column + 0.5) * pixels.width() / kSide;
+    const double y = pixels.y0 + (row + 0.5) * pixels.height() / kSide;
     Ray ray = view_ray(view, x, y);
     ray.origin += ray.direction * view.near_distance;
     rays.push(space.from_world(ray.origin), glm::normalize(ray.direction), std::numeric_limits<double>::infinity(),
