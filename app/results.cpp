@@ -94,6 +94,14 @@ Json not_finite_json(const RayCounts& rays) {
   return {{"pixels", rays.not_finite}, {"first", first}};
 }
 
+Json balance_json(const BalanceReport& report) {
+  return {{"mode", kBalanceNames.at(static_cast<std::size_t>(report.balance))},
+          {"slowest_over_mean", report.slowest_over_mean},
+          {"keys", report.keys},
+          {"light", report.light},
+          {"lent", report.lent}};
+}
+
 }  // namespace
 
 void write_stats(const std::filesystem::path& path, const RunStats& stats) {
@@ -121,6 +129,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
             {"tone", stats.display ? Json(name_of(stats.display->tone)) : Json()},
             {"bytes_sent", stats.bytes_sent},
             {"memory_peak_bytes_per_rank", stats.memory_peak_bytes},
+            {"balance", balance_json(stats.balance)},
             {"ranks", stats.ranks}};
   if (stats.budget) json["budget"] = budget_json(to_record(*stats.budget));
   if (stats.verify) json["verify"] = verify_json(to_record(*stats.verify));

@@ -1,11 +1,23 @@
 #include "core/timing.h"
 
+#include <time.h>
+
 #include <atomic>
 #include <chrono>
 #include <mutex>
 #include <utility>
 
 #include "core/job_board.h"
+
+namespace hpr {
+
+double CpuStopwatch::now_ms() {
+  timespec now{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace hpr
 
 namespace hpr::trace {
 namespace {

@@ -19,6 +19,18 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+/// The processor time that the thread at hand spent since it was made: other programs on the machine change it little.
+class CpuStopwatch {
+ public:
+  CpuStopwatch() : start_ms_(now_ms()) {}
+  [[nodiscard]] double ms() const { return now_ms() - start_ms_; }
+
+ private:
+  static double now_ms();
+
+  double start_ms_;
+};
+
 }  // namespace hpr
 
 /// Spans of what this process does, as trace viewers show them and its launcher is told (core/job_board.h). Costs a few

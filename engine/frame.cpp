@@ -8,6 +8,7 @@
 #include "compositing/compositor.h"
 #include "core/interrupt.h"
 #include "core/timing.h"
+#include "engine/balance/load_balance.h"
 #include "engine/session.h"
 #include "engine/tile_ownership.h"
 #include "engine/verification.h"
@@ -63,7 +64,7 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
 }
 
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
-                              std::span<TileLayer<Key>* const> keys) {
+                              std::span<TileLayer<Key>* const> keys, FrameWork& work) {
   PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
   const trace::Span span("primary rays");
   PrimaryRayStats stats;
@@ -77,6 +78,8 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
     for (const JitteredViews& each : jittered) views.push_back(each.views[screen]);
     rays.draw(views, screen, parts, keys, draws_own ? jittered.front().sample.wanted : nullptr);
     stats += rays.stats();
+    session.balance().add(plan.layout, rays.costs());
+    for (const TileCost& cost : rays.costs()) work.keys_ms += cost.ms;
   }
   return stats;
 }
@@ -89,9 +92,11 @@ FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const Ji
   FrameTimes spent;
   const Stopwatch watch;
   if (plan.primary == Primary::Rays) {
-    spent.primary = trace_primary(session, plan, jittered, keys);
+    spent.primary = trace_primary(session, plan, jittered, keys, spent.work);
   } else {
     for (std::size_t i = 0; i < jittered.size(); ++i) rasterize(session, plan, jittered[i].views, *keys[i]);
+    spent.work.keys_ms = watch.ms() * session.threads();  // what each tile took of it is not known
+    session.balance().add(plan.layout, plan.tiles, spent.work.keys_ms);
   }
   spent.primary_ms = watch.ms();
   return spent;
@@ -122,35 +127,51 @@ void unpack_colors(const TileLayer<Key>& keys, std::span<const std::size_t> tile
   }
 }
 
-/// Adds times and ray counts of the last call of light().
-void add_light(const DeferredShader& shader, FrameTimes& spent) {
+/// Adds times, costs and ray counts of the shader's last call.
+void add_light(Session& session, const FramePlan& plan, const DeferredShader& shader, FrameTimes& spent) {
   FrameTimes light;
   light.passes = shader.times();
   light.rays = shader.counts();
+  for (const TileCost& cost : shader.costs()) light.work.light_ms += cost.ms;
+  session.balance().add(plan.layout, shader.costs());
   spent += light;
+}
+
+/// Whether what is composited goes on to whoever has time to light it.
+bool balances_light(const Session& session, const FramePlan& plan) {
+  return plan.balance != Balance::Static && plan.distribution != Distribution::SortFirst && plan.lit &&
+         plan.shading == Shading::Deferred && session.ranks() > 1;
 }
 
 /// Moves keys to the ranks that own their tiles; the first sample decides which those are.
 void move_to_owners(Session& session, const FramePlan& plan, std::optional<TileOwnership>& ownership, Frame& frame) {
-  if (!ownership) ownership.emplace(session.comm(), plan.layout, frame.owned);
+  if (!ownership && balances_light(session, plan)) {
+    ownership.emplace(session.balance().owners_of_light(session.comm(), *frame.keys, frame.owned), session.rank());
+  } else if (!ownership) {
+    ownership.emplace(session.comm(), plan.layout, frame.owned);
+  }
   if (plan.distribution == Distribution::SortFirst) return;
   ownership->move_to_owners(session.comm(), *frame.keys, frame.owned);
   frame.owned = ownership->mine();
 }
 
-void mark_rank(const Session& session, Frame& frame) {
+void mark_rank(const Session& session, std::span<const LentRows> lent, Frame& frame) {
   const auto layer = frame.aovs.single.find(Aov::Rank);
   if (layer == frame.aovs.single.end()) return;
   for (const std::size_t tile : frame.owned) {
     std::ranges::fill(layer->second.tile(tile), static_cast<float>(session.rank()));
     layer->second.set_active(tile);
   }
+  for (const LentRows& rows : lent) {
+    std::ranges::fill(layer->second.tile(rows.tile).subspan(rows.first_pixel(), rows.pixels()),
+                      static_cast<float>(rows.lit_by));
+  }
 }
 
 /// Shades the tiles of `frame`, a few at a time, between which all ranks agree on whether the sample has been
 /// overtaken. The frame says so.
-void shade_while_wanted(Session& session, DeferredShader& shader, const ShadedSample& lit, Interrupt& interrupt,
-                        Frame& frame, FrameTimes& spent) {
+void shade_while_wanted(Session& session, const FramePlan& plan, DeferredShader& shader, const ShadedSample& lit,
+                        Interrupt& interrupt, Frame& frame, FrameTimes& spent) {
   struct Progress {
     bool overtaken = false;
     bool done = false;
@@ -164,7 +185,7 @@ void shade_while_wanted(Session& session, DeferredShader& shader, const ShadedSa
     count = std::min(count, tiles.size() - first);
     const Stopwatch watch;
     shader.shade(std::span(&lit, 1), tiles.subspan(first, count), [&] { return interrupt.is_raised(); });
-    add_light(shader, spent);
+    add_light(session, plan, shader, spent);
     const Progress mine{interrupt.is_raised(), first + count == tiles.size()};
     const std::vector<Progress> all = all_gather_value(session.comm(), mine);
     frame.overtaken = std::ranges::any_of(all, &Progress::overtaken);
@@ -176,8 +197,33 @@ void shade_while_wanted(Session& session, DeferredShader& shader, const ShadedSa
   }
 }
 
+/// Collective, before a frame begins: whether ranks light parts of others' tiles in it, of so many samples together.
+bool start_lending(Session& session, const FramePlan& plan, std::size_t samples) {
+  return lends_light(session, plan) &&
+         session.balance().lending().start(session.comm(), {plan.layout.tiles(), samples});
+}
+
+/// Shades the owned tiles of some samples, of which `frame` is the first; `lends`: whoever has time does.
+void shade_tiles(Session& session, const FramePlan& plan, std::span<const ShadedSample> samples, bool lends,
+                 Interrupt* interrupt, Frame& frame, FrameTimes& spent) {
+  DeferredShader& shader = session.shader(plan.rays);
+  LightLending& lending = session.balance().lending();
+  if (lends && (interrupt == nullptr || lending.sees_all(session.comm()))) {
+    const LightLending::Work work{samples, frame.owned, session.balance().costs(plan.layout), session.threads(),
+                                  interrupt};
+    frame.overtaken = !lending.shade(session.comm(), shader, work);
+    add_light(session, plan, shader, spent);
+    spent.work.lent += lending.lent().size();
+  } else if (interrupt != nullptr) {
+    shade_while_wanted(session, plan, shader, samples.front(), *interrupt, frame, spent);
+  } else {
+    shader.shade(samples, frame.owned);
+    add_light(session, plan, shader, spent);
+  }
+}
+
 /// rt: gives the owned tiles of `frame` their radiance, from keys or from colors that keys carry.
-void shade(Session& session, const FramePlan& plan, std::span<const View> views, const FrameSample& sample,
+void shade(Session& session, const FramePlan& plan, std::span<const View> views, const FrameSample& sample, bool lends,
            Frame& frame, FrameTimes& spent) {
   if (plan.shading == Shading::Local) {
     const trace::Span light("light");
@@ -185,19 +231,13 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
     const LightOutput output = frame.aovs.output(frame.radiance);
     unpack_colors(*frame.keys, frame.owned, frame.radiance, output.coverage);
     shade_empty(shader, views, *frame.keys, frame.owned, output, sample.number);
-    add_light(shader, spent);
+    add_light(session, plan, shader, spent);
   } else if (plan.lit) {
     const trace::Span light("light");
-    DeferredShader& shader = session.shader(plan.rays);
     const ShadedSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
-    if (sample.interrupt != nullptr) {
-      shade_while_wanted(session, shader, lit, *sample.interrupt, frame, spent);
-      if (frame.overtaken) return;
-    } else {
-      shader.shade(std::span(&lit, 1), frame.owned);
-      add_light(shader, spent);
-    }
-    mark_rank(session, frame);
+    shade_tiles(session, plan, std::span(&lit, 1), lends, sample.interrupt, frame, spent);
+    if (frame.overtaken) return;
+    mark_rank(session, lends ? session.balance().lending().lent() : std::span<const LentRows>(), frame);
   }
 }
 
@@ -223,6 +263,13 @@ VerifyCounts& VerifyCounts::operator+=(const VerifyCounts& other) {
   return *this;
 }
 
+FrameWork& FrameWork::operator+=(const FrameWork& other) {
+  keys_ms += other.keys_ms;
+  light_ms += other.light_ms;
+  lent += other.lent;
+  return *this;
+}
+
 FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   primary_ms += other.primary_ms;
   primary += other.primary;
@@ -233,6 +280,7 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
     for (std::size_t i = 0; i < other.passes.size(); ++i) passes.at(i).ms += other.passes[i].ms;
   }
   rays += other.rays;
+  work += other.work;
   verified += other.verified;
   samples += other.samples;
   return *this;
@@ -253,7 +301,7 @@ DrawnLayer draw_layer(Session& session, const FramePlan& plan, std::span<const V
   if (plan.shading == Shading::Local && !drawn.overtaken) {
     const trace::Span shading("light");
     shade_local(session.shader(plan.rays), views, keys, plan.tiles, sample.number);
-    add_light(session.shader(plan.rays), drawn.spent);
+    add_light(session, plan, session.shader(plan.rays), drawn.spent);
   }
   return drawn;
 }
@@ -263,18 +311,24 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   const trace::Span span("sample", "number", sample.number.sample);
   TileLayer<Key>& keys = session.keys(plan.layout, plan.strategy, plan.mine.group);
   keys.set_depth_format(plan.depth_format);
+  const bool lends = start_lending(session, plan, 1);
   const DrawnLayer layer = draw_layer(session, plan, views, keys, sample);
   FrameTimes spent = layer.spent;
 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.layers),
               plan.is_transparent()};
-  if (sample.ownership != nullptr) move_to_owners(session, plan, *sample.ownership, frame);
+  std::optional<TileOwnership> of_frame;
+  if (sample.ownership != nullptr) {
+    move_to_owners(session, plan, *sample.ownership, frame);
+  } else if (balances_light(session, plan)) {
+    move_to_owners(session, plan, of_frame, frame);
+  }
   if (sample.before_shading != nullptr) (*sample.before_shading)();
   spent.composite_ms = watch.ms();
 
   frame.overtaken = layer.overtaken;
-  if (!frame.overtaken) shade(session, plan, views, sample, frame, spent);
+  if (!frame.overtaken) shade(session, plan, views, sample, lends, frame, spent);
   if (frame.overtaken) return frame;
   if (plan.verify_percent > 0.0) {
     const JitteredViews drawn{{views.begin(), views.end()}, sample};
@@ -305,6 +359,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
     layer.set_depth_format(plan.depth_format);
     layers.push_back(&layer);
   }
+  const bool lends = start_lending(session, plan, jittered.size());
   times = draw_keys(session, plan, jittered, layers);
   std::vector<Frame> frames;
   std::vector<ShadedSample> samples;
@@ -321,9 +376,7 @@ std::vector<Frame> make_round(Session& session, const FramePlan& plan, std::span
         {jittered[i].views, &keys[i], frames[i].aovs.output(frames[i].radiance), sample.number, sample.wanted});
   }
   const trace::Span light("light");
-  DeferredShader& shader = session.shader(plan.rays);
-  shader.shade(samples, frames.front().owned);
-  add_light(shader, times);
+  shade_tiles(session, plan, samples, lends, nullptr, frames.front(), times);
   if (plan.verify_percent > 0.0) times.verified = verify(session, plan, jittered, frames);
   for (Frame& frame : frames) show_ranks(session, plan, frame);
   times.samples = static_cast<int>(jittered.size());

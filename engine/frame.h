@@ -43,6 +43,15 @@ struct VerifyCounts {
   bool operator==(const VerifyCounts&) const = default;
 };
 
+/// What this rank computed for a frame itself, on all of its threads: waiting for others is not in it.
+struct FrameWork {
+  double keys_ms = 0.0;
+  double light_ms = 0.0;
+  std::uint64_t lent = 0;  ///< pieces of this rank's tiles that others lit
+
+  FrameWork& operator+=(const FrameWork& other);
+};
+
 /// Times and ray counts of a frame on this rank; summed over its samples.
 struct FrameTimes {
   double primary_ms = 0.0;  ///< the keys, drawn or traced
@@ -50,6 +59,7 @@ struct FrameTimes {
   double composite_ms = 0.0;
   std::vector<PassTime> passes;  ///< summed over threads
   RayCounts rays;
+  FrameWork work;
   VerifyCounts verified;
   int samples = 0;
 
@@ -78,9 +88,9 @@ struct JitteredViews {
 /// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
 /// Makes the keys of several samples by primary rays, one layer each, in place of rasterize(); all samples want the
-/// same pixels. Returns the ray counts.
+/// same pixels. Adds to `work` and returns the ray counts.
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
-                              std::span<TileLayer<Key>* const> keys);
+                              std::span<TileLayer<Key>* const> keys, FrameWork& work);
 
 /// What a layer took.
 struct DrawnLayer {

@@ -16,6 +16,7 @@
 #include "core/progress.h"
 #include "core/signals.h"
 #include "core/timing.h"
+#include "engine/balance/load_balance.h"
 #include "engine/checkpoint/checkpoint.h"
 #include "engine/session.h"
 
@@ -224,6 +225,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   if (!sampling_.sums()) {
     frame_ = make_frame(session_, plan_, views, &times_, {{number_, 0}, nullptr});
     progress_.samples = 1;
+    note_costs();
     return true;
   }
   checkpoint_file_.emplace(checkpoint.path, checkpoint.keeps_previous);
@@ -250,7 +252,13 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   }
   if (checkpoint.at_end && ownership_) write(checkpoint, true);
   finish();
+  note_costs();
   return true;
+}
+
+void FrameSampler::note_costs() {
+  if (session_.ranks() == 1 || plan_.balance == Balance::Static) return;
+  session_.balance().finish_frame(session_.comm(), plan_.layout, times_.samples);
 }
 
 bool FrameSampler::refine(std::span<const View> views, Interrupt* interrupt) {

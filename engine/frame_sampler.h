@@ -64,6 +64,8 @@ class FrameSampler {
   /// Updates progress_ after samples were added; `seconds` in all.
   void report_progress(double seconds);
   void finish();
+  /// Collective: makes known what the tiles took.
+  void note_costs();
 
   Session& session_;
   const FramePlan& plan_;

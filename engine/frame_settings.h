@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cluster/distribution/assignment.h"
+#include "cluster/distribution/balance.h"
 #include "engine/aov.h"
 #include "image/key.h"
 #include "rt/ray_settings.h"
@@ -31,8 +32,9 @@ inline constexpr std::array<std::string_view, 3> kPrimaryNames{"raster", "rays",
 /// coplanar surfaces of different ranks show the brighter colour.
 struct FrameSettings {
   std::optional<Distribution> distribution;  ///< none: chosen by plan_frame
-  int groups = 0;                            ///< of Hybrid; 0: default_groups
-  std::string strategy;                      ///< empty: chosen by plan_frame
+  Balance balance = Balance::Demand;
+  int groups = 0;        ///< of Hybrid; 0: default_groups
+  std::string strategy;  ///< empty: chosen by plan_frame
   Primary primary = Primary::Auto;
   DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Raster, which Auto then is
   Shading shading = Shading::Deferred;

@@ -112,6 +112,27 @@ Image<float> enlarge(const Image<float>& values, const PicturePart& made, const 
 
 }  // namespace
 
+namespace {
+
+BalanceReport gather_balance(Communicator& comm, Balance balance, const FrameWork& mine) {
+  BalanceReport report{.balance = balance};
+  std::vector<double> keys;
+  std::vector<double> light;
+  std::vector<double> both;
+  for (const FrameWork& work : all_gather_value(comm, mine)) {
+    keys.push_back(work.keys_ms);
+    light.push_back(work.light_ms);
+    both.push_back(work.keys_ms + work.light_ms);
+    report.lent += work.lent;
+  }
+  report.keys = slowest_over_mean(keys);
+  report.light = slowest_over_mean(light);
+  report.slowest_over_mean = slowest_over_mean(both);
+  return report;
+}
+
+}  // namespace
+
 RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes& times, const FrameCost& cost) {
   CountingCommunicator& comm = session.comm();
   RunStats stats;
@@ -135,6 +156,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
     log::warning("{} samples of pixels had no finite radiance and are black, the first in pixel {},{} of screen {}",
                  stats.rays.not_finite, first.x, first.y, first.screen);
   }
+  stats.balance = gather_balance(comm, plan.balance, times.work);
   if (plan.verify_percent > 0.0) stats.verify = {plan.verify_percent, times.verified};
   stats.samples = times.samples;
   stats.samples_in_all = times.samples;

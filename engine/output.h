@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cluster/distribution/balance.h"
 #include "core/error.h"
 #include "engine/aov.h"
 #include "engine/budget.h"
@@ -59,13 +60,23 @@ struct VerifyReport {
   VerifyCounts counts;
 };
 
+/// How evenly the ranks worked: of what they computed themselves, without waiting, the slowest rank by the mean.
+struct BalanceReport {
+  Balance balance = Balance::Demand;
+  double keys = 1.0;
+  double light = 1.0;
+  double slowest_over_mean = 1.0;  ///< of both
+  std::uint64_t lent = 0;          ///< pieces of tiles that others than their owners lit
+};
+
 /// Times and counts of a run of frames, as `--stats` writes it (schema hpr.stats/1) and `demo` prints it.
 struct RunStats {
-  double ms = 0.0;                          ///< one frame, all its samples, slowest rank
-  int samples = 1;                          ///< drawn by this run
-  int samples_in_all = 1;                   ///< of the picture: with those of a checkpoint
-  std::optional<double> relmse;             ///< of a frame of several samples, estimated from their halves
-  std::optional<BudgetReport> budget;       ///< of a frame with a target time
+  double ms = 0.0;                     ///< one frame, all its samples, slowest rank
+  int samples = 1;                     ///< drawn by this run
+  int samples_in_all = 1;              ///< of the picture: with those of a checkpoint
+  std::optional<double> relmse;        ///< of a frame of several samples, estimated from their halves
+  std::optional<BudgetReport> budget;  ///< of a frame with a target time
+  BalanceReport balance;
   std::optional<VerifyReport> verify;       ///< of a frame some of whose tiles were verified
   std::optional<DisplayTransform> display;  ///< of a frame that was shown
   std::vector<std::string> plan;

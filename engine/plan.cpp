@@ -15,6 +15,7 @@
 
 #include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
+#include "engine/balance/load_balance.h"
 #include "engine/display/background.h"
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
@@ -48,18 +49,6 @@ Choice choose_distribution(const FrameSettings& settings, const Scene& scene, in
   }
   return {Distribution::Hybrid,
           fmt::format("{} triangles are shared inside groups, pixels between them", scene.triangles)};
-}
-
-std::vector<std::size_t> tiles_in(const FrameLayout& layout, const std::vector<ScreenRect>& area) {
-  std::vector<std::size_t> tiles;
-  for (const ScreenRect& rect : area) {
-    for (int y = rect.pixels.y0; y < rect.pixels.y1; y += kTileSide) {
-      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide)
-        tiles.push_back(layout.tile_at(rect.screen, x, y));
-    }
-  }
-  std::ranges::sort(tiles);
-  return tiles;
 }
 
 std::string explain_depth(const FramePlan& plan) {
@@ -407,8 +396,12 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     plan.layers.push_back(Aov::Coverage);
   }
   plan.verify_percent = settings.verify_percent;
+  plan.balance = settings.balance;
   std::vector<Assignment> assigned = assign(plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
   if (plan.rays.show == Show::Rank) plan.drawn_by.emplace(assigned, plan.layout);
+  for (std::size_t rank = 0; rank < assigned.size(); ++rank) {
+    if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
+  }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
   if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
@@ -416,13 +409,14 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),
                                       covering_surfaces(session.scene(), false));
   }
-  plan.tiles = tiles_in(plan.layout, plan.mine.area);
+  plan.tiles = tiles_of(plan.layout, plan.mine.area);
 
   if (!settings.strategy.empty()) {
     agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });
   }
 
   explain_distribution(plan, settings, choice, ranks);
+  if (ranks > 1) plan.explained.push_back(explain_balance(plan));
   const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
   plan.primary = primary.primary;
   plan.explained.push_back(
@@ -431,6 +425,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   fit_photons(session, settings, plan, views);
+  plan_areas(session, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   if (plan.verify_percent > 0.0) {
     plan.explained.push_back(fmt::format("verify: {} % of the tiles, drawn again by {} (as asked)", plan.verify_percent,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cluster/distribution/assignment.h"
+#include "cluster/distribution/balance.h"
 #include "engine/aov.h"
 #include "engine/display/drawn_by.h"
 #include "engine/frame_settings.h"
@@ -33,10 +34,12 @@ struct FramePlan {
   double verify_percent = 0.0;  ///< of the tiles; see engine/verification.h
   bool lit = true;              ///< false: only the keys are wanted, no light is spent on them
   FrameLayout layout;
-  Assignment mine;                     ///< this rank's part
-  std::optional<DrawnBy> drawn_by;     ///< where ranks are shown
-  std::vector<std::size_t> tiles;      ///< of this rank's group, ascending
-  std::vector<std::string> explained;  ///< one line per decision, with its reason
+  Balance balance = Balance::Demand;
+  Assignment mine;                             ///< this rank's part
+  std::vector<std::vector<ScreenRect>> areas;  ///< of each group
+  std::optional<DrawnBy> drawn_by;             ///< where ranks are shown
+  std::vector<std::size_t> tiles;              ///< of this rank's group, ascending
+  std::vector<std::string> explained;          ///< one line per decision, with its reason
 
   /// Whether the picture has an alpha other than 1.
   [[nodiscard]] bool is_transparent() const { return rays.background.kind == Background::Kind::Transparent; }

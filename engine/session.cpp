@@ -15,6 +15,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/timing.h"
+#include "engine/balance/load_balance.h"
 #include "raster/gl_context.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
@@ -39,7 +40,8 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
       host_(find_host_resources(comm, settings.threads)),
       scene_(load_scene_of_all(comm_, load)),
       requirements_(requirements_of(scene_)),
-      assembler_(std::make_unique<Assembler>()) {
+      assembler_(std::make_unique<Assembler>()),
+      balance_(std::make_unique<LoadBalance>()) {
   warn_of_scene();
   limit_software_gl(host_.threads);
   if (settings_.backend != "auto" || settings_.device >= 0) start_gl();
@@ -93,6 +95,7 @@ void Session::load(const std::function<Scene()>& load) {
   Scene scene = load_scene_of_all(comm_, load);
   release_scene();
   scene_ = std::move(scene);
+  balance_->forget();
   requirements_ = requirements_of(scene_);
   warn_of_scene();
 }

@@ -19,6 +19,7 @@ class Assembler;
 class Compositor;
 class GlContext;
 class DeferredShader;
+class LoadBalance;
 class PrimaryRays;
 class Rasterizer;
 class RayScene;
@@ -48,6 +49,7 @@ class Session {
 
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
   [[nodiscard]] int rank() const { return comm_.rank(); }
+  [[nodiscard]] int ranks() const { return comm_.size(); }
   [[nodiscard]] const Scene& scene() const { return scene_; }
   [[nodiscard]] const Requirements& requirements() const { return requirements_; }
   [[nodiscard]] int threads() const { return host_.threads; }
@@ -60,6 +62,8 @@ class Session {
   /// Renderer, version and device of OpenGL, for people.
   [[nodiscard]] std::string gl_description() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }
+  /// What ranks know of each other's work.
+  [[nodiscard]] LoadBalance& balance() { return *balance_; }
 
   /// The rasteriser that holds `objects`; kept until other objects are asked for. After start_gl().
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
@@ -140,6 +144,7 @@ class Session {
   std::string strategy_;
   std::unique_ptr<Compositor> compositor_;
   std::unique_ptr<Assembler> assembler_;
+  std::unique_ptr<LoadBalance> balance_;
   TileLayer<Key> keys_;
   std::vector<TileLayer<Key>> round_keys_;
   bool keys_shared_ = false;       ///< whether they were meant to be

@@ -554,6 +554,11 @@ std::vector<Setting> make_table() {
        .value = number(1, 1 << 20, [](Settings& s) -> int& { return s.frame.groups; }),
        .decides_bits = false,
        .used_with = {{"distribute", forms_groups}}},
+      {.name = "balance",
+       .help = "tiles by what they took before (measured), rows of them to who is done too (demand), or by count",
+       .value = choice(kBalanceNames, [](Settings& s) -> Balance& { return s.frame.balance; }),
+       .initial = "demand",
+       .decides_bits = false},
       {.name = "strategy",
        .help = "how layers are composited: a strategy's name or auto",
        .value = text(

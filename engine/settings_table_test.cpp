@@ -47,8 +47,8 @@ TEST(SettingsTable, EachSettingTouchesItsOwnValueAlone) {
   for (const Setting& setting : all_settings()) {
     RenderSettings settings;
     for (const char* const value :
-         {"true", "7",        "0.5",  "1,2,3", "shadow", "local",       "rays", "hybrid", "16", "8", "low",
-          "off",  "gaussian", "best", "depth", "tree",   "partitioned", "aces", "none",   "uv", "x"}) {
+         {"true", "7",        "0.5",  "1,2,3", "shadow", "local",       "rays", "hybrid", "16", "8",      "low",
+          "off",  "gaussian", "best", "depth", "tree",   "partitioned", "aces", "none",   "uv", "static", "x"}) {
       try {
         setting.value.parse(settings, value);
       } catch (const Error&) {

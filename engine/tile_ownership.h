@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "cluster/transport/communicator.h"
@@ -56,6 +57,9 @@ class TileOwnership {
  public:
   /// Collective. `owned`: this rank's tiles, ascending; this rank owns them from now on.
   TileOwnership(Communicator& comm, const FrameLayout& layout, std::span<const std::size_t> owned);
+
+  /// Per tile its owner, or -1, as all ranks know them. This rank is `rank`.
+  TileOwnership(std::vector<int> owners, int rank) : owner_(std::move(owners)) { mine_ = of(rank); }
 
   /// This rank's, ascending.
   [[nodiscard]] const std::vector<std::size_t>& mine() const { return mine_; }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/job_board.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/timing.h"
@@ -124,6 +125,7 @@ struct DeferredShader::State {
   double photon_ms = 0.0;   ///< spent on tracing photons, since the last gather_counts()
   bool has_warned = false;  ///< that rays were cut
   std::vector<PassTime> times;
+  std::vector<TileCost> costs;  ///< of the parts that the last shade() shaded
 
   RayForwarding* forwarding;
 
@@ -149,6 +151,14 @@ struct DeferredShader::State {
                      std::size_t margins);
   void shade_margins(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, bool denoises);
   void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
+  /// What all parts of a call of shade() share.
+  struct Call {
+    std::span<const ShadedSample> samples;
+    const PhotonMaps* photons = nullptr;
+    std::vector<Media> eyes;
+  };
+  [[nodiscard]] Call start_call(std::span<const ShadedSample> samples);
+  void shade_part(const Call& call, const ShadedPart& part);
   void gather_counts(double spent_ms);
   void shade_waiting(const LightContext& context, Scratch& scratch) const;
   void shade_wavefront(const LightContext& context, Scratch& scratch) const;
@@ -384,10 +394,10 @@ void DeferredShader::State::show_tile(const LightContext& context, Scratch& scra
   const trace::Span span("show tile", "tile", index);
   const DenormalsAsZero mode;
   const Stopwatch watch;
-  scratch.sums.clear(index, samples, {});
+  scratch.sums.clear(jobs.front(), index, samples, {});
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
-  const int height = jobs.front().rect.height();
-  for (RowRange rows; rows.first < height; rows.first = rows.end) {
+  const int end = jobs.front().end_row();
+  for (RowRange rows{jobs.front().rows.first, 0}; rows.first < end; rows.first = rows.end) {
     rows.end = end_of_wavefront(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       std::vector<PathVertex>& points = scratch.waiting[0];
@@ -412,15 +422,15 @@ void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scr
   const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
   const bool shows_cost = settings.show == Show::Cost;
   const std::size_t margins = jobs.size() * count_margins(context, jobs.front(), denoises);
-  sums.clear(index, samples,
+  sums.clear(jobs.front(), index, samples,
              {.all_components = shared != 0 || (denoises && Denoiser::keeps_direct(scene)),
               .diffuse = denoises,
               .cost = shows_cost,
               .margins = margins});
   if (scratch.waiting.empty()) scratch.waiting.resize(1);
   start_filters(context, scratch, jobs, denoises, margins);
-  const int height = jobs.front().rect.height();
-  for (RowRange rows; rows.first < height; rows.first = rows.end) {
+  const int end = jobs.front().end_row();
+  for (RowRange rows{jobs.front().rows.first, 0}; rows.first < end; rows.first = rows.end) {
     rows.end = end_of_wavefront(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       const Stopwatch watch;
@@ -494,55 +504,105 @@ void DeferredShader::shade(std::span<const View> views, const TileLayer<Key>& ke
   shade(std::span(&only, 1), tiles);
 }
 
+DeferredShader::State::Call DeferredShader::State::start_call(std::span<const ShadedSample> samples) {
+  const ShadedSample& first = samples.front();
+  costs.clear();
+  Call call{samples, photon_maps(first.number), media.of_eyes(first.views)};
+  if (settings.denoise) fragments.prepare(first.keys->layout(), first.views, settings);
+  return call;
+}
+
+void DeferredShader::State::shade_part(const Call& call, const ShadedPart& part) {
+  const ShadedSample& first = call.samples.front();
+  const TilePlace location = first.keys->layout().place(part.tile);
+  const std::span<const std::uint8_t> wanted = part.keys != nullptr ? part.wanted : mask_of(first.wanted, part.tile);
+  if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
+  const CpuStopwatch watch;
+  std::vector<TileJob> jobs;
+  for (const ShadedSample& sample : call.samples) {
+    const auto keys = part.keys != nullptr ? std::span(part.keys + jobs.size() * kTilePixels, kTilePixels)
+                                           : sample.keys->tile(part.tile);
+    jobs.push_back({location.pixels,
+                    sample.number,
+                    keys,
+                    &sample.views[location.screen],
+                    static_cast<std::uint32_t>(jobs.size() * kTilePixels),
+                    wanted,
+                    {part.first_row, part.end_row}});
+  }
+  std::unique_ptr<Scratch> scratch = take_scratch();
+  const LightContext context{.scene = scene,
+                             .surfaces = surfaces,
+                             .rays = rays ? &*rays : nullptr,
+                             .lights = lights,
+                             .settings = settings,
+                             .followed_lobes = followed_lobes,
+                             .gathers = gathers,
+                             .photons = call.photons,
+                             .view = &first.views[location.screen],
+                             .eye_media = call.eyes[location.screen]};
+  if (needs_light(settings.show)) {
+    shade_tile(context, *scratch, jobs, part.tile, call.samples);
+  } else {
+    show_tile(context, *scratch, jobs, part.tile, call.samples);
+  }
+  const double ms = watch.ms();
+  const std::lock_guard lock(mutex);
+  idle.push_back(std::move(scratch));
+  costs.push_back({part.tile, ms});
+}
+
 void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles,
                            const std::function<bool()>& is_overtaken) {
   HPR_CHECK(samples.size() == 1 || (!samples.empty() && !shades_one_by_one()));
   check_sizes(samples);
   const ShadedSample& first = samples.front();
-  const FrameLayout& layout = first.keys->layout();
   State& state = *state_;
   if (state.reference) {
+    state.costs.clear();
     state.trace_reference(first, tiles);
     state.warn_of_cut_rays();
     return;
   }
-  const PhotonMaps* const photons = state.photon_maps(first.number);
-  const std::vector<Media> eyes = state.media.of_eyes(first.views);
+  const State::Call call = state.start_call(samples);
   const Stopwatch watch;
-  if (state.settings.denoise) state.fragments.prepare(layout, first.views, state.settings);
   const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     if (is_overtaken && is_overtaken()) return;
-    const std::size_t tile = order[i];
-    const TilePlace location = layout.place(tile);
-    const std::span<const std::uint8_t> wanted = mask_of(first.wanted, tile);
+    const std::span<const std::uint8_t> wanted = mask_of(first.wanted, order[i]);
     if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
-    std::vector<TileJob> jobs;
-    for (const ShadedSample& sample : samples) {
-      set_active(sample.output, tile);
-      jobs.push_back({location.pixels, sample.number, sample.keys->tile(tile), &sample.views[location.screen],
-                      static_cast<std::uint32_t>(jobs.size() * kTilePixels), wanted});
-    }
-    std::unique_ptr<Scratch> scratch = state.take_scratch();
-    const LightContext context{.scene = state.scene,
-                               .surfaces = state.surfaces,
-                               .rays = state.rays ? &*state.rays : nullptr,
-                               .lights = state.lights,
-                               .settings = state.settings,
-                               .followed_lobes = state.followed_lobes,
-                               .gathers = state.gathers,
-                               .photons = photons,
-                               .view = &first.views[location.screen],
-                               .eye_media = eyes[location.screen]};
-    if (needs_light(state.settings.show)) {
-      state.shade_tile(context, *scratch, jobs, tile, samples);
-    } else {
-      state.show_tile(context, *scratch, jobs, tile, samples);
-    }
-    const std::lock_guard lock(state.mutex);
-    state.idle.push_back(std::move(scratch));
+    for (const ShadedSample& sample : samples) set_active(sample.output, order[i]);
+    state.shade_part(call, {.tile = order[i]});
   });
   state.gather_counts(watch.ms() * state.settings.threads);
+}
+
+void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart& next) {
+  HPR_CHECK(!is_whole() && (samples.size() == 1 || (!samples.empty() && !shades_one_by_one())));
+  check_sizes(samples);
+  State& state = *state_;
+  const State::Call call = state.start_call(samples);
+  const Stopwatch watch;
+  const auto threads = static_cast<std::size_t>(std::max(state.settings.threads, 1));
+  parallel_for(state.settings.threads, threads, [&](std::size_t) {
+    while (const std::optional<ShadedPart> part = next()) {
+      state.shade_part(call, *part);
+      report_step();
+    }
+  });
+  state.gather_counts(watch.ms() * state.settings.threads);
+}
+
+bool DeferredShader::is_whole() const {
+  return state_->reference || state_->forwarding != nullptr;
+}
+
+bool DeferredShader::shades_whole_tiles() const {
+  return state_->settings.denoise || state_->shared != 0;
+}
+
+std::span<const TileCost> DeferredShader::costs() const {
+  return state_->costs;
 }
 
 bool DeferredShader::trace_photons(Communicator& comm, const SampleNumber& number,

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,17 @@ struct ShadedSample {
   SampleNumber number;
   const PixelMask* wanted = nullptr;  ///< pixels that are shaded; null: all. What is stored elsewhere means nothing
 };
+
+/// Rows of a tile that are shaded at once, maybe for the rank that has the tile.
+struct ShadedPart {
+  std::size_t tile = 0;
+  int first_row = 0;          ///< of the tile
+  int end_row = kTileSide;    ///< past the last
+  const Key* keys = nullptr;  ///< sample after sample those of the whole tile; null: they stand in the samples
+  std::span<const std::uint8_t> wanted = {};  ///< where keys are not null: the tile's mask, in place of the samples'
+};
+/// Called by any thread: what it is to shade next; none once all is drawn.
+using NextPart = std::function<std::optional<ShadedPart>()>;
 
 /// Turns keys into radiance: reconstructs the surface each key names, adds emission and direct light, then what the
 /// planned passes add. A pixel's value depends on its key, its view and the scene only; threads, tile lists and ranks
@@ -89,6 +101,15 @@ class DeferredShader {
   /// `is_overtaken`: asked before each tile, by any thread; once it is true the tiles that are left mean nothing.
   void shade(std::span<const ShadedSample> samples, std::span<const std::size_t> tiles,
              const std::function<bool()>& is_overtaken = {});
+  /// Shades parts of tiles as `next` hands them out; pixels go to the samples' output, where the caller has made the
+  /// tiles active that it needs so. Not where is_whole().
+  void shade(std::span<const ShadedSample> samples, const NextPart& next);
+  /// Whether a list of tiles must be shaded as a whole: the reference, and rays that travel.
+  [[nodiscard]] bool is_whole() const;
+  /// Whether no part may be less than a tile: filters look about in it.
+  [[nodiscard]] bool shades_whole_tiles() const;
+  /// Of the last shade(): what each tile or part took, in no order; nothing of the reference.
+  [[nodiscard]] std::span<const TileCost> costs() const;
   /// Whether samples must be shaded one by one: with photons, the reference, or half-resolution passes.
   [[nodiscard]] bool shades_one_by_one() const;
 

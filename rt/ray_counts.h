@@ -12,6 +12,12 @@
 
 namespace hpr {
 
+/// What was spent on a tile, or on some of it.
+struct TileCost {
+  std::size_t tile = 0;
+  double ms = 0.0;  ///< of one processor
+};
+
 /// What the last PrimaryRays::draw() counted.
 struct PrimaryRayStats {
   std::uint64_t rays = 0;      ///< none go through pixels where no box about triangles is seen

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""One picture, however it is made: the same bits over ranks, distributions, strategies, threads and backends.
+"""One picture, however it is made: the same bits over ranks, distributions, strategies, threads, backends and balances.
 
 usage: bit_equality_test.py HPR [--full]
 
 Renders gen:gallery, its visible surfaces found by OpenGL, by rays, with indirect light along rays, and with every pass and
 four samples, and the points and lines of gen:cloud, and compares the hashes of the visibility keys (--raw) and of the EXR file's bytes. Without --full, so few
 small pictures that every two values of different options meet in one of them, and the first once more; with it, every
-combination at 1280x1024. Prints the hashes, the number of runs and what differs, and leaves with 1 if anything does.
+combination at 1280x1024, but for strategies with other balances than demand. Prints the hashes, the number of runs and what differs, and leaves with 1 if anything does.
 """
 
 import hashlib
@@ -81,9 +81,9 @@ def covering(runs):
 
 def digests(way, run, folder):
     """The hashes of one run's keys and picture, or what went wrong."""
-    ranks, distribution, strategy, threads, backend = run
+    ranks, distribution, strategy, threads, backend, balance = run
     result = hpr(["render", SCENES.get(way, SCENE), "--size", f"{SIZE[0]}x{SIZE[1]}", "--ranks", ranks, "--distribute", *distribution.split(),
-                  "--strategy", strategy, "--threads", threads, "--backend", backend, *plain(*WAYS[way]), "--raw", "a.keys",
+                  "--strategy", strategy, "--threads", threads, "--backend", backend, "--balance", balance, *plain(*WAYS[way]), "--raw", "a.keys",
                   "-o", "a.exr", "--force"], folder)
     if result.returncode != 0:
         return f"left with {result.returncode}: {result.stderr[-2000:]}"
@@ -111,13 +111,18 @@ def differing(way, runs, folder):
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-bits-") as scratch:
         folder = pathlib.Path(scratch)
-        ranks, threads = ("1", "2", "3", "4", "7"), ("1", "2")
+        ranks, threads = ("1", "2", "3", "4", "5", "7", "8"), ("1", "2")
         distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
-        drawn = list(itertools.product(ranks if FULL else ("1", "2", "3", "7"), distributions, choices_of("--strategy", folder), threads, backends))
+        strategies, balances = choices_of("--strategy", folder), choices_of("--balance", folder)
         parts = "sort-last --data partitioned"
-        traced = list(itertools.product(ranks, (*distributions, parts), ("auto",), threads, backends[:1]))
+        traced = list(itertools.product(ranks, (*distributions, parts), ("auto",), threads, backends[:1], balances))
         lit = list(itertools.product(ranks, (*(distributions if FULL else ("sort-first", "sort-last")), parts), ("auto",), threads,
-                                     backends[:1]))
+                                     backends[:1], balances))
+        if FULL:
+            drawn = [*itertools.product(ranks, distributions, strategies, threads, backends, ("demand",)),
+                     *itertools.product(ranks, distributions, ("auto",), threads, backends[:1], balances)]
+        else:
+            drawn = list(itertools.product(("1", "2", "3", "7"), distributions, strategies, threads, backends, balances))
         runs = dict.fromkeys(WAYS, lit) | {"raster": drawn, "rays": traced}
         bad = sum(differing(way, runs[way] if FULL else covering(runs[way]), folder) for way in WAYS)
     return 1 if bad else 0

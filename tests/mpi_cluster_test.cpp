@@ -15,6 +15,7 @@
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/mpi_communicator.h"
 #include "cluster/transport/test_communicator.h"
+#include "cluster/transport/work_board.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -143,6 +144,40 @@ TEST(Mpi, CollectivesWorkFromEveryRoot) {
   std::vector<int> ranks;
   for (int rank = 0; rank < comm.size(); ++rank) ranks.push_back(rank);
   EXPECT_EQ(all_gather_value(comm, comm.rank()), ranks);
+}
+
+TEST(Mpi, RanksOfAHostDrawEachPieceOfWorkOnce) {
+  constexpr std::uint64_t kPieces = 200;
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  WorkBoard board(comm, 16);
+  for (std::uint64_t round = 0; round < 50; ++round) {
+    board.next_round(comm);
+    board.payload()[0] = static_cast<std::byte>(10 * round + static_cast<std::uint64_t>(comm.rank()));
+    board.publish(kPieces + static_cast<std::uint64_t>(comm.rank()));
+    std::vector<std::uint64_t> drawn;  // of all lists
+    for (bool is_open = true; is_open;) {
+      is_open = false;
+      for (int rank = 0; rank < comm.size(); ++rank) {
+        ASSERT_TRUE(board.sees(rank));
+        if (const auto piece = board.draw(rank)) {
+          EXPECT_EQ(board.payload_of(rank)[0], static_cast<std::byte>(10 * round + static_cast<std::uint64_t>(rank)));
+          drawn.push_back(1000 * static_cast<std::uint64_t>(rank) + *piece);
+          is_open = true;
+        }
+        is_open = is_open || !board.is_published(rank);
+      }
+    }
+    std::vector<std::uint64_t> all;
+    for (const auto& list : all_gather_lists(comm, std::span<const std::uint64_t>(drawn))) {
+      all.insert(all.end(), list.begin(), list.end());
+    }
+    std::ranges::sort(all);
+    std::vector<std::uint64_t> expected;
+    for (std::uint64_t rank = 0; rank < static_cast<std::uint64_t>(comm.size()); ++rank) {
+      for (std::uint64_t piece = 0; piece < kPieces + rank; ++piece) expected.push_back(1000 * rank + piece);
+    }
+    EXPECT_EQ(all, expected) << "round " << round;
+  }
 }
 
 TEST(Mpi, AnErrorOfRankZeroReachesEveryone) {

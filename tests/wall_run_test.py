@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""One wall, however many ranks drive it: a wall run by 1, 2 and 4 ranks has the same hashes in its manifest.
+"""One wall, however many ranks drive it and however they balance their work: a wall run by 1, 2 and 4 ranks has the
+same hashes in its manifest.
 
 usage: wall_run_test.py HPR
 
@@ -55,6 +56,25 @@ def one_wall(folder):
     return bad
 
 
+def balanced(folder):
+    """The screens of three frames, of which the first tells where the second is cut."""
+    bad = 0
+    expected = None
+    for ranks, balance in (("1", "static"), ("4", "static"), ("4", "measured"), ("4", "demand"), ("3", "demand")):
+        out = folder / f"balanced-{ranks}-{balance}"
+        options = ["--frames", "3", "--quality", "draft", "--primary", "rays", "--ranks", ranks, "--balance", balance]
+        if run(["wall", "run", "3x2@200x140", SCENE, "--display", "file", "-o", out.name, *options], folder).returncode != 0:
+            bad += 1
+            continue
+        frames = json.loads((out / "manifest.json").read_text())["frames"]
+        hashes = [[screen["xxh64"] for screen in frame["screens"]] for frame in frames]
+        expected = expected or hashes
+        if len(hashes) != 3 or hashes != expected:
+            print(f"{ranks} ranks, balance {balance}: {hashes} instead of {expected}")
+            bad += 1
+    return bad
+
+
 def rests(folder):
     """A target time, one sample and an eye that does not move: the picture is refined from its second frame on."""
     return run(["wall", "run", "5x1@80x90", "gen:cornell", "--target-ms", "5", "--frames", "3", "--display", "none"], folder).returncode != 0
@@ -62,7 +82,7 @@ def rests(folder):
 
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-wall-run-") as scratch:
-        return 1 if one_wall(pathlib.Path(scratch)) or rests(pathlib.Path(scratch)) else 0
+        return 1 if one_wall(pathlib.Path(scratch)) or balanced(pathlib.Path(scratch)) or rests(pathlib.Path(scratch)) else 0
 
 
 if __name__ == "__main__":

@@ -230,6 +230,18 @@ int default_groups(int ranks) {
   return std::max(1, static_cast<int>(std::lround(std::sqrt(ranks))));
 }
 
+std::vector<std::size_t> tiles_of(const FrameLayout& layout, std::span<const ScreenRect> area) {
+  std::vector<std::size_t> tiles;
+  for (const ScreenRect& rect : area) {
+    for (int y = rect.pixels.y0; y < rect.pixels.y1; y += kTileSide) {
+      for (int x = rect.pixels.x0; x < rect.pixels.x1; x += kTileSide)
+        tiles.push_back(layout.tile_at(rect.screen, x, y));
+    }
+  }
+  std::ranges::sort(tiles);
+  return tiles;
+}
+
 std::vector<Assignment> assign(Distribution distribution, const Scene& scene, const FrameLayout& layout, int ranks,
                                int groups) {
   // Sort-first is a group per rank, sort-last one group of all: hybrid nests them, so one rule makes all three.

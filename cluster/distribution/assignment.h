@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,6 +54,9 @@ struct Assignment {
   std::vector<SurfaceRange> objects;  ///< what this rank draws
   std::vector<ScreenRect> area;       ///< where this rank draws: its group's tiles
 };
+
+/// The tiles of some rectangles, ascending.
+[[nodiscard]] std::vector<std::size_t> tiles_of(const FrameLayout& layout, std::span<const ScreenRect> area);
 
 /// Every rank's assignment, computed alike on all ranks. `groups` counts for Hybrid only.
 [[nodiscard]] std::vector<Assignment> assign(Distribution distribution, const Scene& scene, const FrameLayout& layout,

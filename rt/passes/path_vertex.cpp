@@ -170,14 +170,14 @@ std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const
 int end_of_wavefront(const TileJob& job, int first) {
   if (job.wanted.empty()) {
     const int end = first + static_cast<int>(kWavefrontVertices) / kTileSide;
-    return std::min(end - (job.origin().y + end) % 2, job.rect.height());
+    return std::min(end - (job.origin().y + end) % 2, job.end_row());
   }
   std::size_t points = 0;
   int row = first;
   do {
     const auto pixels = job.wanted.subspan(static_cast<std::size_t>(row) * kTileSide, kTileSide);
     points += static_cast<std::size_t>(std::ranges::count(pixels, std::uint8_t{1}));
-  } while (++row < job.rect.height() && points + kTileSide <= kWavefrontVertices);
+  } while (++row < job.end_row() && points + kTileSide <= kWavefrontVertices);
   return row;
 }
 

@@ -13,7 +13,13 @@
 
 namespace hpr {
 
-/// One sample of a tile: its pixels, its view and its keys.
+/// Rows of a tile, from its own first one.
+struct RowRange {
+  int first = 0;
+  int end = 0;
+};
+
+/// One sample of a tile, or of some of its rows: its pixels, its view and its keys.
 struct TileJob {
   Rect rect;
   SampleNumber number;
@@ -21,8 +27,10 @@ struct TileJob {
   const View* view = nullptr;
   std::uint32_t first_pixel = 0;              ///< index into PixelSums: those of other samples come before
   std::span<const std::uint8_t> wanted = {};  ///< 1 at the pixels that are shaded; empty: all
+  RowRange rows = {0, kTileSide};             ///< that are shaded, of those there are
 
   [[nodiscard]] bool wants(std::size_t pixel) const { return wanted.empty() || wanted[pixel] != 0; }
+  [[nodiscard]] int end_row() const { return std::min(rows.end, rect.height()); }
   /// Its upper left pixel, of the whole screen.
   [[nodiscard]] glm::ivec2 origin() const { return {view->block.x0 + rect.x0, view->block.y0 + rect.y0}; }
 };
@@ -31,12 +39,6 @@ struct TileJob {
 /// are where there are so many that the last ones hardly matter.
 [[nodiscard]] std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const TileLayer<Key>& keys,
                                                      int threads);
-
-/// Rows of a tile, from its own first one.
-struct RowRange {
-  int first = 0;
-  int end = 0;
-};
 
 /// Vertices that are shaded together: enough to fill packets, few enough for the second-level cache.
 inline constexpr std::size_t kWavefrontVertices = 512;

@@ -22,12 +22,21 @@ bool is_finite(const Rgb& color) {
 /// Calls `body` with each pixel of the tile that is lit.
 template <typename Body>
 void each_lit(const TileJob& job, const Body& body) {
-  for (int y = 0; y < job.rect.height(); ++y) {
+  for (int y = job.rows.first; y < job.end_row(); ++y) {
     for (int x = 0; x < job.rect.width(); ++x) {
       const auto pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
       if (job.wants(pixel)) body(pixel);
     }
   }
+}
+
+/// The pixels of the job's rows of a tile; past a screen's lower edge, those below its last row too.
+template <typename Pixel>
+std::span<Pixel> rows_of(const TileJob& job, std::span<Pixel> tile) {
+  const auto first = static_cast<std::size_t>(job.rows.first) * kTileSide;
+  const auto end =
+      job.end_row() == job.rect.height() ? kTilePixels : static_cast<std::size_t>(job.rows.end) * kTileSide;
+  return tile.subspan(first, end - first);
 }
 
 /// Counts a pixel whose radiance is no finite number, unless a neighbor that the screen is joined to counts it.
@@ -57,14 +66,15 @@ void clear_sums(std::vector<Sum>& sums, std::size_t pixels, std::size_t margins,
 
 }  // namespace
 
-void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, const WantedSums& wants) {
+void PixelSums::clear(const TileJob& job, std::size_t tile, std::span<const ShadedSample> samples,
+                      const WantedSums& wants) {
   const LightOutput& output = samples.front().output;  // all want the same
   wants_components = wants.all_components ||
                      std::ranges::any_of(output.components, [](const auto* layer) { return layer != nullptr; });
   wants_diffuse = wants.diffuse;
   wants_cost = wants.cost || output.cost != nullptr;
   wants_coverage = output.coverage != nullptr;
-  const std::span<const std::uint8_t> wanted = mask_of(samples.front().wanted, tile);
+  const std::span<const std::uint8_t> wanted = job.wanted;
   const std::size_t pixels = (samples.size() + (wants.diffuse ? 1 : 0)) * kTilePixels;
   const std::size_t margins = wants.margins * kTilePixels;
   clear_sums(radiance, pixels, margins, wanted);
@@ -77,7 +87,7 @@ void PixelSums::clear(std::size_t tile, std::span<const ShadedSample> samples, c
   if (wants_coverage) clear_sums(uncovered, pixels, margins, wanted);
   for (const ShadedSample& sample : samples) {
     for (TileLayer<Rgb>* layer : {sample.output.normal, sample.output.albedo}) {
-      if (layer != nullptr) std::ranges::fill(layer->tile(tile), Rgb{});
+      if (layer != nullptr) std::ranges::fill(rows_of(job, layer->tile(tile)), Rgb{});
     }
   }
 }
@@ -89,7 +99,8 @@ bool fits_floats(const glm::dvec3& light) {
 void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& output, RayCounts& counts) const {
   const auto start = [&](auto* layer) {
     const auto pixels = layer->tile(tile);
-    if (job.wanted.empty()) std::ranges::fill(pixels, typename std::remove_reference_t<decltype(pixels)>::value_type{});
+    using Pixel = typename std::remove_reference_t<decltype(pixels)>::value_type;
+    if (job.wanted.empty()) std::ranges::fill(rows_of(job, pixels), Pixel{});
     return pixels;
   };
   const auto colors = start(output.radiance);

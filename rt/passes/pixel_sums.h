@@ -26,8 +26,9 @@ struct WantedSums {
 /// Light summed per pixel of one tile, sample after sample, in an order that no thread changes: what passes add to.
 class PixelSums {
  public:
-  /// Sets all sums of tile `tile` to 0 where `samples` want them, and what the samples store directly (normal, albedo).
-  void clear(std::size_t tile, std::span<const ShadedSample> samples, const WantedSums& wants);
+  /// Sets all sums of tile `tile` to 0 where `job` wants them, and what the samples store directly of its rows (normal,
+  /// albedo). The samples' jobs are alike.
+  void clear(const TileJob& job, std::size_t tile, std::span<const ShadedSample> samples, const WantedSums& wants);
 
   /// Adds light that reaches a pixel.
   void add(std::uint32_t pixel, Component component, const glm::dvec3& light) {
@@ -53,8 +54,8 @@ class PixelSums {
     if (wants_cost) cost[pixel] += 1.0F;
   }
 
-  /// Stores the sums of a sample as pixels of tile `tile`. Light that is no finite number is black, in all layers, and
-  /// counted in `counts`.
+  /// Stores the sums of a sample as pixels of the job's rows of tile `tile`. Light that is no finite number is black,
+  /// in all layers, and counted in `counts`.
   void store(const TileJob& job, std::size_t tile, const LightOutput& output, RayCounts& counts) const;
 
   bool wants_components = false;

@@ -424,11 +424,13 @@ void PrimaryRays::draw(std::span<const View> views, std::size_t screen, std::spa
   HPR_CHECK(screen < layout.screens() && layout.size(screen) == view.size());
   HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
   stats_ = {};
+  costs_.clear();
   if (rays_.geometries().empty()) return;
   const TileRun run = layout.tiles_of(screen);
   const OccupiedPixels occupied(scene_, rays_, boxes_, views, layout, screen);
   std::mutex mutex;
   parallel_for(threads_, run.count, [&](std::size_t i) {
+    const CpuStopwatch watch;
     std::array<std::uint8_t, kTilePixels> mask;
     const std::size_t tile = run.first + i;
     if (!occupied.mark(tile, layout.place(tile).pixels, mask)) return;
@@ -439,6 +441,7 @@ void PrimaryRays::draw(std::span<const View> views, std::size_t screen, std::spa
     draw_tile(tracer, tile, parts, mask, layers);
     const std::lock_guard lock(mutex);
     stats_ += tracer.stats();
+    costs_.push_back({tile, watch.ms()});
   });
 }
 

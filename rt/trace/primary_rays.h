@@ -42,6 +42,7 @@ class PrimaryRays {
 
   /// Of the last draw().
   [[nodiscard]] const PrimaryRayStats& stats() const { return stats_; }
+  [[nodiscard]] std::span<const TileCost> costs() const { return costs_; }
 
  private:
   const Scene& scene_;
@@ -49,6 +50,7 @@ class PrimaryRays {
   int threads_;
   MeshBoxes boxes_;
   PrimaryRayStats stats_;
+  std::vector<TileCost> costs_;
 };
 
 }  // namespace hpr

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cluster/distribution/balance.h"
+#include "engine/balance/light_lending.h"
+#include "image/tiles.h"
+#include "rt/ray_counts.h"
+
+namespace hpr {
+
+class Communicator;
+class Session;
+struct FramePlan;
+struct View;
+
+/// What a session's ranks know of each other's work, from frame to frame: what each tile took. It decides who computes
+/// what, and no bit of a picture.
+class LoadBalance {
+ public:
+  /// Forgets what tiles took, as after another scene was loaded.
+  void forget();
+
+  /// Adds what this rank spent on tiles of a frame at hand.
+  void add(const FrameLayout& layout, std::span<const TileCost> costs);
+  /// Adds time that this rank spent on all of `tiles` alike.
+  void add(const FrameLayout& layout, std::span<const std::size_t> tiles, double ms);
+  /// Collective, after a frame of so many samples: from here on costs() are what all ranks spent on it and on those
+  /// before.
+  void finish_frame(Communicator& comm, const FrameLayout& layout, int samples);
+  /// Per tile of a frame of this layout what a sample takes, the same on all ranks; empty: not known.
+  [[nodiscard]] std::span<const double> costs(const FrameLayout& layout) const;
+
+  /// Collective, once layers are composited. `present`: the tiles whose keys this rank has in `keys`. Per tile the rank
+  /// that is to light it; -1: none. That is who has its keys, unless that rank had much more to do than others.
+  [[nodiscard]] std::vector<int> owners_of_light(Communicator& comm, const TileLayer<Key>& keys,
+                                                 std::span<const std::size_t> present) const;
+
+  [[nodiscard]] LightLending& lending() { return lending_; }
+
+ private:
+  void begin(const FrameLayout& layout);
+
+  FrameLayout layout_;
+  std::vector<double> spent_;  ///< by this rank, on each tile of the frame at hand
+  TileCosts costs_;
+  LightLending lending_;
+};
+
+/// About what the light of a tile costs, as far as its keys tell.
+[[nodiscard]] double cost_of_keys(const TileLayer<Key>& keys, std::size_t tile);
+
+/// How the work of a plan is balanced, and why.
+[[nodiscard]] std::string explain_balance(const FramePlan& plan);
+
+/// Whether ranks light parts of others' tiles in frames of this plan; the same on all ranks. Collective where the
+/// shader is to be made.
+[[nodiscard]] bool lends_light(Session& session, const FramePlan& plan);
+
+/// Collective, for a new plan: cuts the screens by what the tiles of the last frame took, else by rays through some
+/// pixels of each, where there is a scene for rays anyway, else by their number.
+void plan_areas(Session& session, FramePlan& plan, std::span<const View> views);
+/// Cuts the screens for the next frame by what the last one took, if that gains much. The same on all ranks.
+void update_areas(Session& session, FramePlan& plan);
+
+}  // namespace hpr
