@@ -36,15 +36,33 @@ double smooth_step(double x) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-double radiance_towards(const glm::dvec3& direction) {
+constexpr double kEdge = 6.0;  // degrees, in which a lamp fades
+
+/// A lamp, with what tells directions that it does not light at all.
+struct LampCone {
+  const Lamp* lamp;
+  glm::dvec3 axis;  ///< unit length
+  double cosine;    ///< of an angle past its edge
+};
+
+std::array<LampCone, kLamps.size()> lamp_cones() {
+  std::array<LampCone, kLamps.size()> cones{};
+  std::ranges::transform(kLamps, cones.begin(), [](const Lamp& lamp) {
+    return LampCone{&lamp, glm::normalize(lamp.direction),
+                    std::cos((lamp.radius_degrees + kEdge) * std::numbers::pi / 180.0)};
+  });
+  return cones;
+}
+
+double radiance_towards(const std::array<LampCone, kLamps.size()>& lamps, const glm::dvec3& direction) {
   const double up = direction.y;
   double radiance = up < 0.0 ? std::lerp(kHorizon, kFloor, smooth_step(-up)) : std::lerp(kHorizon, kCeiling, up * up);
-  for (const Lamp& lamp : kLamps) {
-    const double cosine = std::clamp(glm::dot(direction, glm::normalize(lamp.direction)), -1.0, 1.0);
+  for (const auto& [lamp, axis, limit] : lamps) {
+    const double cosine = std::clamp(glm::dot(direction, axis), -1.0, 1.0);
+    if (cosine < limit) continue;
     const double degrees = std::acos(cosine) * 180.0 / std::numbers::pi;
-    constexpr double kEdge = 6.0;  // degrees, in which it fades
-    const double inside = smooth_step((lamp.radius_degrees - degrees) / kEdge + 0.5);
-    radiance = std::lerp(radiance, lamp.radiance, inside);
+    const double inside = smooth_step((lamp->radius_degrees - degrees) / kEdge + 0.5);
+    radiance = std::lerp(radiance, lamp->radiance, inside);
   }
   return radiance;
 }
@@ -86,13 +104,20 @@ double area_of(const Scene& scene, const Instance& instance) {
 Environment make_studio() {
   constexpr Size kSize{256, 128};
   Environment studio{Image<Rgb>(kSize)};
+  std::vector<glm::dvec2> across;  // sine and cosine of each column's azimuth, from -z towards +x
+  for (int x = 0; x < kSize.width; ++x) {
+    const double azimuth = 2.0 * std::numbers::pi * ((x + 0.5) / kSize.width - 0.5);
+    across.emplace_back(std::sin(azimuth), std::cos(azimuth));
+  }
+  const auto lamps = lamp_cones();
   for (int y = 0; y < kSize.height; ++y) {
     const double polar = std::numbers::pi * (y + 0.5) / kSize.height;
+    const double sine = std::sin(polar);
+    const double up = std::cos(polar);
     for (int x = 0; x < kSize.width; ++x) {
-      const double azimuth = 2.0 * std::numbers::pi * ((x + 0.5) / kSize.width - 0.5);  // from -z towards +x
-      const glm::dvec3 direction(std::sin(polar) * std::sin(azimuth), std::cos(polar),
-                                 -std::sin(polar) * std::cos(azimuth));
-      const auto radiance = static_cast<float>(radiance_towards(direction));
+      const glm::dvec2& azimuth = across[static_cast<std::size_t>(x)];
+      const auto radiance =
+          static_cast<float>(radiance_towards(lamps, glm::dvec3(sine * azimuth.x, up, -sine * azimuth.y)));
       studio.image.at(x, y) = {radiance, radiance, radiance};
     }
   }

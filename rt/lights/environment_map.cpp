@@ -67,6 +67,8 @@ SkyCell EnvironmentMap::make_cell(int column, int row, std::span<const glm::dvec
   // First along the center's circle of latitude, then along the meridian.
   const double around = kPi * (columns.end - columns.first) / size.width;
   cell.radius_radians = around * std::sin(kPi * latitude) + 0.5 * kPi * (rows.end - rows.first) / size.height;
+  cell.cosine = std::cos(cell.radius_radians);
+  cell.sine = std::sin(cell.radius_radians);
   for (int y = rows.first; y < rows.end; ++y) {
     const double polar = kPi * (y + 0.5) / size.height;
     glm::dvec3 radiance(0.0);

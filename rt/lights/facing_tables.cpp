@@ -34,6 +34,8 @@ std::size_t index_of(const glm::dvec3& normal) {
 struct Cone {
   glm::dvec3 axis{0.0};
   double radius_radians = 0.0;
+  double cosine = 1.0;  ///< of the radius
+  double sine = 0.0;
 };
 
 Cone normals_at(std::size_t index) {
@@ -53,13 +55,18 @@ Cone normals_at(std::size_t index) {
     const double cosine = glm::dot(cone.axis, direction(across + corner.x, along + corner.y));
     cone.radius_radians = std::max(cone.radius_radians, std::acos(std::min(cosine, 1.0)));
   }
+  cone.cosine = std::cos(cone.radius_radians);
+  cone.sine = std::sin(cone.radius_radians);
   return cone;
 }
 
-/// The cosine of an angle less another, which is at most pi, and of no angle where that leaves none.
-double cosine_within(double cosine, double cosine_of_other, double sine_of_other) {
-  if (cosine >= cosine_of_other) return 1.0;
-  return cosine * cosine_of_other + std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) * sine_of_other;
+/// The largest cosine between a normal and a direction of a cell, whose centers have that cosine.
+double cosine_within(double cosine, const Cone& normals, const SkyCell& cell) {
+  if (normals.radius_radians + cell.radius_radians >= std::numbers::pi) return 1.0;
+  const double reach_cosine = normals.cosine * cell.cosine - normals.sine * cell.sine;
+  if (cosine >= reach_cosine) return 1.0;
+  const double reach_sine = normals.sine * cell.cosine + normals.cosine * cell.sine;
+  return cosine * reach_cosine + std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) * reach_sine;
 }
 
 }  // namespace
@@ -94,8 +101,7 @@ FacingTables::FacingTables(std::span<const SkyCell> cells, std::size_t columns)
     const Cone normals = normals_at(i);
     add_table([&](const SkyCell& cell) {
       if (!(cell.power > 0.0)) return 0.0;
-      const double reach = std::min(normals.radius_radians + cell.radius_radians, std::numbers::pi);
-      const double nearest = cosine_within(glm::dot(normals.axis, cell.center), std::cos(reach), std::sin(reach));
+      const double nearest = cosine_within(glm::dot(normals.axis, cell.center), normals, cell);
       return std::max(0.0, glm::dot(normals.axis, cell.flux)) + kCaution * cell.power * std::max(0.0, nearest);
     });
   }

@@ -12,8 +12,10 @@ namespace hpr {
 struct SkyCell {
   glm::dvec3 center{0.0};       ///< unit length
   double radius_radians = 0.0;  ///< no direction of the cell lies farther from the center
-  double power = 0.0;           ///< brightness times solid angle
-  glm::dvec3 flux{0.0};         ///< directions, weighed by brightness, times solid angle: what a surface takes of it
+  double cosine = 1.0;          ///< of the radius
+  double sine = 0.0;
+  double power = 0.0;    ///< brightness times solid angle
+  glm::dvec3 flux{0.0};  ///< directions, weighed by brightness, times solid angle: what a surface takes of it
 };
 
 /// How much a surface takes from each cell of the sky by how it is turned, for choosing cells: brightness times cosine
