@@ -78,7 +78,7 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
     for (const JitteredViews& each : jittered) views.push_back(each.views[screen]);
     rays.draw(views, screen, parts, keys, draws_own ? jittered.front().sample.wanted : nullptr);
     stats += rays.stats();
-    session.balance().add(plan.layout, rays.costs());
+    session.balance().add_keys(plan.layout, rays.costs());
     for (const TileCost& cost : rays.costs()) work.keys_ms += cost.ms;
   }
   return stats;
@@ -96,7 +96,7 @@ FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const Ji
   } else {
     for (std::size_t i = 0; i < jittered.size(); ++i) rasterize(session, plan, jittered[i].views, *keys[i]);
     spent.work.keys_ms = watch.ms() * session.threads();  // what each tile took of it is not known
-    session.balance().add(plan.layout, plan.tiles, spent.work.keys_ms);
+    session.balance().add_keys(plan.layout, plan.tiles, spent.work.keys_ms);
   }
   spent.primary_ms = watch.ms();
   return spent;
@@ -133,7 +133,7 @@ void add_light(Session& session, const FramePlan& plan, const DeferredShader& sh
   light.passes = shader.times();
   light.rays = shader.counts();
   for (const TileCost& cost : shader.costs()) light.work.light_ms += cost.ms;
-  session.balance().add(plan.layout, shader.costs());
+  session.balance().add_light(plan.layout, shader.costs());
   spent += light;
 }
 
@@ -209,7 +209,7 @@ void shade_tiles(Session& session, const FramePlan& plan, std::span<const Shaded
   DeferredShader& shader = session.shader(plan.rays);
   LightLending& lending = session.balance().lending();
   if (lends && (interrupt == nullptr || lending.sees_all(session.comm()))) {
-    const LightLending::Work work{samples, frame.owned, session.balance().costs(plan.layout), session.threads(),
+    const LightLending::Work work{samples, frame.owned, session.balance().light_costs(plan.layout), session.threads(),
                                   interrupt};
     frame.overtaken = !lending.shade(session.comm(), shader, work);
     add_light(session, plan, shader, spent);

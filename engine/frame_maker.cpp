@@ -98,6 +98,7 @@ void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
 }
 
 void FrameMaker::discard() {
+  session_.balance().forget();  // a rank may have failed where others had gone on
   refining_ = false;
 }
 

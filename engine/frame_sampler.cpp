@@ -222,6 +222,7 @@ std::uint32_t FrameSampler::size_of_round() {
 }
 
 bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& checkpoint, Progress& progress) {
+  if (measures_costs()) session_.balance().start_frame(plan_.layout);
   if (!sampling_.sums()) {
     frame_ = make_frame(session_, plan_, views, &times_, {{number_, 0}, nullptr});
     progress_.samples = 1;
@@ -256,9 +257,12 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
   return true;
 }
 
+bool FrameSampler::measures_costs() const {
+  return session_.ranks() > 1 && plan_.balance != Balance::Static && !plan_.rays.reference;
+}
+
 void FrameSampler::note_costs() {
-  if (session_.ranks() == 1 || plan_.balance == Balance::Static) return;
-  session_.balance().finish_frame(session_.comm(), plan_.layout, times_.samples);
+  if (measures_costs()) session_.balance().finish_frame(session_.comm(), plan_.layout, times_.samples);
 }
 
 bool FrameSampler::refine(std::span<const View> views, Interrupt* interrupt) {

@@ -65,6 +65,7 @@ class FrameSampler {
   void report_progress(double seconds);
   void finish();
   /// Collective: makes known what the tiles took.
+  [[nodiscard]] bool measures_costs() const;
   void note_costs();
 
   Session& session_;

@@ -262,7 +262,12 @@ Compositor& Session::compositor(const std::string& strategy, std::span<const int
 
 TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& strategy, std::span<const int> members) {
   const bool shared = members.size() > 1 && compositor(strategy, members).merges_in_place();
-  const bool fits = keys_.layout() == layout && keys_shared_ == shared && std::ranges::equal(members, keys_members_);
+  bool fits = keys_.layout() == layout && keys_shared_ == shared && std::ranges::equal(members, keys_members_);
+  // Other ranks may have new groups where this one's stays: then all take memory, as all agree on whether there is
+  // some.
+  if (static_cast<int>(members.size()) < comm_.size()) {
+    fits = std::ranges::all_of(all_gather_value(comm_, fits ? 1 : 0), [](int of_rank) { return of_rank == 1; });
+  }
   if (fits && layout.tiles() > 0) {
     keys_.clear();
     return keys_;

@@ -206,7 +206,7 @@ bool LightLending::start(Communicator& comm, const Round& round) {
     } catch (const Error& error) {
       if (error.code() != ExitCode::Limit) throw;
       is_impossible_ = true;  // on all ranks alike
-      if (comm.rank() == 0) log::info("light is not lent between ranks: {}; {}", error.what(), error.hint());
+      if (comm.rank() == 0) log::info("light is not lent between ranks: {}", error.what());
       return false;
     }
   }
@@ -248,7 +248,7 @@ std::vector<ShadedPart> LightLending::publish(const Work& work, bool whole_tiles
   std::uint64_t offers = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const std::size_t tile = tiles[i].tile;
-    if (i >= slots()) {
+    if (i >= slots() || tiles[i].cost == 0.0) {
       kept.push_back({.tile = tile});
       continue;
     }

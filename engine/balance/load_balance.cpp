@@ -119,48 +119,71 @@ double cost_of_keys(const TileLayer<Key>& keys, std::size_t tile) {
 
 void LoadBalance::forget() {
   layout_ = {};
-  spent_.clear();
+  keys_spent_.clear();
+  light_spent_.clear();
   costs_.clear();
+  light_costs_.clear();
 }
 
-void LoadBalance::begin(const FrameLayout& layout) {
-  if (layout == layout_ && spent_.size() == layout.tiles()) return;
+void LoadBalance::start_frame(const FrameLayout& layout) {
+  if (layout != layout_) forget();
   layout_ = layout;
-  spent_.assign(layout.tiles(), 0.0);
-  costs_.clear();
+  keys_spent_.assign(layout.tiles(), 0.0);
+  light_spent_.assign(layout.tiles(), 0.0);
 }
 
-void LoadBalance::add(const FrameLayout& layout, std::span<const TileCost> costs) {
-  begin(layout);
-  for (const TileCost& cost : costs) spent_[cost.tile] += cost.ms;
+void LoadBalance::add_keys(const FrameLayout& layout, std::span<const TileCost> costs) {
+  if (layout != layout_) return;
+  for (const TileCost& cost : costs) keys_spent_[cost.tile] += cost.ms;
 }
 
-void LoadBalance::add(const FrameLayout& layout, std::span<const std::size_t> tiles, double ms) {
-  begin(layout);
-  for (const std::size_t tile : tiles) spent_[tile] += ms / static_cast<double>(tiles.size());
+void LoadBalance::add_light(const FrameLayout& layout, std::span<const TileCost> costs) {
+  if (layout != layout_) return;
+  for (const TileCost& cost : costs) light_spent_[cost.tile] += cost.ms;
+}
+
+void LoadBalance::add_keys(const FrameLayout& layout, std::span<const std::size_t> tiles, double ms) {
+  if (layout != layout_) return;
+  for (const std::size_t tile : tiles) keys_spent_[tile] += ms / static_cast<double>(tiles.size());
 }
 
 void LoadBalance::finish_frame(Communicator& comm, const FrameLayout& layout, int samples) {
-  begin(layout);
-  std::vector<TileNote> mine;
-  for (std::size_t tile = 0; tile < spent_.size(); ++tile) {
-    if (spent_[tile] > 0.0) mine.push_back({static_cast<std::uint32_t>(tile), static_cast<float>(spent_[tile])});
+  if (layout != layout_) return;
+  struct TileSpent {
+    std::uint32_t tile = 0;
+    float keys = 0.0F;
+    float light = 0.0F;
+  };
+  std::vector<TileSpent> mine;
+  for (std::size_t tile = 0; tile < keys_spent_.size(); ++tile) {
+    if (keys_spent_[tile] + light_spent_[tile] == 0.0) continue;
+    mine.push_back({static_cast<std::uint32_t>(tile), static_cast<float>(keys_spent_[tile]),
+                    static_cast<float>(light_spent_[tile])});
   }
-  std::vector<double> spent(spent_.size(), 0.0);
-  for (const auto& notes : all_notes(comm, mine)) {
-    for (const TileNote& note : notes) spent.at(note.tile) += double{note.cost} / std::max(samples, 1);
+  std::vector<double> all(keys_spent_.size(), 0.0);
+  std::vector<double> light(keys_spent_.size(), 0.0);
+  for (const auto& spent : all_gather_lists(comm, std::span<const TileSpent>(mine))) {
+    for (const TileSpent& each : spent) {
+      all.at(each.tile) += (double{each.keys} + double{each.light}) / std::max(samples, 1);
+      light[each.tile] += double{each.light} / std::max(samples, 1);
+    }
   }
-  costs_.add(spent);
-  std::ranges::fill(spent_, 0.0);
+  costs_.add(all);
+  light_costs_.add(light);
+  start_frame(layout);
 }
 
 std::span<const double> LoadBalance::costs(const FrameLayout& layout) const {
   return layout == layout_ ? costs_.costs() : std::span<const double>();
 }
 
+std::span<const double> LoadBalance::light_costs(const FrameLayout& layout) const {
+  return layout == layout_ ? light_costs_.costs() : std::span<const double>();
+}
+
 std::vector<int> LoadBalance::owners_of_light(Communicator& comm, const TileLayer<Key>& keys,
                                               std::span<const std::size_t> present) const {
-  const std::span<const double> known = costs(keys.layout());
+  const std::span<const double> known = light_costs(keys.layout());
   std::vector<TileNote> mine;
   mine.reserve(present.size());
   for (const std::size_t tile : present) {
@@ -191,7 +214,7 @@ std::string explain_balance(const FramePlan& plan) {
   }
   if (plan.shading == Shading::Local) return "balance: measured (light before compositing stays with who drew it)";
   if (plan.rays.part) return "balance: measured (rays travel, so that light is a matter of all ranks)";
-  if (plan.rays.reference) return "balance: measured (the reference lights whole tiles at once)";
+  if (plan.rays.reference) return "balance: estimated (what the reference takes for each tile is not measured)";
   return "balance: demand (tiles are shared out by what they took before, or are expected to, and ranks of a host that "
          "are done light rows of others')";
 }

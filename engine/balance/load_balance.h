@@ -24,15 +24,21 @@ class LoadBalance {
   /// Forgets what tiles took, as after another scene was loaded.
   void forget();
 
-  /// Adds what this rank spent on tiles of a frame at hand.
-  void add(const FrameLayout& layout, std::span<const TileCost> costs);
-  /// Adds time that this rank spent on all of `tiles` alike.
-  void add(const FrameLayout& layout, std::span<const std::size_t> tiles, double ms);
+  /// Begins a frame, on all ranks: nothing is spent on it yet. Costs of another layout are forgotten.
+  void start_frame(const FrameLayout& layout);
+  /// Adds what this rank spent on the keys of tiles, or on their light. Of another layout than the frame's nothing
+  /// counts.
+  void add_keys(const FrameLayout& layout, std::span<const TileCost> costs);
+  void add_light(const FrameLayout& layout, std::span<const TileCost> costs);
+  /// Adds time that this rank spent on the keys of all of `tiles` alike.
+  void add_keys(const FrameLayout& layout, std::span<const std::size_t> tiles, double ms);
   /// Collective, after a frame of so many samples: from here on costs() are what all ranks spent on it and on those
   /// before.
   void finish_frame(Communicator& comm, const FrameLayout& layout, int samples);
   /// Per tile of a frame of this layout what a sample takes, the same on all ranks; empty: not known.
   [[nodiscard]] std::span<const double> costs(const FrameLayout& layout) const;
+  /// The part of costs() that light takes.
+  [[nodiscard]] std::span<const double> light_costs(const FrameLayout& layout) const;
 
   /// Collective, once layers are composited. `present`: the tiles whose keys this rank has in `keys`. Per tile the rank
   /// that is to light it; -1: none. That is who has its keys, unless that rank had much more to do than others.
@@ -42,11 +48,11 @@ class LoadBalance {
   [[nodiscard]] LightLending& lending() { return lending_; }
 
  private:
-  void begin(const FrameLayout& layout);
-
   FrameLayout layout_;
-  std::vector<double> spent_;  ///< by this rank, on each tile of the frame at hand
+  std::vector<double> keys_spent_;  ///< by this rank, on each tile of the frame at hand
+  std::vector<double> light_spent_;
   TileCosts costs_;
+  TileCosts light_costs_;
   LightLending lending_;
 };
 

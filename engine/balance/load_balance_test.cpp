@@ -149,7 +149,8 @@ TEST(LoadBalance, AreasFollowWhatTilesTookAndStayWhereItChangesLittle) {
         if (static_cast<int>(cost.tile + static_cast<std::size_t>(number)) % comm.size() == comm.rank())
           mine.push_back(cost);
       }
-      session.balance().add(plan.layout, mine);
+      session.balance().start_frame(plan.layout);
+      session.balance().add_light(plan.layout, mine);
       session.balance().finish_frame(comm, plan.layout, 1);
       update_areas(session, plan);
     };
@@ -162,6 +163,35 @@ TEST(LoadBalance, AreasFollowWhatTilesTookAndStayWhereItChangesLittle) {
     }
     session.balance().forget();
     EXPECT_TRUE(session.balance().costs(plan.layout).empty());
+  });
+}
+
+/// A rank that has none of a frame's tiles adds nothing to it, and knows what all know.
+TEST(LoadBalance, RanksWithoutTilesKnowWhatAllKnow) {
+  run_local_ranks({.size = 3, .hang_timeout = 60s}, [](Communicator& comm) {
+    const FrameLayout small({{64, 64}});
+    const FrameLayout large({{128, 64}});
+    const std::vector<TileCost> tile{{0, 4.0}};
+    LoadBalance balance;
+    const auto frame_of = [&](const FrameLayout& layout) {
+      balance.start_frame(layout);
+      if (comm.rank() == 0) balance.add_keys(layout, tile);
+      if (comm.rank() == 0) balance.add_light(layout, tile);
+      balance.finish_frame(comm, layout, 2);
+    };
+    frame_of(large);
+    frame_of(small);
+    EXPECT_TRUE(balance.costs(large).empty());
+    ASSERT_EQ(balance.costs(small).size(), 1U);
+    EXPECT_EQ(balance.costs(small)[0], 4.0);
+    EXPECT_EQ(balance.light_costs(small)[0], 2.0);
+    // What a frame took that was never finished, as a resting picture's samples, does not count for the next one.
+    balance.start_frame(small);
+    if (comm.rank() == 0) balance.add_light(small, std::vector<TileCost>{{0, 1000.0}});
+    if (comm.rank() == 0) balance.add_light(large, std::vector<TileCost>{{1, 1000.0}});
+    frame_of(small);
+    EXPECT_EQ(balance.costs(small)[0], 4.0);
+    EXPECT_TRUE(balance.costs(large).empty());
   });
 }
 
@@ -187,6 +217,22 @@ TEST(LoadBalance, TheFirstFrameIsSharedOutByWhatRaysSee) {
   };
   EXPECT_GT(most_pixels("static"), 1.25);
   EXPECT_LE(most_pixels("measured"), 1.1);
+}
+
+/// From frame to frame some ranks may have a new group while others keep theirs.
+TEST(LoadBalance, FramesOfOtherGroupsFollowEachOther) {
+  run_local_ranks({.size = 3, .hang_timeout = 60s}, [](Communicator& comm) {
+    Session session(comm, {.threads = 1}, [] { return load_scene("gen:cornell"); });
+    const View view = make_view(choose_camera({}, session.scene()), {130, 100}, session.scene().bounds);
+    for (const char* distribution : {"sort-first", "hybrid", "sort-last", "hybrid", "sort-first"}) {
+      const RenderSettings settings = settings_with({{"distribute", distribution}});
+      const FramePlan plan = plan_frame(session, settings.frame, std::span(&view, 1));
+      const Frame frame = make_frame(session, plan, std::span(&view, 1));
+      std::size_t owned = 0;
+      for (const std::size_t tiles : all_gather_value(comm, frame.owned.size())) owned += tiles;
+      EXPECT_EQ(owned, plan.layout.tiles()) << distribution;
+    }
+  });
 }
 
 TEST(LoadBalance, WhatIsCompositedGoesOnToWhoHasTime) {
