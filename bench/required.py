@@ -50,7 +50,7 @@ def scenes_of(names):
 
 
 def compare(hpr, scene, arguments, folder):
-    common = ["--size", arguments.size, "--ranks", arguments.ranks]
+    common = ["--size", arguments.size, "--ranks", arguments.ranks, "--balance", "static"]
     full, planned, picture = [], [], None
     same = True
     for _ in range(arguments.runs):

@@ -19,7 +19,7 @@ from program import HPR, expect, failures, plain
 def render(folder, scene, *arguments, ranks="2"):
     """The picture, and what it took: rays by kind, bytes sent, the plan and the steps that ran."""
     result = subprocess.run([HPR, "render", scene, "-o", "a.exr", "--stats", "a.json", "--size", "200x120", "--force",
-                             "--ranks", ranks, *plain(*arguments)], cwd=folder, capture_output=True, text=True, timeout=300,
+                             "--ranks", ranks, "--balance", "static", *plain(*arguments)], cwd=folder, capture_output=True, text=True, timeout=300,
                             check=False)
     expect(result.returncode == 0, f"{scene} {' '.join(arguments)} left with {result.returncode}: {result.stderr[-1000:]}")
     stats = json.loads((folder / "a.json").read_text())
