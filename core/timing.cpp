@@ -11,7 +11,7 @@
 
 namespace hpr {
 
-double CpuStopwatch::now_ms() {
+double thread_ms() {
   timespec now{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);

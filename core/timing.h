@@ -19,16 +19,16 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// The processor time that the thread at hand spent since it was made: other programs on the machine change it little.
+/// CPU time of this thread in ms: what other processes do disturbs it less than the time on a clock.
+[[nodiscard]] double thread_ms();
+
+/// That, since it was made.
 class CpuStopwatch {
  public:
-  CpuStopwatch() : start_ms_(now_ms()) {}
-  [[nodiscard]] double ms() const { return now_ms() - start_ms_; }
+  [[nodiscard]] double ms() const { return thread_ms() - start_ms_; }
 
  private:
-  static double now_ms();
-
-  double start_ms_;
+  double start_ms_ = thread_ms();
 };
 
 }  // namespace hpr

@@ -101,6 +101,10 @@ class Model:
     def use(self, *names):
         self.used.update(names)
 
+    def require(self, name):
+        self.use(name)
+        self.gltf["extensionsRequired"] = [name]
+
     def material(self, extensions=None, pbr=None, **fields):
         if extensions:
             fields["extensions"] = extensions
@@ -293,7 +297,7 @@ def quantization(random, number):
     primitive = {"attributes": {"POSITION": model.positions(bits, component, normalized=normalized_integers),
                                 "COLOR_0": model.accessor(color_bits, UBYTE, normalized=True)},
                  "indices": model.indices(triangles), "material": model.unlit()}
-    model.gltf["extensionsRequired"] = ["KHR_mesh_quantization"]
+    model.require("KHR_mesh_quantization")
     model.node(mesh=model.mesh(primitive), scale=[scale] * 3, translation=[offset] * 3)
     world = [[x / unit * scale + offset for x in row] for row in bits]
     expect_triangles(model, placed(world, [[x / 255 for x in row] for row in color_bits], triangles), lambda color: color)
@@ -314,8 +318,7 @@ def instancing(random, number):
     for made, transform in inner:
         moved = transform if number % 7 != 6 else (lambda p, by=made["translation"]: plus(p, by))
         seen += placed(positions, colors, triangles, lambda p, moved=moved: outer(moved(p)))
-    model.use("EXT_mesh_gpu_instancing")
-    model.gltf["extensionsRequired"] = ["EXT_mesh_gpu_instancing"]
+    model.require("EXT_mesh_gpu_instancing")
     model.node(mesh=model.mesh(colored_primitive(model, positions, colors, triangles)), **fields,
                extensions={"EXT_mesh_gpu_instancing": {"attributes": attributes}})
     expect_triangles(model, seen, lambda color: color)
@@ -517,7 +520,7 @@ def webp_texture(random, number):
         if number % 2:
             texture["source"] = model.picture(packed_png(*drawn_picture(random)))
         else:
-            model.gltf["extensionsRequired"] = ["EXT_texture_webp"]
+            model.require("EXT_texture_webp")
         return model.add("textures", texture)
     model = textured(random, add_texture)
     model.use("EXT_texture_webp")
@@ -535,7 +538,7 @@ def basisu(random, number):
     model = textured(random, add_texture)
     model.use("KHR_texture_basisu")
     if number % 4 == 0:
-        model.gltf["extensionsRequired"] = ["KHR_texture_basisu"]
+        model.require("KHR_texture_basisu")
     if number % 2:
         model.message = "drawn with the one beside it"
     else:
@@ -547,8 +550,7 @@ def basisu(random, number):
 
 def meshopt(random, number):
     model = Model(16)
-    model.use("EXT_meshopt_compression")
-    model.gltf["extensionsRequired"] = ["EXT_meshopt_compression"]
+    model.require("EXT_meshopt_compression")
     positions, colors, triangles = drawn_mesh(random, 3 + number % 3)
     fallback = [0]
 
@@ -586,8 +588,7 @@ def meshopt(random, number):
 
 def draco(random, number):
     model = Model(16)
-    model.use("KHR_draco_mesh_compression")
-    model.gltf["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    model.require("KHR_draco_mesh_compression")
     positions, colors, triangles = drawn_mesh(random, 2 + number % 4)
     float32, position, color = 9, 0, 2
     packed = draco_sequential(triangles, [(position, float32, positions, "f"), (color, float32, colors, "f")])

@@ -44,12 +44,6 @@ double median(std::vector<double> values) {
   return spread_of(std::move(values)).median;
 }
 
-double thread_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 double wall_ms() {
   return 1e-6 * static_cast<double>(trace::now_ns());
 }

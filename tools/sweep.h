@@ -14,6 +14,7 @@
 #include "cluster/transport/communicator.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "core/timing.h"
 #include "image/image.h"
 #include "tools/report/table.h"
 
@@ -33,8 +34,6 @@ struct Spread {
 /// The mean of the two middle values where there is an even number; `values` is not empty.
 [[nodiscard]] double median(std::vector<double> values);
 
-/// CPU time of this thread in ms: what other processes do disturbs it less than the time on a clock.
-[[nodiscard]] double thread_ms();
 /// Time on a steady clock in ms.
 [[nodiscard]] double wall_ms();
 

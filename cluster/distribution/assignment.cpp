@@ -8,6 +8,7 @@
 #include <numeric>
 #include <span>
 
+#include "cluster/distribution/area_cutting.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -23,33 +24,13 @@ std::size_t tiles_in(const Rect& rect) {
   return rect.empty() ? 0 : along(rect.x0, rect.x1) * along(rect.y0, rect.y1);
 }
 
-std::size_t tiles_in(std::span<const ScreenRect> rects) {
-  return std::accumulate(rects.begin(), rects.end(), std::size_t{0},
-                         [](std::size_t sum, const ScreenRect& rect) { return sum + tiles_in(rect.pixels); });
-}
-
-/// Cuts a rectangle at a tile border, `steps` tiles from its left (or upper) edge.
-std::pair<ScreenRect, ScreenRect> cut_at(const ScreenRect& rect, bool along_x, int steps) {
-  const int from = along_x ? rect.pixels.x0 : rect.pixels.y0;
-  const int to = along_x ? rect.pixels.x1 : rect.pixels.y1;
-  const int at = std::min(from + kTileSide * steps, to);
-  ScreenRect first = rect;
-  ScreenRect second = rect;
-  (along_x ? first.pixels.x1 : first.pixels.y1) = at;
-  (along_x ? second.pixels.x0 : second.pixels.y0) = at;
-  return {first, second};
-}
-
 /// Moves about `wanted` tiles of `rect` to `first` and the rest to `second`. One straight cut across the longer side,
 /// unless it would miss `wanted` by a twentieth of the smaller part: then the row of tiles it runs through is cut as
 /// well.
-void cut(const ScreenRect& rect, double wanted, std::vector<ScreenRect>& first, std::vector<ScreenRect>& second) {
-  const auto add = [](std::vector<ScreenRect>& rects, const ScreenRect& part) {
-    if (!part.pixels.empty()) rects.push_back(part);
-  };
+void cut_by_count(const ScreenRect& rect, double wanted, std::vector<ScreenRect>& first,
+                  std::vector<ScreenRect>& second) {
   const bool along_x = rect.pixels.width() >= rect.pixels.height();
-  const int length = along_x ? rect.pixels.width() : rect.pixels.height();
-  const int steps = (length + kTileSide - 1) / kTileSide;
+  const int steps = slices_of(rect, along_x);
   const auto tiles = static_cast<double>(tiles_in(rect.pixels));
   const double per_step = tiles / steps;
   const int nearest = std::clamp(static_cast<int>(std::lround(wanted / per_step)), 0, steps);
@@ -57,46 +38,15 @@ void cut(const ScreenRect& rect, double wanted, std::vector<ScreenRect>& first, 
   const int whole = static_cast<int>(wanted / per_step);
   const int rest = static_cast<int>(std::lround(wanted - whole * per_step));
   if (miss < 0.5 || miss <= 0.05 * std::min(wanted, tiles - wanted) || rest == 0 || whole == steps) {
-    const auto [before, after] = cut_at(rect, along_x, nearest);
-    add(first, before);
-    add(second, after);
+    add_if_any(first, slice(rect, along_x, 0, nearest));
+    add_if_any(second, slice(rect, along_x, nearest, steps));
     return;
   }
-  const auto [before, others] = cut_at(rect, along_x, whole);
-  const auto [row, after] = cut_at(others, along_x, 1);
-  const auto [row_before, row_after] = cut_at(row, !along_x, rest);
-  add(first, before);
-  add(first, row_before);
-  add(second, row_after);
-  add(second, after);
-}
-
-void assign_recursively(std::vector<ScreenRect> rects, std::span<const int> weights,
-                        std::span<std::vector<ScreenRect>> areas) {
-  if (weights.size() == 1) {
-    areas[0] = std::move(rects);
-    return;
-  }
-  const std::size_t half = weights.size() / 2;
-  const double fraction =
-      static_cast<double>(std::accumulate(weights.begin(), weights.begin() + static_cast<std::ptrdiff_t>(half), 0)) /
-      std::accumulate(weights.begin(), weights.end(), 0);
-  double wanted = fraction * static_cast<double>(tiles_in(rects));
-  std::vector<ScreenRect> first;
-  std::vector<ScreenRect> second;
-  for (const ScreenRect& rect : rects) {
-    const auto tiles = static_cast<double>(tiles_in(rect.pixels));
-    if (tiles <= wanted) {
-      first.push_back(rect);
-    } else if (wanted < 0.5) {
-      second.push_back(rect);
-    } else {
-      cut(rect, wanted, first, second);
-    }
-    wanted = std::max(0.0, wanted - tiles);
-  }
-  assign_recursively(std::move(first), weights.first(half), areas.first(half));
-  assign_recursively(std::move(second), weights.subspan(half), areas.subspan(half));
+  const ScreenRect row = slice(rect, along_x, whole, whole + 1);
+  add_if_any(first, slice(rect, along_x, 0, whole));
+  add_if_any(first, slice(row, !along_x, 0, rest));
+  add_if_any(second, slice(row, !along_x, rest, slices_of(row, !along_x)));
+  add_if_any(second, slice(rect, along_x, whole + 1, steps));
 }
 
 struct Chunk {
@@ -200,12 +150,10 @@ Distribution parse_distribution(std::string_view name, std::span<const std::stri
 
 std::vector<std::vector<ScreenRect>> assign_tiles(const FrameLayout& layout, const std::vector<int>& weights) {
   HPR_CHECK(!weights.empty() && std::ranges::all_of(weights, [](int weight) { return weight > 0; }));
-  std::vector<ScreenRect> whole;
-  for (std::size_t screen = 0; screen < layout.screens(); ++screen) {
-    whole.push_back({screen, {0, 0, layout.size(screen).width, layout.size(screen).height}});
-  }
   std::vector<std::vector<ScreenRect>> areas(weights.size());
-  assign_recursively(std::move(whole), weights, areas);
+  share_out(
+      whole_screens(layout), weights, areas,
+      [](const ScreenRect& rect) { return static_cast<double>(tiles_in(rect.pixels)); }, cut_by_count);
   return areas;
 }
 

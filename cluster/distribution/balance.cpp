@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "cluster/distribution/area_cutting.h"
 #include "core/error.h"
 
 namespace hpr {
@@ -46,22 +47,6 @@ class CostSums {
   std::vector<double> costs_;
 };
 
-/// The rows (or columns) of tiles of a rectangle, `from` on and before `end`.
-ScreenRect slice(const ScreenRect& rect, bool along_x, int from, int end) {
-  ScreenRect part = rect;
-  int& low = along_x ? part.pixels.x0 : part.pixels.y0;
-  int& high = along_x ? part.pixels.x1 : part.pixels.y1;
-  const int first = low;
-  low = std::min(first + kTileSide * from, high);
-  high = std::min(first + kTileSide * end, high);
-  return part;
-}
-
-int slices_of(const ScreenRect& rect, bool along_x) {
-  const int length = along_x ? rect.pixels.width() : rect.pixels.height();
-  return (length + kTileSide - 1) / kTileSide;
-}
-
 /// Where a rectangle is to be cut so that the part before costs about `wanted`.
 struct Cut {
   int whole = 0;        ///< slices that cost no more
@@ -83,9 +68,6 @@ Cut find_cut(const CostSums& costs, const ScreenRect& rect, bool along_x, double
 /// longer side where that comes near, else with a step in the slice it would run through.
 void cut_by_cost(const CostSums& costs, const ScreenRect& rect, double wanted, std::vector<ScreenRect>& first,
                  std::vector<ScreenRect>& second) {
-  const auto add = [](std::vector<ScreenRect>& rects, const ScreenRect& part) {
-    if (!part.pixels.empty()) rects.push_back(part);
-  };
   const bool along_x = rect.pixels.width() >= rect.pixels.height();
   const int slices = slices_of(rect, along_x);
   const Cut cut = find_cut(costs, rect, along_x, wanted);
@@ -100,44 +82,16 @@ void cut_by_cost(const CostSums& costs, const ScreenRect& rect, double wanted, s
     const int tiles = inside.whole + (past ? 1 : 0);
     const int all = slices_of(row, !along_x);
     if (tiles > 0 && tiles < all) {
-      add(first, slice(rect, along_x, 0, cut.whole));
-      add(first, slice(row, !along_x, 0, tiles));
-      add(second, slice(row, !along_x, tiles, all));
-      add(second, slice(rect, along_x, cut.whole + 1, slices));
+      add_if_any(first, slice(rect, along_x, 0, cut.whole));
+      add_if_any(first, slice(row, !along_x, 0, tiles));
+      add_if_any(second, slice(row, !along_x, tiles, all));
+      add_if_any(second, slice(rect, along_x, cut.whole + 1, slices));
       return;
     }
     straight = cut.whole + (tiles > 0 ? 1 : 0);
   }
-  add(first, slice(rect, along_x, 0, straight));
-  add(second, slice(rect, along_x, straight, slices));
-}
-
-void assign_by_cost(const CostSums& costs, std::vector<ScreenRect> rects, std::span<const int> weights,
-                    std::span<std::vector<ScreenRect>> areas) {
-  if (weights.size() == 1) {
-    areas[0] = std::move(rects);
-    return;
-  }
-  const std::size_t half = weights.size() / 2;
-  const double first_weights =
-      std::accumulate(weights.begin(), weights.begin() + static_cast<std::ptrdiff_t>(half), 0.0);
-  double wanted = costs.of(rects) * first_weights / std::accumulate(weights.begin(), weights.end(), 0.0);
-  std::vector<ScreenRect> first;
-  std::vector<ScreenRect> second;
-  for (const ScreenRect& rect : rects) {
-    const double cost = costs.of(rect);
-    if (cost <= wanted) {
-      first.push_back(rect);
-      wanted -= cost;
-    } else if (wanted <= 0.0) {
-      second.push_back(rect);
-    } else {
-      cut_by_cost(costs, rect, wanted, first, second);
-      wanted = 0.0;
-    }
-  }
-  assign_by_cost(costs, std::move(first), weights.first(half), areas.first(half));
-  assign_by_cost(costs, std::move(second), weights.subspan(half), areas.subspan(half));
+  add_if_any(first, slice(rect, along_x, 0, straight));
+  add_if_any(second, slice(rect, along_x, straight, slices));
 }
 
 /// Per area its cost by its weight: the time of a group of so many ranks.
@@ -166,12 +120,13 @@ void TileCosts::add(std::span<const double> measured) {
 Areas assign_tiles(const FrameLayout& layout, const std::vector<int>& weights, std::span<const double> costs) {
   HPR_CHECK(!weights.empty() && std::ranges::all_of(weights, [](int weight) { return weight > 0; }));
   HPR_CHECK(costs.size() == layout.tiles());
-  std::vector<ScreenRect> whole;
-  for (std::size_t screen = 0; screen < layout.screens(); ++screen) {
-    whole.push_back({screen, {0, 0, layout.size(screen).width, layout.size(screen).height}});
-  }
   Areas areas(weights.size());
-  assign_by_cost(CostSums(layout, costs), std::move(whole), weights, areas);
+  const CostSums sums(layout, costs);
+  share_out(
+      whole_screens(layout), weights, areas, [&](const ScreenRect& rect) { return sums.of(rect); },
+      [&](const ScreenRect& rect, double wanted, std::vector<ScreenRect>& first, std::vector<ScreenRect>& second) {
+        cut_by_cost(sums, rect, wanted, first, second);
+      });
   return areas;
 }
 

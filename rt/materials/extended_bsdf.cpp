@@ -25,11 +25,6 @@ double largest(const glm::dvec3& v) {
   return std::max({v.x, v.y, v.z});
 }
 
-double schlick_rise(double cosine) {
-  const double m = 1.0 - std::clamp(cosine, 0.0, 1.0);
-  return squared(squared(m)) * m;
-}
-
 MaterialPoint without_extensions(const MaterialPoint& material) {
   MaterialPoint plain = material;
   plain.extensions.reset();

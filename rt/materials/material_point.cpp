@@ -329,8 +329,7 @@ MaterialPoint evaluate_material(const Scene& scene, const SurfacePoint& surface)
 double coat_transmittance(const ExtensionPoint& extensions, const glm::dvec3& direction) {
   constexpr double kCoatF0 = 0.04;  // of an index of 1.5
   if (!(extensions.clearcoat > 0.0)) return 1.0;
-  const double cosine = std::min(std::abs(glm::dot(extensions.clearcoat_normal, direction)), 1.0);
-  const double rise = (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine) * (1.0 - cosine);
+  const double rise = schlick_rise(std::abs(glm::dot(extensions.clearcoat_normal, direction)));
   return 1.0 - extensions.clearcoat * (kCoatF0 + (1.0 - kCoatF0) * rise);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -42,6 +43,12 @@ struct ExtensionPoint {
   double diffuse_transmission = 0.0;  ///< share of the diffuse light
   glm::dvec3 diffuse_transmission_color{1.0};
 };
+
+/// The part of Schlick's Fresnel term that rises from 0 straight on to 1 aslant.
+[[nodiscard]] inline double schlick_rise(double cosine) {
+  const double m = 1.0 - std::clamp(cosine, 0.0, 1.0);
+  return (m * m) * (m * m) * m;
+}
 
 /// The share of light that a clear coat leaves to what lies below it, by Schlick's term at the coat's own normal.
 [[nodiscard]] double coat_transmittance(const ExtensionPoint& extensions, const glm::dvec3& direction);

@@ -134,25 +134,28 @@ double distance_of(const Corners& c) {
   return std::min({distance_of(c[0], c[1]), distance_of(c[1], c[2]), distance_of(c[2], c[0])});
 }
 
+double longest_edge(const Corners& c) {
+  return std::max({glm::distance(c[0], c[1]), glm::distance(c[1], c[2]), glm::distance(c[2], c[0])});
+}
+
 /// Whether refining is worth it for that triangle: for its plane, or for its edges.
 bool is_coarse(const Corners& c) {
   const double distance = std::max(distance_of(c), kMinEdge);
   const glm::dvec3 e1 = c[1] - c[0];
   const glm::dvec3 e2 = c[2] - c[0];
-  const double longest = std::max({glm::length(e1), glm::length(e2), glm::distance(c[1], c[2])});
+  const double longest = longest_edge(c);
   if (longest >= kMinWide && longest > kMinWideness * distance) return true;
   const double rounding =
       plane_rounding(e1, e2, glm::normalize(glm::cross(e1, e2)), glm::abs(c[0]) + glm::max(glm::abs(e1), glm::abs(e2)));
   return rounding > kMinGain * kPlaneSteps * distance;
 }
 
+/// Of a mesh, in its own unit.
 double longest_edge(const Mesh& mesh) {
   double longest = 0.0;
   for (const glm::uvec3& t : mesh.triangles) {
-    const glm::dvec3 a(mesh.positions[t.x]);
-    const glm::dvec3 b(mesh.positions[t.y]);
-    const glm::dvec3 c(mesh.positions[t.z]);
-    longest = std::max({longest, glm::length(b - a), glm::length(c - b), glm::length(a - c)});
+    longest = std::max(longest, longest_edge(Corners{glm::dvec3(mesh.positions[t.x]), glm::dvec3(mesh.positions[t.y]),
+                                                     glm::dvec3(mesh.positions[t.z])}));
   }
   return longest;
 }

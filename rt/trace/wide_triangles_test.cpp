@@ -204,7 +204,7 @@ std::size_t differing(const Image<Rgb>& a, const Image<Rgb>& b) {
   return count;
 }
 
-TEST(WideTriangles, LookLikeThoseOfSixtyMetres) {
+TEST(WideTriangles, MatchTheImagesOfASmallGround) {
   const Material dull = test::diffuse(glm::vec3(0.8F));
   for (const auto& [of_ground, of_ball] : {std::pair(dull, test::mirror(0.8F)), std::pair(test::mirror(0.8F), dull)}) {
     for (const Ground& ground : grounds()) {
