@@ -1,9 +1,8 @@
 #include "core/timing.h"
 
-#include <time.h>
-
 #include <atomic>
 #include <chrono>
+#include <ctime>
 #include <mutex>
 #include <utility>
 
