@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/file_bytes.h"
 #include "core/job_environment.h"
 #include "core/text.h"
 
@@ -156,9 +157,10 @@ std::string_view without_mark(std::string_view text) {
   return text;
 }
 
-std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
-  // O_NONBLOCK so that opening a FIFO returns at once and can be refused.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+namespace {
+
+/// The size of an open file that may be read.
+std::uint64_t checked_size(const Descriptor& file, const std::filesystem::path& path, std::uint64_t limit_bytes) {
   if (file.get() < 0) fail("cannot read", path, errno);
   struct stat info {};
   if (::fstat(file.get(), &info) != 0) fail("cannot read", path, errno);
@@ -172,7 +174,24 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_
                 fmt::format("'{}' has {} bytes, more than the limit of {}", path.string(), size, limit_bytes),
                 "raise the limit with --limit-mem if the file is to be trusted");
   }
-  std::vector<std::byte> bytes(size);
+  return size;
+}
+
+/// O_NONBLOCK so that opening a FIFO returns at once and can be refused.
+Descriptor open_to_read(const std::filesystem::path& path) {
+  return Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+}
+
+}  // namespace
+
+FileBytes map_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
+  const Descriptor file = open_to_read(path);
+  return FileBytes::mapped(file.get(), checked_size(file, path, limit_bytes));
+}
+
+std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
+  const Descriptor file = open_to_read(path);
+  std::vector<std::byte> bytes(checked_size(file, path, limit_bytes));
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t got = ::read(file.get(), bytes.data() + done, bytes.size() - done);

@@ -37,7 +37,23 @@ struct Choice {
   std::string why;
 };
 
+/// Throws Error (Usage) where ranks hold parts of the scene and settings ask for more.
+Choice distribution_of_parts(const FrameSettings& settings, const Scene& scene, int ranks) {
+  const bool in_islands = static_cast<int>(scene.parts.size()) < ranks;
+  const Distribution fits = in_islands ? Distribution::Hybrid : Distribution::SortLast;
+  if (settings.distribution.value_or(fits) != fits) {
+    throw Error(ExitCode::Usage,
+                fmt::format("ranks hold parts of the scene, which --distribute {} needs whole",
+                            name_of(*settings.distribution)),
+                fmt::format("use --distribute {}, or load the scene again", name_of(fits)));
+  }
+  return {fits, in_islands ? fmt::format("{} groups of {} ranks that hold a part of the scene each",
+                                         ranks / static_cast<int>(scene.parts.size()), scene.parts.size())
+                           : "each rank holds a part of the scene"};
+}
+
 Choice choose_distribution(const FrameSettings& settings, const Scene& scene, int ranks) {
+  if (!scene.parts.empty()) return distribution_of_parts(settings, scene, ranks);
   if (settings.distribution) return {*settings.distribution, "as asked"};
   if (ranks == 1) return {Distribution::SortFirst, "one rank draws everything"};
   if (settings.partitioned)
@@ -117,7 +133,7 @@ std::vector<std::string> describe_lights(const Scene& scene) {
   std::size_t triangles = 0;
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
-    if (emitting[mesh.material]) triangles += mesh.triangles.size();
+    if (emitting[mesh.material]) triangles += mesh.triangle_count();
   }
   if (triangles > 0) parts.push_back(counted(triangles, "triangle") + (triangles == 1 ? " that emits" : " that emit"));
   if (!scene.environment_note.empty()) {
@@ -133,7 +149,8 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
   auto& lines = plan.explained;
   if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
   if (plan.rays.part) {
-    lines.emplace_back("data: partitioned (as asked: rays travel to the ranks whose objects they may meet)");
+    lines.push_back(fmt::format("data: partitioned ({}: rays travel to the ranks whose objects they may meet)",
+                                settings.partitioned ? "as asked" : "the scene is too large for one rank"));
   } else if (settings.partitioned) {
     lines.emplace_back("data: whole (one rank has all of it)");
   }
@@ -206,6 +223,7 @@ std::vector<SeenPoint> find_seen(const RayScene& scene, const Surfaces& surfaces
   }
   std::vector<std::uint32_t> hits(camera_rays.size());
   (void)scene.closest(rays, hits);
+  surfaces.prefetch(hits);
   std::vector<SeenPoint> seen;
   WorldTriangle triangle;
   for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -221,7 +239,7 @@ std::vector<SeenPoint> find_seen(const RayScene& scene, const Surfaces& surfaces
 std::optional<double> open_sky(Session& session, const RaySettings& settings, std::span<const View> views) {
   session.partition_rays(settings);
   const RayScene& scene = session.ray_scene(settings.build);
-  const Surfaces surfaces(session.scene(), scene.space());
+  const Surfaces surfaces(session.scene(), scene.space(), true, session.forwarding());
   const std::vector<Ray> rays_from_eye = camera_rays(views);
   std::vector<std::uint8_t> blocked;
   scene.for_each(1, 1, [&](std::size_t) {
@@ -249,7 +267,7 @@ double rounded_footprint(double metres) {
 double pixel_footprint(Session& session, const RaySettings& settings, std::span<const View> views) {
   session.partition_rays(settings);
   const RayScene& scene = session.ray_scene(settings.build);
-  const Surfaces surfaces(session.scene(), scene.space());
+  const Surfaces surfaces(session.scene(), scene.space(), true, session.forwarding());
   const std::vector<Ray> rays_from_eye = camera_rays(views);
   const std::size_t rays_of_view = rays_from_eye.size() / views.size();
   std::vector<double> footprints;
@@ -303,7 +321,7 @@ PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, 
                                std::span<const View> views) {
   if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
   KeyWork work{.triangles = session.scene().triangles, .single_picture = settings.single_picture};
-  for (const Mesh& mesh : session.scene().meshes) work.own_triangles += mesh.triangles.size();
+  for (const Mesh& mesh : session.scene().meshes) work.own_triangles += mesh.triangle_count();
   for (const View& view : views) work.pixels += view.size().area();
   work.rounds_depth = settings.depth_format != DepthFormat::Float32;
   work.software_gl = work.rounds_depth || session.draws_by_software();
@@ -385,7 +403,9 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
 
   const Choice choice = choose_distribution(settings, session.scene(), ranks);
   plan.distribution = choice.distribution;
-  plan.groups = std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
+  const int parts = static_cast<int>(session.scene().parts.size());
+  plan.groups =
+      parts > 0 ? ranks / parts : std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
   plan.depth_format = settings.depth_format;
   plan.shading = settings.shading;
@@ -403,7 +423,10 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
   }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
-  if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
+  if ((settings.partitioned && plan.mine.group.size() > 1) || parts > 0) {
+    plan.rays.part = plan.mine.objects;
+    plan.rays.holders = plan.mine.group;
+  }
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),

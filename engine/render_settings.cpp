@@ -165,6 +165,12 @@ void resolve_show(RenderSettings& settings) {
               "with it, use of --aov only depth, id, normal, albedo, rank and cost");
 }
 
+/// Whether ranks draw no objects but those of a part of the scene that each holds.
+bool may_be_in_parts(const FrameSettings& frame) {
+  return !frame.distribution || *frame.distribution == Distribution::SortLast ||
+         *frame.distribution == Distribution::Hybrid;
+}
+
 /// What of the settings excludes each other.
 void check_combination(const RenderSettings& settings) {
   const FrameSettings& frame = settings.frame;
@@ -177,10 +183,10 @@ void check_combination(const RenderSettings& settings) {
     refuse("--depth-format rounds depths before OpenGL compares them; rays compare their own",
            "use it with --primary raster");
   }
-  if (frame.partitioned && frame.distribution.value_or(Distribution::SortLast) != Distribution::SortLast) {
+  if (frame.partitioned && !may_be_in_parts(frame)) {
     refuse(fmt::format("--data partitioned gives each rank its own objects, of which --distribute {} draws others",
                        name_of(*frame.distribution)),
-           "use --distribute sort-last, or leave it out");
+           "use --distribute sort-last or hybrid, or leave it out");
   }
   const bool splits = std::ranges::any_of(
       frame.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
@@ -273,9 +279,32 @@ FirstView first_view(const RenderSettings& settings, Size size) {
   };
 }
 
-Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
-                 const ImageLimits& pictures, const FirstView& view) {
-  Scene scene = load_unshaped_scene(source, limits, settings.scene);
+namespace {
+
+/// Reads a scene whole, or in parts where that is asked for, or it is too large and nothing says otherwise.
+LoadedScene load_as_fits(const std::string& source, const RenderSettings& settings, const SceneLimits& limits) {
+  const FrameSettings& frame = settings.frame;
+  const auto in_parts = [&] {
+    LoadedScene loaded = load_unshaped_scene(source, limits, settings.scene, true);
+    if (frame.distribution == Distribution::Hybrid) loaded.islands = frame.groups;
+    return loaded;
+  };
+  if (frame.partitioned) return in_parts();
+  try {
+    return load_unshaped_scene(source, limits, settings.scene);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::Limit || settings.is_given("data") || !may_be_in_parts(frame)) throw;
+    log::info("{}; reading it in parts, one for each rank", error.what());
+    return in_parts();
+  }
+}
+
+}  // namespace
+
+LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
+                       const ImageLimits& pictures, const FirstView& view) {
+  LoadedScene loaded = load_as_fits(source, settings, limits);
+  Scene& scene = loaded.scene;
   if (has_points_or_lines(scene)) shape_points_and_lines(scene, settings.widths, view(scene), limits.memory_bytes);
   set_environment(settings.environment, pictures, scene);
   if (settings.cull == Cull::None) {
@@ -291,7 +320,7 @@ Scene load_scene(const std::string& source, const RenderSettings& settings, cons
                                                   : fmt::format("{} values are no finite numbers", scene.not_finite)),
         "repair the file, or draw without --strict: they are replaced");
   }
-  return scene;
+  return loaded;
 }
 
 void check_raw(const RenderSettings& settings) {

@@ -93,8 +93,8 @@ using FirstView = std::function<View(const Scene&)>;
 /// Loads a scene, lights it and shapes its points and lines as the settings say. `pictures`: how large an environment
 /// may be. Throws Error as load_scene, choose_camera and load_environment do, and BadInput for values that are not
 /// finite where the settings are strict.
-[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
-                               const ImageLimits& pictures, const FirstView& view);
+[[nodiscard]] LoadedScene load_scene(const std::string& source, const RenderSettings& settings,
+                                     const SceneLimits& limits, const ImageLimits& pictures, const FirstView& view);
 
 /// Throws Error (Usage) where the settings leave no surface for every pixel of a file of keys.
 void check_raw(const RenderSettings& settings);

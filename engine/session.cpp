@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <utility>
 
 #include "cluster/distribution/scene_distribution.h"
 #include "cluster/transport/collectives.h"
@@ -22,19 +23,37 @@
 #include "rt/trace/primary_rays.h"
 #include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
+#include "rt/trace/refined_triangles.h"
 #include "scene/scene.h"
 
 namespace hpr {
 namespace {
 
-Scene load_scene_of_all(Communicator& comm, const std::function<Scene()>& load) {
+/// Collective. Finds which instances are refined, where no rank can tell for itself.
+void find_refined(Communicator& comm, Scene& scene) {
+  if (scene.parts.empty()) return;
+  const std::vector<SurfaceRange>& part = scene.parts.at(static_cast<std::size_t>(comm.rank()) % scene.parts.size());
+  std::vector<RefinementCount> mine;  // of one of those who hold the part
+  if (static_cast<std::size_t>(comm.rank()) < scene.parts.size()) {
+    mine = count_refined_parts(scene, RaySpace(scene.bounds), part);
+  }
+  std::vector<RefinementCount> all;
+  for (const auto& of_rank : all_gather_lists(comm, std::span(std::as_const(mine)))) {
+    all.insert(all.end(), of_rank.begin(), of_rank.end());
+  }
+  scene.refined = refined_by_counts(scene, all);
+}
+
+Scene load_scene_of_all(Communicator& comm, const std::function<LoadedScene()>& load) {
   const trace::Span span("load scene");
-  return distribute_scene(comm, load);
+  Scene scene = distribute_scene(comm, load);
+  find_refined(comm, scene);
+  return scene;
 }
 
 }  // namespace
 
-Session::Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load)
+Session::Session(Communicator& comm, const SessionSettings& settings, const std::function<LoadedScene()>& load)
     : comm_(comm),
       settings_(settings),
       host_(find_host_resources(comm, settings.threads)),
@@ -91,7 +110,7 @@ Session::HostResources Session::find_host_resources(Communicator& comm, int thre
   return host;
 }
 
-void Session::load(const std::function<Scene()>& load) {
+void Session::load(const std::function<LoadedScene()>& load) {
   Scene scene = load_scene_of_all(comm_, load);
   release_scene();
   scene_ = std::move(scene);
@@ -103,6 +122,7 @@ void Session::load(const std::function<Scene()>& load) {
 void Session::change_scene(const std::function<void(Scene&)>& change) {
   release_scene();
   change(scene_);
+  find_refined(comm_, scene_);
   requirements_ = requirements_of(scene_);
 }
 
@@ -163,11 +183,12 @@ void Session::build_rays_by(const RayBuild& build) {
 
 void Session::partition_rays(const RaySettings& settings) {
   build_rays_by(settings.build);
+  Communicator& holders = settings.part && !settings.holders.empty() ? group(settings.holders) : comm_;
   if (settings.part == part_) return;
   release_rays();
   forwarding_.reset();
   part_ = settings.part;
-  if (part_) forwarding_ = std::make_unique<RayForwarding>(comm_, scene_, RaySpace(scene_.bounds), *part_);
+  if (part_) forwarding_ = std::make_unique<RayForwarding>(holders, scene_, RaySpace(scene_.bounds), *part_);
 }
 
 std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange> objects) const {
@@ -243,8 +264,11 @@ DeferredShader& Session::shader(const RaySettings& settings) {
 Communicator& Session::group(std::span<const int> members) {
   if (static_cast<int>(members.size()) == comm_.size()) return comm_;
   if (!group_.comm || !std::ranges::equal(members, group_.members)) {
-    compositor_.reset();  // both may hold on to the old group
+    compositor_.reset();  // these may hold on to the old group
     keys_ = {};
+    release_rays();
+    forwarding_.reset();
+    part_.reset();
     group_.comm = comm_.subset(members);
     group_.members.assign(members.begin(), members.end());
   }

@@ -10,6 +10,7 @@
 #include "cluster/transport/communicator_wrappers.h"
 #include "image/tiles.h"
 #include "rt/ray_settings.h"
+#include "scene/load_scene.h"
 #include "scene/requirements.h"
 #include "scene/scene.h"
 
@@ -37,14 +38,15 @@ struct SessionSettings {
 class Session {
  public:
   /// `load` runs on rank 0 alone. Starts OpenGL where the settings name a backend or a device.
-  Session(Communicator& comm, const SessionSettings& settings, const std::function<Scene()>& load);
+  Session(Communicator& comm, const SessionSettings& settings, const std::function<LoadedScene()>& load);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
   /// Collective. Another scene in this one's place; when it cannot be loaded, this one stays.
-  void load(const std::function<Scene()>& load);
-  /// Changes the scene; called alike on every rank. What was made of the old scene is made again when it is needed.
+  void load(const std::function<LoadedScene()>& load);
+  /// Collective. Changes the scene, alike on every rank. What was made of the old scene is made again when it is
+  /// needed.
   void change_scene(const std::function<void(Scene&)>& change);
 
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
@@ -79,6 +81,8 @@ class Session {
   [[nodiscard]] const RayScene& ray_scene(const RayBuild& build);
   /// Collective. Makes what travelling rays need, where `settings` have a part.
   void partition_rays(const RaySettings& settings);
+  /// What brings rays to other ranks; null where none travel.
+  [[nodiscard]] RayForwarding* forwarding() { return forwarding_.get(); }
   /// The shader of these settings; kept until others are asked for.
   [[nodiscard]] DeferredShader& shader(const RaySettings& settings);
   /// The communicator of a group this rank belongs to; kept until another group is asked for. Collective over the

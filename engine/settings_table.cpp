@@ -430,12 +430,11 @@ std::vector<Setting> make_table() {
        .limits_reference = true,
        .used_with = {{"show", shows_light}}},
       {.name = "data",
-       .help = "what rays meet on a rank: replicated, all of the scene, or partitioned, what the rank draws itself, "
+       .help = "what a rank holds of the scene: replicated, all of it, or partitioned, what the rank draws itself, "
                "while the rays of the others come to it",
        .value = choice(kDataNames, [](Settings& s) -> bool& { return s.frame.partitioned; }),
        .initial = "replicated",
-       .costs =
-           "partitioned: time and messages, as rays travel; replicated: the memory of a whole ray scene on each rank",
+       .costs = "partitioned: time and messages, as rays travel; replicated: the memory of a whole scene on each rank",
        .loses = "nothing: no bit of a picture",
        .decides_bits = false},
       {.name = "no-terminator-fix",

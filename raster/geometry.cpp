@@ -27,18 +27,18 @@ constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 void append_chunk(const Mesh& mesh, std::uint32_t first, std::uint32_t last, VertexIndices& indices,
                   Geometry& geometry) {
   Chunk chunk{first, last - first, static_cast<std::uint32_t>(geometry.triangles.size()), {}};
-  const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
+  const glm::vec3 start = mesh.positions[mesh.triangle(first).x];
   chunk.box = {start, start};
   const auto add_vertex = [&](std::uint32_t vertex, std::uint32_t triangle) {
     indices[vertex] = static_cast<std::uint32_t>(geometry.vertices.size());
     geometry.vertices.push_back({mesh.positions[vertex], triangle});
   };
   const auto own_corner = static_cast<std::uint32_t>(geometry.vertices.size());
-  for (std::uint32_t t = first; t < last; ++t) add_vertex(mesh.triangles[t].z, t);
+  for (std::uint32_t t = first; t < last; ++t) add_vertex(mesh.triangle(t).z, t);
   for (std::uint32_t t = first; t < last; ++t) {
     glm::uvec3 moved(0U, 0U, own_corner + (t - first));
     for (int corner = 0; corner < 3; ++corner) {
-      const std::uint32_t vertex = mesh.triangles[t][corner];
+      const std::uint32_t vertex = mesh.triangle(t)[corner];
       chunk.box.add({mesh.positions[vertex], mesh.positions[vertex]});
       if (corner == 2) continue;
       if (indices[vertex] == kNowhere) add_vertex(vertex, t);  // nobody's last corner so far
@@ -92,8 +92,7 @@ Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> obje
   for (const InstanceRange& part : parts) wanted[scene.instances[part.instance].mesh].push_back(part.range);
   std::uint64_t triangles = 0;
   for (std::size_t mesh = 0; mesh < wanted.size(); ++mesh) {
-    wanted[mesh] =
-        merged_ranges(std::move(wanted[mesh]), static_cast<std::uint32_t>(scene.meshes[mesh].triangles.size()));
+    wanted[mesh] = merged_ranges(std::move(wanted[mesh]), scene.meshes[mesh].triangle_count());
     for (const SurfaceRange& range : wanted[mesh]) triangles += range.count();
   }
   // Indirect draws address the index buffer with 32 bits, three indices a triangle.

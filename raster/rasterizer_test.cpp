@@ -72,7 +72,7 @@ TEST_P(RasterizerTest, AWrittenAndLoadedSceneHasTheSameKeys) {
   const test::TemporaryFolder folder;
   const std::vector<std::byte> file = encode_glb(scene);
   const Scene loaded =
-      load_gltf(folder.write("scene.glb", {reinterpret_cast<const char*>(file.data()), file.size()}), {});
+      load_gltf(folder.write("scene.glb", {reinterpret_cast<const char*>(file.data()), file.size()}), {}).scene;
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
     const Size size{160, 120};
     const Image<Key> image = draw_all(*context_, scene, make_view(scene.cameras[i], size, scene.bounds));

@@ -23,6 +23,7 @@
 #include "rt/photons/photon_tracer.h"
 #include "rt/reference/path_tracer.h"
 #include "rt/show/show_pixels.h"
+#include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
 
 namespace hpr {
@@ -170,7 +171,7 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
       settings(std::move(chosen)),
       plan(plan_passes(requirements, settings)),
       space(lit.bounds),
-      surfaces(lit, space, settings.show == Show::Ao || lifts_origins(plan, settings)),
+      surfaces(lit, space, settings.show == Show::Ao || lifts_origins(plan, settings), others),
       lights(lit, constant_environment_of(plan)),
       media(lit),
       shared(shared_components(settings)),
@@ -204,6 +205,8 @@ const RayScene& DeferredShader::State::build(std::optional<RayScene>& made, std:
 void DeferredShader::State::for_each(std::size_t count, const std::function<void(std::size_t)>& body) const {
   if (opaque != nullptr) {
     opaque->for_each(settings.threads, count, body);
+  } else if (forwarding != nullptr) {
+    forwarding->for_each(settings.threads, count, body);
   } else {
     parallel_for(settings.threads, count, body);
   }
@@ -235,7 +238,7 @@ void DeferredShader::State::build_reference() {
   own.terminator_fix = settings.terminator_fix;
   own.spread_in_pixel = false;  // views are jittered
   own.threads = settings.threads;
-  reference.emplace(scene, *rays, lights, own);
+  reference.emplace(scene, *rays, lights, own, forwarding);
 }
 
 const RayScene& DeferredShader::State::whole_scene() {

@@ -56,6 +56,7 @@ struct RaySettings {
   std::vector<PassId> half_resolution = {};
   /// Surfaces that this rank's ray scenes hold, where rays are forwarded between ranks; none: all of them.
   std::optional<std::vector<SurfaceRange>> part = {};
+  std::vector<int> holders = {};  ///< the ranks whose parts are all of the scene, this one among them; empty: all ranks
   Background background = {};
   bool denoise = false;  ///< see Denoiser
   /// Filters of a tile (Denoiser, HalfResShading) read its neighbors' pixels too, not only those of other blocks:

@@ -94,8 +94,9 @@ std::array<std::size_t, 3> color_channels(const FloatImage& picture, const std::
 
 }  // namespace
 
-Scene load_unshaped_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice) {
-  if (!source.starts_with(kGenerated)) return importer_for(source).load(source, limits, choice);
+LoadedScene load_unshaped_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice,
+                                bool in_parts) {
+  if (!source.starts_with(kGenerated)) return importer_for(source).load(source, limits, choice, in_parts);
   check_generated(source, choice);
   Scene scene = generate_scene(std::string_view(source).substr(kGenerated.size()));
   if (const std::uint64_t bytes = memory_of(scene); bytes > limits.memory_bytes) {
@@ -103,11 +104,14 @@ Scene load_unshaped_scene(const std::string& source, const SceneLimits& limits, 
                 fmt::format("{}: needs {} bytes, more than the limit of {}", source, bytes, limits.memory_bytes),
                 "choose a smaller scene, or raise --limit-mem");
   }
-  return scene;
+  LoadedScene loaded(std::move(scene));
+  loaded.in_parts = in_parts;
+  loaded.memory_limit = limits.memory_bytes;
+  return loaded;
 }
 
 Scene load_scene(const std::string& source, const SceneLimits& limits, const SceneChoice& choice) {
-  Scene scene = load_unshaped_scene(source, limits, choice);
+  Scene scene = load_unshaped_scene(source, limits, choice).scene;
   if (!has_points_or_lines(scene)) return scene;
   const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
   shape_points_and_lines(scene, {}, make_view(camera, kDefaultPictureSize, scene.bounds), limits.memory_bytes);

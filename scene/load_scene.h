@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "image/image_io.h"
@@ -30,12 +32,29 @@ struct SceneChoice {
   bool operator==(const SceneChoice&) const = default;
 };
 
+/// A scene as it was read, for one rank to hand out to all.
+struct LoadedScene {
+  Scene scene;
+  /// Whether ranks are to hold parts of its meshes, but for those that is_held_by_all().
+  bool in_parts = false;
+  /// How many times the ranks hold all of it together, in groups; 0: as often as memory allows, in two parts or more.
+  int islands = 1;
+  std::uint64_t memory_limit = SceneLimits{}.memory_bytes;  ///< of one rank
+  /// Reads a mesh again, whole; where some of the scene's have no triangles (without_triangles).
+  std::function<Mesh(std::uint32_t)> whole_mesh = nullptr;
+
+  // NOLINTNEXTLINE(google-explicit-constructor): a scene is one that was read
+  LoadedScene(Scene whole) : scene(std::move(whole)) {}
+};
+
 /// A format of scene files.
 struct SceneImporter {
   std::vector<std::string_view> extensions;  ///< in small letters, with their dots
   /// Loads a file into a finished scene, in which points and lines have no shapes yet. Throws Error (Io, BadInput,
   /// Limit; Usage for a choice that it lacks).
-  Scene (*load)(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice);
+  /// `in_parts`: reads mesh by mesh, and leaves triangles out (LoadedScene::whole_mesh).
+  LoadedScene (*load)(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice,
+                      bool in_parts);
   /// The files that `load` reads beside the scene's own; none of one it would refuse.
   std::vector<std::filesystem::path> (*files_beside)(const std::filesystem::path& path, const SceneLimits& limits);
 };
@@ -54,9 +73,10 @@ HPR_SCENE_IMPORTERS(HPR_DECLARE_IMPORTER)
 /// BadInput, Limit, Usage). Generated scenes are the one scene of their source, 0, without variants.
 [[nodiscard]] Scene load_scene(const std::string& source, const SceneLimits& limits = {},
                                const SceneChoice& choice = {});
-/// Loads a scene as load_scene does, but for the shapes of points and lines: see shape_points_and_lines.
-[[nodiscard]] Scene load_unshaped_scene(const std::string& source, const SceneLimits& limits,
-                                        const SceneChoice& choice);
+/// Loads a scene as load_scene does, but for the shapes of points and lines (shape_points_and_lines); `in_parts` for
+/// ranks that hold parts of it: then a file may be larger than memory.
+[[nodiscard]] LoadedScene load_unshaped_scene(const std::string& source, const SceneLimits& limits,
+                                              const SceneChoice& choice, bool in_parts = false);
 
 /// The files load_scene(source, limits) may read: the scene's own, and the buffers and pictures that a glTF names. None
 /// of a generated scene; of a file that load_scene would refuse just that file.

@@ -33,7 +33,7 @@ std::vector<const Material*> visible_materials(const Scene& scene) {
   std::vector<std::uint8_t> used(scene.materials.size(), 0);
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
-    if (!mesh.triangles.empty() && !flattens(instance.to_world)) used[mesh.material] = 1;
+    if (mesh.triangle_count() > 0 && !flattens(instance.to_world)) used[mesh.material] = 1;
   }
   std::vector<const Material*> materials;
   for (std::size_t i = 0; i < used.size(); ++i) {

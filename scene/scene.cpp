@@ -25,12 +25,12 @@ void finish_scene(Scene& scene) {
   for (Instance& instance : scene.instances) {
     HPR_CHECK(instance.mesh < scene.meshes.size());
     instance.first_surface = static_cast<std::uint32_t>(triangles);
-    triangles += scene.mesh_of(instance).triangles.size();
+    triangles += scene.mesh_of(instance).triangle_count();
     if (triangles > kMaxTriangles) {
       throw Error(ExitCode::Limit, fmt::format("the scene has more than {} triangles after instancing", kMaxTriangles),
                   "surface ids have 32 bits; draw fewer instances or a coarser level of detail");
     }
-    if (scene.mesh_of(instance).triangles.empty()) continue;
+    if (scene.mesh_of(instance).triangle_count() == 0) continue;
     const Bounds box = transformed(instance.to_world, boxes[instance.mesh]);
     bounds = united(bounds, box);
   }
@@ -38,13 +38,15 @@ void finish_scene(Scene& scene) {
   scene.bounds = triangles > 0 ? bounds : Bounds{};
 }
 
+std::uint64_t memory_of(const Mesh& mesh) {
+  return (mesh.positions.size() + mesh.normals.size()) * sizeof(glm::vec3) +
+         (mesh.colors.size() + mesh.tangents.size()) * sizeof(glm::vec4) +
+         (mesh.uvs[0].size() + mesh.uvs[1].size()) * sizeof(glm::vec2) + mesh.triangles.size() * sizeof(glm::uvec3);
+}
+
 std::uint64_t memory_of(const Scene& scene) {
   std::uint64_t bytes = scene.instances.size() * sizeof(Instance);
-  for (const Mesh& mesh : scene.meshes) {
-    bytes += mesh.positions.size() * sizeof(glm::vec3) + mesh.normals.size() * sizeof(glm::vec3);
-    bytes += (mesh.colors.size() + mesh.tangents.size()) * sizeof(glm::vec4);
-    bytes += (mesh.uvs[0].size() + mesh.uvs[1].size()) * sizeof(glm::vec2) + mesh.triangles.size() * sizeof(glm::uvec3);
-  }
+  for (const Mesh& mesh : scene.meshes) bytes += memory_of(mesh);
   for (const Texture& texture : scene.textures) bytes += texture.image.pixels().size_bytes();
   return bytes;
 }
@@ -95,7 +97,20 @@ Bounds united(const Bounds& a, const Bounds& b) {
   return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
 }
 
+double longest_edge(const Mesh& mesh) {
+  if (mesh.partial) return mesh.partial->longest_edge;
+  double longest = 0.0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 a(mesh.positions[t.x]);
+    const glm::dvec3 b(mesh.positions[t.y]);
+    const glm::dvec3 c(mesh.positions[t.z]);
+    longest = std::max({longest, glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+  }
+  return longest;
+}
+
 Bounds mesh_bounds(const Mesh& mesh) {
+  if (mesh.partial) return mesh.partial->bounds;
   return bounds_of(mesh, mesh.triangles);
 }
 
@@ -141,7 +156,7 @@ std::vector<InstanceRange> split_by_instance(const Scene& scene, const std::vect
          ++instance) {
       const std::uint32_t base = scene.instances[instance].first_surface;
       if (base >= range.last) break;
-      const auto count = static_cast<std::uint32_t>(scene.mesh_of(scene.instances[instance]).triangles.size());
+      const std::uint32_t count = scene.mesh_of(scene.instances[instance]).triangle_count();
       const std::uint32_t first = std::max(range.first, base) - base;
       const std::uint32_t last = std::min(range.last - base, count);
       if (first < last) parts.push_back({instance, {first, last}});
@@ -165,7 +180,7 @@ std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool alpha_teste
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
     const bool is_alpha_tested = scene.materials[mesh.material].alpha_mode != AlphaMode::Opaque;
-    const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+    const std::uint32_t count = mesh.triangle_count();
     if (is_alpha_tested != alpha_tested || count == 0) continue;
     if (!ranges.empty() && ranges.back().last == instance.first_surface) {
       ranges.back().last += count;

@@ -13,8 +13,11 @@
 #include <variant>
 #include <vector>
 
+#include "core/bytes.h"
 #include "image/color.h"
 #include "image/image.h"
+#include "scene/bounds.h"
+#include "scene/partial_mesh.h"
 
 /// What is drawn, as plain data, independent of how. Right-handed, y up, metres; colours are linear with sRGB
 /// primaries.
@@ -151,6 +154,18 @@ struct Mesh {
   std::vector<glm::vec4> tangents;
   std::vector<glm::uvec3> triangles;  ///< may be degenerate
   std::uint32_t material = 0;         ///< index into Scene::materials, always valid
+  /// Where its triangles are shared out among ranks: the arrays have those that are here. Null: all are.
+  std::shared_ptr<const PartialMesh> partial;
+
+  /// Of the whole mesh.
+  [[nodiscard]] std::uint32_t triangle_count() const {
+    return partial ? partial->triangles : static_cast<std::uint32_t>(triangles.size());
+  }
+  /// Whether triangle `t` of the whole mesh is here, and the vertices of one that is.
+  [[nodiscard]] bool holds(std::uint32_t t) const { return !partial || partial->holds(t); }
+  [[nodiscard]] const glm::uvec3& triangle(std::uint32_t t) const {
+    return triangles[partial ? partial->index_of(t) : t];
+  }
 };
 
 /// A mesh placed in the world. Triangle t of it has the surface id first_surface + t.
@@ -217,9 +232,13 @@ struct Camera {
   std::variant<PerspectiveLens, OrthographicLens> lens;
 };
 
-struct Bounds {
-  glm::dvec3 low{0.0};
-  glm::dvec3 high{0.0};
+/// Surface ids [first, last).
+struct SurfaceRange {
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+
+  [[nodiscard]] std::uint32_t count() const { return last - first; }
+  bool operator==(const SurfaceRange&) const = default;
 };
 
 struct Scene {
@@ -245,6 +264,11 @@ struct Scene {
                                  ///< say; known where it was loaded
   std::uint32_t triangles = 0;   ///< of all instances: the number of surface ids
   Bounds bounds;                 ///< of all instances; low == high == 0 when there is nothing
+  /// Of a scene whose meshes are shared out: the surfaces that each part has, and as what is here does not tell, the
+  /// instances that are refined (refined_instances) and a camera that sees all of it (framing_camera).
+  std::vector<std::vector<SurfaceRange>> parts;
+  std::vector<std::uint8_t> refined;
+  std::optional<Camera> framing;
 
   [[nodiscard]] const Mesh& mesh_of(const Instance& instance) const { return meshes[instance.mesh]; }
 };
@@ -252,15 +276,6 @@ struct Scene {
 /// Whether an instance turns the winding of its triangles round: its matrix has a negative determinant. A front face is
 /// wound counterclockwise in the mesh's own coordinates, and so clockwise in the world where this is true.
 [[nodiscard]] bool is_mirrored(const Instance& instance);
-
-/// Surface ids [first, last).
-struct SurfaceRange {
-  std::uint32_t first = 0;
-  std::uint32_t last = 0;
-
-  [[nodiscard]] std::uint32_t count() const { return last - first; }
-  bool operator==(const SurfaceRange&) const = default;
-};
 
 /// Part of an instance: triangles [range.first, range.last) of its mesh.
 struct InstanceRange {
@@ -278,8 +293,9 @@ struct SurfaceLocation {
 /// the surfaces, computes `triangles` and `bounds`. Throws Error (Limit) past 2^32 - 2 triangles.
 void finish_scene(Scene& scene);
 
-/// What a scene's arrays take, in bytes.
+/// What a scene's arrays take, in bytes: those that are here, and of a mesh.
 [[nodiscard]] std::uint64_t memory_of(const Scene& scene);
+[[nodiscard]] std::uint64_t memory_of(const Mesh& mesh);
 
 /// The instance and triangle of a surface id below scene.triangles.
 [[nodiscard]] SurfaceLocation locate_surface(const Scene& scene, std::uint32_t surface);
@@ -291,17 +307,12 @@ void finish_scene(Scene& scene);
 [[nodiscard]] std::vector<glm::vec3> smooth_normals(const std::vector<glm::vec3>& positions,
                                                     const std::vector<glm::uvec3>& triangles);
 
-/// What holds nothing: low > high.
-[[nodiscard]] Bounds empty_bounds();
-/// The box about both.
-[[nodiscard]] Bounds united(const Bounds& a, const Bounds& b);
+/// Of the triangles of a mesh, in its own unit.
+[[nodiscard]] double longest_edge(const Mesh& mesh);
 
 /// The box of the positions a mesh uses, or some triangles of it, in its own coordinates; empty when there are none.
 [[nodiscard]] Bounds mesh_bounds(const Mesh& mesh);
 [[nodiscard]] Bounds bounds_of(const Mesh& mesh, std::span<const glm::uvec3> triangles);
-
-/// The world box of a box: the image of its centre, give or take |M| times its half extent.
-[[nodiscard]] Bounds transformed(const glm::dmat4& matrix, const Bounds& box);
 
 /// Merges ranges into sorted, disjoint ones that do not touch, inside [0, end), of the same surfaces. `ranges` may come
 /// in any order, overlap and reach past `end`.
@@ -318,11 +329,17 @@ void finish_scene(Scene& scene);
 /// ids.
 [[nodiscard]] std::vector<SurfaceRange> covering_surfaces(const Scene& scene, bool alpha_tested);
 
-/// XXH64 over everything that can change a picture; the same on every rank and machine.
+/// XXH64 over everything that can change a picture; the same on every rank and machine, and whether meshes are whole or
+/// shared out. That of a mesh is a part of it.
 [[nodiscard]] std::uint64_t content_hash(const Scene& scene);
+[[nodiscard]] std::uint64_t content_hash(const Mesh& mesh);
 
 /// A scene as bytes and back, to send to other ranks. `from_bytes` trusts its input.
 [[nodiscard]] std::vector<std::byte> to_bytes(const Scene& scene);
 [[nodiscard]] Scene scene_from_bytes(std::span<const std::byte> bytes);
+void append_bytes(const Mesh& mesh, ByteBuffer& buffer);
+[[nodiscard]] Mesh mesh_from_bytes(std::span<const std::byte> bytes);
+[[nodiscard]] std::vector<std::byte> to_bytes(const Camera& camera);
+[[nodiscard]] Camera camera_from_bytes(std::span<const std::byte> bytes);
 
 }  // namespace hpr

@@ -5,6 +5,7 @@
 #include <cereal/types/string.hpp>
 #include <cereal/types/variant.hpp>
 #include <cereal/types/vector.hpp>
+#include <functional>
 #include <istream>
 #include <ostream>
 #include <streambuf>
@@ -120,9 +121,23 @@ void serialize(Archive& archive, Bounds& b) {
   archive(b.low, b.high);
 }
 template <typename Archive>
+void serialize(Archive& archive, SurfaceRange& r) {
+  archive(r.first, r.last);
+}
+template <typename Archive>
+void serialize(Archive& archive, PartialMesh::Run& r) {
+  archive(r.first, r.last, r.at);
+}
+/// Without its chunks.
+template <typename Archive>
+void serialize(Archive& archive, PartialMesh& s) {
+  archive(s.runs, s.triangles, s.bounds, s.reach, s.longest_edge, s.bytes, s.content);
+}
+/// Without its meshes.
+template <typename Archive>
 void serialize(Archive& archive, Scene& s) {
-  archive(s.name, s.meshes, s.materials, s.textures, s.instances, s.lights, s.cameras, s.background, s.environment,
-          s.warnings, s.triangles, s.bounds);
+  archive(s.name, s.materials, s.textures, s.instances, s.lights, s.cameras, s.background, s.environment, s.warnings,
+          s.triangles, s.bounds);
 }
 
 namespace {
@@ -141,6 +156,24 @@ class VectorSink final : public std::streambuf {
     bytes.push_back(static_cast<std::byte>(c));
     return c;
   }
+};
+
+class BufferSink final : public std::streambuf {
+ public:
+  explicit BufferSink(ByteBuffer& buffer) : buffer_(buffer) {}
+
+ protected:
+  std::streamsize xsputn(const char* text, std::streamsize count) override {
+    buffer_.append(std::as_bytes(std::span(text, static_cast<std::size_t>(count))));
+    return count;
+  }
+  int_type overflow(int_type c) override {
+    buffer_.extend(1)[0] = static_cast<std::byte>(c);
+    return c;
+  }
+
+ private:
+  ByteBuffer& buffer_;
 };
 
 class HashSink final : public std::streambuf {
@@ -182,25 +215,81 @@ void load_extensions(Scene& scene, cereal::BinaryInputArchive& archive) {
   }
 }
 
-/// One serialize() both reads and writes; an output archive only reads. To be loaded again, or to be hashed.
-void save(const Scene& scene, std::streambuf& sink, bool to_load) {
+void save_mesh(const Mesh& mesh, cereal::BinaryOutputArchive& archive) {
+  archive(const_cast<Mesh&>(mesh), mesh.partial != nullptr);  // an output archive only reads
+  if (mesh.partial) archive(const_cast<PartialMesh&>(*mesh.partial));
+}
+
+void load_mesh(Mesh& mesh, cereal::BinaryInputArchive& archive) {
+  bool is_shared_out = false;
+  archive(mesh, is_shared_out);
+  if (!is_shared_out) return;
+  PartialMesh partial;
+  archive(partial);
+  mesh.partial = std::make_shared<const PartialMesh>(std::move(partial));
+}
+
+std::vector<std::byte> bytes_of(const std::function<void(cereal::BinaryOutputArchive&)>& save) {
+  VectorSink sink;
   std::ostream stream(&sink);
   cereal::BinaryOutputArchive archive(stream);
-  if (to_load) archive(scene.node_names, scene.environment_note);
-  archive(const_cast<Scene&>(scene));
-  if (to_load) {
-    const auto extended = [](const Material& material) { return material.extensions != nullptr; };
-    archive(static_cast<std::uint64_t>(std::ranges::count_if(scene.materials, extended)));
-  }
-  save_extensions(scene, archive);
+  save(archive);
+  return std::move(sink.bytes);
+}
+
+std::uint64_t hash_of(const std::function<void(cereal::BinaryOutputArchive&)>& save) {
+  HashSink sink;
+  std::ostream stream(&sink);
+  cereal::BinaryOutputArchive archive(stream);
+  save(archive);
+  return sink.hash.value();
 }
 
 }  // namespace
 
+// One serialize() both reads and writes; an output archive only reads.
+
+void append_bytes(const Mesh& mesh, ByteBuffer& buffer) {
+  constexpr std::size_t kBeside = 4096;  // the name and sizes
+  const std::size_t runs = mesh.partial ? mesh.partial->runs.size() * sizeof(PartialMesh::Run) : 0;
+  buffer.reserve(buffer.size() + memory_of(mesh) + runs + kBeside);
+  BufferSink sink(buffer);
+  std::ostream stream(&sink);
+  cereal::BinaryOutputArchive archive(stream);
+  save_mesh(mesh, archive);
+}
+
+Mesh mesh_from_bytes(std::span<const std::byte> bytes) {
+  SpanSource source(bytes);
+  std::istream stream(&source);
+  cereal::BinaryInputArchive archive(stream);
+  Mesh mesh;
+  load_mesh(mesh, archive);
+  return mesh;
+}
+
+std::vector<std::byte> to_bytes(const Camera& camera) {
+  return bytes_of([&](cereal::BinaryOutputArchive& archive) { archive(const_cast<Camera&>(camera)); });
+}
+
+Camera camera_from_bytes(std::span<const std::byte> bytes) {
+  SpanSource source(bytes);
+  std::istream stream(&source);
+  cereal::BinaryInputArchive archive(stream);
+  Camera camera;
+  archive(camera);
+  return camera;
+}
+
 std::vector<std::byte> to_bytes(const Scene& scene) {
-  VectorSink sink;
-  save(scene, sink, true);
-  return std::move(sink.bytes);
+  return bytes_of([&](cereal::BinaryOutputArchive& archive) {
+    archive(scene.node_names, scene.environment_note, scene.parts, const_cast<Scene&>(scene));
+    archive(static_cast<std::uint64_t>(scene.meshes.size()));
+    for (const Mesh& mesh : scene.meshes) save_mesh(mesh, archive);
+    const auto extended = [](const Material& material) { return material.extensions != nullptr; };
+    archive(static_cast<std::uint64_t>(std::ranges::count_if(scene.materials, extended)));
+    save_extensions(scene, archive);
+  });
 }
 
 Scene scene_from_bytes(std::span<const std::byte> bytes) {
@@ -208,15 +297,25 @@ Scene scene_from_bytes(std::span<const std::byte> bytes) {
   std::istream stream(&source);
   cereal::BinaryInputArchive archive(stream);
   Scene scene;
-  archive(scene.node_names, scene.environment_note, scene);
+  std::uint64_t meshes = 0;
+  archive(scene.node_names, scene.environment_note, scene.parts, scene, meshes);
+  scene.meshes.resize(meshes);
+  for (Mesh& mesh : scene.meshes) load_mesh(mesh, archive);
   load_extensions(scene, archive);
   return scene;
 }
 
+std::uint64_t content_hash(const Mesh& mesh) {
+  if (mesh.partial) return mesh.partial->content;
+  return hash_of([&](cereal::BinaryOutputArchive& archive) { archive(const_cast<Mesh&>(mesh)); });
+}
+
 std::uint64_t content_hash(const Scene& scene) {
-  HashSink sink;
-  save(scene, sink, false);
-  return sink.hash.value();
+  return hash_of([&](cereal::BinaryOutputArchive& archive) {
+    for (const Mesh& mesh : scene.meshes) archive(content_hash(mesh));
+    archive(const_cast<Scene&>(scene));
+    save_extensions(scene, archive);
+  });
 }
 
 }  // namespace hpr

@@ -180,48 +180,78 @@ glm::dvec3 side_to_see(const glm::dvec3& extent) {
   return {0.35, 0.25, 1.0};
 }
 
-/// `add_points` gives the framing every point to be seen.
-template <typename AddPoints>
-Camera frame_points(const Bounds& bounds, AddPoints add_points) {
-  constexpr double kFov = 40.0 * std::numbers::pi / 180.0;
-  constexpr double kMargin = 1.05;
-  const glm::dvec3 extent = bounds.high - bounds.low;
-  const bool finite = std::isfinite(glm::length(extent));
-  const glm::dvec3 from = glm::normalize(side_to_see(finite ? extent : glm::dvec3(1.0)));
-  Camera camera = look_at(from, glm::dvec3(0.0), {0.0, 1.0, 0.0}, kFov);
-  Framing framing(camera.axes, std::tan(0.5 * kFov) / kMargin);
-  const glm::dvec3 center = 0.5 * (bounds.low + bounds.high);
-  if (finite) add_points(framing);
-  const glm::dvec3 eye = framing.eye();
-  // Else all is one point, or nothing.
-  const double size = glm::length(extent);
-  const bool stands_off = size > 0.0 && std::isfinite(glm::length(eye)) && glm::dot(eye - center, from) > 0.1 * size;
-  camera.eye = stands_off ? eye : center + from;
-  std::get<PerspectiveLens>(camera.lens).at_distance = 0.0;  // the whole scene, which is in the bounds
-  camera.name = "framing";
-  return camera;
-}
+/// A camera that is to see some points inside of a box.
+class PointsFraming {
+ public:
+  explicit PointsFraming(const Bounds& bounds)
+      : extent_(bounds.high - bounds.low),
+        center_(0.5 * (bounds.low + bounds.high)),
+        is_finite_(std::isfinite(glm::length(extent_))),
+        from_(glm::normalize(side_to_see(is_finite_ ? extent_ : glm::dvec3(1.0)))),
+        camera_(look_at(from_, glm::dvec3(0.0), {0.0, 1.0, 0.0}, kFov)),
+        framing_(camera_.axes, std::tan(0.5 * kFov) / kMargin) {}
+
+  void add(const glm::dvec3& point) {
+    if (is_finite_) framing_.add(point);
+  }
+
+  [[nodiscard]] Camera camera() const {
+    Camera camera = camera_;
+    const glm::dvec3 eye = framing_.eye();
+    // Else all is one point, or nothing.
+    const double size = glm::length(extent_);
+    const bool stands_off =
+        size > 0.0 && std::isfinite(glm::length(eye)) && glm::dot(eye - center_, from_) > 0.1 * size;
+    camera.eye = stands_off ? eye : center_ + from_;
+    std::get<PerspectiveLens>(camera.lens).at_distance = 0.0;  // the whole scene, which is in the bounds
+    camera.name = "framing";
+    return camera;
+  }
+
+ private:
+  static constexpr double kFov = 40.0 * std::numbers::pi / 180.0;
+  static constexpr double kMargin = 1.05;
+
+  glm::dvec3 extent_;
+  glm::dvec3 center_;
+  bool is_finite_;
+  glm::dvec3 from_;
+  Camera camera_;
+  Framing framing_;
+};
 
 }  // namespace
 
+struct SceneFraming::Impl {
+  PointsFraming framing;
+};
+
+SceneFraming::SceneFraming(const Bounds& bounds) : impl_(std::make_unique<Impl>(PointsFraming(bounds))) {}
+SceneFraming::~SceneFraming() = default;
+
+void SceneFraming::add(const Instance& instance, const Mesh& whole) {
+  const glm::dmat4x3 to_world(instance.to_world);
+  for (const glm::vec3& position : whole.positions) impl_->framing.add(to_world * glm::dvec4(position, 1.0));
+}
+
+Camera SceneFraming::camera() const {
+  return impl_->framing.camera();
+}
+
 Camera framing_camera(const Bounds& bounds) {
-  return frame_points(bounds, [&](Framing& framing) {
-    for (int corner = 0; corner < 8; ++corner) {
-      framing.add({(corner & 1) != 0 ? bounds.high.x : bounds.low.x, (corner & 2) != 0 ? bounds.high.y : bounds.low.y,
-                   (corner & 4) != 0 ? bounds.high.z : bounds.low.z});
-    }
-  });
+  PointsFraming framing(bounds);
+  for (int corner = 0; corner < 8; ++corner) {
+    framing.add({(corner & 1) != 0 ? bounds.high.x : bounds.low.x, (corner & 2) != 0 ? bounds.high.y : bounds.low.y,
+                 (corner & 4) != 0 ? bounds.high.z : bounds.low.z});
+  }
+  return framing.camera();
 }
 
 Camera framing_camera(const Scene& scene) {
-  return frame_points(scene.bounds, [&](Framing& framing) {
-    for (const Instance& instance : scene.instances) {
-      const glm::dmat4x3 to_world(instance.to_world);
-      for (const glm::vec3& position : scene.mesh_of(instance).positions) {
-        framing.add(to_world * glm::dvec4(position, 1.0));
-      }
-    }
-  });
+  if (scene.framing) return *scene.framing;
+  SceneFraming framing(scene.bounds);
+  for (const Instance& instance : scene.instances) framing.add(instance, scene.mesh_of(instance));
+  return framing.camera();
 }
 
 std::vector<View> split_into_blocks(const View& view, int limit) {

@@ -5,6 +5,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -83,6 +84,22 @@ void tighten(View& view, const Bounds& bounds);
 [[nodiscard]] Camera framing_camera(const Bounds& bounds);
 /// A camera as framing_camera of the bounds, but as near as the surfaces themselves allow.
 [[nodiscard]] Camera framing_camera(const Scene& scene);
+
+/// Finds the framing_camera of a scene with these bounds, instance by instance.
+class SceneFraming {
+ public:
+  explicit SceneFraming(const Bounds& bounds);
+  ~SceneFraming();
+  SceneFraming(const SceneFraming&) = delete;
+  SceneFraming& operator=(const SceneFraming&) = delete;
+
+  void add(const Instance& instance, const Mesh& whole);
+  [[nodiscard]] Camera camera() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 /// A perspective camera at `eye` that looks at `at`. Throws Error (Usage) when they coincide or `up` is parallel.
 [[nodiscard]] Camera look_at(const glm::dvec3& eye, const glm::dvec3& at, const glm::dvec3& up,

@@ -9,6 +9,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "rt/passes/pass_list.h"
+#include "scene/flatten.h"
 #include "scene/generators/generators.h"
 #include "scene/gltf/gltf.h"
 #include "scene/load_scene.h"
@@ -158,6 +159,7 @@ class SceneMakeCommand final : public Command {
     options.option("NAME", source_, "one of `hpr scene list`, also as NAME?key=value").required();
     options.option("--triangles", triangles_, "about this many, the nearest size the generator has")
         .range(std::uint64_t{1}, std::uint64_t{4'294'967'294});
+    options.flag("--flatten", flatten_, "a mesh of its own for every instance, in world coordinates");
     options.option("-o", output_, "the .glb file").required();
   }
 
@@ -185,7 +187,8 @@ class SceneMakeCommand final : public Command {
       log::warning("{} has nothing random; --seed changes nothing", generator.name);
     }
     check_writable(output_, globals.force);
-    const Scene scene = generate_scene(text);
+    Scene scene = generate_scene(text);
+    if (flatten_) scene = flattened(scene);
     if (scene.background != Rgb{}) log::warning("glTF has no backgrounds; that of gen:{} is left out", text);
     const std::vector<std::byte> file = encode_glb(scene);
     write_file_atomically(output_, file);
@@ -197,6 +200,7 @@ class SceneMakeCommand final : public Command {
   std::string source_;
   std::string output_;
   std::uint64_t triangles_ = 0;
+  bool flatten_ = false;
 };
 
 class SceneListCommand final : public Command {

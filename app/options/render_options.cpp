@@ -40,12 +40,12 @@ void ReportOptions::declare(const OptionSet& options) {
   options.option("--stats", stats, "write what the frame took as JSON").type("FILE.json");
 }
 
-Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals, Size size) {
+LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals, Size size) {
   return load_scene(source, settings, globals, first_view(settings, size));
 }
 
-Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
-                 const FirstView& view) {
+LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
+                       const FirstView& view) {
   return load_scene(source, settings, globals.scene_limits(), globals.picture_limits(), view);
 }
 

@@ -27,9 +27,9 @@ struct ReportOptions {
 
 /// Loads a scene lit as the settings say, within the limits of the program's options, to be seen first in a picture of
 /// this size or in this view. Throws Error as load_scene does.
-[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
-                               Size size = kDefaultPictureSize);
-[[nodiscard]] Scene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
-                               const FirstView& view);
+[[nodiscard]] LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
+                                     Size size = kDefaultPictureSize);
+[[nodiscard]] LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
+                                     const FirstView& view);
 
 }  // namespace hpr

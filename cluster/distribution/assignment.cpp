@@ -54,23 +54,22 @@ struct Chunk {
   glm::dvec3 center;
 };
 
+/// Of triangles [first, last) of a mesh that may be known by its chunks alone.
+Bounds chunk_bounds(const Mesh& mesh, std::uint32_t first, std::uint32_t last) {
+  if (!mesh.partial) return bounds_of(mesh, std::span(mesh.triangles).subspan(first, last - first));
+  HPR_CHECK(first % kPartChunk == 0 && last - first <= kPartChunk);
+  return mesh.partial->chunks.at(first / kPartChunk);
+}
+
 std::vector<Chunk> make_chunks(const Scene& scene, std::uint32_t most) {
   std::vector<Chunk> chunks;
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
-    const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+    const std::uint32_t count = mesh.triangle_count();
     for (std::uint32_t first = 0, last = 0; first < count; first = last) {
       last = first + std::min(most, count - first);
-      glm::dvec3 low(mesh.positions[mesh.triangles[first].x]);
-      glm::dvec3 high = low;
-      for (std::uint32_t t = first; t < last; ++t) {
-        for (int corner = 0; corner < 3; ++corner) {
-          const glm::dvec3 p(mesh.positions[mesh.triangles[t][corner]]);
-          low = glm::min(low, p);
-          high = glm::max(high, p);
-        }
-      }
-      const glm::dvec3 center(instance.to_world * glm::dvec4(0.5 * (low + high), 1.0));
+      const Bounds box = chunk_bounds(mesh, first, last);
+      const glm::dvec3 center(instance.to_world * glm::dvec4(0.5 * (box.low + box.high), 1.0));
       chunks.push_back({{instance.first_surface + first, instance.first_surface + last}, center});
     }
   }
@@ -159,6 +158,10 @@ std::vector<std::vector<ScreenRect>> assign_tiles(const FrameLayout& layout, con
 
 std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts, std::uint32_t chunk) {
   HPR_CHECK(parts > 0 && chunk > 0);
+  if (!scene.parts.empty()) {
+    HPR_CHECK(scene.parts.size() == static_cast<std::size_t>(parts));
+    return scene.parts;
+  }
   std::vector<std::vector<SurfaceRange>> partition(static_cast<std::size_t>(parts));
   std::vector<Chunk> chunks = make_chunks(scene, chunk);
   partition_recursively(chunks, partition);

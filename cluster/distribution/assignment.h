@@ -38,9 +38,9 @@ struct ScreenRect {
 
 /// The triangles of a scene cut into `parts` shares, balanced by triangle count to one chunk and spatially coherent:
 /// chunks of at most `chunk` neighbouring triangles are halved recursively about the longest axis of their centres.
-/// Ranges of a share ascend. The same on every rank.
+/// Ranges of a share ascend. The same on every rank. Of a scene that is shared out, its own parts.
 [[nodiscard]] std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts,
-                                                                       std::uint32_t chunk = 512);
+                                                                       std::uint32_t chunk = kPartChunk);
 
 /// Which ranks form which group: contiguous, sizes differing by one at most.
 [[nodiscard]] std::vector<std::vector<int>> make_groups(int ranks, int groups);

@@ -2,15 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <memory>
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <string>
 
+#include "cluster/distribution/assignment.h"
 #include "cluster/transport/communicator_wrappers.h"
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/test_communicator.h"
 #include "core/error.h"
+#include "scene/partial_mesh.h"
+#include "scene/view.h"
 
 namespace hpr {
 namespace {
@@ -101,6 +107,131 @@ TEST(DistributeScene, ARankThatHoldsAnotherSceneIsNamedOnEveryRank) {
     }
   });
   EXPECT_EQ(thrown, 4);
+}
+
+/// A grid of quads; `vertices` of it along a side.
+Mesh grid(std::uint32_t vertices, float z) {
+  Mesh mesh;
+  mesh.name = "grid";
+  for (std::uint32_t y = 0; y < vertices; ++y) {
+    for (std::uint32_t x = 0; x < vertices; ++x) {
+      mesh.positions.emplace_back(static_cast<float>(x), static_cast<float>(y), z);
+      mesh.normals.emplace_back(0.0F, 0.0F, 1.0F);
+      if (x + 1 == vertices || y + 1 == vertices) continue;
+      const std::uint32_t at = y * vertices + x;
+      mesh.triangles.insert(mesh.triangles.end(),
+                            {{at, at + 1, at + vertices}, {at + 1, at + vertices + 1, at + vertices}});
+    }
+  }
+  return mesh;
+}
+
+/// A large mesh, one that two instances share, and a light.
+Scene large_scene() {
+  Scene scene;
+  scene.materials.resize(2);
+  scene.materials[1].emissive = glm::vec3(1.0F);
+  scene.meshes = {grid(60, 0.0F), grid(40, 5.0F), grid(2, 9.0F)};
+  scene.meshes[2].material = 1;
+  scene.instances.resize(4);
+  scene.instances[1].mesh = 1;
+  scene.instances[2].mesh = 1;
+  scene.instances[2].to_world[3].x = 100.0;
+  scene.instances[3].mesh = 2;
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(DistributeScene, RanksHoldPartsThatAreTheWholeTogether) {
+  const Scene whole = large_scene();
+  for (int size = 2; size <= 5; ++size) {
+    std::mutex mutex;
+    std::vector<int> holders(whole.triangles, 0);
+    std::uint64_t held = 0;
+    run_local_ranks(size, [&](Communicator& comm) {
+      const Scene scene = distribute_scene(comm, [&] {
+        LoadedScene loaded(large_scene());
+        loaded.in_parts = true;
+        return loaded;
+      });
+      EXPECT_EQ(content_hash(scene), content_hash(whole));
+      EXPECT_EQ(whole_memory_of(scene), memory_of(whole));
+      EXPECT_EQ(scene.triangles, whole.triangles);
+      EXPECT_EQ(scene.parts, partition_objects(whole, size));
+      ASSERT_TRUE(scene.framing.has_value());
+      EXPECT_EQ(scene.framing->eye, framing_camera(whole).eye);
+      EXPECT_FALSE(scene.meshes[2].partial);  // all ranks see its light
+      const std::lock_guard lock(mutex);
+      for (const SurfaceRange& range : scene.parts.at(static_cast<std::size_t>(comm.rank()))) {
+        for (std::uint32_t id = range.first; id < range.last; ++id) {
+          ++holders[id];
+          const SurfaceLocation at = locate_surface(scene, id);
+          const Mesh& mine = scene.mesh_of(scene.instances[at.instance]);
+          const Mesh& theirs = whole.mesh_of(whole.instances[at.instance]);
+          ASSERT_TRUE(mine.holds(at.triangle));
+          for (int corner = 0; corner < 3; ++corner) {
+            ASSERT_EQ(mine.positions[mine.triangle(at.triangle)[corner]],
+                      theirs.positions[theirs.triangles[at.triangle][corner]]);
+          }
+        }
+      }
+      held += memory_of(scene);
+    });
+    EXPECT_EQ(std::ranges::count(holders, 1), whole.triangles) << size;
+    // Vertices at borders and the mesh that two instances share are there more than once.
+    EXPECT_LT(held, memory_of(whole) * 8 / 5) << size;
+  }
+}
+
+TEST(DistributeScene, OneRankHoldsAllOfASceneThatWasReadInParts) {
+  run_local_ranks(1, [&](Communicator& comm) {
+    const Scene scene = distribute_scene(comm, [&] {
+      LoadedScene loaded(large_scene());
+      loaded.in_parts = true;
+      const auto whole = std::make_shared<Scene>(loaded.scene);
+      for (Mesh& mesh : loaded.scene.meshes) mesh = without_triangles(mesh);
+      loaded.whole_mesh = [whole](std::uint32_t mesh) { return whole->meshes.at(mesh); };
+      return loaded;
+    });
+    EXPECT_FALSE(is_shared_out(scene));
+    EXPECT_EQ(to_bytes(scene), to_bytes(large_scene()));
+  });
+}
+
+TEST(DistributeScene, PartsThatNoRankMayHoldAreRefusedWithTheRanksThatCould) {
+  const std::uint64_t bytes = memory_of(large_scene());
+  const auto load = [&](std::uint64_t limit) {
+    LoadedScene loaded(large_scene());
+    loaded.in_parts = true;
+    loaded.memory_limit = limit;
+    return loaded;
+  };
+  std::atomic<int> refused = 0;
+  run_local_ranks(2, [&](Communicator& comm) {
+    try {
+      (void)distribute_scene(comm, [&] { return load(bytes / 3); });
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::Limit);
+      EXPECT_EQ(error.hint(), "use at least 4 ranks, or raise --limit-mem");
+      ++refused;
+    }
+  });
+  EXPECT_EQ(refused, 2);
+  run_local_ranks(4, [&](Communicator& comm) {
+    EXPECT_LT(memory_of(distribute_scene(comm, [&] { return load(bytes / 3); })), bytes / 2);
+  });
+}
+
+TEST(DistributeScene, AMeshThatCannotBeReadAgainIsAnErrorOnEveryRank) {
+  expect_error_on_all(3, ExitCode::Io, "gone", [&](Communicator& comm) {
+    (void)distribute_scene(comm, [&] {
+      LoadedScene loaded(large_scene());
+      loaded.in_parts = true;
+      for (Mesh& mesh : loaded.scene.meshes) mesh = without_triangles(mesh);
+      loaded.whole_mesh = [](std::uint32_t) -> Mesh { throw Error(ExitCode::Io, "gone"); };
+      return loaded;
+    });
+  });
 }
 
 }  // namespace

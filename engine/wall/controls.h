@@ -7,6 +7,7 @@
 
 #include "engine/wall/command_table.h"
 #include "engine/wall/scene_edits.h"
+#include "scene/load_scene.h"
 
 namespace hpr {
 
@@ -15,7 +16,7 @@ struct RenderSettings;
 struct Scene;
 
 /// Loads a scene and lights it as the settings say.
-using SceneLoader = std::function<Scene(const std::string& source, const RenderSettings& settings)>;
+using SceneLoader = std::function<LoadedScene(const std::string& source, const RenderSettings& settings)>;
 
 /// What can be changed about a resident scene and how it is drawn, by the same commands wherever they come from. Every
 /// rank has one and runs the same lines: a change travels as its command, not as the scene.

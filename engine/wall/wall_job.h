@@ -43,7 +43,7 @@ struct WallJob {
   std::uint64_t seed = 1;
   ImageLimits picture_limits = {};
   /// Loads a scene and lights it as the settings say.
-  std::function<Scene(const std::string& source, const RenderSettings& settings)> load = {};
+  std::function<LoadedScene(const std::string& source, const RenderSettings& settings)> load = {};
 
   const DisplayKind* display = nullptr;  ///< not null; that of displays outside the job shows nothing here
   DisplayOptions display_options = {};

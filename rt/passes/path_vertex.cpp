@@ -37,6 +37,7 @@ class PrimaryVertices {
 
  private:
   void find_surfaces() {
+    if (context_.surfaces.are_shared_out()) fetch_all();
     if (context_.rays != nullptr && context_.rays->has_alpha_tested()) trace_alpha_tested();
     const std::optional<glm::dvec3> even = context_.even_background();
     prefetch(rows_.first);
@@ -62,6 +63,18 @@ class PrimaryVertices {
     PathVertex& point = points_.emplace_back();
     point.surface = context_.surfaces.meet(triangle, ray.origin, ray.direction);
     start_vertex(context_, job_, x, y, fraction, point);
+  }
+
+  /// At once, as each request is a round of messages.
+  void fetch_all() const {
+    std::vector<std::uint32_t> ids;
+    for (int y = rows_.first; y < rows_.end; ++y) {
+      for (int x = 0; x < job_.rect.width(); ++x) {
+        const Key key = job_.keys[static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x)];
+        if (key != kNoKey) ids.push_back(key_surface(key));
+      }
+    }
+    context_.surfaces.prefetch(ids);
   }
 
   void prefetch(int y) const {

@@ -517,13 +517,13 @@ void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const 
 }
 
 PathTracer::PathTracer(const Scene& scene, const CoverageTraversal& rays, const LightSampler& lights,
-                       PathSettings settings)
+                       PathSettings settings, RayForwarding* others)
     : state_(std::make_unique<State>(
           PathScene{.scene = scene,
                     .rays = rays,
                     .lights = lights,
                     .space = RaySpace(scene.bounds),
-                    .surfaces = Surfaces(scene, RaySpace(scene.bounds)),
+                    .surfaces = Surfaces(scene, RaySpace(scene.bounds), true, others),
                     .settings = settings,
                     .has_single_sided = !std::ranges::all_of(scene.materials, shows_both_sides)})) {}
 PathTracer::~PathTracer() = default;

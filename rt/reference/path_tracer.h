@@ -73,7 +73,8 @@ struct PathOutput {
 class PathTracer {
  public:
   /// `rays` goes through `scene` in RaySpace(scene.bounds). All must outlive this.
-  PathTracer(const Scene& scene, const CoverageTraversal& rays, const LightSampler& lights, PathSettings settings);
+  PathTracer(const Scene& scene, const CoverageTraversal& rays, const LightSampler& lights, PathSettings settings,
+             RayForwarding* others = nullptr);
   ~PathTracer();
   PathTracer(const PathTracer&) = delete;
   PathTracer& operator=(const PathTracer&) = delete;

@@ -124,6 +124,7 @@ void CoverageTraversal::visit_alpha_tested(std::span<const RayRequest> rays, Tra
     push_waiting(layered, scratch);
     scratch.surfaces.resize(scratch.waiting.size());
     (void)alpha_tested_->closest(scratch.batch, scratch.met, scratch.surfaces);
+    surfaces_.prefetch(scratch.surfaces);
     std::size_t left = 0;
     for (std::size_t i = 0; i < scratch.waiting.size(); ++i) {
       if (add_layer(i, layered, scratch, triangle, visit)) scratch.waiting[left++] = scratch.waiting[i];

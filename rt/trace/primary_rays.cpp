@@ -34,7 +34,7 @@ PlacedKey key_along(const Scene& scene, const RaySpace& space, const View& view,
                     const RayGeometry& geometry, std::uint32_t primitive) {
   const Instance& instance = scene.instances[geometry.instance];
   const Mesh& mesh = scene.mesh_of(instance);
-  const glm::uvec3& corners = mesh.triangles[geometry.first_triangle + primitive];
+  const glm::uvec3& corners = mesh.triangle(geometry.first_triangle + primitive);
   // Edges as differences of the mesh's own coordinates, and all of it relative to the eye: far places cost no digits.
   const glm::dmat3 linear(instance.to_world);
   const glm::dvec3 p0(mesh.positions[corners.x]);
@@ -115,7 +115,7 @@ double largest_depth_step(const View& view, const RaySpace& space) {
 const glm::uvec3& corners_of(const Search& search, std::size_t lane) {
   const RayGeometry& geometry = search.geometry[lane];
   const Mesh& mesh = search.scene->mesh_of(search.scene->instances[geometry.instance]);
-  return mesh.triangles[geometry.first_triangle + search.primitive[lane]];
+  return mesh.triangle(geometry.first_triangle + search.primitive[lane]);
 }
 
 /// The key of a triangle at a lane's pixel; kNoKey where it lies before the near plane, past the far one, or not at

@@ -41,7 +41,7 @@ RayBox box_of(const Scene& scene, const RaySpace& space, const InstanceRange& pa
   RayBox box = empty_box();
   for (std::uint32_t i = part.range.first; i < part.range.last; ++i) {
     for (int corner = 0; corner < 3; ++corner) {
-      const glm::dvec3 position = space.from_world(world_position(instance, mesh.positions[mesh.triangles[i][corner]]));
+      const glm::dvec3 position = space.from_world(world_position(instance, mesh.positions[mesh.triangle(i)[corner]]));
       const std::array<float, 3> at{static_cast<float>(position.x), static_cast<float>(position.y),
                                     static_cast<float>(position.z)};
       widen(box, {at, at});
@@ -121,13 +121,18 @@ std::vector<std::vector<std::byte>> swap_messages(Communicator& comm, std::vecto
   return received;
 }
 
-std::size_t bytes_of_ray(const RayForwarding::Kind& kind) {
+using Ask = RayForwarding::Ask;
+
+/// A ray, or a surface's id.
+std::size_t bytes_of_question(const RayForwarding::Kind& kind) {
+  if (kind.ask == Ask::Triangles) return sizeof(std::uint32_t);
   return sizeof(RayBatch::Ray) + (kind.has_passed != 0 ? sizeof(Passed) : 0);
 }
 
 /// A bit for every shadow ray, what it met for every other one.
 std::size_t bytes_of_answers(const RayForwarding::Kind& kind) {
-  return kind.shadows != 0 ? (kind.count + 7) / 8 : kind.count * sizeof(Passed);
+  if (kind.ask == Ask::Shadow) return (kind.count + 7) / 8;
+  return kind.count * (kind.ask == Ask::Triangles ? sizeof(TriangleRecord) : sizeof(Passed));
 }
 
 }  // namespace
@@ -135,11 +140,13 @@ std::size_t bytes_of_answers(const RayForwarding::Kind& kind) {
 /// The query of one thread: the ranks each of its rays is sent to, and the answers so far.
 struct RayForwarding::Query {
   Kind kind;
-  const RayBatch& rays;
-  std::span<Passed> passed;         ///< of rays that look for the closest; none: they have passed nothing
-  std::span<std::uint8_t> blocked;  ///< of shadow rays
-  std::vector<Passed> met = {};     ///< by rays that look for the closest
-  std::vector<std::vector<std::uint32_t>> to = {};  ///< per rank the rays that go there
+  const RayBatch* rays = nullptr;
+  std::span<Passed> passed = {};                    ///< of rays that look for the closest; none: they passed nothing
+  std::span<std::uint8_t> blocked = {};             ///< of shadow rays
+  std::vector<Passed> met = {};                     ///< by rays that look for the closest
+  std::span<const std::uint32_t> surfaces = {};     ///< whose triangles are asked for
+  std::vector<TriangleRecord> records = {};         ///< of those
+  std::vector<std::vector<std::uint32_t>> to = {};  ///< per rank the rays or surfaces that go there
 };
 
 /// One call of for_each().
@@ -166,19 +173,23 @@ struct RayForwarding::Run {
   }
 };
 
-/// Rays of one query that came from one rank, as they lie in its message, and where in the answer theirs stand.
+/// Rays or surfaces of one query that came from one rank, as they lie in its message, and where in the answer theirs
+/// stand.
 struct RayForwarding::QueryBlock {
   Kind kind;
-  const std::byte* rays = nullptr;
+  const std::byte* questions = nullptr;
   std::byte* answers = nullptr;
 };
 
 RayForwarding::RayForwarding(Communicator& comm, const Scene& scene, const RaySpace& space,
                              std::span<const SurfaceRange> part)
-    : comm_(comm) {
+    : comm_(comm), scene_(scene) {
   const std::vector<RayBox> mine = enclosing_boxes(scene, space, part);
   boxes_ = all_gather_lists(comm, std::span(mine));
   for (const std::vector<RayBox>& boxes : boxes_) bounds_.push_back(enclosing_box(boxes));
+  if (!is_shared_out(scene)) return;
+  const std::vector<SurfaceRange> own = merged_ranges({part.begin(), part.end()}, scene.triangles);
+  owners_ = SurfaceOwners(all_gather_lists(comm, std::span(own)));
 }
 
 std::uint32_t RayForwarding::add(const RayScene& part) {
@@ -187,7 +198,7 @@ std::uint32_t RayForwarding::add(const RayScene& part) {
 }
 
 std::uint64_t RayForwarding::occluded(std::uint32_t part, const RayBatch& rays, std::span<std::uint8_t> blocked) {
-  Query query{.kind = {.part = part, .shadows = 1}, .rays = rays, .passed = {}, .blocked = blocked};
+  Query query{.kind = {.part = part, .ask = Ask::Shadow}, .rays = &rays, .blocked = blocked};
   const std::uint64_t invalid = parts_.at(part)->occluded_local(rays, blocked);
   route(query);
   wait_for_answers(query);
@@ -197,7 +208,7 @@ std::uint64_t RayForwarding::occluded(std::uint32_t part, const RayBatch& rays, 
 std::uint64_t RayForwarding::closest(std::uint32_t part, const RayBatch& rays, std::span<Passed> passed,
                                      std::span<std::uint32_t> surfaces) {
   const auto has_passed = static_cast<std::uint16_t>(passed.empty() ? 0 : 1);
-  Query query{.kind = {.part = part, .has_passed = has_passed}, .rays = rays, .passed = passed, .blocked = {}};
+  Query query{.kind = {.part = part, .has_passed = has_passed}, .rays = &rays, .passed = passed};
   query.met.assign(passed.begin(), passed.end());
   query.met.resize(rays.size());
   const std::uint64_t invalid = parts_.at(part)->closest_local(rays, query.met, surfaces);
@@ -208,15 +219,49 @@ std::uint64_t RayForwarding::closest(std::uint32_t part, const RayBatch& rays, s
   return invalid;
 }
 
+bool RayForwarding::is_here(std::uint32_t surface) const {
+  const SurfaceLocation location = locate_surface(scene_, surface);
+  return scene_.mesh_of(scene_.instances[location.instance]).holds(location.triangle);
+}
+
+std::shared_ptr<const Mesh> RayForwarding::triangle(std::uint32_t id) {
+  for (;;) {
+    if (auto known = triangles_.find(id)) return known;
+    fetch_triangles(std::span(&id, 1));
+  }
+}
+
+void RayForwarding::fetch_triangles(std::span<const std::uint32_t> ids) {
+  if (owners_.is_empty()) return;
+  std::vector<std::uint32_t> missing(ids.begin(), ids.end());
+  std::ranges::sort(missing);
+  const auto repeated = std::ranges::unique(missing);
+  missing.erase(repeated.begin(), repeated.end());
+  std::erase_if(missing, [&](std::uint32_t id) { return id == kNoSurface || is_here(id) || triangles_.find(id); });
+  if (missing.empty()) return;
+  Query query{.kind = {.ask = Ask::Triangles}, .surfaces = missing};
+  query.records.resize(missing.size());
+  query.to.resize(boxes_.size());
+  for (std::uint32_t i = 0; i < missing.size(); ++i) {
+    query.to[static_cast<std::size_t>(owners_.rank_of(missing[i]))].push_back(i);
+  }
+  wait_for_answers(query);
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    const Instance& instance = scene_.instances[locate_surface(scene_, missing[i]).instance];
+    triangles_.add(missing[i], mesh_of(query.records[i], scene_.mesh_of(instance).material));
+  }
+}
+
 /// Finds the ranks that rays are sent to once their local hits are known.
 void RayForwarding::route(Query& query) const {
   // What lies at the distance of a hit may still come before it, by its id.
   constexpr float kBeyond = 1.0F + 1e-5F;
   query.to.resize(boxes_.size());
-  for (std::uint32_t i = 0; i < query.rays.size(); ++i) {
-    RayBatch::Ray ray = query.rays.ray(i);
-    if (!is_traceable(ray) || (query.kind.shadows != 0 && query.blocked[i] != 0)) continue;
-    if (query.kind.shadows == 0 && query.met[i].surface != kNoSurface) {
+  const bool is_shadow = query.kind.ask == Ask::Shadow;
+  for (std::uint32_t i = 0; i < query.rays->size(); ++i) {
+    RayBatch::Ray ray = query.rays->ray(i);
+    if (!is_traceable(ray) || (is_shadow && query.blocked[i] != 0)) continue;
+    if (!is_shadow && query.met[i].surface != kNoSurface) {
       ray.reach = std::min(ray.reach, query.met[i].distance * kBeyond);
     }
     const BoxedRay line(ray);
@@ -322,7 +367,7 @@ std::vector<std::vector<std::byte>> RayForwarding::pack(State mine) const {
     std::vector<std::byte>& message = messages[rank];
     std::size_t bytes = sizeof(MessageHeader);
     for (const Query* query : waiting_) {
-      if (!query->to[rank].empty()) bytes += sizeof(Kind) + query->to[rank].size() * bytes_of_ray(query->kind);
+      if (!query->to[rank].empty()) bytes += sizeof(Kind) + query->to[rank].size() * bytes_of_question(query->kind);
     }
     message.resize(bytes);
     std::byte* to = message.data();
@@ -337,7 +382,11 @@ std::vector<std::vector<std::byte>> RayForwarding::pack(State mine) const {
       kind.count = static_cast<std::uint32_t>(query->to[rank].size());
       put(kind);
       for (const std::uint32_t i : query->to[rank]) {
-        put(query->rays.ray(i));
+        if (kind.ask == Ask::Triangles) {
+          put(query->surfaces[i]);
+          continue;
+        }
+        put(query->rays->ray(i));
         if (kind.has_passed != 0) put(query->passed[i]);
       }
     }
@@ -361,8 +410,8 @@ void RayForwarding::unpack(std::span<const std::byte> message, std::vector<std::
   for (std::size_t at = sizeof(MessageHeader); at < message.size();) {
     QueryBlock block;
     std::memcpy(&block.kind, message.data() + at, sizeof(Kind));
-    block.rays = message.data() + at + sizeof(Kind);
-    at += sizeof(Kind) + block.kind.count * bytes_of_ray(block.kind);
+    block.questions = message.data() + at + sizeof(Kind);
+    at += sizeof(Kind) + block.kind.count * bytes_of_question(block.kind);
     HPR_CHECK(at <= message.size());
     bytes += bytes_of_answers(block.kind);
     blocks.push_back(block);
@@ -396,20 +445,31 @@ RayForwarding::State RayForwarding::round(State mine, int threads) {
   return all;
 }
 
+void RayForwarding::answer_triangles(const QueryBlock& block) const {
+  for (std::size_t i = 0; i < block.kind.count; ++i) {
+    std::uint32_t id = 0;
+    std::memcpy(&id, block.questions + i * sizeof(id), sizeof(id));
+    const TriangleRecord record = record_of(scene_, id);
+    std::memcpy(block.answers + i * sizeof(record), &record, sizeof(record));
+  }
+}
+
 void RayForwarding::answer(const QueryBlock& block) const {
+  if (block.kind.ask == Ask::Triangles) return answer_triangles(block);
   const DenormalsAsZero mode;
+  const bool is_shadow = block.kind.ask == Ask::Shadow;
   const RayScene& scene = *parts_.at(block.kind.part);
   const std::size_t count = block.kind.count;
   RayBatch batch;
-  std::vector<Passed> met(block.kind.shadows != 0 ? 0 : count);
-  const std::byte* from = block.rays;
-  for (std::size_t i = 0; i < count; ++i, from += bytes_of_ray(block.kind)) {
+  std::vector<Passed> met(is_shadow ? 0 : count);
+  const std::byte* from = block.questions;
+  for (std::size_t i = 0; i < count; ++i, from += bytes_of_question(block.kind)) {
     RayBatch::Ray ray;
     std::memcpy(&ray, from, sizeof(ray));
     batch.push(ray);
     if (block.kind.has_passed != 0) std::memcpy(&met[i], from + sizeof(ray), sizeof(Passed));
   }
-  if (block.kind.shadows != 0) {
+  if (is_shadow) {
     std::vector<std::uint8_t> blocked(count);
     (void)scene.occluded_local(batch, blocked);
     for (std::size_t i = 0; i < count; ++i) block.answers[i / 8] |= std::byte{blocked[i]} << (i % 8);
@@ -420,7 +480,7 @@ void RayForwarding::answer(const QueryBlock& block) const {
   std::memcpy(block.answers, met.data(), bytes_of_answers(block.kind));
 }
 
-/// Of one rank, in the order its rays were sent.
+/// Of one rank, in the order its questions were sent.
 void RayForwarding::store_answers(std::size_t rank, std::span<const std::byte> answers) const {
   (void)state_in(answers);
   const std::byte* from = answers.data() + sizeof(MessageHeader);
@@ -430,7 +490,11 @@ void RayForwarding::store_answers(std::size_t rank, std::span<const std::byte> a
     kind.count = static_cast<std::uint32_t>(sent.size());
     HPR_CHECK(from + bytes_of_answers(kind) <= answers.data() + answers.size());
     for (std::size_t i = 0; i < sent.size(); ++i) {
-      if (kind.shadows != 0) {
+      if (kind.ask == Ask::Triangles) {
+        std::memcpy(&query->records[sent[i]], from + i * sizeof(TriangleRecord), sizeof(TriangleRecord));
+        continue;
+      }
+      if (kind.ask == Ask::Shadow) {
         query->blocked[sent[i]] |= std::to_integer<std::uint8_t>(from[i / 8] >> (i % 8) & std::byte{1});
         continue;
       }

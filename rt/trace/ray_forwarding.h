@@ -13,6 +13,7 @@
 
 #include "cluster/transport/communicator.h"
 #include "rt/trace/ray_scene.h"
+#include "rt/trace/remote_triangles.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -62,13 +63,13 @@ struct BoxedRay {
 /// Forwards rays through a scene of which every rank's Embree holds a part: a ray is sent to the remote ranks whose
 /// boxes it meets before its local hit, and its remote hits come back. Two messages between any two ranks carry all
 /// rays of a round, of whatever kind and generation, and their answers: 28 bytes a ray, 40 where it may have passed
-/// surfaces; a bit back for a shadow ray, 12 bytes for others.
+/// surfaces; a bit back for a shadow ray, 12 bytes for others. Triangles that a rank does not hold come the same way.
 ///
 /// Answers have the bits of a scene that is whole: the nearest of all ranks' hits, the lowest id among equals.
 class RayForwarding {
  public:
   /// Collective. `part`: the surfaces that this rank holds, any ranges; the ranks' parts are the whole scene. `comm`
-  /// outlives this and is used by the threads that call the constructor and for_each() only.
+  /// and `scene` outlive this; `comm` is used by the threads that call the constructor and for_each() only.
   RayForwarding(Communicator& comm, const Scene& scene, const RaySpace& space, std::span<const SurfaceRange> part);
 
   /// This rank's part of something of which every rank holds one, in the same order on all. Returns its number.
@@ -86,12 +87,23 @@ class RayForwarding {
   std::uint64_t closest(std::uint32_t part, const RayBatch& rays, std::span<Passed> passed,
                         std::span<std::uint32_t> surfaces);
 
+  /// Surface `id`, of whatever rank's part, as a mesh of one triangle; from inside a body of for_each() only.
+  [[nodiscard]] std::shared_ptr<const Mesh> triangle(std::uint32_t id);
+  /// Gets those of some surfaces together, kNoSurface and those that are here left out, for calls of triangle() that
+  /// follow; from inside a body of for_each() only.
+  void fetch_triangles(std::span<const std::uint32_t> ids);
+
+  enum class Ask : std::uint16_t {
+    Closest,    ///< what rays meet first
+    Shadow,     ///< whether anything stands in their way
+    Triangles,  ///< what surfaces are
+  };
   /// The kind of a query, as messages encode it.
   struct Kind {
     std::uint32_t part = 0;
     std::uint32_t count = 0;
-    std::uint16_t shadows = 0;     ///< whether anything stands in their way; else what they meet first
-    std::uint16_t has_passed = 0;  ///< whether they say what they have passed
+    Ask ask = Ask::Closest;
+    std::uint16_t has_passed = 0;  ///< whether rays say what they have passed
   };
 
  private:
@@ -119,7 +131,13 @@ class RayForwarding {
   void store_answers(std::size_t rank, std::span<const std::byte> answers) const;
   void release(bool answered);
 
+  [[nodiscard]] bool is_here(std::uint32_t surface) const;
+  void answer_triangles(const QueryBlock& block) const;
+
   Communicator& comm_;
+  const Scene& scene_;
+  SurfaceOwners owners_;  ///< of surfaces, where ranks hold parts of meshes
+  RemoteTriangles triangles_;
   std::vector<std::vector<RayBox>> boxes_;  ///< [rank]
   std::vector<RayBox> bounds_;              ///< all of a rank's
   std::map<std::uint32_t, const RayScene*> parts_;

@@ -111,15 +111,15 @@ struct MeshPart {
   std::vector<std::uint32_t> part_index;  ///< of a mesh's vertex among those
 
   MeshPart(const Mesh& of, SurfaceRange triangles) : mesh(of), range(triangles) {
-    if (range.count() == mesh.triangles.size()) return;
+    if (range.count() == mesh.triangles.size()) return;  // all that is here
     constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
     part_index.assign(mesh.positions.size(), kNowhere);
     for (std::uint32_t i = range.first; i < range.last; ++i) {
       for (int corner = 0; corner < 3; ++corner) {
-        std::uint32_t& vertex = part_index[mesh.triangles[i][corner]];
+        std::uint32_t& vertex = part_index[mesh.triangle(i)[corner]];
         if (vertex != kNowhere) continue;
         vertex = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(mesh.triangles[i][corner]);
+        vertices.push_back(mesh.triangle(i)[corner]);
       }
     }
   }
@@ -130,7 +130,7 @@ struct MeshPart {
     return mesh.positions[vertices.empty() ? i : vertices[i]];
   }
   [[nodiscard]] glm::uvec3 triangle(std::uint32_t i) const {
-    const glm::uvec3& t = mesh.triangles[range.first + i];
+    const glm::uvec3& t = mesh.triangle(range.first + i);
     return vertices.empty() ? t : glm::uvec3(part_index[t.x], part_index[t.y], part_index[t.z]);
   }
 };

@@ -5,9 +5,11 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <map>
 #include <optional>
 #include <tuple>
 
+#include "core/error.h"
 #include "rt/trace/surfaces.h"
 
 namespace hpr {
@@ -110,8 +112,7 @@ void divide(const Corners& c, int divisions, Visit&& visit) {
   }
 }
 
-Corners corners_of(const Mesh& mesh, const Instance& instance, std::uint32_t triangle, const RaySpace& space) {
-  const glm::uvec3& t = mesh.triangles[triangle];
+Corners corners_of(const Mesh& mesh, const Instance& instance, const glm::uvec3& t, const RaySpace& space) {
   Corners corners;
   for (int i = 0; i < 3; ++i) {
     corners[static_cast<std::size_t>(i)] = space.from_world(world_position(instance, mesh.positions[t[i]]));
@@ -150,92 +151,136 @@ bool is_coarse(const Corners& c) {
   return rounding > kMinGain * kPlaneSteps * distance;
 }
 
-/// Of a mesh, in its own unit.
-double longest_edge(const Mesh& mesh) {
-  double longest = 0.0;
-  for (const glm::uvec3& t : mesh.triangles) {
-    longest = std::max(longest, longest_edge(Corners{glm::dvec3(mesh.positions[t.x]), glm::dvec3(mesh.positions[t.y]),
-                                                     glm::dvec3(mesh.positions[t.z])}));
-  }
-  return longest;
-}
-
 /// Which instances are refined, one after the other, while parts are left.
 class Refining {
  public:
-  Refining(const Scene& scene, const RaySpace& space)
-      : scene_(scene), space_(space), longest_edges_(scene.meshes.size(), -1.0) {}
+  Refining(const Scene& scene, const RaySpace& space) : scene_(scene), space_(space) {}
 
   /// `is_shared`: Embree would hold it as an instance of a mesh.
   bool refines(const Instance& instance, bool is_shared) {
     if (is_shared && !may_be_unshared(instance)) return false;
-    const std::optional<std::size_t> parts = parts_of(instance);
-    if (!parts) return false;
-    parts_left_ -= *parts;
+    const std::optional<Divided> divided =
+        find_divided(instance, {0, scene_.mesh_of(instance).triangle_count()}, parts_left_);
+    if (!divided || !divided->is_worth_it) return false;
+    const std::size_t parts = count_parts(*divided, parts_left_);
+    if (parts > parts_left_) return false;
+    parts_left_ -= parts;
     return true;
   }
 
+  /// What `range` of its mesh's triangles tells about an instance.
+  [[nodiscard]] RefinementCount count(std::uint32_t index, bool is_shared, const SurfaceRange& range) const {
+    RefinementCount counted{index};
+    const Instance& instance = scene_.instances[index];
+    if (is_shared && !may_be_unshared(instance)) return counted;
+    const std::optional<Divided> divided = find_divided(instance, range, kMaxParts);
+    counted.parts = divided ? count_parts(*divided, kMaxParts) : kMaxParts + 1;
+    counted.is_worth_it = divided && divided->is_worth_it ? 1 : 0;
+    return counted;
+  }
+
  private:
+  struct Divided {
+    std::vector<Corners> triangles;
+    bool is_worth_it = false;
+  };
+
   /// So that many small instances cost no look at each of their triangles.
-  bool may_be_unshared(const Instance& instance) {
+  [[nodiscard]] bool may_be_unshared(const Instance& instance) const {
     const Mesh& mesh = scene_.mesh_of(instance);
-    if (mesh.triangles.size() > kMaxUnshared) return false;
-    double& longest = longest_edges_[instance.mesh];
-    if (longest < 0.0) longest = longest_edge(mesh);
+    if (mesh.triangle_count() > kMaxUnshared) return false;
+    if (!longest_edges_.contains(instance.mesh)) longest_edges_[instance.mesh] = longest_edge(mesh);
     double stretch2 = 0.0;  // Frobenius
     for (int column = 0; column < 3; ++column) {
       const glm::dvec3 axis(instance.to_world[column]);
       stretch2 += glm::dot(axis, axis);
     }
-    return longest * std::sqrt(stretch2) * space_.scale >= kMinWide;
+    return longest_edges_[instance.mesh] * std::sqrt(stretch2) * space_.scale >= kMinWide;
   }
 
-  /// How many parts it has more than triangles; nothing where that is not worth it or too many.
-  [[nodiscard]] std::optional<std::size_t> parts_of(const Instance& instance) const {
+  /// The triangles that are divided; nothing where they are more than `most`.
+  [[nodiscard]] std::optional<Divided> find_divided(const Instance& instance, const SurfaceRange& range,
+                                                    std::size_t most) const {
     const Mesh& mesh = scene_.mesh_of(instance);
     const glm::dmat3 linear(instance.to_world);
     const glm::dvec3 origin = glm::inverse(linear) * (space_.origin - glm::dvec3(instance.to_world[3]));
     // In the mesh's own coordinates, which shrink lengths by up to the distortion against each other: most triangles
     // are far too small for their distance.
     const double reach = 2.0 * distortion(linear);
-    if (!std::isfinite(reach * largest(origin))) return std::nullopt;
-    std::vector<Corners> divided;
-    bool worth = false;
-    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-      const glm::uvec3& t = mesh.triangles[i];
+    Divided divided;
+    if (!std::isfinite(reach * largest(origin))) return divided;
+    for (std::uint32_t i = range.first; i < range.last; ++i) {
+      const glm::uvec3& t = mesh.triangle(i);
       const glm::dvec3 p0(mesh.positions[t.x]);
       const double size =
           std::max(largest(glm::dvec3(mesh.positions[t.y]) - p0), largest(glm::dvec3(mesh.positions[t.z]) - p0));
       if (!(largest(p0 - origin) < reach * size)) continue;
-      const Corners corners = corners_of(mesh, instance, i, space_);
+      const Corners corners = corners_of(mesh, instance, t, space_);
       if (!is_divided(corners)) continue;
-      if (divided.size() >= parts_left_) return std::nullopt;
-      divided.push_back(corners);
-      worth = worth || is_coarse(corners);
+      if (divided.triangles.size() >= most) return std::nullopt;
+      divided.triangles.push_back(corners);
+      divided.is_worth_it = divided.is_worth_it || is_coarse(corners);
     }
-    if (!worth) return std::nullopt;
+    return divided;
+  }
+
+  /// How many parts they have, or some number above `most`.
+  [[nodiscard]] static std::size_t count_parts(const Divided& divided, std::size_t most) {
     std::size_t parts = 0;
-    for (const Corners& corners : divided) {
+    for (const Corners& corners : divided.triangles) {
       divide(corners, kMaxDivisions, [&](const Corners& /*part*/) { ++parts; });
-      if (parts > parts_left_) return std::nullopt;
+      if (parts > most) break;
     }
     return parts;
   }
 
   const Scene& scene_;
   const RaySpace& space_;
-  std::vector<double> longest_edges_;  ///< by mesh; below 0: not yet computed
+  mutable std::map<std::uint32_t, double> longest_edges_;  ///< by mesh
   std::size_t parts_left_ = kMaxParts;
 };
 
 }  // namespace
 
 std::vector<std::uint8_t> refined_instances(const Scene& scene, const RaySpace& space) {
+  if (is_shared_out(scene)) {
+    HPR_CHECK(scene.refined.size() == scene.instances.size());
+    return scene.refined;
+  }
   const std::vector<std::uint8_t> shared = shared_instances(scene);
   std::vector<std::uint8_t> refined(shared.size(), 0);
   Refining refining(scene, space);
   for (std::size_t i = 0; i < refined.size(); ++i) {
     refined[i] = refining.refines(scene.instances[i], shared[i] != 0) ? 1 : 0;
+  }
+  return refined;
+}
+
+std::vector<RefinementCount> count_refined_parts(const Scene& scene, const RaySpace& space,
+                                                 std::span<const SurfaceRange> part) {
+  const std::vector<std::uint8_t> shared = shared_instances(scene);
+  const Refining refining(scene, space);
+  std::vector<RefinementCount> counts;
+  for (const InstanceRange& range :
+       split_by_instance(scene, merged_ranges({part.begin(), part.end()}, scene.triangles))) {
+    counts.push_back(refining.count(range.instance, shared[range.instance] != 0, range.range));
+    if (counts.back().parts == 0) counts.pop_back();
+  }
+  return counts;
+}
+
+std::vector<std::uint8_t> refined_by_counts(const Scene& scene, std::span<const RefinementCount> counts) {
+  std::vector<RefinementCount> sums(scene.instances.size());
+  for (const RefinementCount& count : counts) {
+    sums[count.instance].parts += count.parts;
+    sums[count.instance].is_worth_it += count.is_worth_it;
+  }
+  std::vector<std::uint8_t> refined(sums.size(), 0);
+  std::size_t parts_left = kMaxParts;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (sums[i].is_worth_it == 0 || sums[i].parts > parts_left) continue;
+    refined[i] = 1;
+    parts_left -= sums[i].parts;
   }
   return refined;
 }
@@ -281,7 +326,7 @@ RefinedTriangles refine(const Scene& scene, const Instance& instance, SurfaceRan
   const Mesh& mesh = scene.mesh_of(instance);
   RefinedTriangles refined;
   for (std::uint32_t i = triangles.first; i < triangles.last; ++i) {
-    const Corners whole = corners_of(mesh, instance, i, space);
+    const Corners whole = corners_of(mesh, instance, mesh.triangle(i), space);
     divide(whole, is_divided(whole) ? kMaxDivisions : 0, [&](const Corners& part) {
       refined.parts.push_back(part);
       refined.triangle_of.push_back(i - triangles.first);

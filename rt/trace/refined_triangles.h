@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "rt/trace/ray_scene.h"
@@ -23,6 +24,19 @@ namespace hpr {
 /// parts are left. They have triangles of their own, whatever shared_instances says. Depends on nothing but scene and
 /// space.
 [[nodiscard]] std::vector<std::uint8_t> refined_instances(const Scene& scene, const RaySpace& space);
+
+/// Where ranks hold parts of meshes, what one of them finds out about an instance: how many parts its triangles have
+/// that are divided, and how often that is worth it.
+struct RefinementCount {
+  std::uint32_t instance = 0;
+  std::uint32_t is_worth_it = 0;
+  std::uint64_t parts = 0;
+};
+/// Those of the surfaces of `part`, which are here.
+[[nodiscard]] std::vector<RefinementCount> count_refined_parts(const Scene& scene, const RaySpace& space,
+                                                               std::span<const SurfaceRange> part);
+/// refined_instances() by what all ranks counted, each of its own part.
+[[nodiscard]] std::vector<std::uint8_t> refined_by_counts(const Scene& scene, std::span<const RefinementCount> counts);
 
 /// Metres by which ray origins must leave a refined triangle at a place of it.
 [[nodiscard]] double refined_offset(const RaySpace& space, const glm::dvec3& position);

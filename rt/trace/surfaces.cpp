@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "rt/materials/material_point.h"
+#include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/refined_triangles.h"
 
@@ -132,13 +133,14 @@ void prefetch_vertex(const Mesh& mesh, std::uint32_t vertex) {
 
 }  // namespace
 
-Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts)
-    : scene_(scene), space_(space), lifts_(lifts) {
+Surfaces::Surfaces(const Scene& scene, const RaySpace& space, bool lifts, RayForwarding* others)
+    : scene_(scene), space_(space), lifts_(lifts), others_(is_shared_out(scene) ? others : nullptr) {
   std::vector<glm::dvec3> mesh_reach(scene.meshes.size(), glm::dvec3(0.0));
   parts_.resize(scene.meshes.size());
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     const Mesh& mesh = scene.meshes[i];
     if (scene.materials[mesh.material].alpha_mode == AlphaMode::Blend) parts_[i] = parts_of(mesh);
+    if (mesh.partial) mesh_reach[i] = mesh.partial->reach;
     for (const glm::vec3& p : mesh.positions) mesh_reach[i] = glm::max(mesh_reach[i], glm::abs(glm::dvec3(p)));
   }
   const std::vector<std::uint8_t> shared = shared_instances(scene);
@@ -163,7 +165,7 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
   HPR_CHECK(id < scene_.triangles);  // keys come from other ranks: a wrong one must not pass for a picture
   if (triangle.surface == id) return;
   const Instance* instance = &scene_.instances[triangle.instance];
-  if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangles.size()) {
+  if (id >= instance->first_surface && id - instance->first_surface < scene_.mesh_of(*instance).triangle_count()) {
     triangle.index = id - instance->first_surface;
   } else {
     const SurfaceLocation location = locate_surface(scene_, id);
@@ -172,9 +174,14 @@ void Surfaces::load(std::uint32_t id, WorldTriangle& triangle) const {
     instance = &scene_.instances[location.instance];
   }
   triangle.surface = id;
-  const Mesh& mesh = scene_.mesh_of(*instance);
+  if (triangle.remote) triangle.remote = nullptr;
+  if (!scene_.mesh_of(*instance).holds(triangle.index)) {
+    HPR_CHECK(others_ != nullptr);
+    triangle.remote = others_->triangle(id);
+  }
+  const Mesh& mesh = mesh_of(triangle);
   const Placed& placed = placed_[triangle.instance];
-  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  const glm::uvec3& corners = corners_of(mesh, triangle);
   triangle.v0 = world_position(*instance, mesh.positions[corners.x]);
   // Edges come from differences of the mesh's own coordinates: a far translation does not round them.
   const glm::dmat3 linear(instance->to_world);
@@ -209,8 +216,8 @@ double Surfaces::offset_of(const WorldTriangle& triangle) const {
 
 double Surfaces::coplanar_tolerance(const WorldTriangle& triangle, const SurfacePoint& point) const {
   const Instance& instance = scene_.instances[triangle.instance];
-  const Mesh& mesh = scene_.mesh_of(instance);
-  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  const Mesh& mesh = mesh_of(triangle);
+  const glm::uvec3& corners = corners_of(mesh, triangle);
   glm::dvec3 farthest(0.0);
   for (int corner = 0; corner < 3; ++corner) {
     farthest = glm::max(farthest, glm::abs(glm::dvec3(mesh.positions[corners[corner]])));
@@ -220,6 +227,7 @@ double Surfaces::coplanar_tolerance(const WorldTriangle& triangle, const Surface
 }
 
 void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
+  if (others_ != nullptr) others_->fetch_triangles(ids);
   constexpr std::size_t kAhead = 64;
   std::array<const Mesh*, kAhead> meshes;
   std::array<const glm::uvec3*, kAhead> corners;
@@ -229,12 +237,14 @@ void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
     for (const std::uint32_t id : ids.subspan(first, std::min(kAhead, ids.size() - first))) {
       if (id >= scene_.triangles) continue;
       const Instance* at = &scene_.instances[instance];
-      if (id < at->first_surface || id - at->first_surface >= scene_.mesh_of(*at).triangles.size()) {
+      if (id < at->first_surface || id - at->first_surface >= scene_.mesh_of(*at).triangle_count()) {
         instance = locate_surface(scene_, id).instance;
         at = &scene_.instances[instance];
       }
-      meshes[count] = &scene_.mesh_of(*at);
-      corners[count] = &meshes[count]->triangles[id - at->first_surface];
+      const Mesh& mesh = scene_.mesh_of(*at);
+      if (!mesh.holds(id - at->first_surface)) continue;
+      meshes[count] = &mesh;
+      corners[count] = &mesh.triangle(id - at->first_surface);
       __builtin_prefetch(corners[count++]);
     }
     for (std::size_t i = 0; i < count; ++i) {
@@ -303,8 +313,8 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   if (placed_[triangle.instance].is_refined)
     point.offset = std::min(point.offset, refined_offset(space_, point.position));
 
-  const Mesh& mesh = scene_.mesh_of(scene_.instances[triangle.instance]);
-  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  const Mesh& mesh = mesh_of(triangle);
+  const glm::uvec3& corners = corners_of(mesh, triangle);
   for (std::size_t set = 0; set < point.uv.size(); ++set) {
     const auto& uvs = mesh.uvs[set];
     if (uvs.empty()) continue;
@@ -335,8 +345,8 @@ void Surfaces::lift(const WorldTriangle& triangle, const Weights& weights, doubl
 
 void Surfaces::add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const {
   const Instance& instance = scene_.instances[triangle.instance];
-  const Mesh& mesh = scene_.mesh_of(instance);
-  const glm::uvec3& corners = mesh.triangles[triangle.index];
+  const Mesh& mesh = mesh_of(triangle);
+  const glm::uvec3& corners = corners_of(mesh, triangle);
   // Seen from behind, the mapped normal turns round as a whole.
   const double side = point.inside ? -1.0 : 1.0;
   const auto between = [&](const auto& of_vertices) {

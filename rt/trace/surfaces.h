@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,8 @@
 #include "scene/scene.h"
 
 namespace hpr {
+
+class RayForwarding;
 
 /// A triangle of the scene in world coordinates.
 struct WorldTriangle {
@@ -30,6 +33,8 @@ struct WorldTriangle {
   /// Metres by which ray origins must leave it, wherever they lie on it; of refined ones this is more than is needed,
   /// see refined_offset. Where they do asks for RaySpace::rounding_at.
   double offset = 0.0;
+  /// The mesh of it alone, where another rank holds it; null: the scene has it.
+  std::shared_ptr<const Mesh> remote;
 };
 
 /// Where a ray meets a surface, and all that shading needs of the place. World coordinates, metres.
@@ -71,13 +76,19 @@ struct SurfacePoint {
 /// Surface ids -> triangles -> points. Keeps per instance what every one of its triangles needs.
 class Surfaces {
  public:
-  /// The scene must outlive this. Without `lifts` points have none, for whoever sends no shadow rays.
-  Surfaces(const Scene& scene, const RaySpace& space, bool lifts = true);
+  /// The scene must outlive this. Without `lifts` points have none, for whoever sends no shadow rays. `others` gets the
+  /// triangles that are not here, where those are called for inside RayForwarding::for_each.
+  Surfaces(const Scene& scene, const RaySpace& space, bool lifts = true, RayForwarding* others = nullptr);
 
   /// Sets `triangle` to surface `id` unless it already is; neighbouring pixels mostly share theirs, or the instance.
+  /// Waits for one that another rank holds, unless prefetch() got it.
   void load(std::uint32_t id, WorldTriangle& triangle) const;
 
+  /// Whether other ranks hold some of the triangles.
+  [[nodiscard]] bool are_shared_out() const { return others_ != nullptr; }
+
   /// Asks the memory for the triangles of `ids`, kNoSurface left out, which will be loaded next: they lie far apart.
+  /// Waits for those that other ranks hold, all together.
   void prefetch(std::span<const std::uint32_t> ids) const;
 
   /// The point where the ray meets the triangle's plane, moved onto the triangle when it lies outside (a pixel's centre
@@ -93,6 +104,13 @@ class Surfaces {
   /// Barycentric coordinates of a triangle's corners.
   using Weights = std::array<double, 3>;
 
+  /// The mesh that has a loaded triangle, and its vertices there.
+  [[nodiscard]] const Mesh& mesh_of(const WorldTriangle& triangle) const {
+    return triangle.remote ? *triangle.remote : scene_.mesh_of(scene_.instances[triangle.instance]);
+  }
+  [[nodiscard]] static const glm::uvec3& corners_of(const Mesh& mesh, const WorldTriangle& triangle) {
+    return mesh.triangle(triangle.remote ? 0 : triangle.index);
+  }
   [[nodiscard]] std::uint8_t layer_of(const WorldTriangle& triangle, bool inside) const;
   [[nodiscard]] double offset_of(const WorldTriangle& triangle) const;
   static void lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point);
@@ -111,6 +129,7 @@ class Surfaces {
   const Scene& scene_;
   RaySpace space_;
   bool lifts_;
+  RayForwarding* others_;
   std::vector<Placed> placed_;
   std::vector<std::vector<std::uint32_t>> parts_;  ///< [mesh][triangle]; empty but for those that cover in part
 };

@@ -12,17 +12,22 @@
 #include "scene/gltf/uri.h"
 
 namespace hpr {
-std::vector<std::byte> GltfBuffers::resolve(const std::string& uri, const std::string& where,
-                                            GltfContext& context) const {
+void GltfBuffers::forget() const {
+  if (file_ != nullptr) file_->forget();
+  for (const FileBytes& file : owned_) file.forget();
+}
+
+FileBytes GltfBuffers::resolve(const std::string& uri, const std::string& where, GltfContext& context) const {
+  constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();  // where it takes no memory
   const std::string what = fmt::format("{}: {}", context.name(), where);
   if (is_data_uri(uri)) {
     context.charge(uri.size() / 4 * 3, "a data URI");
     return data_uri_bytes(uri, what);
   }
-  std::vector<std::byte> bytes =
-      read_jailed(folder_, uri, what, std::min(context.limits().file_bytes, context.memory_left()));
-  context.charge(bytes.size(), "a file");
-  return bytes;
+  if (context.reads_in_parts()) return read_jailed(folder_, uri, what, kNoLimit, true);
+  FileBytes file = read_jailed(folder_, uri, what, std::min(context.limits().file_bytes, context.memory_left()));
+  context.charge(file.bytes().size(), "a file");
+  return file;
 }
 
 namespace {
@@ -67,7 +72,7 @@ void GltfBuffers::load(const Json& root, GltfContext& context) {
 }
 
 std::size_t GltfBuffers::add(std::vector<std::byte> bytes) {
-  bytes_.emplace_back(owned_.emplace_back(std::move(bytes)));
+  bytes_.emplace_back(owned_.emplace_back(std::move(bytes)).bytes());
   return bytes_.size() - 1;
 }
 
@@ -78,7 +83,7 @@ std::span<const std::byte> GltfBuffers::load_buffer(const Json& buffer, std::siz
     const auto uri = buffer["uri"].get<std::string>();
     if (is_picture_uri(uri)) context.warn(where, "its data URI says that it is a picture");
     owned_[index] = resolve(uri, where, context);
-    bytes = owned_[index];
+    bytes = owned_[index].bytes();
   } else if (index == 0 && parts_->has_binary) {
     bytes = parts_->binary;
   } else {
@@ -336,6 +341,11 @@ void GltfData::read_floats(int index, float* out, std::size_t width) const {
   }
 }
 
+void GltfData::forget_after(std::size_t bytes) const {
+  constexpr std::size_t kMuch = std::size_t{4} << 20U;
+  if (bytes >= kMuch && context_->reads_in_parts()) forget();
+}
+
 std::vector<std::uint32_t> GltfData::integers(int index) const {
   HPR_CHECK(context_->is_used("accessors", to_size(index)));
   const tinygltf::Accessor& from = accessor(index);
@@ -349,6 +359,7 @@ std::vector<std::uint32_t> GltfData::integers(int index) const {
     to_integers(from.componentType, view(from.bufferView).data() + from.byteOffset, stride == 0 ? size : stride,
                 from.count, width, values.data());
   }
+  forget_after(values.size() * sizeof(std::uint32_t));
   if (!from.sparse.isSparse || from.sparse.count == 0) return values;
   const std::byte* value = view(from.sparse.values.bufferView).data() + from.sparse.values.byteOffset;
   for (const std::uint32_t target : sparse_targets(index)) {

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "core/file_bytes.h"
 #include "core/json.h"
 #include "scene/gltf/document.h"
 #include "scene/gltf/scan.h"
@@ -42,8 +43,9 @@ decltype(auto) visit_component(int component_type, const Visit& visit) {
 /// The bytes behind a document's buffers and pictures. Reads files only below the scene's folder.
 class GltfBuffers {
  public:
-  /// `parts` must outlive this.
-  GltfBuffers(std::filesystem::path folder, const GltfParts& parts) : folder_(std::move(folder)), parts_(&parts) {}
+  /// `parts` must outlive this, and so must the file they lie in, if it is to be forgotten.
+  GltfBuffers(std::filesystem::path folder, const GltfParts& parts, const FileBytes* file = nullptr)
+      : folder_(std::move(folder)), parts_(&parts), file_(file) {}
 
   /// Loads every buffer of a document whose shape was checked; each then has exactly its byteLength, but for those that
   /// cannot be loaded and are not used, and one that only stands in for compressed views (EXT_meshopt_compression) and
@@ -59,16 +61,19 @@ class GltfBuffers {
   [[nodiscard]] std::span<const std::byte> range(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
                                                  const std::string& where, const GltfContext& context) const;
 
+  /// Gives back the memory of files that were looked at and stay where they are.
+  void forget() const;
+
   /// What a "uri" member holds: a data URI's bytes or a file's. Throws Error (Io, BadInput, Limit).
-  [[nodiscard]] std::vector<std::byte> resolve(const std::string& uri, const std::string& where,
-                                               GltfContext& context) const;
+  [[nodiscard]] FileBytes resolve(const std::string& uri, const std::string& where, GltfContext& context) const;
 
  private:
   [[nodiscard]] std::span<const std::byte> load_buffer(const Json& buffer, std::size_t index, GltfContext& context);
 
   std::filesystem::path folder_;
   const GltfParts* parts_;
-  std::vector<std::vector<std::byte>> owned_;
+  const FileBytes* file_;
+  std::vector<FileBytes> owned_;
   std::vector<std::span<const std::byte>> bytes_;
 };
 
@@ -81,6 +86,8 @@ class GltfData {
 
   [[nodiscard]] const tinygltf::Model& model() const { return *model_; }
   [[nodiscard]] GltfContext& context() const { return *context_; }
+  /// See GltfBuffers::forget.
+  void forget() const { buffers_->forget(); }
   [[nodiscard]] const tinygltf::Accessor& accessor(int index) const { return model_->accessors[to_size(index)]; }
   [[nodiscard]] std::size_t count(int index) const { return accessor(index).count; }
   /// The bytes of a buffer view.
@@ -108,8 +115,11 @@ class GltfData {
     std::vector<Value> values(count(index));
     // NOLINTNEXTLINE(bugprone-sizeof-expression): a Value may be one float
     read_floats(index, reinterpret_cast<float*>(values.data()), sizeof(Value) / sizeof(float));
+    forget_after(values.size() * sizeof(Value));
     return values;
   }
+  /// Forgets files after so many bytes were read, if that is much.
+  void forget_after(std::size_t bytes) const;
   void read_floats(int index, float* out, std::size_t width) const;
   void check_view(std::size_t index) const;
   void check_accessor(std::size_t index) const;

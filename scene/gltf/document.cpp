@@ -9,8 +9,8 @@
 #include "core/text.h"
 
 namespace hpr {
-GltfContext::GltfContext(std::string_view name, const SceneLimits& limits)
-    : name_(printable(name, 300)), limits_(limits) {}
+GltfContext::GltfContext(std::string_view name, const SceneLimits& limits, bool in_parts)
+    : name_(printable(name, 300)), limits_(limits), in_parts_(in_parts) {}
 
 void GltfContext::fail(std::string_view where, std::string_view what, std::string_view hint, ExitCode code) const {
   const std::string message =

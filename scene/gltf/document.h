@@ -23,10 +23,12 @@ inline constexpr std::string_view kDecompressHint =
 /// What all steps of loading one glTF file share: its name for messages, its limits, and the warnings.
 class GltfContext {
  public:
-  GltfContext(std::string_view name, const SceneLimits& limits);
+  GltfContext(std::string_view name, const SceneLimits& limits, bool in_parts = false);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const SceneLimits& limits() const { return limits_; }
+  /// Whether meshes are read one by one, and files stay where they are until they are looked at.
+  [[nodiscard]] bool reads_in_parts() const { return in_parts_; }
 
   /// Throws Error(code): "NAME: WHERE: WHAT". `where` is a path into the document, e.g. "accessors[3].count".
   [[noreturn]] void fail(std::string_view where, std::string_view what, std::string_view hint = kRepairHint,
@@ -67,6 +69,9 @@ class GltfContext {
   /// Throws Error (Limit) as charge() does, for memory that is soon released: it is not counted.
   void check_room(std::uint64_t bytes, std::string_view what) const;
   [[nodiscard]] std::uint64_t memory_left() const { return limits_.memory_bytes - charged_; }
+  /// What was counted so far, and back to that: what was counted since is released.
+  [[nodiscard]] std::uint64_t charged() const { return charged_; }
+  void release_to(std::uint64_t charged) { charged_ = charged; }
 
   [[nodiscard]] std::vector<std::string> take_warnings();
 
@@ -75,6 +80,7 @@ class GltfContext {
 
   std::string name_;
   SceneLimits limits_;
+  bool in_parts_;
   std::optional<GltfUsage> usage_;
   std::vector<std::string> warnings_;
   std::unordered_set<std::string> seen_;

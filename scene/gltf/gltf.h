@@ -14,8 +14,12 @@ namespace hpr {
 /// refused. What is wrong but harmless becomes a warning in Scene::warnings, as does what is wrong with things that the
 /// chosen scene does not use. Points and lines have no shapes yet, see shape_points_and_lines. Throws Error (Io,
 /// BadInput, Limit; Usage for a scene or variant that the file lacks).
-[[nodiscard]] Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits,
-                              const SceneChoice& choice = {});
+///
+/// `in_parts`: files stay where they are, and one mesh at a time is read; those that not all ranks hold
+/// (is_held_by_all) come without triangles, see LoadedScene::whole_mesh. What is compressed (Draco, meshopt) is decoded
+/// whole.
+[[nodiscard]] LoadedScene load_gltf(const std::filesystem::path& path, const SceneLimits& limits,
+                                    const SceneChoice& choice = {}, bool in_parts = false);
 
 /// The scene as a binary glTF 2.0 file: meshes, materials, textures (PNG), instances, punctual lights, cameras. Loading
 /// it again gives the same triangles, points and lines, bit by bit. The background and headlights have no place in glTF

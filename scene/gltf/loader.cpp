@@ -9,6 +9,8 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -337,7 +339,19 @@ class SceneBuilder {
     if (scene_.instances.empty()) context().warn("", "the scene has nothing to draw");
   }
 
+  /// A mesh of the scene once more, as it was before its triangles were left out; but for its name and material.
+  [[nodiscard]] Mesh whole_mesh(std::uint32_t index) const {
+    const Source& source = sources_.at(index);
+    return *build(data_.model().nodes[GltfData::to_size(source.node)], source.primitive);
+  }
+
  private:
+  /// A node that shows a mesh, and which primitive of its mesh that is.
+  struct Source {
+    int node = 0;
+    std::size_t primitive = 0;
+  };
+
   /// Which meshes come of a glTF mesh in one pose: (mesh, skin, weights).
   using PoseKey = std::tuple<int, int, std::vector<double>>;
 
@@ -356,7 +370,7 @@ class SceneBuilder {
       if (from.skin >= 0) context().warn(fmt::format("nodes[{}]", node), "has a skin but no mesh");
       return;
     }
-    const std::vector<std::uint32_t>& meshes = meshes_of(from);
+    const std::vector<std::uint32_t>& meshes = meshes_of(node);
     if (from.skin >= 0) {
       // Skinned vertices are in the world already (glTF 2.0, section 3.7.3.3).
       add_instances(node, meshes, glm::dmat4(1.0), {glm::dmat4(1.0)});
@@ -389,30 +403,52 @@ class SceneBuilder {
     return name.empty() ? fmt::format("node{}", node) : name;
   }
 
-  const std::vector<std::uint32_t>& meshes_of(const tinygltf::Node& node) {
+  /// Builds a primitive of a node's mesh, in its pose.
+  [[nodiscard]] std::optional<Mesh> build(const tinygltf::Node& node, std::size_t primitive) const {
     const tinygltf::Mesh& from = data_.model().meshes[GltfData::to_size(node.mesh)];
-    const bool own_weights = !node.weights.empty();
-    PoseKey key{node.mesh, node.skin, own_weights ? node.weights : from.weights};
+    const GltfPose pose{node.weights.empty() ? from.weights : node.weights, joints_of(node.skin)};
+    return build_primitive(data_, from.primitives[primitive], primitive_path(node, primitive), pose, default_material_);
+  }
+
+  static std::string primitive_path(const tinygltf::Node& node, std::size_t primitive) {
+    return fmt::format("meshes[{}].primitives[{}]", node.mesh, primitive);
+  }
+
+  const std::vector<std::uint32_t>& meshes_of(int index) {
+    const tinygltf::Node& node = data_.model().nodes[GltfData::to_size(index)];
+    const tinygltf::Mesh& from = data_.model().meshes[GltfData::to_size(node.mesh)];
+    PoseKey key{node.mesh, node.skin, node.weights.empty() ? from.weights : node.weights};
     const auto known = meshes_.find(key);
     if (known != meshes_.end()) return known->second;
 
     check_weights(node, from);
-    const GltfPose pose{own_weights ? node.weights : from.weights, joints_of(node.skin)};
     std::vector<std::uint32_t> made;
     for (std::size_t p = 0; p < from.primitives.size(); ++p) {
-      const std::string where = fmt::format("meshes[{}].primitives[{}]", node.mesh, p);
-      auto mesh = build_primitive(data_, from.primitives[p], where, pose, default_material_);
+      const std::uint64_t charged = context().charged();
+      auto mesh = build(node, p);
       if (!mesh) continue;
-      check_texture_coordinates(*mesh, where);
+      check_texture_coordinates(*mesh, primitive_path(node, p));
       mesh->name = from.primitives.size() > 1 ? fmt::format("{}.{}", from.name, p) : from.name;
       made.push_back(static_cast<std::uint32_t>(scene_.meshes.size()));
       max_abs_.push_back(max_abs_coordinates(*mesh));
       if (mesh->kind != MeshKind::Triangles && !from.primitives[p].attributes.contains("NORMAL")) {
         unlit_.push_back(made.back());
       }
-      scene_.meshes.push_back(*std::move(mesh));
+      keep(*std::move(mesh), charged);
+      sources_.push_back({index, p});
     }
     return meshes_.emplace(std::move(key), std::move(made)).first->second;
+  }
+
+  /// Adds a mesh to the scene; `charged`: what was counted before it was read.
+  void keep(Mesh mesh, std::uint64_t charged) {
+    if (!context().reads_in_parts() || is_held_by_all(scene_, mesh)) {
+      scene_.meshes.push_back(std::move(mesh));
+      return;
+    }
+    scene_.meshes.push_back(without_triangles(mesh));
+    context().release_to(charged);
+    data_.forget();
   }
 
   /// Points and lines without normals show the sum of base color and emission (glTF 2.0, section 3.9.6): by a copy of
@@ -481,6 +517,7 @@ class SceneBuilder {
   Scene& scene_;
   GltfNodes nodes_;
   std::map<PoseKey, std::vector<std::uint32_t>> meshes_;
+  std::vector<Source> sources_;       ///< per mesh of the scene
   std::vector<glm::dvec3> max_abs_;   ///< per mesh of the scene
   std::vector<std::uint32_t> unlit_;  ///< meshes of points and lines without normals
   std::uint32_t default_material_ = 0;
@@ -527,49 +564,88 @@ std::vector<std::filesystem::path> files_beside(const std::filesystem::path& pat
   return files;
 }
 
+/// A file and what was read of it, from which meshes can be read again.
+class GltfReader {
+ public:
+  GltfReader(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice, bool in_parts)
+      : context_(path.string(), limits, in_parts),
+        file_(open_gltf(path, context_)),
+        buffers_(path.parent_path(), file_.parts, &file_.bytes) {
+    Json root = parse_json(file_.parts.json, context_);
+    const std::size_t drawn = check(root, choice);
+    scene_.name = path.stem().string();
+    scene_.scenes = scene_names(root);
+    scene_.variants = variant_names(root);
+    buffers_.load(root, context_);
+    decode_meshopt_views(root, buffers_, context_);
+    decode_draco_primitives(root, buffers_, context_);
+    context_.set_usage(usage_of(root, drawn));  // with what decoding added
+    const Json images = root.contains("images") ? std::move(root["images"]) : Json();
+    model_ = parse_model(std::move(root), context_);
+    data_.emplace(model_, buffers_, context_);
+    check_meshes(*data_);
+    for (std::size_t i = 0; i < model_.skins.size(); ++i) {
+      context_.check_entry("skins", i, [&] { check_skin(*data_, i); });
+    }
+    GltfMaterials(*data_, buffers_, images).build(scene_);
+    builder_.emplace(*data_, scene_);
+    builder_->build();
+    scene_.warnings = context_.take_warnings();
+    scene_.not_finite = context_.not_finite();
+    finish_scene(scene_);
+  }
+  GltfReader(const GltfReader&) = delete;
+  GltfReader& operator=(const GltfReader&) = delete;
+  ~GltfReader() = default;
+
+  /// To be called once.
+  [[nodiscard]] Scene take_scene() { return std::move(scene_); }
+
+  [[nodiscard]] Mesh whole_mesh(std::uint32_t index) {
+    const std::uint64_t charged = context_.charged();
+    Mesh mesh = builder_->whole_mesh(index);
+    context_.release_to(charged);
+    buffers_.forget();
+    return mesh;
+  }
+
+ private:
+  /// Checks a document and chooses what is drawn of it; returns the number of the scene.
+  std::size_t check(Json& root, const SceneChoice& choice) {
+    if (!root.is_object()) context_.fail("", "this is no glTF: the JSON is not an object");
+    check_extensions(root, context_);
+    const std::size_t drawn = find_scene(root, choice.scene, context_);
+    if (!choice.scene.empty()) root["scene"] = drawn;
+    apply_variant(root, choice.variant, context_);
+    context_.set_usage(usage_of(root, drawn));
+    check_shape(root, context_);
+    if (const std::size_t animations = root["animations"].size(); animations > 0) {
+      context_.warn(
+          "animations",
+          fmt::format("the file has {}; they are not played, things stand where its nodes put them", animations));
+    }
+    return drawn;
+  }
+
+  GltfContext context_;
+  GltfFile file_;
+  GltfBuffers buffers_;
+  tinygltf::Model model_;
+  std::optional<GltfData> data_;
+  Scene scene_;
+  std::optional<SceneBuilder> builder_;
+};
+
 }  // namespace
 
-Scene load_gltf(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice) {
-  GltfContext context(path.string(), limits);
-  const GltfFile file = open_gltf(path, context);
-  Json root = parse_json(file.parts.json, context);
-  if (!root.is_object()) context.fail("", "this is no glTF: the JSON is not an object");
-  check_extensions(root, context);
-  const std::size_t drawn = find_scene(root, choice.scene, context);
-  if (!choice.scene.empty()) root["scene"] = drawn;
-  apply_variant(root, choice.variant, context);
-  context.set_usage(usage_of(root, drawn));
-  check_shape(root, context);
-  if (const std::size_t animations = root["animations"].size(); animations > 0) {
-    context.warn(
-        "animations",
-        fmt::format("the file has {}; they are not played, things stand where its nodes put them", animations));
-  }
-
-  Scene scene;
-  scene.name = path.stem().string();
-  scene.scenes = scene_names(root);
-  scene.variants = variant_names(root);
-
-  GltfBuffers buffers(path.parent_path(), file.parts);
-  buffers.load(root, context);
-  decode_meshopt_views(root, buffers, context);
-  decode_draco_primitives(root, buffers, context);
-  context.set_usage(usage_of(root, drawn));  // with what decoding added
-  const Json images = root.contains("images") ? std::move(root["images"]) : Json();
-  const tinygltf::Model model = parse_model(std::move(root), context);
-  const GltfData data(model, buffers, context);
-  check_meshes(data);
-  for (std::size_t i = 0; i < model.skins.size(); ++i) {
-    context.check_entry("skins", i, [&] { check_skin(data, i); });
-  }
-
-  GltfMaterials(data, buffers, images).build(scene);
-  SceneBuilder(data, scene).build();
-  scene.warnings = context.take_warnings();
-  scene.not_finite = context.not_finite();
-  finish_scene(scene);
-  return scene;
+LoadedScene load_gltf(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice,
+                      bool in_parts) {
+  const auto reader = std::make_shared<GltfReader>(path, limits, choice, in_parts);
+  LoadedScene loaded(reader->take_scene());
+  loaded.in_parts = in_parts;
+  loaded.memory_limit = limits.memory_bytes;
+  if (in_parts) loaded.whole_mesh = [reader](std::uint32_t mesh) { return reader->whole_mesh(mesh); };
+  return loaded;
 }
 
 SceneImporter gltf_importer() {

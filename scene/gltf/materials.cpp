@@ -295,13 +295,13 @@ std::optional<Image<Rgba8>> GltfMaterials::picture(int image) {
   if (has_uri && has_view) context.warn(where, "has a uri and a bufferView; the bufferView is read");
   if (has_view && !entry.contains("mimeType")) context.warn(where, "has no mimeType");
   try {
-    std::vector<std::byte> file;
+    FileBytes file;
     std::span<const std::byte> bytes;
     if (has_view) {
       bytes = data_.view(entry["bufferView"].get<int>());
     } else {
       file = buffers_.resolve(entry["uri"].get<std::string>(), where, context);
-      bytes = file;
+      bytes = file.bytes();
     }
     // Decoding holds the file's channels beside the result.
     ImageLimits limits = context.limits().image;

@@ -211,8 +211,7 @@ class PrimitiveBuilder {
       mesh.tangents = data_.vec4s(found->second);
       note_not_finite(mesh.tangents, "TANGENT");
     }
-    const std::vector<std::uint32_t> indices = read_indices(mesh.positions.size());
-    mesh.triangles = read_triangles(mesh.positions.size(), indices);
+    mesh.triangles = read_triangles(mesh.positions.size(), read_indices(mesh.positions.size()));
     morph(mesh, pose.weights);
     tame_uvs(mesh);
     tame_colors(mesh);
@@ -361,7 +360,7 @@ class PrimitiveBuilder {
   }
 
   [[nodiscard]] std::vector<glm::uvec3> read_triangles(std::size_t vertices,
-                                                       std::span<const std::uint32_t> indices) const {
+                                                       const std::vector<std::uint32_t>& indices) const {
     const std::size_t count = primitive_.indices >= 0 ? indices.size() : vertices;
     const bool list = primitive_.mode == TINYGLTF_MODE_TRIANGLES;
     if (count < 3 || (list && count % 3 != 0)) {

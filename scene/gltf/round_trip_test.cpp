@@ -16,7 +16,7 @@ namespace {
 Scene written_and_loaded(const Scene& scene) {
   const test::TemporaryFolder folder;
   const std::vector<std::byte> file = encode_glb(scene);
-  return load_gltf(folder.write("scene.glb", {reinterpret_cast<const char*>(file.data()), file.size()}), {});
+  return load_gltf(folder.write("scene.glb", {reinterpret_cast<const char*>(file.data()), file.size()}), {}).scene;
 }
 
 /// Colours are written as a colour of at most 1 and a strength; their product may round once more.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <unordered_set>
 #include <vector>
 
@@ -227,9 +228,14 @@ GltfParts scan_gltf(std::span<const std::byte> file, GltfContext& context) {
 
 GltfFile open_gltf(const std::filesystem::path& path, GltfContext& context) {
   const SceneLimits& limits = context.limits();
-  GltfFile file{read_file(path, std::min(limits.file_bytes, limits.memory_bytes)), {}};
-  context.charge(file.bytes.size(), "the file");
-  file.parts = scan_gltf(file.bytes, context);
+  GltfFile file;
+  if (context.reads_in_parts()) {
+    file.bytes = map_file(path, std::numeric_limits<std::uint64_t>::max());  // it takes no memory
+  } else {
+    file.bytes = read_file(path, std::min(limits.file_bytes, limits.memory_bytes));
+    context.charge(file.bytes.bytes().size(), "the file");
+  }
+  file.parts = scan_gltf(file.bytes.bytes(), context);
   // A parsed document takes up to some twenty times its text, and is held twice for a moment.
   context.check_room(std::uint64_t{file.parts.json.size()} * 16, "the JSON text");
   return file;

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/file_bytes.h"
 #include "scene/gltf/document.h"
 
 namespace hpr {
@@ -27,10 +28,11 @@ inline constexpr int kGltfJsonDepth = 64;
 
 /// A file's bytes and its parts, which may be parsed.
 struct GltfFile {
-  std::vector<std::byte> bytes;
+  FileBytes bytes;
   GltfParts parts;
 };
-/// Reads and scans a file, within the context's limits. Throws Error (Io, BadInput, Limit).
+/// Reads and scans a file, within the context's limits; leaves it where it is if the context reads in parts. Throws
+/// Error (Io, BadInput, Limit).
 [[nodiscard]] GltfFile open_gltf(const std::filesystem::path& path, GltfContext& context);
 
 /// What has to hold before a recursive parser may see the text: valid UTF-8, nesting up to kGltfJsonDepth. Keys that

@@ -89,7 +89,7 @@ inline Document square() {
 
 inline Scene load(const Json& json, const SceneLimits& limits = {}, const SceneChoice& choice = {}) {
   const TemporaryFolder folder;
-  return load_gltf(folder.write("scene.gltf", json.dump()), limits, choice);
+  return load_gltf(folder.write("scene.gltf", json.dump()), limits, choice).scene;
 }
 inline Scene load(const Json& json, const SceneChoice& choice) {
   return load(json, {}, choice);

@@ -208,8 +208,8 @@ std::string jailed_path(std::string_view uri, const std::string& what) {
   return path;
 }
 
-std::vector<std::byte> read_jailed(const std::filesystem::path& folder, std::string_view uri, const std::string& what,
-                                   std::uint64_t limit_bytes) {
+FileBytes read_jailed(const std::filesystem::path& folder, std::string_view uri, const std::string& what,
+                      std::uint64_t limit_bytes, bool mapped) {
   const std::string path = jailed_path(uri, what);
   const Descriptor root(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   const Descriptor file = root.get() < 0 ? Descriptor(-1) : open_beneath(root.get(), path);
@@ -232,7 +232,7 @@ std::vector<std::byte> read_jailed(const std::filesystem::path& folder, std::str
         fmt::format("{}: '{}' has {} bytes, more than the limit of {}", what, printable(path), size, limit_bytes),
         "raise the limit with --limit-mem if the file is to be trusted");
   }
-  return read_all(file, size, what);
+  return mapped ? FileBytes::mapped(file.get(), size) : FileBytes(read_all(file, size, what));
 }
 
 }  // namespace hpr

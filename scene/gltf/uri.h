@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/file_bytes.h"
+
 namespace hpr {
 
 /// `text` with %XX replaced by bytes; none when a % is not followed by two hex digits.
@@ -30,10 +32,10 @@ namespace hpr {
 /// 4.2). Returns the relative path. Throws Error (BadInput).
 [[nodiscard]] std::string jailed_path(std::string_view uri, const std::string& what);
 
-/// Reads the regular file `uri` below `folder`, resolved so that neither the URI nor a symbolic link leaves the folder.
-/// Throws Error: BadInput for a URI that is not allowed or an escape, Io when missing or unreadable, Limit past
-/// `limit_bytes`.
-[[nodiscard]] std::vector<std::byte> read_jailed(const std::filesystem::path& folder, std::string_view uri,
-                                                 const std::string& what, std::uint64_t limit_bytes);
+/// Reads, or maps, the regular file `uri` below `folder`, resolved so that neither the URI nor a symbolic link leaves
+/// the folder. Throws Error: BadInput for a URI that is not allowed or an escape, Io when missing or unreadable, Limit
+/// past `limit_bytes`.
+[[nodiscard]] FileBytes read_jailed(const std::filesystem::path& folder, std::string_view uri, const std::string& what,
+                                    std::uint64_t limit_bytes, bool mapped = false);
 
 }  // namespace hpr

@@ -1,0 +1,87 @@
+#include "rt/trace/remote_triangles.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/error.h"
+
+namespace hpr {
+namespace {
+
+enum Array : std::uint32_t { kUv0 = 1, kUv1 = 2, kColors = 4, kTangents = 8 };
+
+template <typename Value>
+void read_corners(const std::vector<Value>& values, const glm::uvec3& corners, std::array<Value, 3>& to) {
+  for (std::size_t i = 0; i < 3; ++i) to[i] = values[corners[static_cast<int>(i)]];
+}
+
+template <typename Value>
+std::uint32_t read_if_any(const std::vector<Value>& values, const glm::uvec3& corners, Array bit,
+                          std::array<Value, 3>& to) {
+  if (values.empty()) return 0;
+  read_corners(values, corners, to);
+  return bit;
+}
+
+template <typename Value>
+std::vector<Value> listed(const std::array<Value, 3>& values) {
+  return {values.begin(), values.end()};
+}
+
+}  // namespace
+
+TriangleRecord record_of(const Scene& scene, std::uint32_t surface) {
+  const SurfaceLocation location = locate_surface(scene, surface);
+  const Mesh& mesh = scene.mesh_of(scene.instances[location.instance]);
+  const glm::uvec3& corners = mesh.triangle(location.triangle);
+  TriangleRecord record;
+  read_corners(mesh.positions, corners, record.positions);
+  read_corners(mesh.normals, corners, record.normals);
+  record.arrays = read_if_any(mesh.uvs[0], corners, kUv0, record.uvs[0]) |
+                  read_if_any(mesh.uvs[1], corners, kUv1, record.uvs[1]) |
+                  read_if_any(mesh.colors, corners, kColors, record.colors) |
+                  read_if_any(mesh.tangents, corners, kTangents, record.tangents);
+  return record;
+}
+
+std::shared_ptr<const Mesh> mesh_of(const TriangleRecord& record, std::uint32_t material) {
+  auto mesh = std::make_shared<Mesh>();
+  mesh->positions = listed(record.positions);
+  mesh->normals = listed(record.normals);
+  if ((record.arrays & kUv0) != 0) mesh->uvs[0] = listed(record.uvs[0]);
+  if ((record.arrays & kUv1) != 0) mesh->uvs[1] = listed(record.uvs[1]);
+  if ((record.arrays & kColors) != 0) mesh->colors = listed(record.colors);
+  if ((record.arrays & kTangents) != 0) mesh->tangents = listed(record.tangents);
+  mesh->triangles = {{0, 1, 2}};
+  mesh->material = material;
+  return mesh;
+}
+
+std::shared_ptr<const Mesh> RemoteTriangles::find(std::uint32_t surface) {
+  Drawer& drawer = drawer_of(surface);
+  const std::lock_guard lock(drawer.mutex);
+  const auto found = drawer.triangles.find(surface);
+  return found == drawer.triangles.end() ? nullptr : found->second;
+}
+
+void RemoteTriangles::add(std::uint32_t surface, std::shared_ptr<const Mesh> triangle) {
+  Drawer& drawer = drawer_of(surface);
+  const std::lock_guard lock(drawer.mutex);
+  if (drawer.triangles.size() >= kPerDrawer) drawer.triangles.clear();
+  drawer.triangles.insert_or_assign(surface, std::move(triangle));
+}
+
+SurfaceOwners::SurfaceOwners(std::span<const std::vector<SurfaceRange>> parts) {
+  for (std::size_t rank = 0; rank < parts.size(); ++rank) {
+    for (const SurfaceRange& range : parts[rank]) ranges_.push_back({range.first, range.last, static_cast<int>(rank)});
+  }
+  std::ranges::sort(ranges_, {}, &Range::first);
+}
+
+int SurfaceOwners::rank_of(std::uint32_t surface) const {
+  const auto range = std::ranges::upper_bound(ranges_, surface, {}, &Range::last);
+  HPR_CHECK(range != ranges_.end() && range->first <= surface);
+  return range->rank;
+}
+
+}  // namespace hpr

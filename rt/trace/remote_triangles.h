@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// A triangle as it travels to a rank that holds it not: its corners, in the mesh's own coordinates.
+struct TriangleRecord {
+  std::array<glm::vec3, 3> positions{};
+  std::array<glm::vec3, 3> normals{};
+  std::array<std::array<glm::vec2, 3>, 2> uvs{};
+  std::array<glm::vec4, 3> colors{};
+  std::array<glm::vec4, 3> tangents{};
+  std::uint32_t arrays = 0;  ///< which of those after the normals the mesh has, a bit each
+};
+
+/// That of a surface that is here.
+[[nodiscard]] TriangleRecord record_of(const Scene& scene, std::uint32_t surface);
+/// A mesh of that one triangle.
+[[nodiscard]] std::shared_ptr<const Mesh> mesh_of(const TriangleRecord& record, std::uint32_t material);
+
+/// Triangles that came from other ranks, as many as fit. Any thread may call it.
+class RemoteTriangles {
+ public:
+  /// Null where it is not here, or not any more.
+  [[nodiscard]] std::shared_ptr<const Mesh> find(std::uint32_t surface);
+  void add(std::uint32_t surface, std::shared_ptr<const Mesh> triangle);
+
+ private:
+  static constexpr std::size_t kDrawers = 64;
+  static constexpr std::size_t kPerDrawer = 1024;  ///< about 0.6 MB
+  struct Drawer {
+    std::mutex mutex;
+    std::unordered_map<std::uint32_t, std::shared_ptr<const Mesh>> triangles;
+  };
+  [[nodiscard]] Drawer& drawer_of(std::uint32_t surface) { return drawers_[surface % kDrawers]; }
+
+  std::array<Drawer, kDrawers> drawers_;
+};
+
+/// Which rank holds a surface that not all hold.
+class SurfaceOwners {
+ public:
+  SurfaceOwners() = default;
+  /// Of each rank what it holds, ranges that share no surface.
+  explicit SurfaceOwners(std::span<const std::vector<SurfaceRange>> parts);
+
+  [[nodiscard]] bool is_empty() const { return ranges_.empty(); }
+  /// The surface must be of some rank's part.
+  [[nodiscard]] int rank_of(std::uint32_t surface) const;
+
+ private:
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t last = 0;
+    int rank = 0;
+  };
+  std::vector<Range> ranges_;  ///< ascending
+};
+
+}  // namespace hpr
