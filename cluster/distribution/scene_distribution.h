@@ -13,8 +13,9 @@ namespace hpr {
 /// (BadInput) that names the rank.
 ///
 /// Of a scene for ranks that hold parts (LoadedScene::in_parts) rank r gets part r modulo their number, of those that
-/// partition_objects() makes; rank 0 has one whole mesh at a time. All throw Error (Limit) where a share needs more memory than a rank may
-/// take, and Error (Usage) where ranks make no groups of one size. Scene::refined is left to be found.
+/// partition_objects() makes; rank 0 has one whole mesh at a time. All throw Error (Limit) where a share needs more
+/// memory than a rank may take, and Error (Usage) where ranks make no groups of one size. Scene::refined is left to be
+/// found.
 [[nodiscard]] Scene distribute_scene(Communicator& comm, const std::function<LoadedScene()>& load);
 
 }  // namespace hpr
