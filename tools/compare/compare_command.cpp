@@ -16,7 +16,6 @@
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/simulated_communicator.h"
 #include "compositing/model/synthetic.h"
-#include "compositing/plugin.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/text.h"
@@ -111,7 +110,6 @@ class CompareCommand final : public Command {
   void declare(const OptionSet& options) override { options_.declare(options); }
 
   ExitCode run(const Globals& globals) override {
-    if (!options_.plugin.empty()) load_compositor_plugin(options_.plugin);
     const CompareInput input = make_input(globals);
     options_.resolve();
     // The process that started this job has looked already.

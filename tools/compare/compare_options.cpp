@@ -134,7 +134,6 @@ void CompareOptions::declare(const OptionSet& options) {
       .type("NAME")
       .show_default();
   options.option("--strategies", strategies, "all, or names of strategies").type("LIST").show_default();
-  options.option("--plugin", plugin, "a shared object with one more strategy (docs/compositing.md)").type("FILE.so");
   frames_option_ = options.option("--frames", frames, "measured frames").type("N").range(1, 1'000'000).show_default();
   options.option("--warmup", warmup, "frames before the measured ones").type("N").range(0, 1'000'000).show_default();
   options
@@ -281,7 +280,7 @@ std::vector<std::string> CompareOptions::arguments(const Globals& globals) const
   std::vector<std::string> all{"compare"};
   if (!scene.empty()) all.push_back(scene);
   if (!synthetic.empty()) all.insert(all.end(), {"--synthetic", synthetic});
-  if (!plugin.empty()) all.insert(all.end(), {"--plugin", plugin});
+  for (const std::string& plugin : globals.plugins) all.insert(all.end(), {"--plugin", plugin});
   all.insert(all.end(), {"--size", size, "--tiles", tiles, "--strategies", strategies});
   if (local_shading()) all.insert(all.end(), {"--shading", shading});
   if (operation() != CompareOperator::Nearest) all.insert(all.end(), {"--operator", operator_name});

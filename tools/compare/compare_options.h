@@ -32,7 +32,6 @@ struct CompareOptions {
   std::string shading = "deferred";
   std::string operator_name = "nearest";
   std::string strategies = "all";
-  std::string plugin;
   int frames = 10;
   int warmup = 2;
   std::string transport = "mpi";
