@@ -1,7 +1,6 @@
 #include "engine/output.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/peak_memory.h"
 #include "core/timing.h"
 #include "engine/frame.h"
 #include "engine/frame_settings.h"
@@ -26,12 +26,6 @@
 
 namespace hpr {
 namespace {
-
-std::uint64_t peak_memory_bytes() {
-  struct rusage usage {};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 /// The slowest rank's time.
 double slowest(Communicator& comm, double ms) {
