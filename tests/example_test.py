@@ -103,6 +103,10 @@ def check_render(hpr, plugin, second):
     rows = json.loads(call("bench", "scale", "gen:cornell", "--size", "96x64", "--ranks", "1,2", "--reps", "1", "--distribute",
                            "sort-last", "--strategy", "wide-tree", "--plugin", plugin.name, "--json"))
     expect(rows["pictures_agree"], "bench scale: other pictures")
+    for transport in ("mpi", "threads"):
+        rows = json.loads(call("compare", "gen:cornell", "--size", "96x64", "--ranks", "3", "--frames", "1", "--distribute", "sort-last",
+                               "--strategy", "wide-tree", "--plugin", plugin.name, "--transport", transport, "--json"))["runs"]
+        expect([(row["strategy"], row["differing_pixels"]) for row in rows] == [("wide-tree", 0)], f"compare --distribute: {rows}")
 
 
 def check_refusals(hpr, bad, plugin):
