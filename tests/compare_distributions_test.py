@@ -15,7 +15,9 @@ import sys
 import tempfile
 import xml.etree.ElementTree
 
+import png
 from program import HPR, expect, failures, run
+from xxh64 import xxh64
 
 SCENE = ["compare", "gen:cornell", "--frames", "2", "--warmup", "1"]
 SMALL = ["--size", "150x100"]
@@ -107,6 +109,28 @@ def on_threads(folder):
     expect(small[0]["frame_xxh64"] != small[0]["picture_xxh64"], "colors of keys are not the picture")
 
 
+def walls(folder):
+    """The screens stand where a wall has them."""
+    made = rows_of(run(folder, *SCENE, *SMALL, "--tiles", "3x2", "--transport", "threads", "--ranks", "2", "--distribute", "hybrid,sort-last",
+                       "--json", "-o", "c.png", "--primary", "rays"))
+    expect(len({row["picture_xxh64"] for row in made}) == 1, f"pictures differ: {made}")
+    drawn = run(folder, "wall", "run", "3x2@150x100", "gen:cornell", "--spp", "1", "--quality", "draft", "--primary", "rays", "--display", "file",
+                "-o", "wall")
+    expect(drawn.returncode == 0, drawn.stderr)
+    shown = [screen["xxh64"] for screen in json.loads((folder / "wall" / "manifest.json").read_text())["frames"][0]["screens"]]
+    drawn = run(folder, *SCENE, *SMALL, "--tiles", "3x2", "--transport", "threads", "--ranks", "2", "--distribute", "sort-first", "--quality",
+                "draft", "--primary", "rays", "-o", "d.png")
+    expect(drawn.returncode == 0, drawn.stderr)
+    width, height, pixels = png.read(folder / "d.png")
+    expect((width, height) == (450, 200), f"{width}x{height}")
+    screens = []
+    for row in range(2):
+        for column in range(3):
+            lines = [4 * (width * y + 150 * column) for y in range(100 * row, 100 * row + 100)]
+            screens.append(xxh64(b"".join(pixels[line:line + 600] for line in lines)))
+    expect(screens == shown, f"other screens than those of wall run: {screens}, {shown}")
+
+
 def inside_a_job(folder):
     mpiexec = shutil.which("mpiexec")
     result = subprocess.run([mpiexec, "--allow-run-as-root", "--oversubscribe", "-n", "3", HPR, *SCENE, *SMALL, "--distribute",
@@ -145,7 +169,7 @@ def refused(folder):
 
 
 def main():
-    for case in (everything, on_threads, inside_a_job, refused):
+    for case in (everything, on_threads, walls, inside_a_job, refused):
         with tempfile.TemporaryDirectory(prefix="hpr-distributions-") as scratch:
             case(pathlib.Path(scratch))
     print(f"{len(failures)} failed" if failures else "all distributions make one frame")

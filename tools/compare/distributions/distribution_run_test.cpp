@@ -104,9 +104,9 @@ TEST(CountDiffering, CountsAPixelOnceWhoseKeyOrColorDiffers) {
   EXPECT_EQ(count_differing(frame, other), 0U);
   other.keys.pixels()[0] = 6;
   EXPECT_EQ(count_differing(frame, other), 1U);
-  other.picture.pixels()[0].a = 254;
-  EXPECT_EQ(count_differing(frame, other), 1U);
   other.picture.pixels()[5].r = 0;
+  EXPECT_EQ(count_differing(frame, other), 2U) << "a key here, a color there";
+  other.picture.pixels()[0].a = 254;
   EXPECT_EQ(count_differing(frame, other), 2U);
   other.picture = Image<Rgba8>({2, 3});
   EXPECT_EQ(count_differing(frame, other), 6U) << "another size";
@@ -209,8 +209,12 @@ TEST(MeasureDistribution, EveryDistributionMakesTheFrameOfOneRank) {
     EXPECT_EQ(run.strategy == kNoStrategy, (run.chosen.empty() ? name : run.chosen) == "sort-first") << name;
     for (std::size_t i = 0; i < run.ms.size(); ++i) {
       EXPECT_GT(run.draw_ms[i], 0.0);
-      EXPECT_GT(run.light_ms[i], 0.0);
+      EXPECT_GT(run.light_ms[i], 0.05 * run.ms[i]);
+      EXPECT_GT(run.collect_ms[i], 0.0);
       EXPECT_GE(run.exchange_ms[i], run.collect_ms[i]);
+      if (run.strategy == kNoStrategy) continue;
+      EXPECT_GT(run.composite_ms[i], 0.0);
+      EXPECT_GT(run.exchange_ms[i], run.collect_ms[i]) << "keys move to the owners of tiles";
       EXPECT_LE(run.draw_ms[i] + run.composite_ms[i] + run.light_ms[i] + run.exchange_ms[i], run.ms[i] + 0.01) << name;
     }
   }
