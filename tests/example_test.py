@@ -82,10 +82,10 @@ def check_render(hpr, plugin, second):
         expect(result.returncode == 0, f"{arguments}: left with {result.returncode}: {result.stderr}")
         return result.stdout
 
-    drawn = ["render", "gen:cornell", "--size", "200x120", "--spp", "1", "--distribute", "sort-last", "--ranks", "5"]
-    call(*drawn, "--strategy", "serial", "-o", "serial.png", "--raw", "serial.raw")
-    # The strategy may be named before the plugin that brings it.
-    plan = call(*drawn, "--strategy", "wide-tree", "--plugin", plugin.name, "--explain", "-o", "mine.png", "--raw", "mine.raw")
+    drawn = ["gen:cornell", "--size", "200x120", "--spp", "1", "--distribute", "sort-last", "--ranks", "5"]
+    call("render", *drawn, "--strategy", "serial", "-o", "serial.png", "--raw", "serial.raw")
+    # The strategy may be named before the plugin that brings it, and the scene after both.
+    plan = call("render", "--strategy", "wide-tree", "--plugin", plugin.name, *drawn, "--explain", "-o", "mine.png", "--raw", "mine.raw")
     expect("composite: wide-tree among 5 ranks (as asked)" in plan, f"another strategy: {plan}")
     for kind in ("png", "raw"):
         expect((plugin.parent / f"mine.{kind}").read_bytes() == (plugin.parent / f"serial.{kind}").read_bytes(),
