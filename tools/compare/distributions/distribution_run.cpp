@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include "cluster/distribution/balance.h"
 #include "core/error.h"
@@ -30,9 +31,10 @@ struct FrameSizes {
 
 }  // namespace
 
-FrameStages stages_of(std::span<const RankFrame> ranks) {
-  const std::array members{&FrameStages::draw_ms, &FrameStages::composite_ms, &FrameStages::light_ms,
-                           &FrameStages::exchange_ms, &FrameStages::collect_ms};
+FrameStages stages_of(std::span<const RankFrame> ranks, Shading shading) {
+  std::array members{&FrameStages::draw_ms, &FrameStages::composite_ms, &FrameStages::light_ms,
+                     &FrameStages::exchange_ms, &FrameStages::collect_ms};
+  if (shading == Shading::Local) std::swap(members[1], members[2]);
   std::vector<double> done(ranks.size());  // per rank, by the stages so far
   double last = 0.0;
   FrameStages stages;
@@ -50,8 +52,8 @@ FrameStages stages_of(std::span<const RankFrame> ranks) {
   return stages;
 }
 
-void DistributionRun::add(std::span<const RankFrame> frame) {
-  const FrameStages stages = stages_of(frame);
+void DistributionRun::add(std::span<const RankFrame> frame, Shading shading) {
+  const FrameStages stages = stages_of(frame, shading);
   ms.push_back(std::ranges::max(frame, {}, &RankFrame::ms).ms);
   draw_ms.push_back(stages.draw_ms);
   composite_ms.push_back(stages.composite_ms);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/frame_settings.h"
 #include "image/color.h"
 #include "image/image.h"
 #include "image/key.h"
@@ -47,8 +48,8 @@ struct RankFrame {
 
 /// A frame's stages as all ranks together passed them: each lasts from when the last rank was done with the stages
 /// before it to when the last rank was done with it. So waiting counts as what was waited for, and the stages add up to
-/// no more than the frame.
-[[nodiscard]] FrameStages stages_of(std::span<const RankFrame> ranks);
+/// no more than the frame. `shading`: whether light comes before or after compositing.
+[[nodiscard]] FrameStages stages_of(std::span<const RankFrame> ranks, Shading shading = Shading::Deferred);
 
 /// Frames of one distribution on one number of ranks; lists have one entry a frame, but for the one of ranks.
 struct DistributionRun {
@@ -75,7 +76,7 @@ struct DistributionRun {
   std::string picture_xxh64;           ///< of the picture's RGBA8 pixels
   std::optional<double> predicted_ms;  ///< of `ms`
 
-  void add(std::span<const RankFrame> frame);
+  void add(std::span<const RankFrame> frame, Shading shading = Shading::Deferred);
   /// Appends the frames of another job of the same distribution and ranks.
   void append(const DistributionRun& more);
 };

@@ -43,6 +43,15 @@ TEST(StagesOf, WaitingCountsAsWhatWasWaitedFor) {
   EXPECT_EQ(stages.collect_ms, 1.0);
 }
 
+TEST(StagesOf, LayersThatAreLitBeforeTheyAreCompositedAreWaitedForAsLight) {
+  const std::vector<RankFrame> ranks{frame_of(1, 80, 10, 1, 1), frame_of(1, 2, 88, 1, 1)};
+  const FrameStages stages = stages_of(ranks, Shading::Local);
+  EXPECT_EQ(stages.draw_ms, 1.0);
+  EXPECT_EQ(stages.light_ms, 88.0);
+  EXPECT_EQ(stages.composite_ms, 2.0);
+  EXPECT_EQ(stages_of(ranks).composite_ms, 80.0);
+}
+
 TEST(DistributionRun, AddsRanksUpFrameByFrame) {
   DistributionRun run;
   run.add(std::vector{frame_of(10, 0, 0, 0, 0), frame_of(30, 0, 0, 0, 0)});

@@ -160,7 +160,7 @@ DistributionRun measure_distribution(Communicator& comm, const Globals& globals,
   measure_in_turns(1, frames, [&](std::size_t /*contender*/, bool counts) {
     const std::vector<RankFrame> all = all_gather_value(comm, bench.draw());
     if (!counts) return;
-    run.add(all);
+    run.add(all, settings.frame.shading);
     if (run.memory_peak_bytes.empty()) run.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
     const WholeFrame whole = bench.collect();
     if (comm.rank() != 0) return;
