@@ -69,7 +69,8 @@ void register_compositor(MakeCompositor make) {
                 "take letters, digits and hyphens");
   }
   if (has_compositor(name)) {
-    throw Error(ExitCode::BadInput, fmt::format("there is a strategy named '{}' already", printable(name)));
+    throw Error(ExitCode::BadInput, fmt::format("there is a strategy named '{}' already", printable(name)),
+                "give it another name");
   }
   registered().push_back(std::move(make));
 }

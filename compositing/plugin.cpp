@@ -10,8 +10,8 @@ namespace hpr {
 
 void load_compositor_plugin(const std::filesystem::path& path) {
   const std::string name = printable(path.string());
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(path, failure)) {
     throw Error(ExitCode::Io, fmt::format("--plugin: {} is no file", name), "name the .so that was built");
   }
   // A path without a slash would be looked for where libraries are.
@@ -32,7 +32,11 @@ void load_compositor_plugin(const std::filesystem::path& path) {
         fmt::format("--plugin: {} was built for HPR {}, this is {}", name, printable(plugin->built_for), kBuild),
         "build it again, against this installation");
   }
-  register_compositor(plugin->make);
+  try {
+    register_compositor(plugin->make);
+  } catch (const Error& error) {
+    throw Error(error.code(), fmt::format("--plugin: {}: {}", name, error.what()), error.hint());
+  }
 }
 
 }  // namespace hpr

@@ -211,15 +211,22 @@ void shade_tiles(Session& session, const FramePlan& plan, std::span<const Shaded
   if (lends && (interrupt == nullptr || lending.sees_all(session.comm()))) {
     const LightLending::Work work{samples, frame.owned, session.balance().light_costs(plan.layout), session.threads(),
                                   interrupt};
+    const Stopwatch watch;
     frame.overtaken = !lending.shade(session.comm(), shader, work);
+    spent.light_ms += watch.ms() - lending.return_ms();
+    spent.exchange_ms += lending.return_ms();
     add_light(session, plan, shader, spent);
     spent.work.lent += lending.lent().size();
-  } else if (interrupt != nullptr) {
+    return;
+  }
+  const Stopwatch watch;
+  if (interrupt != nullptr) {
     shade_while_wanted(session, plan, shader, samples.front(), *interrupt, frame, spent);
   } else {
     shader.shade(samples, frame.owned);
     add_light(session, plan, shader, spent);
   }
+  spent.light_ms += watch.ms();
 }
 
 /// rt: gives the owned tiles of `frame` their radiance, from keys or from colors that keys carry.
@@ -229,9 +236,11 @@ void shade(Session& session, const FramePlan& plan, std::span<const View> views,
     const trace::Span light("light");
     DeferredShader& shader = session.shader(plan.rays);
     const LightOutput output = frame.aovs.output(frame.radiance);
+    const Stopwatch watch;
     unpack_colors(*frame.keys, frame.owned, frame.radiance, output.coverage);
     shade_empty(shader, views, *frame.keys, frame.owned, output, sample.number);
     add_light(session, plan, shader, spent);
+    spent.light_ms += watch.ms();
   } else if (plan.lit) {
     const trace::Span light("light");
     const ShadedSample lit{views, frame.keys, frame.aovs.output(frame.radiance), sample.number, sample.wanted};
@@ -274,6 +283,8 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   primary_ms += other.primary_ms;
   primary += other.primary;
   composite_ms += other.composite_ms;
+  exchange_ms += other.exchange_ms;
+  light_ms += other.light_ms;
   if (passes.empty()) {
     passes = other.passes;
   } else {
@@ -292,6 +303,7 @@ DrawnLayer draw_layer(Session& session, const FramePlan& plan, std::span<const V
   TileLayer<Key>* const layer = &keys;
   DrawnLayer drawn{draw_keys(session, plan, std::span(&jittered, 1), std::span(&layer, 1))};
 
+  const Stopwatch light;
   if (spends_light(plan)) {
     const trace::Span photons("photons");
     std::function<bool()> is_overtaken;
@@ -303,6 +315,7 @@ DrawnLayer draw_layer(Session& session, const FramePlan& plan, std::span<const V
     shade_local(session.shader(plan.rays), views, keys, plan.tiles, sample.number);
     add_light(session, plan, session.shader(plan.rays), drawn.spent);
   }
+  drawn.spent.light_ms = light.ms();
   return drawn;
 }
 
@@ -318,6 +331,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
   const Stopwatch watch;
   Frame frame{&keys, TileLayer<Rgb>(plan.layout), composite(session, plan, keys), AovLayers(plan.layout, plan.layers),
               plan.is_transparent()};
+  spent.composite_ms = watch.ms();
   std::optional<TileOwnership> of_frame;
   if (sample.ownership != nullptr) {
     move_to_owners(session, plan, *sample.ownership, frame);
@@ -325,7 +339,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
     move_to_owners(session, plan, of_frame, frame);
   }
   if (sample.before_shading != nullptr) (*sample.before_shading)();
-  spent.composite_ms = watch.ms();
+  spent.exchange_ms = watch.ms() - spent.composite_ms;
 
   frame.overtaken = layer.overtaken;
   if (!frame.overtaken) shade(session, plan, views, sample, lends, frame, spent);

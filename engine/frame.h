@@ -57,6 +57,8 @@ struct FrameTimes {
   double primary_ms = 0.0;  ///< the keys, drawn or traced
   PrimaryRayStats primary;
   double composite_ms = 0.0;
+  double exchange_ms = 0.0;      ///< bringing keys to the owners of their tiles, and light that others lit back
+  double light_ms = 0.0;         ///< photons and light, until this rank's are done
   std::vector<PassTime> passes;  ///< summed over threads
   RayCounts rays;
   FrameWork work;

@@ -1,7 +1,6 @@
 #include "engine/output.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/peak_memory.h"
 #include "core/timing.h"
 #include "engine/frame.h"
 #include "engine/frame_settings.h"
@@ -26,12 +26,6 @@
 
 namespace hpr {
 namespace {
-
-std::uint64_t peak_memory_bytes() {
-  struct rusage usage {};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 /// The slowest rank's time.
 double slowest(Communicator& comm, double ms) {
@@ -145,7 +139,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
     stats.rays.primary += traced.rays;
     stats.rays.invalid += traced.invalid;
   }
-  stats.times.push_back({"composite", slowest(comm, times.composite_ms)});
+  stats.times.push_back({"composite", slowest(comm, times.composite_ms + times.exchange_ms)});
   // The shader adds up what its threads took; a frame waits for them side by side.
   for (const PassTime& pass : times.passes) {
     stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads()), pass.pass});

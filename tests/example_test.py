@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The strategy of docs/examples/strategy, built against an installation, keeps the contract and joins `hpr compare`.
+"""The strategy of docs/examples/strategy, built against an installation, keeps the contract, joins `hpr compare` and
+composites the frames of every command that draws.
 
 usage: example_test.py HPR CMAKE BUILD SOURCE
 """
@@ -33,6 +34,7 @@ struct Taken final : hpr::Compositor {
 };
 HPR_COMPOSITOR_PLUGIN(Taken)
 """
+SECOND = TAKEN.replace("serial", "second").replace("Taken", "Second")
 failures = []
 
 
@@ -72,7 +74,49 @@ def check_compare(hpr, plugin):
         expect(rows["wide-tree"]["messages_total"] == 2 * (ranks - 1), f"one message a rank, and one to collect, on {ranks}")
 
 
-def check_refusals(hpr, bad):
+def check_render(hpr, plugin, second):
+    """Ranks that hpr starts load it too, and the pictures are those of a built-in strategy."""
+    def call(*arguments):
+        result = subprocess.run([hpr, *map(str, arguments)], cwd=plugin.parent, capture_output=True, text=True, timeout=120,
+                                check=False)
+        expect(result.returncode == 0, f"{arguments}: left with {result.returncode}: {result.stderr}")
+        return result.stdout
+
+    drawn = ["gen:cornell", "--size", "200x120", "--spp", "1", "--distribute", "sort-last", "--ranks", "5"]
+    call("render", *drawn, "--strategy", "serial", "-o", "serial.png", "--raw", "serial.raw")
+    # The strategy may be named before the plugin that brings it, and the scene after both.
+    plan = call("render", "--strategy", "wide-tree", "--plugin", plugin.name, *drawn, "--explain", "-o", "mine.png", "--raw", "mine.raw")
+    expect("composite: wide-tree among 5 ranks (as asked)" in plan, f"another strategy: {plan}")
+    for kind in ("png", "raw"):
+        expect((plugin.parent / f"mine.{kind}").read_bytes() == (plugin.parent / f"serial.{kind}").read_bytes(),
+               f"render: another .{kind} than that of serial")
+
+    hashes = {}
+    for strategy in ("serial", "wide-tree"):
+        call("--plugin", plugin.name, "--plugin", second, "wall", "run", "2x1@96x64", "gen:cornell", "--frames", "2", "--ranks", "3",
+             "--distribute", "sort-last", "--strategy", strategy, "--display", "file", "-o", strategy)
+        manifest = json.loads((plugin.parent / strategy / "manifest.json").read_text())
+        expect({frame["strategy"] for frame in manifest["frames"]} == {strategy}, f"the manifest names another than {strategy}")
+        hashes[strategy] = [[screen["xxh64"] for screen in frame["screens"]] for frame in manifest["frames"]]
+    expect(hashes["serial"] == hashes["wide-tree"], f"wall run: other pictures than those of serial: {hashes}")
+
+    rows = json.loads(call("bench", "scale", "gen:cornell", "--size", "96x64", "--ranks", "1,2", "--reps", "1", "--distribute",
+                           "sort-last", "--strategy", "wide-tree", "--plugin", plugin.name, "--json"))
+    expect(rows["pictures_agree"], "bench scale: other pictures")
+    for transport in ("mpi", "threads"):
+        rows = json.loads(call("compare", "gen:cornell", "--size", "96x64", "--ranks", "3", "--frames", "1", "--distribute", "sort-last",
+                               "--strategy", "wide-tree", "--plugin", plugin.name, "--transport", transport, "--json"))["runs"]
+        expect([(row["strategy"], row["differing_pixels"]) for row in rows] == [("wide-tree", 0)], f"compare --distribute: {rows}")
+
+
+def check_refusals(hpr, bad, plugin):
+    drawn = ["render", "gen:tetra", "-o", bad / "never.png", "--ranks", "2"]
+    for words, code, mention in ((["--plugin", bad / "none.so"], 4, "none.so is no file"), (["--plugin", ""], 2, "--plugin"),
+                                 (["--plugin", plugin, "--plugin", plugin], 3, "libwide_tree.so: there is a strategy named 'wide-tree'"),
+                                 (["--plugin", plugin, "--strategy", "wide-tre"], 2, "did you mean 'wide-tree'")):
+        result = run(hpr, *drawn, *words, check=False)
+        expect(result.returncode == code, f"{words}: left with {result.returncode} instead of {code}: {result.stderr}")
+        expect(mention in result.stderr and result.stderr.count("error:") == 1, f"{words}: does not say {mention!r}: {result.stderr}")
     ours = ["--synthetic", "half", "--size", "64x64", "--ranks", "2"]
     for name, code, words in (("none.so", 4, "none.so"), ("plain/libbad.so", 3, "brings no strategy"),
                               ("other/libbad.so", 3, "was built for HPR 0.0.0 (another)"),
@@ -103,13 +147,14 @@ def main():
         (bad / "text.so").write_text("no shared object")
         (bad / "CMakeLists.txt").write_text(
             "cmake_minimum_required(VERSION 3.25)\nproject(bad LANGUAGES C CXX)\nfind_package(HPR REQUIRED)\n"
-            "foreach(kind plain other taken)\n  add_library(${kind} MODULE ${kind}.cpp)\n"
+            "foreach(kind plain other taken second)\n  add_library(${kind} MODULE ${kind}.cpp)\n"
             "  target_link_libraries(${kind} PRIVATE hpr::compositing)\n"
             "  set_target_properties(${kind} PROPERTIES OUTPUT_NAME bad LIBRARY_OUTPUT_DIRECTORY ${kind})\nendforeach()\n")
-        for kind, text in (("plain", PLAIN), ("other", OTHER_BUILD), ("taken", TAKEN)):
+        for kind, text in (("plain", PLAIN), ("other", OTHER_BUILD), ("taken", TAKEN), ("second", SECOND)):
             (bad / f"{kind}.cpp").write_text(text)
         build(bad, bad, prefix)
-        check_refusals(hpr, bad)
+        check_render(hpr, scratch / "example" / "libwide_tree.so", bad / "second" / "libbad.so")
+        check_refusals(hpr, bad, scratch / "example" / "libwide_tree.so")
 
     print(f"{len(failures)} failed" if failures else "the example is part of the comparison")
     return 1 if failures else 0

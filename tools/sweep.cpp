@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <numeric>
+#include <random>
 
 #include "app/launch/launcher.h"
 #include "app/results.h"
@@ -48,6 +50,18 @@ double wall_ms() {
   return 1e-6 * static_cast<double>(trace::now_ns());
 }
 
+std::vector<std::size_t> shuffled_rounds(std::size_t cases, int rounds, std::uint64_t seed) {
+  std::vector<std::size_t> order;
+  std::vector<std::size_t> of_round(cases);
+  std::iota(of_round.begin(), of_round.end(), std::size_t{0});
+  std::mt19937_64 random(seed);
+  for (int round = 0; round < rounds; ++round) {
+    std::ranges::shuffle(of_round, random);
+    order.insert(order.end(), of_round.begin(), of_round.end());
+  }
+  return order;
+}
+
 std::vector<double> median_times(const std::vector<std::function<void()>>& contenders, Repetitions repetitions,
                                  double (*clock)()) {
   std::vector<std::vector<double>> times(contenders.size());
@@ -83,16 +97,30 @@ std::optional<std::string> job_request(const char* variable) {
   return text == nullptr ? std::nullopt : std::optional<std::string>(text);
 }
 
+namespace {
+
+JobResult run_measuring(int ranks, const std::vector<std::string>& arguments, JobOptions options) {
+  JobResult result;
+  options.captured_stdout = &result.rows;
+  result.code = static_cast<ExitCode>(run_job(ranks, arguments, options));
+  return result;
+}
+
+}  // namespace
+
 JobResult run_measuring_job(const Globals& globals, int ranks, const std::vector<std::string>& arguments,
                             const char* variable, const std::string& request) {
-  JobResult result;
-  const int code = run_job(ranks, arguments,
-                           {.captured_stdout = &result.rows,
-                            .environment = {{variable, request}},
-                            .starter = globals.starter(ranks),
-                            .hang_limit = globals.hang_limit()});
-  result.code = static_cast<ExitCode>(code);
-  return result;
+  return run_measuring(
+      ranks, arguments,
+      {.environment = {{variable, request}}, .starter = globals.starter(ranks), .hang_limit = globals.hang_limit()});
+}
+
+JobResult run_measuring_process(const Globals& globals, const std::vector<std::string>& arguments, const char* variable,
+                                const std::string& request) {
+  return run_measuring(1, arguments,
+                       {.environment = {{variable, request}},
+                        .starter = std::vector<std::string>{},
+                        .hang_limit = globals.hang_limit()});
 }
 
 void throw_nothing_handed_over(const JsonError& error) {

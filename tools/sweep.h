@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <optional>
@@ -52,6 +53,16 @@ void measure_in_turns(std::size_t contenders, Repetitions repetitions, const Mea
   }
 }
 
+/// The cases 0, 1 .. of so many rounds: each round has all of them, in an order of its own by the seed, so that what
+/// slows the machine for a while does not fall on one of them, and none always follows the same other one.
+[[nodiscard]] std::vector<std::size_t> shuffled_rounds(std::size_t cases, int rounds, std::uint64_t seed);
+/// Rounds of jobs, each with a part of the frames.
+inline constexpr int kJobRounds = 3;
+/// How many of `frames` are measured in a round: as many in each, one more in the first ones.
+[[nodiscard]] inline int frames_of_round(int frames, int rounds, int round) {
+  return frames / rounds + (round < frames % rounds ? 1 : 0);
+}
+
 /// Median times in ms of `clock`, one for each of `contenders`, which run in turns.
 [[nodiscard]] std::vector<double> median_times(const std::vector<std::function<void()>>& contenders,
                                                Repetitions repetitions, double (*clock)() = wall_ms);
@@ -91,6 +102,9 @@ struct JobResult {
 /// Runs this program with `arguments` as an MPI job of `ranks` ranks, which finds `request` in job_request(variable).
 [[nodiscard]] JobResult run_measuring_job(const Globals& globals, int ranks, const std::vector<std::string>& arguments,
                                           const char* variable, const std::string& request);
+/// As run_measuring_job, in one process without MPI, whose threads may be ranks.
+[[nodiscard]] JobResult run_measuring_process(const Globals& globals, const std::vector<std::string>& arguments,
+                                              const char* variable, const std::string& request);
 /// Prints rows for the process that started this job, as one line of JSON; rank 0 calls it.
 template <typename Row>
 void hand_over(const std::vector<Column<Row>>& columns, std::span<const Row> rows) {

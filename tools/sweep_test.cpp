@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +34,28 @@ TEST(MeasureInTurns, EachContenderRunsOnceARoundAndWarmUpDoesNotCount) {
   measure_in_turns(2, {1, 2}, [&](std::size_t contender, bool counts) { calls.emplace_back(contender, counts); });
   EXPECT_EQ(calls, (std::vector<std::pair<std::size_t, bool>>{
                        {0, false}, {1, false}, {0, true}, {1, true}, {0, true}, {1, true}}));
+}
+
+TEST(ShuffledRounds, EachRoundHasAllCasesInAnOrderOfItsOwnByTheSeed) {
+  const std::vector<std::size_t> order = shuffled_rounds(20, 3, 7);
+  ASSERT_EQ(order.size(), 60U);
+  std::vector<std::vector<std::size_t>> rounds;
+  for (auto first = order.begin(); first != order.end(); first += 20) {
+    auto sorted = rounds.emplace_back(first, first + 20);
+    std::ranges::sort(sorted);
+    for (std::size_t i = 0; i < sorted.size(); ++i) EXPECT_EQ(sorted[i], i);
+  }
+  EXPECT_NE(rounds[0], rounds[1]);
+  EXPECT_NE(rounds[1], rounds[2]);
+  EXPECT_EQ(order, shuffled_rounds(20, 3, 7));
+  EXPECT_NE(order, shuffled_rounds(20, 3, 8));
+}
+
+TEST(FramesOfRound, AddUpToAllFrames) {
+  EXPECT_EQ(frames_of_round(10, 3, 0), 4);
+  EXPECT_EQ(frames_of_round(10, 3, 1), 3);
+  EXPECT_EQ(frames_of_round(10, 3, 2), 3);
+  EXPECT_EQ(frames_of_round(1, 1, 0), 1);
 }
 
 TEST(MedianTimes, AreOfEachContenderOnTheClockThatIsGiven) {

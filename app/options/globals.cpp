@@ -6,6 +6,7 @@
 #include <charconv>
 
 #include "cluster/transport/communicator.h"
+#include "compositing/plugin.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "engine/session.h"
@@ -63,6 +64,14 @@ void Globals::declare(const OptionSet& options) {
   options
       .option("--launcher", launcher, "what starts the ranks in place of mpiexec, e.g. \"srun --mpi=pmix -n {ranks}\"")
       .type("COMMAND")
+      .group(everywhere);
+  // Before --strategy gets its value, wherever on the command line that stands.
+  options
+      .option("--plugin", plugins,
+              "a shared object with one more compositing strategy (docs/compositing.md); may be repeated")
+      .type("FILE.so")
+      .repeats()
+      .each([](const std::string& file) { load_compositor_plugin(file); })
       .group(everywhere);
   options.flag("--force", force, "overwrite files").group(everywhere);
   options.option("--trace", trace, "write what ranks and threads did when, as chrome://tracing and Perfetto show it")

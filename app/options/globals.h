@@ -31,12 +31,13 @@ struct Globals {
   std::string limit_mem;
   std::string limit_image;
   std::string hang_timeout;
-  std::string launcher;           ///< command line that starts ranks; empty: mpiexec
-  bool force = false;             ///< overwrite files
-  std::string trace;              ///< file for the timeline of ranks and threads; empty: none
-  int ranks = 0;                  ///< 0: as many as the launcher started, else 1
-  int threads = 0;                ///< of one rank; 0: the machine's cores divided among the ranks of a host
-  std::vector<std::string> args;  ///< this process's command line after the program's name
+  std::string launcher;              ///< command line that starts ranks; empty: mpiexec
+  bool force = false;                ///< overwrite files
+  std::vector<std::string> plugins;  ///< shared objects with further strategies, as they were named; loaded
+  std::string trace;                 ///< file for the timeline of ranks and threads; empty: none
+  int ranks = 0;                     ///< 0: as many as the launcher started, else 1
+  int threads = 0;                   ///< of one rank; 0: the machine's cores divided among the ranks of a host
+  std::vector<std::string> args;     ///< this process's command line after the program's name
 
   void declare(const OptionSet& options);
 

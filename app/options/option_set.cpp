@@ -84,6 +84,13 @@ Option Option::check(const std::function<std::string(const std::string&)>& probl
   return *this;
 }
 
+Option Option::each(const std::function<void(const std::string&)>& use) const {
+  option_->each([use](const std::string& value) {
+    if (!value.empty()) use(value);
+  });
+  return *this;
+}
+
 Option Option::list() const {
   option_->delimiter(',');
   return *this;

@@ -43,6 +43,9 @@ class Option {
   Option choices(const std::vector<std::string>& names) const;
   /// `problem` returns what is wrong with a value; an empty text: nothing.
   Option check(const std::function<std::string(const std::string&)>& problem) const;
+  /// `use` is called with every value that is not empty, before options of commands below get theirs; what it throws
+  /// leaves the parser.
+  Option each(const std::function<void(const std::string&)>& use) const;
   /// A list whose entries are separated by commas.
   Option list() const;
   /// May be given several times; each time with one value.

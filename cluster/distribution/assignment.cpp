@@ -137,6 +137,10 @@ std::string_view name_of(Distribution distribution) {
   return "";
 }
 
+std::span<const Distribution> all_distributions() {
+  return kDistributions;
+}
+
 Distribution parse_distribution(std::string_view name, std::span<const std::string> further) {
   std::vector<std::string> choices;
   for (const Distribution choice : kDistributions) {

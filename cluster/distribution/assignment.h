@@ -18,6 +18,8 @@ enum class Distribution {
   Hybrid,     ///< groups of ranks own tiles (sort-first), ranks of a group share the objects (sort-last)
 };
 [[nodiscard]] std::string_view name_of(Distribution distribution);
+/// Every distribution, in the order reports list them.
+[[nodiscard]] std::span<const Distribution> all_distributions();
 /// Throws Error (Usage) with the choices and `further` ones that the caller has.
 [[nodiscard]] Distribution parse_distribution(std::string_view name, std::span<const std::string> further = {});
 

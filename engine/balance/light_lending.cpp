@@ -279,6 +279,7 @@ bool LightLending::shade(Communicator& comm, DeferredShader& shader, const Work&
   shader.shade(work.samples, [&] { return drawing.next(); });
 
   const trace::Span span("return lent light");
+  const Stopwatch watch;
   std::vector<LentRows> mine = drawing.lit_for_others();
   const bool interrupted = work.interrupt != nullptr && board_->is_raised();
   if (interrupted) mine.push_back({.owner = -1});
@@ -286,9 +287,10 @@ bool LightLending::shade(Communicator& comm, DeferredShader& shader, const Work&
   for (const auto& list : all_gather_lists(comm, std::span<const LentRows>(mine))) {
     all.insert(all.end(), list.begin(), list.end());
   }
-  if (std::ranges::find(all, -1, &LentRows::owner) != all.end()) return false;
-  return_light(comm, work.samples, all);
-  return true;
+  const bool is_whole = std::ranges::find(all, -1, &LentRows::owner) == all.end();
+  if (is_whole) return_light(comm, work.samples, all);
+  return_ms_ = watch.ms();
+  return is_whole;
 }
 
 void LightLending::return_light(Communicator& comm, std::span<const ShadedSample> samples,

@@ -63,6 +63,9 @@ class LightLending {
 
   /// Whether all ranks share memory.
   [[nodiscard]] bool sees_all(const Communicator& comm) const;
+  /// How long this rank took in the last round to send and receive light that was made for others, once it had none
+  /// left to make: mostly waiting for the last one.
+  [[nodiscard]] double return_ms() const { return return_ms_; }
   /// What others lit of this rank's tiles in the last round.
   [[nodiscard]] std::span<const LentRows> lent() const { return lent_; }
 
@@ -89,6 +92,7 @@ class LightLending {
   Round round_;
   int ranks_ = 1;
   bool is_impossible_ = false;
+  double return_ms_ = 0.0;
   std::vector<LentRows> lent_;
 };
 

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
-#include <numeric>
 #include <optional>
-#include <random>
 
 #include "app/command.h"
 #include "app/doctor/doctor.h"
@@ -26,9 +24,6 @@ namespace {
 
 /// Set for the jobs that are measured: "THREADS FRAMES QUIET TRACED". Rank 0 hands over its runs.
 constexpr const char* kJobVariable = "OMPI_HPR_BENCH_SCALE_JOB";
-/// Jobs of each size, each with a part of the frames, in random order: what slows the machine down for a while then
-/// does not affect one size alone.
-constexpr int kRounds = 3;
 
 struct JobOrder {
   int threads = 1;
@@ -216,21 +211,14 @@ ExitCode BenchScaleCommand::run_in_job(const Globals& globals, const ScaleInput&
 
 ExitCode BenchScaleCommand::run_jobs(const Globals& globals, const ScaleInput& input) const {
   const std::vector<Job> sizes = jobs(globals);
-  const int rounds = std::min(kRounds, frames_);
+  const int rounds = std::min(kJobRounds, frames_);
   std::vector<std::vector<ScaleRun>> of_size(sizes.size());
-  std::vector<std::size_t> order;  // of the jobs of all rounds
-  std::mt19937_64 random(globals.seed);
-  std::vector<std::size_t> of_round(sizes.size());
-  std::iota(of_round.begin(), of_round.end(), std::size_t{0});
-  for (int round = 0; round < rounds; ++round) {
-    std::ranges::shuffle(of_round, random);
-    order.insert(order.end(), of_round.begin(), of_round.end());
-  }
+  const std::vector<std::size_t> order = shuffled_rounds(sizes.size(), rounds, globals.seed);
   ExitCode failed = ExitCode::Done;
   const auto run_job = [&](std::size_t i) {
     const Job& size = sizes[order[i]];
     const int round = static_cast<int>(i / sizes.size());
-    const int frames = frames_ / rounds + (round < frames_ % rounds ? 1 : 0);
+    const int frames = frames_of_round(frames_, rounds, round);
     const JobResult job =
         run_measuring_job(globals, size.ranks, globals.args, kJobVariable,
                           fmt::format("{} {} {:d} {:d}", size.threads, frames, i > 0, i + 1 == order.size()));

@@ -16,7 +16,6 @@
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/simulated_communicator.h"
 #include "compositing/model/synthetic.h"
-#include "compositing/plugin.h"
 #include "core/file.h"
 #include "core/job_environment.h"
 #include "core/text.h"
@@ -29,6 +28,7 @@
 #include "tools/compare/compare.h"
 #include "tools/compare/compare_options.h"
 #include "tools/compare/compare_report.h"
+#include "tools/compare/distributions/distribution_comparison.h"
 #include "tools/sweep.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/geometry.h"
@@ -111,7 +111,7 @@ class CompareCommand final : public Command {
   void declare(const OptionSet& options) override { options_.declare(options); }
 
   ExitCode run(const Globals& globals) override {
-    if (!options_.plugin.empty()) load_compositor_plugin(options_.plugin);
+    if (!options_.distributions.empty()) return compare_distributions(globals, options_);
     const CompareInput input = make_input(globals);
     options_.resolve();
     // The process that started this job has looked already.
@@ -121,10 +121,7 @@ class CompareCommand final : public Command {
 
  private:
   [[nodiscard]] CompareInput make_input(const Globals& globals) const {
-    const Size screen = parse_size(options_.size, "--size", kRasterLimit);
-    const Size grid = parse_size(options_.tiles, "--tiles", kMaxScreensASide);
-    check_size(screen, globals.picture_limits());
-    check_size({screen.width * grid.width, screen.height * grid.height}, globals.picture_limits());
+    const auto [screen, grid] = options_.wall_size(globals);
     if (options_.scene.empty() == options_.synthetic.empty()) {
       throw Error(ExitCode::Usage,
                   options_.scene.empty() ? "nothing to composite" : "a scene and --synthetic exclude each other",

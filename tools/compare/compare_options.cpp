@@ -118,11 +118,6 @@ std::vector<std::string> split_strategies(std::string_view list) {
 
 void CompareOptions::declare(const OptionSet& options) {
   options.option("scene", scene, "a scene to draw the layers from").type("SCENE");
-  options
-      .option("--shading", shading,
-              "deferred: the scene's surfaces are composited; local: its colours, each rank having lit its own")
-      .type("NAME")
-      .show_default();
   options.option("--synthetic", synthetic, "made-up layers: dense, half, sparse, scatter or checker").type("KIND");
   options.option("--size", size, "pixels of one screen").type("WxH").show_default();
   options.option("--tiles", tiles, "screens of the wall").type("CxR").show_default();
@@ -133,8 +128,12 @@ void CompareOptions::declare(const OptionSet& options) {
               "floats a channel")
       .type("NAME")
       .show_default();
-  options.option("--strategies", strategies, "all, or names of strategies").type("LIST").show_default();
-  options.option("--plugin", plugin, "a shared object with one more strategy (docs/compositing.md)").type("FILE.so");
+  strategies_option_ =
+      options.option("--strategies", strategies, "all, or names of strategies").type("LIST").show_default();
+  options
+      .option("--distribute", distributions,
+              "all, or names of distributions and auto: whole frames by each of them, in place of strategies")
+      .type("LIST");
   frames_option_ = options.option("--frames", frames, "measured frames").type("N").range(1, 1'000'000).show_default();
   options.option("--warmup", warmup, "frames before the measured ones").type("N").range(0, 1'000'000).show_default();
   options
@@ -148,18 +147,24 @@ void CompareOptions::declare(const OptionSet& options) {
   options.flag("--json", json, "print the result as JSON (schema hpr.compare/1) instead of a table");
   options.option("-o,--output", picture, "write the composited frame of the last number of ranks").type("FILE.png");
   options.option("--raw", raw, "write that frame's keys: per pixel uint64, row 0 at the top").type("FILE");
+  for (const Setting& setting : all_settings()) {
+    if (setting.scope == SettingScope::Pictures && setting.name != "distribute") {
+      (void)declare_setting(options, settings, setting);
+    }
+  }
 }
 
 void CompareOptions::resolve() {
   if (!simulate.empty() && !frames_option_->specified()) frames = warmup = 1;  // simulated frames are all alike
   check_transport();
   check_operator();
-  check_shading();
-  for (const int count : rank_counts()) (void)strategies_for(count);
-  if (inside_mpi_job() && transport != "mpi") {
-    throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
-                "leave mpirun away, or --transport");
+  check_settings();
+  if (!distributions.empty()) {
+    check_whole_frames();
+    (void)rank_counts();
+    return;
   }
+  for (const int count : rank_counts()) (void)strategies_for(count);
 }
 
 void CompareOptions::check_files(const Globals& globals) const {
@@ -175,10 +180,22 @@ void CompareOptions::check_transport() const {
     throw Error(ExitCode::Usage, fmt::format("no transport is named '{}'", printable(transport)),
                 unknown_name_hint(printable(transport), transports));
   }
+  if (inside_mpi_job() && transport != "mpi") {
+    throw Error(ExitCode::Usage, "--transport threads runs in one process, not in an MPI job",
+                "leave mpirun away, or --transport");
+  }
   if (!simulate.empty() && (!ranks.empty() || transport != "mpi" || inside_mpi_job())) {
     throw Error(ExitCode::Usage, "--simulate excludes --ranks, --transport and mpirun",
                 "the number of ranks is said by --simulate ranks=N; it runs on threads of one process");
   }
+}
+
+CompareOptions::WallSize CompareOptions::wall_size(const Globals& globals) const {
+  const Size screen = parse_size(size, "--size", kRasterLimit);
+  const Size grid = parse_size(tiles, "--tiles", kMaxScreensASide);
+  check_size(screen, globals.picture_limits());
+  check_size({screen.width * grid.width, screen.height * grid.height}, globals.picture_limits());
+  return {screen, grid};
 }
 
 CompareOperator CompareOptions::operation() const {
@@ -197,16 +214,33 @@ void CompareOptions::check_operator() const {
   }
 }
 
-void CompareOptions::check_shading() const {
-  const std::vector<std::string> shadings{"deferred", "local"};
-  if (std::ranges::find(shadings, shading) == shadings.end()) {
-    throw Error(ExitCode::Usage, fmt::format("unknown shading '{}'", printable(shading)),
-                unknown_name_hint(printable(shading), shadings));
-  }
+void CompareOptions::check_settings() const {
   if (local_shading() && scene.empty()) {
     throw Error(ExitCode::Usage, "--shading local lights a scene, and there is none",
                 "leave it out: synthetic layers are colours already");
   }
+  if (!distributions.empty()) return;
+  for (const std::string_view name : settings.specified) {
+    if (name == "shading") continue;
+    throw Error(ExitCode::Usage, fmt::format("--{} is about whole frames, and compare merges layers of keys", name),
+                "leave it out, or compare whole frames with --distribute all");
+  }
+}
+
+void CompareOptions::check_whole_frames() const {
+  const auto refuse = [](const char* option, const char* hint) {
+    throw Error(ExitCode::Usage, fmt::format("--distribute draws whole frames of a scene, and excludes {}", option),
+                hint);
+  };
+  if (!synthetic.empty()) refuse("--synthetic", "name a scene instead");
+  if (!simulate.empty()) refuse("--simulate", "hpr bench scale and --ranks measure frames on this machine");
+  if (operation() != CompareOperator::Nearest) refuse("--operator", "leave it out: the nearest surface is drawn");
+  if (strategies_option_->specified()) refuse("--strategies", "--strategy NAME says which one composites the frames");
+  if (settings.sampling.goal.seconds) {
+    throw Error(ExitCode::Usage, "--distribute compares the same frame: --spp until a time makes others",
+                "write e.g. --spp 16");
+  }
+  if (!raw.empty()) check_raw(settings);
 }
 
 std::vector<int> CompareOptions::rank_counts() const {
@@ -281,9 +315,9 @@ std::vector<std::string> CompareOptions::arguments(const Globals& globals) const
   std::vector<std::string> all{"compare"};
   if (!scene.empty()) all.push_back(scene);
   if (!synthetic.empty()) all.insert(all.end(), {"--synthetic", synthetic});
-  if (!plugin.empty()) all.insert(all.end(), {"--plugin", plugin});
+  for (const std::string& plugin : globals.plugins) all.insert(all.end(), {"--plugin", plugin});
   all.insert(all.end(), {"--size", size, "--tiles", tiles, "--strategies", strategies});
-  if (local_shading()) all.insert(all.end(), {"--shading", shading});
+  if (local_shading()) all.insert(all.end(), {"--shading", "local"});
   if (operation() != CompareOperator::Nearest) all.insert(all.end(), {"--operator", operator_name});
   all.insert(all.end(), {"--frames", std::to_string(frames), "--warmup", std::to_string(warmup)});
   if (simulate.empty()) {

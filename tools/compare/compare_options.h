@@ -7,6 +7,7 @@
 
 #include "app/options/globals.h"
 #include "app/options/option_set.h"
+#include "app/options/render_options.h"
 #include "cluster/transport/simulated_communicator.h"
 #include "image/image.h"
 #include "tools/compare/compare.h"
@@ -29,10 +30,10 @@ struct CompareOptions {
   std::string size = "1920x1080";
   std::string tiles = "1x1";
   std::string ranks;
-  std::string shading = "deferred";
   std::string operator_name = "nearest";
   std::string strategies = "all";
-  std::string plugin;
+  std::string distributions;  ///< of whole frames, in place of strategies; empty: strategies are compared
+  RenderSettings settings;    ///< of whole frames; of layers only how they are shaded
   int frames = 10;
   int warmup = 2;
   std::string transport = "mpi";
@@ -50,8 +51,14 @@ struct CompareOptions {
   void check_files(const Globals& globals) const;
 
   [[nodiscard]] bool on_threads() const { return transport == "threads" || !simulate.empty(); }
-  [[nodiscard]] bool local_shading() const { return shading == "local"; }
+  [[nodiscard]] bool local_shading() const { return settings.frame.shading == Shading::Local; }
   [[nodiscard]] CompareOperator operation() const;
+  /// The pixels of a screen, and the screens of the wall. Throws Error for what is no size, or too large.
+  struct WallSize {
+    Size screen;
+    Size grid;
+  };
+  [[nodiscard]] WallSize wall_size(const Globals& globals) const;
   /// Empty inside an MPI job unless --ranks is given.
   [[nodiscard]] std::vector<int> rank_counts() const;
   [[nodiscard]] CompareSettings settings_for(int count) const;
@@ -61,7 +68,8 @@ struct CompareOptions {
  private:
   void check_transport() const;
   void check_operator() const;
-  void check_shading() const;
+  void check_settings() const;
+  void check_whole_frames() const;
   [[nodiscard]] std::vector<std::string> all_strategies_for(int count) const;
   [[nodiscard]] std::vector<std::string> strategies_for(int count) const;
   /// Throws Error (Usage) when no strategy of that name can do what is asked for, whatever the number of ranks.
@@ -69,6 +77,7 @@ struct CompareOptions {
   [[nodiscard]] bool fits(const std::string& name, int count) const;
 
   std::optional<Option> frames_option_;
+  std::optional<Option> strategies_option_;
 };
 
 }  // namespace hpr

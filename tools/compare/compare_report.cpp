@@ -209,24 +209,9 @@ std::string summary(const CompareReport& report) {
 
 std::string heading(const CompareReport& report) {
   const CompareRun& first = report.runs.front();
-  const std::string screens =
-      report.grid.area() == 1 ? "one screen" : fmt::format("{} screens", grid_name(report.grid));
-  std::string text = html_heading(
-      "Compositing strategies compared",
-      std::array{Fact{"Input", fmt::format("{}, seed {}", report.input, report.seed)},
-                 Fact{"Wall", fmt::format("{} of {}x{} pixels", screens, report.screen.width, report.screen.height)},
-                 Fact{"Operator", report.operation}, Fact{"Machine", report.machine.cpu},
-                 Fact{"Cores",
-                      fmt::format("{}, {}oversubscribed", report.machine.cores, report.oversubscribed() ? "" : "not ")},
-                 Fact{"MPI", report.machine.mpi}, Fact{"Transport", first.transport},
-                 Fact{"Frames", fmt::format("{} per run", first.frames)}, Fact{"Commit", std::string(kCommit)},
-                 Fact{"Command", report.command, true}});
-  if (report.oversubscribed()) {
-    text +=
-        "<p class=\"warning\">Some runs have more ranks than cores: their times say how the cores were shared as much "
-        "as what a strategy costs.</p>\n";
-  }
-  return text;
+  return compare_heading("Compositing strategies compared", report, report.oversubscribed(),
+                         {Fact{"Operator", report.operation}, Fact{"Transport", first.transport},
+                          Fact{"Frames", fmt::format("{} per run", first.frames)}});
 }
 
 std::string html_table(const CompareReport& report) {
@@ -329,11 +314,54 @@ const std::vector<Column<CompareRun>>& compare_columns() {
   return columns;
 }
 
+std::string compare_headline(const CompareSubject& subject, bool oversubscribed) {
+  return fmt::format("{}, {} screen{} of {}x{}, seed {}; {}, {} cores{}, {}\n", subject.input, grid_name(subject.grid),
+                     subject.grid.area() == 1 ? "" : "s", subject.screen.width, subject.screen.height, subject.seed,
+                     subject.machine.cpu, subject.machine.cores, oversubscribed ? " (fewer than ranks)" : "",
+                     subject.machine.mpi);
+}
+
+std::string compare_document(const CompareSubject& subject, bool oversubscribed, Json runs) {
+  Json machine = machine_json(subject.machine);
+  machine["oversubscribed"] = oversubscribed;
+  const Json json{
+      {"schema", "hpr.compare/1"},
+      {"command", subject.command},
+      {"commit", std::string(kCommit)},
+      {"machine", machine},
+      {"image",
+       {{"width", subject.screen.width}, {"height", subject.screen.height}, {"tiles", grid_name(subject.grid)}}},
+      {"input", subject.input},
+      {"operator", subject.operation},
+      {"seed", subject.seed},
+      {"runs", std::move(runs)}};
+  return json.dump(2) + "\n";
+}
+
+std::string compare_heading(std::string_view title, const CompareSubject& subject, bool oversubscribed,
+                            std::vector<Fact> further) {
+  const std::string screens =
+      subject.grid.area() == 1 ? "one screen" : fmt::format("{} screens", grid_name(subject.grid));
+  std::vector<Fact> facts{
+      {"Input", fmt::format("{}, seed {}", subject.input, subject.seed)},
+      {"Wall", fmt::format("{} of {}x{} pixels", screens, subject.screen.width, subject.screen.height)},
+      {"Machine", subject.machine.cpu},
+      {"Cores", fmt::format("{}, {}oversubscribed", subject.machine.cores, oversubscribed ? "" : "not ")},
+      {"MPI", subject.machine.mpi}};
+  std::ranges::move(further, std::back_inserter(facts));
+  facts.push_back({"Commit", std::string(kCommit)});
+  facts.push_back({"Command", subject.command, true});
+  std::string text = html_heading(title, facts);
+  if (oversubscribed) {
+    text +=
+        "<p class=\"warning\">Some runs have more ranks than cores: their times say how the cores were shared as much "
+        "as what a frame costs.</p>\n";
+  }
+  return text;
+}
+
 std::string compare_table(const CompareReport& report) {
-  return fmt::format("{}, {} screen{} of {}x{}, seed {}; {}, {} cores{}, {}\n", report.input, grid_name(report.grid),
-                     report.grid.area() == 1 ? "" : "s", report.screen.width, report.screen.height, report.seed,
-                     report.machine.cpu, report.machine.cores, report.oversubscribed() ? " (fewer than ranks)" : "",
-                     report.machine.mpi) +
+  return compare_headline(report, report.oversubscribed()) +
          Table(compare_columns(), std::span(report.runs))
              .text({"strategy", "ranks", "ms.median", "predicted_ms", "ms.min", "ms.p95", "ms.max",
                     "ms_composite.median", "ms_collect.median", "bytes_total", "messages_total", "imbalance",
@@ -341,19 +369,7 @@ std::string compare_table(const CompareReport& report) {
 }
 
 std::string compare_json(const CompareReport& report) {
-  Json machine = machine_json(report.machine);
-  machine["oversubscribed"] = report.oversubscribed();
-  const Json json{
-      {"schema", "hpr.compare/1"},
-      {"command", report.command},
-      {"commit", std::string(kCommit)},
-      {"machine", machine},
-      {"image", {{"width", report.screen.width}, {"height", report.screen.height}, {"tiles", grid_name(report.grid)}}},
-      {"input", report.input},
-      {"operator", report.operation},
-      {"seed", report.seed},
-      {"runs", Table(compare_columns(), std::span(report.runs)).json()}};
-  return json.dump(2) + "\n";
+  return compare_document(report, report.oversubscribed(), Table(compare_columns(), std::span(report.runs)).json());
 }
 
 std::string compare_csv(const CompareReport& report) {

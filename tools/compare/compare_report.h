@@ -12,8 +12,8 @@
 
 namespace hpr {
 
-/// Everything `hpr compare` prints.
-struct CompareReport {
+/// What was compared, where and how.
+struct CompareSubject {
   std::string command;  ///< as the user could type it again
   Machine machine;
   Size screen;
@@ -21,6 +21,19 @@ struct CompareReport {
   std::string input;
   std::string operation = "nearest";  ///< nearest, over8 or overf
   std::uint64_t seed = 1;
+};
+
+/// The line above a table for people.
+[[nodiscard]] std::string compare_headline(const CompareSubject& subject, bool oversubscribed);
+/// A document of schema hpr.compare/1 with these runs.
+[[nodiscard]] std::string compare_document(const CompareSubject& subject, bool oversubscribed, Json runs);
+/// A page's heading: the subject, `further` facts, the commit and the command; with a warning where a run is
+/// oversubscribed.
+[[nodiscard]] std::string compare_heading(std::string_view title, const CompareSubject& subject, bool oversubscribed,
+                                          std::vector<Fact> further);
+
+/// Everything `hpr compare` prints about strategies.
+struct CompareReport : CompareSubject {
   std::vector<CompareRun> runs;
 
   /// Whether any run has more ranks than cores: its times then show how the cores were shared as much as what a
